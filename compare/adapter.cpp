@@ -19,7 +19,7 @@ constexpr std::uintmax_t kMostBytes = 1 << 20;
 constexpr std::size_t kMostArguments = 256;
 constexpr double kDefaultExtraSeconds = 300, kMostExtraSeconds = 1e6;
 constexpr double kMostSpp = 1e12;
-// Accepted differences between their clock and ours.
+// The difference that is accepted between the program's clock and ours, as a ratio and in seconds.
 constexpr double kClockRatio = 1.02, kClockSeconds = .05;
 
 const std::set<std::string> kKeys = {"name", "command", "first_spp", "most_seconds", "scenes", "about"};
@@ -31,7 +31,7 @@ tl::unexpected<Error> wrong_key(const std::filesystem::path& file, const std::st
   return fail(Errc::invalid_argument, fmt::format("{}: {}", file.string(), what));
 }
 
-// The names in braces; an error for text that looks like a placeholder but is unknown.
+// Returns the names in braces; an error for text that looks like a placeholder but is unknown.
 Result<std::set<std::string>> placeholders(const std::vector<std::string>& command,
                                            const std::filesystem::path& file) {
   std::set<std::string> found;

@@ -20,16 +20,19 @@ struct Adapter {
   // True for commands with {time}: the program is run once, and lists the images that it made. False for
   // commands with {spp}: it is run once per image, each time from the start.
   bool lists = false;
-  std::uint64_t first_spp = 4;   // for runs with {spp}
-  double most_seconds = 0;       // per run, in addition to the race's time, for loading and compilation
+  std::uint64_t first_spp = 4;  // samples per pixel of the first run of a command with {spp}
+  // seconds that a run may take, for loading and compilation, in addition to those that follow from the
+  // race's time
+  double most_seconds = 0;
   std::set<std::string> scenes;  // names of the only scenes that it can render; empty: all
   std::filesystem::path folder;  // {adapter}: the folder of the JSON file
 };
-// invalid_argument: the file cannot be read, or names the wrong key and what is allowed.
+// invalid_argument: the file cannot be read, or a key is wrong; the message names the key and what is
+// allowed.
 Result<Adapter> read_adapter(const std::filesystem::path& file);
 Result<Adapter> parse_adapter(const std::string& json, const std::filesystem::path& file);
 
-// The command with its placeholders replaced; `values` must have all of them.
+// Returns the command with its placeholders replaced; `values` must have a value for each of them.
 std::vector<std::string> filled(const Adapter& adapter, const std::map<std::string, std::string>& values);
 
 // An image that a program claims to have made.
@@ -40,13 +43,15 @@ struct MadePicture {
   std::optional<double> cpu_seconds;
 };
 inline constexpr std::size_t kMostPictures = 64;
-// Parses the list written by a program with {time}: one JSON object per line. invalid_argument names the
-// line.
+// Parses the list of images written by a program with {time}: one JSON object per line. invalid_argument: a
+// line is wrong; the message names it.
 Result<std::vector<MadePicture>> parse_pictures(const std::string& lines);
 // Parses the optional times of a program with {spp}: {"seconds": S, "cpu_seconds": C}.
 Result<MadePicture> parse_times(const std::string& json);
 
-// Checks the claimed times: they cannot exceed those of its process. invalid_argument names the claim.
+// Returns the cost that a program claims for an image. invalid_argument: a claimed time exceeds the one that
+// was measured for its process (`process`), or the CPU time is missing in a race by CPU time; the message
+// names the claim.
 Result<Cost> plausible_cost(const MadePicture& claim, const Cost& process, RaceClock clock);
 
 }  // namespace ls::race

@@ -12,7 +12,8 @@ namespace ls::race {
 
 using Pixels = std::vector<float>;  // R, G, B interleaved, row by row from the top; all finite
 
-// A folder for the images of one race, removed with the object. They are many and only read once, at the end.
+// A folder for the images of one race, which is removed with the object. The images are many, and are read
+// only once, at the end.
 class Scratch {
  public:
   static Result<Scratch> make();
@@ -30,12 +31,12 @@ class Scratch {
 Result<void> keep(const std::filesystem::path& file, std::span<const float> pixels);
 Result<Pixels> kept(const std::filesystem::path& file, FrameSize size);
 
-// invalid_argument names the file: not a readable EXR, of another size, or with values that are NaN or
-// infinite.
+// Reads an image of a given size. invalid_argument: it is not a readable EXR, has another size, or values
+// that are NaN or infinite; the message names the file.
 Result<Pixels> read_picture(const std::filesystem::path& exr, FrameSize size);
 
-// The reference for a race: two independent images of the right answer, each with its own noise, or a single
-// one that is taken as exact (`second` is empty).
+// The reference for a race: either two independent images of the right answer, each with its own noise, or a
+// single image that is taken as exact (then `second` is empty).
 struct Reference {
   Pixels first, second;
 };
@@ -43,14 +44,15 @@ struct Reference {
 struct Wrong {
   double mse = 0, relmse = 0;
 };
-// Mean over pixels and channels of (x - a)(x - b), and of the same over r^2 + 0.01 with r = (a + b) / 2. With
-// a and b independent of x and of each other, both unbiased, E[(x - a)(x - b)] = E[(x - truth)^2]: the
-// references' own noise cancels. The result may be negative where that noise is larger than x's error. With
-// one reference b = a, and its noise counts as the image's.
+// Returns the errors of an image x against the reference images a and b. `mse` is the mean over pixels and
+// channels of (x - a)(x - b); `relmse` is the mean of the same divided by r^2 + 0.01, where r = (a + b) / 2.
+// If a and b are unbiased and independent of x and of each other, E[(x - a)(x - b)] = E[(x - truth)^2]: the
+// references' own noise cancels. The result may be negative where that noise is larger than the error of x.
+// With a single reference b = a, and its noise counts as the image's.
 Wrong wrong(std::span<const float> pixels, const Reference& reference);
 
-// relMSE of the mean of the two references, from their difference: (a - b)^2 / 4 over r^2 + 0.01. 0 for a
-// single one.
+// Returns the relMSE of the mean of the two references a and b, from their difference: the mean of (a - b)^2
+// / 4 over r^2 + 0.01, where r = (a + b) / 2. It is 0 for a single reference.
 double noise_of(const Reference& reference);
 
 }  // namespace ls::race

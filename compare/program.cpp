@@ -67,7 +67,7 @@ class Running {
     ::close(ends[1]);
     return error;
   }
-  // Waits briefly, and reads what was written.
+  // Waits briefly, and reads what the program has written.
   void look() {
     pollfd waited{read_, POLLIN, 0};
     ::poll(&waited, closed_ ? 0 : 1, kLookMilliseconds);
@@ -79,7 +79,8 @@ class Running {
            info.si_pid == pid_;
   }
   void kill_group() { ::kill(-pid_, SIGKILL); }
-  // Call after ended() or kill_group(). Also kills processes that the program left behind.
+  // Waits for the program's end and returns its exit status; call after ended() or kill_group(). Also kills
+  // processes that the program left behind.
   int reap() {
     kill_group();
     int status = 0;

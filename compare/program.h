@@ -14,14 +14,14 @@ namespace ls::race {
 
 struct Program {
   std::vector<std::string> command;  // the first word is searched for in PATH
-  double most_seconds = 0;           // of wall time; then it is killed with all its descendants
+  double most_seconds = 0;  // limit of wall time; then the program is killed with all its descendants
 };
-// Returns the total cost: wall time from start to end, CPU time of the program and of the children it waited
-// for. Its input is empty; it gets our environment except variables that begin with LIGHTSHAFT_, which may
-// hold tokens.
+// Runs the program and returns its total cost: wall time from start to end, and CPU time of the program and
+// of the children it waited for. Its input is empty; it gets our environment except variables that begin with
+// LIGHTSHAFT_, which may hold tokens.
 //   invalid_argument: it cannot be started, ended with an exit code other than 0, or was killed by a signal;
 //   resource_exhausted: it ran for too long; failed_precondition: `stop` was set.
-// The message has the last line that it wrote.
+// The error's message has the last line that the program wrote.
 Result<Cost> run_program(const Program& program, const Clock& clock, const std::atomic<bool>& stop);
 
 }  // namespace ls::race

@@ -9,7 +9,8 @@
 namespace ls::race {
 namespace {
 
-// Runs the lanes of one seed to the end. Entrants that fail are added to `failures`.
+// The part of a race with one seed: runs the lanes (an entrant with this seed) to the end. Entrants that fail
+// are added to `failures`.
 class Heat {
  public:
   Heat(std::size_t seed, Lanes& out) : seed_(seed), out_(out) {}
@@ -76,7 +77,8 @@ class Sum {
   double weights_ = 0;
 };
 
-// Our entrant with the smallest error as estimated by its final images.
+// Returns our entrant with the smallest error as estimated by its final images, of those that render
+// everything.
 std::optional<std::size_t> best_of_ours(const Race& race, const Lanes& lanes, std::size_t seeds) {
   std::optional<std::size_t> best;
   double least = std::numeric_limits<double>::infinity();

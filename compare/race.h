@@ -1,4 +1,5 @@
-// A race on one scene: lanes (a racer with a seed) run in turns, then their images are judged.
+// A race on one scene. An entrant is an integrator or a program that takes part; it runs once per seed, and
+// each of these runs is a lane. Lanes run in turns, then their images are judged.
 #pragma once
 
 #include <functional>
@@ -33,13 +34,14 @@ struct Lanes {
   std::vector<Failure> failures;  // an entrant that failed has no lanes
 };
 
-// Creates the racer of an entrant for the seed with this index, loaded and ready.
+// Creates the racer that renders for an entrant with the seed of this index, loaded and ready.
 using MakeRacer = std::function<Result<std::unique_ptr<Racer>>(std::size_t entrant, std::size_t seed)>;
-// Called before each turn.
+// Called before each turn; `used` is the time that this lane has used so far, in seconds on the race's clock.
 using Progress = std::function<void(std::size_t seed, std::size_t entrant, double used)>;
 
-// Runs seed after seed; the entrants of one seed in turns (schedule.h), each time beginning with another.
-// Returns an error only because of `stop`; a racer's own error only removes its entrant.
+// Runs the seeds one after the other. For one seed the entrants run in turns (schedule.h), beginning with
+// another entrant for each seed. Returns an error only because of `stop`; an error of a racer only removes
+// its entrant from the race.
 Result<Lanes> run_lanes(std::size_t entrants, std::size_t seeds, const MakeRacer& make,
                         const std::atomic<bool>& stop, const Progress& progress);
 
@@ -49,7 +51,7 @@ struct JudgedPoint {
   double seconds = 0;  // on the race's clock
   bool last = false;
   std::optional<ImageError> estimate;
-  double mse = 0, relmse = 0;  // against the reference; not above 0: hidden by the reference's noise
+  double mse = 0, relmse = 0;  // errors against the reference; 0 or less: hidden by the reference's noise
 };
 struct JudgedLane {
   std::size_t entrant = 0, seed = 0;
@@ -66,14 +68,15 @@ struct Race {
   std::vector<std::string> notes;
 };
 
-// invalid_argument unless there is such an entrant of ours, and enough seeds, that judge() needs no
-// reference.
+// Checks that judge() can work without a reference. invalid_argument: no entrant of ours renders everything
+// that the scene has, or there are not enough seeds.
 Result<void> judges_itself(const Race& race, std::size_t seeds);
 
-// Measures all images against `reference`. Without one, uses the images of the other seeds by the best of our
-// own entrants: for seed s the means of the halves A and of the halves B of its final images of all seeds but
-// s, which are independent of the image and of each other. invalid_argument: there is no such entrant, or
-// only one seed.
+// Measures the errors of all images against `reference`. Without a reference, it makes one for each seed s
+// from the final images of the best of our own entrants for all other seeds: one image from the means of
+// their halves A (even samples), another from those of their halves B (odd samples). These two are
+// independent of the images of seed s and of each other. invalid_argument: there is no such entrant, or only
+// one seed.
 Result<void> judge(Race& race, const Lanes& lanes, std::size_t seeds,
                    const std::optional<Reference>& reference);
 

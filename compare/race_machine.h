@@ -8,11 +8,11 @@
 
 namespace ls::race {
 
-// Restricts this process, its threads and the programs it starts to this many of its cores. Call before any
-// thread is created. resource_exhausted: there are fewer.
+// Restricts this process, its threads and the programs it starts to `count` of its cores. Call before any
+// thread is created. resource_exhausted: the process has fewer cores.
 Result<void> use_cores(int count);
 
-// "AMD EPYC 7B13, 2 of 8 cores".
+// Returns the machine's processor and the number of cores used, such as "AMD EPYC 7B13, 2 of 8 cores".
 std::string machine_words(int cores);
 double cpu_seconds(const rusage& usage);  // user and system
 double load_average();                    // the kernel's one-minute average; negative: unknown
@@ -21,8 +21,8 @@ double load_average();                    // the kernel's one-minute average; ne
 class Others {
  public:
   Others() : start_(taken()) {}
-  // Share of the time of all cores used neither by this process nor by the programs it waited for. Negative:
-  // unknown.
+  // Returns the share, 0 to 1, of the time of all cores that was used neither by this process nor by the
+  // programs it waited for. Negative: unknown.
   double share() const;
 
  private:

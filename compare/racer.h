@@ -17,7 +17,7 @@ namespace ls::race {
 
 inline constexpr std::uint64_t kNoLimit = UINT64_C(1) << 31;  // samples per pixel that no race reaches
 
-// The conditions, the same for all racers.
+// The conditions of a race, the same for all racers.
 struct Conditions {
   double time = 10;  // seconds, on the race's clock
   RaceClock clock = RaceClock::wall;
@@ -27,11 +27,12 @@ struct Conditions {
   double seconds(const Cost& cost) const { return cost.seconds(clock, threads); }
 };
 
-// One image: its total cost without loading, and its file (see keep()).
+// One image of a racer at some point of the race: its total cost up to there without loading, and its file,
+// written by keep().
 struct Checkpoint {
   double spp = 0;
   Cost cost;
-  bool last = false;                   // the racer's last one
+  bool last = false;                   // true for the racer's last image
   std::optional<ImageError> estimate;  // the image's own error estimate; ours only
   std::filesystem::path picture;
 };
@@ -40,10 +41,11 @@ class Racer {
  public:
   virtual ~Racer() = default;
   virtual Turn next() const = 0;
-  // An error ends this racer's participation. failed_precondition after `stop`.
+  // Runs the racer for one turn. An error ends its participation. failed_precondition: `stop` was set.
   virtual Result<void> take_turn(const std::atomic<bool>& stop) = 0;
   virtual std::vector<Checkpoint> checkpoints() const = 0;
-  // The half means of the last image (see keep()); ours only.
+  // The files with the means of the two halves of the samples of the last image, written by keep(); empty for
+  // external programs.
   virtual std::vector<std::filesystem::path> halves() const { return {}; }
   virtual std::vector<std::string> notes() const { return {}; }  // remarks for the report
 };

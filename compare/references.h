@@ -14,11 +14,12 @@ struct ReferenceFile {
   std::string name;  // without folders
   ls::Reference picture;
 };
-// Like read_picture(), with the error layers and seed that the file has.
+// Reads an image like read_picture(), with the error layers and the seed that the file has.
 Result<ReferenceFile> read_reference(const std::filesystem::path& exr, FrameSize size);
 
-// One file, or two that are independent of each other. A file with standard errors s counts as two: ref + s
-// and ref - s are the means of its halves, in unknown order (common/image/reference/reference.h).
+// Makes the reference of a race from one file, or from two that are independent of each other. One file that
+// has standard errors s counts as two images: ref + s and ref - s are the means of its two halves of samples,
+// in unknown order (common/image/reference/reference.h).
 Reference combine(const std::vector<ReferenceFile>& files);
 std::string describe(const std::vector<ReferenceFile>& files);
 

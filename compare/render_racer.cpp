@@ -13,8 +13,9 @@
 namespace ls::race {
 namespace {
 
-// Wall time of a turn, unless the round ends earlier: long enough that waiting for the last tile is a small
-// part, short enough that changes of the machine's speed affect all racers.
+// The wall time after which a turn ends, unless the round ends earlier. It is long enough that waiting for
+// the last tile is a small part of it, and short enough that changes of the machine's speed affect all
+// racers.
 constexpr double kTurnSeconds = 1;
 
 double thread_cpu_seconds() {
@@ -101,7 +102,7 @@ class RenderRacer final : public Racer {
     return entry_.folder / fmt::format("{}.{}", entry_.name, what);
   }
 
-  // Renders and folds the next tile of the round; true: it was the last, or none was left.
+  // Renders and folds the next tile of the round. True: it was the last tile, or none was left.
   std::optional<bool> one_tile(const std::atomic<bool>& stop) {
     TileIndex tile;
     {
@@ -160,7 +161,7 @@ class RenderRacer final : public Racer {
     return keep(file("b"), means(1, 2, spp / 2));
   }
 
-  // Means over the halves [from, to).
+  // Returns the means over the halves of the samples [from, to): 0 is half A, 1 is half B.
   Pixels means(std::size_t from, std::size_t to, std::uint64_t samples) const {
     Pixels out(values());
     for (std::size_t i = 0; i < out.size(); ++i) {

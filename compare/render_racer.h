@@ -15,7 +15,7 @@ struct RenderEntry {
   std::string name;  // for file names: the lane's name, unique in `folder`
   std::filesystem::path folder;
 };
-// Renders a few samples that are not counted, to warm up memory.
+// Makes the racer. It also renders a few samples that are not counted, to warm up memory.
 std::unique_ptr<Racer> make_render_racer(RenderEntry entry, const Conditions& conditions, const Clock& clock);
 
 }  // namespace ls::race

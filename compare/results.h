@@ -1,5 +1,6 @@
 // The files of a comparison: tables for programs (CSV), a page for people (HTML), the same in Markdown, and a
-// plot of each scene (SVG). All pure: the same results give the same text.
+// plot of each scene (SVG). All functions are pure: the same results give the same text. An entrant is an
+// integrator or a program that takes part.
 #pragma once
 
 #include <string>
@@ -19,7 +20,7 @@ struct Machine {
       -1;  // share of the time of all cores used by other processes during the races; negative: unknown
   std::string build;  // our build
 };
-// True if others used so much of the machine that wall times are unreliable.
+// True if other processes used so much of the machine that wall times are unreliable.
 bool busy(const Machine& machine);
 
 struct Results {
@@ -29,27 +30,30 @@ struct Results {
   std::uint64_t first_seed = 0;  // the others follow consecutively
 };
 
-// scene, entrant, seed, spp, wall_seconds, cpu_seconds, seconds (on the race's clock), relmse, rmse,
-// estimated_relmse, estimated_lo, estimated_hi (ours only), last
+// A row per image, with the columns scene, entrant, seed, spp, wall_seconds, cpu_seconds, seconds (on the
+// race's clock), relmse, rmse, estimated_relmse, estimated_lo, estimated_hi (these three for our integrators
+// only), last.
 std::string points_csv(const Results& results);
-// scene, entrant, seeds, spp, seconds, relmse, _lo, _hi, efficiency, _lo, _hi, slope, _lo, _hi, ratio, _lo,
-// _hi, spread
+// A row per entrant and scene, with the columns scene, entrant, seeds, spp, seconds, relmse, efficiency,
+// slope, ratio, spread; relmse, efficiency, slope and ratio are followed by the columns _lo and _hi of their
+// intervals.
 std::string summary_csv(const Results& results);
-// scene, entrant, seed, spp, spent, target, predicted, lo, hi, actual, within
+// A row per prediction, with the columns scene, entrant, seed, spp, spent, target, predicted, lo, hi, actual,
+// within.
 std::string forecasts_csv(const Results& results);
 
 std::string markdown(const Results& results);
 std::string html_page(const Results& results);
 
-// The plot of one race, as a separate SVG. file_name() is the scene's name, safe for a path.
+// The plot of one race, as a separate SVG file; file_name() makes the scene's name safe for a path.
 std::string plot_svg(const Race& race);
 std::string file_name(const std::string& scene);
 
-// Shared by the two pages.
+// Shared by the HTML page and the Markdown page.
 
 report::LogPlot plot_of(const Race& race);
 std::string clock_words(const Conditions& conditions);  // "CPU seconds a thread, on 2 threads"
-// "0.123 (0.11 to 0.14)"; a dash for nullopt, the value alone if the interval is unbounded.
+// Returns "0.123 (0.11 to 0.14)"; a dash for nullopt, the value alone if the interval is unbounded.
 std::string with_interval(const std::optional<Estimate>& e);
 std::vector<std::string> paragraphs_before(const Results& results);  // what was done, and on which machine
 struct Table {

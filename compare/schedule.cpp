@@ -6,10 +6,10 @@
 namespace ls::race {
 namespace {
 
-// A cut round that adds less than this share of the existing samples is not worth rendering.
+// If a cut round would add less than 1 / kLeastShare of the existing samples, it is not rendered.
 constexpr std::uint64_t kLeastShare = 16;
 constexpr std::uint64_t kGrowth = 4;
-// A run that fills at least this share of the time is the last: the next could not be much longer.
+// A run that fills at least this share of the time is the last: a next run could not be much longer.
 constexpr double kFull = .7;
 // No run is planned for more than this share of the time, because costs are estimates.
 constexpr double kMostOfTime = 1.15;
@@ -62,7 +62,8 @@ std::optional<NextRun> next_run(std::span<const PastRun> past, std::uint64_t fir
   const auto cost = [&](std::uint64_t spp) { return start + per_sample * static_cast<double>(spp); };
   const std::uint64_t grown = std::min(kGrowth * last.spp, most_spp);
   if (cost(grown) <= kFull * time) return NextRun{grown, cost(grown)};
-  // Fills the time; no further run if that takes no more samples than the last one.
+  // Otherwise the next run has as many samples as fill the time. If these are no more than the samples of the
+  // last run, there is no further run.
   const double filling = (time - start) / per_sample;
   const auto spp = std::min<std::uint64_t>(most_spp, static_cast<std::uint64_t>(std::max(0., filling)));
   if (spp <= last.spp || cost(spp) > kMostOfTime * time) return std::nullopt;

@@ -1,4 +1,5 @@
-// Decides which racer runs next, and for how long. Pure: times are arguments, no clock is read.
+// Decides which racer (a participant in a race) runs next, and for how long. The functions are pure: times
+// are arguments, no clock is read.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +12,9 @@
 
 namespace ls::race {
 
-// The clock of a race. `cpu`: CPU seconds of all threads divided by the number of threads, which is what wall
-// time would be on a quiet machine; it also works on a busy one, except for shared caches and memory.
+// The clock by which a race measures time. `wall` is wall time. `cpu` is the CPU time of all threads divided
+// by the number of threads: on a quiet machine this equals wall time, and other programs on a busy machine
+// change it only through shared caches and memory.
 enum class RaceClock { wall, cpu };
 std::string to_string(RaceClock clock);
 
@@ -25,27 +27,30 @@ struct Cost {
   Cost operator+(const Cost& o) const { return {wall + o.wall, cpu + o.cpu}; }
 };
 
-// A racer before its next turn.
+// The state of a racer before its next turn.
 struct Turn {
   bool done = false;
   double used = 0;      // seconds of the race used so far
   double expected = 0;  // seconds expected for the next turn; 0: unknown
 };
-// The racer whose next turn has its middle earliest in the race, so that short turns alternate, and a single
-// long one falls into the middle of the others'. Among equals the first from `lap` on, cyclically, so that
-// none always goes first. nullopt: all are done.
+// Returns the index of the racer that runs next: the one for which used + expected / 2, the middle of its
+// next turn, is smallest. So short turns of the racers alternate, and a single long turn falls into the
+// middle of the others' turns. Among equals, the first one counting cyclically from index `lap` runs, so that
+// no racer always goes first. nullopt: all are done.
 std::optional<std::size_t> next_turn(std::span<const Turn> turns, std::size_t lap);
 
-// The samples with which a render continues: round `k` as a whole, or cut to what fits into `seconds_left` at
-// `seconds_per_sample` (per sample per pixel; 0: unknown, only before round 0) and below `most_spp` in total.
-// nullopt: it ends here, because nothing fits, or no more than a sixteenth would be added.
+// Returns the samples that a render adds next: those of round `k` (a fixed range of samples), cut to what
+// fits into `seconds_left` at a cost of `seconds_per_sample`, and to `most_spp` samples per pixel in total.
+// `seconds_per_sample` is the time for one more sample in every pixel; 0: unknown, which is allowed only for
+// round 0. nullopt: the render ends here, because no samples fit, or a cut round would add no more than a
+// sixteenth to the existing samples.
 std::optional<SampleRange> next_range(RoundIndex k, double seconds_per_sample, double seconds_left,
                                       std::uint64_t most_spp);
 
-// Samples of the next run of a program that starts anew each time, given its runs so far, ascending: the
-// first has `first`, each next four times as many, and the last as many as fill the time. Its time is
-// modelled as a constant plus a cost per sample (a line through the last two runs). nullopt: it has had its
-// last run.
+// Returns the number of samples for the next run of a program that starts anew for each image. `past` are its
+// runs so far, in ascending order of samples. The first run has `first` samples per pixel, each next run four
+// times as many, and the last run as many as fill `time`. The time of a run is modelled as a constant plus a
+// cost per sample (a line through the last two runs). nullopt: there is no further run.
 struct PastRun {
   std::uint64_t spp = 0;
   double seconds = 0;

@@ -12,22 +12,24 @@ struct Estimate {
   double value = 0, lo = 0, hi = 0;  // 95 % interval; unbounded for a single value
 };
 
-// Geometric mean of positive values; the interval of a single value is (0, infinity). nullopt: no values, or
-// one is not a positive finite number.
+// Returns the geometric mean of positive values; the interval of a single value is (0, infinity). nullopt:
+// there are no values, or one of them is not a positive finite number.
 std::optional<Estimate> geometric_mean(std::span<const double> values);
 
-// Geometric mean of a[i] / b[i]. Effects common to both at the same i (the machine's speed at that time)
-// cancel. nullopt: the counts differ, or as above.
+// Returns the geometric mean of the ratios a[i] / b[i]. Effects common to both at the same i (such as the
+// machine's speed at that time) cancel. nullopt: a and b have different sizes, or geometric_mean() of the
+// ratios is nullopt.
 std::optional<Estimate> geometric_ratio(std::span<const double> a, std::span<const double> b);
 
-// Arithmetic mean; the interval of a single value is (-infinity, infinity).
+// Returns the arithmetic mean; the interval of a single value is (-infinity, infinity).
 std::optional<Estimate> mean(std::span<const double> values);
 
 struct TimeError {
   double seconds = 0, error = 0;
 };
-// s in error ~ seconds^-s, by least squares through the logarithms; 1 for independent samples. nullopt: fewer
-// than three points with both positive, or all at the same time.
+// Returns the exponent s of error ~ seconds^-s, fitted by least squares through the logarithms of the points;
+// it is 1 for independent samples. nullopt: fewer than three points have positive time and error, or all of
+// them have the same time.
 std::optional<double> log_slope(std::span<const TimeError> points);
 
 }  // namespace ls::race

@@ -15,7 +15,7 @@ std::vector<const JudgedLane*> lanes_of(const Race& race, std::size_t entrant) {
   return out;
 }
 
-// One value per lane, from its last point.
+// Returns one value per lane (the run of an entrant with one seed), from its last point.
 template <class Value>
 std::vector<double> at_end(const std::vector<const JudgedLane*>& lanes, const Value& value) {
   std::vector<double> out;
@@ -25,7 +25,8 @@ std::vector<double> at_end(const std::vector<const JudgedLane*>& lanes, const Va
 
 double efficiency(const JudgedPoint& p) { return 1 / (p.relmse * p.seconds); }
 
-// Points from the last one back, each with at most half the samples of the one after it.
+// Returns points at doubling sample counts: from the last point back, each with at most half the samples of
+// the one after it.
 std::vector<TimeError> doublings(const JudgedLane& lane) {
   std::vector<TimeError> out;
   double next = std::numeric_limits<double>::infinity();

@@ -1,4 +1,5 @@
-// The results of a race: for each entrant its final error, its efficiency and its curve, over the seeds.
+// The results of a race: for each entrant (an integrator or a program that takes part) its final error, its
+// efficiency and its curve of error over time, as means over the seeds.
 #pragma once
 
 #include <optional>
@@ -17,19 +18,21 @@ struct Row {
   std::optional<Estimate> relmse;      // at the end
   std::optional<Estimate> efficiency;  // 1 / (relMSE x seconds) at the end
   std::optional<Estimate> slope;       // s of relMSE ~ seconds^-s, from points of doubling samples
-  // Efficiency of the first entrant divided by this one's, seed by seed. nullopt for the first.
+  // Mean over the seeds of the efficiency of the first entrant divided by that of this one. nullopt for the
+  // first entrant.
   std::optional<Estimate> ratio;
   double spread = 1;  // largest over smallest final relMSE: large if few pixels dominate
 };
-// One row per entrant that finished, in their order.
+// Returns one row per entrant that finished, in the order of the entrants.
 std::vector<Row> rows_of(const Race& race);
 
 struct CurveAt {
   double spp = 0, seconds = 0;
   Estimate relmse;
 };
-// Geometric means over the seeds at each sample count shared by an entrant's lanes, and at their ends. Sample
-// counts reached by less than half of the seeds, and errors below the reference's noise, are omitted.
+// Returns the curve of an entrant: geometric means over the seeds at each sample count that the runs of the
+// different seeds share, and at the ends of the runs. Sample counts that less than half of the seeds reached,
+// and errors below the reference's noise, are omitted.
 std::vector<CurveAt> curve_of(const Race& race, std::size_t entrant);
 
 }  // namespace ls::race

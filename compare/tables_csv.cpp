@@ -8,7 +8,7 @@
 namespace ls::race {
 namespace {
 
-// Quotes a field by RFC 4180.
+// Quotes a field of a table by RFC 4180.
 std::string field(const std::string& text) {
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string quoted = "\"";
@@ -18,7 +18,7 @@ std::string field(const std::string& text) {
 
 std::string field(double value) { return std::isfinite(value) ? fmt::format("{:.6g}", value) : ""; }
 
-// Three fields; empty for nullopt.
+// Returns an estimate as three fields, value and interval; they are empty for nullopt.
 std::string fields(const std::optional<Estimate>& e) {
   return e ? fmt::format("{},{},{}", field(e->value), field(e->lo), field(e->hi)) : ",,";
 }

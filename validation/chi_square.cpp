@@ -25,7 +25,7 @@ constexpr std::uint64_t kSamplesPerCell = 5000;
 // statistic.
 constexpr double kConverged = 1e-4, kNegligible = 1e-6;
 constexpr int kFirstGrid = 8, kLastGrid = 512;
-// A total density above 1 by more than this is an error; the integration is far more accurate.
+// A density whose integral exceeds 1 by more than this is an error; the integration is far more accurate.
 constexpr double kExcess = 1e-3;
 
 struct Surface {
@@ -122,7 +122,8 @@ class BinTable {
   V3 wo_;
 };
 
-// Merges cells of fewer than `least` expected samples, the smallest first, until none is left.
+// Merges cells of fewer than `least` expected samples, the smallest first, until no such cell is left, and
+// computes the statistic of the resulting cells.
 void compare(const std::vector<double>& p, const std::vector<std::uint64_t>& n, std::uint64_t samples,
              double least, ValidateCase& c) {
   std::vector<std::size_t> order(p.size());
@@ -163,7 +164,7 @@ Result<ValidateCase> chi2_case(const NoriTest& test, std::size_t bsdf, const ren
                             "chi2test could test",
                             bsdf + 1));
   render::RandomStream stream(render::combine(seed, 0x6368693274657374));
-  // Cosine-distributed, as in Nori.
+  // Draws a direction with a density proportional to the cosine, as in Nori.
   const double u = stream.uniform(), phi = 2 * std::numbers::pi * stream.uniform();
   const BinTable table(surface->bsdfs, surface->index, test.resolution, direction(std::sqrt(1 - u), phi));
   const std::uint64_t samples =

@@ -10,10 +10,11 @@
 
 namespace ls::cli {
 
-// Tests test.bsdfs[bsdf], seen from a direction that `seed` chooses. expected: the degrees of freedom; got:
-// the statistic; standard_error: that of the statistic for a correct sampler; z: the deviation in these
-// units. Fills p; the caller judges, except where the density itself is wrong: more than 1 in total, or
-// samples where it is 0. invalid_argument: a bsdf that the renderer rejects, or with delta lobes only.
+// Tests test.bsdfs[bsdf], seen from a direction that `seed` chooses. In the result, `expected` is the degrees
+// of freedom, `got` the statistic, `standard_error` the standard deviation of the statistic for a correct
+// sampler, and `z` the deviation in these units. Fills `p`, the probability of such a deviation, which the
+// caller judges, except where the density itself is wrong: its integral is more than 1, or there are samples
+// where it is 0. invalid_argument: the renderer rejects the bsdf, or it has delta lobes only.
 Result<ValidateCase> chi2_case(const NoriTest& test, std::size_t bsdf, const render::AssetFiles& files,
                                std::uint64_t seed);
 

@@ -12,8 +12,9 @@
 namespace ls::cli {
 namespace {
 
-// Radiance is float32: a path of n vertices multiplies about 10 n numbers, each rounded by 2^-24, and errors
-// of many samples partly share their sign. Sufficient for paths of 25 vertices in the worst case.
+// The relative error allowed for rounding. Radiance is float32: a path of n vertices multiplies about 10 n
+// numbers, each rounded by 2^-24, and errors of many samples partly share their sign. The allowance is
+// sufficient for paths of 25 vertices in the worst case.
 constexpr double kRounding = 0x1p-16;
 
 class Runner {
@@ -48,7 +49,7 @@ class Runner {
  private:
   bool asked_for(const std::string& name) const { return name.find(options_.only) != std::string::npos; }
 
-  // One name: tests the luminance; three: the channels.
+  // Tests a scene's mean: with one name its luminance, with three names its channels.
   Result<void> t_test(const Scene& scene, const std::vector<std::string>& names, const double* expected) {
     const std::uint64_t seed = options_.seed + number_++;
     bool any = false;

@@ -1,4 +1,4 @@
-// Runs the tests of a Nori file as cases.
+// Runs the tests of a Nori file (a <test> element) as cases.
 #pragma once
 
 #include <functional>
@@ -23,8 +23,9 @@ struct ValidateOptions {
 Result<std::vector<ValidateCase>> validate_test(const NoriTest& test, const render::AssetFiles& files,
                                                 const ValidateOptions& options);
 
-// A bsdf's weights are its radiance in an environment of radiance 1: the scene seen by a camera at this angle
-// (in degrees from the normal), with paths of two segments.
+// Returns a scene for measuring the weights of a bsdf, f cos / pdf: the bsdf's surface in an environment of
+// radiance 1, seen by a camera at `degrees` from the normal, with paths of two segments. The radiance of the
+// surface is then the mean weight.
 Scene albedo_scene(const Scene& bsdf, double degrees);
 
 }  // namespace ls::cli

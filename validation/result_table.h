@@ -11,8 +11,8 @@ namespace ls::cli {
 
 std::string table_heading();
 std::string table_line(const ValidateCase& c);
-// {"cases": [{name, expected, got, stderr, allowance, z, p, level, verdict, nonfinite, seconds, why}],
-// "passed", "failed"}
+// Returns {"cases": [{name, expected, got, stderr, allowance, z, p, level, verdict, nonfinite, seconds,
+// why}], "passed", "failed"}.
 nlohmann::ordered_json table_json(const std::vector<ValidateCase>& cases);
 
 }  // namespace ls::cli

@@ -19,18 +19,19 @@ namespace {
 using cli::Measured;
 using cli::ValidateCase;
 
-// Paths of the first run, which determines how many paths the case needs.
+// Number of paths of a case's first run, which determines how many paths the case needs.
 constexpr std::uint64_t kPilotPaths = 1 << 13;
-// This many standard errors are left between the interval and the band's end: in one run of seven chance
-// takes more, or the first run's variance was far off. The case is then repeated with as many paths as the
-// better figures require, within these factors.
+// The number of paths is planned so that this many standard errors are left between the interval and the
+// band's end. In one run of seven chance takes more than that, or the variance in the first run was far off.
+// Then the case is repeated with as many paths as the better figures require, which is between kAgain and
+// kMostAgain times as many.
 constexpr double kSpare = 1.5, kAgain = 2, kMostAgain = 16;
-// Degrees of freedom assumed in planning.
+// The degrees of freedom of the standard error that are assumed when the number of paths is planned.
 constexpr double kPlannedFreedom = 1e3;
-// The level of the two one-sided tests, as a two-sided level.
+// The level of the two one-sided tests that the figure lies in the band, as a two-sided level.
 constexpr double kBandLevel = 2 * kWrongPass / kAttempts;
 
-// FNV-1a: a case's random numbers do not depend on its neighbours in the table.
+// FNV-1a, a hash of the case's id: so a case's random numbers do not depend on its neighbours in the table.
 std::uint64_t seed_of(const std::string& id, std::uint64_t seed, std::uint64_t attempt) {
   std::uint64_t h = 0xcbf29ce484222325ull;
   const auto eat = [&h](std::uint64_t byte) { h = (h ^ byte) * 0x100000001b3ull; };
@@ -64,7 +65,7 @@ class Runner {
   std::vector<ValidateCase> take() { return std::move(lines_); }
 
  private:
-  // A measured mean with its expected value and errors.
+  // A measured mean with its expected value and errors, in each channel.
   struct Sight {
     Channels expected, got, error, freedom;
     render::Health health;
@@ -94,7 +95,7 @@ class Runner {
   }
 
   Result<Sight> difference(const Same& same, std::uint64_t paths, std::uint64_t seed) const {
-    // Cases of this kind have no known mean: uses 1.
+    // The mean of such a case is not known in advance; a broken renderer is simulated with mean 1.
     const auto a = options_.gain ? broken(grey(1)) : look(same.scene, paths, seed),
                b = options_.gain ? a : look(same.other, paths, ~seed);
     if (!a) return tl::unexpected(a.error());
@@ -116,8 +117,9 @@ class Runner {
     return s;
   }
 
-  // The figures of a renderer whose values are `gain` times the right ones, with an error that leaves room
-  // for kSpare more of it, as growth() plans; relative to the mean of the correct renderer.
+  // Returns the figures of a renderer whose values are `gain` times the right ones. Its standard error leaves
+  // room for kSpare more of it within the band, as growth() plans, relative to the mean of a correct
+  // renderer.
   Result<Measured> broken(const Channels& expected) const {
     Measured m;
     m.paths = kPilotPaths;
@@ -133,10 +135,11 @@ class Runner {
   }
 
   double band() const { return case_->options.band * (options_.quick ? kQuickWidening : 1); }
-  // The systematic part of an interval's half width.
+  // Returns the systematic part of an interval's half width: rounding, and the uncertainty of the answer.
   double unknown(double expected) const { return (kRounding + case_->options.slack) * std::abs(expected); }
 
-  // The factor on the number of paths for intervals of half the band.
+  // Returns the factor on the number of paths that makes the interval fit into the band with kSpare standard
+  // errors to spare; 0: no number of paths would suffice.
   double growth(const Sight& s) const {
     double worst = 0;
     for (std::size_t k = 0; k < lines_of(*case_); ++k) {

@@ -1,4 +1,5 @@
-// Runs cases: measures, and judges by equivalence.
+// Runs cases: measures each, and judges it by equivalence (its interval must lie within a band around the
+// answer).
 #pragma once
 
 #include <cstdint>
@@ -18,17 +19,17 @@ struct RunOptions {
   bool quick = false;
   std::string only;                                         // prefix or glob of ids; empty: all
   std::function<void(const cli::ValidateCase&)> done = {};  // called after each line of the table
-  // Simulates a broken renderer, to test that each case fails for it: every value is multiplied by this.
-  // Statistical cases are then judged by the figures that such a renderer gives on average, without
-  // rendering, with the error that the case's paths are planned for.
+  // Simulates a broken renderer, to test that each case fails for it: every value is multiplied by `gain`.
+  // Statistical cases are then not rendered but judged by the figures that such a renderer gives on average,
+  // with the standard error that the case's number of paths is planned for.
   std::optional<double> gain = {};
 };
 
-// The lines of the report; a case whose channels differ has one per channel. A scene that cannot be built
-// gives a failed line.
+// Runs the cases and returns the lines of the report. A case whose channels differ has one line per channel.
+// A scene that cannot be built gives a failed line.
 std::vector<cli::ValidateCase> run_cases(const Table& table, const RunOptions& options);
 
-// One of the table's cases, at the table's level.
+// Runs one case, with the error probability that it has as a part of the whole table.
 std::vector<cli::ValidateCase> run_case(const Table& table, std::size_t index, const RunOptions& options);
 
 // The error probability, on either side, of each interval of the table.

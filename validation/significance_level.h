@@ -5,9 +5,10 @@
 
 namespace ls::cases {
 
-// A correct renderer fails any case of the whole table by chance with at most this probability: shared by all
-// intervals of the table (Sidak), whichever of them are run. A fifth of the total for all statistical tests
-// of this project, tests/support/significance.h; the power is set by the band, not by this level.
+// A correct renderer fails any case of the whole table by chance with at most this probability. It is shared
+// by all confidence intervals of the table (Sidak), whichever of them are run. It is a fifth of the total for
+// all statistical tests of this project, tests/support/significance.h. The power of the tests is set by the
+// band (the tolerated deviation), not by this level.
 inline constexpr double kWrongVerdicts = 2e-4;
 
 // A renderer that is off by more than the band in a case passes that case with at most this probability: two
@@ -15,19 +16,20 @@ inline constexpr double kWrongVerdicts = 2e-4;
 // does (an intersection-union test: Berger 1982); it is shared among a case's attempts.
 inline constexpr double kWrongPass = 1e-3;
 
-// Maximum number of runs of a case whose interval came out too wide, each with more paths; each counts as an
-// interval of the table.
+// The most runs of one case. A case is run again, with more paths, if its interval came out too wide; each
+// run counts as an interval of the table.
 inline constexpr std::size_t kAttempts = 3;
 
-// Radiance is float32: a path of n vertices multiplies about 10 n numbers, each rounded by 2^-24, and errors
-// of many samples partly share their sign. Sufficient for paths of 25 vertices in the worst case.
+// The relative error allowed for rounding. Radiance is float32: a path of n vertices multiplies about 10 n
+// numbers, each rounded by 2^-24, and errors of many samples partly share their sign. The allowance is
+// sufficient for paths of 25 vertices in the worst case.
 inline constexpr double kRounding = 0x1p-16;
 
-// Least degrees of freedom of the standard error: with fewer, a few pixels dominate it and it is not
-// reliable. Not required if the error is below the allowance for float32.
+// The least degrees of freedom that a standard error must have: with fewer, a few pixels dominate it and it
+// is not reliable. This is not required if the standard error is below the allowance for float32.
 inline constexpr double kLeastFreedom = 40;
 
-// The quick table uses bands wider by this factor: a tenth of the paths.
+// The quick table uses bands wider by this factor, which need a tenth of the paths.
 inline constexpr double kQuickWidening = 10. / 3;
 
 // A case that needs more paths than this fails.

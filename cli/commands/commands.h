@@ -1,5 +1,5 @@
-// The commands. Each adds itself to the command line and sets `action` if it is the one given; main() runs
-// the action and returns its exit code.
+// The commands. Each function adds its command to the command line, and sets `action` if the user gives that
+// command; main() runs the action and returns its exit code.
 #pragma once
 
 #include <CLI/CLI.hpp>

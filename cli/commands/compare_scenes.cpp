@@ -103,7 +103,8 @@ class SceneRace {
     return std::optional(race::combine(read));
   }
 
-  // An image shares its noise with one of the same scene and seed, and would seem much better than it is.
+  // Rejects a reference of the same scene and seed as an image of the race: the two would share their noise,
+  // and the image would seem much better than it is.
   Result<void> refuse_own_noise(const race::ReferenceFile& file) const {
     for (const Digest& scene : scenes_)
       for (std::size_t i = 0; i < options_.seeds; ++i)

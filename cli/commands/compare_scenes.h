@@ -16,7 +16,7 @@ struct CompareOptions {
   std::vector<std::string> scenes;
   std::vector<std::string> integrators;  // empty: the scene's
   std::vector<race::Adapter> programs;
-  race::Conditions conditions;    // except the size
+  race::Conditions conditions;    // all conditions except the size of the image
   std::optional<FrameSize> size;  // empty: the scene's
   std::size_t seeds = 5;
   std::uint64_t first_seed = 0;
@@ -27,11 +27,12 @@ struct CompareOptions {
   bool strict = false, quiet = false;
 };
 
-// Names of scenes for tables and files: the file's name, or its folder's if the file's says nothing.
+// Returns names of the scenes for tables and files: the name of the scene file without extension, or its
+// folder's name if the file is called "scene". A number is appended to a name that occurs twice.
 std::vector<std::string> scene_names(const std::vector<std::string>& files);
 
-// The reference images in a folder for a scene of this name: NAME.0.exr and NAME.1.exr, or NAME.exr; empty:
-// none.
+// Returns the reference images in `folder` for the scene called `name`: NAME.0.exr and NAME.1.exr, or
+// NAME.exr; empty: there are none.
 std::vector<std::filesystem::path> references_in(const std::filesystem::path& folder,
                                                  const std::string& name);
 

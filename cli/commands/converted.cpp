@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Gives the assets of a scene that has already been read.
+// Finds only the assets of a scene that has already been read.
 class KnownAssets final : public AssetSource {
  public:
   explicit KnownAssets(const Scene& scene) {
@@ -42,7 +42,7 @@ bool leads_out(const std::string& name) {
   return name.starts_with('/') || name == ".." || name.starts_with("../");
 }
 
-// Gives unique names within the new folder.
+// Gives assets whose names lead out of the new folder names within it, which differ from all others.
 void rename_those_outside(Scene& scene) {
   std::set<std::string> taken;
   for (const Asset& a : scene.assets)

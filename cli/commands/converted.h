@@ -19,16 +19,17 @@ struct FileCopy {
 struct Converted {
   std::string text;
   Digest digest;                 // of the scene that the text describes
-  std::vector<FileCopy> copies;  // files that are not in place yet
+  std::vector<FileCopy> copies;  // files that are not in place yet, and must be copied
 };
 
-// Converts for a file `out`. In the folder of the original, names are unchanged and nothing is copied. In
-// another folder, files keep their names relative to it; files whose name is absolute or leads out by ".."
-// are put into the folder itself. The text is read back and compared; internal: it is not the same scene.
-// already_exists: the folder has another file of such a name.
+// Converts a scene for the file `out`. If `out` is in the folder of the original scene, file names are
+// unchanged and nothing is copied. If it is in another folder, files keep their names relative to it; files
+// whose name is absolute or leads out by ".." are put directly into that folder. The text is read back and
+// compared. internal: the text does not give the same scene; already_exists: the folder has another file of a
+// name that is needed.
 Result<Converted> convert_scene(const LocalScene& scene, const std::filesystem::path& out);
 
-// Copies completely or not at all; creates missing folders.
+// Copies a file to its place beside the converted scene, completely or not at all; creates missing folders.
 Result<void> copy_beside(const FileCopy& copy);
 
 }  // namespace ls::cli

@@ -79,7 +79,7 @@ int fetch(FarmApi& api, const FarmFlags& flags) {
   return fetch_results(api, flags.id, {flags.out, flags.report, flags.html, flags.farm.json, false});
 }
 
-// A frame of a sequence is a separate job with its own id.
+// Makes `flags` name the job of one frame: each frame of a sequence is a separate job with its own id.
 Result<void> choose_frame(FarmFlags& flags) {
   if (flags.frame.empty()) return {};
   const auto frame = parse_whole("--frame", flags.frame, 0, kMaxFrameNumber);

@@ -21,7 +21,7 @@ struct InspectFlags {
   bool json = false, strict = false, variants = false, work = false;
 };
 
-// Large enough to reach all parts of a scene, and small enough to be fast.
+// Side of the small image in pixels: large enough to reach all parts of a scene, small enough to be fast.
 constexpr int kSmallSide = 32;
 constexpr SampleRange kSmallSamples{0, 4};
 
@@ -31,7 +31,8 @@ FrameSize small(FrameSize size) {
   return {scaled(size.width), scaled(size.height)};
 }
 
-// The sums of a small image by every variant that covers the scene.
+// Renders a small image with every integrator variant that covers the scene; the result has the digest of
+// each variant's sums.
 tl::expected<VariantBitsList, coordinator::Rejected> render_variants(const LocalScene& scene, JobSpec spec,
                                                                      FrameSize full) {
   spec.size = small(full);
@@ -47,7 +48,7 @@ tl::expected<VariantBitsList, coordinator::Rejected> render_variants(const Local
                           });
 }
 
-// The work counters of a small image.
+// Returns the work counters of rendering a small image.
 tl::expected<nlohmann::ordered_json, coordinator::Rejected> count_work(
     [[maybe_unused]] const LocalScene& scene, [[maybe_unused]] JobSpec spec,
     [[maybe_unused]] FrameSize full) {

@@ -14,7 +14,7 @@ namespace {
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-// The coordinator's sums of both halves, in double.
+// The size of the coordinator's sums of both halves of the samples, R, G and B each, in double.
 constexpr std::uint64_t kFilmBytesPerPixel = 6 * sizeof(double);
 
 ordered_json files_that_stay(const LocalScene& scene, const JobSpec& spec) {
@@ -85,7 +85,8 @@ std::string parts(const ordered_json& j, bool used) {
   return table.text();
 }
 
-// Facts that depend on the files too: structures of the BVH and of the lights, sampling strategies.
+// Describes facts that also depend on the scene's files: structures of the BVH and of the lights, sampling
+// strategies.
 std::string made_ready(const ordered_json& j) {
   const auto listed = [&](const char* key) {
     std::vector<std::string> all;
@@ -122,7 +123,7 @@ std::string files(const ordered_json& j) {
   return (travel.empty() ? none : going.text()) + staying.text();
 }
 
-// A bar of up to 24 marks.
+// Draws a bar of up to 24 marks; `largest` has all of them.
 std::string bar(std::uint64_t bytes, std::uint64_t largest) {
   if (bytes == 0 || largest == 0) return "";
   const auto marks =
@@ -143,7 +144,8 @@ std::string memory(const ordered_json& j) {
   return table.text() + fmt::format("in the coordinator's: {} of film\n", show_bytes(j.at("film_bytes")));
 }
 
-// The instructions per path, and what the omitted parts would add. Either is null if it could not be counted.
+// Describes the instructions per path, and how many more the omitted parts of the renderer would take. Either
+// argument is null if the instructions could not be counted.
 std::string instructions(const ordered_json& per_path, const ordered_json& cheapest) {
   if (per_path.is_null()) return "";
   const double n = per_path;

@@ -13,7 +13,7 @@ namespace ls::cli {
 nlohmann::ordered_json inspection(const LocalScene& scene, const LocalWorld& built,
                                   const VariantBitsList& variants);
 
-// Formats the result of inspection(). Every line ends with a newline.
+// Formats the result of inspection() for people. Every line ends with a newline.
 std::string inspection_text(const nlohmann::ordered_json& inspection);
 
 }  // namespace ls::cli

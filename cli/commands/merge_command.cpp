@@ -31,7 +31,8 @@ struct MergeFlags {
   bool float_output = false;
 };
 
-// A folder stands for the EXR files in it, sorted by name: there may be more than a command line can hold.
+// Returns the given files. A folder stands for the EXR files in it, sorted by name, because there may be more
+// of them than a command line can hold.
 Result<std::vector<fs::path>> files_of(const std::vector<std::string>& arguments) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -74,7 +75,8 @@ Result<void> write_report(const MergeFlags& flags, const Merged& merged, const s
   return save_result(flags.report, j.dump(2) + "\n");
 }
 
-// True if some job of the scene has this digest; the integrator, which partials do not name, affects pruning.
+// True if `digest` is that of the scene as some job renders it. A job's scene is pruned, which depends on the
+// integrator, and partials (files with pixel sums) do not name the integrator; so all kinds are tried.
 bool is_of(const Scene& scene, const Digest& digest) {
   const std::string own = scene.integrator.name;
   return std::ranges::any_of(
@@ -84,7 +86,8 @@ bool is_of(const Scene& scene, const Digest& digest) {
       });
 }
 
-// Partials contain only identifiers; the names for the Cryptomatte manifests come from the scene.
+// Returns the names for the Cryptomatte manifests, which come from the scene, because partials contain only
+// identifiers.
 tl::expected<CryptomatteManifests, coordinator::Rejected> manifests(const MergeFlags& flags,
                                                                     const Merged& merged) {
   const AovSet aovs = merged.film.aovs();

@@ -24,7 +24,7 @@ struct ValidateFlags {
   bool strict = false, quick = false;
 };
 
-// Records which renderer and options the figures come from, so that tables of several cannot be mixed.
+// Records from which renderer and options the figures come, so that tables of different ones cannot be mixed.
 void add_origin(nlohmann::ordered_json& json, const ValidateFlags& flags) {
   json["build"] = render::kBuildId;
   json["numeric_class"] = render::numeric_class().hex();
@@ -45,7 +45,8 @@ int report(const std::vector<ValidateCase>& lines, nlohmann::ordered_json json, 
   return failed > 0 ? kFailed : kOk;
 }
 
-// Adds the descriptions of the rows, for the docs page and for the check that no row is missing.
+// Adds the descriptions of the rows of the list of cases, for the docs page and for the check that no row is
+// missing.
 nlohmann::ordered_json table_with_rows(const cases::Table& table, const std::vector<ValidateCase>& lines,
                                        bool quick) {
   nlohmann::ordered_json json = table_json(lines);

@@ -42,7 +42,8 @@ Result<FinalPicture> open_image(const std::string& path) {
   return read_final_exr(*bytes, path);
 }
 
-// Preconditions of a comparison: the same scene and the same numeric class.
+// Checks what a comparison requires: that image and scene are of the same scene, and that this machine has
+// the numeric class of the image (its machines give the same bits).
 Result<void> check_same(const SealedImage& image, const LocalScene& scene, const VerifyFlags& flags) {
   if (const Digest mine = digest_of(scene.scene); mine != image.scene)
     return fail(
@@ -62,7 +63,7 @@ Result<void> check_same(const SealedImage& image, const LocalScene& scene, const
   return {};
 }
 
-// Tiles that were not rendered count as neither right nor wrong.
+// The number of tiles with each result. Tiles that were not rendered count as neither right nor wrong.
 struct Tally {
   std::size_t right = 0, wrong = 0, stopped = 0;
 };
@@ -174,7 +175,7 @@ int run(const VerifyFlags& flags) {
   auto picture = open_image(flags.image);
   if (!picture) return print_error(picture.error());
   Contents contents = contents_of(*picture);
-  // Reported first, because later steps may fail because of it.
+  // This is reported first, because later steps may fail because of it.
   if (!contents.changed.empty()) complain(fmt::format("{}: {}", flags.image, line_of(contents)));
   const auto image = read_sealed_image(std::move(*picture), flags.image);
   if (!image) return print_error(image.error());

@@ -16,24 +16,27 @@ struct VerifiedTile {
   TileIndex tile = 0;
   PixelRect rect;
   std::uint64_t spp = 0;
-  bool stopped = false;  // interrupted before it was rendered: not verified
-  TileError error;       // estimated from its samples
-  std::string problem;   // empty: the digest and all layers match
+  // True if verifying was interrupted before the tile was rendered, so that nothing is known about it.
+  bool stopped = false;
+  TileError error;      // estimated from its samples
+  std::string problem;  // empty: the digest and all layers match
 
   bool wrong() const { return !problem.empty(); }
 };
 
-// `count` distinct tiles, or all if there are fewer, in ascending order; a function of the seed.
+// Returns `count` distinct tiles of 0 to `all` - 1, or all of them if there are fewer, in ascending order.
+// The choice is a function of `seed`.
 std::vector<TileIndex> random_tiles(TileIndex all, std::uint64_t count, std::uint64_t seed);
 
-// Renders all rounds of the tile and compares the chain over its units' digests with the one sealed in the
-// image, and its values in every layer with those of the image. The world must be that of the image's scene
-// and settings.
+// Renders all rounds (ranges of samples) of the tile again. Compares the hash chain over the digests of its
+// units with the one sealed in the image, and its values in every layer with those of the image. The world
+// must be that of the image's scene and settings.
 VerifiedTile verify_tile(const render::World& world, const SealedImage& image, TileIndex tile,
                          const std::atomic<bool>& stop);
 
-// Headers that contradict the settings, the names of the scene or, if `tiles` has all of the image's, their
-// samples: "header NAME". The others (seconds, health, ...) are protected by the seal only.
+// Returns, as "header NAME", the image's headers that contradict its settings or the names of the scene. If
+// `tiles` has all tiles of the image, also returns those that contradict their samples. The other headers
+// (seconds, health, ...) are protected by the seal only.
 std::vector<std::string> wrong_headers(const SealedImage& image, const CryptomatteManifests& names,
                                        const std::vector<VerifiedTile>& tiles);
 

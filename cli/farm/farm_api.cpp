@@ -17,7 +17,8 @@ using nlohmann::json;
 
 constexpr std::size_t kMaxShownBody = 300;
 constexpr std::size_t kDigestsPerQuestion = 10'000;
-// After a broken connection smaller files are sent again as a whole, which costs one request instead of two.
+// Files of at least this size are sent in parts, so that an upload can continue after a broken connection.
+// Smaller files are sent again as a whole, which costs one request instead of two.
 constexpr std::uintmax_t kSentInParts = 1u << 20;
 constexpr int kBarrenAttempts = 8;  // consecutive attempts without progress before giving up
 
@@ -189,7 +190,7 @@ FarmApi::Answer<void> FarmApi::upload_missing(const LocalScene& scene, const Job
   return {};
 }
 
-// Safe to repeat, as blobs are identified by digest.
+// Sending again is safe, because blobs are identified by digest.
 FarmApi::Answer<HttpResponse> FarmApi::send_file(const std::string& path, const std::filesystem::path& file) {
   std::error_code error;
   if (std::filesystem::file_size(file, error) < kSentInParts || error)
@@ -201,7 +202,7 @@ FarmApi::Answer<HttpResponse> FarmApi::send_file(const std::string& path, const 
   }
 }
 
-// Sends the part that the coordinator does not have yet.
+// Sends the part of the file that the coordinator does not have yet.
 FarmApi::Answer<HttpResponse> FarmApi::send_rest(const std::string& path, const std::filesystem::path& file,
                                                  Sending& sending) {
   auto there = client_.request("HEAD", path);
@@ -213,7 +214,7 @@ FarmApi::Answer<HttpResponse> FarmApi::send_rest(const std::string& path, const 
   sending.reached = std::max(sending.reached, offset);
   auto put = client_.upload(path, file, offset);
   sending.retry.answered();
-  // An earlier connection delivered more bytes between the two requests.
+  // 409: an earlier connection delivered more bytes between the two requests.
   if (put && put->status == 409) return refused({Errc::unavailable, problem_of(*put).error.message});
   return checked(std::move(put));
 }

@@ -1,5 +1,5 @@
-// A coordinator's HTTP API as function calls: addresses and tokens from options and environment, problem
-// details as errors.
+// A coordinator's HTTP API as function calls. Addresses and tokens come from options and environment; error
+// responses ("problem details", RFC 9457) become errors.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -39,10 +39,11 @@ class FarmApi {
   // receives a message for each upload.
   Answer<Json> submit(const LocalScene& scene, const JobSpec& spec,
                       const std::function<void(const std::string&)>& on_progress);
-  // Uploads a file unless the coordinator has it; specs refer to it by the digest.
+  // Uploads a file unless the coordinator has it. Returns its digest, by which a spec refers to it.
   Answer<Digest> upload(const std::filesystem::path& file,
                         const std::function<void(const std::string&)>& on_progress);
-  // Sends an archive unchanged; `query` comes from spec_query().
+  // Sends an archive of a scene unchanged, to create a job from it. `type` comes from bundle_type(), `query`
+  // from spec_query().
   Answer<Json> submit_bundle(const std::filesystem::path& file, const std::string& type,
                              const std::string& query);
 
@@ -50,12 +51,12 @@ class FarmApi {
   explicit FarmApi(HttpClient client) : client_(std::move(client)) {}
   Answer<void> upload_missing(const LocalScene& scene, const JobSpec& spec, const Digest& text,
                               const std::function<void(const std::string&)>& on_progress);
-  // Sends a file, and resumes where the connection broke.
+  // Sends a file. If the connection breaks, continues after the last byte that the coordinator has.
   Answer<HttpResponse> send_file(const std::string& path, const std::filesystem::path& file);
   struct Sending {
     RetryPolicy retry;
     std::uint64_t reached = 0;  // the most bytes that the coordinator has acknowledged
-    int barren = 0;             // attempts since that last increased
+    int barren = 0;             // attempts since `reached` last increased
   };
   Answer<HttpResponse> send_rest(const std::string& path, const std::filesystem::path& file,
                                  Sending& sending);

@@ -94,7 +94,8 @@ bool is_over(const json& job) {
   return state == "done" || state == "failed" || state == "cancelled";
 }
 
-// For a job that ends by target error or time only, `spp` is a limit that the user did not set.
+// Describes the samples done and to be done. For a job that ends by target error or time only, `spp` is a
+// limit that the user did not set.
 std::string samples(const json& job) {
   const std::string done = number(job, "spp_done", "{:.6g}"), limit = number(job, "spp", "{:.0f}");
   const auto asked = job.find("spp_asked");

@@ -13,14 +13,14 @@ struct WatchOptions {
   bool quiet = false;
   bool json = false;  // print the job as one JSON line on stdout after each change
 };
-// The finished job, or the error for which it cannot be followed. Waits for a coordinator that is unreachable
-// for a while (a restart).
+// Waits until the job `id` ends and returns it, or the error because of which it cannot be followed. If the
+// coordinator cannot be reached for a while (a restart), keeps trying.
 FarmApi::Answer<nlohmann::json> watch_job(FarmApi& api, const std::string& id, const WatchOptions& options);
 
 ProgressFigures progress_of(const nlohmann::json& job);
 
-// For a finished job prints the error of its image (with `quiet` only if it is not to be trusted) and returns
-// kOk; otherwise prints why it is not done and returns kFailed.
+// Prints how a job ended. If it is done, prints the error of its image (with `quiet` only if the error is not
+// to be trusted) and returns kOk; otherwise prints why it is not done and returns kFailed.
 int print_end(const nlohmann::json& job, bool quiet);
 
 }  // namespace ls::cli

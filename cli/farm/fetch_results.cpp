@@ -19,7 +19,8 @@ struct Download {
   std::string path, option, file;
 };
 
-// Accepts bounded whole numbers only: they are untrusted and become part of file names.
+// Returns the frame number in a farm's answer. Only bounded whole numbers are accepted, because they are
+// untrusted and become part of file names.
 std::optional<std::uint32_t> frame_number(const json& frame) {
   const int number = frame.is_object() ? int_field(frame, "frame", -1) : -1;
   if (number < 0 || number > static_cast<int>(kMaxFrameNumber)) return std::nullopt;

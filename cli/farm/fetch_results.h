@@ -18,8 +18,9 @@ struct Results {
 Result<void> check_outputs(const std::string& option, const std::string& name,
                            const std::optional<FrameRange>& frames);
 
-// For a sequence, fetches every frame that has data and lists the others; fetches one report for the whole
-// sequence if its name has no #. Returns the exit code.
+// Downloads the results of job `id`; returns the exit code. For a sequence (a job with several frames),
+// downloads every frame that has data and names the others. A report name without # gets one report for the
+// whole sequence.
 int fetch_results(FarmApi& api, const std::string& id, const Results& results);
 
 }  // namespace ls::cli

@@ -185,7 +185,7 @@ Result<HttpResponse> HttpClient::State::perform(const std::string& path, const H
                 fmt::format("the answer to {} is larger than {} bytes", path, kMaxAnswerBytes));
   if (receiver.write_failed)
     return fail(Errc::resource_exhausted, "the answer cannot be written: is the disk full?");
-  // An upload was rejected midway: the answer is more informative than the broken connection.
+  // The server rejected an upload midway: its response is more informative than the broken connection.
   if (code == CURLE_SEND_ERROR && status >= 400) return response;
   const std::string asked = urls[current];
   if (code == CURLE_UNSUPPORTED_PROTOCOL)
@@ -216,7 +216,7 @@ Result<HttpResponse> HttpClient::request(std::string_view method, const std::str
   return state_->perform(path, headers, nullptr);
 }
 
-// Uses PUT unless another method is set.
+// Sends a file by PUT, unless another method is set.
 Result<HttpResponse> HttpClient::State::send(const std::string& path, const fs::path& file,
                                              std::string_view content_type,
                                              std::optional<std::uint64_t> offset) {

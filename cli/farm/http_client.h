@@ -22,8 +22,9 @@ struct HttpResponse {
 class HttpClient {
  public:
   struct Options {
-    // "https://farm.example:8080"; http or https, with or without a path before /api. If several coordinators
-    // share a farm, several addresses separated by commas: if one does not answer, the next is tried.
+    // The coordinator's address, such as "https://farm.example:8080": http or https, with or without a path
+    // before /api. If several coordinators share a farm, these are their addresses separated by commas: if
+    // one does not answer, the client tries the next.
     std::string url;
     std::string token;  // sent as a bearer token; may be empty
     std::string ca;     // file of CA certificates to trust instead of the system's; may be empty
@@ -33,13 +34,13 @@ class HttpClient {
   ~HttpClient();
   HttpClient(HttpClient&&) noexcept;
 
-  // `path` begins with "/". Errors: unavailable (no connection, cut off, no trusted certificate: the message
-  // says which), resource_exhausted (the answer is larger than kMaxAnswerBytes). Any status counts as a
-  // response.
+  // Sends a request and returns the response, whatever its status. `path` begins with "/". Errors:
+  // unavailable (no connection, a connection that broke, or no trusted certificate: the message says which),
+  // resource_exhausted (the response is larger than kMaxAnswerBytes).
   Result<HttpResponse> request(std::string_view method, const std::string& path, std::string_view body = {},
                                std::string_view content_type = "application/json");
-  // PUTs a file's bytes without holding them in memory; with an offset only those after it, as a part of the
-  // whole that the server keeps if the connection breaks.
+  // PUTs the bytes of a file without holding them all in memory. With `offset`, sends only the bytes from
+  // there on; the server appends them to those that it has, and keeps what arrives if the connection breaks.
   Result<HttpResponse> upload(const std::string& path, const std::filesystem::path& file,
                               std::optional<std::uint64_t> offset = std::nullopt);
   // POSTs a file; the coordinator may take up to an hour to answer, because it unpacks the archive first.

@@ -1,4 +1,5 @@
-// Retries while a coordinator is unreachable for a while: a restart, a proxy in between, too many requests.
+// Decides whether to repeat a failed request: a coordinator may be unreachable for a while because of a
+// restart, a proxy in between, or too many requests.
 #pragma once
 
 #include "common/base/clock.h"
@@ -8,8 +9,9 @@ namespace ls::cli {
 
 class RetryPolicy {
  public:
-  // True if the failed request should be retried; it has then waited, longer each time. False if the error is
-  // permanent, or the coordinator has been unreachable for two minutes since the last answered().
+  // Waits, each time longer, and returns true if the failed request should be repeated. Returns false without
+  // waiting if `error` is permanent, or if the coordinator has been unreachable for two minutes since the
+  // last answered().
   bool again(const Error& error);
   void answered();
 
@@ -19,7 +21,7 @@ class RetryPolicy {
   int pause_milliseconds_ = 0;
 };
 
-// Runs `call`, which must be repeatable, until it succeeds or RetryPolicy gives up.
+// Runs `call`, which must be repeatable, until it succeeds or RetryPolicy::again() returns false.
 template <class Call>
 auto with_retries(Call call) {
   RetryPolicy retry;

@@ -1,4 +1,5 @@
-// `submit` of an archive: it is sent unchanged, with the options in the query.
+// `submit` of an archive (a scene with its files): the archive is sent unchanged, with the options in the
+// query of the request.
 #pragma once
 
 #include <optional>
@@ -8,12 +9,13 @@
 
 namespace ls::cli {
 
-// "application/zip" or "application/x-tar" by the file's name (.zip, .tar, .tar.gz, .tgz); nullopt: it is a
-// scene.
+// Returns "application/zip" or "application/x-tar" according to the file's name (.zip, .tar, .tar.gz, .tgz);
+// nullopt: the file is a scene, not an archive.
 std::optional<std::string> bundle_type(const std::string& file);
 
-// The spec as query parameters: "?spp=8&define=a%3D1", or empty. Options that were not given are omitted,
-// because the bundle may set them; `with_priority`: the priority was given.
+// Returns the spec as query parameters, such as "?spp=8&define=a%3D1", or an empty text. Options that were
+// not given are omitted, because the archive may set them. A priority has no such absent value:
+// `with_priority` says whether it was given.
 std::string spec_query(const JobSpec& spec, bool with_priority);
 
 }  // namespace ls::cli

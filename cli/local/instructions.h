@@ -9,16 +9,16 @@ namespace ls::cli {
 
 class InstructionCounter {
  public:
-  // unavailable: the machine has no such counter (most virtual machines), or does not allow its use. `opener`
-  // returns a descriptor from which counts of eight bytes can be read, or -1 with errno set; tests replace
-  // it.
+  // Opens the counter for the calling thread. unavailable: the machine has no such counter (most virtual
+  // machines), or does not allow its use. `opener` returns a descriptor from which counts of eight bytes can
+  // be read, or -1 with errno set; tests pass their own.
   static Result<InstructionCounter> open(int (*opener)() = &of_this_thread);
   InstructionCounter(InstructionCounter&& other) noexcept;
   InstructionCounter& operator=(InstructionCounter&&) = delete;
   ~InstructionCounter();
 
-  // Instructions in user mode of the thread that opened it and of all threads it has started since. Counts
-  // vary slightly from run to run.
+  // Returns the number of instructions executed in user mode by the thread that opened the counter and all
+  // threads that it has started since. The number varies slightly from run to run.
   Result<std::uint64_t> read() const;
 
  private:

@@ -33,18 +33,18 @@ class LocalFarm {
   Result<Digest> adopt(const std::filesystem::path& file);
   tl::expected<JobId, coordinator::Rejected> submit(const LocalScene& scene, const JobSpec& spec);
 
-  // Renders the submitted jobs until stop(). `on_result` receives every finished unit, on the agent's thread.
-  // Call once.
+  // Renders the submitted jobs until stop(). `on_result` is called with the result of every finished unit
+  // (one tile and range of samples), on the agent's thread. Call once.
   Result<void> start(std::function<void(const UnitResult&)> on_result);
   void stop();
 
-  // Observations of the worker.
+  // What has been observed of the worker.
   double load_seconds() const;
-  std::optional<std::string> scene_fault() const;  // why no world could be built from the scene
+  std::optional<std::string> scene_fault() const;  // why the scene could not be prepared for rendering
   std::optional<Error> agent_error() const;        // the error with which the agent ended
 
  private:
-  struct Watched;  // the backend, with observation
+  struct Watched;  // wraps the render backend and records how it fares
   explicit LocalFarm(Options options);
   Result<std::unique_ptr<worker::RenderBackend>> make_backend() const;
 
@@ -61,7 +61,7 @@ class LocalFarm {
   std::jthread thread_;
 };
 
-// The part of --isolate that runs in the child: `lightshaft --render-child THREADS`.
+// Runs the render child, the child process in which --isolate renders: `lightshaft --render-child THREADS`.
 inline constexpr const char* kRenderChildFlag = "--render-child";
 int run_render_child(const char* threads);
 

@@ -18,7 +18,8 @@ struct HereFile final : worker::BlobFile {
   std::filesystem::path file;
 };
 
-// Named through this process's /proc entry, so that a render child can open it too.
+// A file in memory. Its path leads through this process's /proc entry, so that a render child (a child
+// process that renders) can open it too.
 struct MemoryFile final : worker::BlobFile {
   explicit MemoryFile(coordinator::File f)
       : file(std::move(f)), name(fmt::format("/proc/{}/fd/{}", ::getpid(), file.fd())) {}

@@ -1,5 +1,6 @@
-// Gives the agent the blobs of an in-memory coordinator as files: adopted files stay where they are; blobs in
-// memory (the canonical scene) become memory files, which leave nothing behind.
+// Gives the worker agent in this process the blobs (files by digest) of the in-memory coordinator as files.
+// Adopted files stay where they are; blobs in memory (the canonical scene) become memory files, which leave
+// nothing behind.
 #pragma once
 
 #include "coordinator/store/blobs/memory_blobs.h"
@@ -10,7 +11,7 @@ namespace ls::cli {
 class LocalBlobFiles final : public worker::BlobFiles {
  public:
   explicit LocalBlobFiles(std::shared_ptr<coordinator::MemoryBlobs> blobs) : blobs_(std::move(blobs)) {}
-  // Its errors are final: there is no point in waiting for this machine to recover.
+  // Errors of acquire() are final: there is no point in waiting for this machine to recover.
   Result<std::shared_ptr<const worker::BlobFile>> acquire(const BlobRef& blob) override;
   std::vector<Digest> held(std::size_t) const override { return {}; }
 

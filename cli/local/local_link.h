@@ -11,8 +11,8 @@ namespace ls::cli {
 
 class LocalLink final : public worker::CoordinatorLink {
  public:
-  // `coordinator` must outlive the link. `on_result`, if given, receives every result before the coordinator
-  // does.
+  // `coordinator` must outlive the link. `on_result`, if given, is called with every result before the
+  // coordinator receives it.
   explicit LocalLink(coordinator::Coordinator& coordinator,
                      std::function<void(const UnitResult&)> on_result = {})
       : coordinator_(coordinator), on_result_(std::move(on_result)) {}

@@ -28,8 +28,8 @@ using coordinator::JobView;
 
 constexpr auto kProgressPeriod = std::chrono::milliseconds(200);
 
-// Stores units besides the image. add() is called on the agent's thread, everything else before or after
-// that.
+// Stores the results of units in other places than the image. add() is called on the worker agent's thread,
+// everything else before or after that thread runs.
 struct Keepers {
   std::optional<PartialDir> partials;
   std::mutex mutex;
@@ -142,7 +142,7 @@ class LocalRender {
       if (const auto fault = farm_->scene_fault()) return print_rejected(cli::scene_fault(scene_, *fault));
       return print_error({Errc::internal, view->error});
     }
-    // A full disk in the folder of partials does not affect the image.
+    // An error in the folder of partials, such as a full disk, does not affect the image.
     if (keepers_.trouble) complain(keepers_.trouble->message);
     const bool cut = view->state != JobState::done;
     if (cut && view->spp_done == 0) {

@@ -16,7 +16,7 @@ struct LocalRenderOptions {
   std::filesystem::path out;
   std::optional<std::filesystem::path> report, html, partial_dir, reference;
 };
-// Returns the exit code.
+// Renders the scene, and writes the output files; returns the exit code.
 int render_locally(const LocalScene& scene, const LocalRenderOptions& options);
 
 }  // namespace ls::cli

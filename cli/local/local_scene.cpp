@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMostShown = 200;  // characters of names in one message
 
-// A folder that records which files were requested.
+// A folder of assets that records which files were requested.
 class RecordedFolder final : public AssetSource {
  public:
   explicit RecordedFolder(fs::path folder) : folder_(std::move(folder)) {}
@@ -42,7 +42,7 @@ class RecordedFolder final : public AssetSource {
     texts_ += *text;
     return text;
   }
-  // The files requested since the last call.
+  // Returns the files requested since the last call.
   std::map<std::string, LocalFile> take_files() { return std::exchange(files_, {}); }
   std::string take_included_texts() { return std::exchange(texts_, {}); }
 
@@ -52,7 +52,7 @@ class RecordedFolder final : public AssetSource {
   std::string texts_;  // the reader limits its size
 };
 
-// The $names in a text, each as long as possible.
+// Returns the $names in a text, each as long as possible.
 std::set<std::string> parameters_in(const std::string& text) {
   const auto is_name = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
   std::set<std::string> names;
@@ -64,8 +64,8 @@ std::set<std::string> parameters_in(const std::string& text) {
   return names;
 }
 
-// A -D that nothing in the scene uses is probably a typing error. ($ab may also mean the value of $a followed
-// by b.)
+// Returns the name of a -D option that nothing in the scene uses, which is probably a typing error. ($ab in
+// the scene may also mean the value of $a followed by the letter b.)
 std::optional<std::string> unused_define(const std::map<std::string, std::string>& defines,
                                          const std::string& texts) {
   if (defines.empty()) return std::nullopt;

@@ -31,17 +31,17 @@ struct LocalScene {
   std::vector<Diagnostic> warnings;
   std::map<std::string, LocalFile> files;  // by the name in the scene: assets and included scene files
   std::optional<std::uint32_t> frame;      // the frame for which it was read
-  // Assets that a job uses, with an integrator that ignores media and with one that does not: other assets
-  // need not be uploaded.
+  // The assets that a job uses: first with an integrator that ignores media, second with one that does not.
+  // Other assets need not be uploaded.
   std::array<std::set<Digest>, 2> needed = {};
 };
 
 // True if the job uses this file of the scene.
 bool is_needed(const LocalScene& scene, const JobSpec& spec, const LocalFile& file);
 
-// File names are relative to the scene's folder. `strict`: warnings are errors. `frame`: for sequences.
-// `labels`: include the names of shapes and materials, which are part of the scene if the job has Cryptomatte
-// layers.
+// Reads the scene at `path`, and the files that it names, relative to the scene's folder. `strict`: warnings
+// are errors. `frame` is the frame number, for a sequence (a job that renders several frames). `labels`:
+// include the names of shapes and materials, which are part of the scene if the job has Cryptomatte layers.
 tl::expected<LocalScene, coordinator::Rejected> read_local_scene(
     const std::string& path, const std::map<std::string, std::string>& defines, bool strict,
     std::optional<std::uint32_t> frame = {}, bool labels = false);
@@ -57,8 +57,8 @@ class SceneReader {
 
   tl::expected<LocalScene, coordinator::Rejected> read(std::optional<std::uint32_t> frame,
                                                        bool labels = false);
-  // Reads all frames, or returns what is wrong with them: every missing file, up to 20. The result has the
-  // scene of the first frame, the files of all frames, and each warning once.
+  // Reads the scene for all frames. Returns the scene of the first frame, the files of all frames, and each
+  // warning once; or, if a frame has errors, the errors of all frames (up to 20), such as every missing file.
   tl::expected<LocalScene, coordinator::Rejected> read_all(const FrameRange& frames);
 
  private:

@@ -17,15 +17,16 @@ struct LocalWorld {
   scene::Needs needs;
   std::uint64_t scene_bytes = 0;  // of the canonical scene, as sent to workers
 };
-// Resolves the settings and checks the limits exactly as for a job.
+// Builds the world (the scene prepared for tracing). Resolves the settings and checks the limits exactly as
+// for a job.
 tl::expected<LocalWorld, coordinator::Rejected> build_local_world(const LocalScene& scene,
                                                                   const JobSpec& spec, int threads);
 
-// The world for the settings with which an image was rendered; no setting is taken from the scene.
+// Builds the world for the settings with which an image was rendered; no setting is taken from the scene.
 tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> build_world_again(
     const LocalScene& scene, const RenderSettings& settings, int threads);
 
-// Turns an error in one of the scene's files into a diagnostic of the scene as a whole.
+// Turns an error in one of the scene's files, `text`, into a diagnostic of the scene as a whole.
 coordinator::Rejected scene_fault(const LocalScene& scene, const std::string& text);
 
 }  // namespace ls::cli

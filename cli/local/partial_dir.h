@@ -1,4 +1,5 @@
-// Stores every unit's partial EXR of a render in a folder, for `lightshaft merge`.
+// Stores the partial (the pixel sums) of every unit of a render as an EXR file in a folder, for `lightshaft
+// merge`. A unit is one tile and one round (range of samples).
 #pragma once
 
 #include <filesystem>
@@ -15,13 +16,14 @@ namespace ls::cli {
 
 class PartialDir {
  public:
-  // Creates the folder. Files of earlier renders stay, except those of the same tile and round, which are
-  // replaced.
+  // Creates the folder if it is missing. Files of earlier renders stay, except those of the same tile and
+  // round, which are replaced.
   static Result<PartialDir> open(std::filesystem::path folder);
 
   Result<void> keep(const UnitResult& result);
-  // Removes stored rounds that the image does not contain: a tile that reached the target error has units
-  // that were rendered ahead and dropped. `folded`: rounds of each tile.
+  // Removes stored rounds that are not part of the image: when a tile reaches the target error, those of its
+  // units that were rendered ahead are dropped. `folded` has the number of rounds of each tile that are part
+  // of the image.
   Result<void> drop_unfolded(std::span<const RoundIndex> folded);
 
   std::filesystem::path path(TileIndex tile, RoundIndex round) const;

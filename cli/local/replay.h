@@ -8,7 +8,7 @@
 
 namespace ls::cli {
 
-// Prints its value; returns the exit code.
+// Prints the sample's value; returns the exit code.
 int replay_sample(const LocalScene& scene, const JobSpec& spec, int threads, std::pair<int, int> pixel,
                   std::uint64_t sample);
 

@@ -1,5 +1,5 @@
-// Renders the same small image with every integrator variant that covers a scene: checks that they give the
-// same bits, and measures their cost.
+// Renders the same small image with every variant of the integrator (compiled for a subset of its features)
+// that covers a scene: checks that all give the same bits, and measures their cost.
 #pragma once
 
 #include <functional>
@@ -17,15 +17,15 @@ struct VariantBits {
   Digest sums;
   std::optional<double> instructions;  // per path; nullopt if they cannot be counted
 };
-// Results for all covering variants, cheapest first, which is the one used for rendering.
+// The results for all variants that cover the scene, cheapest first; renders use the first one.
 struct VariantBitsList {
   std::vector<VariantBits> all;  // empty: not requested
   std::string uncounted;         // why instructions are missing; empty: none are
 };
 
-// `render` renders `paths` paths with the named variant and returns the digest of their sums. `counter`: of
-// this thread, or the reason why there is none. If counting fails for one variant, only its figure is
-// missing, with the reason.
+// Measures the variants called `names`. `render` renders `paths` paths with the variant of the given name and
+// returns the digest of their sums. `counter` counts the instructions of this thread, or is the reason why
+// they cannot be counted. If counting fails for one variant, only its figure is missing, with the reason.
 VariantBitsList measure_variants(const std::vector<std::string>& names, double paths,
                                  const Result<InstructionCounter>& counter,
                                  const std::function<Digest(const std::string&)>& render);

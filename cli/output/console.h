@@ -13,16 +13,17 @@ namespace ls::cli {
 
 enum ExitCode : int { kOk = 0, kFailed = 1, kUsage = 2 };
 
-// Each prints what is wrong and returns the command's exit code.
+// Each of these prints what is wrong and returns the exit code with which the command is to end.
 int usage_error(const std::string& text);  // kUsage
 int print_error(const Error& error);       // kUsage if the input is at fault, otherwise kFailed
-// For a rejected scene or job, with its diagnostics if any. kUsage if the input is at fault, otherwise
-// kFailed.
+// Prints why a scene or job was rejected, with its diagnostics if any. Returns kUsage if the input is at
+// fault, otherwise kFailed.
 int print_rejected(const coordinator::Rejected& rejected);
 
 void complain(const std::string& text);  // "lightshaft: error: text" to stderr
 
-// Returns the action's exit code; prints an exception and returns kFailed.
+// Runs `action` and returns its exit code. If it throws, prints the exception's message and returns kFailed.
+// `command` is the command's name, for that message.
 int run_guarded(const std::string& command, const std::function<int()>& action);
 
 void print_diagnostics(const std::vector<Diagnostic>& diagnostics);

@@ -11,7 +11,8 @@ namespace {
 
 using nlohmann::json;
 
-// `object` has the fields `trusted` and `kind`; older coordinators send only the kind.
+// Reads a verdict. `object` has the fields `trusted` and, under `kind_key`, the kind; older coordinators send
+// only the kind.
 Verdict verdict(const json& object, const char* kind_key, const char* words_key) {
   const std::string kind = text_field(object, kind_key);
   const bool untrusted = object.value("trusted", json()) == json(false);
@@ -22,7 +23,7 @@ Verdict verdict(const json& object, const char* kind_key, const char* words_key)
   return out;
 }
 
-// The errors against a reference, each preceded by a comma.
+// Returns the errors against a reference image, each preceded by a comma.
 std::string reference_errors_text(const json& job) {
   const auto reference = job.find("reference");
   if (reference == job.end() || !reference->is_object()) return "";
@@ -56,7 +57,7 @@ std::string estimate_text(const json& job, const char* key, const char* interval
 std::string time_left_text(const json& job, const json& times, const char* key, const char* interval) {
   const auto value = number_field(times, key);
   if (!value) return "-";
-  // A fixed number of samples takes the same time whatever the error.
+  // A job that ends after a fixed number of samples takes the same time whatever the error.
   if (number_field(job, "target_error") && verdict_of(job).doubtful)
     return "at least " + show_seconds(*value);
   const auto ci = interval ? pair_field(times, interval) : std::nullopt;

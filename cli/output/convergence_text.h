@@ -7,7 +7,8 @@
 namespace ls::cli {
 
 struct Verdict {
-  // few pixels carry the error, it has reached a bias floor, or no light has been found yet
+  // True if few pixels carry the error, if the error has reached a bias floor (it no longer falls), or if no
+  // light has been found yet.
   bool doubtful = false;
   std::string words;  // plain text; begins with kDoubt if doubtful
 };
@@ -16,16 +17,21 @@ inline constexpr const char* kDoubt = "don't trust yet";
 Verdict verdict_of(const nlohmann::json& job);            // of GET /jobs/ID
 Verdict verdict_of_report(const nlohmann::json& report);  // of GET /jobs/ID/report
 
-// "0.0123 (0.0118 to 0.0129)", "0.0123 (don't trust yet)", "-".
+// Returns the error that `job` has under `key`, as "0.0123 (0.0118 to 0.0129)", "0.0123 (don't trust yet)",
+// or "-" if it is unknown. `interval` is the key of its interval.
 std::string estimate_text(const nlohmann::json& job, const char* key, const char* interval);
-// "4:12 (3:06 to 5:30)", "at least 4:12" (for a doubtful job with a target), "-".
+// Returns the remaining time that `times` (the job, or a part of it) has under `key`, as "4:12 (3:06 to
+// 5:30)", "at least 4:12" (for a doubtful job with a target), or "-" if it is unknown. `interval` is the key
+// of its interval.
 std::string time_left_text(const nlohmann::json& job, const nlohmann::json& times, const char* key,
                            const char* interval = nullptr);
-// "0.0123", "below the reference's noise", "0.0123 (not to be trusted: ...)"; empty: unknown. `below`: the
-// name of the flag for values below the noise.
+// Returns the error against the reference image that `object` has under `key`: "0.0123", "below the
+// reference's noise", or "0.0123 (not to be trusted: ...)" if `same_seed`, that is, image and reference were
+// rendered with the same seed; empty: unknown. `below` is the key of the flag that says that the error cannot
+// be told from the reference's noise. `digits` is the number of significant digits.
 std::string reference_error_text(const nlohmann::json& object, const char* key, const char* below,
                                  bool same_seed, int digits = 3);
-// One line on the error of a job's image; empty: unknown.
+// Returns one line on the error of a job's image; empty: unknown.
 std::string error_text(const nlohmann::json& job);
 
 }  // namespace ls::cli

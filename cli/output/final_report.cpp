@@ -19,7 +19,7 @@ using nlohmann::json;
 
 double number(const json& object, const char* key) { return number_field(object, key).value_or(0); }
 
-// The cost of reducing the error further.
+// Describes the cost of reducing the error further, from the report's forecast.
 std::string outlook(const json& report, bool doubtful) {
   const auto forecast = report.find("forecast");
   if (forecast == report.end() || !forecast->is_object()) return "";

@@ -1,4 +1,4 @@
-// The report of a local render: the coordinator's, with additions that only this process knows.
+// The report of a local render: the coordinator's report, with additions that only this process knows.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ struct LocalFacts {
 };
 Result<std::string> local_report(const std::string& report, const LocalFacts& facts);
 
-// One line with the main results.
+// Returns one line with the main results of the report.
 std::string report_summary(const std::string& report);
 // Prints numeric health problems to stderr; usually nothing.
 void print_report_health(const std::string& report);

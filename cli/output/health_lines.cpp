@@ -20,7 +20,7 @@ const json* causes_of(const json& job) {
   return causes != health->end() && causes->is_array() ? &*causes : nullptr;
 }
 
-// ", first at pixel 3,4 sample 7"; empty for a cause without a location.
+// Returns "; first at pixel 3,4 sample 7"; empty for a cause without a location.
 std::string place_of(const json& cause) {
   const auto first = cause.find("first");
   if (first == cause.end() || !first->is_array() || first->empty() || !(*first)[0].is_object()) return "";

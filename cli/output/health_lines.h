@@ -7,12 +7,13 @@
 
 namespace ls::cli {
 
-// From the `health` of a report or of a farm's job: each cause with its first location and the command that
-// replays it. Empty: healthy, or unknown.
+// Makes the lines from the `health` of `job`, which is a report or a farm's answer about a job: each cause
+// with its first location and the command that renders that sample again. Empty: the job is healthy, or its
+// health is unknown.
 std::vector<std::string> health_lines(const nlohmann::json& job);
 bool unclean(const nlohmann::json& job);
 
-// Prints them to stderr, under a heading.
+// Prints these lines to stderr, under a heading.
 void print_health(const nlohmann::json& job);
 
 }  // namespace ls::cli

@@ -8,7 +8,7 @@
 
 namespace ls::cli {
 
-// `report`: the JSON report of this job.
+// Writes the page to `file`. `report` is the JSON report of this job.
 Result<void> save_html_report(const std::filesystem::path& file, const coordinator::Coordinator& coordinator,
                               const JobId& job, const std::string& report);
 

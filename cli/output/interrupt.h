@@ -1,5 +1,5 @@
-// Handles Ctrl-C and SIGTERM while something runs: the first requests a stop, the second ends the process in
-// the usual way.
+// Handles Ctrl-C and SIGTERM while something runs: the first signal requests a stop, the second ends the
+// process in the usual way.
 #pragma once
 
 #include <atomic>
@@ -8,7 +8,7 @@
 
 namespace ls::cli {
 
-// Create before any other thread, so that they inherit the blocked signals.
+// An Interrupt must be created before any other thread, so that all threads inherit the blocked signals.
 class Interrupt {
  public:
   Interrupt();

@@ -15,7 +15,7 @@ struct ProgressFigures {
   double samples_per_second = 0;
   std::optional<double> relmse;
   std::optional<double> eta_seconds;
-  std::string trouble;      // why the job is waiting
+  std::string trouble;      // why the job is waiting, if it is
   std::string frames = {};  // for sequences: "3 of 10 frames"
   std::optional<std::pair<double, double>> eta_ci95 = {};
   std::optional<std::pair<double, double>> relmse_ci95 = {};
@@ -24,14 +24,14 @@ struct ProgressFigures {
   int more_workers = 8;
   bool doubtful = false;  // the error is not reliable yet, nor is the time to a target
 };
-// " 42 % [######          ] 26.9 spp  3.1 M samples/s  relMSE 0.0123 (0.0118 to 0.0129), target 0.001  4:12
-// left (3:06 to 5:30), 1:06 with 8 more". On a narrow terminal whole parts are omitted, in this order: the
-// rate, the effect of more workers, the error's interval, the bar, the forecast's interval, the target. A
-// doubtful job has no intervals, but "don't trust yet" and, with a target, "at least 4:12 left", which are
-// never omitted.
+// Returns the line for the terminal: " 42 % [######          ] 26.9 spp  3.1 M samples/s  relMSE 0.0123
+// (0.0118 to 0.0129), target 0.001  4:12 left (3:06 to 5:30), 1:06 with 8 more". If it is longer than
+// `columns`, whole parts are omitted, in this order: the rate, the effect of more workers, the error's
+// interval, the bar, the forecast's interval, the target. The line of a doubtful job has no intervals but
+// "don't trust yet" and, with a target, "at least 4:12 left", which are never omitted.
 std::string progress_line(const ProgressFigures& figures, int columns);
 
-// Writes to stderr, only if that is a terminal.
+// Draws the line on stderr, only if stderr is a terminal.
 class ProgressBar {
  public:
   explicit ProgressBar(bool quiet);

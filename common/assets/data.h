@@ -31,8 +31,8 @@ struct MeshAttribute {
   std::vector<float> values;  // components interleaved
 };
 
-// A triangle mesh. Three floats per vertex in positions and (if the file has any) normals, two in uvs; three
-// indices per triangle, all below vertex_count(). uvs are as in the file.
+// A triangle mesh: three floats per vertex in `positions` and (if the file has any) in `normals`, two in
+// `uvs`; three indices per triangle, all below vertex_count(). The uvs are as in the file.
 struct MeshData {
   std::vector<float> positions, normals, uvs;
   std::vector<std::uint32_t> indices;
@@ -65,7 +65,7 @@ struct GridData {
   std::uint64_t negatives = 0;  // values below zero in the file, set to 0
 };
 
-// Reads a file of at most `limit` bytes. `name` (as written in the scene) is for messages.
+// Reads a file of at most `limit` bytes. `name` is the file's name as written in the scene, for messages.
 Result<std::vector<std::byte>> read_asset(const std::filesystem::path& path, std::string_view name,
                                           std::uint64_t limit = kMaxAssetBytes);
 

@@ -22,7 +22,8 @@ void on_error(j_common_ptr info) {
   f->base.format_message(info, f->message);
   std::longjmp(f->escape, 1);
 }
-// The library replaces missing data by grey; here a broken file is an error.
+// Treats the library's warnings as errors: the library would replace missing data by grey, but here a broken
+// file is an error.
 void on_message(j_common_ptr info, int level) {
   if (level < 0) on_error(info);
 }

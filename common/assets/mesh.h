@@ -12,20 +12,22 @@
 
 namespace ls {
 
-// v, vt, vn and f; indices may be negative (counted back from the last). Grouping, material and smoothing
-// statements, points, lines and comments are ignored. Each distinct (v, vt, vn) becomes one vertex. Normals
-// and uvs are kept if any face uses them (0 for corners without).
+// Reads the statements v, vt, vn and f of an OBJ file; indices may be negative (counted back from the last).
+// Grouping, material and smoothing statements, points, lines and comments are ignored. Each distinct (v, vt,
+// vn) becomes one vertex. Normals and uvs are kept if any face uses them; corners without them get 0.
 Result<MeshData> decode_obj(std::string_view name, std::span<const std::byte> file);
 
-// ascii, binary_little_endian and binary_big_endian 1.0; element vertex with x y z, optionally nx ny nz and
-// (u v | s t | texture_u texture_v); element face with the list vertex_indices or vertex_index; of other
-// properties the requested `attributes` that exist (ply_attributes.h). Everything else is skipped. Attributes
-// of a face become those of each of its triangles.
+// Reads a PLY file: ascii, binary_little_endian or binary_big_endian, version 1.0. It must have an element
+// `vertex` with x y z, optionally nx ny nz and (u v | s t | texture_u texture_v), and an element `face` with
+// the list vertex_indices or vertex_index. Of the other properties, decode_ply_with() also reads those of the
+// requested `attributes` that exist (ply_attributes.h). Everything else is skipped. Attributes of a face
+// become those of each of its triangles.
 Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file);
 Result<MeshData> decode_ply_with(std::span<const std::string> attributes, std::string_view name,
                                  std::span<const std::byte> file);
 
-// Mitsuba's `.serialized`, versions 3 and 4: mesh number `index` of the file. Vertex colours are skipped.
+// Reads mesh number `index` of a file in Mitsuba's `.serialized` format, version 3 or 4. Vertex colours are
+// skipped.
 bool is_serialized(std::span<const std::byte> file);
 Result<MeshData> decode_serialized(std::string_view name, std::span<const std::byte> file, int index);
 

@@ -6,14 +6,14 @@
 
 namespace ls {
 
-// Indices counted from 0; -1: none.
+// A corner of a face: the indices of its position (v), uv (vt) and normal (vn), counted from 0; -1: none.
 struct Corner {
   std::int64_t v = -1, vt = -1, vn = -1;
   bool operator==(const Corner&) const = default;
 };
 
-// Keyed by a secret, so that a file cannot choose corners whose hashes collide. The resulting mesh does not
-// depend on the secret: vertices are numbered in order of appearance.
+// The hash of a corner. It is keyed by a secret, so that a file cannot choose corners whose hashes collide.
+// The resulting mesh does not depend on the secret: vertices are numbered in order of appearance.
 struct CornerHash {
   std::uint64_t secret = 0;
 

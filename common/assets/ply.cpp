@@ -47,7 +47,7 @@ struct Element {
   std::uint64_t count = 0;
   std::vector<Property> properties;
 
-  // The least number of bytes that one element can take.
+  // Returns the least number of bytes that one element can take.
   std::uint64_t least_bytes(Coding c) const {
     if (c == Coding::ascii) return properties.size();
     std::uint64_t n = 0;
@@ -56,7 +56,7 @@ struct Element {
   }
 };
 
-// Destination of a vertex property: positions 0-2, normals 3-5, uvs 6-7; -1: none.
+// Returns where a vertex property is stored: positions 0-2, normals 3-5, uvs 6-7; -1: nowhere.
 int vertex_slot(std::string_view name) {
   constexpr std::pair<std::string_view, int> kSlots[] = {
       {"x", 0}, {"y", 1}, {"z", 2}, {"nx", 3},        {"ny", 4},        {"nz", 5},        {"u", 6},
@@ -166,7 +166,7 @@ class PlyReader {
     return true;
   }
 
-  // The next number of the body; nullopt at the end or if it is not a number.
+  // Returns the next number of the file's body; nullopt at its end, or if it is not a number.
   std::optional<double> number(const TypeName& t) {
     if (coding_ == Coding::ascii) {
       std::size_t a = rest_.find_first_not_of(" \t\r\n\v\f");
@@ -344,7 +344,7 @@ class PlyReader {
         static_cast<float>(decoded(p.type->type, *v));
     return true;
   }
-  // As in Mitsuba 3.9: integers are sRGB codes, except bytes.
+  // Decodes a colour as Mitsuba 3.9 does: integers are sRGB codes, except bytes.
   static double decoded(Type t, double v) {
     constexpr std::pair<Type, double> kLargest[] = {{Type::i8, 127},
                                                     {Type::i16, 32767},
@@ -358,7 +358,7 @@ class PlyReader {
       }
     return v;
   }
-  // Repeats a face's attributes for each of its triangles, possibly none.
+  // Stores a face's attributes once for each of its triangles, of which there may be none.
   void share_among_triangles(const std::vector<Place>& places, std::size_t triangles) {
     for (const Place& p : places) {
       if (p.attribute < 0 || p.component > 0) continue;

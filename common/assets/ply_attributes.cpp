@@ -24,8 +24,8 @@ std::optional<PlyAttribute> colour(std::span<const std::string_view> names) {
   return std::nullopt;
 }
 
-// Consecutive properties of one prefix whose last characters follow one of the known sequences from its
-// start.
+// Consecutive properties with one prefix. Their last characters are the beginning of one of the sequences in
+// kKinds.
 struct Run {
   std::string_view prefix;
   std::string_view kind;

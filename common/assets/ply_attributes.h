@@ -1,10 +1,11 @@
 // Groups the properties of a PLY element into the attributes that Mitsuba 3.9 sees.
 //
-// r g b, or red green blue, at any position (a fourth, a or alpha, is ignored) are "color". Of the others,
-// only properties whose name ends in an underscore and one character: neighbours foo_x foo_y foo_z, foo_0
-// foo_1 foo_2 or foo_1 foo_2 foo_3 are "foo", foo_r foo_g foo_b are "foo_color"; the first of such a group
-// without the others is a single number. Groups of two or four are no attribute, nor is a later one of the
-// same name.
+// Properties r g b, or red green blue, at any position are the attribute "color"; a fourth property, a or
+// alpha, is ignored. Of the other properties only those count whose name ends in an underscore and one
+// character. Of these, neighbours with one prefix form a group: foo_x foo_y foo_z, foo_0 foo_1 foo_2 or foo_1
+// foo_2 foo_3 are the attribute "foo", foo_r foo_g foo_b are "foo_color", each of three numbers. A group that
+// consists only of its first property is an attribute of one number. Groups of two or four are no attribute.
+// If a group with the same prefix has become an attribute before, later ones are ignored.
 #pragma once
 
 #include <span>
@@ -19,7 +20,8 @@ struct PlyAttribute {
   std::vector<std::size_t> properties;  // one or three
 };
 
-// `names`: of the element's properties in order; empty ones are skipped.
+// Returns the attributes of an element. `names` are those of its properties in order; empty names are
+// skipped.
 std::vector<PlyAttribute> ply_attributes(std::span<const std::string_view> names);
 
 }  // namespace ls

@@ -13,8 +13,8 @@
 
 namespace ls {
 
-// One channel. NaN and infinite values are rejected, naming the node; negative ones become 0 and are counted.
-// The result always has x fastest.
+// Decodes a grid, which has one channel. A value that is NaN or infinite is an error that names its node;
+// negative values become 0 and are counted. The result always has x fastest.
 Result<GridData> decode_raw_grid(std::string_view name, std::span<const std::byte> file, GridOrder order);
 Result<GridData> load_raw_grid(const std::filesystem::path& path, std::string_view name, GridOrder order);
 

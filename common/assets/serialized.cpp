@@ -91,7 +91,7 @@ class SerializedReader {
     return false;
   }
 
-  // The bytes of the mesh from its compressed part on; sets version_.
+  // Returns the bytes of mesh number `index` from its compressed part on; sets version_.
   std::optional<std::span<const std::byte>> find(int index) {
     if (!header(file_)) return std::nullopt;
     if (index == 0) return file_.subspan(4);
@@ -165,7 +165,8 @@ class SerializedReader {
     return false;
   }
 
-  // zlib packs at most 1032 to 1: larger counts are false, and rejected before memory is allocated.
+  // zlib packs at most 1032 to 1: larger counts in the header are false, and are rejected before memory is
+  // allocated.
   bool plausible(std::uint32_t flags, std::uint64_t vertices, std::uint64_t triangles) {
     const std::uint64_t per_vertex =
         3 + (flags & kHasNormals ? 3 : 0) + (flags & kHasUvs ? 2 : 0) + (flags & kHasColours ? 3 : 0);

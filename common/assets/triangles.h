@@ -26,8 +26,9 @@ inline bool is_drawable(const MeshData& m, std::uint32_t a, std::uint32_t b, std
   return area2 > 0;
 }
 
-// Adds the triangles (0, i, i + 1); counts instead those of zero area or with a non-finite vertex. Indices
-// must be in range.
+// Adds a polygon to `m` as triangles of its corners (0, i, i + 1). Triangles of zero area or with a
+// non-finite vertex are not added but counted in m.dropped_triangles. The indices in `corners` must be in
+// range.
 inline void add_polygon(MeshData& m, std::span<const std::uint32_t> corners) {
   for (std::size_t i = 1; i + 1 < corners.size(); ++i) {
     if (is_drawable(m, corners[0], corners[i], corners[i + 1]))

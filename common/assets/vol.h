@@ -12,8 +12,8 @@
 
 namespace ls {
 
-// 1 or 3 channels. NaN and infinite values are rejected, naming the voxel; negative ones become 0 and are
-// counted.
+// Decode a grid of 1 or 3 channels. A value that is NaN or infinite is an error that names its voxel;
+// negative values become 0 and are counted.
 Result<GridData> decode_vol(std::string_view name, std::span<const std::byte> file);
 Result<GridData> load_vol(const std::filesystem::path& path, std::string_view name);
 

@@ -6,7 +6,7 @@
 namespace ls {
 
 using Duration = std::chrono::nanoseconds;
-// Monotonic; not comparable between processes.
+// A point in time of the monotonic clock; not comparable between processes.
 using TimePoint = std::chrono::time_point<std::chrono::steady_clock, Duration>;
 
 class Clock {
@@ -22,7 +22,7 @@ class SystemClock final : public Clock {
   }
 };
 
-// Advances only on request; for tests and simulation.
+// A clock that advances only when it is told to; for tests and simulation.
 class FakeClock final : public Clock {
  public:
   TimePoint now() const override { return now_; }

@@ -9,7 +9,8 @@
 
 namespace ls {
 
-// The gRPC codes in use; one table each maps them to gRPC and to HTTP.
+// The gRPC status codes that this project uses. One table maps them to gRPC's numbers, another to HTTP status
+// codes.
 enum class Errc {
   invalid_argument,  // the input is wrong; sending it again will not help
   not_found,         // no such job, blob, worker, file

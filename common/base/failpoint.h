@@ -7,7 +7,7 @@
 
 namespace ls {
 
-// In the order of a unit's life.
+// The names of all steps, in the order in which a unit passes through them.
 inline constexpr std::string_view kSteps[] = {
     // coordinator                            worker
     "lease-sent",        "lease-received",    "unit-rendered",    "result-sent",   "result-arrived",

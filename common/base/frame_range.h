@@ -1,5 +1,5 @@
-// The frames of a sequence: "1-10", "1-10x2" (every second one), "7". In file names a run of # stands for the
-// frame number, zero-padded to the run's length.
+// The frames of a sequence (a job that renders one image per frame), as text: "1-10", "1-10x2" (every second
+// frame), "7". In file names a run of # stands for the frame number, zero-padded to the run's length.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 namespace ls {
 
 inline constexpr std::uint32_t kMaxFrameNumber = 9'999'999;
-inline constexpr std::uint32_t kMaxFrames = 10'000;  // of one sequence
+inline constexpr std::uint32_t kMaxFrames = 10'000;  // largest number of frames in one sequence
 
 struct FrameRange {
   std::uint32_t first = 0, last = 0;  // both included
@@ -25,12 +25,13 @@ struct FrameRange {
   bool operator==(const FrameRange&) const = default;
 };
 
-// invalid_argument: the message has the text, the correct syntax and any limit exceeded.
+// invalid_argument: `text` is not a range of frames; the message quotes it, and says the correct syntax and
+// any limit exceeded.
 Result<FrameRange> parse_frames(std::string_view text);
 std::string to_string(const FrameRange& range);
 
-// "fog.####.vdb" of frame 7 is "fog.0007.vdb"; every run of # is replaced. A number longer than its run is
-// written in full.
+// Returns `name` with every run of # replaced by the frame number: "fog.####.vdb" of frame 7 is
+// "fog.0007.vdb". A number with more digits than its run is written in full.
 std::string numbered(std::string_view name, std::uint32_t frame);
 bool has_frame_number(std::string_view name);  // true if it contains a #
 

@@ -22,11 +22,11 @@ void log_info(std::string_view keys, std::string_view text);
 void log_warn(std::string_view keys, std::string_view text);
 void log_error(std::string_view keys, std::string_view text);
 
-// Escapes external text for use as the value of a key, so that it cannot end the value or begin another key
-// or line.
+// Escapes external text for use as the value of a key, so that the text cannot end the value, nor begin
+// another key or another line.
 std::string log_value(std::string_view text);
 
-// The line without time and level; for tests.
+// Returns the line that is logged, without its time and level; for tests.
 std::string log_line(LogFormat format, std::string_view keys, std::string_view text);
 
 }  // namespace ls

@@ -1,4 +1,4 @@
-// std::visit(overloaded{...}, variant)
+// overloaded{...} joins lambdas into one visitor: std::visit(overloaded{...}, variant).
 #pragma once
 
 namespace ls {

@@ -12,7 +12,7 @@ struct Character {
   std::size_t bytes = 0;
 };
 
-// The UTF-8 character at the start of the text; nullopt if the bytes are not UTF-8.
+// Returns the UTF-8 character at the start of the text; nullopt if the bytes are not UTF-8.
 std::optional<Character> first_character(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const std::uint32_t lead = byte(0);

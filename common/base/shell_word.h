@@ -6,8 +6,9 @@
 
 namespace ls {
 
-// Unchanged if the shell gives nothing in it a meaning; otherwise quoted. Control characters are written as
-// escapes ($'...', as bash, zsh and ksh read them), so the word can be shown on a terminal and in a log line.
+// Returns `text` unchanged if the shell gives no character of it a special meaning, otherwise quoted. Control
+// characters are written as escapes ($'...', as bash, zsh and ksh read them), so the word can be shown on a
+// terminal and in a log line.
 std::string shell_word(std::string_view text);
 
 }  // namespace ls

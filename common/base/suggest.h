@@ -9,17 +9,19 @@
 
 namespace ls {
 
-inline constexpr std::size_t kMaxNameWork = 4'000'000;  // cells of edit distance tables for one suggestion
+// the most cells of edit distance tables that are computed for one suggestion
+inline constexpr std::size_t kMaxNameWork = 4'000'000;
 
-// The nearest of `known` by edit distance (a swap of neighbours counts once; case and '_' are ignored);
-// nullopt if it differs by more than a third of the longer name. If there are very many names, only as many
-// are compared as kMaxNameWork allows.
+// Returns the name in `known` that is nearest to `given` by edit distance (a swap of neighbouring letters
+// counts once; case, '_' and '-' are ignored). nullopt: even the nearest name differs by more than a third of
+// the letters of the longer of the two. If `known` is very long, only as many names are compared as
+// kMaxNameWork allows.
 std::optional<std::string> nearest_name(std::string_view given, std::span<const std::string> known);
 
-// "; known here: a, b, c"; empty if there are none, or too many for a message.
+// Returns "; known here: a, b, c", or an empty text if there are no names, or too many for a message.
 std::string listing(std::span<const std::string> known);
 
-// "; did you mean 'x'?" or, if none is near and alternatives are few, "; known: a, b, c"; may be empty.
+// Returns "; did you mean 'x'?", or listing(known) if no name is near.
 std::string suggestion(std::string_view given, std::span<const std::string> known);
 
 }  // namespace ls

@@ -21,13 +21,13 @@ struct HealthNote {
   bool operator==(const HealthNote&) const = default;
 };
 
-// `command`: replay_command() of the job.
+// Returns a note for each cause in `health`. `command` is replay_command() of the job.
 std::vector<HealthNote> health_notes(const Health& health, const std::string& command);
-// Merges the notes of another frame into those of earlier frames.
+// Merges the notes `more` of frame number `frame` into `notes`, those of earlier frames.
 void add_notes(std::vector<HealthNote>& notes, std::span<const HealthNote> more, std::uint32_t frame);
 
-// {"clean", "nonfinite", "negative", "majorant_violations", "causes": [{"cause", "effect": "rejected" |
-// "kept" | "input", "count", "text", "frame", "first": [{"pixel": [x, y], "sample"}], "replay"}]}
+// Returns {"clean", "nonfinite", "negative", "majorant_violations", "causes": [{"cause", "effect": "rejected"
+// | "kept" | "input", "count", "text", "frame", "first": [{"pixel": [x, y], "sample"}], "replay"}]}.
 std::string health_json(const Health& totals, std::span<const HealthNote> notes);
 
 }  // namespace ls

@@ -119,7 +119,7 @@ std::optional<std::uint64_t> Fields::whole(const char* key, std::uint64_t least,
 std::optional<std::int64_t> Fields::integer(const char* key, std::int64_t least, std::int64_t most) {
   const Json* v = find(key);
   if (!v) return std::nullopt;
-  // An unsigned value above the signed range would become negative.
+  // A value above the signed range is rejected, because it would become negative.
   const bool fits =
       v->is_number_integer() && !(v->is_number_unsigned() && v->get<std::uint64_t>() > INT64_MAX);
   if (fits && v->get<std::int64_t>() >= least && v->get<std::int64_t>() <= most)

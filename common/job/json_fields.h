@@ -16,12 +16,12 @@ namespace ls::job {
 
 using Json = nlohmann::json;
 
-// Makes text fit for messages: cut to `most` bytes and ASCII only, so that any input can go into a log line
-// or a JSON string.
+// Returns `text` cut to `most` bytes and made ASCII, so that any input can go into a log line or a JSON
+// string.
 std::string printable(std::string_view text, std::size_t most);
 
-// Rejects anything but an object, duplicate keys, and texts that are too long or too deeply nested. `what`:
-// the name for messages, such as "spec".
+// Parses the text of a JSON object. Anything else, duplicate keys, and texts that are too long or too deeply
+// nested are errors. `what` is the name of the text for messages, such as "spec".
 Result<Json> parse_object(std::string_view text, std::string_view what);
 
 class Fields {
@@ -30,7 +30,7 @@ class Fields {
 
   const std::optional<Error>& error() const { return error_; }  // the first error
 
-  // nullopt if the key is absent or its value is wrong.
+  // Each of these returns nullopt if the key is absent or its value is wrong.
   std::optional<std::uint64_t> whole(const char* key, std::uint64_t least, std::uint64_t most);
   std::optional<std::int64_t> integer(const char* key, std::int64_t least, std::int64_t most);
   std::optional<double> positive(const char* key, double most);

@@ -9,7 +9,8 @@
 namespace ls {
 
 inline constexpr int kMinTile = 8, kMaxTile = 256;  // pixels per side
-// Tiles x rounds. 2^24 samples are possible for one small tile (262 thousand rounds), not for a whole frame.
+// Limit of the number of units of a job, which is tiles times rounds. 2^24 samples are possible for one small
+// tile (262 thousand rounds), not for a whole frame.
 inline constexpr std::uint64_t kMaxUnits = std::uint64_t{1} << 26;
 // Size of a film's sums: all AOVs of a UHD frame take about 5 GB, colour alone of the largest frame 3.2 GB.
 inline constexpr std::uint64_t kMaxFilmBytes = std::uint64_t{8} << 30;
@@ -17,8 +18,9 @@ inline constexpr double kMaxSeconds = 1e9;  // limit of a time budget
 inline constexpr double kMaxTargetError = 1e6;
 inline constexpr int kMaxPriority = 1'000'000;                      // absolute value
 inline constexpr std::size_t kMaxSpecBytes = std::size_t{1} << 20;  // size of a spec or settings text
-inline constexpr std::uint64_t kMaxAtOnce = 1'000'000;  // limit of workers or units that a job may occupy
-// bytes that a job may require of a worker
+// The most workers, or leased units, to which a job may limit itself at any one time.
+inline constexpr std::uint64_t kMaxAtOnce = 1'000'000;
+// The most bytes of memory that a job may require of a worker.
 inline constexpr std::uint64_t kMaxMemory = std::uint64_t{1} << 50;
 inline constexpr std::size_t kMaxNames = 64;  // number of names in `aov` and `tags`
 inline constexpr std::size_t kMaxNameBytes = 64;

@@ -9,11 +9,12 @@
 
 namespace ls {
 
-// "lightshaft render SCENE" with all options that determine the value of a sample, each word quoted for a
-// shell. `scene`: the job's name for it. `frame`: for sequences.
+// Returns "lightshaft render SCENE" with all options that determine the value of a sample, each word quoted
+// for a shell. `scene` is the name by which the job calls its scene. `frame` is the frame number, for jobs
+// with frames.
 std::string replay_command(const std::string& scene, const JobSpec& spec,
                            std::optional<std::uint32_t> frame = {});
-// The command for one sample; `command` comes from the function above.
+// Returns the command for one sample of the pixel (x, y). `command` is a result of the function above.
 std::string replay_command(const std::string& command, int x, int y, std::uint64_t sample);
 
 }  // namespace ls

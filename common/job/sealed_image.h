@@ -1,5 +1,5 @@
-// A final EXR of ours, read back with its provenance, so that it can be rendered again and compared. The file
-// is untrusted: sizes are bounded, headers and layers must be as final_exr() writes them.
+// A final EXR of this program, read back with its provenance, so that it can be rendered again and compared.
+// The file is untrusted: sizes are bounded, and headers and layers must be as final_exr() writes them.
 #pragma once
 
 #include <cstddef>
@@ -28,14 +28,15 @@ struct SealedImage {
   TileGrid grid() const { return {picture.size, settings.tile}; }
 };
 
-// invalid_argument: names the header or layer that is missing or wrong.
+// invalid_argument: a header or a layer is missing or wrong; the message names it.
 Result<SealedImage> read_sealed_image(FinalPicture picture, const std::string& name);
 
-// The tile's number of samples according to its pixels. invalid_argument: they disagree.
+// Returns the number of samples of each pixel of the tile, according to the image's layer `spp`.
+// invalid_argument: the tile's pixels have different numbers, or one that this program never renders.
 Result<std::uint64_t> tile_samples(const SealedImage& image, TileIndex tile);
 
-// The tile's first value that differs from what final_exr() would store for the film, in the order of layers.
-// If the image lacks a whole layer, its first pixel in the tile.
+// The place of the first value of a tile, in the order of layers, that differs from what final_exr() would
+// store for the film. If the image lacks a whole layer, it is that layer's first pixel in the tile.
 struct PixelDifference {
   int x = 0, y = 0;
   std::string layer;

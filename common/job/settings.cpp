@@ -41,7 +41,7 @@ void read_defines(Fields& fields, JobSpec& spec) {
   }
 }
 
-// "1-10", or 7: a single frame.
+// Reads the frames, written as a range such as "1-10" or as the number of a single frame.
 void read_frames(Fields& fields, JobSpec& spec) {
   const Json* v = fields.find("frames");
   if (!v) return;

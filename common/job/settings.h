@@ -1,6 +1,6 @@
-// A job's request in two parts: what determines a unit's pixels (RenderSettings), and what concerns only the
-// job as a whole (JobSpec). Raising a job's samples must not change its units' identity, so spp is in the
-// second.
+// A job's request in two parts: RenderSettings determines the pixels of a unit (one tile and range of
+// samples); JobSpec has what concerns only the job as a whole. Raising a job's number of samples must not
+// change the identity of its units, so `spp` is in JobSpec.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +32,8 @@ struct RenderSettings {
 };
 AovSet aovs_of(const RenderSettings& settings);
 
-// The request, as in `spec` of the HTTP API and the options of the command line. Absent: as the scene says.
+// The request, as in `spec` of the HTTP API and the options of the command line. For a member without a
+// value, the scene's setting applies.
 struct JobSpec {
   std::optional<std::uint64_t> spp;
   std::optional<double> target_error;  // relMSE
@@ -62,10 +63,11 @@ Digest digest_of(const RenderSettings& settings);
 Result<void> check_job_size(const RenderSettings& settings, std::uint64_t spp);
 
 std::string canonical_json(const JobSpec& spec);
-// Unknown keys, wrong types and values out of range are errors that name the key.
+// Parses a request. Unknown keys, wrong types and values out of range are errors that name the key.
 Result<JobSpec> parse_job_spec(std::string_view json);
-// The two halves of it: the text as an object (keys given twice, over-long or deeply nested texts are
-// errors), and the request from the object.
+// The two steps of parse_job_spec(): parse_spec_object() parses the text as a JSON object (keys given twice
+// and texts that are too long or too deeply nested are errors); job_spec_of() reads the request from the
+// object.
 Result<nlohmann::json> parse_spec_object(std::string_view text);
 Result<JobSpec> job_spec_of(const nlohmann::json& object);
 

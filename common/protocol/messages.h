@@ -22,7 +22,8 @@ namespace ls {
 
 inline constexpr int kProtocolVersion = 1;
 
-// The pure task: (job, tile, round). The same unit gives the same bits anywhere in its numeric class.
+// A unit: the work of one render task, which is one round (range of samples) of one tile of a job. Rendering
+// the same unit gives the same bits on every machine of one numeric class.
 struct UnitKey {
   JobId job;
   TileIndex tile = 0;
@@ -37,15 +38,16 @@ struct BlobRef {
   bool operator==(const BlobRef&) const = default;
 };
 
-// Everything a worker needs to know about a job. Sent before the job's first lease on a stream.
+// Everything that a worker needs to know about a job. The coordinator sends it before the job's first lease
+// on a connection.
 struct JobBrief {
   JobId job;
   Digest scene;  // blob: the canonical scene (common/scene/json/serialize.h)
   RenderSettings settings;
   Digest settings_digest;
   std::vector<BlobRef> assets;  // only those that the scene uses
-  // The coordinator's analysis of the scene's needs (common/scene/analysis/needs.h), for the worker to
-  // compare with its own; empty: not sent.
+  // What the scene needs of the renderer, according to the coordinator (common/scene/analysis/needs.h). The
+  // worker compares it with its own analysis. Empty: not sent.
   std::string needs;
   bool operator==(const JobBrief&) const = default;
 };
@@ -58,7 +60,8 @@ struct LeaseUnit {
   bool operator==(const LeaseUnit&) const = default;
 };
 
-// Units leased to a worker. They are rendered and reported one by one, in order.
+// Units that the coordinator has assigned to one worker until a deadline. The worker renders and reports them
+// one by one, in order.
 struct Lease {
   LeaseId id;
   JobId job;
@@ -66,9 +69,9 @@ struct Lease {
   bool operator==(const Lease&) const = default;
 };
 
-// Seconds that a worker spent on a unit besides rendering it. `load` and `build` are sent with the first
-// result of a world: fetching the job's files, and reading them and building the world (wall time of the
-// loading thread).
+// Seconds that a worker spent on a unit besides rendering it. Two of them concern the job's world (the scene
+// prepared for rendering) and are sent only with the first result rendered from it: `load` is the time to
+// fetch the job's files, `build` the wall time in which the loading thread read them and built the world.
 struct UnitTimes {
   double load = 0, build = 0;
   double transfer = 0;  // packing the result: encoding and digest
@@ -80,29 +83,29 @@ struct UnitTimes {
 struct UnitResult {
   UnitKey unit;
   LeaseId lease;
-  std::vector<std::byte> exr;  // encoded Partial
-  Digest digest;               // unit_digest of it
-  double cpu_seconds = 0;      // of the thread that rendered it
+  std::vector<std::byte> exr;  // the encoded partial: the pixel sums of the unit
+  Digest digest;               // unit_digest() of the partial
+  double cpu_seconds = 0;      // CPU time of the thread that rendered the unit
   Health health;
   UnitTimes times;
   bool operator==(const UnitResult&) const = default;
 };
 
-// A unit that could not be rendered. `scene_at_fault`: the world cannot be built (a truncated grid, say), so
-// the job fails at once, as another worker cannot succeed either. Otherwise only this unit failed (crash,
-// hang, memory).
+// A unit that could not be rendered. `scene_at_fault`: the world cannot be built from the scene (because of a
+// truncated grid, say), so the coordinator fails the job immediately: another worker cannot succeed either.
+// Otherwise only this unit failed (crash, hang, memory).
 struct UnitFailure {
   UnitKey unit;
   LeaseId lease;
   bool scene_at_fault = false;
   std::string reason;                        // for a person
   std::optional<int> signal;                 // signal that ended the render child
-  std::optional<std::pair<int, int>> pixel;  // the breadcrumb: the pixel being rendered
+  std::optional<std::pair<int, int>> pixel;  // the pixel that was being rendered
   std::optional<std::uint64_t> sample;
   bool operator==(const UnitFailure&) const = default;
 };
 
-// From worker to coordinator.
+// Messages from worker to coordinator, from here on.
 struct WorkerHello {
   int protocol = kProtocolVersion;
   std::string name;
@@ -119,7 +122,7 @@ struct WorkerHello {
   bool fake = false;  // it does not render but generates fake pixels
   bool operator==(const WorkerHello&) const = default;
 };
-// Renews the deadlines of the named leases. Sent about once a second while there is work.
+// Renews the deadlines of the named leases. The worker sends it about once a second while it has work.
 struct WorkerProgress {
   struct Entry {
     LeaseId lease;
@@ -130,15 +133,16 @@ struct WorkerProgress {
   std::string activity;  // "loading bath.vdb", "rendering", "idle": for the dashboard
   double cpu_seconds_total = 0;
   std::uint64_t rss_bytes = 0;
-  double load_seconds = 0;  // last world build
+  double load_seconds = 0;  // duration of the last build of a world
   bool operator==(const WorkerProgress&) const = default;
 };
-// Requests that no more leases be sent; finished units are still delivered, the others come back as
+// The worker asks for no more leases. It still delivers finished units, and returns the others by
 // LeaseReturned.
 struct WorkerDraining {
   bool operator==(const WorkerDraining&) const = default;
 };
-// Units of this lease that were not and will not be rendered here (drain, cancel).
+// Units of this lease that this worker has not rendered and will not render (because it drains, or was told
+// to cancel them).
 struct LeaseReturned {
   LeaseId lease;
   std::vector<UnitKey> unrendered;
@@ -147,28 +151,32 @@ struct LeaseReturned {
 using FromWorker =
     std::variant<WorkerHello, WorkerProgress, UnitResult, UnitFailure, LeaseReturned, WorkerDraining>;
 
-// From coordinator to worker.
+// Messages from coordinator to worker, from here on.
 struct Welcome {
   WorkerId worker;
-  std::uint64_t epoch = 0;  // grows with every registration of this worker; an older stream is closed
+  // A number that grows with every registration of this worker; the coordinator closes the connections of
+  // older ones.
+  std::uint64_t epoch = 0;
   bool operator==(const Welcome&) const = default;
 };
-struct Refused {  // the stream ends after it
+struct Refused {  // after it the coordinator closes the connection
   Error error;
   bool retry = false;
   bool operator==(const Refused&) const = default;
 };
 struct AssignLease {
   Lease lease;
-  std::optional<JobBrief> brief;  // with a job's first lease on this stream
+  std::optional<JobBrief> brief;  // sent with a job's first lease on this connection
   bool operator==(const AssignLease&) const = default;
 };
-struct ResultAck {  // the result is durable (or rejected, with a reason): remove it from the outbox
+// The result is stored durably, or rejected with a reason: the worker removes it from its outbox.
+struct ResultAck {
   UnitKey unit;
   std::optional<Error> refused;
   bool operator==(const ResultAck&) const = default;
 };
-struct CancelJob {  // stop its units immediately; results are discarded
+// The worker stops rendering the job's units immediately; results of the job are discarded.
+struct CancelJob {
   JobId job;
   bool operator==(const CancelJob&) const = default;
 };

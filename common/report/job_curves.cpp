@@ -26,14 +26,14 @@ std::string range(const std::optional<std::pair<double, double>>& ci, std::strin
   return ci ? fmt::format("{} to {}", words(ci->first), words(ci->second)) : std::string();
 }
 
-// Interval of the error at a checkpoint. The reliability of single checkpoints is not stored: if the last is
-// in doubt none is shown.
+// Returns the interval of the error at a checkpoint. Whether the figures of a single checkpoint can be
+// trusted is not stored: if those of the last one are in doubt (`doubt`), no interval is shown.
 std::optional<std::pair<double, double>> shown_interval(const Json& point, bool doubt) {
   return doubt ? std::nullopt : interval(point, "relmse_ci95");
 }
 
-// The point at which the error will reach the requested target; for wall seconds extrapolated at the previous
-// pace.
+// Returns the point at which the error will reach the requested target. If the curve is over wall time, the
+// remaining time is extrapolated at the previous pace.
 std::optional<Ahead> ahead_of(const Json& report, const Json& last, const Clock& clock) {
   const Json& forecast = member(report, "forecast");
   const double more = number(forecast, "core_seconds"), now = number(last, clock.key);

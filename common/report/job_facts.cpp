@@ -44,7 +44,7 @@ std::string feature_list(const Json& report, bool used) {
                      used ? "" : " out", items);
 }
 
-// Parts of the scene that affect no pixel, and were neither stored nor sent.
+// Lists the parts of the scene that affect no pixel, and were neither stored nor sent.
 std::string pruned(const Json& report) {
   std::string items;
   for (const Json& one : objects(member(report, "analysis"), "left_out")) {
@@ -65,7 +65,7 @@ std::string row(const char* name, const std::string& value, bool code = false) {
 
 std::string whole(double n) { return std::isfinite(n) ? fmt::format("{:.0f}", n) : std::string(); }
 
-// The requested path limits and end conditions; without those not given.
+// Describes the requested path limits and end conditions, those that were given.
 std::string asked(const Json& report) {
   const double depth = number(report, "max_depth"), spp = number(report, "spp_asked");
   const std::string roulette = whole(number(report, "rr_depth"));

@@ -80,7 +80,7 @@ std::string lesser_figures(const Json& report) {
   return out + fact("Memory", byte_size(number(report, "peak_rss_bytes")), "at its peak");
 }
 
-// Stacked bars, with widths as attributes: the page's policy forbids style attributes.
+// Draws stacked bars. Their widths are attributes, because the page's policy forbids style attributes.
 std::string bar(const Json& time, double total) {
   std::string out =
       R"(<svg class="bar" viewBox="0 0 1000 26" preserveAspectRatio="none" aria-hidden="true">)";

@@ -15,10 +15,11 @@ struct JobPage {
   std::string report;                                    // the JSON of GET /api/v1/jobs/ID/report
   std::vector<std::byte> image, error_map, samples_map;  // PNG files; empty: none
 };
-// Fields missing from the report are omitted from the page, as are fields of the wrong type.
-// invalid_argument: not a JSON object.
+// Makes the page. Parts for which a field of the report is missing or of the wrong type are omitted.
+// invalid_argument: the report is not a JSON object.
 Result<std::string> job_page(const JobPage& page);
-// The content security policy for the response that carries such a page: the same as in the page.
+// Returns the content security policy for the HTTP response that carries such a page; the page itself has the
+// same.
 std::string job_page_policy();
 
 }  // namespace ls::report

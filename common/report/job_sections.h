@@ -1,5 +1,5 @@
-// The sections of a job's page, as markup generated from its report. Each is empty if the report has no data
-// for it.
+// The sections of a job's page, as markup generated from the job's report. A section is empty if the report
+// has no data for it.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ namespace ls::report {
 
 // Convergence status (job_verdict.cpp).
 bool doubtful(const Json& report);              // true if the error figures are not reliable yet
-std::string verdict(const Json& report);        // why they are not, with further notes
+std::string verdict(const Json& report);        // why they are not reliable, with further notes
 std::string verdict_words(const Json& report);  // a sentence for a report that is not doubtful; empty: none
 std::string failure(const Json& report);
 

@@ -33,7 +33,7 @@ std::string time_label(double seconds) {
   return seconds < kDay ? fmt::format("{:g} h", seconds / kHour) : fmt::format("{:g} d", seconds / kDay);
 }
 
-// Round times: only `coarse` ones, or those in between too.
+// Returns the round times on the axis: if `coarse` only the main ones, otherwise also those in between.
 std::vector<double> usual_times(const LogAxis& axis, bool coarse) {
   std::vector<double> all;
   const auto take = [&](double unit, std::initializer_list<double> steps) {

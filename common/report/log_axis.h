@@ -1,5 +1,5 @@
-// A logarithmic axis: range, ticks and labels. The dashboard's (web/static/js/plot_scale.js) follows the same
-// rules.
+// A logarithmic axis: range, ticks and labels. The axes of the dashboard (web/static/js/plot_scale.js) follow
+// the same rules.
 #pragma once
 
 #include <string>
@@ -12,7 +12,8 @@ struct LogAxis {
   double from = 0, to = 1;        // their positions in the drawing
   double at(double value) const;  // position of a value above 0
 };
-// An axis for values from `lo` to `hi` (above 0, lo <= hi), with a margin, at least one decade wide.
+// Returns an axis for values from `lo` to `hi` (above 0, lo <= hi), with a margin, at least one decade wide.
+// `from` and `to` are the positions of its ends in the drawing.
 LogAxis log_axis(double lo, double hi, double from, double to);
 
 struct Tick {
@@ -24,8 +25,8 @@ enum class AxisUnit {
   plain,    // 0.1, 0.01, 10⁻⁴
   seconds,  // 1 s, 10 s, 1 min, 1 h, 1 d
 };
-// In ascending order. Decades are labelled (for time its usual steps), values between them if decades are
-// few; on a long axis only every n-th decade.
+// Returns the ticks in ascending order. Decades are labelled, or for time its usual steps (1 s, 10 s, 1 min,
+// ...). On a short axis some values between decades are labelled too, on a long one only every n-th decade.
 std::vector<Tick> ticks(const LogAxis& axis, AxisUnit unit);
 
 }  // namespace ls::report

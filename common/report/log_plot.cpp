@@ -27,7 +27,7 @@ using Out = std::back_insert_iterator<std::string>;
 bool drawable(const CurvePoint& p) { return std::isfinite(p.x) && std::isfinite(p.y) && p.x > 0 && p.y > 0; }
 bool has_band(const CurvePoint& p) { return std::isfinite(p.hi) && p.lo > 0 && p.hi >= p.lo; }
 
-// The points that can be drawn, in order of x.
+// Returns the points that are drawn, in order of x.
 std::vector<CurvePoint> chosen(const Curve& curve) {
   std::vector<CurvePoint> all;
   std::copy_if(curve.points.begin(), curve.points.end(), std::back_inserter(all), drawable);
@@ -220,7 +220,7 @@ class Drawing {
     text_ += "</g>";
   }
 
-  // Marks that can be distinguished without colour.
+  // Draws a mark; the marks of different curves can be distinguished without colour.
   static std::string mark(std::size_t index, double x, double y) {
     switch (index % 4) {
       case 1:

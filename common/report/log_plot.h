@@ -23,10 +23,10 @@ struct Curve {
 inline constexpr std::size_t kMostCurves = 8;         // with distinct colours and marks
 inline constexpr std::size_t kMostCurvePoints = 512;  // drawn per curve; longer curves are thinned evenly
 
-// The forecast point at which the first curve reaches the target.
+// A predicted point: the x at which the first curve will reach the target.
 struct Ahead {
   double x = 0, x_lo = 0, x_hi = 0;  // interval in x; x_lo = x_hi = 0: none
-  double x_with_more = 0;            // with more workers; 0: unknown
+  double x_with_more = 0;            // the x at which it is reached with more workers; 0: unknown
 };
 
 struct LogPlot {
@@ -40,9 +40,10 @@ struct LogPlot {
   std::optional<Ahead> ahead;    // only with a target
 };
 
-// For use inside a page whose style has plot_css(). A plot without points says so.
+// Returns an SVG element for use inside a page whose style has plot_css(). For a plot without points it says
+// so.
 std::string svg_of(const LogPlot& plot);
-// A separate file that follows the reader's dark or light mode.
+// Returns the content of a separate SVG file, which follows the reader's dark or light mode.
 std::string standalone_svg(const LogPlot& plot);
 std::string_view plot_css();
 

@@ -1,5 +1,5 @@
-// Reads a report that may be of another version, or foreign: each function returns the value or a default if
-// it is missing.
+// Reads fields of a report that another version of this program, or another program, may have written. Each
+// function returns the field's value, or a default if the field is missing.
 #pragma once
 
 #include <limits>

@@ -11,7 +11,8 @@ inline constexpr const char* kAbsent = "–";  // for unknown (non-finite) value
 std::string superscript(int n);  // "⁻⁴"
 // Three significant digits: "0.0213", "3.20 × 10⁻⁵".
 std::string figure(double x);
-std::string true_figure(double x, bool below_noise);  // against a reference
+// figure(x), or if `below_noise` "below the reference's noise"
+std::string true_figure(double x, bool below_noise);
 std::string given(double x);  // a number chosen by a person, with its original digits: "0.001"
 // "0.4 s", "12 s", "4.2 min", "1 h 12 min", "3 d 4 h".
 std::string duration(double seconds);

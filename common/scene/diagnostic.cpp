@@ -13,7 +13,7 @@ namespace {
 
 bool is_continuation(char c) { return (static_cast<unsigned char>(c) & 0xC0) == 0x80; }
 
-// The bytes of the characters [first, last).
+// Returns the bytes of the characters [first, last).
 std::string_view characters(std::string_view text, std::size_t first, std::size_t last) {
   std::size_t begin = text.size(), end = text.size(), n = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -28,7 +28,7 @@ std::string_view characters(std::string_view text, std::size_t first, std::size_
   return begin < end ? text.substr(begin, end - begin) : std::string_view{};
 }
 
-// The line with a caret under the place; of a long line only the part around it.
+// Returns the line with a caret under the place; of a long line only the part around it.
 std::string excerpt(const Diagnostic& d) {
   const std::size_t column = static_cast<std::size_t>(std::max(1, d.place.column)) - 1;
   const std::size_t first = column > scene::kMaxExcerptBytes / 2 ? column - scene::kMaxExcerptBytes / 2 : 0;

@@ -22,7 +22,7 @@ struct Diagnostic {
   bool operator==(const Diagnostic&) const = default;
 };
 
-// "file:line:column: error: text", the line and a caret under the place.
+// Returns "file:line:column: error: text", followed by the line and a caret under the place.
 std::string format_diagnostic(const Diagnostic& d);
 std::string format_diagnostics(const std::vector<Diagnostic>& all);
 

@@ -14,15 +14,16 @@ namespace ls {
 
 class FolderAssets final : public AssetSource {
  public:
-  // `folder`: that of the main scene file; empty: the working directory.
+  // `folder` is the one of the main scene file; empty: the working directory.
   explicit FolderAssets(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  // Computes each file's digest once. If a file is missing, the error suggests similar names.
-  // invalid_argument: it exists but is not a regular file, or cannot be read.
+  // Returns name, digest and size of a file; computes each file's digest only once. not_found: the file is
+  // missing; the error suggests similar names. invalid_argument: it exists but is not a regular file, or
+  // cannot be read.
   Result<Asset> find(std::string_view name) override;
   Result<std::string> text(std::string_view name) override;
 
-  // Path of a file that find() has found.
+  // Returns the path of a file that find() has found.
   std::optional<std::filesystem::path> path_of(std::string_view name) const;
   std::optional<std::filesystem::path> path_of(const Digest& digest) const;
 

@@ -28,7 +28,7 @@ inline constexpr std::size_t kMaxDiagnostics = 20;
 inline constexpr std::size_t kMaxExcerptBytes = 160;  // longest part of a source line in a message
 inline constexpr std::size_t kMaxSceneJsonBytes = std::size_t{256} << 20;
 inline constexpr int kMaxJsonNesting = 16;
-// Pairs of shapes compared to find out whether one lets light into the other.
+// The most pairs of shapes that are compared to find out whether one lets light into the other.
 inline constexpr std::uint64_t kMaxEntrances = std::uint64_t{1} << 23;
 
 }  // namespace ls::scene

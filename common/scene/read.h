@@ -20,22 +20,23 @@ namespace ls {
 class AssetSource {
  public:
   virtual ~AssetSource() = default;
-  // Digest and size of the file that the scene calls `name`.
+  // Returns digest and size of the file that the scene calls `name`.
   virtual Result<Asset> find(std::string_view name) = 0;
-  // Text of an included scene file, of limited size.
+  // Returns the text of an included scene file, of limited size.
   virtual Result<std::string> text(std::string_view name) = 0;
 };
 
 struct ReadOptions {
   std::map<std::string, std::string> defines;  // $name -> value; unused ones cause a warning
-  bool strict = false;                         // warnings become errors
-  // For sequences: a run of # in a file name is replaced by this number, and $frame is defined as it.
+  bool strict = false;                         // true: warnings are errors
+  // The frame number, for sequences (jobs with several frames): it replaces each run of # in file names and
+  // is the value of $frame.
   std::optional<std::uint32_t> frame = std::nullopt;
   bool labels = false;  // fill Scene::shape_labels and instance_labels
 };
 
 struct ReadResult {
-  std::optional<Scene> scene;  // absent if there is any error
+  std::optional<Scene> scene;  // nullopt if there is any error
   std::vector<Diagnostic> diagnostics;
 };
 

@@ -32,7 +32,8 @@ struct BitmapTexture {
   Wrap wrap = Wrap::repeat;
   bool raw = false;  // true: no sRGB decoding of 8- and 16-bit files
   UvTransform to_uv;
-  // For an opacity: use the image's alpha channel if it falls below 1/2 somewhere, otherwise its colour.
+  // For a texture that is an opacity. If true, the value is the image's alpha channel if that falls below 1/2
+  // somewhere, otherwise the image's colour.
   bool alpha = false;
   bool operator==(const BitmapTexture&) const = default;
 };
@@ -44,8 +45,9 @@ struct CheckerboardTexture {
   UvTransform to_uv;
   bool operator==(const CheckerboardTexture&) const = default;
 };
-// The largest channel of another texture, or with `hue` its colour divided by that (white where it is black):
-// their product is the texture. An extension, used to express Nori's `microfacet`.
+// The largest channel of another texture or, with `hue`, the colour of that texture divided by its largest
+// channel (white where it is black). The product of the two is the texture itself. This is an extension, used
+// to express Nori's `microfacet`.
 struct PeakTexture {
   TextureIndex texture;
   bool hue = false;
@@ -63,8 +65,9 @@ using Texture =
 
 // Surfaces.
 enum class Microfacet { beckmann, ggx };
-// Rough surfaces with multiple_scattering include light scattered several times between microfacets, which
-// the plain model omits (docs/design/multiple-scattering.md). Their roughness must be one constant.
+// Rough surfaces with multiple_scattering include light that is scattered several times between microfacets,
+// which the plain model omits (docs/design/multiple-scattering.md). The roughness of such a surface must be
+// one constant.
 
 struct DiffuseBsdf {
   TextureIndex reflectance;
@@ -143,8 +146,8 @@ struct NormalMapBsdf {  // normal = 2 colour - 1 in the frame of u, v and the su
   bool flip_invalid_normals = true, use_shadowing_function = true;
   bool operator==(const NormalMapBsdf&) const = default;
 };
-// Displaces the surface along its normal by scale * luminance, in scene units, but in the shading normal
-// only. The texture is a bitmap.
+// A bump map: the texture's luminance times `scale`, in scene units, displaces the surface along its normal,
+// but only the shading normal changes. The texture is a bitmap.
 struct BumpMapBsdf {
   TextureIndex texture;
   double scale = 1;
@@ -166,8 +169,8 @@ using Bsdf = std::variant<DiffuseBsdf, ConductorBsdf, RoughConductorBsdf, Dielec
 
 // Volumes and media.
 //
-// As a density it fills the unit cube [0,1]^3 of its local space, transformed by to_world; otherwise it
-// extends everywhere.
+// A constant value. As a density it fills the unit cube [0,1]^3 of its local space, transformed by to_world;
+// for any other purpose it extends everywhere.
 struct ConstVolume {
   Rgb value{1, 1, 1};
   Transform to_world;
@@ -202,8 +205,8 @@ struct HgPhase {
 };
 using Phase = std::variant<IsotropicPhase, HgPhase>;
 
-// sigma_t (per scene unit) and albedo, multiplied out at load: sigma_s = albedo * sigma_t * scale. Emission
-// per length is emission + sigma_a * source_radiance.
+// A medium with a constant extinction sigma_t (per scene unit) and albedo. When it is loaded, sigma_s =
+// albedo * sigma_t * scale. Emission per length is emission + sigma_a * source_radiance.
 struct HomogeneousMedium {
   Rgb sigma_t{1, 1, 1};
   Rgb albedo{.75, .75, .75};
@@ -227,7 +230,7 @@ struct HeterogeneousMedium {
   std::optional<VolumeIndex> temperature;
   double emission_scale = 1;  // factor on the emission
   double temperature_scale = 1, temperature_offset = 0;
-  int priority = 0;  // as for a homogeneous medium
+  int priority = 0;  // of overlapping media, all those of the highest priority are in effect
   bool operator==(const HeterogeneousMedium&) const = default;
 };
 using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
@@ -237,7 +240,8 @@ struct ConstantEmitter {  // radiance from all directions
   Rgb radiance{1, 1, 1};
   bool operator==(const ConstantEmitter&) const = default;
 };
-// `direction`: the light's direction of travel, in the world; irradiance on a plane facing it
+// Parallel light. `direction` is the direction in which the light travels, in the world; the irradiance is
+// that on a plane that faces the light.
 struct DirectionalEmitter {
   Vec3 direction{0, 0, 1};
   Rgb irradiance{1, 1, 1};
@@ -255,7 +259,7 @@ struct SpotEmitter {  // at the origin of to_world, emitting along its +z
   Rgb intensity{1, 1, 1};
   double cutoff_angle = 20;             // degrees from the axis; dark beyond
   double beam_width = 15;               // full intensity within; linear in the angle between the two
-  std::optional<TextureIndex> texture;  // projected, as in Mitsuba
+  std::optional<TextureIndex> texture;  // image by which the light is multiplied, projected as in Mitsuba
   bool operator==(const SpotEmitter&) const = default;
 };
 // Radiance from all directions: an image in latitude-longitude form. In its own space the top row is +y; on
@@ -268,9 +272,9 @@ struct EnvmapEmitter {
   bool operator==(const EnvmapEmitter&) const = default;
 };
 
-// An inverse camera: at the origin of to_world, along its +z, +y up, it projects an image as a camera with
-// that field of view and the image's aspect would see it. On the plane one scene unit ahead the irradiance is
-// pi * scale times the image's value.
+// An inverse camera at the origin of to_world, which looks along its +z with +y up: it projects an image as a
+// camera with that field of view and the image's aspect ratio would see it. On the plane one scene unit
+// ahead, the irradiance is pi * scale times the image's value.
 struct ProjectorEmitter {
   TextureIndex irradiance;
   double scale = 1;
@@ -315,7 +319,7 @@ struct Scene {
   std::vector<ShapeGroup> groups;
   std::vector<Instance> instances;
   std::string aovs;  // AOVs that the scene requests: names of common/image/aov/aov.h, separated by commas
-  // For each shape and instance; empty unless requested (ReadOptions::labels).
+  // The labels of all shapes and of all instances, by index; empty unless requested (ReadOptions::labels).
   std::vector<Label> shape_labels, instance_labels;
   bool operator==(const Scene&) const = default;
 };

@@ -12,9 +12,10 @@ namespace ls {
 
 enum class FovAxis { x, y, diagonal, smaller, larger };
 
-// orthographic: parallel rays from [-1, 1] times [-1/a, 1/a] of its own x and y (a: width / height), which
-// to_world may scale. spherical: all directions, by latitude and longitude: +y is the top row, the left edge
-// -z, a quarter of the width further +x (Mitsuba 0.x); no clip planes.
+// How the camera projects. orthographic: parallel rays from the rectangle [-1, 1] x [-1/a, 1/a] of its own x
+// and y (a: width / height of the image), which to_world may scale. spherical: all directions by latitude and
+// longitude; the top row is +y, the left edge -z, and a quarter of the width further is +x (Mitsuba 0.x); it
+// has no clip planes.
 enum class Projection { perspective, orthographic, spherical };
 struct Sensor {  // looks along +z of to_world, +y up, +x to the LEFT (Mitsuba)
   Transform to_world;
@@ -26,7 +27,8 @@ struct Sensor {  // looks along +z of to_world, +y up, +x to the LEFT (Mitsuba)
   double focus_distance = 1;
   std::optional<MediumIndex> medium;  // the medium around the camera
   Projection projection = Projection::perspective;
-  std::optional<TextureIndex> aperture_scale;  // over the frame: factor on the aperture's radius at a pixel
+  // image over the frame: at each pixel the factor on the aperture's radius
+  std::optional<TextureIndex> aperture_scale;
   bool operator==(const Sensor&) const = default;
 };
 
@@ -47,7 +49,7 @@ using ReconstructionFilter = std::variant<BoxFilter, TentFilter, GaussianFilter>
 struct FilmSettings {
   FrameSize size{768, 576};
   ReconstructionFilter filter = GaussianFilter{};
-  // The rendered part of the frame; a width of 0: the whole frame.
+  // The rendered part of the frame, in pixels; if its width is 0, the whole frame.
   std::array<int, 2> crop_offset{0, 0};
   FrameSize crop_size{0, 0};
   bool has_crop() const { return crop_size.width > 0; }

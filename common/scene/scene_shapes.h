@@ -38,9 +38,9 @@ struct MeshShape {
 };
 using Geometry = std::variant<RectangleShape, CubeShape, SphereShape, DiskShape, MeshShape, CylinderShape>;
 
-// Emits on the side of the normal only. At an angle a from it, in degrees: the full radiance within
-// beam_width, none beyond cutoff_angle, and in between radiance times s^falloff with s = (cos a - cos
-// cutoff_angle) / (cos beam_width - cos cutoff_angle).
+// Light from a shape's surface, emitted on the side of the normal only. At an angle a from the normal, in
+// degrees, the radiance is the full one for a within beam_width, none beyond cutoff_angle, and in between the
+// full one times s^falloff with s = (cos a - cos cutoff_angle) / (cos beam_width - cos cutoff_angle).
 struct AreaEmitter {
   TextureIndex radiance;
   double cutoff_angle = 90, beam_width = 90, falloff = 1;
@@ -55,8 +55,9 @@ struct Shape {
   std::optional<AreaEmitter> emitter;
   std::optional<MediumIndex> interior, exterior;  // interior: the side the normal points away from
   bool is_medium_transition = false;              // interior or exterior was given
-  // Visible only through instances of this group; to_world places it within the group. The shapes of a group
-  // are contiguous in the scene's list, groups in the order of their indices; none of them emits light.
+  // If set, the shape is visible only through instances of this group, and to_world places it within the
+  // group. The shapes of a group are contiguous in the scene's list, and groups are in the order of their
+  // indices. None of these shapes emits light.
   std::optional<GroupIndex> group;
   bool operator==(const Shape&) const = default;
 };

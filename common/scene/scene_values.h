@@ -14,12 +14,12 @@ inline bool all_zero(const Rgb& c) { return c == Rgb{0, 0, 0}; }
 // A point or direction. A separate type from colours, as files write the two differently.
 struct Vec3 : std::array<double, 3> {};
 
-// Row-major 4 x 4 for column vectors: p' = M p. Identity by default.
+// A row-major 4 x 4 matrix for column vectors: p' = M p. It is the identity by default.
 struct Transform {
   std::array<double, 16> m{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   bool operator==(const Transform&) const = default;
 };
-// Row-major 3 x 3 acting on (u, v, 1).
+// A row-major 3 x 3 matrix that acts on (u, v, 1).
 struct UvTransform {
   std::array<double, 9> m{1, 0, 0, 0, 1, 0, 0, 0, 1};
   bool operator==(const UvTransform&) const = default;
@@ -38,8 +38,8 @@ using PhaseIndex = Index<struct PhaseTag>;
 using MediumIndex = Index<struct MediumTag>;
 using GroupIndex = Index<struct GroupTag>;
 
-// A file that the scene names. `name` is as written in the scene (for messages); the bytes are identified by
-// digest.
+// A file that the scene names. `name` is as written in the scene, for messages; the digest identifies the
+// bytes.
 struct Asset {
   std::string name;
   Digest digest;

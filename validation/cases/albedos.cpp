@@ -24,7 +24,8 @@ void white(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     for (const double tau : {1e-6, 1., 64.}) {
       for (const double g : {0., .9999}) {
-        // Roulette may end paths of more than 1024 vertices; here nearly all are shorter.
+        // Russian roulette may end paths of more than 1024 vertices, so that not every path would weigh 1.
+        // This case has such paths; in the others nearly all paths are shorter.
         if (tau > 1 && g == 0) continue;
         t.exact(fmt::format("N16-white-depth-{:g}-g-{:g}{}", tau, g, configuration.name()), "N16 N17 7.6c",
                 "Albedo 1 in a white sky: every path weighs 1 exactly, in every sample.",
@@ -46,7 +47,8 @@ void white(Table& t) {
   }
 }
 
-// A slab of albedo 1 - 1e-7: the absorbed share is 1e-7 times the mean number of scatterings, here about 40.
+// A slab of albedo 1 - 1e-7. The share of light that it absorbs is 1e-7 times the mean number of scatterings,
+// which is about 40 here.
 void all_but_white(Table& t) {
   for (const Configuration& configuration : two_configurations()) {
     t.mean("N16-all-but-white-16" + configuration.name(), "N16 7.2",
@@ -58,8 +60,8 @@ void all_but_white(Table& t) {
   }
 }
 
-// T = (4/3) K / (tau + 1.42089) for a white slab at normal incidence, K = sqrt(3) / 4 H(1), H(1) = 2.907811;
-// at tau = 16 it equals the tabulated 0.096368 to all digits.
+// The transmittance of a white slab at normal incidence, T = (4/3) K / (tau + 1.42089), with K = sqrt(3) / 4
+// H(1), H(1) = 2.907811; at tau = 16 it equals the tabulated 0.096368 to all digits.
 double white_transmittance(double tau) { return std::sqrt(3.) / 3 * 2.907811 / (tau + 1.42089); }
 
 void deep(Table& t) {

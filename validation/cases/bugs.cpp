@@ -12,8 +12,8 @@
 namespace ls::cases {
 namespace {
 
-// Textbook sampling and density lose their digits from 0.999 on, so other renderers clamp at 0.99: the peak
-// is then four orders of magnitude too low.
+// Textbook formulas for sampling and density lose their digits from g = 0.999 on, so other renderers clamp g
+// at 0.99: the peak of the phase function is then four orders of magnitude too low.
 void clamped_g(Table& t) {
   for (const double g : {.9995, -.9995})
     t.mean(fmt::format("bug-g-clamped-to-.99/homogeneous/volpath{}", g > 0 ? "" : "-backward"), "N18 bug",
@@ -22,7 +22,7 @@ void clamped_g(Table& t) {
            {.slack = 2 * 0x1p-25 / (1 - std::abs(g))});
 }
 
-// 1 - expf(-tau) is 0 in float32 below 6e-8, and has lost half of its digits at 2e-7.
+// In float32, 1 - expf(-tau) is 0 for tau below 6e-8, and has lost half of its digits at 2e-7.
 void one_minus_exp(Table& t) {
   constexpr Configuration kDistant{false, true}, kDistantGrid{true, true};
   for (const Configuration& configuration : {kDistant, kDistantGrid})
@@ -56,10 +56,10 @@ SceneBuilder row_of_voxels(float density, double sigma, bool by_shadow) {
   return builder;
 }
 
-// At a tentative collision in a voxel at its cell's bound there are no null collisions, and, if nothing
-// scatters either, probabilities normalised by "scattered or null" are 0 / 0. This renderer's bounds are 4
-// ulps above the voxels, so the null share is never exactly 0; for densities of 2e-32 it is 1e-38, which
-// becomes 0 when denormals are flushed (as in every renderer's threads).
+// At a tentative collision in a voxel whose density equals the bound of its cell there are no null
+// collisions. If nothing scatters there either, probabilities normalised by "scattered or null" are 0 / 0.
+// This renderer's bounds are 4 ulps above the voxels, so the null share is never exactly 0; but for densities
+// of 2e-32 it is 1e-38, which becomes 0 when denormals are flushed (as in every thread of the renderer).
 void null_collisions(Table& t) {
   for (const bool by_shadow : {false, true})
     for (const bool tiny : {false, true}) {

@@ -1,5 +1,5 @@
-// The rows of the list that unit tests cover without an image: sums, counters, rejected scenes, single rays
-// at surfaces and cameras.
+// The rows of the list of cases (docs/measurements/stability.md) that unit tests cover without an image:
+// sums, counters, rejected scenes, single rays at surfaces and cameras.
 #include "validation/fixtures/case.h"
 
 namespace ls::cases {
@@ -78,8 +78,8 @@ const std::vector<CoveredByTests>& covered_by_tests() {
       {"N56", "tests/unit/render/math/sampler_test.cpp",
        "SampleStream, NoKeyRepeatsOverAJobOfAMillionNumbers"},
       {"N57", "tests/unit/assemble/assemble_test.cpp", "Report, HasEveryKeyOfTheContract"},
-      // The cost of denormals is not measured, as tests read no clocks. Flushed to zero, they cost what zeros
-      // do.
+      // The cost of denormal numbers is not measured, as tests read no clocks. Denormals are flushed to zero,
+      // so they cost what zeros do.
       {"N58", "tests/unit/render/world/health_test.cpp",
        "Health, DenormalNumbersAreZerosWhileRaysAreTracedInEveryThread"},
       {"N59", "tests/unit/render/media/boundary_test.cpp",
@@ -92,7 +92,7 @@ const std::vector<CoveredByTests>& covered_by_tests() {
        "Preview, ShowsNaNInMagentaAndInfinitiesAtTheEnds"},
       {"N66", "tests/unit/render/media/emission_test.cpp",
        "BlackBody, IsDarkWhereItIsColdAndNeverMoreThanRayleighAndJeans"},
-      // There is no motion.
+      // The renderer has no motion.
       {"N68", "tests/system/test_validation_table.py", "test_shutters_that_mean_nothing_are_warned_of"},
       {"N69", "tests/statistical/overlaps.cpp", "Two identical media of half the density"},
   };

@@ -11,7 +11,8 @@ namespace ls::cases {
 namespace {
 
 constexpr double kThin[] = {1e-12, 1e-9, 1e-6, 1e-3};
-// A figure that all samples share is a product of about ten float32 numbers, with an error of 2^-24 each.
+// The tolerance for a figure that is the same in all samples. It is a product of about ten float32 numbers,
+// each with an error of 2^-24.
 constexpr double kTenRoundings = 6e-7;
 
 constexpr Configuration kDistant{false, true}, kDistantGrid{true, true}, kVolpath{false, false};
@@ -100,11 +101,11 @@ void opaque(Table& t) {
               });
     }
   }
-  // 1 - sqrt(1 - a) H(1), Chandrasekhar 1950, to six digits. From 1e5 on the mean free path is shorter than
-  // the offset of rays from surfaces (2^-20 of the world), so the distance to the face must be measured from
-  // the path's true position. At 1e6 it is 17 ulps of float32 at the face's height: the contribution next to
-  // the face is a trapezoidal sum over these instead of an integral, which for isotropic scattering, int
-  // E_2(z) dz, is 3.1e-3 too much.
+  // The answers are 1 - sqrt(1 - a) H(1), Chandrasekhar 1950, to six digits, with a the albedo. From depth
+  // 1e5 on the mean free path is shorter than the offset of rays from surfaces (2^-20 of the world), so the
+  // distance to the face must be measured from the path's true position. At 1e6 the mean free path is 17 ulps
+  // of float32 at the face's height. Then the contribution next to the face is a trapezoidal sum over these
+  // positions instead of an integral; for isotropic scattering, int E_2(z) dz, the sum is 3.1e-3 too much.
   constexpr double kDigits = 2e-6, kPlaces = 3.1e-3;
   for (const Configuration& configuration : all_configurations()) {
     for (const double tau : {1e3, 1e5, 1e6}) {
@@ -125,11 +126,11 @@ void opaque(Table& t) {
   }
 }
 
-// Light straight down through an absorber onto a floor: seen by shadow rays only.
+// Light falls straight down through an absorber onto a floor, where only shadow rays find it.
 void shadows(Table& t) {
   for (const double tau : {20., 30., 80.}) {
     const double expected = std::exp(-tau) / (2 * kPi);
-    // The exponent has a float32 rounding of 2^-24: its effect on e^-tau.
+    // The exponent has a float32 rounding of 2^-24; the second term is its effect on e^-tau.
     const double tolerance = kTenRoundings + 2 * tau * 0x1p-24;
     for (const Configuration& configuration : both_media()) {
       t.exact(fmt::format("N05-shadow-{:g}{}", tau, configuration.name()), "N5 N60",
@@ -144,8 +145,9 @@ void shadows(Table& t) {
               });
     }
   }
-  // Where density varies, roulette keeps few trackers at low transmittance (kRouletteDepth): right in the
-  // mean. Density 0, 1, 2, 3 at the centres of four voxels along z, clamped beyond: 1.5 in total.
+  // Where density varies, roulette keeps few of the paths that track transmittance when the transmittance is
+  // low (kRouletteDepth); their mean is right. The density is 0, 1, 2, 3 at the centres of four voxels along
+  // z and constant beyond, 1.5 in total.
   t.mean("N05-shadow-ramp-8/grid/volpath", "N5 7.6a",
          "A shadow ray through a ramp of densities, by residual tracking.",
          [] {

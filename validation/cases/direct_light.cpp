@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kGreyReflectance = .5;
 
-// The point of the floor at the origin, seen from the side; radiance = reflectance / pi x irradiance.
+// A floor seen from the side, at the point at the origin; its radiance = reflectance / pi x irradiance.
 SceneBuilder floor() {
   SceneBuilder builder;
   const BsdfIndex white = builder.diffuse(kGreyReflectance);
@@ -22,8 +22,8 @@ SceneBuilder floor() {
 }
 
 void direct(Table& t) {
-  // BSDF sampling hits the smallest light once in 40,000 paths, with a correspondingly small share of its
-  // light.
+  // BSDF sampling hits the smallest of these lights once in 40,000 paths, and finds a correspondingly small
+  // share of its light.
   const auto add = [&](const char* name, SceneBuilder builder, double irradiance) {
     t.mean(std::string("7.6g-") + name, "7.6g N26", "Direct light on a floor, by the light's closed form.",
            std::move(builder), grey(irradiance * kGreyReflectance / kPi), {.slack = 5e-5});
@@ -62,8 +62,8 @@ void direct(Table& t) {
     add("direct-point", builder, 3 / std::pow(1.25, 1.5));
   }
   {
-    // Halfway between beam (10 degrees) and cutoff (30): half the intensity; aimed along -z, with the point
-    // 20 degrees off the axis.
+    // The direction to the floor's point is 20 degrees off the light's axis, halfway between beam (10
+    // degrees) and cutoff (30), so the intensity is a half. The light is aimed along -z.
     const double tangent = std::tan(20 * kPi / 180), cosine = std::cos(20 * kPi / 180);
     SceneBuilder builder = floor();
     builder.scene.emitters.push_back(
@@ -71,7 +71,7 @@ void direct(Table& t) {
     add("direct-spot-falloff", builder, .5 * 2 * cosine * cosine * cosine);
   }
   {
-    // All kinds at once, to test the choice among lights.
+    // Lights of all kinds in one scene, to test the choice among lights.
     SceneBuilder builder = floor();
     area(builder, SphereShape{}, translate({0, 0, 2}) * scale(.5));
     builder.scene.emitters.push_back(PointEmitter{{.5, 0, 1}, rgb(.3)});

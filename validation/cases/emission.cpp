@@ -1,5 +1,5 @@
-// Emissive media: closed forms of emission with absorption, and equilibria with scattering, in which
-// everything is as bright as the source.
+// Emissive media. The answers are closed forms for emission with absorption, and equilibria for emission with
+// scattering, in which everything is as bright as the source.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -12,7 +12,8 @@ namespace {
 
 constexpr Rgb kSigma{0, 1, 16}, kEmission{1, 2.5, 4};
 
-// Homogeneous media or constant volumes, with emission given in either of the two ways.
+// Sets the emission of homogeneous media or constant volumes in either of the two ways: per length, or
+// (`per_absorption`) as source radiance.
 void set_emission(SceneBuilder& builder, MediumIndex m, const Rgb& emission, bool per_absorption) {
   if (auto* h = std::get_if<HomogeneousMedium>(&builder.scene.media[m.value])) {
     (per_absorption ? h->source_radiance : h->emission) = emission;
@@ -29,7 +30,8 @@ std::vector<float> hills(std::size_t n) {
   return v;
 }
 
-// A cube of an absorbing medium in the dark, seen through its middle: a path length of 1.
+// A cube of an absorbing medium without any other light, seen through its middle, so that the path through it
+// has length 1.
 void absorbing(Table& t) {
   const auto add = [&](const char* name, bool grid, bool per_absorption, const Rgb& sigma) {
     SceneBuilder builder;

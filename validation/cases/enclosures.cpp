@@ -9,10 +9,10 @@
 namespace ls::cases {
 namespace {
 
-// radiance outside of a room, so that a single leak among a million paths shows
+// The radiance outside of a room, so high that a single leak among a million paths shows.
 constexpr double kOutside = 1e6;
 
-// Grey emitting walls, seen from inside: everywhere 1 / (1 - .5).
+// A room with grey emitting walls, seen from inside: the radiance is 1 / (1 - .5) everywhere.
 SceneBuilder room(const Geometry& g, double size, const Vec3& shift = {0, 0, 0}) {
   SceneBuilder builder;
   Shape& s = builder.shape(g, translate(shift) * scale(size), builder.diffuse(.5));
@@ -90,7 +90,7 @@ void paths(Table& t) {
       }
 }
 
-// White everywhere, whatever the shape, the coat and the phase function.
+// A furnace: everything is white, whatever the shape, the coat and the phase function.
 void furnaces(Table& t) {
   for (const bool grid : {false, true})
     for (const double g : {-.5, .9})

@@ -33,7 +33,8 @@ std::vector<float> sampled(F density, int n) {
   return v;
 }
 
-// Voxel means are midpoint sums: accurate to f'' / (24 n^2), below 1e-6 of the depth for 256 voxels.
+// The mean of the voxels is a midpoint sum of the density, which is accurate to f'' / (24 n^2): below 1e-6 of
+// the depth for 256 voxels.
 void atmospheres(Table& t) {
   const auto add = [&](const char* name, const char* about, auto density, double depth) {
     t.mean(fmt::format("7.6a-{}/grid/volpath", name), "7.6a", about,
@@ -50,11 +51,11 @@ void atmospheres(Table& t) {
       3 * std::sqrt(kPi) * .2 * std::erf(.5 / .2));
 }
 
-// The mean path length is 4V/S = 4R/3, whatever scatters inside (Blanco and Fournier 2003): mean(1 - L) =
-// sigma_a 4R/3, minus a relative correction sigma_a <l^2> / (2 <l>) = sigma_a x mean remaining path from
-// inside. That is 0.75 R without scattering, and diffusion adds about R^2 sigma_s / 5 = 0.4 R: below 2 R. A
-// path's weight is a product of albedos, each rounded by 2^-25: relative to sigma_a / sigma_t = 5e-4 an error
-// of 6e-5.
+// The mean path length in a ball is 4V/S = 4R/3, whatever scatters inside (Blanco and Fournier 2003). So
+// mean(1 - L) = sigma_a 4R/3, minus a relative correction sigma_a <l^2> / (2 <l>), which is sigma_a times the
+// mean remaining path from inside. That path is 0.75 R without scattering, and diffusion adds about R^2
+// sigma_s / 5 = 0.4 R: below 2 R. The weight of a path is a product of albedos, each rounded by 2^-25, which
+// relative to sigma_a / sigma_t = 5e-4 is an error of 6e-5.
 void mean_paths(Table& t) {
   constexpr double kAbsorption = 1e-3, kScattering = 2, kDistance = 1000, kMargin = 1.01;
   for (const Configuration& configuration : all_configurations()) {
@@ -96,9 +97,10 @@ SceneBuilder endless(double albedo, double r, MediumIndex* medium) {
   return builder;
 }
 
-// The fluence of a ball of 1 W whose radius is half the distance; a camera of all directions shows it divided
-// by 4 pi. A ball, because estimates for a point light have infinite variance: radiance grows like the
-// inverse of the angle to the point. At albedo 0.999 paths have a thousand segments: a wider band.
+// The fluence of a ball that emits 1 W, whose radius is half the distance; a camera of all directions shows
+// it divided by 4 pi. The source is a ball because estimates for a point light have infinite variance:
+// radiance grows like the inverse of the angle to the point. At albedo 0.999 paths have a thousand segments,
+// so the band is wider.
 void endless_medium(Table& t) {
   for (const double c : {.3, .5, .8, .9, .99, .999}) {
     for (const double r : {.25, 1., 2., 5.}) {
@@ -124,8 +126,9 @@ void endless_medium(Table& t) {
   }
 }
 
-// A point light, which no camera sees directly: its fluence without e^-r / (4 pi r^2). Its tails are heavier
-// at lower albedo, so it is tested where they matter least.
+// A point light, which no camera sees directly: the answer is its fluence without the direct part e^-r / (4
+// pi r^2). The distribution of the estimates has heavier tails at lower albedo, so it is tested where they
+// matter least.
 void endless_lamp(Table& t) {
   struct Row {
     double c, r;

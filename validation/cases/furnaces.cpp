@@ -106,7 +106,8 @@ void shining_walls(Table& t) {
   add("shining-cube-forward", CubeShape{}, {}, forward);
   add("shining-cube-grid", CubeShape{}, {}, grid);
   {
-    // Five emitting rectangles and the environment through a window: many lights, one of them never sampled.
+    // Five emitting rectangles, and the environment seen through a window: many lights, of which one is never
+    // sampled.
     SceneBuilder builder;
     const MediumIndex m = builder.homogeneous(rgb(.8), rgb(1), .2);
     const BsdfIndex black = builder.diffuse(0), open = builder.null();

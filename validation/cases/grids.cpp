@@ -43,7 +43,7 @@ SceneBuilder seen_through(const std::array<int, 3>& n, const std::vector<float>&
   }
   return builder;
 }
-// The radiance for a given transmittance.
+// Returns the radiance for a given transmittance: seen directly, or (`by_shadow`) as light on the floor.
 double shown(double transmittance, bool by_shadow) {
   return by_shadow ? transmittance * .5 / kPi : transmittance;
 }
@@ -83,8 +83,8 @@ double depth_along(const std::array<int, 3>& n, const std::vector<float>& values
 }
 
 void bounds_too_high(Table& t) {
-  // Sixteen voxels per side of density 1, and one beside the ray that is many times denser, in macro cells on
-  // the ray, whose bound it sets.
+  // A grid with sixteen voxels per side of density 1, and one voxel beside the ray that is many times denser.
+  // It lies in macro cells on the ray, whose bound it sets.
   for (const bool shadow : {false, true}) {
     for (const double times : {1., 10., 1e4, 1e6}) {
       t.mean(
@@ -198,7 +198,7 @@ void along_faces(Table& t) {
                         {"all-but-an-axis", {0, .5, .5}, {1, .5 + 1e-7, .5 - 1e-7}}};
   for (const Line& line : lines) {
     for (const bool shadow : {false, true}) {
-      // The optical depth of a unit length is between 0.4 and 0.7 of sigma here.
+      // The optical depth of a path of unit length is between 0.4 and 0.7 of sigma here.
       const double tau = depth_along(n, values, line.from, line.to);
       t.mean(
           fmt::format("N12-{}{}", line.name, way_of(shadow)), "N12 N13",
@@ -207,7 +207,7 @@ void along_faces(Table& t) {
           grey(shown(std::exp(-tau), shadow)));
     }
   }
-  // x y z over the unit cube from its nodes: t^3 along the diagonal of length sqrt(3).
+  // The density x y z over the unit cube, given at its nodes: t^3 along the diagonal of length sqrt(3).
   for (const bool shadow : {false, true}) {
     t.mean(
         std::string("N12-corner-grid-diagonal") + way_of(shadow), "N12 7.6a",
@@ -223,7 +223,7 @@ void along_faces(Table& t) {
   }
 }
 
-// Null boundaries that cut a unit cube of medium 0 into pieces along x.
+// Adds null boundaries that cut a unit cube of medium 0 into pieces along x.
 void cut(SceneBuilder& builder, int pieces) {
   const BsdfIndex null = builder.null();
   for (int i = 1; i < pieces; ++i)
@@ -349,7 +349,8 @@ void no_densities(Table& t) {
             if (!p) return {.why = p.error().message};
             return {1, static_cast<double>(p->clamped_inputs), 0, {}, 0};
           });
-  // All voxels 1e-40, with an extinction that gives a depth of 1e-12: neither lost in products nor slow.
+  // All voxels are 1e-40 (or 1e-38), with an extinction that gives a depth of 1e-12: such values must neither
+  // get lost in products nor be slow.
   for (const float value : {1e-40f, 1e-38f}) {
     t.exact(fmt::format("N58-denormal-{:g}/grid/volpath", value), "N14 N58",
             "Densities around the smallest float32: nothing is in the way, and nothing goes wrong.",
@@ -366,8 +367,8 @@ void no_densities(Table& t) {
   }
 }
 
-// No extinction in red, almost opaque in blue: one randomly chosen channel decides flights, and all channels
-// weight them.
+// A medium without extinction in red, almost opaque in blue. One randomly chosen channel decides how far a
+// path flies, and all channels weight the path.
 void heroes(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     t.mean("N15-hero-without-extinction" + configuration.name(), "N15 7.6a",

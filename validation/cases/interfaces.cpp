@@ -12,7 +12,7 @@
 namespace ls::cases {
 namespace {
 
-// This many glass plates between a white wall and the camera, at normal incidence.
+// `m` glass plates between a white wall and the camera, at normal incidence.
 SceneBuilder plates(int m) {
   SceneBuilder builder;
   const BsdfIndex glass = builder.glass(1.5);
@@ -27,7 +27,8 @@ SceneBuilder plates(int m) {
 }
 SceneBuilder floor_behind(int boundaries) {
   SceneBuilder builder;
-  // A haze of optical depth 2e-4: boundaries between two sides without a medium would be pruned.
+  // A haze of optical depth 2e-4 fills the scene, because boundaries between two sides without a medium would
+  // be pruned.
   const MediumIndex haze = builder.homogeneous(rgb(1e-5), rgb(0));
   builder.scene.sensor.medium = haze;
   builder.shape(RectangleShape{}, scale(30), builder.diffuse(.5)).exterior = haze;
@@ -108,7 +109,7 @@ void shapes(Table& t) {
         "A box as an instance, mirrored or squeezed, is the box there.",
         [m = maps[i]] { return placed(true, m); }, [m = maps[i]] { return placed(false, m); },
         {.band = .003});
-  // A scene of this size, and a box in it that is squeezed by 1e6.
+  // A scene of size `s`, and a box in it that is squeezed by 1e6.
   for (const double s : {1e-6, 1e6})
     t.same(
         fmt::format("N44-instance-scaled-{:g}", s), "N44 N4",
@@ -144,7 +145,7 @@ SceneBuilder painted(float texel, const UvTransform& to_uv = {}, int side = 1) {
   return builder;
 }
 
-// A floor with a constant normal, given as the colour of a normal map, lit by the sun and an environment.
+// A floor, lit by the sun and an environment, whose normal map has one constant normal, given as a colour.
 SceneBuilder mapped(const Rgb& normal) {
   SceneBuilder builder;
   builder.shape(RectangleShape{}, scale(9),

@@ -15,8 +15,8 @@ constexpr Configuration kAngles{false, true, DistanceSampling::equiangular},
     kAnglesInGrid{true, true, DistanceSampling::equiangular};
 
 // A ray along z through a very thin medium (sigma 1e-12) from 0 to a plate at `length`, and a lamp of 1 W/sr
-// beside z = `where` at distance D: sigma / (4 pi) times the angle subtended by the ray, divided by D.
-// Equi-angular sampling gives that without variance.
+// at `distance` D beside z = `where`. The answer is sigma / (4 pi) times the angle that the ray subtends at
+// the lamp, divided by D. Equi-angular sampling gives it without variance.
 SceneBuilder beside(const Configuration& configuration, double length, double where, double distance) {
   SceneBuilder builder;
   configuration.choose(builder);
@@ -33,7 +33,7 @@ SceneBuilder beside(const Configuration& configuration, double length, double wh
   return builder;
 }
 double beside_answer(double length, double where, double distance) {
-  // atan(b) - atan(a) without cancellation.
+  // atan(b) - atan(a), without cancellation.
   const double a = -where / distance, b = (length - where) / distance;
   return 1e-12 / (4 * kPi) * std::atan2(b - a, 1 + a * b) / distance;
 }
@@ -59,7 +59,8 @@ void passing_by(Table& t) {
   }
   for (const Configuration& configuration : all_configurations()) {
     for (const double h : {1., .5, .01, 1e-4}) {
-      // In grids only the other integrator samples by angle: close to the lamp flights find too little.
+      // In grids only volpath_distant_mis samples by angle: close to the lamp, flights of the other
+      // integrator find too little.
       if (configuration.grid && !configuration.distant && h < .5) continue;
       t.mean(fmt::format("N22-passing-a-lamp-at-{:g}{}", h, configuration.name()), "N22 N23 7.6f",
              "A ray that passes a lamp at this distance, light scattered once.",
@@ -73,14 +74,15 @@ void passing_by(Table& t) {
   }
 }
 
-// The ray goes through the lamp itself: averaged over a pixel of half width w about it, 1 / D is 2 ln(1 +
-// sqrt 2) / w. Its square has no finite mean there, so the band is wide.
+// The ray goes through the lamp itself. The mean of 1 / D over a pixel of half width w about the lamp is 2
+// ln(1 + sqrt 2) / w. The square of 1 / D has no finite mean there, so the band is wide.
 void through_a_lamp(Table& t) {
   for (const Configuration& configuration :
        {Configuration{false, false}, Configuration{false, true}, kAngles, kAnglesInGrid}) {
     constexpr double kHalf = .01, kSigma = 1e-3;
     const double mean = 2 * std::log(1 + std::sqrt(2.)) / kHalf;
-    // int dt / (D^2 + t^2) over -3..3 is pi / D - 2 / 3 up to D^2; extinction acts over about 3 + |t|.
+    // The integral of dt / (D^2 + t^2) over -3..3 is pi / D - 2 / 3 up to terms of D^2; extinction acts over
+    // a length of about 3 + |t|.
     const double angles = kPi * mean - 2. / 3;
     t.mean(
         "N23-through-a-lamp" + configuration.name(), "N23",
@@ -122,8 +124,8 @@ void from_afar(Table& t) {
                  AreaEmitter{light};
              return builder;
            },
-           // Its rim is 0.1 rad off: the way down is longer by at most 0.005, times 0.01. Flights rarely
-           // scatter in a grid this thin.
+           // The lamp's rim is 0.1 rad off the vertical, so the way down through the cube is longer by at
+           // most 0.005, times the extinction 0.01. Flights rarely scatter in a grid this thin.
            grey(lit_cube_answer(.01, 1)),
            {.slack = 5e-5,
             .slow = configuration.grid && !configuration.distant,
@@ -165,13 +167,14 @@ void enormous(Table& t) {
                    .emitter = AreaEmitter{builder.texture(rgb(1 / light.solid_angle))};
                return builder;
              },
-             // Its rim is 0.01 rad off, 0.014 in the corners: ways down are longer by at most 1e-4.
+             // The light's rim is 0.01 rad off the vertical, 0.014 in the corners: ways down are longer by at
+             // most 1e-4.
              grey(lit_cube_answer(1, 1) * leaning(light.lean)), {.slack = 1e-4});
   }
 }
 
-// A cube [-1, 1]^3 seen along z through its middle, and a lamp on the y axis, inside or outside: extinction
-// acts inside only.
+// The answer for a cube [-1, 1]^3 seen along z through its middle, and a lamp on the y axis inside or outside
+// the cube. Extinction acts inside only.
 double cube_answer(double y, double sigma) {
   const double end = std::atan(1 / y);
   return sigma / (16 * kPi * kPi * y) *
@@ -196,7 +199,8 @@ void across_boundaries(Table& t) {
             builder.scene.emitters = {PointEmitter{{0, y, 0}, rgb(1 / (4 * kPi))}};
             return builder;
           },
-          // For a lamp above the face no ray to it leaves the cube through a side: |z| < 1 is below y.
+          // For a lamp above the face, no ray to it leaves the cube through a side, because |z| < 1 is below
+          // y.
           grey(cube_answer(y, 1)));
     }
   }

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kReflectance = .5;
 
-// The point of the floor at the origin, seen from the side; radiance = reflectance / pi x irradiance.
+// A floor seen from the side, at the point at the origin; its radiance = reflectance / pi x irradiance.
 SceneBuilder floor_point(double size = 3) {
   SceneBuilder builder;
   builder.shape(RectangleShape{}, scale(size), builder.diffuse(kReflectance));
@@ -75,7 +75,7 @@ void huge(Table& t) {
       },
       reflected(kPi));
   for (const double height : {1e-3, .1, 1.}) {
-    // A square of half side 1 at this height.
+    // The light is a square of half side 1 at this height.
     const double x = 1 / height, s = std::sqrt(1 + x * x);
     t.mean(fmt::format("N27-square-at-{:g}", height), "N27 7.6g",
            "A floor this close below a shining square: up to pi, where the square is all it sees.",
@@ -88,7 +88,8 @@ void huge(Table& t) {
            },
            reflected(4 * x / s * std::atan(x / s)), {.slack = 1e-5});
   }
-  // The foot of an emitting wall, 20 x 10 above the floor: atan(b / c) - c / r atan(b / r), r^2 = c^2 + h^2.
+  // The floor at the foot of an emitting wall that is 20 wide and 10 high: the answer is atan(b / c) - c / r
+  // atan(b / r), r^2 = c^2 + h^2.
   constexpr double kFar = 1e-2, kSide = 10, kR = 10.000005;
   t.mean("N27-at-the-foot-of-a-wall", "N27 7.6g", "A floor up to the very edge of a shining wall.",
          [] {
@@ -102,7 +103,7 @@ void huge(Table& t) {
          reflected(std::atan(kSide / kFar) - kFar / kR * std::atan(kSide / kR)), {.slack = 1e-5});
 }
 
-// An OBJ file of triangles, given by their corners.
+// Makes an OBJ file of triangles, which are given by their corners.
 AssetIndex obj(SceneBuilder& builder, const std::vector<std::array<Vec3, 3>>& triangles) {
   std::string text;
   for (const auto& triangle : triangles)
@@ -113,7 +114,8 @@ AssetIndex obj(SceneBuilder& builder, const std::vector<std::array<Vec3, 3>>& tr
 }
 
 void of_nothing(Table& t) {
-  // A square of half side 0.8 at height 1.25 as two triangles, with five degenerate ones among them.
+  // The lamp is a square of half side 0.8 at height 1.25, made of two triangles, with five degenerate ones
+  // among them.
   const auto lamp = [](bool degenerate, bool proper) {
     SceneBuilder builder = floor_point();
     std::vector<std::array<Vec3, 3>> triangles;
@@ -155,7 +157,7 @@ void of_nothing(Table& t) {
 }
 
 void orders_apart(Table& t) {
-  // Lamps of intensities from 1e-20 to 1e20: the sum is that of the brightest few.
+  // Lamps with intensities from 1e-20 to 1e20: the sum of their light is that of the brightest few.
   for (const bool tree : {false, true}) {
     const int count = tree ? 1000 : 4;
     double irradiance = 0;
@@ -177,7 +179,8 @@ void orders_apart(Table& t) {
         },
         reflected(irradiance));
   }
-  // A delta light reflected by a delta lobe: no strategy finds it, and none divides by a density of 0.
+  // A point light (delta light) reflected by a mirror (delta lobe): no sampling strategy finds it, and none
+  // divides by a density of 0.
   t.exact("N32-lamp-in-a-mirror", "N32", "A point light in a mirror is not seen, and nothing goes wrong.",
           [](const Bench& b) {
             SceneBuilder builder;

@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kSlant = 30;  // angle of the view from the normal, in degrees
 
-// A white metal in z = 0, seen by parallel rays and lit by a directional light for which the half vector is
-// off the normal by this angle.
+// A white metal in z = 0, seen by parallel rays and lit by a directional light. The half vector between view
+// and light is `off` the normal.
 SceneBuilder glint(double alpha, Microfacet d, double off) {
   SceneBuilder builder;
   const TextureIndex a = builder.texture(rgb(alpha));
@@ -30,7 +30,8 @@ SceneBuilder glint(double alpha, Microfacet d, double off) {
   return builder;
 }
 
-// GGX's masking and shadowing (Smith's, separable) at these angles; Beckmann's is 1 here to all digits.
+// Returns GGX's masking and shadowing (Smith's, separable) at the angles of view and light; Beckmann's is 1
+// here to all digits.
 double unmasked(double alpha, double view, double light) {
   const auto lambda = [alpha](double angle) {
     return (std::sqrt(1 + std::pow(alpha * std::tan(angle), 2)) - 1) / 2;
@@ -38,7 +39,7 @@ double unmasked(double alpha, double view, double light) {
   return 1 / ((1 + lambda(view)) * (1 + lambda(light)));
 }
 
-// D G / (4 cos) times the light's irradiance.
+// The answer is D G / (4 cos) times the light's irradiance.
 void peaks(Table& t) {
   for (const auto d : {Microfacet::ggx, Microfacet::beckmann})
     for (const double alpha : {2e-3, .01, .1})
@@ -49,7 +50,8 @@ void peaks(Table& t) {
         const double shape =
                          ggx ? std::pow(1 + s2, -2) * unmasked(alpha, view, view + 2 * off) : std::exp(-s2),
                      density = shape * std::pow(1 + tangent * tangent, 2) / (kPi * alpha * alpha);
-        // Directions are accurate to 2^-24: relative to alpha, squared in the exponent.
+        // Directions are accurate to 2^-24. This error counts relative to alpha, and is squared in the
+        // exponent.
         const double tolerance = 1e-5 + 2. * slopes * 4 * 0x1p-24 / alpha;
         t.exact(
             fmt::format("N34-{}-alpha-{:g}-{}", ggx ? "ggx" : "beckmann", alpha,

@@ -10,14 +10,14 @@
 namespace ls::cases {
 namespace {
 
-// A light straight ahead: light travels against the view, so that it arrives scattered by 0 degrees. 4 pi
-// p(0) = (1 + g) / (1 - g)^2, 1.9999e8 at g = 0.9999.
+// A light straight ahead: it travels against the view, so it arrives scattered by 0 degrees. 4 pi p(0) = (1 +
+// g) / (1 - g)^2, which is 1.9999e8 at g = 0.9999.
 void phase_peaks(Table& t) {
   const auto add = [&](const std::string& id, const char* rows, const Configuration& configuration,
                        double g) {
     t.mean(id, rows, "Light scattered straight on: 4 pi p = (1 + |g|) / (1 - |g|)^2, not clamped.",
            [=] { return head_on(configuration, g, .5, g > 0); }, grey(head_on_answer(g, .5)),
-           // 1 - g is known with a relative error of 2^-24 / (1 - g), and enters squared.
+           // In float32, 1 - g is known with a relative error of 2^-24 / (1 - g), and it enters squared.
            {.band = .003, .slack = 2 * 0x1p-25 / (1 - std::abs(g))});
   };
   for (const Configuration& configuration : all_configurations()) {
@@ -79,7 +79,8 @@ void small_and_forbidden(Table& t) {
             });
 }
 
-// R and T of Henyey-Greenstein slabs (van de Hulst 1980), and backward scattering.
+// Reflectance R and transmittance T of slabs with Henyey-Greenstein phase functions (van de Hulst 1980), also
+// for backward scattering.
 void slabs(Table& t) {
   struct Row {
     Slab slab;

@@ -14,12 +14,12 @@ namespace {
 constexpr double kDepth = 1;
 Channels lit(double depth) { return grey(std::exp(-depth) / (2 * kPi)); }
 
-// A box between the sun and a floor, by its lower and upper corner.
+// Adds a box, given by its lower and upper corner, between the sun and a floor.
 void add_box(SceneBuilder& builder, MediumIndex m, const Vec3& lo, const Vec3& hi) {
   builder.container(CubeShape{}, box(lo, hi) * box({.5, .5, .5}, {1, 1, 1}), builder.null(), m);
 }
 
-// The light falls straight down along the edge that the boxes share.
+// The light falls straight down along the edge that the two boxes share.
 void faces_on_each_other(Table& t) {
   for (const Configuration& configuration : both_media()) {
     const auto medium = [configuration](SceneBuilder& builder, double sigma) {
@@ -87,7 +87,7 @@ void panes_on_faces(Table& t) {
           });
 }
 
-// L + rho L + rho^2 L ...: sampled directions that hit the wall must find the light on it too.
+// The answer is L + rho L + rho^2 L ...: sampled directions that hit the wall must find the light on it too.
 void lights_on_walls(Table& t) {
   for (const bool first : {false, true})
     t.mean(
@@ -108,7 +108,8 @@ void lights_on_walls(Table& t) {
         grey(2));
 }
 
-// Emission per length without extinction, seen from both sides of the face and from the face itself.
+// A medium that emits per length but has no extinction, seen from both sides of its face and from the face
+// itself.
 void cameras_at_a_boundary(Table& t) {
   for (const Configuration& configuration : both_media())
     for (const double x : {-1e-2, -1e-5, -1e-7, 1e-7, 1e-5, 1e-2})
@@ -139,7 +140,7 @@ void cameras_at_a_boundary(Table& t) {
   from_inside("N43-in-a-bubble-in-glass", "A camera in a bubble of air in a ball of glass: 1.", 1, true);
 }
 
-// Shading points on the light itself.
+// Points to be lit that are on the light itself.
 void on_lights(Table& t) {
   const auto alone = [&](const char* name, const Geometry& g) {
     t.exact(fmt::format("N27-on-a-shining-{}", name), "N27",
@@ -156,8 +157,8 @@ void on_lights(Table& t) {
   alone("cube", CubeShape{});
 }
 
-// A small bright disk out of focus: rays from the part of the lens within a radius of rho / |1 - z / f| hit
-// it. The circle of confusion is 2 R |z - f| / z at the focus, seen from its middle.
+// A small bright disk out of focus. Rays from the part of the lens within a radius of rho / |1 - z / f| hit
+// the disk. The circle of confusion is seen from its middle; its diameter is 2 R |z - f| / z at the focus.
 void out_of_focus(Table& t) {
   constexpr double kAperture = .1, kFocus = 4, kDisk = .02;
   for (const double z : {2., 3., 8.}) {

@@ -32,7 +32,7 @@ SceneBuilder miniature(const Configuration& configuration, double s) {
 void of_any_scale(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     for (const int k : {-40, -13, 20, 60}) {
-      // Grids in Mitsuba's files have float32 boxes of their own: the unit cube, at every scale.
+      // Grids in Mitsuba's files have a float32 box of their own, so at every scale they fill the unit cube.
       t.exact(fmt::format("N04-scaled-by-2^{}{}", k, configuration.name()), "N4 7.7",
               "A scene scaled by a power of two has the same pixels, bit for bit.", [=](const Bench& b) {
                 return same_bits(b, miniature(configuration, 1), miniature(configuration, std::ldexp(1., k)),
@@ -85,7 +85,7 @@ void anywhere(Table& t) {
   }
 }
 
-// The first point of every sequence.
+// Tests the first point of every sample sequence.
 void first_samples(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     t.exact("N70-first-samples-of-seed-0" + configuration.name(), "N70 N6",

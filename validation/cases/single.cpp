@@ -10,7 +10,7 @@
 namespace ls::cases {
 namespace {
 
-// The default integrator, and the other one with each of its settings.
+// The settings that are tested: the default integrator, and volpath_distant_mis with each of its settings.
 struct Setting {
   std::string name;
   Configuration configuration;
@@ -42,7 +42,7 @@ void cubes(Table& t) {
   }
 }
 
-// passing() with the setting's heuristic.
+// The scene passing() with the setting's heuristic.
 SceneBuilder passing_lit(const Setting& s, const Rgb& sigma, const Rgb& albedo) {
   SceneBuilder builder = passing(s.configuration, sigma, albedo);
   builder.scene.integrator.heuristic = s.heuristic;
@@ -54,19 +54,20 @@ void shine(SceneBuilder& builder, const Geometry& g, const Transform& t) {
   builder.shape(g, t, black).emitter = AreaEmitter{light};
 }
 
-// int sigma e^(-sigma (t + 3)) / (4 pi) arriving(t) dt along the ray.
+// Returns the integral of sigma e^(-sigma (t + 3)) / (4 pi) arriving(t) dt along the ray.
 template <class F>
 double along(double sigma, F arriving) {
   return integrate([&](double t) { return sigma * std::exp(-sigma * (t + 3)) / (4 * kPi) * arriving(t); }, -3,
                    3, 1200);
 }
 
-// A sphere of radiance 1 and radius r at distance h from the ray: the mean over its solid angle of the light
-// that reaches each point, by quadrature over the cosine to its centre.
+// The answer for a sphere of radiance 1 and radius r at distance h from the ray: at each point of the ray,
+// the mean over the sphere's solid angle of the light that reaches the point, by quadrature over the cosine
+// to the sphere's centre.
 double sphere_answer(double h, double r, double sigma) {
   return along(sigma, [=](double t) {
     const double d2 = h * h + t * t, d = std::sqrt(d2), cos_max = std::sqrt(1 - r * r / d2);
-    // c = cos_max + (1 - cos_max)(1 - v^2) removes the square root singularity at the rim.
+    // The substitution c = cos_max + (1 - cos_max)(1 - v^2) removes the square root singularity at the rim.
     return 2 * kPi *
            integrate(
                [=](double v) {
@@ -77,7 +78,7 @@ double sphere_answer(double h, double r, double sigma) {
                0, 1, 200);
   });
 }
-// A square light of side 2a, facing the ray at distance h.
+// The answer for a square light of side 2a that faces the ray at distance h.
 double square_answer(double h, double a, double sigma) {
   return along(sigma, [=](double t) {
     return integrate(
@@ -92,7 +93,8 @@ double square_answer(double h, double a, double sigma) {
         -a, a, 80);
   });
 }
-// A lamp at distance h whose intensity falls linearly with the angle from 30 to 60 degrees off its axis.
+// The answer for a lamp at distance h whose intensity falls linearly with the angle from 30 to 60 degrees off
+// its axis.
 double spot_answer(double h, double sigma) {
   return along(sigma, [=](double t) {
     const double d2 = h * h + t * t, degrees = std::abs(std::atan2(t, h)) * 180 / kPi;
@@ -106,8 +108,8 @@ void lights(Table& t) {
                spot = spot_answer(.5, .7);
   for (const bool grid : {false, true}) {
     for (const Setting& s : settings(grid)) {
-      // Settings that reach points near a light by chance only: a short first run misses these, or
-      // overestimates them.
+      // These settings reach points near a light by chance only: a short first run misses such points, or
+      // overestimates their light.
       const bool by_chance =
           s.configuration.distance == DistanceSampling::exponential || (grid && !s.configuration.distant);
       const MeanOptions options{.slow = by_chance, .paths = by_chance ? 1u << 21 : 0u},

@@ -92,8 +92,8 @@ std::string named(const char* what, const Slab& s, const char* side, const Confi
   return fmt::format("7.2-{}-a{:g}-tau{:g}-{}{}", what, s.albedo, s.tau, side, configuration.name());
 }
 
-// The little light transmitted by a deep slab needs long paths: tested to 1 % of it, in the faster
-// configuration; for the white slab of depth 16, R covers the other one.
+// Deep slabs transmit little light, by long paths only: this is tested to 1 %, in the faster configuration.
+// For the white slab of depth 16, the case of its reflectance R covers the other configuration.
 MeanOptions of_little(double through, bool slow) {
   const bool little = through < .3;
   return {.band = little ? .01 : kBand,
@@ -138,7 +138,8 @@ SceneBuilder plate_above(const Configuration& configuration, Slab slab) {
   return builder;
 }
 
-// The slab's reflection of an environment above it, seen by a plate that hides at most (.0025)^2 of it.
+// The light that the slab reflects from an environment above it, seen by a plate that hides at most (.0025)^2
+// of the environment.
 SceneBuilder plate_facing(const Configuration& configuration, const Slab& slab) {
   SceneBuilder builder = column(configuration, slab, false);
   add_small_plate(builder, {.1, .15, slab.tau}, .05);
@@ -178,7 +179,7 @@ void dielectric(Table& t) {
            },
            grey(.55168), {.slack = 1e-4, .slow = configuration.grid});
   }
-  // Little light is reflected, most of it by few paths: in the faster configuration only.
+  // The slab reflects little light, most of it by few paths; tested in the faster configuration only.
   t.mean("7.5-water-slab-R/homogeneous/volpath", "7.5", "A slab of water that scatters forward.",
          [] {
            return column({}, {.9, .75, 2, 1.33}, false);
@@ -186,7 +187,8 @@ void dielectric(Table& t) {
          grey(.10931), {.slack = 1e-4, .slow = true});
 }
 
-// Single scattering: R_1 = (a/2) int mu / (1 + mu) (1 - e^(-tau (1 + 1/mu))) dmu.
+// The answer for single scattering: R_1 = (a/2) int mu / (1 + mu) (1 - e^(-tau (1 + 1/mu))) dmu, with a the
+// albedo.
 double first_order(double albedo, double tau) {
   return albedo / 2 *
          integrate(
@@ -210,7 +212,8 @@ std::array<double, 3> orders_of_endless() {
   return {1. / 2 - first, 1. / 8 + first / 2 - second, 1. / 16 + first / 8 + second / 2 - third};
 }
 
-// A white slab in an environment, without mirror walls (which would count as scatterings), so very wide.
+// A white slab in an environment. It has no mirror walls at its sides, which would count as scatterings, so
+// it is very wide.
 SceneBuilder wide_slab(const Configuration& configuration, double tau, int scatterings) {
   SceneBuilder builder = column(configuration, {1, 0, tau}, false);
   builder.scene.shapes.erase(builder.scene.shapes.begin(), builder.scene.shapes.begin() + 4);
@@ -219,7 +222,7 @@ SceneBuilder wide_slab(const Configuration& configuration, double tau, int scatt
   return builder;
 }
 
-// 1 if a column is brighter with paths of one more scattering than `order`.
+// Returns 1 if a column (a slab between mirrors) is brighter with paths of one more scattering than `order`.
 Figure more_light(const Bench& bench, int order) {
   double mean[2] = {0, 0};
   Figure f{.expected = 1};
@@ -252,7 +255,7 @@ void orders(Table& t) {
            "What a slab reflects of light scattered at most twice, or three times: .250699746, .319941097.",
            [=] { return wide_slab({}, 60, most); }, grey(each[0] + each[1] + (most > 2 ? each[2] : 0)),
            {.slack = 1e-4, .slow = true});
-  // Each order adds light, and all of them together are the whole.
+  // Each order of scattering adds light, and all of them together give the whole.
   for (int order = 1; order <= 8; order *= 2) {
     t.exact(fmt::format("7.6h-order-{}-adds-light/homogeneous/volpath", order), "7.6h",
             "One more scattering, more light: the same numbers, paths one segment longer.",

@@ -63,7 +63,8 @@ void mean_way_through_a_cube(Table& t) {
     t.mean(fmt::format("7.6d-cube-{:g}-g{:g}{}", r.sigma_s, r.g, r.configuration.name()), "7.6d",
            "Light's mean way through the unit cube is 4 V / S = 2/3, however it is scattered.",
            [=] { return cubes(r.configuration, r.sigma_s, r.g); }, grey(2. / 3),
-           // Four points per angle: accurate to 1e-3 of what scattering changes, a tenth.
+           // The quadrature has four points per angle; it is accurate to 1e-3 of what scattering changes,
+           // which is a tenth.
            {.slack = 2e-4, .slow = r.sigma_s > 2 || r.configuration.grid});
 }
 
@@ -90,7 +91,7 @@ void bodies_all_but_white(Table& t) {
              builder.scene.sensor.projection = Projection::orthographic;
              return builder;
            },
-           // Reabsorption: a share of 1.6e-6 per length, over path lengths of about 20.
+           // Reabsorption takes a share of 1.6e-6 per length, over path lengths of about 20.
            grey(kPi / 3 * kDepth * kAbsorbed * kSource),
            {.band = .01,
             .why_band = "16 mean free paths: ways that vary by more than their mean",

@@ -14,8 +14,8 @@ BsdfIndex rough_mirror(SceneBuilder& builder, double alpha, Microfacet d = Micro
   return builder.bsdf(RoughConductorBsdf{d, a, a, {0, 0, 0}, {1, 1, 1}, builder.texture(rgb(1))});
 }
 
-// A large rectangle in z = 0 of the material from `make`, seen `degrees` off its normal. Callers add what is
-// seen in it.
+// A large rectangle in z = 0 with the material from `make`, seen `degrees` off its normal. Callers add what
+// is seen in it or through it.
 SceneBuilder sheet(double degrees, auto make) {
   SceneBuilder builder;
   builder.shape(RectangleShape{}, scale(1e3), make(builder));
@@ -27,7 +27,8 @@ SceneBuilder in_white(SceneBuilder builder) {
   builder.environment();
   return builder;
 }
-// A wall of two colours behind it and an environment, so that the ray's direction matters.
+// Adds a wall of two colours behind the rectangle and an environment, so that the direction of the ray
+// matters.
 SceneBuilder before_a_wall(SceneBuilder builder) {
   const TextureIndex dark = builder.texture(rgb(.25)), bright = builder.texture({1, .75, .5});
   builder.scene.textures.push_back(CheckerboardTexture{dark, bright, {{8, 0, 0, 0, 8, 0, 0, 0, 1}}});
@@ -116,7 +117,8 @@ void microfacets(Table& t) {
     t.mean(fmt::format("N35-grazing-rough-{:g}", alpha), "N35",
            "A rough white metal at 89.99 degrees: what facets leave of a white sky, by quadrature.",
            [=] { return in_white(sheet(89.99, [=](SceneBuilder& k) { return rough_mirror(k, alpha); })); },
-           // The midpoint rule is accurate to 2e-5 for the square root at the rim.
+           // The answer comes from the midpoint rule, which is accurate to 2e-5 for the square root at the
+           // rim.
            grey(unmasked_at(89.99, alpha)), {.slack = 2e-5});
 }
 

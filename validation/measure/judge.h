@@ -14,32 +14,36 @@ struct ValidateCase {
   double z = 0;
   // Systematic deviation that is accepted: float32 rounding, and the uncertainty of the expected value.
   double allowance = 0;
-  // The probability of a figure at least as far off if the program is correct, and the level below which the
-  // case fails.
+  // p: the probability that a correct program gives a figure at least as far off. level: the p below which
+  // the case fails.
   double p = 1, level = 0;
-  // Level of the interval that must lie within the band; `level` is that of the one that must cover the
-  // answer.
+  // Statistical cases of the table are judged by two confidence intervals: the one at `band_level` must lie
+  // within the band, the one at `level` must contain the answer.
   double band_level = 0;
-  std::uint64_t nonfinite = 0;  // bad samples: any makes the case fail
+  std::uint64_t nonfinite = 0;  // number of faulty samples; a single one makes the case fail
   double seconds = 0;
-  std::string why;  // of a failure
-  // For the table's own cases: a one-sentence description; "statistical", with the share of the answer that
-  // the interval must lie within, or "exact", with the tolerance.
+  std::string why;  // reason of the failure; empty: the case passed
+  // For the cases of the table: the rows that the case covers, a one-sentence description, and the kind of
+  // test: "statistical", where `band` is the share of the answer that the interval must lie within, or
+  // "exact", where it is the tolerance.
   std::string rows, about, kind;
   double band = 0;
   std::string why_band;  // reason for a wider band
   std::uint64_t paths = 0;
-  bool too_wide = false;  // failed only because the interval is too wide: more paths may help
+  // true if the case failed only because its interval is too wide, so that more paths may help
+  bool too_wide = false;
   bool passed() const { return why.empty(); }
 };
 
-// Judges a case whose figures are known: sets z, p, allowance and why. `freedom`: degrees of freedom of the
-// standard error. `rounding`: deviation allowed for float32 in a figure whose samples are all equal.
+// Judges a case whose figures are known: sets z, p, allowance and why. `freedom` is the degrees of freedom of
+// the standard error. `rounding` is the deviation allowed for float32 rounding, as in a figure whose samples
+// are all equal.
 void judge(ValidateCase& c, double freedom, double rounding);
 
-// Judges by equivalence: the interval at the case's level, widened by `unknown`, must cover the answer, and
-// the one at its band_level must lie inside the band around it; too few samples fail. A standard error above
-// `rounding` with fewer than `least` degrees of freedom is rejected.
+// Judges by equivalence, with the standard error's `freedom` degrees of freedom. Both intervals are widened
+// by `unknown`, the uncertainty of the answer. The interval at c.level must contain the answer, and the one
+// at c.band_level must lie inside the band around it, so too few samples fail. A standard error above
+// `rounding` with fewer than `least` degrees of freedom fails, too.
 void judge_equivalence(ValidateCase& c, double freedom, double unknown, double rounding, double least);
 
 }  // namespace ls::cli

@@ -27,7 +27,8 @@ FrameSize enough(FrameSize size) {
   return {size.width * factor, size.height * factor};
 }
 
-// Sums over pixels: the mean, the estimated squared error, and its square.
+// Sums over the pixels of a frame: of their means, of their estimated squared errors, and of the squares of
+// these.
 struct Sums {
   double mean = 0, square = 0, fourth = 0;
   void add(double weight, double a, double b) {

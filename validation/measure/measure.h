@@ -12,19 +12,20 @@
 
 namespace ls::cli {
 
-// Samples of all causes.
+// Returns the number of faulty samples, of all causes together.
 std::uint64_t samples_gone_wrong(const render::Health& health);
-// The causes, with the first location: "1 majorant_violation, first at pixel (3, 5), sample 17".
+// Returns the causes with their counts and the first location, such as "1 majorant_violation, first at pixel
+// (3, 5), sample 17".
 std::string health_text(const render::Health& health);
 void add(render::Health& sum, const render::Health& h);
 
 // Renders every pixel of `size`, one row per task; the planes of the sums cover the whole frame.
 render::TileResult render_frame(const render::World& world, FrameSize size, SampleRange samples, int threads);
 
-// The scene as a worker receives it: pruned, written and read again.
+// Returns the scene as a worker receives it: pruned (without what affects no pixel), written and read again.
 Result<Scene> as_sent(const Scene& scene);
 
-// The scene's settings with this seed.
+// Returns the scene's settings, with this seed.
 RenderSettings settings_of(const Scene& scene, std::uint64_t seed);
 
 struct Measured {
@@ -38,13 +39,14 @@ struct Measured {
   std::uint64_t unhealthy() const { return samples_gone_wrong(health); }
 };
 
-// Renders at least `paths` samples, spread evenly over the frame whatever its filter. A frame of few pixels
-// is enlarged to as many independent pixels as a standard error needs; its mean does not change.
+// Renders at least `paths` samples, spread evenly over the frame whatever its filter, and measures their
+// mean. A frame of few pixels is rendered with as many independent pixels as a standard error needs; its mean
+// does not change.
 Result<Measured> measure(const Scene& scene, const render::AssetFiles& files, std::uint64_t paths,
                          std::uint64_t seed, int threads);
 
-// The mean of this many (at least 2) such frames, each with its own seeds and its share of the paths. The
-// error is that of a mean of independent figures, with frames - 1 degrees of freedom.
+// Measures the mean of `frames` (at least 2) such frames, each with its own seeds and its share of `paths`.
+// The standard error is that of the mean of independent figures, with frames - 1 degrees of freedom.
 Result<Measured> measure_frames(const Scene& scene, const render::AssetFiles& files, std::uint64_t paths,
                                 std::uint64_t seed, int threads, std::uint64_t frames);
 

@@ -1,5 +1,5 @@
-// Additional outputs of an image (AOVs): names, planes in a partial, sizes. docs/reference/aovs.md defines
-// each.
+// Additional outputs of an image (AOVs): their names, sizes, and planes in a partial (the pixel sums of one
+// tile and range of samples). docs/reference/aovs.md defines each.
 //
 // After its six colour planes a partial has the planes of sums of the requested AOVs, then those of
 // identifiers (id_slots.h); each kind sorted by name, which is also the order in the file.
@@ -42,7 +42,7 @@ inline constexpr std::size_t kAovs = 16;
 // The type of an AOV's values, and the divisor of their mean.
 enum class AovKind {
   of_hits,  // sums over the samples that hit a surface; the mean is over these
-  of_all,   // likewise, but the mean is over all samples: 0 where nothing is hit
+  of_all,   // sums over the samples that hit a surface; the mean is over all samples: a miss counts as 0
   light,    // components of the radiance; the mean is over all samples
   ids       // identifiers, each with its number of samples
 };
@@ -73,9 +73,9 @@ class AovSet {
 };
 AovSet aovs_of(AovKind kind);  // all of a kind
 
-// Accepts the names in common use ("normal", "sh_normal", "crypto_object"), ignoring case and with '-' for
-// '_'. "spp" and "stderr", which every image has, are accepted and add nothing. invalid_argument: an unknown
-// name; the message lists the known ones.
+// Parses names of AOVs. Names in common use ("normal", "sh_normal", "crypto_object") are accepted; case is
+// ignored, and '-' stands for '_'. "spp" and "stderr", which every image has, are accepted and add nothing.
+// invalid_argument: an unknown name; the message lists the known ones.
 Result<AovSet> parse_aovs(std::span<const std::string> names);
 std::vector<std::string> names_of(AovSet set);  // sorted
 std::string known_aovs();                       // "albedo, coverage, ..."
@@ -96,7 +96,8 @@ struct AovPlanes {
 };
 AovPlanes planes_of(AovSet set);
 
-// Bytes per pixel: in a partial (and in a tail), and in the film's sums.
+// Bytes per pixel of a partial (and of a tail, the last round of a film if it is cut), and of the film's
+// sums.
 std::size_t partial_bytes_per_pixel(AovSet set);
 std::size_t film_bytes_per_pixel(AovSet set);
 

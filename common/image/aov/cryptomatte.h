@@ -14,14 +14,15 @@ namespace ls {
 // MurmurHash3_x86_32 (A. Appleby, public domain) with seed 0.
 std::uint32_t murmur3_32(std::string_view text);
 
-// The name's hash as the bits of a float; one exponent bit is flipped where the float would not survive every
-// program (0, denormal, infinite or NaN).
+// Returns the identifier of a name: its hash, taken as the bits of a float. Where not every program would
+// keep that float (0, denormal, infinite or NaN), one exponent bit is flipped.
 float cryptomatte_id(std::string_view name);
 
-// {"name":"8 hexadecimal digits of its id", ...}, sorted by name, without duplicates.
+// Returns {"name":"8 hexadecimal digits of its id", ...}, sorted by name, without duplicates.
 std::string cryptomatte_manifest(std::vector<std::string> names);
 
-// Header strings of layer `layer`: cryptomatte/KEY/name, hash, conversion and manifest (omitted if empty).
+// Returns the header strings of layer `layer`: cryptomatte/KEY/name, hash, conversion and manifest (omitted
+// if empty).
 std::map<std::string, std::string> cryptomatte_header(std::string_view layer, const std::string& manifest);
 
 }  // namespace ls

@@ -32,14 +32,16 @@ struct IdSlots {
 
 bool is_identifier(float id);
 
-// Slots from the objects that one unit saw in a pixel, in any order, each once.
+// Makes slots from the objects that one unit (a tile and a range of samples) saw in a pixel. `seen` has each
+// object once, in any order.
 IdSlots ranked(std::vector<IdSlot> seen);
 IdSlots operator+(const IdSlots& a, const IdSlots& b);
 
-// Checks slots against the number of samples; returns the fault, empty if none.
+// Checks slots against the number of samples; returns a description of the fault, empty if there is none.
 std::string wrong_with(const IdSlots& slots, std::uint64_t samples);
 
-// Convert between slots and kIdPlanes planes, with a stride of `stride` floats, at one pixel.
+// Convert between slots and the kIdPlanes planes of one pixel; `stride` is the distance between planes in
+// floats.
 IdSlots load_slots(const float* planes, std::size_t stride);
 void store_slots(const IdSlots& slots, float* planes, std::size_t stride);
 

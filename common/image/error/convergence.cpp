@@ -34,7 +34,8 @@ Log log_of(const ErrorPoint& p) {
   return {std::log(p.core_seconds), std::log(p.relmse), p.spp, interval * std::sqrt(.5)};
 }
 
-// Points from the last one back, each with at most half the samples of the one after it; in order of samples.
+// Returns points at doubling sample counts: from the last point back, each with at most half the samples of
+// the one after it. They are in order of samples.
 std::vector<Log> doublings(std::span<const ErrorPoint> points) {
   std::vector<Log> out;
   for (std::size_t i = points.size(); i-- > 0 && out.size() < kMostPoints;) {
@@ -49,16 +50,17 @@ double covariance(const Log& a, const Log& b) {
   return a.sigma * b.sigma * std::min(a.spp, b.spp) / std::max(a.spp, b.spp);
 }
 
-// Covariance, at two times relative to the line's reference point, of the deviation due to a slope that
-// follows a Brownian motion; independent on either side of that point.
+// If the slope of the line follows a Brownian motion, the errors deviate from the line. This is the
+// covariance of the deviations at two times u and v, relative to the line's reference point, for a motion of
+// variance 1 per unit of log time; deviations on different sides of that point are independent.
 double bend_covariance(double u, double v) {
   if (u * v <= 0) return 0;
   const double near = std::min(std::abs(u), std::abs(v)), far = std::max(std::abs(u), std::abs(v));
   return near * near * (3 * far - near) / 6;
 }
 
-// The lower Cholesky factor of the covariance, including a slope variation of `bend`; nullopt if not positive
-// definite.
+// Returns the lower Cholesky factor of the points' covariance, including a variation of the slope by `bend`;
+// nullopt if the covariance is not positive definite.
 using Matrix = std::array<std::array<double, kMostPoints>, kMostPoints>;
 std::optional<Matrix> factor(const std::vector<Log>& y, double bend) {
   Matrix l{};
@@ -74,7 +76,8 @@ std::optional<Matrix> factor(const std::vector<Log>& y, double bend) {
   return l;
 }
 
-// L^-1 times the vector given by `value`: transforms the points to independent ones of variance 1.
+// Returns L^-1 times the vector given by `value`, which transforms the points to independent ones of variance
+// 1.
 template <class Value>
 std::vector<double> whitened(const Matrix& l, const std::vector<Log>& y, const Value& value) {
   std::vector<double> out(y.size());
@@ -120,9 +123,9 @@ class Line {
   struct Value {
     double mean = 0, sigma = 0;
   };
-  // Prediction of the estimate at exp(later) times the samples of the last point: the line, plus the part of
-  // the points' deviations from it that persists because samples are shared (Rasmussen and Williams 2006,
-  // section 2.7).
+  // Predicts the estimate at exp(later) times the samples of the last point: the value of the line, plus the
+  // part of the points' deviations from it that persists because samples are shared (Rasmussen and Williams
+  // 2006, section 2.7).
   Value at(double later) const {
     const Log then{0, 0, y_.back().spp * std::exp(later), y_.back().sigma};
     const auto shared = whitened(l_, y_, [&](const Log& p) { return covariance(p, then); });
@@ -169,7 +172,7 @@ bool stands_on_a_floor(std::span<const ErrorPoint> points) {
   return false;
 }
 
-// The earliest time after the last point, as a logarithm, at which `value` falls to `wanted`.
+// Returns the earliest time after the last point, as a logarithm, at which `value` falls to `wanted`.
 template <class Curve>
 double when(const Curve& value, double wanted) {
   constexpr double kMost = 60;  // e^60 times as long counts as never
@@ -182,15 +185,15 @@ double when(const Curve& value, double wanted) {
   return hi;
 }
 
-// The end of the round that contains sample `spp`.
+// Returns the number of samples at the end of the round that contains sample `spp`.
 double end_of_round(double spp) {
   if (!(spp < 0x1p52)) return spp;
   const auto samples = static_cast<std::uint64_t>(std::ceil(spp));
   return static_cast<double>(round_range(round_count(samples) - 1).s1);
 }
 
-// How much the cost of a sample varies between doublings: relative standard deviation about the mean of all
-// samples so far, over the last few doublings. 0: too few points.
+// Returns by how much the cost of a sample varies between doublings of their number: its standard deviation
+// over the last few doublings, relative to the mean cost of all samples so far. 0: there are too few points.
 double cost_spread(std::span<const ErrorPoint> points) {
   constexpr int kDoublings = 4;
   const ErrorPoint& now = points.back();

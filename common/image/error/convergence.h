@@ -31,7 +31,7 @@ struct Trend {
   double slope = 0, slope_lo = 0, slope_hi = 0;  // with a 95 % interval
   std::string verdict;                           // in words
 };
-// Points in order of samples. nullopt: fewer than three are usable.
+// Fits the trend. `points` are in order of samples. nullopt: fewer than three of them are usable.
 std::optional<Trend> trend_of(std::span<const ErrorPoint> points);
 
 // How far an image's error figures can be trusted, as one word and as a sentence.
@@ -48,9 +48,9 @@ struct ConvergenceStatus {
   bool operator==(const ConvergenceStatus&) const = default;
 };
 const char* to_string(ConvergenceStatus::Kind kind);
-// `doubt`: ImageError::verdict, empty if the image's own figures are trusted. Reasons in order of precedence:
-// doubt, a bias floor, the slope.
-//
+// Judges an image's convergence. `doubt` is ImageError::verdict, empty if the image's own figures are
+// trusted. If there are several reasons for distrust, the first of these is given: `doubt`, a bias floor, the
+// slope.
 // Bias floor: the part of the true error that the estimated one lacks is a squared bias, if there is one, and
 // does not fall with samples. Random differences between the two fall with samples, except for the
 // reference's own noise, which stays as well. A floor is reported if the last true error exceeds the
@@ -60,12 +60,13 @@ const char* to_string(ConvergenceStatus::Kind kind);
 ConvergenceStatus judge(std::span<const ErrorPoint> points, const std::string& doubt);
 
 struct Forecast {
-  double spp = 0;                                                     // at the target
+  double spp = 0;  // mean samples per pixel at which the target is reached
   double core_seconds = 0, core_seconds_lo = 0, core_seconds_hi = 0;  // remaining; 95 % interval
 };
-// What is needed until the estimated relMSE reaches `target`, rounded up to a whole round. Zeros: already
-// reached. nullopt: no point has a positive error and time. The slope is the fitted one, drawn to 1 as far as
-// the points leave it open (a Gaussian prior of standard deviation 0.15).
+// Returns what is needed until the estimated relMSE reaches `target`, rounded up to a whole round (range of
+// samples). Core seconds of 0: the target has been reached. nullopt: no point has a positive error and time.
+// The slope is the fitted one, drawn to 1 as far as the points leave it open (a Gaussian prior of standard
+// deviation 0.15).
 //
 // Slopes change: the gain of low-discrepancy points on smooth parts of an image is used up eventually, and a
 // slope of 1.2 at 4 samples has become 1.0 at 256 (the bench scene `tint`). A straight line through all

@@ -19,8 +19,9 @@ constexpr double k95 = 1.959963984540054;  // two-sided 95 % point of the normal
 // sum unreliable. Small images need fewer: in one of 32 x 32, object edges alone sometimes carry the error.
 constexpr double kFewPixels = 100, kPartOfSmall = 48;
 constexpr double kLargeShare = 0.1;  // of the error in one pixel, for images with many pixels
-// Limit, in smooth parts of the image, for fourth powers relative to the variance from pairs of neighbours: 1
-// for Gaussian noise, up to 6 for low-discrepancy points on a smooth image (tests/coverage).
+// Fourth powers of D in smooth parts of the image are compared with the variance from pairs of neighbours.
+// Their ratio is 1 for Gaussian noise, and up to 6 for low-discrepancy points on a smooth image
+// (tests/coverage); above this limit the estimate is not trusted.
 constexpr double kHeavy = 10;
 // ratio of the light in the two halves from which a pixel counts as having few hits
 constexpr double kOneSided = 19;
@@ -41,7 +42,8 @@ double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earl
                  *b1 = &earlier.halves.b[row];
     const double *roots = &w.roots[row], *leans = &w.leans[row];
     for (std::size_t x = 0; x < width; ++x) {
-      // each half's part of the mean: a = last * a_n + before * a_o
+      // The mean of each half is split into the part of the last round and that of earlier rounds: a = last *
+      // a_n + before * a_o.
       const double ao = before * a1[x], bo = before * b1[x], an = a[x] - ao, bn = b[x] - bo;
       const double of_before = 0.25 * (ao - bo) * (ao - bo), of_last = 0.25 * (an - bn) * (an - bn);
       const double apart = 0.5 * ((an + bn) / last - (ao + bo) / before);
@@ -68,14 +70,16 @@ double trace_of_moments(const NoiseSums& s, bool trusted) {
   return channel / 3 + cross * r2 / (1 + 2 * r2) + (trusted ? s.flat_pairs : 0);
 }
 
-// Standard deviation of (estimated - realised) sum of squares, divided by the estimated sum.
+// Returns the standard deviation of the estimated minus the realised sum of squares, divided by the estimated
+// sum.
 double relative_spread(const NoiseSums& s, bool trusted) {
   if (!(s.squares > 0)) return 0;
   return trusted ? 2 * std::sqrt(s.changes.products) / s.changes.squares
                  : 2 * std::sqrt(trace_of_moments(s, false)) / s.squares;
 }
 
-// `a`, `b`: changes of the halves' means, three planes each; `scale`: factor on their squares.
+// Returns the sums for the interval. `a` and `b` are the changes of the two halves' means, three planes each;
+// `scale` is a factor on their squares.
 ChangeSums change_sums(const std::vector<double>& a, const std::vector<double>& b, double scale) {
   const std::size_t n = a.size() / 3;
   ChangeSums out;
@@ -90,7 +94,8 @@ ChangeSums change_sums(const std::vector<double>& a, const std::vector<double>& 
   return out;
 }
 
-// Ratio of fourth powers to pairs of neighbours in smooth parts of the image; 0 where edges dominate.
+// Returns the ratio of fourth powers to pairs of neighbours in smooth parts of the image; 0 where edges
+// dominate.
 double heaviness(const NoiseSums& s) {
   constexpr double kPart = .25;
   const double flat = s.pixel_fourth - s.edge_pixel_fourth;
@@ -182,8 +187,8 @@ void TileError::subtract_skew(double part) {
 
 namespace {
 
-// A vectorised loop for pixels with light in both halves, which are nearly all; only black pixels need their
-// neighbours.
+// Counts pixels with light and with few hits. Nearly all pixels have light in both halves and are handled by
+// a vectorised loop; only black pixels need their neighbours.
 void count_hits(const HalfMeans& h, TileError& out) {
   const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
   const double *a = h.a.data(), *b = h.b.data();
@@ -205,7 +210,8 @@ void count_hits(const HalfMeans& h, TileError& out) {
 
 namespace {
 
-// Uses the last round, if it is long enough.
+// Computes the sums from the changes in the last round, if that round and the part before it have enough
+// samples.
 void send_changes(const HalfMeans& h, std::uint64_t spp, const EarlierMeans& earlier,
                   const std::vector<double>& roots, TileError& out) {
   if (std::min(earlier.spp, spp - earlier.spp) < kTellingSamples) return;

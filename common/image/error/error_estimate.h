@@ -74,7 +74,8 @@
 
 namespace ls {
 
-// Sums of the changes of the half means in the last round: alpha and beta of the derivation.
+// Sums of the changes of the half means in the last round (range of samples); alpha and beta as in the
+// derivation above.
 struct ChangeSums {
   double squares = 0;   // sum over pixels of (alpha . alpha + beta . beta) / 2
   double products = 0;  // sum over pixels of (alpha . beta)^2
@@ -98,11 +99,11 @@ struct NoiseSums {
 struct TileError {
   std::uint64_t pixels = 0;
   std::uint64_t samples = 0;  // spp x pixels
-  // Pixels of which at least one half has almost no light although there is some: their light came from very
-  // few samples, and neither their value nor their difference is reliable. A pixel counts if one half has 19
-  // times as much as the other, or if both have none and more than half of the neighbours in its window have
-  // some. (k equal hits all fall into one half with probability 2^-(k-1): of pixels with 2 hits half are
-  // found, with 5 one in 16, with 10 one in 500.)
+  // Number of pixels of which at least one half has almost no light although there is some: their light came
+  // from very few samples, and neither their value nor their difference is reliable. A pixel counts if one
+  // half has 19 times as much light as the other, or if both have none and more than half of the neighbours
+  // in its window have some. (k equal hits all fall into one half with probability 2^-(k-1): of pixels with 2
+  // hits half are found, with 5 one in 16, with 10 one in 500.)
   std::uint64_t few_hits = 0;
   std::uint64_t lit = 0;  // pixels in which some sample found light
   NoiseSums plain;        // of D
@@ -118,17 +119,17 @@ struct HalfMeans {
   int width = 0, height = 0;
   std::span<const double> a, b;
 };
-// The tile at an earlier time; its samples are included in the later means.
+// The half means of the same tile after fewer samples, which are included in the later means.
 struct EarlierMeans {
   HalfMeans halves;
   std::uint64_t spp = 0;  // at least 2, fewer than now
 };
-// `spp`: samples per pixel of the means, both halves together. Without `earlier`, skewed noise is not
-// corrected and the interval assumes Gaussian noise.
+// Estimates the error of a tile. `spp` is the number of samples per pixel in `halves`, both halves together.
+// Without `earlier`, skewed noise is not corrected and the interval assumes Gaussian noise.
 TileError estimate_error(const HalfMeans& halves, std::uint64_t spp, const EarlierMeans* earlier = nullptr);
-// 1 / (m^2 + 0.01), minus the bias that noise of variance s2 in m causes.
+// Returns 1 / (m^2 + 0.01), minus the bias that noise of variance s2 in m causes.
 double relative_weight(double m, double s2);
-// True if pixel (x, y) counts in few_hits.
+// True if pixel (x, y) counts in TileError::few_hits.
 bool has_few_hits(const HalfMeans& halves, int x, int y);
 
 // The error figures shown to the user.
@@ -136,30 +137,33 @@ struct ImageError {
   double rmse = 0, rmse_lo = 0, rmse_hi = 0;  // 95 % interval for the realised error of this image
   double relmse = 0, relmse_lo = 0, relmse_hi = 0;
   double spp = 0;  // mean over pixels
-  // (sum x)^2 / sum x^2 of the relative error: the number of pixels that carry it
+  // With x the relative error of a pixel: (sum of x)^2 / (sum of x^2), the number of pixels that carry the
+  // error.
   double effective_pixels = 0;
   double top_share = 0;        // share of the relative error in the worst pixel
   std::uint64_t few_hits = 0;  // number of pixels
-  // false: few pixels carry the error, or there is no light, so the interval is unreliable
+  // False if few pixels carry the error, or if there is no light; then the intervals are unreliable.
   bool trusted = false;
   std::string verdict;  // in words; empty when trusted
 };
 ImageError image_error(const TileError& sums);
 
-// Collects the figures of all tiles after each round. A checkpoint is a round over all tiles, summed in tile
-// order, so that it does not depend on the order of arrival. A tile that stopped early counts with its last
-// figures.
+// Collects the error figures of all tiles after each round (range of samples). A checkpoint has the image's
+// figures at one round: the sum over all tiles in tile order, so that it does not depend on the order in
+// which results arrive. A tile that stopped early counts with its last figures.
 class Checkpoints {
  public:
   explicit Checkpoints(TileIndex tiles) : tiles_(tiles), waiting_(tiles) {}
 
-  // Call after each fold. A repeated round (a cut round replaced by the full one, a restarted tile) replaces
-  // the tile's figures from that round on, except in complete checkpoints, which are final.
+  // Records a tile's figures; call after each fold (addition of a round). If a round is repeated (a cut round
+  // replaced by the full one, or a restarted tile), the figures replace the tile's figures from that round
+  // on, except in complete checkpoints, which are final.
   void folded(TileIndex tile, RoundIndex round, const TileError& error);
-  // No more rounds will follow for this tile unless folded() is called for it again.
+  // Says that no more rounds will follow for this tile, unless folded() is called for it again.
   void stopped(TileIndex tile);
 
-  // Number of rounds that all tiles have reached, and the image's figures at one of them.
+  // complete() is the number of rounds that all tiles have reached; at() has the image's figures at one of
+  // them.
   RoundIndex complete() const { return static_cast<RoundIndex>(done_.size()); }
   const TileError& at(RoundIndex round) const { return done_[round]; }
 
@@ -170,7 +174,7 @@ class Checkpoints {
     RoundIndex reached = 0;  // last folded round + 1
     bool stopped = false;
   };
-  bool ready(const Tile& tile) const;  // for the next checkpoint
+  bool ready(const Tile& tile) const;  // true if the tile has its figures for the next checkpoint
   void change(TileIndex index, const std::function<void(Tile&)>& edit);
   void settle();
 

@@ -11,7 +11,7 @@ namespace {
 
 using Scanline = std::vector<double>;
 
-// A row of three planes, with the g^2 of its pixels (edges).
+// A row of three planes of values, with the g^2 of its pixels (`edges`).
 struct Values {
   const double *r, *g, *b, *edges;
 };
@@ -59,7 +59,7 @@ struct Columns {
                 edge_pixel_fourth.data());
   }
 
-  // Pairs of each pixel with the one before it.
+  // Adds the products of each pixel with the one before it in the row.
   void add_pairs(const Values& v) {
     double* __restrict covariance = pair_covariance.data(), * __restrict variance = pair_variance.data();
     const std::size_t width = squares.size();
@@ -71,8 +71,9 @@ struct Columns {
     }
   }
 
-  // Adds (D(p) . D(q))^2 for the neighbours beside (beside[x]: with the previous one, beside[x + 1]: with the
-  // next), above and below; 0 where there is none.
+  // Adds, for each pixel, (D(p) . D(q))^2 for its neighbours q. `beside` has these for neighbours in the row
+  // (beside[x]: with the previous pixel, beside[x + 1]: with the next), `above` and `below` for those in the
+  // rows above and below; they are 0 where there is no neighbour.
   void add_flat(const double* edges, const Scanline& beside, const Scanline& above, const Scanline& below,
                 bool first, bool last) {
     const std::size_t width = squares.size();
@@ -90,7 +91,7 @@ struct Columns {
   }
 };
 
-// (D(p) . D(q))^2 of pixels and their neighbours.
+// Computes (D(p) . D(q))^2 for `count` pixels and their neighbours.
 void square_dots(const Values& p, const Values& q, std::size_t count, double* out) {
   for (std::size_t x = 0; x < count; ++x) {
     const double dot = p.r[x] * q.r[x] + p.g[x] * q.g[x] + p.b[x] * q.b[x];

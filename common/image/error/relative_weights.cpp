@@ -22,7 +22,7 @@ class Room {
   std::unique_ptr<double[]> values_;
 };
 
-// Take values, not references, so that they compile to vector instructions.
+// These take values, not references, so that they compile to vector instructions.
 inline double larger(double a, double b) { return a < b ? b : a; }
 inline double smaller(double a, double b) { return b < a ? b : a; }
 
@@ -60,7 +60,7 @@ double span_of(std::size_t i, std::size_t count) {
                              (i > kWindowReach ? i - kWindowReach : 0) + 1);
 }
 
-// f = 1 / (m^2 + c) minus f" s2 / 2, within [f/2, 2f]; f" = (6 m^2 - 2 c) / (m^2 + c)^3.
+// Returns f = 1 / (m^2 + c) minus f" s2 / 2, limited to [f/2, 2f], where f" = (6 m^2 - 2 c) / (m^2 + c)^3.
 inline double corrected(double m, double f, double s2) {
   return smaller(larger(f - s2 * (3 * m * m - kRelMseDenominator) * f * f * f, f / 2), 2 * f);
 }
@@ -86,7 +86,8 @@ struct Channel {
   }
 };
 
-// One row of pixels starting at `at`; `spans`: widths of the windows, `rows`: their height.
+// Computes the weights of one row of pixels, which starts at `at`; `spans` are the widths of the windows in
+// pixels, `rows` is their height.
 void weigh_row(const Channel& c, std::size_t at, const std::vector<double>& spans, double rows,
                double* __restrict roots, double* __restrict leans, double* __restrict edges) {
   const double *__restrict own = c.own.at(at), *__restrict square = c.square.at(at), *__restrict noise = c.noise.at(at);

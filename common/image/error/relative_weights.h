@@ -8,17 +8,18 @@
 
 namespace ls {
 
-// relMSE divides a squared error by the squared truth plus this.
+// relMSE is a squared error divided by the sum of the squared true value and this constant.
 inline constexpr double kRelMseDenominator = 0.01;
 
-// For each pixel: the square root of the weight in each channel and its derivative by the pixel's own value
-// (`leans`), planar, and the square of the mean of g over channels (`edges`).
+// The weights of each pixel of a tile. `roots` has the square root of the weight in each channel, `leans` the
+// derivative of that root by the pixel's own value (both planar), and `edges` the square of the mean of g
+// over the channels, one plane.
 struct RelativeWeights {
   std::vector<double> roots, leans, edges;
 };
 RelativeWeights relative_weights(const HalfMeans& halves);
 
-// Sums over one tile. `values`: three planes of width x height; `edges`: one.
+// Returns sums over one tile. `values` has three planes of width x height values, `edges` one plane.
 NoiseSums noise_sums(const std::vector<double>& values, const std::vector<double>& edges, int width,
                      int height);
 

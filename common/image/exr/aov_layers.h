@@ -20,12 +20,13 @@ inline constexpr int kCryptomatteRanks =
 // The name of a layer: that of the AOV, or "crypto_object", "crypto_material".
 std::string layer_of(Aov aov);
 
-// Adds channels NAME.R, NAME.X, ... and, for identifiers, NAME00.R to NAME02.A with their header strings. All
-// are 0 in pixels without a surface. Returns the number of values that exceeded the largest half.
+// Adds the film's AOVs to `picture`: channels NAME.R, NAME.X, ... and, for identifiers, NAME00.R to NAME02.A
+// with their header strings. All are 0 in pixels without a surface. Returns the number of values that
+// exceeded the largest half, 65504.
 std::uint64_t add_aov_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
                              ExrPicture& picture);
 
-// Clamps to +-65504, the largest half; returns the number of clamped values.
+// Clamps the values to +-65504, the largest half; returns the number of clamped values.
 std::uint64_t clamp_to_half(std::vector<float>& plane);
 
 }  // namespace ls

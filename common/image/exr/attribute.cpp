@@ -38,7 +38,7 @@ constexpr Fixed kFixed[] = {{"box2i", 16},
                             {"v3f", 12},
                             {"v3d", 24}};
 
-// Names followed by 16 bytes each, and an empty name.
+// Checks a list of channels: each a name followed by 16 bytes, and an empty name at the end.
 bool channel_list(ByteCursor in) {
   constexpr std::size_t kMaxNameBytes = 255;
   while (const auto name = in.name(kMaxNameBytes)) {
@@ -48,7 +48,7 @@ bool channel_list(ByteCursor in) {
   return false;
 }
 
-// Each string is preceded by its length.
+// Checks a list of strings, each preceded by its length.
 bool strings(ByteCursor in) {
   while (in.left() > 0) {
     const auto length = in.value<std::int32_t>();
@@ -57,7 +57,7 @@ bool strings(ByteCursor in) {
   return true;
 }
 
-// Width, height, and four bytes per pixel.
+// Checks a preview: width, height, and four bytes per pixel.
 bool preview(ByteCursor in) {
   const auto width = in.value<std::uint32_t>(), height = in.value<std::uint32_t>();
   return width && height && std::uint64_t{*width} * *height <= in.left() / 4 &&

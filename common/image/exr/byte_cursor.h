@@ -33,7 +33,7 @@ class ByteCursor {
     std::memcpy(&v, raw->data(), sizeof(T));
     return v;
   }
-  // Zero-terminated, at most `longest` characters.
+  // Reads a zero-terminated text of at most `longest` characters.
   std::optional<std::string_view> name(std::size_t longest) {
     if (left() == 0) return std::nullopt;
     const auto* begin = reinterpret_cast<const char*>(bytes_.data() + position_);

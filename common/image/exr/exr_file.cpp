@@ -81,7 +81,7 @@ Result<RgbImage> read_part(Imf::MultiPartInputFile& file, const Source& source) 
   return image;
 }
 
-// The part's layers of standard errors; nullopt unless it has all of them.
+// Returns the part's layers of standard errors; nullopt unless it has all of them.
 std::optional<Source> find_error(const Imf::MultiPartInputFile& file, const Source& colour) {
   const Imf::ChannelList& list = file.header(colour.part).channels();
   const Source source{colour.part, {"stderr.R", "stderr.G", "stderr.B"}};

@@ -30,9 +30,10 @@ struct ExrLimits {
   int max_side = 65536;
 };
 
-// Reads flat scanline or tiled EXR, half or float, with any compression; a single part, or the first part
-// that has colour. Channels R G B, or Y alone (grey); alpha is ignored. Chroma-subsampled (luminance/chroma)
-// and deep files are rejected. `name` is for messages. Sizes are checked before anything is allocated.
+// Reads a flat scanline or tiled EXR, half or float, with any compression. It reads the file's single part,
+// or the first part that has colour: the channels R G B, or Y alone (grey); alpha is ignored.
+// Chroma-subsampled (luminance/chroma) and deep files are rejected. `name` is for messages. Sizes are checked
+// before anything is allocated.
 Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::string& name,
                               const ExrLimits& limits = {});
 // Reads a whole file. Errors: not_found, unavailable; resource_exhausted: more than limits.max_bytes.
@@ -67,7 +68,7 @@ struct ExrPicture {
   std::map<std::string, std::variant<ExrHalf, ExrFloat, ExrUint>> channels;  // "R", "stderr.R", "spp", ...
   std::map<std::string, std::string> strings;                                // header attributes
 };
-// Scanline, ZIP compressed. The bytes depend only on the image.
+// Encodes an image as a scanline EXR with ZIP compression. The bytes depend only on the image.
 Result<std::vector<std::byte>> write_exr(const ExrPicture& picture);
 
 // Destination for files too large to be held in memory.
@@ -76,15 +77,16 @@ class ByteSink {
   virtual ~ByteSink() = default;
   virtual Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) = 0;
 };
-// An image delivered in bands of whole rows, from the top: each an ExrPicture of that many rows, all with the
-// same channels. The strings of the first one also go into the header.
+// An image delivered in bands of whole rows, from the top. Each band is an ExrPicture of that many rows; all
+// have the same channels. The strings of the first band also go into the header.
 struct ExrBands {
   FrameSize size;
   std::map<std::string, std::string> strings;
-  // called for 0, 1, 2, ... until all rows are delivered, twice in total
+  // Returns band 0, 1, 2, ... until all rows are delivered. It is called for each band twice, in two passes.
   std::function<ExrPicture(int band)> band;
 };
-// Writes the whole image as one file, with the seal of all of it in its header (seal.h).
+// Writes the whole image to `sink` as one EXR file, with the seal (digests of all layers and headers, seal.h)
+// in its header.
 Result<void> write_sealed_exr(const ExrBands& bands, ByteSink& sink);
 
 }  // namespace ls

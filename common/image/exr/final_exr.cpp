@@ -86,7 +86,7 @@ void append(const ExrPicture& band, FinalPicture& image) {
         channel);
 }
 
-// One band at a time, so that a small file with a large claimed size costs little memory.
+// Reads one band of rows at a time, so that a small file with a large claimed size costs little memory.
 void read_pixels(Imf::InputFile& file, FinalPicture& image) {
   constexpr int kBand = 64;
   exr::Seal seal;

@@ -18,25 +18,27 @@
 
 namespace ls {
 
-// SHA-256 over float32((sumA+sumB)/(nA+nB)), divided in double, -0 replaced by +0; R, G, B interleaved per
-// pixel, row by row, little endian. Pixels without samples are zero.
+// Returns the SHA-256 over the pixels as float32((sumA + sumB) / (nA + nB)), where sums and counts are those
+// of the two halves of the samples: divided in double, -0 replaced by +0; R, G, B interleaved per pixel, row
+// by row, little endian. Pixels without samples are zero.
 Digest pixels_sha256(const Film& film);
 
-// The note named `fake`, for an image that contains results of fake workers.
+// The text of the note (Provenance::notes) called `fake`, for an image that contains results of fake workers.
 inline constexpr const char* kFakePixels = "the pixels are made up by fake workers (--fake), not rendered";
 
-// The header strings `lightshaft:...` of the final EXR; docs/design/error.md lists them. `:relmse`,
-// `:relmse_ci95`
-// ("LOW HIGH"), `:rmse`, `:rmse_ci95`, `:few_hits` (pixels), `:verdict` ("trusted", or the reason why not)
-// and `:tiles` come from the film; without samples only the last is written. `:pixels_without_samples` is
+// The source of the header strings `lightshaft:...` of the final EXR, which docs/design/error.md lists. Some
+// strings come from the film instead: `:relmse`, `:relmse_ci95` ("LOW HIGH"), `:rmse`, `:rmse_ci95`,
+// `:few_hits` (pixels), `:verdict` ("trusted", or the reason why not) and `:tiles`. Without samples only
+// `:tiles` of these is written. `:pixels_without_samples` is written if there are any.
 // written if there are any.
 struct Provenance {
   Digest scene;
   std::string settings_json;  // canonical RenderSettings
   std::string build;
   Digest numeric_class;
-  std::optional<std::uint64_t> seed = {};  // nullopt, here and below: unknown, and not written
-  std::optional<double> seconds = {};      // render time
+  // for this and the following: nullopt means unknown, and is not written
+  std::optional<std::uint64_t> seed = {};
+  std::optional<double> seconds = {};  // render time
   // "clean", or canonical_json() of the Health; empty: unknown, and not written.
   std::string health;
   CryptomatteManifests manifests = {};
@@ -45,26 +47,27 @@ struct Provenance {
   std::optional<ConvergenceStatus> convergence_status =
       {};  // includes the convergence curve, which the film alone does not have
   std::map<std::string, double> figures = {};     // further numbers, by the name after "lightshaft:"
-  std::map<std::string, std::string> notes = {};  // further texts, likewise
+  std::map<std::string, std::string> notes = {};  // further texts, by the name after "lightshaft:"
 };
 struct FinalImage {
   std::vector<std::byte> exr;
   std::uint64_t clamped = 0;  // number of values above 65504, the largest half
 };
-// The layers of the final EXR of a film, or of one row of its tiles, with their header strings. Adds to
-// `clamped`.
+// Returns the layers of the final EXR of a film, or of one row of its tiles, with their header strings. Adds
+// the number of clamped values to `clamped`.
 ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
                         std::uint64_t* clamped = nullptr);
-// Half R, G, B (or float), FLOAT stderr.R, stderr.G, stderr.B, UINT spp, and the film's AOVs as layers, all
-// sealed in `lightshaft:seal` (seal.h). Also works on an unfinished film.
+// Makes the final EXR, also of an unfinished film. Its layers are half (or with `float_output` float) R, G,
+// B, FLOAT stderr.R, stderr.G, stderr.B, UINT spp, and the film's AOVs; all are sealed in `lightshaft:seal`
+// (seal.h).
 Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output);
 // Writes the same bytes to `sink`, one row of tiles at a time, so that a large image is never in memory as a
 // whole. Returns the number of clamped values.
 Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& provenance, bool float_output,
                                       ByteSink& sink);
 
-// The header strings with the error of an image whose tiles have these sums, by full name;
-// `lightshaft:verdict` is based on the pixels only. None without samples.
+// Returns the header strings about the error, by full name, of an image whose tiles have the sums `sums`;
+// `lightshaft:verdict` is based on the pixels only. There are none without samples.
 std::map<std::string, std::string> error_strings(const TileError& sums, std::uint64_t pixels_without_samples);
 
 // Number of values of R, G and B that a half image clamps.
@@ -78,18 +81,20 @@ struct FinalPicture : ExrPicture {
   // Layers and headers that do not match the seal, by name ("layer depth.Z"); nullopt: no seal.
   std::optional<std::vector<std::string>> changed;
 };
-// invalid_argument: names what is missing or wrong.
+// Reads a final EXR. invalid_argument: something is missing or wrong; the message names it. `name` is the
+// file's name for that message.
 Result<FinalPicture> read_final_exr(std::span<const std::byte> exr, const std::string& name);
 float as_half(float value);  // rounded to half precision
 
-// 8-bit sRGB (IEC 61966-2-1, rounded to nearest) of a linear pixel times `scale`; magenta if a channel is
-// NaN.
+// Returns a linear pixel times `scale` in 8-bit sRGB (IEC 61966-2-1, rounded to nearest); magenta if a
+// channel is NaN.
 std::array<std::uint8_t, 3> srgb8(const double* rgb, double scale);
 
-// RGB, 8 bits, row by row, as a PNG.
+// Encodes an image as a PNG. `rgb` has 8 bits per channel, row by row.
 Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::uint8_t> rgb);
 
-// 8-bit sRGB of the mean times 2^exposure. NaN is magenta; tiles without samples show a dark checker.
+// Returns a PNG of the film's means times 2^exposure_stops in 8-bit sRGB. NaN is magenta; tiles without
+// samples show a dark checkerboard.
 Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops);
 
 }  // namespace ls

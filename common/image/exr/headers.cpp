@@ -13,8 +13,9 @@ namespace {
 
 constexpr std::uint32_t kMagic = 20000630, kTiledFlag = 0x200, kMultiPartFlag = 0x1000;
 constexpr std::size_t kMaxNameBytes = 255;
-// The library allocates a chunk's buffers before reading any of it. Above this size the file must be long
-// enough: the best compression in the format is a few thousand to one (deflate: 1032).
+// The library allocates a chunk's buffers before it reads any of the chunk. For chunks above this size the
+// file must be long enough to hold them: the best compression in the format is a few thousand to one
+// (deflate: 1032).
 constexpr std::uint64_t kFreeChunkBytes = std::uint64_t{64} << 20;
 constexpr double kMostPacking = 4096;
 constexpr std::size_t kLeastChannelBytes = 18;  // a name of one letter, the terminating zero, four int32

@@ -65,7 +65,7 @@ class MemoryWriter final : public Imf::OStream {
   std::uint64_t position_ = 0;
 };
 
-// No threads of the library's own: the farm assigns threads itself, and small images gain nothing.
+// Forbids the library threads of its own: the farm assigns threads itself, and small images gain nothing.
 inline void set_up_library() {
   static std::once_flag once;
   std::call_once(once, [] { Imf::setGlobalThreadCount(0); });

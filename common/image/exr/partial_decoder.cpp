@@ -66,7 +66,7 @@ std::vector<std::string> file_channels(AovSet aovs) {
   return names;
 }
 
-// Names of all channels; each must be FLOAT and present at every pixel.
+// Returns the names of all channels; each must be FLOAT and present at every pixel.
 Result<std::vector<std::string_view>> channel_names(std::span<const std::byte> raw) {
   ByteCursor in(raw);
   std::vector<std::string_view> names;
@@ -86,7 +86,7 @@ Result<std::vector<std::string_view>> channel_names(std::span<const std::byte> r
   return names;
 }
 
-// The AOVs with at least one channel.
+// Returns the AOVs of which at least one channel is among `names`.
 AovSet aovs_among(std::span<const std::string_view> names) {
   AovSet set;
   for (const AovRow& row : aov_rows()) {

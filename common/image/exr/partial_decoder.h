@@ -1,4 +1,5 @@
-// Shared by the encoder and the decoder of partials.
+// Shared by the encoder and the decoder of partials (files with the pixel sums of one tile and range of
+// samples).
 #pragma once
 
 #include <array>
@@ -9,8 +10,9 @@
 namespace ls {
 
 inline constexpr char kUnitAttribute[] = "lightshaft:unit";
-// In the order of the planes. A file sorts them by name: kFileOrder[i] is the plane of the file's i-th
-// channel. The AOV channels follow in both, in their own order.
+// The names of the colour channels in the order of the planes in memory. A file has its channels sorted by
+// name: kFileOrder[i] is the plane of the file's i-th channel. The AOV channels follow in both, in their own
+// order.
 inline constexpr std::array<const char*, kPartialChannels> kPartialChannelNames = {"A.R", "A.G", "A.B",
                                                                                    "B.R", "B.G", "B.B"};
 inline constexpr std::array<int, kPartialChannels> kFileOrder = {2, 1, 0, 5, 4, 3};

@@ -16,10 +16,11 @@
 namespace ls::exr {
 namespace {
 
-// Attributes for the storage of the pixels, and the seal itself.
+// Attributes that the seal leaves out: those about the storage of the pixels, and the seal itself.
 constexpr std::array<std::string_view, 3> kLeftOut = {"compression", "lineOrder", kSealName};
 
-// The lines of a seal by what they cover. An unknown line stands for itself.
+// Returns the lines of a seal, keyed by the layer or header that they cover. A line of unknown form is its
+// own key.
 std::map<std::string, std::string> lines_of(const std::string& seal) {
   constexpr std::size_t kDigits = 64;
   std::map<std::string, std::string> lines;
@@ -74,7 +75,7 @@ std::vector<std::string> differences(const std::string& sealed, const std::strin
       if (found == theirs->end() || found->second != digest) names.insert(name);
     }
   std::vector<std::string> out(names.begin(), names.end());
-  // only its format differs
+  // The two texts cover the same and differ in their form only.
   if (out.empty() && sealed != now) out.emplace_back(fmt::format("header {}", kSealName));
   return out;
 }

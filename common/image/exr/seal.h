@@ -29,7 +29,7 @@ class Seal {
   std::map<std::string, Digest> attributes_;
 };
 
-// The layers and headers ("layer depth.Z") in which two seals differ, sorted.
+// Compares two texts of seals. Returns the layers and headers in which they differ ("layer depth.Z"), sorted.
 std::vector<std::string> differences(const std::string& sealed, const std::string& now);
 
 }  // namespace ls::exr

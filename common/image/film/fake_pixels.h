@@ -1,6 +1,7 @@
-// Pixels of the fake renderer: a pure function of the unit, for tests of everything around the renderer. A
-// sample is 21 bits of noise in [0, 1) plus a gradient of the pixel. A unit sums in double and rounds once,
-// as the renderer does, so its floats have full mantissas.
+// Pixels of the fake renderer, for tests of everything around the renderer. They are a pure function of the
+// unit (one tile and range of samples). A sample is 21 bits of noise in [0, 1) plus a gradient of the pixel.
+// The samples of a unit are summed in double and rounded once, as the renderer does, so the resulting floats
+// have full mantissas.
 //
 // That alone does not reveal the order in which rounds are folded: double sums of a few floats of similar
 // size are exact, hence equal in every order. Therefore one pixel in kFakeMarkerEvery is a *marker*. Its
@@ -41,7 +42,7 @@ inline std::uint64_t fake_seed(const UnitHeader& header) {
 inline constexpr std::uint64_t kFakeMarkerEvery = 32;  // pixels
 inline constexpr RoundIndex kFakeMarkerRounds = 8;
 
-// Seed of a pixel's samples.
+// Returns the seed of a pixel's samples.
 inline std::uint64_t fake_pixel_seed(std::uint64_t seed, int x, int y) {
   const auto place =
       static_cast<std::uint64_t>(static_cast<std::uint32_t>(y)) << 32 | static_cast<std::uint32_t>(x);
@@ -49,7 +50,7 @@ inline std::uint64_t fake_pixel_seed(std::uint64_t seed, int x, int y) {
 }
 inline bool fake_is_marker(std::uint64_t pixel_seed) { return pixel_seed % kFakeMarkerEvery == 0; }
 
-// One sample: R, G, B in [0, 2), multiples of 2^-21; for a marker in [2^-47, 2^-46).
+// Returns one sample: R, G, B in [0, 2), multiples of 2^-21; for a marker in [2^-47, 2^-46).
 inline std::array<double, 3> fake_sample(std::uint64_t pixel_seed, int x, int y, std::uint64_t sample) {
   const std::uint64_t h = fake_mix(pixel_seed + sample);
   const bool marker = fake_is_marker(pixel_seed);
@@ -63,14 +64,14 @@ inline std::array<double, 3> fake_sample(std::uint64_t pixel_seed, int x, int y,
   return rgb;
 }
 
-// The round that contains a sample.
+// Returns the round that contains a sample.
 inline RoundIndex fake_round(std::uint64_t sample) {
   if (sample < 2) return 0;
   if (sample < 64) return static_cast<RoundIndex>(std::bit_width(sample) - 1);
   return static_cast<RoundIndex>(sample / 64 + 5);
 }
 
-// What a marker adds to the sum of each half in this round, besides its samples: a value with a full
+// Returns what a marker adds to the sum of each half in this round, besides its samples: a value with a full
 // mantissa, its negative, or 0.
 inline double fake_mark(std::uint64_t pixel_seed, std::size_t channel, RoundIndex round) {
   const std::uint64_t h = fake_mix(~pixel_seed + 3 * (round / kFakeMarkerRounds) + channel);
@@ -83,7 +84,7 @@ inline double fake_mark(std::uint64_t pixel_seed, std::size_t channel, RoundInde
   return at == std::min(one, other) ? value : -value;
 }
 
-// The AOVs of a pixel: the sum of the samples' red, with every sample a hit on the same object.
+// Fills the AOVs of a pixel as if every sample hit the same object: each sum is the sum of the samples' red.
 inline void fake_aovs(Partial& partial, std::size_t pixel, std::size_t pixels) {
   const AovPlanes planes = planes_of(partial.aovs);
   const float red = partial.sums[pixel] + partial.sums[3 * pixels + pixel];

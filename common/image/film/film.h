@@ -1,10 +1,12 @@
-// The film: per-pixel double sums of both halves (A: even sample indices, B: odd ones) of every tile, folded
-// round by round in order. Its pixels depend only on the partials, not on when or in which order they
+// The film: per-pixel double sums of every tile, separately for two halves (A: even sample indices, B: odd
+// ones). Folding adds a partial (the pixel sums of one tile and one round, a range of samples) to them, round
+// by round in order. So the film's pixels depend only on the partials, not on when or in which order they
 // arrived.
 //
-// A round shorter than its full range (the last one of a job) is a tile's *tail*: it is kept beside the sums,
-// is included in all results, and is replaced when a longer range of the same round arrives. So an N-sample
-// film that is continued to 2N has the same bits as a 2N film rendered at once.
+// A round shorter than its full range (only the last round of a job) is a tile's *tail*: the film keeps it
+// beside the sums and includes it in all results. When a longer range of the same round arrives, that
+// replaces the tail. So an N-sample film that is later continued to 2N samples has the same bits as a film
+// rendered with 2N samples from the start.
 //
 // AOVs are folded likewise: sums in double, identifiers by the rule of id_slots.h.
 //
@@ -53,8 +55,8 @@ class Film {
   const TileGrid& grid() const { return grid_; }
   AovSet aovs() const { return aovs_; }
 
-  // Folds round `round` of tile `tile`. Rounds must come in order 0, 1, 2, ... per tile; a cut round only as
-  // the last.
+  // Folds the partial of round `round` of tile `tile`. The rounds of a tile must come in the order 0, 1, 2,
+  // ...; a cut round only as the last.
   //   invalid_argument: the partial is not of this tile or round;
   //   failed_precondition: an earlier round is missing (the message names the next one);
   //   already_exists: this round, or more of it, has been folded.
@@ -62,42 +64,43 @@ class Film {
   Result<TileError> fold(TileIndex tile, RoundIndex round, const Partial& partial);
   Result<TileError> fold(TileIndex tile, RoundIndex round, const Partial& partial, const Digest& digest);
 
-  // Resets a tile (a worker sent wrong results): it starts again from round 0.
+  // Resets a tile, because a worker sent wrong results: it starts again from round 0.
   void discard(TileIndex tile) { tiles_[tile] = nullptr; }
 
-  // One tile.
+  // Figures of one tile.
   RoundIndex full_rounds(TileIndex tile) const;  // complete rounds; also the index of the next round to fold
   RoundIndex rounds_folded(TileIndex tile) const;  // full_rounds(), plus one if there is a tail
   std::optional<SampleRange> tail(TileIndex tile) const;
   std::uint64_t spp(TileIndex tile) const;
   TileError error(TileIndex tile) const;  // as of the last fold; zeros (and its pixel count) before the first
-  // SHA-256 chain over the unit digests in round order: c = SHA-256(c || unit digest), beginning with 32 zero
-  // bytes.
+  // Returns the hash chain over the unit digests in round order: c = SHA-256(c || unit digest), beginning
+  // with 32 zero bytes.
   Digest tile_digest(TileIndex tile) const;
   TilePixels pixels(TileIndex tile) const;
   TileAovs aov_pixels(TileIndex tile) const;
-  // Half means of A and of B: R, G, B planes, as HalfMeans requires; empty without samples.
+  // Returns the half means of A and of B: R, G, B planes, as HalfMeans requires; empty without samples.
   std::array<std::vector<double>, 2> half_means(TileIndex tile) const;
 
-  // The image.
+  // Figures of the image.
   std::uint64_t samples() const;       // over all pixels
-  std::uint64_t memory_bytes() const;  // of the sums and identifiers
-  // Sum over all tiles with samples, in tile order; the error of other tiles is unknown.
+  std::uint64_t memory_bytes() const;  // memory taken by the sums and identifiers
+  // Returns the sum over all tiles with samples, in tile order; the error of other tiles is unknown.
   TileError error() const;
   std::uint64_t pixels_without_samples() const;
 
-  // One row of tiles as a separate film that shares the tiles, for outputs made band by band.
+  // Returns one row of tiles as a separate film that shares the tiles, for outputs that are made band by
+  // band.
   Film row(int row) const;
 
-  // Restart.
+  // Saving and loading, for a restart of the coordinator.
   //
-  // Versioned, with a SHA-256 at the end; the whole film or one tile at a time (no bytes: nothing folded).
-  // Loading rejects damaged or foreign bytes.
+  // The bytes have a version and end with a SHA-256. They hold the whole film or one tile; no bytes stand for
+  // a tile of which nothing is folded. Loading rejects damaged or foreign bytes.
   std::vector<std::byte> save() const;
   static Result<Film> load(std::span<const std::byte> bytes);
   std::vector<std::byte> save_tile(TileIndex tile) const;
-  // save_tile() of the current tile, to be called later: it keeps only that tile alive, where a copy of the
-  // film would keep all tiles.
+  // Returns a function that does save_tile() of the tile as it is now, for a later call. It keeps only that
+  // tile alive, where a copy of the film would keep all tiles.
   std::function<std::vector<std::byte>()> saver(TileIndex tile) const;
   Result<void> load_tile(TileIndex tile, std::span<const std::byte> bytes);
 
@@ -121,12 +124,12 @@ class Film {
     std::uint64_t spp() const;
     bool operator==(const Tile&) const = default;
   };
-  // Sums of the full rounds, with or without the tail; R, G, B planes of A and of B.
+  // Returns the sums of the full rounds, with or without the tail, as R, G, B planes of A and of B.
   static std::array<std::vector<double>, 2> halves(const Tile& tile, std::size_t pixels,
                                                    bool with_tail = true);
   static std::array<std::vector<double>, 2> means(const Tile& tile, std::size_t pixels,
                                                   bool with_tail = true);
-  // `before`: the tile before its last round; null if not available.
+  // Estimates the error of a tile. `before` is the same tile before its last round; null if not available.
   static TileError estimate(const Tile& tile, const Tile* before, const PixelRect& rect);
   Result<void> accepts(TileIndex tile, RoundIndex round, const Partial& partial) const;
   static std::vector<std::byte> tile_bytes(const Tile* tile, TileIndex index);

@@ -59,7 +59,7 @@ class Reader {
     return Reader(body.subspan(magic.size()));
   }
   std::size_t left() const { return bytes_.size(); }
-  // Returns zeros past the end; callers check ok() or left().
+  // Reads a number; returns zero past the end, so callers check ok() or left().
   template <class T>
   T value() {
     T v{};

@@ -1,5 +1,5 @@
-// Numeric health of the rendered samples: which faults occurred, how often, and where first. Empty, without
-// allocations, for a healthy job. Depends on the samples only: the result of merging does not depend on the
+// Numeric health of the rendered samples: which faults occurred, how often, and where first. For a healthy
+// job it is empty and allocates nothing. It depends on the samples only: merging gives the same result in any
 // order.
 #pragma once
 
@@ -16,11 +16,12 @@
 
 namespace ls {
 
-// To add a cause, add it here and a row in health.cpp (the compiler reports a missing one). Causes are stored
-// and sent by the rows' names, so their order here is free.
+// The causes of bad health. To add one, add it here and a row in health.cpp (the compiler reports a missing
+// one). Causes are stored and sent by the names in these rows, so their order here is free.
 enum class HealthCause : std::uint8_t {
   none,  // for a good sample; never in a Health
-  // A rejected sample: counted, contributes zero, stays in N, is never drawn again.
+  // Causes of rejected samples. Such a sample is counted, contributes zero to the sums, still counts in their
+  // number of samples N, and is not drawn again.
   unnamed,  // the sender did not name the cause, or names one that is unknown here
   not_a_number,
   infinite,
@@ -28,10 +29,11 @@ enum class HealthCause : std::uint8_t {
   too_many_surfaces,  // path cut off
   no_direction,
   nested_media,  // inside more media at once than a path can store
-  // Counted but kept, because rejecting them would bias the result.
+  // Causes of samples that are counted but kept, because rejecting them would bias the result.
   negative,
-  majorant_violation,  // one per density above its bound
-  // Scene inputs that were corrected; the same for all units of a job, and without a pixel.
+  // a density above the bound (majorant) of its place; each occurrence counts
+  majorant_violation,
+  // Values of the scene that were corrected. They are the same for all units of a job, and have no pixel.
   negative_density,
   bright_albedo,
   negative_texel,
@@ -54,11 +56,11 @@ struct HealthLocation {
     return y != o.y ? y < o.y : x != o.x ? x < o.x : sample < o.sample;
   }
 };
-inline constexpr std::size_t kHealthLocations = 8;  // kept per cause
+inline constexpr std::size_t kHealthLocations = 8;  // number of locations that are kept per cause
 
 struct HealthEntry {
   std::uint64_t count = 0;
-  std::vector<HealthLocation> first;  // the smallest, in ascending order; empty for inputs
+  std::vector<HealthLocation> first;  // the locations that come first, in ascending order; empty for inputs
   bool operator==(const HealthEntry&) const = default;
 };
 
@@ -76,12 +78,15 @@ struct Health {
   bool operator==(const Health&) const = default;
 };
 
-// {"too_large":{"count":3,"first":[[x,y,sample],...]}}: keys sorted, no spaces; {} if healthy.
+// Returns {"too_large":{"count":3,"first":[[x,y,sample],...]}} with sorted keys and without spaces; {} if
+// healthy.
 std::string canonical_json(const Health& health);
-// Rejects anything that canonical_json does not write; an unknown cause becomes `unnamed`.
+// Parses a Health. Anything that canonical_json() does not write is an error; an unknown cause becomes
+// `unnamed`.
 Result<Health> parse_health(std::string_view json);
 
-// invalid_argument: it contains pixels, samples or more rejected samples than such a unit has.
+// Checks the health of a unit with these pixels and samples. invalid_argument: it names pixels or samples
+// outside the unit, or has more rejected samples than the unit has samples.
 Result<void> check_health(const Health& health, const PixelRect& rect, const SampleRange& samples);
 
 }  // namespace ls

@@ -17,7 +17,7 @@ struct Entry {
   SampleRange samples;
   Digest digest;
 };
-// Ordered by position, so that tiles come row by row.
+// Orders rectangles by position, so that tiles come row by row.
 struct ByPlace {
   bool operator()(const PixelRect& a, const PixelRect& b) const {
     return std::tie(a.y0, a.x0, a.y1, a.x1) < std::tie(b.y0, b.x0, b.y1, b.x1);
@@ -59,7 +59,8 @@ class Merger {
     return file;
   }
 
-  // First pass: indexes the partials and checks that they belong together. Pixels are not kept.
+  // The first pass: reads the headers of the partials and checks that they belong together. Pixels are not
+  // kept.
   Result<void> index(std::size_t i) {
     const auto file = read(i);
     if (!file) return tl::unexpected(file.error());
@@ -83,7 +84,8 @@ class Merger {
     return {};
   }
 
-  // The tile side is that of the largest tile; every partial's rectangle must then belong to the tiling.
+  // Returns the tiling. The largest tile gives the side of all tiles; every partial's rectangle must then
+  // belong to the tiling.
   Result<TileGrid> tiling() const {
     const TileGrid grid{frame_, tile_side_};
     const std::uint64_t tiles = std::uint64_t(grid.columns()) * std::uint64_t(grid.rows());
@@ -103,7 +105,8 @@ class Merger {
 
   const std::string& name(const Entry& e) const { return sources_[e.source].name; }
 
-  // Partials of equal ranges must be equal; of ranges with the same start the longest is kept.
+  // Chooses the partials of one tile to be folded. Partials of equal ranges of samples must be equal; of
+  // ranges with the same start the longest is kept.
   Result<std::vector<Entry>> choose(std::vector<Entry> entries) {
     std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
       return std::tie(a.samples.s0, b.samples.s1) < std::tie(b.samples.s0, a.samples.s1);

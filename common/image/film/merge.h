@@ -1,4 +1,5 @@
-// Folds partial files exactly as the coordinator does: `lightshaft merge`.
+// Folds (adds up in order) the partials of an image, files with the pixel sums of one tile and range of
+// samples, exactly as the coordinator does; for `lightshaft merge`.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +16,7 @@ namespace ls {
 
 struct PartialSource {
   std::string name;                                      // for the messages
-  std::function<Result<std::vector<std::byte>>()> read;  // may be called twice
+  std::function<Result<std::vector<std::byte>>()> read;  // reads the file; may be called twice
 };
 
 struct Merged {
@@ -24,10 +25,11 @@ struct Merged {
   std::uint64_t duplicates = 0;  // equal partials that were dropped
 };
 
-// Groups by tile, orders by s0. Rejects, naming the files: partials of different scenes, settings or numeric
-// classes; frames or AOVs that differ; tiles that do not fit one tiling; gaps and overlaps in a tile's
-// samples; duplicates that differ; tiles of the frame without a partial. Of a cut round and its full one,
-// uses the full one. Holds one partial's pixels at a time.
+// Groups the partials by tile and folds each tile's in the order of their first sample (s0). If a tile has
+// both a full round (range of samples) and a cut one, uses the full one. Holds one partial's pixels at a
+// time. Errors name the files: partials of different scenes, settings or numeric classes; frames or AOVs that
+// differ; tiles that do not fit one tiling; gaps and overlaps in a tile's samples; duplicates that differ;
+// tiles of the frame without a partial.
 Result<Merged> merge_partials(const std::vector<PartialSource>& sources);
 
 }  // namespace ls

@@ -1,5 +1,5 @@
-// A unit's result: per-pixel float32 sums of both halves over one sample range of one tile, with its exact
-// identity.
+// A partial, the result of a unit (one tile and one range of samples): float32 sums of the samples of each
+// pixel, separately for the two halves of the samples, with everything that identifies the unit.
 #pragma once
 
 #include <cstddef>
@@ -43,17 +43,19 @@ struct Partial {
 // SHA-256 over the header's canonical JSON followed by all planes (little endian); not over file bytes.
 Digest unit_digest(const Partial& partial);
 
-// The partial's EXR format: scanline, uncompressed, FLOAT, dataWindow the tile, displayWindow the frame.
-// Without AOVs it has exactly the six channels; with them also those of planes_of(aovs).
+// Encodes a partial as an EXR file: scanline, uncompressed, FLOAT; the dataWindow is the tile, the
+// displayWindow the frame. Without AOVs it has exactly the six channels; with AOVs also those of
+// planes_of(aovs).
 Result<std::vector<std::byte>> encode_partial(const Partial& partial, FrameSize frame);
 
-// Rejects, naming the fault, anything but exactly such a file: other windows, channels, compression, part
-// counts, sizes, non-finite sums, impossible identifiers and counts, trailing data. `expected` must equal the
-// header in the file; `aovs` determines the required channels.
+// Decodes a file made by encode_partial() for the unit `expected`, which must equal the header in the file;
+// `aovs` determines the required channels. Anything else is an error that names the fault: other windows,
+// channels, compression, part counts or sizes, non-finite sums, impossible identifiers and counts, trailing
+// data.
 Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader& expected, FrameSize frame,
                                AovSet aovs = {});
 
-// For `lightshaft merge`: header and AOVs are taken from the file.
+// A partial whose header and AOVs are taken from its file; for `lightshaft merge`.
 struct PartialFile {
   Partial partial;
   FrameSize frame;

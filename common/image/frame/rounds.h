@@ -1,6 +1,6 @@
-// Rounds group a tile's samples: 2, 2, 4, 8, 16, 32, then 64 each. The grouping is constant: it does not
-// depend on spp, cost or timing, so that any two jobs group the same samples alike and their double sums are
-// equal bit for bit.
+// Rounds group a tile's samples: 2, 2, 4, 8, 16, 32, then 64 in each round. The grouping is constant: it does
+// not depend on the number of samples, cost or timing. So any two jobs group the same samples alike, and
+// their double sums are equal bit for bit.
 #pragma once
 
 #include <algorithm>
@@ -24,10 +24,10 @@ constexpr SampleRange round_range(RoundIndex k) {
   return {64 * static_cast<std::uint64_t>(k - 5), 64 * static_cast<std::uint64_t>(k - 4)};
 }
 
-// Samples per pixel as rendered: odd counts are rounded up to even, at least 2.
+// Returns the samples per pixel as rendered: odd numbers are rounded up to even, to at least 2.
 constexpr std::uint64_t even_spp(std::uint64_t spp) { return std::max<std::uint64_t>(2, spp + (spp & 1)); }
 
-// The number of rounds of an image with `spp` samples; its last round may be cut.
+// Returns the number of rounds of an image with `spp` samples; its last round may be cut short.
 constexpr RoundIndex round_count(std::uint64_t spp) {
   const std::uint64_t n = even_spp(spp);
   if (n <= 64) {
@@ -38,7 +38,8 @@ constexpr RoundIndex round_count(std::uint64_t spp) {
   return static_cast<RoundIndex>((n + 63) / 64 + 5);
 }
 
-// Round k of an image with `spp` samples: the full range, or its remainder.
+// Returns the samples of round k of an image with `spp` samples: the full range, or what is left of the `spp`
+// samples.
 constexpr SampleRange cut_range(RoundIndex k, std::uint64_t spp) {
   SampleRange r = round_range(k);
   r.s1 = std::min(r.s1, even_spp(spp));

@@ -57,7 +57,8 @@ Triple lab(const Triple& rgb) {
   return {116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])};
 }
 
-// In darker colours differences of hue are less visible (Hunt 1952; [LDR] equation (6)).
+// Adjusts colours as [LDR] equation (6) does: in darker colours differences of hue are less visible (Hunt
+// 1952).
 Triple hunt(Triple v) {
   v[1] *= .01F * v[0];
   v[2] *= .01F * v[0];
@@ -84,7 +85,7 @@ Planes opponents(const FlipImage& image) {
   return out;
 }
 
-// The colours as seen at this distance, in adjusted CIELAB.
+// Returns the colour of a pixel as seen at this distance, in CIELAB adjusted by hunt().
 Triple seen(const Planes& filtered, std::size_t i) {
   Triple rgb = rgb_of({filtered[0][i], filtered[1][i], filtered[2][i]});
   for (float& v : rgb) v = shown(v);
@@ -97,7 +98,7 @@ constexpr float kTone[6] = {.6F * .6F * 2.51F, .6F * .03F, 0, .6F * .6F * 2.43F,
 float tone_mapped(float v) {
   if (!(v > 0)) return 0;
   if (!std::isfinite(v)) return 1;
-  // Beyond this, where squares would overflow, the curve has reached its limit, above 1.
+  // Limits v, as larger values would overflow when squared; there the curve has reached its limit, above 1.
   v = std::min(v, 1e15F);
   return shown((kTone[0] * v * v + kTone[1] * v + kTone[2]) / (kTone[3] * v * v + kTone[4] * v + kTone[5]));
 }
@@ -145,7 +146,7 @@ FlipExposures flip_exposures(std::span<const float> rgb) {
   const auto middle = light.begin() + static_cast<std::ptrdiff_t>(light.size() / 2);
   std::nth_element(light.begin(), middle, light.end());
   const float median = *middle, most = *std::max_element(light.begin(), light.end());
-  // The larger x at which the curve is 0.85: a quadratic equation.
+  // The larger x at which the tone curve is kLevel, from a quadratic equation.
   constexpr float kLevel = .85F;
   const float a = kTone[0] - kLevel * kTone[3], b = kTone[1] - kLevel * kTone[4],
               c = kTone[2] - kLevel * kTone[5];

@@ -29,12 +29,13 @@ struct FlipImage {
   std::span<const float> rgb;
 };
 
-// Error of each pixel on displays that show `rgb` clamped to 0..1. Both images have the same size.
+// Returns the error of each pixel on a display that shows `rgb` clamped to 0..1. Both images have the same
+// size.
 std::vector<float> ldr_flip(const FlipImage& reference, const FlipImage& image,
                             float pixels_per_degree = kFlipPixelsPerDegree);
 
-// In stops; [HDR] section 4: from the exposure that maps the brightest pixel of the reference to 0.85 to the
-// one that does so for the median.
+// The exposures of HDR-FLIP in stops ([HDR] section 4): from the one that maps the brightest pixel of the
+// reference to 0.85, to the one that maps the median to 0.85.
 struct FlipExposures {
   float first = 0, last = 0;
   int count = 2;
@@ -44,7 +45,7 @@ struct FlipExposures {
 };
 FlipExposures flip_exposures(std::span<const float> reference_rgb);
 
-// Error of each pixel, maximum over all exposures. Negative and non-finite values count as 0.
+// Returns the error of each pixel, the maximum over all exposures. Negative and non-finite values count as 0.
 std::vector<float> hdr_flip(const FlipImage& reference, const FlipImage& image,
                             float pixels_per_degree = kFlipPixelsPerDegree);
 

@@ -43,7 +43,8 @@ Plane along_columns(const Plane& in, FrameSize size, const Kernel& kernel) {
   return out;
 }
 
-// a sqrt(pi / b) exp(-pi^2 x^2 / b), x in degrees, applied along both axes.
+// A term of the contrast sensitivity filter: a sqrt(pi / b) exp(-pi^2 x^2 / b), x in degrees, applied along
+// both axes.
 struct Sensitivity {
   double a, b;
 };

@@ -26,10 +26,12 @@ class Planes {  // Y, Cx, Cz
   std::array<std::vector<float>, 3> planes_;
 };
 
-// Filters every channel with the contrast sensitivity function ([LDR] equations (3), (4), table 1).
+// Returns the image with every channel filtered by the contrast sensitivity function ([LDR] equations (3),
+// (4), table 1).
 Planes contrast_filtered(const Planes& image, float pixels_per_degree);
 
-// max(|edge_r - edge_t|, |point_r - point_t|) on the first planes ([LDR] equations (10) to (12)).
+// Returns max(|edge_r - edge_t|, |point_r - point_t|) of each pixel, from the first plane of the reference
+// (r) and of the image (t) ([LDR] equations (10) to (12)).
 std::vector<float> feature_difference(const Planes& reference, const Planes& image, float pixels_per_degree);
 
 }  // namespace ls::flip

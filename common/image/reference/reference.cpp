@@ -15,7 +15,8 @@ tl::unexpected<Error> refuse(const std::string& name, std::string why) {
   return fail(Errc::invalid_argument, fmt::format("{}: {}", name, why));
 }
 
-// Mean of s^2 over the eight neighbours of value i, without i itself.
+// Returns the mean of s^2 (the reference's squared standard error) over the eight neighbours of value i,
+// without i itself.
 double noise_around(const Reference& r, std::size_t i) {
   const auto width = static_cast<std::size_t>(r.size.width), height = static_cast<std::size_t>(r.size.height);
   const std::size_t channel = i % 3, x = i / 3 % width, y = i / 3 / width;
@@ -31,7 +32,7 @@ double noise_around(const Reference& r, std::size_t i) {
   return count > 0 ? sum / count : 0;
 }
 
-// The weight h of the header.
+// Returns the weight h, which reference.h defines.
 double weight(const Reference& r, std::size_t i) {
   const double value = r.rgb[i];
   if (r.error.empty()) return relative_weight(value, 0);

@@ -50,7 +50,8 @@ struct ReferenceOrigin {
   std::string scene, seed;
 };
 // True if the reference was rendered from this scene with this seed. Then image and reference share their
-// samples: their common noise cancels in the difference, so no figure shows the image's true error.
+// samples and so a part of their noise, which cancels in the difference: no figure shows the image's true
+// error.
 bool same_noise(const ReferenceOrigin& origin, const Digest& scene, std::uint64_t seed);
 inline constexpr const char* kSameSeed =
     "the reference shares this job's seed: its noise is the same noise; render it with another --seed";
@@ -61,9 +62,9 @@ struct Reference {
   std::vector<float> error;  // standard error of each value; empty: unknown
   ReferenceOrigin origin = {};
 };
-// invalid_argument: not an image, another size than `size`, or values that are not finite. `name` is for
-// messages. Error layers with values that are not finite and positive are rejected too, rather than partly
-// used.
+// Reads a reference image. invalid_argument: it is not an image, has another size than `size`, or has values
+// that are not finite. If error layers have values that are not finite and positive, the file is rejected
+// too, rather than partly used. `name` is for messages.
 Result<Reference> read_reference(std::span<const std::byte> exr, const std::string& name, FrameSize size,
                                  const ExrLimits& limits = {});
 
@@ -77,11 +78,11 @@ struct TrueError {
   double rmse = 0, relmse = 0;
   std::optional<double> mse_stderr = {}, relmse_stderr = {};  // of rmse^2 and relmse; nullopt: s is unknown
 };
-// `rgb`: the image, interleaved, of the reference's size.
+// Returns the errors of the image `rgb` (interleaved, of the reference's size) against the reference.
 TrueError true_error(const Reference& reference, std::span<const float> rgb);
 
-// True if a figure cannot be distinguished from 0: it is less than three standard errors above it, the usual
-// limit of detection. False if the standard error is unknown.
+// True if an error figure cannot be distinguished from 0, because it is less than three times its standard
+// error, the usual limit of detection. False if the standard error is unknown.
 bool below_noise(double figure, const std::optional<double>& standard_error);
 
 }  // namespace ls

@@ -1,7 +1,8 @@
-// What a scene needs of the renderer, as plain data: a function of the scene alone, computed once when a job
-// is submitted, stored with the job and sent along. A worker computes it again from the scene it receives; if
-// the two differ, the program versions differ and nothing is rendered. It determines the integrator variant,
-// and `lightshaft inspect` and the report describe it in words.
+// What a scene needs of the renderer, as plain data: a function of the scene alone. The coordinator computes
+// it once when a job is submitted, stores it with the job and sends it to workers. A worker computes it again
+// from the scene it receives; if the two differ, the program versions differ and the worker renders nothing.
+// The needs determine the integrator variant (the integrator compiled for a subset of its features);
+// `lightshaft inspect` and the report describe them in words.
 #pragma once
 
 #include <cstdint>
@@ -22,38 +23,40 @@ struct FileNeed {
 };
 
 struct Needs {
-  // Media: any at all; density that varies in space; extinction that differs between channels; emission;
-  // phase functions other than isotropic.
+  // Whether the scene has any media; media whose density varies in space; whose extinction differs between
+  // channels; which emit; and whose phase function is not isotropic.
   bool media = false, grids = false, chromatic = false, emission = false, anisotropic = false;
   bool camera_in_medium = false;
-  // Index-matched surfaces, and surfaces with null transmission.
+  // Whether it has index-matched surfaces, and surfaces through which a part of the light passes straight
+  // (null transmission).
   bool boundaries = false, null_transmission = false;
   bool lens = false, crop = false;
-  // Number of each kind, by the names of describe.h; absent: none.
+  // Number of objects of each type, by the type's name in describe.h; types without an object are absent.
   std::map<std::string, std::uint32_t> shapes, materials, textures, lights, media_kinds;
   std::uint32_t area_lights = 0, instances = 0;
   std::uint32_t compensated = 0;  // rough materials with multiple_scattering
-  // Heterogeneous media whose density is a file. They are chromatic if it has three channels, which only the
-  // file tells.
+  // True if a heterogeneous medium has its density in a file. If that file has three channels the medium is
+  // chromatic, but only the file tells.
   bool density_files = false;
-  // All lights are points, spots, projectors or directions without extent: no ray can hit one.
+  // True if all lights are points, spots, projectors or directions without extent, which no ray can hit.
   bool only_delta_lights = false;
   std::vector<FileNeed> files;  // in the scene's order
   bool operator==(const Needs&) const = default;
 
-  // Lights that next-event estimation samples: all but a constant environment.
+  // Returns the number of lights that next-event estimation samples: all but a constant environment.
   std::uint32_t sampled_lights() const;
 };
 
-// `scene` must be consistent and compacted (validate.h). `sees_media`: false for the integrator `path`.
+// Computes the needs. `scene` must be consistent and compacted (validate.h). `sees_media` is false for the
+// integrator `path`, which ignores media.
 Needs needs_of(const Scene& scene, bool sees_media);
 
-// Sorted keys, no spaces: equal needs have equal texts. Without the files, which the scene's digest covers,
-// so a few hundred bytes for any scene.
+// Returns the needs as JSON with sorted keys and without spaces: equal needs give equal texts. The files are
+// left out, because the scene's digest covers them; so the text has a few hundred bytes for any scene.
 std::string canonical_json(const Needs& needs);
 
-// The first difference of two canonical texts ("lights.point: 2 here, 3 there"), for a message; empty if they
-// are equal. Safe for any text.
+// Returns the first difference of two such texts ("lights.point: 2 here, 3 there"), for a message; empty if
+// they are equal. It accepts any text.
 std::string first_difference(const std::string& here, const std::string& there);
 
 // A part of the renderer ("volume grids"), whether the scene needs it, and why or why not.

@@ -41,7 +41,7 @@ class Pruner {
   void note(std::string what, std::string why, std::uint32_t count = 1, std::uint64_t bytes = 0) {
     if (count > 0) left_out_.push_back({std::move(what), std::move(why), count, bytes});
   }
-  // The value of a constant texture; null for others.
+  // Returns the value of a constant texture; nullptr for others.
   const Rgb* constant(TextureIndex t) const {
     const auto* c = std::get_if<ConstantTexture>(&s_.textures[t.value]);
     return c ? &c->value : nullptr;
@@ -106,7 +106,8 @@ std::vector<bool> Pruner::named_media() const {
   return named;
 }
 
-// Removes media without effect, except those that keep media of lower priority out.
+// Removes media without effect, except those that keep media of lower priority from acting where they
+// overlap.
 std::uint32_t Pruner::drop_idle_media() {
   const std::vector<bool> named = named_media();
   const auto idle = [&](const Medium& m) {
@@ -150,7 +151,8 @@ std::uint32_t Pruner::drop_unreachable_media() {
   return static_cast<std::uint32_t>(std::count(dropped.begin(), dropped.end(), true));
 }
 
-// Repeats until nothing changes: a removed medium may have been the reason to keep another.
+// Removes media, and repeats that until nothing changes: a removed medium may have been the reason to keep
+// another.
 void Pruner::media() {
   drop_dark_sources();
   std::uint32_t dead = 0, hidden = 0;
@@ -186,8 +188,8 @@ void Pruner::phases() {
   note("phase function", "its medium scatters no light", unasked);
 }
 
-// Simplifies by one step; false if it cannot. A branch keeps its own constants, so that the rest scatters as
-// before.
+// Replaces a bsdf by a simpler one with the same effect, by one step; false if it cannot. A branch (bsdf
+// inside it) that remains keeps its own constants, so that it scatters as before.
 bool Pruner::simplify(Bsdf& b) {
   if (const auto* blend = std::get_if<BlendBsdf>(&b)) {
     const bool first = everywhere(blend->weight, 0);

@@ -1,9 +1,9 @@
-// Removes what cannot affect any pixel, before the scene is stored, sent or loaded: dead branches of
-// materials, lights without power, media without effect or that no light enters (unreachable.h), phase
-// functions of media that do not scatter, invisible surfaces; and the files that only these refer to. The
-// image stays the same. Its bits do too, unless something was removed that rays used to hit (invisible
-// surfaces), that next-event estimation used to sample, or that caused equi-angular sampling in the remaining
-// media (a medium that no light enters).
+// Removes from a scene what cannot affect any pixel, before the scene is stored, sent or loaded: dead
+// branches of materials, lights without power, media without effect or that no light enters (unreachable.h),
+// phase functions of media that do not scatter, invisible surfaces; and the files that only these refer to.
+// The image stays the same. Its bits stay the same too, with three exceptions: rays used to hit a removed
+// surface (invisible surfaces), next-event estimation used to sample a removed light, or a removed medium
+// (one that no light enters) caused equi-angular sampling in the remaining media.
 #pragma once
 
 #include <string>
@@ -27,15 +27,16 @@ struct Pruned {
   std::vector<LeftOut> left_out;  // in a fixed order
 };
 
-// Properties of the integrator that pruning depends on. `media`: false for `path`, which ignores media;
-// `passing_counts`: surfaces that light passes unchanged use up its depth, so they are visible by what is
-// missing behind them.
+// Properties of the integrator that pruning depends on. `media` is false for `path`, which ignores media.
+// `passing_counts` is true if surfaces that light passes unchanged use up the path's depth; then they are
+// visible by what is missing behind them.
 struct PrunedFor {
   bool media = true, passing_counts = false;
 };
 PrunedFor pruned_for(std::string_view integrator, int max_depth);
 
-// `scene` must be consistent (validate.h). Pruning is idempotent.
+// Returns `scene` without what cannot affect a pixel. `scene` must be consistent (validate.h). Pruning the
+// result again changes nothing.
 Pruned pruned(const Scene& scene, const PrunedFor& whom);
 
 }  // namespace ls::scene

@@ -17,7 +17,8 @@ Box grown(Box b, double by);       // to all sides
 bool touch(const Box& a, const Box& b);
 double largest_coordinate(const Box& b);
 
-// A box that encloses the shape, seldom the smallest. For shapes in a group, in the group's space.
+// Returns a box that encloses the shape, seldom the smallest such box. For a shape in a group, the box is in
+// the group's space. nullopt: the shape is a mesh, or the box is not finite.
 std::optional<Box> box_of(const Shape& shape);
 
 // True if the point is inside a sphere or cube, whose to_world must be invertible; false for other shapes.

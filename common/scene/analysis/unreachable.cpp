@@ -11,8 +11,8 @@
 namespace ls::scene {
 namespace {
 
-// Distance, relative to the largest coordinate, at which rays offset from one object cannot get into another:
-// 16 times the renderer's offset.
+// A distance, relative to the largest coordinate. If two objects are at least this far apart, rays that are
+// offset from one of them cannot get into the other: it is 16 times the renderer's offset.
 constexpr double kApart = 0x1p-16;
 Box with_margin(const Box& b, const Box& beside) {
   return grown(b, kApart * std::max(largest_coordinate(b), largest_coordinate(beside)));
@@ -115,7 +115,7 @@ class Search {
                        [&](const Entrance& e) { return e.shape != i && e.box && apart(box, e); });
   }
 
-  // True if the entrance is beside the shape, or surrounds it.
+  // True if the entrance (a surface through which light may come) is beside the shape, or surrounds it.
   bool apart(const Box& tight, const Entrance& e) const {
     const Box box = with_margin(tight, *e.box);
     if (!touch(box, *e.box)) return true;

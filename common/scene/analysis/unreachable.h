@@ -1,5 +1,5 @@
-// Interior media that no camera path can enter. Decided from the scene description alone, so conservative for
-// meshes.
+// Finds media inside shapes that no camera path can enter. The decision uses the scene description alone,
+// without mesh files, so it is conservative for meshes.
 #pragma once
 
 #include <vector>
@@ -8,9 +8,10 @@
 
 namespace ls::scene {
 
-// For each shape: true if its interior medium can be removed without changing the image, provided nothing
-// else refers to that medium. `scene` must be consistent. Paths begin at the camera, in the sensor's medium,
-// and enter another medium when they leave a surface to its side, reflected or not. There are two reasons:
+// Returns for each shape whether its interior medium can be removed without changing the image, provided
+// that nothing else refers to that medium. `scene` must be consistent. Paths begin at the camera, in the
+// sensor's medium, and enter another medium when they leave a surface to its side, reflected or not. There
+// are two reasons:
 // - The surface is black behind: no path leaves it to that side, whatever arrives there.
 // - It is a sphere or cube that lets nothing through, with neither the camera, nor an emitter, nor a surface
 //   that light passes inside or on it. Only rounding can put a path inside (around an edge of a cube), and

@@ -30,7 +30,7 @@ class ObjectReader {
     const auto it = json_.find(std::string(f.name));
     if (it == json_.end()) return f.elided ? void() : fail(f.name, "is missing");
     read(f, *it, value);
-    // For a unique form, the omitted default must not be written explicitly.
+    // Equal scenes have one form only: a default that the writer omits must not be written explicitly.
     if (f.elided && wrong_.empty() && value == T{}) fail(f.name, "has the value that is left out");
   }
 

@@ -10,7 +10,7 @@
 namespace ls::scene::nori {
 namespace {
 
-// The parameters of an integrator, by the one that it becomes.
+// Returns the parameters of an integrator of Nori, according to the integrator that it becomes.
 std::vector<Parameter> parameters_of(const IntegratorRow& row) {
   std::vector<Parameter> p;
   if (row.ours == "volpath_distant_mis") {

@@ -41,7 +41,7 @@ Element parallel(Object& o) {
   return out;
 }
 
-// A disk of given radiance and angular radius thetaA.
+// Makes a disk-shaped light of given radiance and angular radius thetaA.
 Element disk(Object& o, Report& report) {
   need(o, "radiance");
   need(o, "thetaA");

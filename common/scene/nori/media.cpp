@@ -56,7 +56,7 @@ class Reader {
   Report& report_;
 };
 
-// The value of a constant volume; nullopt for a grid.
+// Returns the value of a constant volume; nullopt for a grid.
 std::optional<Rgb> constant_of(const Element& e, Report& report) {
   if (e.tag != "volume") {
     const auto v = parse_numbers(e.get("value"), 3);  // already checked
@@ -98,7 +98,7 @@ std::optional<Element> grid(const Element* filename, const Element* order, std::
   return out;
 }
 
-// The <volume> of a heterogeneous medium that is not constant.
+// Makes the <volume> of a heterogeneous medium that is not constant.
 std::optional<Element> grid_volume(const Element& e, std::string name, const Mesh& mesh, Report& report) {
   const Plugin* plugin = known_plugin(e, report);
   if (!plugin) return std::nullopt;

@@ -36,7 +36,7 @@ std::string range_text(const Parameter& p) {
   return fmt::format("{}{}{}", low, p.name, high);
 }
 
-// The values in a property of this tag; nullopt: not readable.
+// Returns the values in a property of this tag; nullopt: they are not readable.
 std::optional<std::vector<double>> values_of(const Element& e) {
   const std::string_view text = e.get("value");
   if (e.tag == "float") {

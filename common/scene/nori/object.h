@@ -18,7 +18,8 @@ Kind object_kind(const Element& e);
 // Checks elements, their attributes and nesting; false if errors were reported.
 bool check_objects(const Element& root, Report& report);
 
-// Reports an unknown type, with a suggestion, or an unsupported one, and returns nullptr.
+// Returns the table's row for the type of `e`. If the type is unknown or unsupported, reports that, with a
+// suggestion for an unknown one, and returns nullptr.
 const Plugin* known_plugin(const Element& e, Report& report);
 
 class Object {
@@ -30,21 +31,23 @@ class Object {
   std::string_view type() const { return plugin_.type; }
   bool has(std::string_view parameter) const;
 
-  // The element that sets the parameter; nullptr if there is none, or it was wrong (and reported).
+  // Returns the element that sets the parameter; nullptr if there is none, or if it is wrong, which is
+  // reported.
   const Element* take(std::string_view parameter);
   double number(std::string_view parameter, double fallback);
   Rgb color(std::string_view parameter, const Rgb& fallback);
   Vec3 triple(std::string_view parameter, const Vec3& fallback);
   std::string_view text(std::string_view parameter, std::string_view fallback);
   void missing(std::string_view parameter);
-  // Reports an error and returns true if both are given.
+  // True if both parameters are given, which is reported as an error.
   bool both(std::string_view one, std::string_view other);
 
-  // Nested objects with this tag that are not the value of a parameter.
+  // Returns the nested objects with this tag that are not the value of a parameter.
   std::vector<const Element*> nested(std::string_view tag);
-  const Element* only(std::string_view tag);  // reports a second one
+  // the single nested object with this tag; a second one is reported
+  const Element* only(std::string_view tag);
   void finish();
-  // For an unsupported object: reports only unknown parameters.
+  // Like finish() for an unsupported object: reports only unknown parameters.
   void finish_refused();
 
  private:
@@ -63,17 +66,18 @@ class Object {
   std::vector<Child> children_;
 };
 
-// Elements in Mitsuba's dialect. A new element gets the place of the Nori element it is made from.
+// These make elements of Mitsuba's dialect. A new element gets the place of the Nori element it is made from.
 Element made(std::string tag, std::string_view type, const Span& at);
 void set(Element& e, std::string attribute, std::string value, const Span& at);
 void add(Element& parent, Element child);
-// Adds a property; numbers in the shortest form that reads back to the same bits.
+// Each adds a property; numbers are written in the shortest form that reads back to the same bits.
 void add(Element& parent, std::string tag, std::string name, std::string value, const Span& at);
 void add(Element& parent, std::string name, double value, const Span& at);
 void add(Element& parent, std::string name, const Rgb& value, const Span& at);
 // Adds the same property under another name.
 void add_as(Element& parent, const Element* property, std::string name);
-// Adds a <transform> with these steps before its own; none if there are no steps at all.
+// Adds a <transform>: the steps `before`, followed by those of `transform`. Adds nothing if there are no
+// steps at all.
 void add_transform(Element& parent, const Element* transform, std::string name,
                    std::vector<Element> before = {});
 Element matrix_step(const std::array<double, 16>& m, const Span& at);

@@ -17,21 +17,22 @@ struct Mesh {
 };
 
 std::optional<Element> bsdf(const Element& e, const Mesh& mesh, Report& report);
-// A property or object `name` of a bsdf, from a colour or a <texture>.
+// Translates a colour or a <texture> to a property or object called `name` of a bsdf.
 std::optional<Element> texture(const Element& given, std::string name, const Mesh& mesh, Report& report);
 
 std::optional<Element> medium(const Element& e, const Mesh& mesh, Report& report);
 
-// An emitter of the scene, or of a mesh.
+// Translate an emitter of the scene, and an emitter of a mesh.
 std::optional<Element> emitter(const Element& e, Report& report);
 std::optional<Element> mesh_emitter(const Element& e, Report& report);
 
-// <sensor> with film and sampler; `sampler` may be nullptr.
+// Translates a camera to a <sensor> with film and sampler; `sampler` may be nullptr.
 std::optional<Element> camera(const Element& e, const Element* sampler, Report& report);
 
 struct Integrator {
   Element element;
-  bool inmedium = false;  // Kombu: the camera is inside the medium of the mesh around it
+  // from Kombu, a descendant of Nori: the camera is inside the medium of the mesh around it
+  bool inmedium = false;
 };
 std::optional<Integrator> integrator(const Element& e, Report& report);
 

@@ -42,7 +42,7 @@ const TagRow* row_of(const Element& e) {
   return nullptr;
 }
 
-// Suggestions for elements of Mitsuba.
+// Suggests what to write instead of an element that only Mitsuba has.
 std::string_view instead(std::string_view tag) {
   static constexpr std::pair<std::string_view, std::string_view> kOthers[] = {
       {"shape", "in Nori it is called <mesh>"},

@@ -21,7 +21,7 @@ void add_placement(Element& texture, const Placement& p) {
                 {matrix_step({p.au, 0, 0, p.cu, 0, p.av, 0, p.cv, 0, 0, 1, 0, 0, 0, 0, 1}, texture.at)});
 }
 
-// One or two numbers of a parameter about u and v.
+// Returns a parameter of one or two numbers about u and v; one number stands for both.
 std::array<double, 2> pair(Object& o, std::string_view parameter, double fallback) {
   const Element* e = o.take(parameter);
   const auto v = e ? parse_numbers(e->get("value"), 3) : std::nullopt;

@@ -14,7 +14,7 @@ struct ChannelRow {
 std::span<const ChannelRow> channels();
 const ChannelRow* channel_row(std::string_view theirs);  // nullptr: unknown name
 
-// Converts a list of our names: "depth,normal" -> "depth:depth,normal:sh_normal".
+// Converts a list of our names to channels of Mitsuba: "depth,normal" -> "depth:depth,normal:sh_normal".
 std::string mitsuba_channels(std::string_view aovs);
 
 }  // namespace ls::scene

@@ -99,8 +99,8 @@ class Parameters {
     longest_ = std::min(std::max(longest_, name.size()), kMaxParameterNameBytes);
   }
 
-  // The longest parameter name at `at` (as in Mitsuba: "$resx" is `resx` if that exists, else `res` followed
-  // by an x).
+  // Returns the parameter with the longest name that the text has at `at`, as in Mitsuba: "$resx" means
+  // `resx` if that exists, otherwise the value of `res` followed by an x.
   Values::const_iterator longest_at(const std::string& text, std::size_t at) const {
     std::size_t end = at;
     while (end < std::min(text.size(), at + longest_) && is_name_char(text[end])) ++end;
@@ -262,8 +262,8 @@ class Loader {
   struct Included {
     std::string name, text;
   };
-  // Searches as Mitsuba 3 does: in the folder of the including file, in the <path>s, latest first, beside the
-  // main file.
+  // Searches for an included file as Mitsuba 3 does: in the folder of the including file, then in the folders
+  // of the <path> elements, the latest of these first, then beside the main file.
   Result<Included> find_included(const std::string& name) {
     std::vector<std::string> places;
     if (!including_.empty()) places.push_back(join_path(join_path(including_.back(), ".."), name));

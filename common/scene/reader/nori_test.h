@@ -41,10 +41,10 @@ struct NoriTestResult {
   std::vector<Diagnostic> diagnostics;
 };
 
-// True if the root element of this text is a <test>; false if it is not XML.
+// True if the root element of this text is a <test>; false if it is not, or if the text is not XML.
 bool is_nori_test(std::string_view text);
 
-// Like read_scene(), with errors of the same kind.
+// Reads a Nori test as read_scene() reads a scene, with errors of the same kind.
 NoriTestResult read_nori_test(std::string_view file_name, std::string_view text, AssetSource& assets,
                               const ReadOptions& options = {});
 

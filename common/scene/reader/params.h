@@ -1,4 +1,5 @@
-// The parameters of one object: readers take those they know; those left over at the end are reported.
+// The parameters of one object. Its reader takes those that it knows; finish() reports those that are left
+// over.
 #pragma once
 
 #include <fmt/format.h>
@@ -22,24 +23,26 @@ class Params {
   const Element& object() const { return object_; }
   std::string title() const;  // bsdf "diffuse"
   bool has(std::string_view name) const;
-  // The child of that name (a property, an object or a reference); marks the name as known.
+  // Returns the child of that name (a property, an object or a reference), and marks the name as known.
   const Element* take(std::string_view name);
-  // A nested object that nobody took by name, and the element at this place (which may be a reference).
+  // A nested object that no reader took by name, and the element at its place, which may be a reference to
+  // it.
   struct Nested {
     const Element* object;
     const Element* use;
   };
   enum class Names { any, none };  // none: only those without a name
   std::vector<Nested> take_nested(std::string_view tag, Names names = Names::any);
-  // Reports the parameters that nobody took.
+  // Reports the parameters that no reader took.
   void finish();
 
-  // Plain values; nullopt if absent or (reported) of the wrong type.
+  // Each returns a plain value; nullopt if it is absent, or of the wrong type, which is reported.
   std::optional<std::string> take_string(std::string_view name);
   std::optional<double> take_number(std::string_view name);
   std::optional<Transform> take_transform(std::string_view name);
 
-  // For Binder: converts `e` to `value`, in the file's notation for that type. Reports errors.
+  // For Binder: these convert `e` to `value`, in the notation that files use for that type, and report
+  // errors.
   void convert(const Field& f, const Element& e, double& value);
   void convert(const Field& f, const Element& e, int& value);
   void convert(const Field& f, const Element& e, bool& value);
@@ -91,7 +94,7 @@ class Params {
                   const std::vector<std::string>& names);
   bool in_range(const Field& f, const Element& e, double x);
   bool in_range(const Field& f, const Element& e, const std::array<double, 3>& x);
-  // The object at `e`, nested or referenced; nullptr if `e` is a plain value (or wrong, and reported).
+  // Returns the object at `e`, nested or referenced; nullptr if `e` is a plain value, or wrong and reported.
   const Element* object_at(const Element& e);
   std::optional<std::string> string_value(std::string_view name, const Element& e);
   std::optional<Rgb> colour(const Field& f, const Element& e, std::string_view wanted);
@@ -104,7 +107,7 @@ class Params {
   std::vector<std::string> known_;
 };
 
-// Reads a described object from its parameters.
+// Reads an object, whose fields describe() lists, from its parameters.
 class Binder {
  public:
   explicit Binder(Params& params) : params_(params) {}

@@ -25,8 +25,9 @@ std::optional<Rgb> Params::colour(const Field& f, const Element& e, std::string_
   return in_range(f, e, *c) ? c : std::nullopt;
 }
 
-// Follows the RGB modes of Mitsuba. Version 3: reflectances are seen under D65, light as it is, so light of
-// equal power at all wavelengths is not white. 0.x: all curves are seen as they are, single numbers are grey.
+// Converts spectra as the RGB modes of Mitsuba do. Version 3: curves of reflectances are seen under D65,
+// curves of light as they are, so light of equal power at all wavelengths is not white. 0.x: all curves are
+// seen as they are, and a single number is grey.
 std::optional<Rgb> Params::spectrum(const Field& f, const Element& e, std::string_view wanted) {
   const SpectrumText text = parse_spectrum(e.get("value"));
   const bool emits = object_.tag == "emitter";

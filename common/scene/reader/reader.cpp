@@ -31,7 +31,7 @@ Scene Reader::read() {
   return std::move(scene_);
 }
 
-// At the top level a reference stands for the object itself, as in any parent.
+// At the top level a reference stands for the object that it refers to, as in any other parent element.
 void Reader::read_child(const Element& child) {
   const TagKind kind = kind_of(child);
   if (kind == TagKind::alias) return;
@@ -78,7 +78,7 @@ const Element* Reader::resolve(const Element& child) {
   return nullptr;
 }
 
-// Suggestion for an unresolved reference.
+// Returns a suggestion for a reference that leads nowhere.
 std::string Reader::hint_for(const Element& reference) const {
   if (ids_.empty()) return "; no object here has one";
   std::vector<std::string> known;

@@ -20,11 +20,11 @@ class Reader {
   Scene read();  // valid only if the report has no errors afterwards
 
   Report& report() { return report_; }
-  // The object that `child` is or refers to; nullptr (reported) if there is none.
+  // Returns the object that `child` is or refers to; nullptr: there is none, which has been reported.
   const Element* resolve(const Element& child);
 
-  // Objects are read once, however often they are referred to; `use` is the place of the reference. nullopt:
-  // an error was reported.
+  // Each returns the index of `object` in the scene, and reads the object only once, however often it is
+  // referred to; `use` is the place of the reference. nullopt: an error was reported.
   std::optional<TextureIndex> texture(const Element& object, const Element& use);
   std::optional<BsdfIndex> bsdf(const Element& object, const Element& use);
   std::optional<VolumeIndex> volume(const Element& object, const Element& use);
@@ -121,7 +121,7 @@ class Reader {
   void read_channels(Params& p);
 
   std::string fresh_label(std::string name, std::string_view type, std::size_t index);
-  void label_shape(const Element& e);  // the last shape of scene_
+  void label_shape(const Element& e);  // names the last shape of scene_
   void label_instance(const Element& e);
 
   const Document& document_;
@@ -129,16 +129,17 @@ class Reader {
   Report& report_;
   Ids ids_;
   Scene scene_;
-  std::vector<const Element*> shape_elements_;  // for the scene's shapes
+  std::vector<const Element*> shape_elements_;  // the elements of the scene's shapes, in the same order
   const Element* sensor_ = nullptr;
   const Element* integrator_ = nullptr;
-  const Element* material_ = nullptr;  // of the last shape read; nullptr: the default
+  const Element* material_ = nullptr;  // material of the last shape read; nullptr: the default material
   std::unordered_set<std::string> labels_;
-  // Top-level films, filters and samplers, and those that a sensor refers to.
+  // parts_: the films, filters and samplers at the top level. used_parts_: those that a sensor refers to.
   std::vector<const Element*> parts_;
   std::unordered_set<const Element*> used_parts_;
-  std::vector<std::optional<Bounds>> texture_bounds_;  // for the first textures of scene_
-  std::vector<BsdfTraits> bsdf_traits_;                // for the first bsdfs of scene_
+  // bounds of the first textures of scene_; more are added when needed
+  std::vector<std::optional<Bounds>> texture_bounds_;
+  std::vector<BsdfTraits> bsdf_traits_;  // traits of the first bsdfs of scene_; more are added when needed
 
   bool reads_attributes_ = false;                     // some texture read so far is a mesh attribute
   std::map<TextureIndex, TextureIndex> old_numbers_;  // keyed by the textures as they were read
@@ -147,12 +148,12 @@ class Reader {
   Memo<VolumeIndex> volumes_;
   Memo<PhaseIndex> phases_;
   Memo<MediumIndex> media_;
-  // Read where they are defined; nullopt: without a shape, or wrong.
+  // The shape groups, read where they are defined; nullopt: the group has no shape, or is wrong.
   std::unordered_map<const Element*, std::optional<GroupIndex>> groups_;
   std::optional<GroupIndex> group_;  // the group whose shapes are being read
   std::map<std::string, AssetIndex> assets_by_name_;
   std::unordered_set<const Element*> in_progress_;
-  std::unordered_set<const Element*> bad_refs_;  // already reported
+  std::unordered_set<const Element*> bad_refs_;  // references whose errors have been reported
 };
 
 }  // namespace ls::scene

@@ -129,7 +129,7 @@ std::optional<BsdfIndex> Reader::read_plain_bsdf(const Element& e) {
   return add_bsdf(e, b);
 }
 
-// The energy table is for a single roughness.
+// Multiple scattering needs a constant roughness, because its energy table is for a single roughness.
 void Reader::check_multiple_scattering(const Element& e, TextureIndex alpha_u, TextureIndex alpha_v) {
   const std::size_t n = scene_.textures.size();
   if (alpha_u.value >= n || alpha_v.value >= n) return;  // already reported
@@ -158,7 +158,7 @@ std::optional<BsdfIndex> Reader::read_rough(const Element& e) {
   return add_bsdf(e, b);
 }
 
-// Like the others, but eta and k may also be given by a metal's name.
+// Reads a conductor as the other bsdfs are read, but eta and k may also be given by a metal's name.
 template <class T>
 std::optional<BsdfIndex> Reader::read_metal(const Element& e) {
   Params p(*this, e);

@@ -7,15 +7,17 @@
 
 namespace ls::scene {
 
-// Why a parameter of the dialect has no effect here; empty for all other parameters.
+// Returns why a parameter of the dialect (Mitsuba's scene format) has no effect here; empty for all other
+// parameters.
 std::string_view meaningless_because(std::string_view tag, std::string_view plugin,
                                      std::string_view parameter);
 std::vector<std::string> meaningless_parameters(std::string_view tag, std::string_view plugin);
 
-// What to write instead of a parameter of an older or related dialect; empty for all other parameters.
+// Returns what to write instead of a parameter of an older or related dialect; empty for all other
+// parameters.
 std::string_view replacement(std::string_view tag, std::string_view parameter);
 
-// The plugins of a tag that can be read, and the other ones of the dialect.
+// The dialect's plugins of a tag: those that this program can read, and the others.
 const std::vector<std::string>& supported_plugins(std::string_view tag);
 const std::vector<std::string>& unsupported_plugins(std::string_view tag);
 bool is_supported_plugin(std::string_view tag, std::string_view plugin);

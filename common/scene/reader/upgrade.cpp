@@ -99,7 +99,8 @@ void place_texture(Element& e) {
   e.children.push_back(std::move(transform));
 }
 
-// gamma: -1 as the file says, 1 linear, which is `raw`. One wrap mode for both directions.
+// Upgrades a bitmap texture. gamma: -1 means as the file says; 1 means linear, which is `raw`. The texture
+// gets one wrap mode for both directions.
 void upgrade_bitmap(Element& e) {
   if (const Element* gamma = child(e, "gamma")) {
     const auto value = parse_number(gamma->get("value"));

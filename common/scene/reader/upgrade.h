@@ -11,14 +11,14 @@
 
 namespace ls::scene {
 
-// True for a version of such a file ("0.5.0", but not "3.0.0").
+// True if `version` is one of such a file ("0.5.0", but not "3.0.0").
 bool is_old_version(std::string_view version);
 
-// Rewrites an element, whose children have been rewritten already, and marks it as old. Leaves what it does
-// not understand, to be reported when it is read.
+// Rewrites an element, whose children have been rewritten already, and marks it as old. It leaves what it
+// does not understand as it is; the reader of the element reports that.
 void upgrade(Element& e);
 
-// maxDepth -> max_depth, intIOR -> int_ior.
+// Converts names: maxDepth -> max_depth, intIOR -> int_ior.
 std::string snake_case(std::string_view name);
 
 // Parameters whose new name is not just the old one in snake_case; also used for the documentation.

@@ -92,7 +92,7 @@ std::string escaped(std::string_view text) {
 // A flag that Mitsuba 3 does not know: written only if set.
 constexpr std::string_view kOurOwn = "node_centred";
 
-// The plugin for a value of this type.
+// Returns the name of the plugin for a value of this type.
 template <class T>
 std::string_view plugin(const T&) {
   const TypeInfo& info = kInfo<T>;

@@ -49,7 +49,8 @@ BsdfTraits traits_of(const Bsdf& bsdf, const std::vector<BsdfTraits>& known) {
   return t;
 }
 
-// By relaxation, for any order of the list: a chain of n settles after n rounds, a cycle never does.
+// Computes the traits by relaxation, so that the list may be in any order: a chain of n nested bsdfs is known
+// after n passes over the list, a cycle never.
 std::optional<std::vector<BsdfTraits>> bsdf_traits(const Scene& scene) {
   for (const Bsdf& b : scene.bsdfs)
     for (const auto& inner : nested_bsdfs(b))

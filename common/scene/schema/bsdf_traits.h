@@ -1,4 +1,4 @@
-// Properties of a bsdf that follow from those it contains.
+// Properties of a bsdf that follow from its type and from the bsdfs that it contains.
 #pragma once
 
 #include <array>
@@ -18,14 +18,15 @@ struct BsdfTraits {
   bool operator==(const BsdfTraits&) const = default;
 };
 
-// The bsdfs that it contains directly.
+// Returns the bsdfs that `bsdf` contains directly.
 std::array<std::optional<BsdfIndex>, 2> nested_bsdfs(const Bsdf& bsdf);
 
-// `known`: the traits of the scene's bsdfs, at least of those that this one contains.
+// Returns the traits of `bsdf`. `known` has the traits of the scene's bsdfs, at least of those that `bsdf`
+// contains.
 BsdfTraits traits_of(const Bsdf& bsdf, const std::vector<BsdfTraits>& known);
 
-// Traits of every bsdf. nullopt: one refers to a bsdf that does not exist, or they contain each other in a
-// cycle or more than kMaxBsdfNesting deep.
+// Returns the traits of every bsdf. nullopt: a bsdf refers to one that does not exist, or bsdfs contain each
+// other in a cycle or more than kMaxBsdfNesting deep.
 std::optional<std::vector<BsdfTraits>> bsdf_traits(const Scene& scene);
 
 }  // namespace ls::scene

@@ -40,15 +40,17 @@ struct Field {
   bool named_ior = false;    // names of materials ("water") are accepted too
   bool constvolume = false;  // a colour that may be given as a <volume type="constvolume">
   bool required = false;
-  // For the documentation, if the C++ type is not enough: "point", "medium" (a nested one with the field's
-  // name), "<phase>" (a nested one without a name). Derived fields without it are not written in files.
+  // The type as the documentation names it, if the C++ type is not enough: "point", "medium" (a nested one
+  // with the field's name), "<phase>" (a nested one without a name). Derived fields without such a name are
+  // not written in files.
   std::string_view given_as = "";
-  // For a number or colour that is not in the dialect: not written in files if it has this value.
+  // For a number or colour that the dialect does not have: the value for which the field is not written in
+  // files.
   double unwritten = std::numeric_limits<double>::quiet_NaN();
   bool number = false;  // a texture that is read as a scalar, not as a colour
-  // For fields that were added after scenes had digests, or are not in the dialect: if the field has its
-  // type's initial value (false, 0, empty), it is written neither in JSON, where it may be missing, nor in
-  // files.
+  // True for fields that were added after scenes had digests, or that the dialect does not have. If such a
+  // field has its type's initial value (false, 0, empty), it is written neither in files nor in JSON, where
+  // it may be missing.
   bool elided = false;
 };
 
@@ -179,7 +181,7 @@ LS_TYPE(IntegratorSettings, "integrator", "volpath", "volpath, volpath_distant_m
 template <class T, class U>
 concept Of = std::same_as<std::remove_const_t<T>, U>;
 
-// Names of enumerators.
+// The enumerators of an enumeration with their names.
 template <class E>
 struct Named {
   std::string_view name;

@@ -323,7 +323,7 @@ void describe(V& v, T& s) {
   v.field({.name = "instance_labels", .doc = "", .elided = true}, s.instance_labels);
 }
 
-// Any type that the table describes as an object.
+// Accepts any type that the table describes as an object.
 struct AnyVisitor {
   template <class T>
   void field(const Field&, T&) {}

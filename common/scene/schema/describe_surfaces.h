@@ -5,7 +5,7 @@
 
 namespace ls::scene {
 
-// For rough surfaces.
+// Describes the parameter multiple_scattering, which several rough surfaces have.
 template <class V, class T>
 void describe_multiple_scattering(V& v, T& b) {
   v.field({.name = "multiple_scattering",

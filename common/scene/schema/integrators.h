@@ -1,4 +1,5 @@
-// The integrators by their names in all versions of the dialect, for scenes and for --integrator.
+// The integrators by their names in all versions of the dialect (Mitsuba's scene format), for scenes and for
+// --integrator.
 #pragma once
 
 #include <optional>
@@ -14,17 +15,19 @@ struct IntegratorRow {
   std::string_view name;         // the dialect's, or ours
   std::string_view ours;         // IntegratorSettings::name
   std::optional<int> max_depth;  // implied by the name
-  // Another method for the same result, not implemented here; scenes that request it get a warning.
+  // True if the name stands for another method with the same result that is not implemented here: scenes that
+  // request it get a warning.
   bool other_method = false;
 };
 
 std::span<const IntegratorRow> integrators();
 const IntegratorRow* integrator_row(std::string_view name);  // nullptr: unknown name
 
-// False for `path` and those that become it; true for unknown names. `name`: the dialect's, ours or Nori's.
+// True if the integrator renders media, or is unknown; false for `path` and those that are read as `path`.
+// `name` is the dialect's, ours or Nori's.
 bool sees_media(std::string_view name);
 
-// Integrators that wrap a nested one and add something; here the nested one is used alone.
+// Integrators that contain another one and add something to its result; here the inner one is used alone.
 struct WrapperRow {
   std::string_view name;
   std::string_view lost;  // the function that is lost

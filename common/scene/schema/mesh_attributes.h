@@ -9,21 +9,23 @@
 namespace ls::scene {
 
 struct AttributeUse {
-  // number: one component. colour: three (a normal map). any: either, one component being grey.
+  // How many numbers the attribute must have. number: one. colour: three (a normal map). any: either; a
+  // single number is grey.
   enum class As { any, number, colour } as = As::any;
-  TextureIndex texture;   // a MeshAttributeTexture
-  bool in_light = false;  // read by the shape's emitter: numbers above 1 make sense
+  TextureIndex texture;  // a MeshAttributeTexture
+  // True if the shape's emitter reads it, so that numbers above 1 make sense.
+  bool in_light = false;
   auto operator<=>(const AttributeUse&) const = default;
 };
 
 // True if any texture of the scene reads an attribute; if not, the shapes need not be examined.
 bool any_attribute(const Scene& scene);
-// Sorted, without duplicates. Terminates for any scene, including circular ones; ignores indices out of
-// range.
+// Return the attributes that a shape or a texture reads, sorted, without duplicates. They terminate for any
+// scene, including circular ones, and ignore indices out of range.
 std::vector<AttributeUse> attribute_uses(const Scene& scene, const Shape& shape);
 std::vector<AttributeUse> attribute_uses(const Scene& scene, TextureIndex texture);
 
-// "vertex_..." or "face_...", with a non-empty rest.
+// True for "vertex_..." and "face_..." with a non-empty rest.
 bool is_attribute_name(std::string_view name);
 
 }  // namespace ls::scene

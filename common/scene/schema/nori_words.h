@@ -26,7 +26,7 @@ enum Types : unsigned {
   kVolume = 512,
   kBsdf = 1024
 };
-// Names of these types, as "<float> or <color>".
+// Returns the names of these types, such as "<float> or <color>".
 std::string text_of(unsigned types);
 
 struct Parameter {
@@ -63,7 +63,7 @@ struct IntegratorRow {
 std::span<const IntegratorRow> integrators();
 const IntegratorRow* integrator_row(std::string_view name);
 
-// Generates the section of docs/reference/scene-format.md.
+// Generates the section about Nori of docs/reference/scene-format.md.
 std::string markdown();
 
 }  // namespace ls::scene::nori

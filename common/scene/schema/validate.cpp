@@ -15,7 +15,7 @@
 namespace ls::scene {
 namespace {
 
-// The list that an index refers to.
+// Returns the list that an index refers to.
 template <class S>
 auto& pool(S& s, AssetIndex) {
   return s.assets;
@@ -172,7 +172,8 @@ class ValueChecker {
                   outside(f.crop_offset[1], f.crop_size.height, f.size.height)))
       wrong_ = "scene.film: the crop is not within the frame";
   }
-  // Nesting depth of each texture by relaxation over the list, for as many rounds as textures may nest.
+  // Computes the nesting depth of each texture by relaxation: as many passes over the list as textures may
+  // nest.
   void check_texture_nesting() {
     std::vector<int> depth(s_.textures.size(), 0);
     for (int round = 0; round <= kMaxReferenceDepth; ++round) {

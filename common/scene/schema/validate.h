@@ -7,13 +7,14 @@
 
 namespace ls::scene {
 
-// The first inconsistency: an index out of range, textures or bsdfs that contain themselves, a bsdf that is
-// not allowed within `twosided`, a frame too large, matrices that are not finite; empty if consistent.
+// Returns the first inconsistency: an index out of range, textures or bsdfs that contain themselves, a bsdf
+// that is not allowed within `twosided`, a frame too large, or matrices that are not finite. Empty if the
+// scene is consistent.
 std::string find_inconsistency(const Scene& scene);
 
-// Reduces the lists to what shapes, emitters and the sensor reach, in the order in which it is first reached,
-// so that scenes that differ only in unused objects or in the order of definitions become equal. `scene` must
-// be consistent except for order.
+// Returns the scene with only those objects that shapes, emitters and the sensor reach, directly or through
+// others. Its lists are in the order in which the objects are first reached. So scenes that differ only in
+// unused objects or in the order of definitions become equal. `scene` must be consistent except for order.
 Scene compacted(const Scene& scene);
 
 }  // namespace ls::scene

@@ -1,5 +1,5 @@
-// A scene file as a tree of elements with places: includes are spliced in, $parameters substituted, but
-// nothing is interpreted yet.
+// A scene file as a tree of elements with their places in the text: includes are inserted, $parameters
+// substituted, but nothing is interpreted yet.
 #pragma once
 
 #include <map>
@@ -26,7 +26,7 @@ struct Element {
   bool old = false;  // in a file of Mitsuba 0.x; see upgrade.h
 
   const Attribute* find(std::string_view attribute) const;
-  // The attribute's value, empty if there is none.
+  // Returns the attribute's value, empty if the element has no such attribute.
   std::string_view get(std::string_view attribute) const;
 };
 
@@ -37,17 +37,18 @@ struct Document {
   bool labels = false;                    // ReadOptions::labels
 };
 
-// Parses XML text; nullopt (and diagnostics) if it is malformed, not UTF-8 or beyond the limits. The only
-// user of pugixml.
+// Parses XML text. nullopt: it is malformed, not UTF-8 or beyond the limits, which has been reported. No
+// other function uses pugixml. `elements_left` is the number of elements still allowed; it is reduced by
+// those found.
 std::optional<Element> parse_xml(std::uint32_t file, Report& report, std::size_t& elements_left);
 
-// The whole stage: parses, follows <include>, applies <default> and the defines. <include>, <default> and
-// <path> are not in the result.
+// Reads a scene file into a Document: parses it, follows <include>, applies <default> and the defines of
+// `options`. The elements <include>, <default> and <path> are not in the result.
 std::optional<Document> load_document(std::string_view file_name, std::string_view text, AssetSource& assets,
                                       const ReadOptions& options, Report& report);
 
-// `name` relative to `folder` (either may be absolute or empty), with "." and ".." resolved where that is
-// possible without the disk.
+// Returns `name` relative to `folder` (either may be absolute or empty), with "." and ".." resolved where
+// that is possible without looking at the disk.
 std::string join_path(std::string_view folder, std::string_view name);
 
 }  // namespace ls::scene

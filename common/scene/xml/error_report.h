@@ -14,7 +14,7 @@ class Report {
  public:
   explicit Report(bool strict) : strict_(strict) {}
 
-  // Adds a file, which lives as long as the report; the returned index is for Span::file.
+  // Adds a file, which is kept as long as the report. Returns its index, for Span::file.
   std::uint32_t add_file(SourceText file);
   const SourceText& file(std::uint32_t index) const { return files_[index]; }
 
@@ -23,9 +23,10 @@ class Report {
 
   bool has_errors() const { return errors_ > 0; }
   bool full() const { return errors_ >= kMax; }  // further errors would not be shown: reading may stop
-  // True if further warnings would be shown; check before expensively composing one.
+  // True if a further warning would be shown; check this before a warning is composed at some expense.
   bool takes_warnings() const { return (strict_ ? errors_ : warnings_) < kMax; }
-  // "line 9", with the file's name if it differs from that of `here`.
+  // Returns text that refers to the place `there` in a message about `here`: "line 9", with the file's name
+  // if the two are in different files.
   std::string refer_to(const Span& there, const Span& here) const;
   std::vector<Diagnostic> take();  // in the order found; with too many, errors are kept before warnings
 

@@ -1,5 +1,5 @@
 // Checks which elements exist, their attributes and their nesting, for a whole document before anything is
-// interpreted, so that the readers of objects can rely on it.
+// interpreted, so that the readers of objects can rely on a correct structure.
 #pragma once
 
 #include <map>
@@ -14,7 +14,7 @@ enum class TagKind { object, property, transform, step, reference, alias, unknow
 TagKind kind_of(const Element& e);  // a <spectrum type="..."> is an object
 
 using Ids = std::map<std::string, const Element*, std::less<>>;
-// Reports structural errors, duplicate ids and aliases without a target; returns the objects that have ids,
+// Reports structural errors, duplicate ids and aliases without a target. Returns the objects that have ids,
 // as pointers into `root`.
 Ids check_structure(const Element& root, Report& report);
 

@@ -22,8 +22,8 @@ std::uint32_t count_lines(std::string_view text) {
   return static_cast<std::uint32_t>(std::count(text.begin(), text.end(), '\n'));
 }
 
-// Length in bytes of the well-formed sequence at the start of `text`; 0 if there is none (RFC 3629, table 3-7
-// of Unicode).
+// Returns the length in bytes of the well-formed sequence at the start of `text`; 0 if there is none (RFC
+// 3629, table 3-7 of Unicode).
 std::size_t sequence_length(std::string_view text) {
   const auto at = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char lead = at(0);

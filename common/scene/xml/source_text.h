@@ -11,7 +11,8 @@
 
 namespace ls::scene {
 
-// A range of one of the files that were read: bytes [offset, offset + length).
+// A range of one of the files that were read: the bytes [offset, offset + length) of the file with index
+// `file`.
 struct Span {
   std::uint32_t file = 0;
   std::size_t offset = 0;
@@ -25,27 +26,27 @@ class SourceText {
 
   const std::string& name() const { return name_; }
   const std::string& text() const { return text_; }
-  // Line and column from 1; the column counts characters (UTF-8 code points), not bytes, which takes time
-  // proportional to the line's length.
+  // Returns line and column of a byte, both from 1. The column counts characters (UTF-8 code points), not
+  // bytes, which takes time proportional to the line's length.
   SourcePlace place(std::size_t offset) const;
   int line(std::size_t offset) const;  // the line only, without scanning it
   std::size_t index_bytes() const { return lines_before_.size() * sizeof lines_before_[0]; }
-  // A diagnostic for [offset, offset + length), with its line cut to a readable length.
+  // Makes a diagnostic about the bytes [offset, offset + length), with their line cut to a readable length.
   Diagnostic diagnose(Diagnostic::Severity severity, std::size_t offset, std::size_t length,
                       std::string message) const;
 
  private:
   std::size_t line_start(std::size_t offset) const;
   std::string name_, text_;
-  // Number of line ends before each block of the text. An entry per line would be many times the size of a
-  // text of empty lines.
+  // The number of line ends before each block of the text. (An entry for each line would make this many times
+  // the size of a text that consists of empty lines.)
   std::vector<std::uint32_t> lines_before_;
 };
 
-// Offset of the first byte that is not well-formed UTF-8; npos if none.
+// Returns the offset of the first byte that is not well-formed UTF-8; npos if there is none.
 std::size_t find_invalid_utf8(std::string_view text);
-// Offset of the first control character in well-formed UTF-8 (below U+0020 except blanks and line ends,
-// U+007F to U+009F); npos if none.
+// Returns the offset of the first control character in well-formed UTF-8 (below U+0020 except blanks and line
+// ends, U+007F to U+009F); npos if there is none.
 std::size_t find_control(std::string_view text);
 
 }  // namespace ls::scene

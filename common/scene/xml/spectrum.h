@@ -9,28 +9,30 @@
 
 namespace ls::scene {
 
-// Linear between the points, 0 beyond the ends. At least two points; nm increases.
+// A curve over the wavelength: linear between the points, 0 beyond the ends. It has at least two points; nm
+// increases.
 struct SpectralCurve {
   std::vector<double> nm, value;
   bool operator==(const SpectralCurve&) const = default;
 };
 
-// The illuminant of a reflectance. Spectra of light, and all curves of Mitsuba 0.x, use equal_energy: the
-// same power at all wavelengths.
+// The illuminant by which a curve is multiplied: d65 for a reflectance. Spectra of light, and all curves of
+// Mitsuba 0.x, use equal_energy: the same power at all wavelengths.
 enum class Illuminant { equal_energy, d65 };
 
-// integral(curve * illuminant * observer) / integral(illuminant * y), from 360 to 830 nm, as linear sRGB.
-// Components are negative for colours outside sRGB.
+// Returns integral(curve * illuminant * observer) / integral(illuminant * y), from 360 to 830 nm, as linear
+// sRGB, where `y` is the observer's y. Components are negative for colours outside sRGB.
 Rgb linear_srgb(const SpectralCurve& curve, Illuminant illuminant);
 
-// From CIE 1931 X, Y, Z.
+// Converts CIE 1931 X, Y, Z to linear sRGB.
 Rgb linear_srgb(const std::array<double, 3>& xyz);
 
-// X, Y, Z of a black body by Planck's law [W/(m^2 sr nm)], in the units of linear_srgb(): 1 at all
-// wavelengths gives X = Y = Z = 1. kelvin > 0.
+// Returns X, Y, Z of a black body at `kelvin` > 0 by Planck's law [W/(m^2 sr nm)], in the units of
+// linear_srgb(): a radiance of 1 at all wavelengths gives X = Y = Z = 1.
 std::array<double, 3> black_body_xyz(double kelvin);
 
-// Light of the same power at all wavelengths and luminance 1: X = Y = Z = 1, which is not white.
+// Returns the linear sRGB of light of the same power at all wavelengths and luminance 1: X = Y = Z = 1, which
+// is not white.
 Rgb equal_energy_srgb();
 
 }  // namespace ls::scene

@@ -20,7 +20,7 @@ namespace {
 constexpr double kUnitSlack = 1e-3;  // tolerance for an axis written with three digits
 
 Vec3 normalized(const Vec3& v) {
-  // Scaled first, so that squares of tiny or huge components neither underflow nor overflow.
+  // The vector is scaled first, so that squares of tiny or huge components neither underflow nor overflow.
   const double largest = std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
   const Vec3 s{v[0] / largest, v[1] / largest, v[2] / largest};
   const double n = std::sqrt(dot(s, s));
@@ -48,7 +48,7 @@ Vec3 some_up(const Vec3& n) {
   return {1 + sign * n[0] * n[0] * a, sign * n[0] * n[1] * a, -sign * n[0]};
 }
 
-// Camera space to world: +z from origin to target, +x to the left.
+// Returns the matrix from camera space to world: +z points from origin to target, +x to the left.
 std::optional<Transform> look_at(const Vec3& origin, const Vec3& target, Vec3 up) {
   const Vec3 way{target[0] - origin[0], target[1] - origin[1], target[2] - origin[2]};
   if (is_zero(way)) return std::nullopt;

@@ -14,22 +14,25 @@ Vec3 transform_point(const Transform& t, const Vec3& p);  // affine part
 Vec3 transform_vector(const Transform& t, const Vec3& v);
 double determinant3(const Transform& t);  // of the linear part
 
-// True if the matrix and its inverse are non-singular and within the range of numbers.
+// True if the matrix is invertible, and it and its inverse are within the range of numbers.
 bool invertible(const Transform& t);
-// True for translation, rotation and reflection only, up to 1e-3 as Mitsuba 3 requires of sensors.
+// True if the matrix consists only of translation, rotation and reflection, up to 1e-3 as Mitsuba 3 requires
+// of sensors.
 bool is_rigid(const Transform& t);
 
-// The steps of a <transform>, each applied after the previous ones. Reports and skips wrong ones.
+// Reads a <transform>: the product of its steps, each applied after the previous ones. Reports and skips
+// wrong steps.
 Transform read_transform(const Element& e, Report& report);
-// True if the singular values of the linear part are equal within the rounding of single precision.
+// True if the singular values of the linear part are equal within the rounding of single precision: the
+// matrix scales equally in all directions.
 bool is_similarity(const Transform& t);
-// The x and y rows and the translation of a 4 x 4 matrix, as in Mitsuba 3.
+// Returns the x and y rows and the translation of a 4 x 4 matrix, as Mitsuba 3 uses them for textures.
 UvTransform uv_part(const Transform& t);
 
-// x, y, z or value="..." of <translate>, <rotate>, <scale>, <vector>, <point>; missing components become
-// `missing`.
+// Reads x, y, z or value="..." of <translate>, <rotate>, <scale>, <vector> or <point>; missing components
+// become `missing`.
 std::optional<Vec3> read_xyz(const Element& e, double missing, Report& report);
-// The place of the attribute's value, or of the element if there is none.
+// Returns the place of the attribute's value, or of the element if it has no such attribute.
 Span value_place(const Element& e, std::string_view attribute);
 
 }  // namespace ls::scene

@@ -11,19 +11,20 @@
 
 namespace ls::scene {
 
-// A finite number, with surrounding blanks only.
+// Parse one finite number, which may have blanks around it.
 std::optional<double> parse_number(std::string_view text);
 std::optional<long long> parse_integer(std::string_view text);
 std::optional<bool> parse_boolean(std::string_view text);  // true or false, in any letter case
-// Numbers separated by commas or blanks; nullopt if one of them is not a number, or there are more than
+// Parses numbers separated by commas or blanks. nullopt: one of them is not a number, or there are more than
 // `most`.
 std::optional<std::vector<double>> parse_numbers(std::string_view text, std::size_t most);
-// One number (grey), three, or #rrggbb: 8-bit sRGB, decoded to linear.
+// Parses a colour: one number (grey), three numbers, or #rrggbb, which is 8-bit sRGB and decoded to linear.
 std::optional<Rgb> parse_rgb(std::string_view text);
-// #rrggbb without decoding: 255 is 1.
+// Parses #rrggbb without decoding: 255 becomes 1.
 std::optional<Rgb> parse_hex(std::string_view text);
 double decode_srgb(double x);  // to linear (IEC 61966-2-1)
-// <spectrum>: one number, three of linear sRGB (0.x files), or wavelength:value pairs in nm.
+// The value of a <spectrum>: one number, three numbers of linear sRGB (0.x files), or wavelength:value pairs
+// in nm; std::monostate if it is none of these.
 using SpectrumText = std::variant<std::monostate, double, Rgb, SpectralCurve>;
 SpectrumText parse_spectrum(std::string_view text);
 

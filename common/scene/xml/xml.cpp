@@ -45,8 +45,8 @@ class AttributePlaces {
   std::size_t at_;
 };
 
-// What is not allowed in a value, after decoding character numbers (&#0; ...); empty if it is valid. `raw`:
-// the value as written.
+// Returns what is wrong with a value after character numbers (&#0; ...) are decoded; empty if it is valid.
+// `raw` is the value as written in the file.
 std::string_view unprintable(const Attribute& a, std::string_view raw) {
   if (find_invalid_utf8(a.value) != std::string_view::npos) return "a number that is no character";
   if (find_control(a.value) != std::string_view::npos) return "a control character";
@@ -124,9 +124,9 @@ class TreeBuilder {
   std::string_view text_;
 };
 
-// Where an attribute value begins that runs into the next element (a forgotten quote, which a parser notices
-// only later); npos if there is none. XML allows no '<' in values. Quotes in comments, CDATA and instructions
-// are ignored.
+// Returns the offset at which an attribute value begins that runs into the next element, because its closing
+// quote was forgotten (which a parser notices only later); npos if there is none. XML allows no '<' in
+// values. Quotes in comments, CDATA and instructions are ignored.
 std::size_t find_open_quote(std::string_view text) {
   static constexpr std::string_view kOpaque[][2] = {{"<!--", "-->"}, {"<![CDATA[", "]]>"}, {"<?", "?>"}};
   bool in_tag = false;
@@ -167,7 +167,7 @@ void malformed(std::uint32_t file, const pugi::xml_parse_result& result, Report&
   report.error({file, offset, 1}, fmt::format("malformed XML: {}", result.description()));
 }
 
-// Bounds what pugixml would allocate.
+// Checks numbers of tags and attributes, which limit what pugixml allocates.
 bool small_enough(std::uint32_t file, std::string_view text, Report& report, std::size_t& elements_left) {
   std::size_t tags = 0, attributes = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
