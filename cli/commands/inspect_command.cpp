@@ -21,7 +21,8 @@ struct InspectFlags {
   bool json = false, strict = false, variants = false, work = false;
 };
 
-// Side of the small image in pixels: large enough to reach all parts of a scene, small enough to be fast.
+// --variants renders a small image with every instantiation. Its longer side in pixels: large enough that
+// paths meet all parts of a scene, small enough to be fast.
 constexpr int kSmallSide = 32;
 constexpr SampleRange kSmallSamples{0, 4};
 

@@ -172,7 +172,8 @@ struct UnitAccepted {
   // Seconds that the rendering thread waited for a core or for memory meanwhile: core_share.h
   double wait_seconds = 0;
 };
-// The assembler has carried out a Fold (domain/effect.h): the unit's result is part of the image.
+// The result of a unit (one tile, one range of its samples) has been added to the image, as the farm asked
+// with a Fold (effect.h).
 struct UnitFolded {
   UnitKey unit;
   SampleRange samples;  // as in the Fold

@@ -19,9 +19,10 @@ struct EtaInputs {
   double core_to_limit = 0;  // the same until the sample limit, whatever the error; 0: unknown
   // Target error (relMSE) and time budget (seconds since the first ray), if requested
   std::optional<double> target, time;
-  double elapsed = 0;          // seconds since the first ray
-  double cores = 0;            // cores that work on it, or would: CPU seconds per second of wall-clock time
-  double cores_with_more = 0;  // the same with more workers; at most `cores` if they would not help
+  double elapsed = 0;  // seconds since the first ray
+  // CPU seconds per wall-clock second that the job's workers give it; if it is not running, that they would
+  double cores = 0;
+  double cores_with_more = 0;  // the same with kMoreWorkers more workers; not above `cores`: they do not help
   double unit_seconds = 0;     // mean core seconds of a remaining unit; 0: unknown
   double units_at_once = 0;    // most units that can be rendered at the same time; 0: no limit
 };

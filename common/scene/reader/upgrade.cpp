@@ -41,7 +41,8 @@ void erase_child(Element& e, std::string_view name) {
   std::erase_if(e.children, [&](const Element& c) { return c.get("name") == name; });
 }
 
-// An element for an implicit default of an old file, with the place of the object.
+// Makes an element for a default that an old file leaves out. Its place in the text, for messages, is that of
+// the object it belongs to.
 Element made(std::string tag, const Span& at) {
   Element e;
   e.tag = std::move(tag);

@@ -137,7 +137,8 @@ void Farm::State::count_failure(Job& job, UnitCode code, Worker& worker, const U
     fail(job, head + describe_failure(rect, job.range(code), job.failures.attempts(code), job.plan.replay),
          failure);
   };
-  // That the scene is at fault is only what one worker says, too: its memory may be bad, or it lies.
+  // One worker's word that the scene is at fault does not fail the job: its memory may be bad, or it lies. It
+  // counts like any other failure.
   const std::string at_fault = failure.scene_at_fault ? "the scene cannot be rendered: " : "";
   if (job.failures.exhausted(code, known)) return report(at_fault);
   if (known > 0 && willing == 0) {

@@ -1,5 +1,5 @@
-// Receives blobs in parts. Each is a file FOLDER/<64 hex digits> that grows, over broken connections and
-// restarts of the coordinator, until the blob is complete. Thread-safe.
+// Receives blobs in parts. An incomplete blob is a file, FOLDER/<its SHA-256 in hex>, to which each part is
+// appended. It outlives broken connections and restarts of the coordinator. Thread-safe.
 #pragma once
 
 #include <filesystem>

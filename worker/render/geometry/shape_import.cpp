@@ -119,8 +119,9 @@ void transform(LocalMesh& m, const Affine& to_scene) {
   }
 }
 
-// If a file has no normals, the dialect computes smooth ones: at each vertex the normalised sum of the
-// normals of its triangles, weighted by their angles there (Thuermer and Wuethrich 1998).
+// For a mesh file without normals Mitsuba computes smooth ones, and so does this: at each vertex the
+// normalised sum of the normals of its triangles, weighted by their angles there (Thuermer and Wuethrich
+// 1998).
 void smooth(LocalMesh& m) {
   m.normals.assign(m.positions.size(), V3d(0));
   for (std::size_t i = 0; i + 2 < m.indices.size(); i += 3) {
