@@ -9,7 +9,7 @@ const job = (id, name, state, more = {}) => ({
 });
 
 const half = {
-  progress: 0.43, spp_done: 214.6, rmse: 0.0312, relmse: 0.00418, relmse_ci95: [0.0039, 0.00448], target_error: 0.001, eta_seconds: 252, eta_ci95: [186, 330], eta_with_8_more: 66,
+  progress: 0.43, spp_done: 214.6, rmse: 0.0312, relmse: 0.00418, relmse_ci95: [0.0039, 0.00448], target_error: 0.001, eta_seconds: 252, eta_ci95: [186, 330], eta_with_more: { workers: 8, seconds: 66, ci95: null },
   units_done: 1240, elapsed_seconds: 187, core_seconds: 742, spp_asked: 512, rmse_ci95: [0.0302, 0.0322], slope: -0.98, slope_ci95: [-1.06, -0.9], efficiency_per_core: 0.322,
   time: { load: 2.1, build: 9.4, render: 742, transfer: 6.2, merge: 3.9, idle: 21.5 },
 };
