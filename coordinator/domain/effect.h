@@ -80,7 +80,7 @@ struct JobStateChanged {
   JobState from = JobState::queued;
   JobState to = JobState::queued;
 };
-// Of every tile at least as many rounds are folded as `rounds` gives for it. The service adds a point to the
+// Every tile has at least as many rounds folded as `rounds` gives for it. The service adds a point to the
 // convergence curve and may take a snapshot. With a target error, tiles have different numbers of rounds:
 // those of one level of the stop rule (coordinator/domain/adaptive_stop.h). The checkpoints and their order
 // do not depend on the order in which results arrive.

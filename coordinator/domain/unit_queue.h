@@ -139,7 +139,7 @@ class UnitQueue {
  private:
   static constexpr RoundIndex kNoWindow = std::numeric_limits<RoundIndex>::max();
 
-  // What set_wanted() said of a tile. Not used while no tile has speculative units.
+  // Per tile, the round set by set_wanted(). Not used while no tile has speculative units.
   struct Wanted {
     RoundIndex before = kNoWindow;
     float weight = 0;

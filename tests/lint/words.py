@@ -14,12 +14,12 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 WORDS = {
     "say": "print, report", "says": "print, report", "said": "reply, reported", "tell": "send, report, notify", "tells": "send, report, notify",
     "told": "sent, reported, notified", "telling": "sending, reporting", "untold": "unreported", "book": "table, registry", "barred": "quarantined",
-    "distrust": "quarantine", "liar": "faulty", "kit": "builder", "glow": "medium emission", "glows": "emits", "veil": "null transmission",
+    "distrust": "quarantine", "distrusted": "quarantined", "liar": "faulty", "kit": "builder", "glow": "medium emission", "glows": "emits", "veil": "null transmission",
     "veils": "null transmission", "matte": "cryptomatte", "mattes": "cryptomattes", "elsewhere": "the place meant", "hungry": "wanting work",
     "steered": "adaptive", "foreseen": "predicted, speculative", "chore": "background write", "chores": "background writes",
     "awaited": "missing", "dormant": "unloaded", "witness": "voter", "witnesses": "voters", "patiently": "with retries", "outlook": "eta",
     "believe": "validate, trust", "believed": "validated", "heed": "apply", "intake": "admission", "stretch": "optical depth", "cage": "sandbox",
-    "caged": "sandboxed", "shut_in": "enter sandbox", "mouthful": "allocation chunk", "misbehave": "inject fault", "unwell": "unhealthy",
+    "caged": "sandboxed", "mouthful": "allocation chunk", "misbehave": "inject fault", "unwell": "unhealthy",
     "lend": "lease", "lent": "leased", "sick": "unhealthy", "patience": "retry policy, time limit",
 }
 # (identifier, file): why it stays.
@@ -34,6 +34,9 @@ ALLOWED = {
     ("kTellingSamples", "common/image/error/error_estimate.cpp"): "samples from which the halves tell the error",
     ("said", "worker/render/media/vdb_validate.cpp"): "what the other process replied",
     ("said", "coordinator/store/redis/redis_link.cpp"): "Redis' own words",
+    **{("distrusted", path): "a field of stored records" for path in (
+        "coordinator/service/service_restore.cpp", "coordinator/service/service_shared.cpp", "coordinator/store/jobs/job_store.h",
+        "coordinator/store/jobs/stored_job.cpp")},
 }
 
 TOKEN = re.compile(r'(R"(\w*)\(.*?\)\2"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])\'|//[^\n]*|/\*.*?\*/|#include[^\n]*)|([A-Za-z_]\w*)', re.S)

@@ -20,3 +20,8 @@ def test_comments_texts_and_includes_are_left_alone():
 def test_an_exception_holds_for_its_file_alone():
     assert words.violations("worker/render/vdb/vdb_module.cpp", "void say();") == []
     assert words.violations("worker/render/vdb/other.cpp", "void say();") == [(1, "say", "say")]
+
+
+def test_every_word_of_the_list_can_be_found():
+    for word in words.WORDS:
+        assert words.violations("x.cpp", f"int {word}_x;") == [(1, f"{word}_x", word)]
