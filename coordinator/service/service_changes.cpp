@@ -91,6 +91,7 @@ Result<void> Service::become_locked(const EntryPtr& entry, JobState asked) {
     if (auto saved = save_pin_locked(*entry); !saved) return saved;
     if (auto saved = save_quarantined_locked(); !saved) return saved;
     entry->trouble.clear();
+    ++entry->resumes;
     run_locked(JobResumed{id});
   }
   return {};

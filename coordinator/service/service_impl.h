@@ -78,6 +78,7 @@ struct JobEntry {
   std::optional<TimePoint> still_since;    // since when its clock stands still, because the job is paused
   double fold_seconds = 0;                 // seconds on the job's clock at the last fold
   std::string trouble;                     // why the job waits
+  std::uint64_t resumes = 0;               // how often it was resumed
   // The workers that each leased unit (tile and round) is leased to, for display
   std::map<std::pair<TileIndex, RoundIndex>, std::vector<WorkerId>> leased;
   // Seconds on the job's clock of each durable result, while a restart replays the results
@@ -330,7 +331,7 @@ class Service final : public Coordinator {
   void commit(std::vector<Checked> batch);
   void accept_locked(Checked& item, std::optional<PartialLog::Place> place);
   void refuse_locked(const Arrived& arrived, const Error& error);
-  void cannot_store_locked(const Arrived& arrived, const Error& error);
+  void cannot_store_locked(const Arrived& arrived, const Error& error, std::uint64_t resumes);
   void acknowledge_locked(const Arrived& arrived, std::optional<Error> refused);
 
   // Workers (service_workers.cpp)

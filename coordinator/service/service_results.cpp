@@ -89,6 +89,7 @@ void Service::commit(std::vector<Checked> batch) {
   struct Stored {
     std::optional<PartialLog::Place> place;
     std::optional<Error> error;
+    std::uint64_t resumes = 0;  // of its job, when storing began
   };
   std::vector<Stored> stored(batch.size());
   std::set<std::shared_ptr<PartialLog>> written;
@@ -106,6 +107,7 @@ void Service::commit(std::vector<Checked> batch) {
       if (a.from->fake && !a.duplicate && !std::exchange(a.job->stored.fake, true)) a.job->pin_unsaved = true;
       at[i] = elapsed_locked(*a.job);
       logs[i] = a.job->log;
+      stored[i].resumes = a.job->resumes;
       if (const auto saved = save_pin_locked(*a.job); !saved) stored[i].error = saved.error();
       if (const auto saved = save_quarantined_locked(); !saved) stored[i].error = saved.error();
     }
@@ -138,7 +140,7 @@ void Service::commit(std::vector<Checked> batch) {
       acknowledge_locked(item.arrived,
                          Error{Errc::failed_precondition, "this worker is barred: it rendered wrong pixels"});
     else if (stored[i].error)
-      cannot_store_locked(item.arrived, *stored[i].error);
+      cannot_store_locked(item.arrived, *stored[i].error, stored[i].resumes);
     else if (const auto* bad = std::get_if<BadResult>(&item.verified))
       refuse_locked(item.arrived, bad->error);
     else if (std::holds_alternative<OtherRange>(item.verified))
@@ -197,15 +199,19 @@ void Service::refuse_locked(const Arrived& a, const Error& error) {
 }
 
 // Handles a result that could not be stored. This is the coordinator's fault: the unit waits again, and the
-// job is paused until a person resumes it. Otherwise workers would render for a full disk.
-void Service::cannot_store_locked(const Arrived& a, const Error& error) {
+// job is paused until a person resumes it. Otherwise workers would render for a full disk. If a person has
+// resumed it since storing began, the error may be of what that person mended: the job is not paused again,
+// and the next result shows whether it is.
+void Service::cannot_store_locked(const Arrived& a, const Error& error, std::uint64_t resumes) {
   const UnitKey& unit = a.result.unit;
   ++figures_.not_stored;
   log_error(fmt::format("job={} tile={} round={}", unit.job.value, unit.tile, unit.round), error.message);
-  log_job(unit.job, "paused: " + error.message);
   store_trouble_ = error.message;
-  a.job->trouble = error.message + "; then resume the job";
-  run_locked(JobPaused{unit.job});
+  if (a.job->resumes == resumes) {
+    log_job(unit.job, "paused: " + error.message);
+    a.job->trouble = error.message + "; then resume the job";
+    run_locked(JobPaused{unit.job});
+  }
   run_locked(LeaseCameBack{a.from->worker, {a.result.lease, {unit}}});
   acknowledge_locked(a, error);
 }

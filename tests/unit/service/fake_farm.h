@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -36,10 +37,17 @@ class Mailbox {
     arrived_.notify_all();
   }
   // Nothing within 20 s: a test hangs no longer than that.
-  std::optional<std::pair<int, ToWorker>> take() {
+  std::optional<std::pair<int, ToWorker>> take(const std::function<void()>& meanwhile = {}) {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
     std::unique_lock lock(mutex_);
-    if (!arrived_.wait_for(lock, std::chrono::seconds(20), [&] { return !mail_.empty(); }))
-      return std::nullopt;
+    while (mail_.empty()) {
+      if (std::chrono::steady_clock::now() > until) return std::nullopt;
+      arrived_.wait_for(lock, std::chrono::milliseconds(meanwhile ? 2 : 1000));
+      if (!mail_.empty() || !meanwhile) continue;
+      lock.unlock();
+      meanwhile();
+      lock.lock();
+    }
     auto first = std::move(mail_.front());
     mail_.pop_front();
     return first;
@@ -104,6 +112,8 @@ class FakeFarm {
   // Whose pixels are wrong.
   std::function<bool(int worker, const UnitResult&)> lies = [](int, const UnitResult&) { return false; };
   std::function<void(std::vector<LeaseUnit>&)> reorder = [](auto&) {};
+  // The coordinator's clock ticks while no message comes: a worker that gave units back gets more at a tick
+  bool ticks = false;
   int results_sent = 0;
   int stop_after = -1;  // results; then run() returns false
   std::vector<ResultAck> refusals;
@@ -112,7 +122,7 @@ class FakeFarm {
   // Works until all units that are out have been acknowledged and `until` holds.
   bool run(const std::function<bool()>& until) {
     while (!until()) {
-      const auto letter = mail_->take();
+      const auto letter = ticks ? mail_->take([this] { coordinator_.tick(); }) : mail_->take();
       if (!letter) {
         ADD_FAILURE() << "the farm stands still";
         return false;

@@ -2,6 +2,8 @@
 // is told to.
 #pragma once
 
+#include <atomic>
+#include <functional>
 #include <mutex>
 #include <utility>
 
@@ -19,6 +21,7 @@ class MovingStore final : public JobStore {
     next_ = std::move(moved);
   }
   std::atomic<bool> refuses_to_bar{false};
+  std::function<void()> on_refusal = [] {};  // called under the coordinator's lock
 
   Result<void> put_job(const StoredJob& job) override { return inner_->put_job(job); }
   Result<void> put_jobs(std::span<const StoredJob> jobs) override { return inner_->put_jobs(jobs); }
@@ -38,7 +41,10 @@ class MovingStore final : public JobStore {
   Result<void> add_log(const JobId& job, const LogLine& line) override { return inner_->add_log(job, line); }
   Result<std::vector<LogLine>> log(const JobId& job) const override { return inner_->log(job); }
   Result<void> quarantine(const QuarantinedWorker& worker) override {
-    if (refuses_to_bar) return fail(Errc::resource_exhausted, "the disk is full");
+    if (refuses_to_bar) {
+      on_refusal();
+      return fail(Errc::resource_exhausted, "the disk is full");
+    }
     return inner_->quarantine(worker);
   }
   Result<std::vector<QuarantinedWorker>> quarantined() const override { return inner_->quarantined(); }

@@ -265,6 +265,7 @@ TEST_F(FoundElsewhere, UntilItIsStoredThatAWorkerIsQuarantinedTheJobsWait) {
   auto coordinator = Coordinator::open(std::move(options)).value();
   const JobId job = submit(*coordinator, samples(64));
   FakeFarm farm(*coordinator, 4);
+  farm.ticks = true;
   farm.lies = [&](int worker, const UnitResult&) { return worker == 2; };
   store->refuses_to_bar = true;
 
@@ -278,6 +279,39 @@ TEST_F(FoundElsewhere, UntilItIsStoredThatAWorkerIsQuarantinedTheJobsWait) {
   ASSERT_TRUE(farm.finish(job));
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels(64));
   EXPECT_EQ(store->quarantined().value().size(), 1u);
+}
+
+// A person who resumes the job while a result is being stored: that the result could not be stored was found
+// before the disk had room, and is told after. The try is made again, since whether the resumption falls
+// between the two is up to the scheduler.
+TEST_F(FoundElsewhere, AnErrorFromBeforeAJobWasResumedDoesNotPauseItAgain) {
+  for (int trial = 0; trial < 40; ++trial) {
+    store = std::make_shared<MovingStore>();
+    Coordinator::Options options;
+    options.jobs = store;
+    options.audit_rate = 1;
+    auto coordinator = Coordinator::open(std::move(options)).value();
+    const JobId job = submit(*coordinator, samples(64));
+    std::atomic<int> refusals = 0;
+    store->on_refusal = [&] {
+      if (++refusals == 1) refusals.notify_all();
+    };
+    store->refuses_to_bar = true;
+    std::jthread user([&] {
+      refusals.wait(0);
+      // The second refusal is of a result, if one is still under way
+      for (int i = 0; i < 100000 && refusals < 2; ++i) std::this_thread::yield();
+      store->refuses_to_bar = false;
+      EXPECT_TRUE(coordinator->resume(job));
+    });
+    FakeFarm farm(*coordinator, 4);
+    farm.ticks = true;
+    farm.lies = [&](int worker, const UnitResult&) { return worker == 2; };
+
+    ASSERT_TRUE(farm.finish(job)) << "trial " << trial;
+
+    EXPECT_EQ(pixels(*coordinator, job), reference_pixels(64));
+  }
 }
 
 TEST(Trust, AbsurdTimesOfAWorkerCountForNothingAndTheRecordStaysReadable) {
