@@ -294,6 +294,10 @@ struct IntegratorSettings {
   bool hide_emitters = false;
   DistanceSampling distance = DistanceSampling::mis;  // these two for "volpath_distant_mis" only
   MisHeuristic heuristic = MisHeuristic::power;
+  // For "volpath" only. Points at which light is looked for on a camera segment through a medium; 0: as many
+  // as pay for the scene, perhaps none; -1: none.
+  int camera_points = 0;
+  bool phase_only = false;  // directions are never aimed at lamps
   bool operator==(const IntegratorSettings&) const = default;
 };
 

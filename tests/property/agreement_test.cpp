@@ -3,6 +3,7 @@
 // fresh numbers and 16 times as many decides, at a level that keeps a right renderer from failing anywhere in
 // the whole run with more than this file's share of the suite's rate. The seeds are fixed.
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -36,6 +37,13 @@ std::vector<Rival> rivals(const IntegratorSettings& base) {
   add("mis, balance", DistanceSampling::mis, MisHeuristic::balance);
   add("exponential", DistanceSampling::exponential, MisHeuristic::power);
   add("equiangular", DistanceSampling::equiangular, MisHeuristic::balance);
+  IntegratorSettings s = base;
+  s.camera_points = -1;
+  s.phase_only = true;
+  all.push_back({"without points and lamps", s});
+  s.camera_points = 3;
+  s.phase_only = false;
+  all.push_back({"three points", s});
   return all;
 }
 
@@ -87,6 +95,45 @@ TEST(RandomScenes, GiveTheSameImageByEveryIntegrator) {
   if (count == kScenes) tests.close();
   EXPECT_GE(4 * with_media, count);
   EXPECT_LE(10 * undecided, with_media + 10);
+}
+
+// A narrow beam in fog above a floor, and a second lamp: what is scattered several times near the lamps.
+SceneBuilder lamps_in_fog(bool grid) {
+  SceneBuilder builder({16, 16});
+  builder.scene.integrator.max_depth = 8;
+  builder.look({0, 0, 5}, {0, 0, 0}, 40, {0, 1, 0});
+  builder.shape(RectangleShape{}, translate({0, -1.2, 0}) * rotate_x(-90) * scale(3), builder.diffuse(.7));
+  const MediumIndex fog =
+      grid ? builder.heterogeneous(builder.grid({3, 3, 3}, {1, 2, 3, 1, 0, 2, 2, 1, 3, 3, 2, 1, 0, 1,
+                                                            2, 1, 2, 3, 2, 0, 1, 1, 3, 2, 1, 2, 0},
+                                                translate({-1, -1, -1}) * scale(2)),
+                                   {.9, .8, .7}, .4, .3)
+           : builder.homogeneous({.4, .5, .6}, {.95, .9, .8}, .5);
+  builder.container(CubeShape{}, {}, builder.null(), fog);
+  SpotEmitter spot;
+  spot.intensity = {30, 28, 24};
+  spot.cutoff_angle = 25;
+  spot.beam_width = 15;
+  spot.to_world = translate({-.3, .6, .1}) * rotate_x(80);
+  builder.scene.emitters.push_back(spot);
+  builder.scene.emitters.push_back(PointEmitter{{.5, -.2, -.3}, {1, 2, 3}});
+  builder.environment(.1);
+  return builder;
+}
+
+TEST(Lamps, GiveTheSameImageWhetherDirectionsAreAimedAtThemOrNot) {
+  Tests tests("property/lamps");
+  for (const bool grid : {false, true}) {
+    SceneBuilder aimed = lamps_in_fog(grid), plain = aimed;
+    plain.scene.integrator.phase_only = true;
+    plain.scene.integrator.camera_points = -1;
+    ASSERT_THAT(render::describe(*world_of(aimed)).variant, testing::HasSubstr("aimed"));
+    ASSERT_THAT(render::describe(*world_of(plain)).variant, testing::Not(testing::HasSubstr("aimed")));
+    // Without the aim a second moment is infinite, so the plain image gets no closer than this
+    const Comparison c = look(aimed, plain, 31 + grid, tests.level(3), {1024, 16384});
+    EXPECT_NE(c.verdict, Verdict::different) << c.told;
+  }
+  tests.close();
 }
 
 }  // namespace

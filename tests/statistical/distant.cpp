@@ -1,5 +1,5 @@
-// The integrator `volpath_distant_mis` in all its settings, with every kind of light: the same answers as
-// everything else here.
+// The integrator `volpath_distant_mis` in all its settings, and `volpath` with points on the camera's
+// segments, with every kind of light: the same answers as everything else here.
 #include <cmath>
 
 #include "tests/statistical/case.h"
@@ -34,6 +34,12 @@ class Adder {
       i.distance = choice.distance;
       i.heuristic = choice.heuristic;
       c.band = choice.distance == DistanceSampling::exponential ? .02 : band;
+      cases_.push_back(std::move(c));
+    }
+    for (const int points : {1, 5}) {
+      Case c{"camera_points_" + std::to_string(points) + "_" + name, builder, expected, spp};
+      c.builder.scene.integrator.camera_points = points;
+      c.band = band;
       cases_.push_back(std::move(c));
     }
   }

@@ -77,6 +77,7 @@ inline constexpr std::array kShares = {Share{Family::chi_square, "bsdf/sampling"
                                        Share{Family::coverage, "coverage/fireflies", 1},
                                        Share{Family::coverage, "coverage/denominators", 24},
                                        Share{Family::scenes, "property/agreement", 180},
+                                       Share{Family::scenes, "property/lamps", 6},
                                        Share{Family::scenes, "property/pruned", 720},
                                        Share{Family::scenes, "property/twins", 120},
                                        Share{Family::scenes, "property/shared_faces", 24},

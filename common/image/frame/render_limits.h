@@ -11,5 +11,6 @@ inline constexpr std::int64_t kMaxFramePixels = std::int64_t{1} << 26;  // 67 mi
 inline constexpr std::uint32_t kMaxTiles = std::uint32_t{1} << 22;
 inline constexpr std::uint64_t kMaxSpp = std::uint64_t{1} << 24;
 inline constexpr int kMaxDepthSetting = 1 << 20;  // limit of max_depth and rr_depth
+inline constexpr int kMaxCameraPoints = 64;       // limit of camera_points
 
 }  // namespace ls

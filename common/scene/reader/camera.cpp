@@ -212,18 +212,19 @@ void Reader::read_integrator(const Element& e, int depth) {
                                                         "by other means",
                                                         p.title(), row->ours));
   i.name = row->ours;
-  if (i.name != kDistantMis) refuse_distances(p);
+  if (i.name != kDistantMis) refuse(p, {"distance", "heuristic"}, kDistantMis);
+  if (i.name != "volpath") refuse(p, {"camera_points", "phase_only"}, "volpath");
   bind(p, i);
   if (row->max_depth) i.max_depth = *row->max_depth;
   p.finish();
 }
 
-// Rejects parameters of `volpath_distant_mis` for other integrators.
-void Reader::refuse_distances(Params& p) {
-  for (const std::string_view name : {"distance", "heuristic"})
+// Rejects parameters that only the integrator `of` has.
+void Reader::refuse(Params& p, std::initializer_list<std::string_view> names, std::string_view of) {
+  for (const std::string_view name : names)
     if (const Element* e = p.take(name))
       report_.error(e->at, fmt::format("'{}' is a parameter of the integrator \"{}\" alone, not of {}", name,
-                                       kDistantMis, p.title()));
+                                       of, p.title()));
 }
 
 }  // namespace ls::scene

@@ -1,6 +1,7 @@
 // Converts a Document to a Scene: the state shared by the readers of all kinds of objects. One .cpp per kind.
 #pragma once
 
+#include <initializer_list>
 #include <map>
 #include <optional>
 #include <string>
@@ -117,7 +118,7 @@ class Reader {
   ReconstructionFilter read_plain_filter(const Element& e);
   void read_sampler(const Element& e);
   void read_integrator(const Element& e, int depth);
-  void refuse_distances(Params& p);
+  void refuse(Params& p, std::initializer_list<std::string_view> names, std::string_view of);
   void read_channels(Params& p);
 
   std::string fresh_label(std::string name, std::string_view type, std::size_t index);

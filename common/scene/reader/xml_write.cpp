@@ -257,26 +257,26 @@ class Writer {
     close("shape");
   }
 
-  // Omits the parameters of `volpath_distant_mis` for other integrators.
-  struct WithoutDistances {
+  // Omits the parameters of other integrators.
+  struct OwnParameters {
     Writer& writer;
+    std::string_view integrator;
     template <class T>
     void field(const Field& f, const T& x) {
-      if (f.name != "distance" && f.name != "heuristic") writer.field(f, x);
+      const bool distances = f.name == "distance" || f.name == "heuristic";
+      const bool aims = f.name == "camera_points" || f.name == "phase_only";
+      if (distances ? integrator == kDistantMis : !aims || integrator == "volpath") writer.field(f, x);
     }
   };
   void write_integrator() {
     const IntegratorSettings& i = scene_.integrator;
-    WithoutDistances plain{*this};
+    OwnParameters own{*this, i.name};
     if (!scene_.aovs.empty()) {
       open("integrator", "aov", "", "");
       value("string", "aovs", mitsuba_channels(scene_.aovs));
     }
     open("integrator", plugin(i), "", "");
-    if (i.name == kDistantMis)
-      describe(*this, i);
-    else
-      describe(plain, i);
+    describe(own, i);
     close("integrator");
     if (!scene_.aovs.empty()) close("integrator");
   }

@@ -288,6 +288,20 @@ void describe(V& v, T& i) {
           i.distance);
   v.field({.name = "heuristic", .doc = "`volpath_distant_mis` alone: weighs the two against each other"},
           i.heuristic);
+  v.field(
+      {.name = "camera_points",
+       .doc =
+           "`volpath` alone: points of a camera ray's way through a medium at which it looks for light; 0: "
+           "as many as pay for the scene, perhaps none; -1: none, only where the ray is scattered",
+       .range = {-1, kMaxCameraPoints},
+       .elided = true},
+      i.camera_points);
+  v.field(
+      {.name = "phase_only",
+       .doc = "`volpath` alone: in media with point, spot or projector lights too, directions are those of "
+              "the phase function and the material, none is aimed at such a light",
+       .elided = true},
+      i.phase_only);
 }
 
 template <class V, Of<Asset> T>

@@ -41,6 +41,7 @@ auto PathTracer<F, Light>::fly_through(const Medium& medium, const SurfaceHit* e
   last_.delta = false;
   if (plan.matters()) last_.in_medium = Light<F>::vertex(*this, medium, plan, flight.t);
   begin_vertex(segment, flight);
+  if constexpr (F.aimed) near_lamps_ = LampDirections(world_.lamps, last_.p);
   Light<F>::at_vertex(*this, medium, last_.p, ray_.d);
   return scatter_by_phase(medium);
 }
@@ -57,7 +58,22 @@ void PathTracer<F, Light>::begin_vertex(Segment segment, const Flight& flight) {
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::scatter_by_phase(const Medium& medium) -> Step {
   const Group direction = stream_.group(depth_, Purpose::direction);
-  const PhaseSample s = medium.phase.sample(ray_.d, {direction.u(0), direction.u(1)});
+  const V2 u(direction.u(0), direction.u(1));
+  PhaseSample s;
+  if constexpr (F.aimed) {
+    float choice = direction.u(2);
+    if (const auto w = near_lamps_.sample(choice, u))
+      s = {*w, medium.phase.value(ray_.d, *w)};
+    else
+      s = medium.phase.sample(ray_.d, u);
+    const float own = s.pdf;
+    if (near_lamps_.any()) {
+      s.pdf = near_lamps_.pdf(own, s.w);
+      beta_ *= own / s.pdf;
+    }
+  } else {
+    s = medium.phase.sample(ray_.d, u);
+  }
   last_.pdf = s.pdf;
   ray_.d = s.w;
   return {Collision::scattered, direction.u(3)};
@@ -91,6 +107,7 @@ auto PathTracer<F, Light>::fly_through_several(const SurfaceHit* end, float reac
   last_ = Vertex{};
   last_.delta = false;
   begin_vertex(segment, flight);
+  if constexpr (F.aimed) near_lamps_ = LampDirections(world_.lamps, last_.p);
   light_vertex(*met, last_.p, ray_.d);
   return scatter_by_phase(*met);
 }
@@ -106,7 +123,8 @@ void PathTracer<F, Light>::light_vertex(const Medium& medium, const V3& p, const
   const auto light = lights.sample(choice, p);
   if (!light) return;
   const float phase = medium.phase.value(d, light->direction);
-  const float weight = light->delta ? 1 : light->pdf / (light->pdf + phase);
+  const float sampled = direction_pdf(p, phase, light->direction);
+  const float weight = light->delta ? 1 : light->pdf / (light->pdf + sampled);
   const C3 arriving =
       unoccluded(ray_.start, p, *light, medium_, stream_.stream(depth_, Purpose::track_shadow));
   if (!is_black(arriving)) add(beta_ * arriving * (phase * weight / light->pdf));

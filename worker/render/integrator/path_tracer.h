@@ -57,6 +57,9 @@ enum class Collision : std::uint8_t {
   scattered,  // the path goes on in a new direction, if it survives Russian roulette
 };
 
+template <Features F>
+class SegmentNee;
+
 template <Features F, template <Features> class Light = VertexNee>
 class PathTracer {
  public:
@@ -72,6 +75,8 @@ class PathTracer {
 
  private:
   friend class Light<F>;
+  friend class VertexNee<F>;
+  friend class SegmentNee<F>;
   struct Vertex {  // where the current ray was scattered
     V3 p{0, 0, 0};
     V3 n{0, 0, 0};      // normal of its surface; 0 in a medium
@@ -106,6 +111,14 @@ class PathTracer {
   }
   void pass_boundary(const SurfaceHit& hit, const SurfaceInfo& surface);
   void light_surface(const SurfaceHit& hit, const V3& wo);
+  // The density with which a vertex in a medium at p samples the direction w, where `own` is that of the
+  // phase function.
+  float direction_pdf([[maybe_unused]] const V3& p, float own, [[maybe_unused]] const V3& w) const {
+    if constexpr (F.aimed) return LampDirections(world_.lamps, p).pdf(own, w);
+    return own;
+  }
+  std::optional<BsdfSample> sample_bsdf(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo,
+                                        const Group& g) const;
   void add_emission(const SurfaceHit& hit);
   void add_environment();
   C3 unoccluded(const V3& start, const V3& p, const LightSample& light, const Within& medium,
@@ -156,6 +169,8 @@ class PathTracer {
   Vertex last_;
   SampleOutcome outcome_;
   MediumCounters counters_;
+  // With F.aimed: the directions near lamps at the current vertex
+  LampDirections near_lamps_;
 };
 
 template <Features F, template <Features> class Light>
@@ -256,7 +271,9 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0)) return;
   const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wo, wi);
   if (is_black(f.f_cos)) return;
-  const float weight = !F.found_lights || light->delta ? 1 : balance_weight(light->pdf, f.pdf);
+  float sampled = f.pdf;
+  if constexpr (F.aimed) sampled = near_lamps_.pdf(f.pdf, light->direction);
+  const float weight = !F.found_lights || light->delta ? 1 : balance_weight(light->pdf, sampled);
   const V3 p = offset_point(hit, light->direction);
   const Within medium = beyond(hit, surface, light->direction, ray_.d, medium_);
   const C3 arriving = unoccluded(hit.p, p, *light, medium, stream_.stream(depth_, Purpose::track_shadow));
@@ -271,9 +288,11 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   ++depth_;
   const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
   const V3 wo = hit.shading.to_local(-ray_.d);
+  if constexpr (F.aimed)
+    near_lamps_ = surface.smooth ? LampDirections(world_.lamps, hit.p) : LampDirections();
   light_surface(hit, wo);
   const Group g = stream_.group(depth_, Purpose::direction);
-  const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), wo, g.u(2), {g.u(0), g.u(1)});
+  const auto s = sample_bsdf(hit, surface, wo, g);
   if (!s) return {Collision::absorbed};
   const V3 w = normalize(hit.shading.to_world(s->wi));
   // The path is absorbed if w lies on different sides of the surface by its geometric and by its shading
@@ -291,6 +310,33 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   if constexpr (F.media) medium_ = beyond(hit, surface, w, ray_.d, medium_);
   ray_.leave(hit, w);
   return {Collision::scattered, g.u(3)};
+}
+
+template <Features F, template <Features> class Light>
+std::optional<BsdfSample> PathTracer<F, Light>::sample_bsdf(const SurfaceHit& hit, const SurfaceInfo& surface,
+                                                            const V3& wo, const Group& g) const {
+  float choice = g.u(2);
+  if constexpr (F.aimed) {
+    if (const auto w = near_lamps_.sample(choice, {g.u(0), g.u(1)})) {
+      BsdfSample s;
+      s.wi = hit.shading.to_local(*w);
+      const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wo, s.wi);
+      if (is_black(f.f_cos)) return std::nullopt;
+      s.pdf = near_lamps_.pdf(f.pdf, *w);
+      s.weight = f.f_cos * (1 / s.pdf);
+      s.transmitted = (s.wi.z > 0) != (wo.z > 0);
+      return s;
+    }
+  }
+  auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), wo, choice, {g.u(0), g.u(1)});
+  if constexpr (F.aimed) {
+    if (!s || !near_lamps_.any()) return s;
+    const float own = s->pdf;
+    s->pdf = s->delta ? own * near_lamps_.own_share()
+                      : near_lamps_.pdf(own, normalize(hit.shading.to_world(s->wi)));
+    s->weight *= own / s->pdf;
+  }
+  return s;
 }
 
 // Decides whether the path passes straight through a null-transmitting surface. If so it is not scattered

@@ -40,6 +40,7 @@ constexpr Variant kVariants[] = {
 static_assert(std::end(kVariants)[-1].covers == kEveryScene);
 
 std::span<const Variant> variants_for(const World& w) {
+  if (w.need.aimed) return aimed_variants();
   return w.distant_mis ? distant_variants() : std::span<const Variant>(kVariants);
 }
 const Variant& split_variant(const World& w) { return w.distant_mis ? kDistantSplitVariant : kSplitVariant; }

@@ -33,6 +33,7 @@ class SegmentNee {
  public:
   struct Plan {
     OpticalDepthIn<F> depths;
+    int by_depth = 1;     // points sampled by depth
     bool angles = false;  // the segment is finite, so points can be sampled by angle
 
     static bool matters() { return true; }
@@ -43,34 +44,40 @@ class SegmentNee {
     float flight_pdf = 0, t = 0;
     V3 o{0, 0, 0}, d{0, 0, 0};
     float length = 0;
+    float points = 1;  // that are sampled by depth; by angle, there is one
 
-    float found_as_light() const { return depth_ratio; }
+    float found_as_light() const { return std::min(points * depth_ratio, kMaxRatio); }
     float found_as_light(const V3& pivot) const {
-      if (!by_angle) return depth_ratio;
+      if (!by_angle) return found_as_light();
       const float ratio = flight_pdf > 0 ? angle_pdf(pivot) / flight_pdf : kMaxRatio;
-      return std::min(by_depth ? depth_ratio + ratio : ratio, kMaxRatio);
+      return std::min(by_depth ? points * depth_ratio + ratio : ratio, kMaxRatio);
     }
     float angle_pdf(const V3& pivot) const { return EquiAngular(o, d, length, pivot).pdf(t); }
   };
 
   template <class Path>
-  static Plan ahead(Path& path, const Medium& medium, Segment segment) {
-    Plan plan{OpticalDepthIn<F>(medium, path.ray_.start, path.ray_.d, segment.length)};
+  static Plan ahead(Path& path, const Medium& medium, Segment segment, int points = 1) {
+    Plan plan{OpticalDepthIn<F>(medium, path.ray_.start, path.ray_.d, segment.length), points};
     const OpticalDepthIn<F>& s = plan.depths;
     plan.angles =
         path.world_.distance != DistanceSampling::exponential && std::isfinite(s.to()) && s.to() > s.from();
     const Lights& lights = path.world_.lights;
     if (!path.may_scatter() || !lights.can_sample() || !(s.total() > 0)) return plan;
     if (path.world_.distance == DistanceSampling::mis || !plan.angles) {
+      RandomStream stream = path.stream_.stream(path.segment_, Purpose::track_distance);
       const Group g = path.stream_.group(path.segment_, Purpose::distance);
-      const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]});
-      propose(path, medium, segment, plan, choice, false, g.bits[3]);
+      for (int i = 0; i < points; ++i) {
+        const Group at = point_of(g, i, points);
+        const LightChoice choice = lights.choose({at.bits[0], at.bits[1], at.bits[2]});
+        propose(path, medium, segment, plan, choice, false, at.bits[3], stream);
+      }
     }
     if (plan.angles) {
+      RandomStream stream = path.stream_.stream(path.segment_, Purpose::track_segment);
       const Group g = path.stream_.group(path.segment_, Purpose::segment);
       const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]});
       if (choice.has_place || path.world_.distance == DistanceSampling::equiangular)
-        propose(path, medium, segment, plan, choice, choice.has_place, g.bits[3]);
+        propose(path, medium, segment, plan, choice, choice.has_place, g.bits[3], stream);
     }
     return plan;
   }
@@ -84,6 +91,18 @@ class SegmentNee {
   static void at_vertex(Path&, const Medium&, const V3&, const V3&) {}  // all done in ahead()
 
  private:
+  // The random numbers of point i of several, from those of one point: places are stratified along the
+  // segment, and the numbers that choose a light and a point on it move on by constant steps, modulo 1.
+  static Group point_of(const Group& g, int i, int points) {
+    if (points == 1) return g;
+    const auto k = static_cast<std::uint32_t>(i), n = static_cast<std::uint32_t>(points);
+    const std::uint32_t step = static_cast<std::uint32_t>((std::uint64_t{1} << 32) / n);
+    const std::uint64_t place = ((std::uint64_t{k} << 32) + g.bits[3]) / n;
+    // The steps of the point on the light are those of a two-dimensional lattice (Roberts 2018, R2)
+    return {{g.bits[0] + k * step, g.bits[1] + k * 0xc13fa9a9u, g.bits[2] + k * 0x91e10da5u,
+             static_cast<std::uint32_t>(place)}};
+  }
+
   // The mean over channels of density(sigma), where sigma is the channel's extinction; each channel is
   // weighted by its density of the path so far.
   template <class Path, class Fn>
@@ -121,6 +140,7 @@ class SegmentNee {
         over_channels(path, medium, [&](float sigma) { return sigma * std::exp(-sigma * at_point.x); });
     const DistanceSampling distance = path.world_.distance;
     Vertex v;
+    v.points = static_cast<float>(plan.by_depth);
     v.by_angle = plan.angles;
     v.by_depth = distance != DistanceSampling::equiangular || !plan.angles;
     v.depth_ratio =
@@ -137,7 +157,7 @@ class SegmentNee {
   // towards the path.
   template <class Path>
   static void propose(Path& path, const Medium& medium, const Segment& segment, const Plan& plan,
-                      const LightChoice& choice, bool by_angle, std::uint32_t bits) {
+                      const LightChoice& choice, bool by_angle, std::uint32_t bits, RandomStream& stream) {
     const OpticalDepthIn<F>& s = plan.depths;
     const V3 pivot = choice.has_place ? path.world_.lights.pivot(choice) : V3(0);
     OpticalDepth::Point at_point;
@@ -166,16 +186,16 @@ class SegmentNee {
     const bool both = choice.has_place && v.by_angle && v.by_depth;
     const float e_depth = at_point.rate * depth_pdf(path, medium, plan, at_point.x);
     if (both && !by_angle) e_angle = v.angle_pdf(pivot);
-    const float own = by_angle ? e_angle : e_depth;
+    // The expected number of points per unit of length, of each way to sample them
+    const float by_depth = e_depth * v.points;
+    const float own = by_angle ? e_angle : by_depth;
     if (!(own > 0)) return;
-    float weight = both ? mis_weight(path.world_.heuristic, own, by_angle ? e_depth : e_angle) : 1.f;
+    float weight = both ? mis_weight(path.world_.heuristic, own, by_angle ? by_depth : e_angle) : 1.f;
     const float phase = medium.phase.value(path.ray_.d, light->direction);
     if (!light->delta) {
       const float found = choice.has_place ? v.found_as_light(pivot) : v.found_as_light();
-      weight *= 1 / (1 + phase / (light->pdf * found));
+      weight *= 1 / (1 + path.direction_pdf(p, phase, light->direction) / (light->pdf * found));
     }
-    RandomStream stream =
-        path.stream_.stream(path.segment_, by_angle ? Purpose::track_segment : Purpose::track_distance);
     const C3 arriving = path.unoccluded(start, p, *light, path.medium_, RandomStream(stream.next()));
     if (is_black(arriving)) return;
     const C3 through =

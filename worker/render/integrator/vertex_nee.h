@@ -107,13 +107,14 @@ class VertexNee {
     const auto light = lights.sample(choice, p);
     if (!light) return;
     const float phase = medium.phase.value(d, light->direction);
-    const Vertex& v = path.last_.in_medium;
+    const auto& v = path.last_.in_medium;
     const float with_equiangular = v.uses_equiangular(choice.is_point) && choice.has_place
                                        ? 1 + v.equiangular_ratio(lights.pivot(choice))
                                        : 1.f;
-    const float weight = !F.found_lights || light->delta
-                             ? 1 / with_equiangular
-                             : light->pdf / (light->pdf * with_equiangular + phase);
+    const float weight =
+        !F.found_lights || light->delta
+            ? 1 / with_equiangular
+            : light->pdf / (light->pdf * with_equiangular + path.direction_pdf(p, phase, light->direction));
     const C3 arriving = path.unoccluded(path.ray_.start, p, *light, path.medium_,
                                         path.stream_.stream(path.depth_, Purpose::track_shadow));
     if (!is_black(arriving)) path.add(path.beta_ * arriving * (phase * weight / light->pdf));
@@ -147,7 +148,9 @@ class VertexNee {
     const float ratio = ratio_to_flight(s.pdf, flight_pdf<F>(medium, path.density_, at_point));
     const bool delta = !F.found_lights || light->delta;
     const float weight =
-        delta ? ratio / (1 + ratio) : light->pdf / (light->pdf + (light->pdf + phase) / ratio);
+        delta ? ratio / (1 + ratio)
+              : light->pdf /
+                    (light->pdf + (light->pdf + path.direction_pdf(p, phase, light->direction)) / ratio);
     const C3 arriving = path.unoccluded(s.p, p, *light, path.medium_,
                                         path.stream_.stream(path.segment_, Purpose::track_segment));
     if (is_black(arriving)) return;

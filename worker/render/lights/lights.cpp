@@ -26,11 +26,18 @@ float one_minus_cos(const Sphere& s, float reach, float sign, const V3& x) {
 }  // namespace
 
 std::vector<V3> Lights::points() const {
+  std::vector<const Light*> found;
+  for (const Light& l : lights_)
+    if (is_point(l.kind)) found.push_back(&l);
+  std::stable_sort(found.begin(), found.end(),
+                   [&](const Light* a, const Light* b) { return power(*a, 1) > power(*b, 1); });
   std::vector<V3> list;
-  for (const Light& l : lights_) {
-    if (is_point(l.kind)) list.push_back(l.position);
-  }
+  for (const Light* l : found) list.push_back(l->position);
   return list;
+}
+
+bool Lights::any_without_place() const {
+  return std::any_of(lights_.begin(), lights_.end(), [](const Light& l) { return !has_place(l.kind); });
 }
 
 V3 Lights::pivot(const LightChoice& choice) const {

@@ -58,7 +58,9 @@ class Lights {
   // False if there is no light that next-event estimation can sample.
   bool can_sample() const { return !lights_.empty(); }
   bool any_with_place() const { return any_with_place_; }
-  std::vector<V3> points() const;  // positions of all lights without extent
+  std::vector<V3> points() const;  // positions of all lights without extent, the most powerful first
+  // True if there are lights without a position that next-event estimation samples: distant ones, suns, maps.
+  bool any_without_place() const;
   // Chooses a light before the shaded point is known: with probability 1/2 in proportion to power, else
   // uniformly.
   LightChoice choose(const LightNumbers& numbers) const { return chosen(numbers, draw(numbers.light)); }

@@ -12,6 +12,7 @@
 #include "worker/render/camera/pixel_filter.h"
 #include "worker/render/geometry/accel.h"
 #include "worker/render/geometry/geometry.h"
+#include "worker/render/integrator/lamp_directions.h"
 #include "worker/render/lights/lights.h"
 #include "worker/render/media/medium.h"
 #include "worker/render/media/medium_stack.h"
@@ -55,6 +56,10 @@ class World {
   bool distant_mis = false;  // the integrator is `volpath_distant_mis` (segment_nee.h); its options follow
   DistanceSampling distance = DistanceSampling::mis;
   MisHeuristic heuristic = MisHeuristic::power;
+  // With Features::aimed:
+  Lamps lamps;  // about which directions are sampled too
+  int camera_points =
+      0;  // on a camera segment through a medium, at which light is looked for; 0: at vertices only
   bool hide_emitters = false;
   int max_depth = -1;  // maximum path length in segments; -1: unlimited
   // True if passing a null boundary or a null-transmitting surface counts as a segment for max_depth, as in

@@ -8,6 +8,7 @@
 #include "common/scene/schema/integrators.h"
 #include "worker/render/base/built.h"
 #include "worker/render/geometry/coincident.h"
+#include "worker/render/world/aim.h"
 #include "worker/render/world/media_build.h"
 #include "worker/render/world/overlap.h"
 #include "worker/render/world/world.h"
@@ -100,8 +101,9 @@ bool a_point_shines_in_a_grid(const World& w) {
 }
 
 // A crop renders the pixels of the full frame: the same samples give the same bits. If the image is rendered
-// at a size other than that of the crop, it is the same part of a correspondingly scaled frame.
-void place_camera(const Scene& scene, const RenderSettings& settings, World& w) {
+// at a size other than that of the crop, it is the same part of a correspondingly scaled frame. Returns the
+// size of the full frame.
+FrameSize place_camera(const Scene& scene, const RenderSettings& settings, World& w) {
   const FilmSettings& film = scene.film;
   FrameSize frame = settings.size;
   if (film.has_crop()) {
@@ -113,6 +115,7 @@ void place_camera(const Scene& scene, const RenderSettings& settings, World& w) 
     w.origin_y = scaled(film.crop_offset[1], ky);
   }
   w.camera = Camera(scene.sensor, frame, w.geometry.center, w.geometry.scale, &w.textures);
+  return frame;
 }
 
 // Fails if the world needs a part of the renderer that this build leaves out (built.h).
@@ -218,7 +221,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   auto accel = Accel::build(w.geometry, threads, w.coincident);
   if (!accel) return tl::unexpected(accel.error());
   w.accel = std::move(*accel);
-  place_camera(scene, settings, w);
+  const FrameSize frame = place_camera(scene, settings, w);
   if (!w.camera.usable())
     return fail(Errc::invalid_argument,
                 "the rays of the sensor leave the range of single precision: check its to_world, fov, "
@@ -251,6 +254,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   // segments are sampled.
   if (!w.equiangular && !w.equiangular_points && settings.integrator != "volpath_distant_mis")
     w.lights.use_tree_in_media();
+  aim(scene.integrator, frame, w);
   return std::shared_ptr<const World>(world);
 }
 

@@ -72,6 +72,8 @@ WorldReport describe(const World& w) {
       w.need.media && w.lights.any_with_place() && w.distance != DistanceSampling::exponential;
   feature(w.distant_mis ? angles : w.equiangular || w.equiangular_points,
           "equi-angular sampling about lights");
+  feature(w.camera_points > 0, "points on camera segments at which light is sampled");
+  feature(w.lamps.count > 0, "directions near lights without extent");
   feature(w.accel.has_boundaries(), "boundary BVH for index-matched surfaces");
   feature(w.lights.can_sample(), "next-event estimation");
   feature(w.lights.count() > 1, "choice among lights");

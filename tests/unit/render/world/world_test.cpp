@@ -42,6 +42,13 @@ SceneBuilder room() {
   builder.scene.emitters.push_back(DirectionalEmitter{{.3, .2, -1}, {.5, .5, .5}});
   builder.environment(.1);
   builder.look({0, -5, 1}, {0, 0, 0}, 40);
+  builder.scene.integrator.camera_points = -1;
+  builder.scene.integrator.phase_only = true;
+  return builder;
+}
+SceneBuilder aimed(SceneBuilder builder) {
+  builder.scene.integrator.camera_points = 3;
+  builder.scene.integrator.phase_only = false;
   return builder;
 }
 std::vector<float> cloud() {
@@ -153,6 +160,24 @@ TEST(World, EveryVariantThatCoversASceneGivesTheSameBits) {
       EXPECT_EQ(render(*world, name.c_str()).sums, first.sums) << n.name << " as " << name;
     }
   }
+}
+
+TEST(World, EveryVariantThatAimsGivesTheSameBits) {
+  int found = 0;
+  for (const Named& n : scenes()) {
+    const auto world = test::world_of(aimed(n.builder));
+    const auto names = covering_variants(*world);
+    if (names.front().find("aimed") == std::string::npos) continue;
+    ++found;
+    const TileResult first = render(*world);
+    EXPECT_NE(first.sums, render(*test::world_of(n.builder)).sums) << n.name;
+    EXPECT_EQ(first.health.nonfinite + first.health.negative + first.health.majorant_violations, 0u)
+        << n.name;
+    EXPECT_GE(names.size(), 2u) << n.name;
+    for (const std::string& name : names)
+      EXPECT_EQ(render(*world, name.c_str()).sums, first.sums) << n.name << " as " << name;
+  }
+  EXPECT_GE(found, 8);
 }
 
 TEST(World, ASubsetOfATileIsThatPartOfTheTile) {

@@ -45,6 +45,37 @@ TEST(Integrator, OfAnyOtherNameRefusesWhatItWouldIgnore) {
   }
 }
 
+TEST(Integrator, OfVolpathSaysWhereItLooksForLightThereAndBack) {
+  const Scene plain = must_read(integrator("volpath", ""));
+  EXPECT_EQ(plain.integrator.camera_points, 0);
+  EXPECT_FALSE(plain.integrator.phase_only);
+  // Digests of scenes that do not use the parameters are those of before they existed
+  EXPECT_THAT(serialize(plain), ::testing::Not(HasSubstr("camera_points")));
+  const Scene s = must_read(integrator(
+      "volpath",
+      "<integer name=\"camera_points\" value=\"-1\"/><boolean name=\"phase_only\" value=\"true\"/>"));
+  EXPECT_EQ(s.integrator.camera_points, -1);
+  EXPECT_TRUE(s.integrator.phase_only);
+  EXPECT_EQ(serialize(must_read(write_xml(s))), serialize(s));
+  EXPECT_NE(digest_of(s), digest_of(plain));
+  for (const char* value : {"-2", "65"})
+    EXPECT_FALSE(
+        read(integrator("volpath", std::string("<integer name=\"camera_points\" value=\"") + value + "\"/>"))
+            .scene);
+}
+
+TEST(Integrator, OfOtherNamesRefusesTheParametersOfVolpath) {
+  for (const char* type : {"volpath_distant_mis", "path"})
+    for (const char* parameter :
+         {"<integer name=\"camera_points\" value=\"3\"/>", "<boolean name=\"phase_only\" value=\"true\"/>"}) {
+      const auto r = read(integrator(type, parameter));
+      EXPECT_FALSE(r.scene);
+      ASSERT_FALSE(r.diagnostics.empty());
+      EXPECT_EQ(r.diagnostics[0].place.line, 2);
+      EXPECT_THAT(r.diagnostics[0].text, HasSubstr("a parameter of the integrator \"volpath\" alone"));
+    }
+}
+
 TEST(Integrator, NamesTheSettingsThatThereAre) {
   const auto r = read(integrator("volpath_distant_mis", "<string name=\"distance\" value=\"equi\"/>"));
   EXPECT_FALSE(r.scene);

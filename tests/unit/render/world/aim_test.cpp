@@ -1,0 +1,120 @@
+// Where paths look for light beside the vertices that they reach by chance: which scenes use it, and that it
+// brings what it is for. That the image stays the same is tested in tests/statistical and tests/property.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/render_check.h"
+
+namespace ls::render {
+namespace {
+
+using test::SceneBuilder;
+using test::scale;
+using test::translate;
+using test::operator*;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+const char* const kPoints = "points on camera segments at which light is sampled";
+const char* const kNearLamps = "directions near lights without extent";
+
+// The camera looks through a box of fog, 2 units deep, at a floor behind it.
+SceneBuilder fog(double sigma_t, bool grid = false, double floor = .5) {
+  SceneBuilder builder({24, 16});
+  builder.look({0, 0, 4}, {0, 0, 0}, 30, {0, 1, 0});
+  builder.shape(RectangleShape{}, translate({0, 0, -2}) * scale(4), builder.diffuse(floor));
+  const Rgb sigma{sigma_t, sigma_t, sigma_t}, albedo{.9, .8, .7};
+  const MediumIndex medium =
+      grid ? builder.heterogeneous(builder.grid({2, 2, 2}, {1, 1, 1, 1, 1, 1, 1, 1}, translate({-1, -1, -1}) * scale(2)), albedo, sigma_t)
+           : builder.homogeneous(sigma, albedo, .3);
+  builder.container(CubeShape{}, {}, builder.null(), medium);
+  builder.scene.integrator.max_depth = 6;
+  return builder;
+}
+void add_sun(SceneBuilder& builder) {
+  builder.scene.emitters.push_back(DirectionalEmitter{{0, -1, -.2}, {3, 3, 3}});
+}
+void add_lamp(SceneBuilder& builder) {
+  builder.scene.emitters.push_back(PointEmitter{{.3, .2, .1}, {1, 1, 1}});
+}
+WorldReport report(const SceneBuilder& builder) { return describe(*test::world_of(builder)); }
+
+TEST(Aim, LooksForDistantLightAlongCameraSegmentsThroughThinMedia) {
+  for (const bool grid : {false, true}) {
+    SceneBuilder thin = fog(.2, grid), dense = fog(5, grid);
+    add_sun(thin);
+    add_sun(dense);
+    EXPECT_THAT(report(thin).used, Contains(kPoints)) << grid;
+    EXPECT_THAT(report(thin).left_out, Contains(kNearLamps)) << grid;
+    EXPECT_THAT(report(thin).variant, HasSubstr("aimed")) << grid;
+    EXPECT_THAT(report(dense).left_out, Contains(kPoints)) << grid;
+    EXPECT_THAT(report(dense).variant, Not(HasSubstr("aimed"))) << grid;
+  }
+}
+
+TEST(Aim, AimsDirectionsAtLampsInMedia) {
+  for (const bool grid : {false, true}) {
+    SceneBuilder builder = fog(.2, grid);
+    add_lamp(builder);
+    EXPECT_THAT(report(builder).used, Contains(kNearLamps)) << grid;
+    EXPECT_THAT(report(builder).left_out, Contains(kPoints)) << grid;
+  }
+}
+
+TEST(Aim, LeavesOutWhatASceneDoesNotNeed) {
+  SceneBuilder area = fog(.2);
+  area.shape(RectangleShape{}, translate({0, 2, 0}), area.diffuse(0)).emitter = AreaEmitter{area.texture({1, 1, 1})};
+  SceneBuilder no_medium({24, 16});
+  add_sun(no_medium);
+  add_lamp(no_medium);
+  SceneBuilder only_seen = fog(.2);
+  add_sun(only_seen);
+  only_seen.scene.integrator.max_depth = 1;
+  SceneBuilder switched_off = fog(.2);
+  add_sun(switched_off);
+  add_lamp(switched_off);
+  SceneBuilder distant = switched_off;
+  switched_off.scene.integrator.camera_points = -1;
+  switched_off.scene.integrator.phase_only = true;
+  distant.scene.integrator.name = "volpath_distant_mis";
+  for (const SceneBuilder& builder : {area, no_medium, only_seen, switched_off, distant})
+    EXPECT_THAT(report(builder).variant, Not(HasSubstr("aimed")));
+}
+
+// A crop has the pixels of the full frame, so the choice must not look at the crop alone.
+TEST(Aim, ChoosesForACropAsForTheWholeFrame) {
+  SceneBuilder whole = fog(.4);
+  add_sun(whole);
+  SceneBuilder crop = whole;
+  crop.scene.film.crop_offset = {0, 0};
+  crop.scene.film.crop_size = {4, 4};  // sees next to nothing of the fog
+  const auto a = render_tile(*test::world_of(whole), {0, 0, 4, 4}, {0, 8}, nullptr, nullptr);
+  const auto b = render_tile(*test::world_of(crop), {0, 0, 4, 4}, {0, 8}, nullptr, nullptr);
+  EXPECT_EQ(a.sums, b.sums);
+}
+
+double squared_error(const SceneBuilder& builder) {
+  const auto estimate = test::estimate(builder, 2);
+  return estimate.standard_error[1] * estimate.standard_error[1];
+}
+
+// With the optical depth 0.2 a flight ends in the fog in a share p = 0.18 of all samples, and then brings all
+// that is scattered there: the variance of a sample is (1 - p) / p = 4.5 times the square of its mean. Points
+// on the segment leave what the sun's way through the fog varies by: its transmittance lies between 1 and
+// exp(-0.2), so the variance is below 0.01 times that square.
+TEST(Aim, TakesTheNoiseFromLightScatteredOnceInThinFog) {
+  for (const bool grid : {false, true}) {
+    SceneBuilder points = fog(.1, grid, 0);
+    add_sun(points);
+    points.scene.integrator.max_depth = 2;
+    points.scene.film.size = {32, 32};
+    points.look({0, 0, 4}, {0, 0, 0}, 10, {0, 1, 0});
+    SceneBuilder none = points;
+    points.scene.integrator.camera_points = 4;
+    none.scene.integrator.camera_points = -1;
+    EXPECT_LT(squared_error(points), .01 * squared_error(none)) << grid;
+  }
+}
+
+}  // namespace
+}  // namespace ls::render

@@ -1,0 +1,21 @@
+// A separate source file, because instantiating the path tracer takes long to compile.
+#include "worker/render/integrator/camera_segment_nee.h"
+#include "worker/render/integrator/variant.h"
+
+namespace ls::render {
+
+std::span<const Variant> aimed_variants() {
+  static constexpr Features kEverything = [] {
+    Features all = kEveryScene;
+    all.aimed = true;
+    return all;
+  }();
+  static constexpr Variant kVariants[] = {
+      variant<Features{.media = true, .passing = true, .aimed = true}, CameraSegmentNee>("homogeneous grey media, aimed"),
+      variant<Features{.media = true, .grids = true, .passing = true, .aimed = true}, CameraSegmentNee>("grey grids, aimed"),
+      variant<kEverything, CameraSegmentNee>("everything, aimed"),
+  };
+  return kVariants;
+}
+
+}  // namespace ls::render

@@ -1,0 +1,76 @@
+// Directions from a vertex in a medium, or on a surface in one, mixed from the vertex's own distribution (the
+// phase function or the BSDF) and from directions that pass close to a lamp, a light without extent.
+//
+// Light that is scattered at the distance D from a lamp is as bright as 1 / D^2, and along a ray that passes
+// the lamp at the distance D, its integral is as 1 / D. From a vertex at the distance r, a ray at the angle
+// theta to the lamp passes it at D = r sin(theta): the second moment of 1 / sin(theta) over a bounded density
+// of directions is infinite, and shows as fireflies. Directions of density 1 / sin(theta) make it finite
+// (Georgiev et al. 2013, "Joint Importance Sampling of Low-Order Volumetric Scattering", section 4).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "worker/render/math/math.h"
+
+namespace ls::render {
+
+inline constexpr std::size_t kMaxLamps = 4;
+// How often the directions near lamps are chosen.
+inline constexpr float kLampShare = .25f;
+
+struct Lamps {
+  std::array<V3, kMaxLamps> position;
+  std::size_t count = 0;
+};
+
+class LampDirections {
+ public:
+  LampDirections() = default;  // none: the vertex's own distribution alone
+  LampDirections(const Lamps& lamps, const V3& p) {
+    for (std::size_t i = 0; i < lamps.count; ++i) {
+      const V3 to = lamps.position[i] - p;
+      const float l2 = dot(to, to);
+      if (l2 > 0) to_lamp_[count_++] = to * (1 / std::sqrt(l2));
+    }
+  }
+  bool any() const { return count_ > 0; }
+  float own_share() const { return count_ > 0 ? 1 - kLampShare : 1.f; }
+
+  // The density of the mixture at w, per steradian. `own` is that of the vertex's own distribution.
+  float pdf(float own, const V3& w) const {
+    if (count_ == 0) return own;
+    float sum = 0;
+    for (std::size_t i = 0; i < count_; ++i) sum += near_pdf(to_lamp_[i], w);
+    return (1 - kLampShare) * own + kLampShare / static_cast<float>(count_) * sum;
+  }
+  // Chooses by `choice`, and samples a direction by u if it is to pass close to a lamp. nullopt: the vertex's
+  // own distribution was chosen; then `choice` is uniform again.
+  std::optional<V3> sample(float& choice, V2 u) const {
+    if (count_ == 0) return std::nullopt;
+    if (choice < kLampShare) {
+      const auto which = static_cast<std::size_t>(choice / kLampShare * static_cast<float>(count_));
+      return near(to_lamp_[std::min(which, count_ - 1)], u);
+    }
+    choice = std::min((choice - kLampShare) / (1 - kLampShare), 0x1.fffffep-1f);
+    return std::nullopt;
+  }
+
+ private:
+  // sin(theta) is bounded from below: it is known to about 1e-7 only, and the density then is the same for
+  // both strategies, although not quite that of near().
+  static float near_pdf(const V3& to_lamp, const V3& w) {
+    const V3 c = cross(to_lamp, w);
+    return kInvTwoPi * kInvPi / std::max(std::sqrt(dot(c, c)), 1e-6f);
+  }
+  static V3 near(const V3& to_lamp, V2 u) {
+    const V2 theta = unit_circle(.5f * u.x), phi = unit_circle(u.y);
+    return normalize(Frame(to_lamp).to_world({theta.y * phi.x, theta.y * phi.y, theta.x}));
+  }
+
+  std::array<V3, kMaxLamps> to_lamp_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace ls::render

@@ -1,0 +1,86 @@
+#include "worker/render/world/aim.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "worker/render/integrator/offset_ray.h"
+#include "worker/render/media/optical_depth.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+namespace {
+
+// How many points a camera segment gets where they pay
+// (docs/decisions/0027-light-along-camera-segments.md).
+constexpr int kPointsThatPay = 2;
+// They pay in media where a camera ray is scattered at most this often: in denser ones flights that end on
+// the segment find the light as well.
+constexpr float kThin = .7f;
+
+// The probability that a camera ray is scattered or absorbed in media before it meets a surface.
+float met_by(const World& w, const CameraRay& ray) {
+  OffsetRay at{ray.o, ray.o, ray.d};
+  std::uint32_t medium = w.camera_medium;
+  float passes = 1, left = ray.t_max;
+  constexpr int kMaxBoundaries = 16;
+  for (int i = 0; i < kMaxBoundaries; ++i) {
+    SurfaceHit hit;
+    const auto primitive = w.accel.nearest(at.origin, at.d, left);
+    const bool met = primitive && w.geometry.complete(*primitive, at.origin, at.d, hit);
+    if (medium != kNone) {
+      const Medium& m = w.media[medium];
+      const OpticalDepth depths(m, at.start, at.d, met ? at.length_to(hit) : left);
+      // A ray without end through a medium without end has an infinite depth, or 0 times infinity
+      const float depth = mean_component(m.sigma_t) * depths.total();
+      passes *= depth > 0 ? std::exp(-depth) : 1.f;
+    }
+    const SurfaceInfo* surface = met ? &w.geometry.surfaces[hit.surface] : nullptr;
+    if (!met || !surface->null) break;
+    if (surface->transition) medium = dot(at.d, hit.ng) > 0 ? surface->exterior : surface->interior;
+    at.leave(hit, at.d);
+    left = kInfinity;
+  }
+  return 1 - passes;
+}
+
+// The mean of met_by() over a lattice of camera rays, leaving out rays that meet next to nothing.
+float mean_met(const World& w, FrameSize frame) {
+  constexpr int kLattice = 16;
+  constexpr float kNothing = 1e-3f;
+  float sum = 0;
+  int rays = 0;
+  for (int j = 0; j < kLattice; ++j)
+    for (int i = 0; i < kLattice; ++i) {
+      const double x = (i + .5) / kLattice * frame.width, y = (j + .5) / kLattice * frame.height;
+      const float p = met_by(w, w.camera.ray(x, y, {.5f, .5f}));
+      if (!(p > kNothing)) continue;
+      sum += p;
+      ++rays;
+    }
+  return rays > 0 ? sum / static_cast<float>(rays) : 0;
+}
+
+int points_for(const IntegratorSettings& settings, FrameSize frame, const World& w) {
+  if (settings.camera_points != 0) return std::max(0, settings.camera_points);
+  // Light with a position is found by equi-angular sampling on every segment already, and where media overlap
+  // no segment is sampled
+  if (!w.lights.any_without_place() || w.overlaps) return 0;
+  const float met = mean_met(w, frame);
+  return met > 0 && met < kThin ? kPointsThatPay : 0;
+}
+
+}  // namespace
+
+void aim(const IntegratorSettings& settings, FrameSize frame, World& w) {
+  if (w.distant_mis || !w.need.media || !w.lights.can_sample() || !w.depth_allows(1)) return;
+  const bool in_medium = std::any_of(w.media.begin(), w.media.end(), [](const Medium& m) {
+    return m.equiangular_mode != EquiangularMode::none;
+  });
+  if (in_medium && !settings.phase_only)
+    for (const V3& p : w.lights.points())
+      if (w.lamps.count < kMaxLamps) w.lamps.position[w.lamps.count++] = p;
+  w.camera_points = points_for(settings, frame, w);
+  w.need.aimed = w.lamps.count > 0 || w.camera_points > 0;
+}
+
+}  // namespace ls::render
