@@ -11,8 +11,10 @@ std::span<const Variant> aimed_variants() {
     return all;
   }();
   static constexpr Variant kVariants[] = {
-      variant<Features{.media = true, .passing = true, .aimed = true}, CameraSegmentNee>("homogeneous grey media, aimed"),
-      variant<Features{.media = true, .grids = true, .passing = true, .aimed = true}, CameraSegmentNee>("grey grids, aimed"),
+      variant<Features{.media = true, .passing = true, .aimed = true}, CameraSegmentNee>(
+          "homogeneous grey media, aimed"),
+      variant<Features{.media = true, .grids = true, .passing = true, .aimed = true}, CameraSegmentNee>(
+          "grey grids, aimed"),
       variant<kEverything, CameraSegmentNee>("everything, aimed"),
   };
   return kVariants;

@@ -1,6 +1,7 @@
-// A strategy of path_tracer.h for light in media: on the camera's segments, before the first scattering, light
-// scattered once is found by next-event estimation at several points of the segment (segment_nee.h), and not
-// at the vertex where the path's own flight ends. On later segments it is found as by default (vertex_nee.h).
+// A strategy of path_tracer.h for light in media: on the camera's segments, before the first scattering,
+// light scattered once is found by next-event estimation at several points of the segment (segment_nee.h),
+// and not at the vertex where the path's own flight ends. On later segments it is found as by default
+// (vertex_nee.h).
 //
 // In a thin medium few flights end on the camera's segment, and each that does is the whole of the light
 // scattered there: this is most of the noise of light shafts. Points on the segment are there in each sample,

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "worker/render/integrator/offset_ray.h"
 #include "worker/render/media/optical_depth.h"
 #include "worker/render/world/world.h"
 
@@ -19,25 +18,26 @@ constexpr float kThin = .7f;
 
 // The probability that a camera ray is scattered or absorbed in media before it meets a surface.
 float met_by(const World& w, const CameraRay& ray) {
-  OffsetRay at{ray.o, ray.o, ray.d};
+  V3 start = ray.o, origin = ray.o;
   std::uint32_t medium = w.camera_medium;
   float passes = 1, left = ray.t_max;
   constexpr int kMaxBoundaries = 16;
   for (int i = 0; i < kMaxBoundaries; ++i) {
     SurfaceHit hit;
-    const auto primitive = w.accel.nearest(at.origin, at.d, left);
-    const bool met = primitive && w.geometry.complete(*primitive, at.origin, at.d, hit);
+    const auto primitive = w.accel.nearest(origin, ray.d, left);
+    const bool met = primitive && w.geometry.complete(*primitive, origin, ray.d, hit);
     if (medium != kNone) {
       const Medium& m = w.media[medium];
-      const OpticalDepth depths(m, at.start, at.d, met ? at.length_to(hit) : left);
+      const OpticalDepth depths(m, start, ray.d, met ? dot(hit.p - start, ray.d) : left);
       // A ray without end through a medium without end has an infinite depth, or 0 times infinity
       const float depth = mean_component(m.sigma_t) * depths.total();
       passes *= depth > 0 ? std::exp(-depth) : 1.f;
     }
     const SurfaceInfo* surface = met ? &w.geometry.surfaces[hit.surface] : nullptr;
     if (!met || !surface->null) break;
-    if (surface->transition) medium = dot(at.d, hit.ng) > 0 ? surface->exterior : surface->interior;
-    at.leave(hit, at.d);
+    if (surface->transition) medium = dot(ray.d, hit.ng) > 0 ? surface->exterior : surface->interior;
+    start = hit.p;
+    origin = offset_point(hit, ray.d);
     left = kInfinity;
   }
   return 1 - passes;

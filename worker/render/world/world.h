@@ -12,7 +12,7 @@
 #include "worker/render/camera/pixel_filter.h"
 #include "worker/render/geometry/accel.h"
 #include "worker/render/geometry/geometry.h"
-#include "worker/render/integrator/lamp_directions.h"
+#include "worker/render/lights/lamp_directions.h"
 #include "worker/render/lights/lights.h"
 #include "worker/render/media/medium.h"
 #include "worker/render/media/medium_stack.h"

@@ -8,8 +8,8 @@
 namespace ls::render {
 namespace {
 
-using test::SceneBuilder;
 using test::scale;
+using test::SceneBuilder;
 using test::translate;
 using test::operator*;
 using ::testing::Contains;
@@ -24,9 +24,10 @@ SceneBuilder fog(double sigma_t, bool grid = false, double floor = .5) {
   builder.look({0, 0, 4}, {0, 0, 0}, 30, {0, 1, 0});
   builder.shape(RectangleShape{}, translate({0, 0, -2}) * scale(4), builder.diffuse(floor));
   const Rgb sigma{sigma_t, sigma_t, sigma_t}, albedo{.9, .8, .7};
-  const MediumIndex medium =
-      grid ? builder.heterogeneous(builder.grid({2, 2, 2}, {1, 1, 1, 1, 1, 1, 1, 1}, translate({-1, -1, -1}) * scale(2)), albedo, sigma_t)
-           : builder.homogeneous(sigma, albedo, .3);
+  const MediumIndex medium = grid ? builder.heterogeneous(builder.grid({2, 2, 2}, {1, 1, 1, 1, 1, 1, 1, 1},
+                                                                       translate({-1, -1, -1}) * scale(2)),
+                                                          albedo, sigma_t)
+                                  : builder.homogeneous(sigma, albedo, .3);
   builder.container(CubeShape{}, {}, builder.null(), medium);
   builder.scene.integrator.max_depth = 6;
   return builder;
@@ -63,7 +64,8 @@ TEST(Aim, AimsDirectionsAtLampsInMedia) {
 
 TEST(Aim, LeavesOutWhatASceneDoesNotNeed) {
   SceneBuilder area = fog(.2);
-  area.shape(RectangleShape{}, translate({0, 2, 0}), area.diffuse(0)).emitter = AreaEmitter{area.texture({1, 1, 1})};
+  area.shape(RectangleShape{}, translate({0, 2, 0}), area.diffuse(0)).emitter =
+      AreaEmitter{area.texture({1, 1, 1})};
   SceneBuilder no_medium({24, 16});
   add_sun(no_medium);
   add_lamp(no_medium);

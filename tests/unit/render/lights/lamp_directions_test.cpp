@@ -1,5 +1,5 @@
 // Directions near lamps: their density, their samples, and the second moment that they bound.
-#include "worker/render/integrator/lamp_directions.h"
+#include "worker/render/lights/lamp_directions.h"
 
 #include <gtest/gtest.h>
 
@@ -62,8 +62,8 @@ TEST(LampDirections, HaveTheDensityThatTheySay) {
   }
 }
 
-// Of 1 / sin(theta) to a lamp, as light near it goes: by quadrature over theta. The uniform distribution alone
-// has no second moment; the samples could not have this one if directions near the lamp were rarer.
+// Of 1 / sin(theta) to a lamp, as light near it goes: by quadrature over theta. The uniform distribution
+// alone has no second moment; the samples could not have this one if directions near the lamp were rarer.
 TEST(LampDirections, BoundTheSecondMomentOfLightNearALamp) {
   const LampDirections directions(lamps({{1, 2, 3}}), kVertex);
   const V3 to_lamp = normalize(V3(1, 2, 3) - kVertex);
