@@ -204,6 +204,8 @@ class Composer {
       i.max_depth = 2 + static_cast<int>(dice_.below(3));
       i.rr_depth = 5;
     }
+    i.camera_points = std::min(i.camera_points, 8);  // more only cost time
+    if (i.name != kNames[0]) i.camera_points = 0, i.phase_only = false;
     if (i.name == kNames[1]) return;
     i.distance = DistanceSampling::mis;
     i.heuristic = MisHeuristic::power;

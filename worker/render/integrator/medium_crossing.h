@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "worker/render/base/work_counters.h"
+#include "worker/render/integrator/lamp_flight.h"
 #include "worker/render/media/emission.h"
 #include "worker/render/world/world.h"
 
@@ -30,8 +31,11 @@ auto PathTracer<F, Light>::fly_through(const Medium& medium, const SurfaceHit* e
   if constexpr (F.emission) add_medium_emission(medium, t_max);
   const auto plan = Light<F>::ahead(*this, medium, segment);
   const Group numbers = stream_.group(segment_, Purpose::flight);
-  const Flight flight = free_flight<F>(medium, hero_, numbers.bits[0], ray_.start, ray_.d, t_max,
-                                       stream_.stream(segment_, Purpose::track_flight), counters_);
+  const bool past_lamps = F.aimed && world_.lamps.count > 0 && !medium.grid && std::isfinite(t_max);
+  const Flight flight = past_lamps
+                            ? fly_past_lamps(medium, hero_, numbers, ray_.start, ray_.d, t_max, world_.lamps)
+                            : free_flight<F>(medium, hero_, numbers.bits[0], ray_.start, ray_.d, t_max,
+                                             stream_.stream(segment_, Purpose::track_flight), counters_);
   if (!flight.scattered) {
     apply(flight);
     return {Collision::escaped};

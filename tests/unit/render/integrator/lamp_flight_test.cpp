@@ -1,0 +1,109 @@
+// Flights past lamps: their weights have the means that closed forms give, in every channel, and they bound
+// the second moment of light near a lamp.
+#include "worker/render/integrator/lamp_flight.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "worker/render/math/random.h"
+
+namespace ls::render {
+namespace {
+
+Medium homogeneous(const C3& sigma_t, const C3& sigma_s) {
+  Medium m;
+  m.sigma_t = sigma_t;
+  m.sigma_s = sigma_s;
+  return m;
+}
+Lamps lamps(std::initializer_list<V3> positions) {
+  Lamps all;
+  for (const V3& p : positions) all.position[all.count++] = p;
+  return all;
+}
+float mean(const C3& c) { return (c.x + c.y + c.z) / 3; }
+
+constexpr float kEnd = 3;
+
+struct Moments {
+  double sum = 0, squares = 0;
+  std::uint64_t n = 0;
+  void add(double v) { sum += v, squares += v * v, ++n; }
+  double mean() const { return sum / static_cast<double>(n); }
+  double error() const {
+    return std::sqrt((squares / static_cast<double>(n) - mean() * mean()) / static_cast<double>(n));
+  }
+};
+// Calls take(flight) for flights along +x from the origin to kEnd, each with a hero of its own.
+template <class Take>
+void fly(const Medium& medium, const Lamps& all, Take take) {
+  RandomStream random(11);
+  for (int i = 0; i < 1 << 20; ++i) {
+    const auto bits = [&] { return random.bits(); };
+    const Group numbers{{bits(), bits(), bits(), bits()}};
+    take(fly_past_lamps(medium, i % 3, numbers, {0, 0, 0}, {1, 0, 0}, kEnd, all));
+  }
+}
+
+// With the channels combined as in path_tracer.h: what scatters in a channel is albedo (1 - e^(-sigma end)),
+// with t as a factor albedo (1 - (1 + sigma end) e^(-sigma end)) / sigma, and what passes e^(-sigma end). Five
+// standard errors each: 6e-7.
+TEST(LampFlight, HasTheMeansOfTheMedium) {
+  for (const Lamps& all : {lamps({{1, .01f, 0}}), lamps({{1, .2f, .1f}, {-2, 1, 0}, {2.9f, 0, .001f}})})
+    for (const C3& sigma : {C3(.5f, .5f, .5f), C3(0, .3f, 4), C3(1e-4f, 2, 30)}) {
+      const Medium medium = homogeneous(sigma, {.9f * sigma.x, .5f * sigma.y, .8f * sigma.z});
+      Moments scattered[3], distance[3], passed[3];
+      fly(medium, all, [&](const Flight& f) {
+        for (int c = 0; c < 3; ++c) {
+          const double w = f.weight[c] / mean(f.density);
+          scattered[c].add(f.scattered ? w : 0);
+          distance[c].add(f.scattered ? w * f.t : 0);
+          passed[c].add(f.scattered ? 0 : w);
+        }
+      });
+      for (int c = 0; c < 3; ++c) {
+        const double s = sigma[c], rest = std::exp(-s * kEnd), albedo = s > 0 ? medium.sigma_s[c] / s : 0;
+        EXPECT_NEAR(scattered[c].mean(), albedo * (1 - rest), 5 * scattered[c].error()) << s;
+        EXPECT_NEAR(passed[c].mean(), rest, 5 * passed[c].error()) << s;
+        if (s > 0)
+          EXPECT_NEAR(distance[c].mean(), albedo * (1 - (1 + s * kEnd) * rest) / s, 5 * distance[c].error())
+              << s;
+      }
+    }
+}
+
+// A flight past a lamp at the distance D, and light as 1 / r^2 in a thin medium. Flights of the medium alone
+// have the second moment sigma int 1 / r^4 dt = sigma pi / (2 D^3). A share q of flights has the density e = D /
+// (a r^2), with a < pi the angle that the way takes up about the lamp: the second moment is below int (sigma /
+// r^2)^2 / (q e) dt = sigma^2 a pi / (q D^2).
+TEST(LampFlight, BoundsTheSecondMomentOfLightNearALamp) {
+  constexpr float kDistance = .01f, kSigma = .01f;
+  const Medium medium = homogeneous(C3(kSigma), C3(kSigma));
+  Moments light;
+  fly(medium, lamps({{1, kDistance, 0}}), [&](const Flight& f) {
+    const double r2 = sqr(f.t - 1) + sqr(kDistance);
+    light.add(f.scattered ? f.weight.x / r2 : 0);
+  });
+  const double pi = M_PI, d = kDistance, s = kSigma;
+  const double alone = s * pi / (2 * d * d * d), bound = s * s * pi * pi / (kLampFlightShare * d * d);
+  EXPECT_LT(bound, .01 * alone);
+  EXPECT_LT(light.squares / static_cast<double>(light.n), bound);
+  // From the first to the last angle, without the little that the medium takes away on the way
+  EXPECT_NEAR(light.mean(), s / d * (std::atan(2 / d) + std::atan(1 / d)), 5 * light.error() + s * s / d * pi);
+}
+
+TEST(LampFlight, StaysFiniteInMediaWithoutAndBeyondAnyExtinction) {
+  const Lamps all = lamps({{1, 0, 0}, {0, 0, 0}, {kEnd, 0, 0}});
+  for (const float sigma : {0.f, 1e-30f, 1e6f, 1e30f})
+    fly(homogeneous({sigma, 1, 1e20f}, {sigma, 1, 1e20f}), all, [&](const Flight& f) {
+      for (int c = 0; c < 3; ++c) {
+        ASSERT_TRUE(std::isfinite(f.weight[c]) && f.weight[c] >= 0) << sigma;
+        ASSERT_TRUE(f.density[c] >= 0) << sigma;
+      }
+      ASSERT_TRUE(f.t >= 0);
+    });
+}
+
+}  // namespace
+}  // namespace ls::render
