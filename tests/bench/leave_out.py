@@ -131,10 +131,13 @@ def instructions(binary, scene, folder):
     return collected / (SIZE[0] * SIZE[1] * SPP), re.search(r"pixels_sha256 (\w+)", run.stdout)[1]
 
 
-# By name: the first seven flags of worker/render/base/features.h, in their order, without those that are not set at the end.
+# By name: the flags of worker/render/base/features.h but for the last five, in their order, without those that are not set at
+# the end.
 INSTANTIATIONS = {"surfaces": (), "surfaces that light passes": (0, 0, 0, 0, 0, 1), "homogeneous grey media": (1, 0, 0, 0, 0, 1),
                   "homogeneous chromatic media": (1, 0, 1, 0, 0, 1), "grey grids": (1, 1, 0, 0, 0, 1), "chromatic grids": (1, 1, 1, 0, 0, 1),
-                  "everything": (1, 1, 1, 1, 1, 1), "everything, and light in parts": (1, 1, 1, 1, 1, 1, 1)}
+                  "everything": (1, 1, 1, 1, 1, 1), "everything, and light in parts": (1, 1, 1, 1, 1, 1, 1),
+                  "homogeneous grey media, aimed": (1, 0, 0, 0, 0, 1, 0, 1), "grey grids, aimed": (1, 1, 0, 0, 0, 1, 0, 1),
+                  "everything, aimed": (1, 1, 1, 1, 1, 1, 0, 1), "everything, aimed, and light in parts": (1, 1, 1, 1, 1, 1, 1, 1)}
 
 
 def inclusive(callgrind):
@@ -164,7 +167,7 @@ def by_instantiation(binary, scene, folder):
     costs = {}
     for function, cost in inclusive(out).items():
         if (m := re.search(r"sample_with<ls::render::Features\{([^}]*)\}", function)):
-            flags = [int(flag == "true") for flag in m[1].split(", ")][:7] if m[1] else []
+            flags = [int(flag == "true") for flag in m[1].split(", ")][:-5] if m[1] else []
             while flags and not flags[-1]:
                 flags.pop()
             flags = tuple(flags)

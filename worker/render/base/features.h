@@ -18,10 +18,10 @@ struct Features {
   bool overlaps = false;
   // The scene has surfaces that light passes straight through: index-matched ones, masks, thin dielectrics.
   bool passing = false;
+  bool split = false;  // light AOVs: each sample's radiance split into its components (light_components.h)
   // Light is looked for at several points of the camera's segments through media (camera_segment_nee.h), or
   // directions are sampled towards lamps too (lamp_directions.h).
   bool aimed = false;
-  bool split = false;  // light AOVs: each sample's radiance split into its components (light_components.h)
   // Features that every variant has, unless the build leaves them out (built.h): index-matched surfaces, null
   // transmission, equi-angular sampling, lights that rays can hit, and the checks that count bad samples.
   bool boundaries = kBuilt.boundaries, null_transmission = kBuilt.null_transmission;
@@ -38,7 +38,6 @@ inline constexpr Features kEveryScene{
     .media = true, .grids = true, .chromatic = true, .emission = true, .overlaps = true, .passing = true};
 inline constexpr Features kEverything = [] {
   Features all = kEveryScene;
-  all.aimed = true;
   all.split = true;
   return all;
 }();
@@ -50,7 +49,7 @@ inline constexpr Features kBuiltFeatures{.media = kBuilt.media,
                                          .emission = kBuilt.emission,
                                          .overlaps = kBuilt.overlaps,
                                          .passing = true,
-                                         .aimed = true,
-                                         .split = true};
+                                         .split = true,
+                                         .aimed = true};
 
 }  // namespace ls::render

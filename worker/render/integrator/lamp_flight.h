@@ -1,6 +1,6 @@
 // Free flights through homogeneous media with lamps (lights without extent): a share of them ends where
-// equi-angular sampling about a lamp says. Light that was scattered before it arrives near a lamp is as bright as 1 /
-// distance there, and flights of the medium alone rarely end so near.
+// equi-angular sampling about a lamp says. Light that was scattered before it arrives near a lamp is as
+// bright as 1 / distance there, and flights of the medium alone rarely end so near.
 #pragma once
 
 #include <algorithm>
@@ -16,9 +16,9 @@ namespace ls::render {
 // How many flights end near a lamp.
 inline constexpr float kLampFlightShare = .1f;
 
-// The flight from o along d, of length t_max at most (finite), by the numbers bits[0] (its depth), u(1) (which
-// distribution) and u(2) (the place near the lamp). There must be a lamp. Weights and densities are as those
-// of free_flight(); the density of a distance is that of the mixture, the balance heuristic.
+// The flight from o along d, of length t_max at most (finite), by the numbers bits[0] (its depth), u(1)
+// (which distribution) and u(2) (the place near the lamp). There must be a lamp. Weights and densities are as
+// those of free_flight(); the density of a distance is that of the mixture, the balance heuristic.
 inline Flight fly_past_lamps(const Medium& medium, int hero, const Group& numbers, const V3& o, const V3& d,
                              float t_max, const Lamps& lamps) {
   const auto about = [&](std::size_t i) { return EquiAngular(o, d, t_max, lamps.position[i]); };

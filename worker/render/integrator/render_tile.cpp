@@ -43,7 +43,10 @@ std::span<const Variant> variants_for(const World& w) {
   if (w.need.aimed) return aimed_variants();
   return w.distant_mis ? distant_variants() : std::span<const Variant>(kVariants);
 }
-const Variant& split_variant(const World& w) { return w.distant_mis ? kDistantSplitVariant : kSplitVariant; }
+const Variant& split_variant(const World& w) {
+  if (w.need.aimed) return kAimedSplitVariant;
+  return w.distant_mis ? kDistantSplitVariant : kSplitVariant;
+}
 const Variant& choose(const World& w) {
   for (const Variant& v : variants_for(w)) {
     if (v.covers.covers(w.need)) return v;

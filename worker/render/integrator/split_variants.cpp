@@ -1,9 +1,8 @@
 // A separate source file, because instantiating the path tracer takes long to compile.
-#include "worker/render/integrator/camera_segment_nee.h"
 #include "worker/render/integrator/variant.h"
 
 namespace ls::render {
 
-const Variant kSplitVariant = variant<kEverything, CameraSegmentNee>("everything, and light in parts");
+const Variant kSplitVariant = variant<kEverything>("everything, and light in parts");
 
 }  // namespace ls::render

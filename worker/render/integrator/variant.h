@@ -46,8 +46,8 @@ std::span<const Variant> aimed_variants();
 // The variants of the integrator `volpath_distant_mis`, cheapest first; the last one has the features of
 // every scene.
 std::span<const Variant> distant_variants();
-// The variants of the integrators `volpath` and `volpath_distant_mis` that also compute light components.
-// Each has the features of every scene.
-extern const Variant kSplitVariant, kDistantSplitVariant;
+// The variants of the integrators `volpath` (without and with Features::aimed) and `volpath_distant_mis` that
+// also compute light components. Each has all other features.
+extern const Variant kSplitVariant, kAimedSplitVariant, kDistantSplitVariant;
 
 }  // namespace ls::render

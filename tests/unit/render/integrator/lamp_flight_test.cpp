@@ -47,8 +47,8 @@ void fly(const Medium& medium, const Lamps& all, Take take) {
 }
 
 // With the channels combined as in path_tracer.h: what scatters in a channel is albedo (1 - e^(-sigma end)),
-// with t as a factor albedo (1 - (1 + sigma end) e^(-sigma end)) / sigma, and what passes e^(-sigma end). Five
-// standard errors each: 6e-7.
+// with t as a factor albedo (1 - (1 + sigma end) e^(-sigma end)) / sigma, and what passes e^(-sigma end).
+// Five standard errors each: 6e-7.
 TEST(LampFlight, HasTheMeansOfTheMedium) {
   for (const Lamps& all : {lamps({{1, .01f, 0}}), lamps({{1, .2f, .1f}, {-2, 1, 0}, {2.9f, 0, .001f}})})
     for (const C3& sigma : {C3(.5f, .5f, .5f), C3(0, .3f, 4), C3(1e-4f, 2, 30)}) {
@@ -74,9 +74,9 @@ TEST(LampFlight, HasTheMeansOfTheMedium) {
 }
 
 // A flight past a lamp at the distance D, and light as 1 / r^2 in a thin medium. Flights of the medium alone
-// have the second moment sigma int 1 / r^4 dt = sigma pi / (2 D^3). A share q of flights has the density e = D /
-// (a r^2), with a < pi the angle that the way takes up about the lamp: the second moment is below int (sigma /
-// r^2)^2 / (q e) dt = sigma^2 a pi / (q D^2).
+// have the second moment sigma int 1 / r^4 dt = sigma pi / (2 D^3). A share q of flights has the density e =
+// D / (a r^2), with a < pi the angle that the way takes up about the lamp: the second moment is below int
+// (sigma / r^2)^2 / (q e) dt = sigma^2 a pi / (q D^2).
 TEST(LampFlight, BoundsTheSecondMomentOfLightNearALamp) {
   constexpr float kDistance = .01f, kSigma = .01f;
   const Medium medium = homogeneous(C3(kSigma), C3(kSigma));
@@ -90,7 +90,8 @@ TEST(LampFlight, BoundsTheSecondMomentOfLightNearALamp) {
   EXPECT_LT(bound, .01 * alone);
   EXPECT_LT(light.squares / static_cast<double>(light.n), bound);
   // From the first to the last angle, without the little that the medium takes away on the way
-  EXPECT_NEAR(light.mean(), s / d * (std::atan(2 / d) + std::atan(1 / d)), 5 * light.error() + s * s / d * pi);
+  EXPECT_NEAR(light.mean(), s / d * (std::atan(2 / d) + std::atan(1 / d)),
+              5 * light.error() + s * s / d * pi);
 }
 
 TEST(LampFlight, StaysFiniteInMediaWithoutAndBeyondAnyExtinction) {
