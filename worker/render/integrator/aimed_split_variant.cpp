@@ -3,13 +3,17 @@
 #include "worker/render/integrator/variant.h"
 
 namespace ls::render {
+namespace {
 
-const Variant kAimedSplitVariant = variant<
-    [] {
-      Features all = kEverything;
-      all.aimed = true;
-      return all;
-    }(),
-    CameraSegmentNee>("everything, aimed, and light in parts");
+constexpr Features kAimedEverything = [] {
+  Features all = kEverything;
+  all.aimed = true;
+  return all;
+}();
+
+}  // namespace
+
+const Variant kAimedSplitVariant =
+    variant<kAimedEverything, CameraSegmentNee>("everything, aimed, and light in parts");
 
 }  // namespace ls::render
