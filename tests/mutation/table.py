@@ -21,7 +21,7 @@ TABLE = ("validate:seed*", "validate:N41*", "validate:N22*", "validate:7.6[abcg]
 
 ROWS = [
     # ---- render
-    (1, "worker/render/integrator/path_tracer.h", "light->delta ? 1 : «balance_weight(light->pdf, f.pdf)»;", "1.f",
+    (1, "worker/render/integrator/path_tracer.h", "light->delta ? 1 : «balance_weight(light->pdf, sampled)»;", "1.f",
      "next-event estimation at surfaces counts in full beside the directions that hit the light", RENDER),
     (2, "worker/render/integrator/path_tracer.h", "if (!(u < q)) return false;\n  «beta_ /= q;»", ";", "survivors of roulette are not weighted up", RENDER),
     (3, "worker/render/integrator/path_tracer.h", "if («(dot(w, hit.ng) > 0) != (s->wi.z > 0)») return {Collision::absorbed};", "false",
@@ -30,7 +30,7 @@ ROWS = [
      "grey media forget their albedo", RENDER),
     (5, "worker/render/media/medium.h", "if (kBuilt.health && «rho > hi») ++counters", "false", "densities above their bound are not counted", RENDER),
     (6, "worker/render/media/medium.h", "for (float& x : factor) «x /= q;»", ";", "shadow rays that survive roulette are not weighted up", RENDER),
-    (7, "worker/render/integrator/vertex_nee.h", ": light->pdf / (light->pdf * with_equiangular + «phase»);", "2 * phase",
+    (7, "worker/render/integrator/vertex_nee.h", ": light->pdf / (light->pdf * with_equiangular + «path.direction_pdf(p, phase, light->direction)»);", "2 * phase",
      "in media, the weight of next-event estimation and that of found lights do not add up to 1", RENDER),
     (8, "worker/render/lights/lights.cpp", "if (i == kNone || «!(dot(hit.ng, w) > 0)») return {0, 0, 0};", "false", "lights shine from their back", RENDER),
     (9, "worker/render/media/phase.h", "const V3 diff = «g >= 0 ? w - w1 : w + w1»;", "w - w1", "media that scatter backward are looked up as forward ones", RENDER),
@@ -135,8 +135,8 @@ ROWS = [
     (110, "worker/render/media/medium.h", "f.weight[c] = «scattering[c]» / s;\n      }", "m.sigma_t[c]", "grey grids forget their albedo", TABLE),
     (111, "worker/render/integrator/vertex_nee.h", "const float phase = «medium.phase.value(d, light->direction)»;", "kInvFourPi",
      "next-event estimation in media takes every phase function for an even one", TABLE),
-    (112, "worker/render/integrator/medium_crossing.h", "const PhaseSample s = «medium.phase.sample(ray_.d, {direction.u(0), direction.u(1)})»;",
-     "HenyeyGreenstein{0}.sample(ray_.d, {direction.u(0), direction.u(1)})", "paths scatter evenly in all media", TABLE),
+    (112, "worker/render/integrator/medium_crossing.h", "PhaseSample s = «medium.phase.sample(ray_.d, u)»;",
+     "HenyeyGreenstein{0}.sample(ray_.d, u)", "paths scatter evenly in all media", TABLE),
     (113, "worker/render/integrator/path_tracer.h", "«beta_ *= s->weight;»\n  if (s->transmitted)", ";", "surfaces take nothing of the light that they scatter", TABLE),
     (114, "worker/render/integrator/shadow_ray.h", "«value *= through_media(medium, ray.start, d, t, stream);»", ";", "media throw no shadow", TABLE),
     (115, "worker/render/integrator/path_tracer.h", "bool may_scatter() const { return world_.depth_allows(depth_ + «1»); }", "2", "the last scattering in media is left out", TABLE),

@@ -63,20 +63,15 @@ template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::scatter_by_phase(const Medium& medium) -> Step {
   const Group direction = stream_.group(depth_, Purpose::direction);
   const V2 u(direction.u(0), direction.u(1));
-  PhaseSample s;
+  PhaseSample s = medium.phase.sample(ray_.d, u);
   if constexpr (F.aimed) {
-    float choice = direction.u(2);
-    if (const auto w = near_lamps_.sample(choice, u))
-      s = {*w, medium.phase.value(ray_.d, *w)};
-    else
-      s = medium.phase.sample(ray_.d, u);
-    const float own = s.pdf;
     if (near_lamps_.any()) {
+      float choice = direction.u(2);
+      if (const auto w = near_lamps_.sample(choice, u)) s = {*w, medium.phase.value(ray_.d, *w)};
+      const float own = s.pdf;
       s.pdf = near_lamps_.pdf(own, s.w);
       beta_ *= own / s.pdf;
     }
-  } else {
-    s = medium.phase.sample(ray_.d, u);
   }
   last_.pdf = s.pdf;
   ray_.d = s.w;
