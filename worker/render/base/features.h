@@ -19,8 +19,8 @@ struct Features {
   // The scene has surfaces that light passes straight through: index-matched ones, masks, thin dielectrics.
   bool passing = false;
   bool split = false;  // light AOVs: each sample's radiance split into its components (light_components.h)
-  // Light is looked for at several points of the camera's segments through media (camera_segment_nee.h), or
-  // directions are sampled towards lamps too (lamp_directions.h).
+  // Light is sampled at several points of the camera's segments through media (camera_segment_nee.h), or
+  // directions and flights also go near lamps (lamp_directions.h, lamp_flight.h).
   bool aimed = false;
   // Features that every variant has, unless the build leaves them out (built.h): index-matched surfaces, null
   // transmission, equi-angular sampling, lights that rays can hit, and the checks that count bad samples.

@@ -53,7 +53,8 @@ class World {
   // True if shadow rays are traced boundary by boundary, for null transmission or because they may cross
   // media.
   bool shadows_walk = false;
-  bool distant_mis = false;  // the integrator is `volpath_distant_mis` (segment_nee.h); its options follow
+  bool distant_mis = false;  // the integrator is `volpath_distant_mis` (segment_nee.h)
+  // How points on segments are sampled and weighted by that integrator, and with `camera_points`
   DistanceSampling distance = DistanceSampling::mis;
   MisHeuristic heuristic = MisHeuristic::power;
   // With Features::aimed:

@@ -171,8 +171,10 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   w.passing_counts = settings.integrator == "path" && settings.max_depth >= 0;
   w.use_media = scene::sees_media(settings.integrator);
   w.distant_mis = settings.integrator == "volpath_distant_mis";
-  w.distance = scene.integrator.distance;
-  w.heuristic = scene.integrator.heuristic;
+  if (w.distant_mis) {
+    w.distance = scene.integrator.distance;
+    w.heuristic = scene.integrator.heuristic;
+  }
   w.hide_emitters = scene.integrator.hide_emitters;
   auto geometry = Geometry::build(scene, loader);
   if (!geometry) return tl::unexpected(geometry.error());
