@@ -14,7 +14,7 @@ namespace {
 constexpr int kPointsThatPay = 2;
 // They pay in media where a camera ray is scattered at most this often: in denser ones flights that end on
 // the segment find the light as well.
-constexpr float kThin = .7f;
+constexpr float kThin = .35f;
 
 // The probability that a camera ray is scattered or absorbed in media before it meets a surface.
 float met_by(const World& w, const CameraRay& ray) {

@@ -42,7 +42,7 @@ WorldReport report(const SceneBuilder& builder) { return describe(*test::world_o
 
 TEST(Aim, LooksForDistantLightAlongCameraSegmentsThroughThinMedia) {
   for (const bool grid : {false, true}) {
-    SceneBuilder thin = fog(.2, grid), dense = fog(5, grid);
+    SceneBuilder thin = fog(.1, grid), dense = fog(1, grid);
     add_sun(thin);
     add_sun(dense);
     EXPECT_THAT(report(thin).used, Contains(kPoints)) << grid;
@@ -63,16 +63,16 @@ TEST(Aim, AimsDirectionsAtLampsInMedia) {
 }
 
 TEST(Aim, LeavesOutWhatASceneDoesNotNeed) {
-  SceneBuilder area = fog(.2);
+  SceneBuilder area = fog(.1);
   area.shape(RectangleShape{}, translate({0, 2, 0}), area.diffuse(0)).emitter =
       AreaEmitter{area.texture({1, 1, 1})};
   SceneBuilder no_medium({24, 16});
   add_sun(no_medium);
   add_lamp(no_medium);
-  SceneBuilder only_seen = fog(.2);
+  SceneBuilder only_seen = fog(.1);
   add_sun(only_seen);
   only_seen.scene.integrator.max_depth = 1;
-  SceneBuilder switched_off = fog(.2);
+  SceneBuilder switched_off = fog(.1);
   add_sun(switched_off);
   add_lamp(switched_off);
   SceneBuilder distant = switched_off;
@@ -85,7 +85,7 @@ TEST(Aim, LeavesOutWhatASceneDoesNotNeed) {
 
 // A crop has the pixels of the full frame, so the choice must not look at the crop alone.
 TEST(Aim, ChoosesForACropAsForTheWholeFrame) {
-  SceneBuilder whole = fog(.4);
+  SceneBuilder whole = fog(.1);
   add_sun(whole);
   SceneBuilder crop = whole;
   crop.scene.film.crop_offset = {0, 0};
