@@ -193,6 +193,14 @@ struct FoundElsewhere : ::testing::Test {
     options.audit_rate = 0;
     return Coordinator::open(std::move(options)).value();
   }
+  // In memory, with every result audited.
+  std::unique_ptr<Coordinator> open_audited_here() {
+    store = std::make_shared<MovingStore>();
+    Coordinator::Options options;
+    options.jobs = store;
+    options.audit_rate = 1;
+    return Coordinator::open(std::move(options)).value();
+  }
 };
 
 TEST_F(FoundElsewhere, AWorkerHereIsQuarantinedAtOnceAndItsTilesAreRenderedAgain) {
@@ -258,11 +266,7 @@ TEST_F(FoundElsewhere, AJobThatWasDoneBeforeIsExtendedWithoutTheLiarsPixels) {
 }
 
 TEST_F(FoundElsewhere, UntilItIsStoredThatAWorkerIsQuarantinedTheJobsWait) {
-  store = std::make_shared<MovingStore>();
-  Coordinator::Options options;
-  options.jobs = store;
-  options.audit_rate = 1;
-  auto coordinator = Coordinator::open(std::move(options)).value();
+  auto coordinator = open_audited_here();
   const JobId job = submit(*coordinator, samples(64));
   FakeFarm farm(*coordinator, 4);
   farm.ticks = true;
@@ -286,11 +290,7 @@ TEST_F(FoundElsewhere, UntilItIsStoredThatAWorkerIsQuarantinedTheJobsWait) {
 // between the two is up to the scheduler.
 TEST_F(FoundElsewhere, AnErrorFromBeforeAJobWasResumedDoesNotPauseItAgain) {
   for (int trial = 0; trial < 40; ++trial) {
-    store = std::make_shared<MovingStore>();
-    Coordinator::Options options;
-    options.jobs = store;
-    options.audit_rate = 1;
-    auto coordinator = Coordinator::open(std::move(options)).value();
+    auto coordinator = open_audited_here();
     const JobId job = submit(*coordinator, samples(64));
     std::atomic<int> refusals = 0;
     store->on_refusal = [&] {

@@ -17,6 +17,7 @@ std::span<const Variant> aimed_variants() {
           "grey grids, aimed"),
       variant<kEverything, CameraSegmentNee>("everything, aimed"),
   };
+  static_assert(std::end(kVariants)[-1].covers == kEverything);
   return kVariants;
 }
 

@@ -41,7 +41,8 @@ constexpr Variant variant(const char* name) {
   return {F, name, &sample_with<F, Light>};
 }
 
-// The variants of the integrators `path` and `volpath` with Features::aimed, cheapest first.
+// The variants of the integrator `volpath` with Features::aimed, cheapest first; the last one has the
+// features of every scene.
 std::span<const Variant> aimed_variants();
 // The variants of the integrator `volpath_distant_mis`, cheapest first; the last one has the features of
 // every scene.

@@ -1,5 +1,6 @@
-// Directions from a vertex in a medium, or on a surface in one, mixed from the vertex's own distribution (the
-// phase function or the BSDF) and from directions that pass close to a lamp, a light without extent.
+// The directions that a path may take from a vertex in a medium or on a surface. They are mixed from the
+// vertex's own distribution (the phase function or the BSDF) and from directions that pass close to a lamp, a
+// light without extent.
 //
 // Light that is scattered at the distance D from a lamp is as bright as 1 / D^2, and along a ray that passes
 // the lamp at the distance D, its integral is as 1 / D. From a vertex at the distance r, a ray at the angle

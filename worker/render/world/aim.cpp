@@ -12,8 +12,8 @@ namespace {
 // How many points a camera segment gets where they pay
 // (docs/decisions/0027-light-along-camera-segments.md).
 constexpr int kPointsThatPay = 2;
-// They pay in media where a camera ray is scattered at most this often: in denser ones flights that end on
-// the segment find the light as well.
+// They pay where camera rays are scattered in media with a mean probability below this. In denser media the
+// flights that end on the segment find the light often enough.
 constexpr float kThin = .35f;
 
 // The probability that a camera ray is scattered or absorbed in media before it meets a surface.

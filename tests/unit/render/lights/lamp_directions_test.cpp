@@ -62,8 +62,9 @@ TEST(LampDirections, HaveTheDensityThatTheySay) {
   }
 }
 
-// Of 1 / sin(theta) to a lamp, as light near it goes: by quadrature over theta. The uniform distribution
-// alone has no second moment; the samples could not have this one if directions near the lamp were rarer.
+// Light near a lamp grows as 1 / sin(theta), where theta is the angle to the lamp. The test compares the
+// second moment of this function, as sampled, with its quadrature over theta. Uniform directions alone would
+// have an infinite one.
 TEST(LampDirections, BoundTheSecondMomentOfLightNearALamp) {
   const LampDirections directions(lamps({{1, 2, 3}}), kVertex);
   const V3 to_lamp = normalize(V3(1, 2, 3) - kVertex);
