@@ -24,8 +24,8 @@ COPY = ROOT / "build" / "mutation"
 BIN = COPY / "build" / "release" / "bin"
 RESULTS = COPY / "results.json"
 
-GTEST = ("agent_test", "assemble_test", "bsdf_test", "cli_test", "domain_test", "http_api_test", "http_server_test", "image_test", "render_test",
-         "sampling_test", "service_test", "statistical_test", "store_test")
+GTEST = ("agent_test", "assemble_test", "bsdf_test", "cli_test", "domain_test", "http_api_test", "http_server_test",
+         "image_test", "leave_out_test", "render_test", "sampling_test", "service_test", "statistical_test", "store_test")
 
 
 def command_of(test):

@@ -93,9 +93,13 @@ struct Leased {
 std::string audit_job_load(const Job& job, Leased& leased, const ShareLimits& limits) {
   const JobPlan& plan = job.plan;
   const std::string name = "job " + plan.brief.job.value;
-  const double charge = leased.charges[job.seq];
+  const auto leases = leased.charges.find(job.seq);
+  const double charge = leases == leased.charges.end() ? 0 : leases->second;
   if (std::abs(job.charge_out - charge) > 1e-6 * (1 + charge))
     return fmt::format("{}: charged with {} s, leased {} s", name, job.charge_out, charge);
+  // Rounding errors of what was added and subtracted must not stay for good.
+  if (leases == leased.charges.end() && job.charge_out != 0)
+    return fmt::format("{}: charged with {} s though nothing is leased", name, job.charge_out);
   const bool alone = plan.group.empty();  // a job in a group has no limits of its own: they are the group's
   return audit_load(name, job.load, leased.jobs[job.seq],
                     alone ? tighter(plan.max_units, limits.units_per_job) : 0,

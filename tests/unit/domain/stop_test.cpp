@@ -191,6 +191,27 @@ TEST(StopByTime, NothingLeasedIsThrownAwayAndNothingIsLeasedAfterwards) {
   EXPECT_GE(seconds(rig.now.time_since_epoch()), 10 - kLeaseSeconds);
 }
 
+// One unit of each tile is rendered although the time is over after the first of them: an image without a
+// sample in some tile is none. The worker does not wait for a tick in between.
+TEST(StopByTime, EveryTileHasItsFirstRoundHoweverLateItIs) {
+  constexpr int kTiles = 20;
+  Rig rig;
+  rig.join("w", 1);
+  rig.cpu_seconds = 2;
+  JobPlan plan = plan_of("j", kTiles, std::nullopt);
+  plan.time = 1;
+  rig.submit(plan);
+  for (int rendered = 0; rendered < kTiles; ++rendered) {
+    ASSERT_FALSE(rig.held[{"w"}].empty()) << rendered << " tiles have their first round";
+    rig.now += 2s;
+    rig.render("w");
+  }
+  rig.pass(0s);
+
+  EXPECT_EQ(rig.job().stopped, StopReason::time);
+  EXPECT_EQ(rig.job().units_folded, std::uint64_t{kTiles});
+}
+
 // One thread, units of a second: of those that would end after the time none is begun that ends mostly after
 // it.
 TEST(StopByTime, TheLastRoundsAreChosenFromWhatUnitsHaveCost) {

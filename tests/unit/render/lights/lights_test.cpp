@@ -241,6 +241,18 @@ TEST(Lights, ADarkSideIsNeitherSampledNorGivenADensity) {
   EXPECT_EQ(inside.world->lights.pdf(hit, from_in, {0, 0, 1}), 0.f);
 }
 
+TEST(Lights, AreSeenFromTheirFrontAlone) {
+  const LightBench bench(area(RectangleShape{}, {}));
+  SurfaceHit hit;
+  const V3 origin = bench.at({.1, .1, 2});
+  const auto primitive = bench.world->accel.nearest(origin, {0, 0, -1}, kInfinity);
+  ASSERT_TRUE(primitive && bench.world->geometry.complete(*primitive, origin, {0, 0, -1}, hit));
+
+  EXPECT_FALSE(is_black(bench.world->lights.emitted(hit, {0, 0, 1})));
+  EXPECT_TRUE(is_black(bench.world->lights.emitted(hit, {0, 0, -1})));
+  EXPECT_TRUE(is_black(bench.world->lights.emitted(hit, {1, 0, 0}))) << "along the surface";
+}
+
 TEST(Lights, LightsWithoutPowerAreLeftOut) {
   SceneBuilder builder = area(RectangleShape{}, {});
   builder.scene.textures[0] = ConstantTexture{{0, 0, 0}};
