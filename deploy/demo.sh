@@ -5,16 +5,18 @@
 #   deploy/demo.sh --detach   leaves the farm running
 #   deploy/demo.sh --stop     ends a farm left running
 #   deploy/demo.sh --full     the large setting: more pixels, more samples, a finer grid
+#   deploy/demo.sh --denoise  installs Open Image Denoise into build/oidn, and denoises the picture
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-detach=0 setting=small
+detach=0 setting=small denoise=() layer=""
 for arg in "$@"; do
   case "$arg" in
     --detach) detach=1 ;;
     --stop) setting=stop ;;
     --full) setting=full ;;
-    *) echo "usage: deploy/demo.sh [--detach | --stop] [--full]" >&2; exit 2 ;;
+    --denoise) denoise=(--denoise) layer="&layer=denoised" ;;
+    *) echo "usage: deploy/demo.sh [--detach | --stop] [--full] [--denoise]" >&2; exit 2 ;;
   esac
 done
 
@@ -44,6 +46,7 @@ fi
 
 started=$SECONDS
 deploy/install-deps.sh
+[ "${#denoise[@]}" = 0 ] || deploy/install-denoiser.sh
 echo "building, which takes minutes (log: build/demo/build.log)"
 mkdir -p "$home"
 if ! { cmake --preset release -DLIGHTSHAFT_TESTS=OFF && cmake --build --preset release --target lightshaft lightshaft-coordinator lightshaft-worker; } >"$home/build.log" 2>&1; then
@@ -83,9 +86,9 @@ done
 
 token=$(cat "$home/data/token")
 echo "dashboard: $url/#token=$token"
-LIGHTSHAFT_URL="$url" LIGHTSHAFT_TOKEN="$token" "$bin/lightshaft" submit "$home/bath/bath.xml" --wait -o "$home/bath.exr" | tee "$home/job"
+LIGHTSHAFT_URL="$url" LIGHTSHAFT_TOKEN="$token" "$bin/lightshaft" submit "$home/bath/bath.xml" "${denoise[@]}" --wait -o "$home/bath.exr" | tee "$home/job"
 job=$(head -n 1 "$home/job")
-curl -fsS -H "Authorization: Bearer $token" "$url/api/v1/jobs/$job/image.png?exposure=0.8" -o "$home/bath.png"
+curl -fsS -H "Authorization: Bearer $token" "$url/api/v1/jobs/$job/image.png?exposure=0.8$layer" -o "$home/bath.png"
 
 cat <<EOF
 

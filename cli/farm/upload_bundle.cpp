@@ -56,6 +56,7 @@ std::string spec_query(const JobSpec& spec, bool with_priority) {
   for (const auto& [name, value] : spec.defines) query.add("define", name + "=" + value);
   if (with_priority) query.add("priority", fmt::format("{}", spec.priority));
   if (spec.float_output) query.add("float", "true");
+  if (spec.denoise) query.add("denoise", "true");
   if (!spec.tags.empty()) query.add("tags", fmt::format("{}", fmt::join(spec.tags, ",")));
   if (spec.frames) query.add("frames", to_string(*spec.frames));
   query.add("max_workers", spec.max_workers);

@@ -50,6 +50,7 @@ Result<std::unique_ptr<LocalFarm>> LocalFarm::open(Options options) {
   coordinator::Coordinator::Options o;
   o.blobs = farm->blobs_;
   o.clock = std::make_shared<SystemClock>();
+  o.denoise_threads = options.threads;
   o.tick = std::chrono::milliseconds(100);
   auto opened = coordinator::Coordinator::open(std::move(o));
   if (!opened) return tl::unexpected(opened.error());

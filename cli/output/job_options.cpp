@@ -131,6 +131,9 @@ void JobOptions::add_to(CLI::App& app) {
       ->allow_extra_args(false)
       ->type_name("name=value");
   app.add_flag("--float", float_output, "32-bit pixels in the image instead of half");
+  app.add_flag("--denoise", denoise,
+               "also the layers denoised.R, G, B, with their own error (needs Open Image Denoise: "
+               "deploy/install-denoiser.sh)");
   app.add_flag("--strict", strict, "warnings of the scene are errors");
 }
 
@@ -169,6 +172,7 @@ Result<JobSpec> JobOptions::parse() const {
   spec.aov = aov;
   spec.priority = priority_value.value_or(0);
   spec.float_output = float_output;
+  spec.denoise = denoise;
   spec.tags = tags;
   if (workers) spec.max_workers = static_cast<std::uint32_t>(*workers);
   if (units) spec.max_units = static_cast<std::uint32_t>(*units);

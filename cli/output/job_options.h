@@ -18,6 +18,7 @@ struct JobOptions {
   std::string max_workers, max_units, memory;
   std::vector<std::string> aov, defines, tags;
   bool float_output = false;
+  bool denoise = false;
   bool strict = false;
 
   void add_to(CLI::App& app);

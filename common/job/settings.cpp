@@ -139,6 +139,7 @@ std::string canonical_json(const JobSpec& spec) {
             {"float", spec.float_output},
             {"priority", spec.priority},
             {"tags", spec.tags}};
+  if (spec.denoise) json["denoise"] = true;
   if (spec.spp) json["spp"] = *spec.spp;
   if (spec.target_error) json["target_error"] = *spec.target_error;
   if (spec.time) json["time"] = *spec.time;
@@ -164,7 +165,7 @@ Result<JobSpec> job_spec_of(const nlohmann::json& object) {
   if (!object.is_object()) return fail(Errc::invalid_argument, "spec: must be a JSON object {...}");
   Fields fields(object, "spec",
                 {"spp", "target_error", "time", "seed", "size", "integrator", "aov", "defines", "priority",
-                 "float", "tags", "frames", "max_workers", "max_units", "memory", "reference"});
+                 "float", "denoise", "tags", "frames", "max_workers", "max_units", "memory", "reference"});
   JobSpec spec;
   spec.spp = fields.whole("spp", 1, kMaxSpp);
   spec.target_error = fields.positive("target_error", kMaxTargetError);
@@ -176,6 +177,7 @@ Result<JobSpec> job_spec_of(const nlohmann::json& object) {
   read_defines(fields, spec);
   spec.priority = static_cast<int>(fields.integer("priority", -kMaxPriority, kMaxPriority).value_or(0));
   spec.float_output = fields.boolean("float").value_or(false);
+  spec.denoise = fields.boolean("denoise").value_or(false);
   spec.tags = fields.names("tags").value_or(spec.tags);
   read_frames(fields, spec);
   const auto some = [&](const char* key) -> std::optional<std::uint32_t> {

@@ -45,6 +45,9 @@ struct JobSpec {
   std::map<std::string, std::string> defines;  // Mitsuba's $name parameters
   int priority = 0;
   bool float_output = false;
+  // True: the image also has denoised layers (common/denoise/denoised_image.h). The coordinator makes them
+  // from the film, which gets the AOVs that this needs.
+  bool denoise = false;
   std::vector<std::string> tags;
   std::optional<FrameRange> frames;          // a sequence: one film per frame; absent: one image
   std::optional<std::uint32_t> max_workers;  // maximum number of workers at the same time

@@ -71,6 +71,8 @@ std::string threads_of(const Json& report) {
 std::string lesser_figures(const Json& report) {
   std::string out = fact("RMSE", figure(number(report, "rmse")), within(report, "rmse_ci95"));
   out += true_figures(report);
+  if (const Json& denoised = member(report, "denoised"); denoised.is_object() && denoised.contains("relmse"))
+    out += fact("relMSE, denoised", figure(number(denoised, "relmse")), within(denoised, "relmse_ci95"));
   out +=
       fact("Efficiency", figure(number(report, "efficiency")), "1 / (relMSE × seconds)" + threads_of(report));
   out += fact("Efficiency per core", figure(number(report, "efficiency_per_core")),

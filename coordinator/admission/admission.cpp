@@ -74,6 +74,8 @@ Result<void> check_spec(const JobSpec& spec) {
 // Sets the AOVs: those that the job requests and those that the scene requests.
 Result<void> choose_aovs(const Scene& scene, const JobSpec& spec, RenderSettings& settings) {
   std::vector<std::string> names = spec.aov;
+  if (spec.denoise)
+    for (std::string& name : names_of(aovs_of(AovKind::guide))) names.push_back(std::move(name));
   for (std::string_view rest = scene.aovs; !rest.empty();) {
     const auto end = std::min(rest.find(','), rest.size());
     names.emplace_back(rest.substr(0, end));

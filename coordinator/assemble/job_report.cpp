@@ -86,6 +86,23 @@ json point(const ConvergencePoint& p) {
   return j;
 }
 
+json denoised_of(const ReportFacts& facts) {
+  if (!facts.denoised) return {};
+  const DenoisedFigures& d = *facts.denoised;
+  if (d.by.empty()) return {{"error", d.trouble}};
+  json j{{"by", d.by},
+         {"seconds", number(d.seconds)},
+         {"rmse", number(d.error.rmse)},
+         {"rmse_ci95", {number(d.error.rmse_lo), number(d.error.rmse_hi)}},
+         {"relmse", number(std::max(0.0, d.error.relmse))},
+         {"relmse_ci95", {number(d.error.relmse_lo), number(d.error.relmse_hi)}}};
+  if (!d.true_error) return j;
+  j["true_rmse"] = number(d.true_error->rmse);
+  j["true_relmse"] = number(d.true_error->relmse);
+  j["true_relmse_stderr"] = number(d.true_error->relmse_stderr);
+  return j;
+}
+
 // Returns a forecast of the cost of reaching the job's target error. If there is none, or it is reached, the
 // forecast is for half of the present error.
 json forecast(const ReportFacts& facts) {
@@ -186,6 +203,10 @@ std::map<std::string, double> header_figures(const ReportFacts& facts) {
     put("true_rmse", reference_error->rmse);
     put("true_relmse", reference_error->relmse);
   }
+  if (facts.denoised && !facts.denoised->by.empty()) {
+    put("denoised_rmse", facts.denoised->error.rmse);
+    put("denoised_relmse", std::max(0.0, facts.denoised->error.relmse));
+  }
   return figures;
 }
 
@@ -193,6 +214,12 @@ std::map<std::string, std::string> header_notes(const ReportFacts& facts) {
   std::map<std::string, std::string> notes;
   if (facts.job.reference_same_seed) notes["reference_same_seed"] = kSameSeed;
   if (facts.job.fake) notes["fake"] = kFakePixels;
+  if (facts.denoised && !facts.denoised->by.empty()) {
+    const DenoisedError& e = facts.denoised->error;
+    notes["denoised_by"] = facts.denoised->by;
+    notes["denoised_rmse_ci95"] = fmt::format("{:.9g} {:.9g}", e.rmse_lo, e.rmse_hi);
+    notes["denoised_relmse_ci95"] = fmt::format("{:.9g} {:.9g}", e.relmse_lo, e.relmse_hi);
+  }
   const auto reference_error = last_reference_error(facts.convergence);
   if (!reference_error) return notes;
   std::string below = reference_error->rmse_below_noise() ? "rmse" : "";
@@ -270,6 +297,7 @@ std::string report_json(const ReportFacts& facts) {
   j["pixels_without_samples"] = facts.pixels_without_samples;
   j["error"] = text_or_null(job.error);
   j["adaptive"] = job.spec.target_error.has_value();
+  if (job.spec.denoise) j["denoised"] = denoised_of(facts);
   if (const std::string note = job.stopped ? note_on(*job.stopped) : ""; !note.empty()) j["note"] = note;
   return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }

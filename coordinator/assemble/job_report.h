@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/base/digest.h"
+#include "common/denoise/denoised_image.h"
 #include "common/image/error/convergence.h"
 #include "common/image/error/error_estimate.h"
 #include "common/image/film/film.h"
@@ -15,6 +16,15 @@
 #include "coordinator/store/jobs/job_store.h"
 
 namespace ls::coordinator {
+
+// The denoised image of a job, in figures.
+struct DenoisedFigures {
+  std::string by;       // name and version of the denoiser; empty: the image could not be denoised
+  std::string trouble;  // why not
+  DenoisedError error;
+  double seconds = 0;                   // that denoising took
+  std::optional<TrueError> true_error;  // against the job's reference
+};
 
 struct ReportFacts {
   StoredJob job;  // the job as stored, but with current totals
@@ -27,6 +37,7 @@ struct ReportFacts {
   std::vector<ConvergencePoint> convergence;
   std::string replay;                             // the job's replay_command()
   std::optional<ReferenceNoise> reference_noise;  // nullopt: unknown, or there is no reference
+  std::optional<DenoisedFigures> denoised;        // nullopt: not asked for, or not made yet
 };
 std::string report_json(const ReportFacts& facts);
 // Sets those facts that the film gives: samples, pixels without samples, and error.
@@ -40,10 +51,11 @@ struct Efficiency {
 };
 Efficiency efficiency_of(const ReportFacts& facts);
 // Returns numbers for the header of the final EXR besides those of the film: slope, efficiency,
-// efficiency_per_core, target_error, true_rmse, true_relmse, as far as they are known.
+// efficiency_per_core, target_error, true_rmse, true_relmse, denoised_relmse, denoised_rmse, as far as they
+// are known.
 std::map<std::string, double> header_figures(const ReportFacts& facts);
-// Returns texts for the header of the final EXR: true_below_noise, reference_same_seed and fake, if they
-// apply
+// Returns texts for the header of the final EXR: true_below_noise, reference_same_seed, fake, denoised_by,
+// denoised_relmse_ci95 and denoised_rmse_ci95, if they apply
 std::map<std::string, std::string> header_notes(const ReportFacts& facts);
 
 // Returns a note for an image that ended for another reason than having its samples; else an empty text.

@@ -107,6 +107,9 @@ Service::Service(Options options, std::shared_ptr<CollectedBlobs> blobs, std::sh
       start_(start),
       farm_(Farm::Options{lease_prefix(), options_.limits, options_.audit_rate, random_number()}),
       last_epoch_(start << 32),
+      denoising_(options_.denoise_threads > 0 ? options_.denoise_threads
+                                              : static_cast<int>(std::thread::hardware_concurrency()),
+                 options_.denoiser, options_.clock),
       hub_(std::make_unique<EventHub>([this](std::uint64_t n) { return store_->reserve("events", n); })) {}
 
 void Service::start_threads() {

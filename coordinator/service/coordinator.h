@@ -43,6 +43,8 @@ class Coordinator {
     ShareLimits limits;
     double audit_rate = 0.01;  // fraction of the results that another worker renders again
     std::shared_ptr<const Clock> clock;
+    int denoise_threads = 0;  // 0: one per core that this process may use
+    std::string denoiser;     // library of Open Image Denoise; empty: it is looked for
     // Time between two Tick events, which a thread of the coordinator raises. nullopt: there is no such
     // thread, and the caller calls tick()
     std::optional<Duration> tick;
@@ -74,7 +76,10 @@ class Coordinator {
   virtual Result<void> extend(const JobId& id, std::uint64_t spp) = 0;  // `spp`: the new total
   // The current image, or the final one
   virtual Result<std::vector<std::byte>> image_exr(const JobId& id) const = 0;
-  virtual Result<std::vector<std::byte>> image_png(const JobId& id, double exposure) const = 0;
+  // As an 8-bit picture; with `denoised`, of a job with JobSpec::denoise, the denoised image, also of a job
+  // that still renders. One image is denoised at a time, which takes seconds.
+  virtual Result<std::vector<std::byte>> image_png(const JobId& id, double exposure,
+                                                   bool denoised = false) const = 0;
   // False-colour maps of the error and of the samples (common/image/exr/maps.h).
   virtual Result<std::vector<std::byte>> error_png(const JobId& id) const = 0;
   virtual Result<std::vector<std::byte>> samples_png(const JobId& id) const = 0;

@@ -176,12 +176,39 @@ Result<void> Service::write_snapshot_now(const EntryPtr& entry) {
   return write_snapshot(entry, folded);
 }
 
+// Returns the denoised image of a job that asks for one, and puts its figures into the facts. Null if the job
+// asks for none or has no samples. Call without the lock: it takes seconds.
+std::shared_ptr<const Denoising::Denoised> Service::denoised(const Film& film, ReportFacts& facts) const {
+  if (!facts.job.spec.denoise || facts.samples == 0) return nullptr;
+  std::optional<Reference> reference;
+  if (facts.job.spec.reference && !facts.job.reference_same_seed)
+    if (auto read = load_reference(facts.job.spec, facts.job.settings.size, *blobs_))
+      reference = std::move(*read);
+  auto made = denoising_.of(film, reference);
+  facts.denoised = made->figures;
+  return made;
+}
+
+// Denoises the final image of a job ahead of finish(), on another thread than that of the writes.
+void Service::denoise_final(const EntryPtr& entry, std::uint64_t number) {
+  std::unique_lock lock(mutex_);
+  if (entry->finishing != number || !entry->assembly) return;
+  const Film film = entry->assembly->film();
+  ReportFacts facts = facts_locked(*entry);
+  lock.unlock();
+  auto made = denoised(film, facts);
+  lock.lock();
+  if (entry->finishing == number) entry->denoised = std::move(made);
+}
+
 // Writes the final image. Returns how many values it cannot represent.
-Result<std::uint64_t> Service::write_image(const Film& film, const ReportFacts& facts) {
+Result<std::uint64_t> Service::write_image(const Film& film, const ReportFacts& facts,
+                                           std::span<const float> denoised) {
   auto file = AtomicFile::create(folder(facts.job.id) / "image.exr");
   if (!file) return tl::unexpected(file.error());
   ImageFile sink(*file);
-  const auto clamped = write_final_exr(film, provenance_of(facts), facts.job.spec.float_output, sink);
+  const auto clamped =
+      write_final_exr(film, provenance_of(facts), facts.job.spec.float_output, sink, denoised);
   if (!clamped) return clamped;
   if (auto done = file->commit(); !done) return tl::unexpected(done.error());
   failpoint("image-written");
@@ -206,12 +233,20 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
   const JobFigures figures = farm_.job(entry->stored.id).value_or(JobFigures{});
   facts.job.totals.units = figures.units_done;
   facts.job.totals.units_planned = figures.units_total;
+  auto denoised_image = std::exchange(entry->denoised, nullptr);
   lock.unlock();
 
   if (on_disk()) {
     const auto written = [&]() -> Result<void> {
       const auto where = folder(facts.job.id);
-      const auto clamped = write_image(film, facts);
+      if (denoised_image)
+        facts.denoised = denoised_image->figures;
+      else
+        denoised_image = denoised(film, facts);
+      if (facts.denoised && facts.denoised->by.empty())
+        log_warn(fmt::format("job={}", facts.job.id.value), "no denoised layers: " + facts.denoised->trouble);
+      const auto clamped = write_image(
+          film, facts, denoised_image ? std::span(denoised_image->image.rgb) : std::span<const float>());
       if (!clamped) return tl::unexpected(clamped.error());
       facts.clamped_values = *clamped;
       facts.pixels = pixels_sha256(film);

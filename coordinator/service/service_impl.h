@@ -18,6 +18,7 @@
 #include <mutex>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -32,6 +33,7 @@
 #include "coordinator/domain/farm/farm.h"
 #include "coordinator/domain/limits.h"
 #include "coordinator/service/coordinator.h"
+#include "coordinator/service/denoising.h"
 #include "coordinator/service/eta.h"
 #include "coordinator/service/event_hub.h"
 #include "coordinator/store/blobs/collected_blobs.h"
@@ -58,6 +60,8 @@ struct JobEntry {
   std::optional<ReferenceTiles> reference_tiles;
   // Noise of the reference, from the last comparison; nullopt: unknown
   std::optional<ReferenceNoise> reference_noise;
+  // The denoised final image, until it is written; null: none is asked for, or it is not made yet
+  std::shared_ptr<const Denoising::Denoised> denoised;
   std::vector<ConvergencePoint> points;
   // Number of the current convergence curve. Points of an older curve, which had wrong or lost pixels, are
   // dropped
@@ -133,7 +137,7 @@ class Service final : public Coordinator {
   Result<void> set_priority(const JobId& id, int priority) override;
   Result<void> extend(const JobId& id, std::uint64_t spp) override;
   Result<std::vector<std::byte>> image_exr(const JobId& id) const override;
-  Result<std::vector<std::byte>> image_png(const JobId& id, double exposure) const override;
+  Result<std::vector<std::byte>> image_png(const JobId& id, double exposure, bool denoised) const override;
   Result<std::vector<std::byte>> error_png(const JobId& id) const override;
   Result<std::vector<std::byte>> samples_png(const JobId& id) const override;
   Result<std::string> report_json(const JobId& id) const override;
@@ -308,7 +312,8 @@ class Service final : public Coordinator {
   Result<void> write_snapshot_now(const EntryPtr& entry);
   void take_snapshot(const EntryPtr& entry);
   Result<SnapshotFile> copy_folded(const EntryPtr& entry);
-  Result<std::uint64_t> write_image(const Film& film, const ReportFacts& facts);
+  Result<std::uint64_t> write_image(const Film& film, const ReportFacts& facts,
+                                    std::span<const float> denoised);
   ReportFacts facts_locked(const JobEntry& entry) const;
   void add_point_locked(const EntryPtr& entry, const ConvergencePoint& point);
   void end_curve_locked(const EntryPtr& entry);
@@ -323,6 +328,8 @@ class Service final : public Coordinator {
                bool last);
   std::shared_ptr<const Reference> reference_of(const StoredJob& job);
   void after_comparisons(const EntryPtr& entry, std::function<void()> write);
+  std::shared_ptr<const Denoising::Denoised> denoised(const Film& film, ReportFacts& facts) const;
+  void denoise_final(const EntryPtr& entry, std::uint64_t number);
 
   // Results (service_results.cpp)
   void receive_result(const std::shared_ptr<Connection>& from, UnitResult result, std::function<void()> next);
@@ -393,6 +400,7 @@ class Service final : public Coordinator {
   TimePoint last_look_{};
   std::shared_ptr<const Reference> reference_;  // the reference image that the last comparison used
   Digest reference_digest_;
+  mutable Denoising denoising_;
   std::unique_ptr<EventHub> hub_;
   // This is the last member, so the threads are joined before anything that they use is destroyed
   std::vector<std::jthread> threads_;

@@ -47,6 +47,9 @@ Result<void> Service::room_for_locked(const std::string& owner, std::size_t jobs
 }
 
 tl::expected<JobId, Rejected> Service::submit(SubmitRequest request) {
+  if (request.spec.denoise)
+    if (const auto possible = denoising_.available(); !possible)
+      return tl::unexpected(Rejected{possible.error(), {}});
   if (request.spec.frames) return submit_sequence(request);
   const auto in_use = blobs_->in_use();
   auto admission = admit(request, *blobs_);

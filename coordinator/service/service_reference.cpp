@@ -97,10 +97,12 @@ void Service::compare(const EntryPtr& entry, std::uint64_t curve, double spp,
   });
 }
 
-// Runs `write` on the writer thread. If the job has a reference, `write` is queued behind the job's
-// comparisons that are still to be made.
+// Runs `write` on the writer thread. If the job has a reference or is to be denoised, `write` is queued
+// behind the job's comparisons that are still to be made, and behind denoising.
 void Service::after_comparisons(const EntryPtr& entry, std::function<void()> write) {
-  if (!entry->reference_tiles) return background_writes_.push(std::move(write));
+  const bool denoise = entry->stored.spec.denoise && on_disk();
+  if (!entry->reference_tiles && !denoise) return background_writes_.push(std::move(write));
+  if (denoise) comparisons_.push([this, entry, number = entry->finishing] { denoise_final(entry, number); });
   comparisons_.push([this, write = std::move(write)] { background_writes_.push(write); });
 }
 

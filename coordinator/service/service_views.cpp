@@ -114,6 +114,7 @@ JobView Service::view_locked(const JobEntry& entry) const {
   v.stopped = v.state == JobState::done && job.stopped ? std::string(to_string(*job.stopped)) : "";
   if (v.state == JobState::cancelled) v.stopped = to_string(StopReason::user);
   v.target_error = job.spec.target_error;
+  v.denoise = job.spec.denoise;
   v.error = job.error.empty() ? entry.trouble : job.error;
   v.warnings = job.warnings;
   v.fake = job.fake;
@@ -215,9 +216,11 @@ Result<std::vector<std::byte>> Service::image_exr(const JobId& id) const {
     lock.unlock();
     if (final_image) return read_file(folder(id) / "image.exr", std::uint64_t{1} << 33);
   }
-  const auto shown = picture(id);
+  auto shown = picture(id);
   if (!shown) return tl::unexpected(shown.error());
-  auto image = final_exr(shown->film, provenance_of(shown->facts), shown->facts.job.spec.float_output);
+  const auto made = denoised(shown->film, shown->facts);
+  auto image = final_exr(shown->film, provenance_of(shown->facts), shown->facts.job.spec.float_output,
+                         made ? std::span(made->image.rgb) : std::span<const float>());
   if (!image) return tl::unexpected(image.error());
   return std::move(image->exr);
 }
@@ -229,10 +232,17 @@ std::filesystem::path Service::final_file(const JobId& id, const std::string& na
   return folder(id) / name;
 }
 
-Result<std::vector<std::byte>> Service::image_png(const JobId& id, double exposure) const {
-  const auto shown = picture(id);
+Result<std::vector<std::byte>> Service::image_png(const JobId& id, double exposure, bool denoise) const {
+  auto shown = picture(id);
   if (!shown) return tl::unexpected(shown.error());
-  return preview_png(shown->film, exposure);
+  if (!denoise) return preview_png(shown->film, exposure);
+  if (!shown->facts.job.spec.denoise)
+    return fail(Errc::failed_precondition,
+                fmt::format("job {} was submitted without \"denoise\": it has no denoised image", id.value));
+  const auto made = denoised(shown->film, shown->facts);
+  if (!made) return preview_png(shown->film, exposure);  // without samples there is nothing to denoise
+  if (made->image.rgb.empty()) return fail(Errc::unavailable, made->figures.trouble);
+  return preview_png(shown->film, exposure, made->image.rgb);
 }
 
 Result<std::vector<std::byte>> Service::error_png(const JobId& id) const {
@@ -263,6 +273,8 @@ Result<std::string> Service::report_json(const JobId& id) const {
   if (!shown) return tl::unexpected(shown.error());
   ReportFacts& facts = shown->facts;
   facts.pixels = pixels_sha256(shown->film);
+  // While a job renders its report is asked for often, and is not to wait for a denoiser.
+  if (is_terminal(facts.job.state)) denoised(shown->film, facts);
   if (!facts.job.spec.float_output) facts.clamped_values = values_above_half(shown->film);
   return coordinator::report_json(facts);
 }

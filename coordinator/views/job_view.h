@@ -89,6 +89,7 @@ struct JobView {
   std::uint64_t spp = 0;  // samples per pixel: requested, or the limit
   bool spp_asked = true;  // false: no number of samples was requested; its target error or its time ends it
   std::optional<double> target_error;  // relMSE at which the job is to end, if requested
+  bool denoise = false;                // its image also gets denoised layers
   double spp_done = 0;                 // samples per pixel so far, mean over all pixels
   std::optional<ErrorFigures> error_now;
   // At the last checkpoint that was compared with the reference

@@ -52,6 +52,7 @@ json to_value(const JobView& v) {
          {"spp_asked", v.spp_asked ? json(v.spp) : json()},
          {"spp_done", number(v.spp_done)},
          {"target_error", v.target_error ? number(*v.target_error) : json()},
+         {"denoise", v.denoise},
          {"eta_seconds", v.eta_seconds ? number(*v.eta_seconds) : json()},
          {"eta_ci95", pair_or_null(v.eta_ci95)},
          {"eta_with_more", v.eta_with_more ? json{{"workers", kMoreWorkers},

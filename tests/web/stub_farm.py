@@ -20,7 +20,7 @@ TOKEN = "let-there-be-light"
 
 def job(id="j-1", name="steam.xml", state="running", **more):
     return {"id": id, "name": name, "state": state, "stopped": "", "progress": 0.25, "spp": 64, "spp_done": 16, "rmse": 0.05, "relmse": 0.01,
-            "relmse_ci95": [0.009, 0.011], "target_error": None, "eta_seconds": 42, "error": "", "warnings": [], "size": [64, 48], "tile": 32,
+            "relmse_ci95": [0.009, 0.011], "target_error": None, "denoise": False, "eta_seconds": 42, "error": "", "warnings": [], "size": [64, 48], "tile": 32,
             "priority": 0, "owner": "", "units_done": 6, "units_total": 24, "elapsed_seconds": 14, "core_seconds": 28, "submitted_unix": 1765000000,
             "health": {"clean": True, "nonfinite": 0, "negative": 0, "majorant_violations": 0, "causes": []}, **more}
 

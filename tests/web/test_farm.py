@@ -18,7 +18,8 @@ def real_farm(tmp_path):
         pytest.skip(str(missing))
     folder = tmp_path / "farm"
     folder.mkdir()
-    with LocalFarm(folder, bin) as farm:
+    stand_in = bin.parent / "fake_oidn" / "blurs.so"  # for Open Image Denoise
+    with LocalFarm(folder, bin, environment={"LIGHTSHAFT_OIDN": str(stand_in)}) as farm:
         yield farm
 
 
@@ -184,6 +185,24 @@ def test_the_maps_come_from_the_farm(real_farm, page):
 
     assert found["error"][0] == 96 and found["error"][1] > 16, "noise differs from pixel to pixel"
     assert found["samples"] == [96, 1], "every pixel has 16 samples"
+
+
+def test_the_denoised_picture_is_offered_where_there_is_one(real_farm, page):
+    real_farm.add_worker()
+    jobs = {asked: real_farm.submit(SCENE, spp=16, denoise=asked) for asked in ("true", "false")}
+    for job in jobs.values():
+        real_farm.wait_for_job(job)
+    picture = "document.querySelector('live-image canvas').toDataURL()"
+    page.evaluate(f"void (location.hash = '#/jobs/{jobs['true']}')")
+    page.wait("document.querySelector('live-image')?.dataset.painted")
+    plain = page.evaluate(picture)
+
+    page.click(".image-tools [value=denoised]")
+    page.wait(f"{picture} !== {json.dumps(plain)}")
+    assert page.evaluate("document.querySelector('.image-tools input[type=range]') !== null"), "with its exposure"
+
+    page.evaluate(f"void (location.hash = '#/jobs/{jobs['false']}')")
+    page.wait("document.querySelector('.image-tools') && !document.querySelector('.image-tools [value=denoised]')")
 
 
 @pytest.mark.parametrize("width", [1280, 375])

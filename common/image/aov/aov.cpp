@@ -15,6 +15,8 @@ namespace {
 constexpr std::array<AovRow, kAovs> kAovRows = {{
     {Aov::albedo, "albedo", AovKind::of_all, "RGB", true},
     {Aov::coverage, "coverage", AovKind::of_all, "A", true},
+    {Aov::denoising_albedo, "denoising_albedo", AovKind::guide, "RGB", true},
+    {Aov::denoising_normal, "denoising_normal", AovKind::guide, "XYZ", true},
     {Aov::depth, "depth", AovKind::of_hits, "Z", false},
     {Aov::direct, "direct", AovKind::light, "RGB", true},
     {Aov::emission, "emission", AovKind::light, "RGB", true},
@@ -123,11 +125,18 @@ AovPlanes planes_of(AovSet set) {
       out.ids.push_back(row.aov);
       continue;
     }
-    for (std::size_t c = 0; c < row.components.size(); ++c)
-      out.sums.push_back(
-          {fmt::format("aov.{}.{}", row.name, row.components[c]), row.aov, static_cast<int>(c), false});
+    for (std::size_t c = 0; c < row.components.size(); ++c) {
+      const char letter = row.components[c];
+      const auto component = static_cast<int>(c);
+      if (row.kind != AovKind::guide)
+        out.sums.push_back({fmt::format("aov.{}.{}", row.name, letter), row.aov, component});
+      else
+        for (const int half : {0, 1})
+          out.sums.push_back(
+              {fmt::format("aov.{}.{}.{}", row.name, "AB"[half], letter), row.aov, component, half});
+    }
   }
-  if (set.any_of(aovs_of(AovKind::of_hits))) out.sums.push_back({"aov.hits", Aov::depth, 0, true});
+  if (set.any_of(aovs_of(AovKind::of_hits))) out.sums.push_back({"aov.hits", Aov::depth, 0, 0, true});
   std::sort(out.sums.begin(), out.sums.end(),
             [](const AovPlane& a, const AovPlane& b) { return a.name < b.name; });
   for (std::size_t i = 0; i < out.sums.size(); ++i) {

@@ -22,6 +22,8 @@ inline constexpr int kPartialChannels = 6;
 enum class Aov : std::uint8_t {
   albedo,
   coverage,
+  denoising_albedo,
+  denoising_normal,
   depth,
   direct,
   emission,
@@ -37,13 +39,14 @@ enum class Aov : std::uint8_t {
   uv,
   volume
 };
-inline constexpr std::size_t kAovs = 16;
+inline constexpr std::size_t kAovs = 18;
 
 // The type of an AOV's values, and the divisor of their mean.
 enum class AovKind {
   of_hits,  // sums over the samples that hit a surface; the mean is over these
   of_all,   // sums over the samples that hit a surface; the mean is over all samples: a miss counts as 0
   light,    // components of the radiance; the mean is over all samples
+  guide,    // for a denoiser: sums over all samples, separately for the two halves of the samples
   ids       // identifiers, each with its number of samples
 };
 
@@ -82,9 +85,10 @@ std::string known_aovs();                       // "albedo, coverage, ..."
 
 // One plane of sums: a component of an AOV, or the number of samples that hit a surface.
 struct AovPlane {
-  std::string name;      // the partial's channel: "aov.albedo.B", "aov.hits"
+  std::string name;      // the partial's channel: "aov.albedo.B", "aov.denoising_albedo.A.B", "aov.hits"
   Aov aov = Aov::depth;  // unused for hits
   int component = 0;     // in the row's order
+  int half = 0;          // of a guide: 0 for A, 1 for B; otherwise 0, for both together
   bool hits = false;
 };
 struct AovPlanes {

@@ -29,8 +29,9 @@ class Layers {
   explicit Layers(const Film& film)
       : film_(film), frame_(film.grid().frame), planes_(planes_of(film.aovs())) {
     sums_.assign(planes_.sums.size(), {});
+    // The hits and half B of a guide have no layer of their own.
     for (std::size_t p = 0; p < sums_.size(); ++p)
-      if (p != planes_.hits) sums_[p].resize(pixels_of(frame_));
+      if (p != planes_.hits && planes_.sums[p].half == 0) sums_[p].resize(pixels_of(frame_));
     ids_.assign(planes_.ids.size() * 2 * kCryptomatteRanks, std::vector<float>(pixels_of(frame_)));
   }
 
@@ -46,7 +47,7 @@ class Layers {
   std::uint64_t move_to(ExrPicture& picture, const CryptomatteManifests& manifests, bool float_output) {
     std::uint64_t clamped = 0;
     for (std::size_t p = 0; p < sums_.size(); ++p) {
-      if (p == planes_.hits) continue;
+      if (sums_[p].empty()) continue;
       const AovRow& row = row_of(planes_.sums[p].aov);
       const std::string name = fmt::format(
           "{}.{}", layer_of(row.aov), row.components[static_cast<std::size_t>(planes_.sums[p].component)]);
@@ -73,12 +74,17 @@ class Layers {
     const auto n = static_cast<std::size_t>(tile.rect.pixels());
     const double* hits = planes_.hits == SIZE_MAX ? nullptr : &tile.sums[planes_.hits * n];
     for (std::size_t p = 0; p < sums_.size(); ++p) {
-      if (p == planes_.hits) continue;
-      const bool by_hits = row_of(planes_.sums[p].aov).kind == AovKind::of_hits;
+      if (sums_[p].empty()) continue;
+      const AovRow& row = row_of(planes_.sums[p].aov);
+      const bool by_hits = row.kind == AovKind::of_hits;
+      // The planes of half B of a guide follow those of A.
+      const double* other =
+          row.kind == AovKind::guide ? &tile.sums[(p + row.components.size()) * n] : nullptr;
       each_pixel(tile.rect, frame_, [&](std::size_t to, std::size_t from) {
         const double count = by_hits ? hits[from] : static_cast<double>(tile.spp);
+        const double sum = tile.sums[p * n + from] + (other ? other[from] : 0);
         // Maps -0 to +0; everything else is unchanged.
-        if (count > 0) sums_[p][to] = static_cast<float>(tile.sums[p * n + from] / count) + 0.f;
+        if (count > 0) sums_[p][to] = static_cast<float>(sum / count) + 0.f;
       });
     }
   }

@@ -20,7 +20,7 @@ namespace {
 
 constexpr const char* kColours[3] = {"R", "G", "B"};
 constexpr const char* kErrors[3] = {"stderr.R", "stderr.G", "stderr.B"};
-constexpr std::size_t kMaxLayers = 128;  // all AOVs together give 68
+constexpr std::size_t kMaxLayers = 128;  // all AOVs together give 74, denoising 3 more
 
 tl::unexpected<Error> bad(const std::string& name, const std::string& what) {
   return fail(Errc::invalid_argument, fmt::format("{}: {}", name, what));

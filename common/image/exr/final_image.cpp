@@ -156,6 +156,26 @@ std::map<std::string, std::string> strings_of(const Film& film, const Provenance
   return strings;
 }
 
+// Adds the layers of the denoised image in one row of tiles. Returns the number of clamped values.
+std::uint64_t add_denoised(std::span<const float> denoised, const TileGrid& grid, int row, bool float_output,
+                           ExrPicture& band) {
+  const auto width = static_cast<std::size_t>(grid.frame.width);
+  const auto first = static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.tile) * width;
+  const std::size_t pixels = static_cast<std::size_t>(band.size.height) * width;
+  std::uint64_t clamped = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::vector<float> plane(pixels);
+    for (std::size_t i = 0; i < pixels; ++i) plane[i] = pixel_value(double{denoised[3 * (first + i) + c]});
+    const std::string name = fmt::format("denoised.{}", "RGB"[c]);
+    if (!float_output) clamped += clamp_to_half(plane);
+    if (float_output)
+      band.channels[name] = ExrFloat{std::move(plane)};
+    else
+      band.channels[name] = ExrHalf{std::move(plane)};
+  }
+  return clamped;
+}
+
 class MemorySink final : public ByteSink {
  public:
   Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) override {
@@ -170,19 +190,24 @@ class MemorySink final : public ByteSink {
 }  // namespace
 
 Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& from, bool float_output,
-                                      ByteSink& sink) {
+                                      ByteSink& sink, std::span<const float> denoised) {
   std::uint64_t clamped = 0;
   const ExrBands bands{film.grid().frame, strings_of(film, from), [&](int row) {
                          if (row == 0) clamped = 0;  // the bands are requested twice
-                         return final_layers(film.row(row), from.manifests, float_output, &clamped);
+                         ExrPicture band =
+                             final_layers(film.row(row), from.manifests, float_output, &clamped);
+                         if (!denoised.empty())
+                           clamped += add_denoised(denoised, film.grid(), row, float_output, band);
+                         return band;
                        }};
   if (auto written = write_sealed_exr(bands, sink); !written) return tl::unexpected(written.error());
   return clamped;
 }
 
-Result<FinalImage> final_exr(const Film& film, const Provenance& from, bool float_output) {
+Result<FinalImage> final_exr(const Film& film, const Provenance& from, bool float_output,
+                             std::span<const float> denoised) {
   MemorySink sink;
-  const auto clamped = write_final_exr(film, from, float_output, sink);
+  const auto clamped = write_final_exr(film, from, float_output, sink, denoised);
   if (!clamped) return tl::unexpected(clamped.error());
   return FinalImage{std::move(sink.bytes), *clamped};
 }

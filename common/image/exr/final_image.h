@@ -58,13 +58,15 @@ struct FinalImage {
 ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
                         std::uint64_t* clamped = nullptr);
 // Makes the final EXR, also of an unfinished film. Its layers are half (or with `float_output` float) R, G,
-// B, FLOAT stderr.R, stderr.G, stderr.B, UINT spp, and the film's AOVs; all are sealed in `lightshaft:seal`
-// (seal.h).
-Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output);
+// B, FLOAT stderr.R, stderr.G, stderr.B, UINT spp, the film's AOVs, and denoised.R, denoised.G, denoised.B if
+// `denoised` is not empty: the denoised image, interleaved RGB of the whole frame, row by row. All are sealed
+// in `lightshaft:seal` (seal.h).
+Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output,
+                             std::span<const float> denoised = {});
 // Writes the same bytes to `sink`, one row of tiles at a time, so that a large image is never in memory as a
 // whole. Returns the number of clamped values.
 Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& provenance, bool float_output,
-                                      ByteSink& sink);
+                                      ByteSink& sink, std::span<const float> denoised = {});
 
 // Returns the header strings about the error, by full name, of an image whose tiles have the sums `sums`;
 // `lightshaft:verdict` is based on the pixels only. There are none without samples.
@@ -94,7 +96,9 @@ std::array<std::uint8_t, 3> srgb8(const double* rgb, double scale);
 Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::uint8_t> rgb);
 
 // Returns a PNG of the film's means times 2^exposure_stops in 8-bit sRGB. NaN is magenta; tiles without
-// samples show a dark checkerboard.
-Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops);
+// samples show a dark checkerboard. If `denoised` is not empty (as for final_exr), its pixels are shown
+// instead of the film's.
+Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops,
+                                           std::span<const float> denoised = {});
 
 }  // namespace ls

@@ -24,19 +24,18 @@ std::array<double, 255> srgb_steps() {
   return out;
 }
 
-void draw_tile(const Film& film, TileIndex index, double scale, png_byte* image) {
+void draw_tile(const Film& film, TileIndex index, double scale, std::span<const float> denoised,
+               png_byte* image) {
   const TilePixels tile = film.pixels(index);
   const auto width = static_cast<std::size_t>(film.grid().frame.width);
   std::size_t from = 0;
   for (int y = tile.rect.y0; y < tile.rect.y1; ++y) {
-    png_byte* to = image + (static_cast<std::size_t>(y) * width + static_cast<std::size_t>(tile.rect.x0)) * 3;
-    for (int x = tile.rect.x0; x < tile.rect.x1; ++x, to += 3, from += 3) {
-      const double* v = &tile.mean[from];
-      if (tile.spp == 0) {
-        std::copy_n(kEmpty[(x / kChecker + y / kChecker) % 2].begin(), 3, to);
-      } else {
-        std::copy_n(srgb8(v, scale).begin(), 3, to);
-      }
+    std::size_t at = (static_cast<std::size_t>(y) * width + static_cast<std::size_t>(tile.rect.x0)) * 3;
+    for (int x = tile.rect.x0; x < tile.rect.x1; ++x, at += 3, from += 3) {
+      std::array<double, 3> rgb = {tile.mean[from], tile.mean[from + 1], tile.mean[from + 2]};
+      if (!denoised.empty()) std::copy_n(&denoised[at], 3, rgb.begin());
+      const auto shown = tile.spp == 0 ? kEmpty[(x / kChecker + y / kChecker) % 2] : srgb8(rgb.data(), scale);
+      std::copy(shown.begin(), shown.end(), image + at);
     }
   }
 }
@@ -68,7 +67,8 @@ Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::ui
   return png;
 }
 
-Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops) {
+Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops,
+                                           std::span<const float> denoised) {
   if (!(std::abs(exposure_stops) <= kMaxStops))
     return fail(Errc::invalid_argument, fmt::format("exposure: {} stops; from -{} to {} are possible",
                                                     exposure_stops, kMaxStops, kMaxStops));
@@ -76,7 +76,7 @@ Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_sto
   std::vector<png_byte> pixels(static_cast<std::size_t>(frame.width) *
                                static_cast<std::size_t>(frame.height) * 3);
   for (TileIndex t = 0; t < film.grid().count(); ++t)
-    draw_tile(film, t, std::exp2(exposure_stops), pixels.data());
+    draw_tile(film, t, std::exp2(exposure_stops), denoised, pixels.data());
   return write_png(frame, pixels);
 }
 

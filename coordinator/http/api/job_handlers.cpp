@@ -178,7 +178,10 @@ Response get_image_png(Api& api, const Request& request, const Params& params) {
     if (error != std::errc{} || end != text->data() + text->size() || !(std::abs(exposure) <= kMaxExposure))
       return problem(400, fmt::format("'exposure' must be a number of stops from -{0} to {0}", kMaxExposure));
   }
-  auto image = api.coordinator().image_png(*id, exposure);
+  const auto layer = request.parameter("layer");
+  if (layer && *layer != "denoised")
+    return problem(400, "'layer' must be \"denoised\", or be left out for the image itself");
+  auto image = api.coordinator().image_png(*id, exposure, layer.has_value());
   return image ? file_response("image/png", std::move(*image), id->value + ".png") : problem(image.error());
 }
 

@@ -59,7 +59,7 @@ std::optional<Result<Json>> parse_value(std::string_view key, std::string_view t
   if (key == "integrator" || key == "frames" || key == "reference")
     return Result<Json>(Json(std::string(text)));
   if (key == "aov" || key == "tags") return Result<Json>(parse_list(text));
-  if (key == "float") {
+  if (key == "float" || key == "denoise") {
     if (text == "true" || text == "1") return Result<Json>(Json(true));
     if (text == "false" || text == "0") return Result<Json>(Json(false));
     return Result<Json>(wrong(key, text, "true or false"));
@@ -100,7 +100,7 @@ Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, cons
           Errc::invalid_argument,
           fmt::format(
               "unknown query parameter '{}'; known: {}{}spp, target_error, time, seed, size, integrator, "
-              "aov, define, priority, float, tags, frames, max_workers, max_units, memory, "
+              "aov, define, priority, float, denoise, tags, frames, max_workers, max_units, memory, "
               "reference",
               key, also, also.empty() ? "" : ", "));
     if (!*value) return tl::unexpected(value->error());

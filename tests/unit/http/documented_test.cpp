@@ -33,6 +33,8 @@ TEST(Documented, AreAllFiguresOfAReport) {
   facts.job.spec.target_error = 1e-3;
   facts.job.spec.reference = sha256("reference");
   facts.job.stopped = StopReason::error;
+  facts.job.spec.denoise = true;
+  facts.denoised = coordinator::DenoisedFigures{"Open Image Denoise 2.5.1", "", {}, 1, TrueError{}};
   facts.error = ImageError{};
   for (const double spp : {2., 4., 8., 16.}) {
     coordinator::ConvergencePoint point{spp, spp, spp, {1, .1 / spp, .05 / spp, .2 / spp, .9, 1.1}};

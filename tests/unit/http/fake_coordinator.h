@@ -161,13 +161,15 @@ class FakeCoordinator final : public Coordinator {
     if (auto found = job(id); !found) return tl::unexpected(found.error());
     return std::vector<std::byte>(exr_bytes, std::byte{7});
   }
-  Result<std::vector<std::byte>> image_png(const JobId& id, double exposure) const override {
+  Result<std::vector<std::byte>> image_png(const JobId& id, double exposure, bool denoised) const override {
     if (auto found = job(id); !found) return tl::unexpected(found.error());
     if (slow_image != nullptr) slow_image(exposure);
     return std::vector<std::byte>(static_cast<std::size_t>(10 + exposure), std::byte{1});
   }
-  Result<std::vector<std::byte>> error_png(const JobId& id) const override { return image_png(id, 1); }
-  Result<std::vector<std::byte>> samples_png(const JobId& id) const override { return image_png(id, 2); }
+  Result<std::vector<std::byte>> error_png(const JobId& id) const override { return image_png(id, 1, false); }
+  Result<std::vector<std::byte>> samples_png(const JobId& id) const override {
+    return image_png(id, 2, false);
+  }
   Result<std::string> report_json(const JobId& id) const override { return text_of(id, "{\"spp\":16}"); }
   Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const override {
     if (auto found = job(id); !found) return tl::unexpected(found.error());

@@ -157,7 +157,8 @@ class FakeFarm {
   UnitResult render_unit(const Lease& lease, const LeaseUnit& unit) {
     const JobBrief& brief = briefs_.at(lease.job);
     const Partial partial =
-        fake_partial({brief.scene, brief.settings_digest, sha256("fake class"), unit.rect, unit.samples});
+        fake_partial({brief.scene, brief.settings_digest, sha256("fake class"), unit.rect, unit.samples},
+                     aovs_of(brief.settings));
     UnitResult r;
     r.unit = {lease.job, unit.tile, unit.round};
     r.lease = lease.id;
@@ -174,7 +175,8 @@ class FakeFarm {
   void falsify(UnitResult& result, const LeaseUnit& unit) {
     const JobBrief& brief = briefs_.at(result.unit.job);
     Partial partial =
-        fake_partial({brief.scene, brief.settings_digest, sha256("fake class"), unit.rect, unit.samples});
+        fake_partial({brief.scene, brief.settings_digest, sha256("fake class"), unit.rect, unit.samples},
+                     aovs_of(brief.settings));
     partial.sums[0] += 1;
     result.exr = encode_partial(partial, brief.settings.size).value();
     result.digest = unit_digest(partial);

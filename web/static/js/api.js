@@ -48,8 +48,11 @@ export const api = {
   report: async (id) => (await call("GET", `${jobPath(id)}/report`)).json(),
   workers: async () => (await (await call("GET", "/workers")).json()).workers,
   setState: (id, state) => call("PATCH", jobPath(id), json({ state })),
-  image: async (id, exposure, signal) =>
-    createImageBitmap(await (await call("GET", `${jobPath(id)}/image.png?exposure=${exposure}`, { signal })).blob()),
+  /** layer: "picture" or "denoised". */
+  image: async (id, exposure, layer, signal) => {
+    const query = `exposure=${exposure}${layer === "denoised" ? "&layer=denoised" : ""}`;
+    return createImageBitmap(await (await call("GET", `${jobPath(id)}/image.png?${query}`, { signal })).blob());
+  },
   /** kind: "error" or "samples". */
   map: async (id, kind, signal) => createImageBitmap(await (await call("GET", `${jobPath(id)}/${kind}.png`, { signal })).blob()),
   missingBlobs: async (digests) => (await (await call("POST", "/blobs/missing", json({ digests }))).json()).missing,

@@ -16,7 +16,8 @@ export function makeJobActions({ get, set, attempt, api }) {
     confirm: (id) => set(withUi(get(), { confirming: id })),
     image: (exposure, signal) => {
       const { shown, layer } = get().open;
-      return layer === "picture" ? api.image(shown, exposure, signal) : api.map(shown, layer, signal);
+      if (layer === "picture" || layer === "denoised") return api.image(shown, exposure, layer, signal);
+      return api.map(shown, layer, signal);
     },
     setLayer: (layer) => set(withOpen(get(), { layer })),
     setClock: (clock) => set(withOpen(get(), { clock, picked: null })),

@@ -39,7 +39,7 @@ export const openJob = (id, shown = id) => ({
   folds: 0, // grows with every fold: the image has changed
   exposure: 0,
   showTiles: true,
-  layer: "picture", // over the image: "error", "samples"
+  layer: "picture", // or "denoised"; over the image: "error", "samples"
   clock: "seconds", // of the plot: "core_seconds"
   picked: null, // point of the plot under the pointer
   problem: null, // why it can't be shown

@@ -27,8 +27,8 @@ constexpr AovSet kOfLight = AovSet{}
                                 .with(Aov::single)
                                 .with(Aov::surface)
                                 .with(Aov::volume);
-static_assert((kOfSurface.bits() & kOfLight.bits()) == 0 &&
-              (kOfSurface.bits() | kOfLight.bits()) == (1u << kAovs) - 1);
+constexpr AovSet kOfGuide = AovSet{}.with(Aov::denoising_albedo).with(Aov::denoising_normal);
+static_assert((kOfSurface.bits() ^ kOfLight.bits() ^ kOfGuide.bits()) == (1u << kAovs) - 1);
 
 V2 uv_of_sphere(const Geometry& g, const SurfaceHit& hit) {
   const Sphere& s = g.spheres[hit.primitive.index];
@@ -59,7 +59,8 @@ AovPixel::AovPixel(const World& world)
     : world_(world),
       planes_(planes_of(world.aovs)),
       wants_surface_(world.aovs.any_of(kOfSurface)),
-      wants_light_(world.aovs.any_of(kOfLight)) {}
+      wants_light_(world.aovs.any_of(kOfLight)),
+      wants_guide_(world.aovs.any_of(kOfGuide)) {}
 
 void AovPixel::begin_pixel() {
   sums_ = {};
@@ -68,8 +69,8 @@ void AovPixel::begin_pixel() {
   materials_.clear();
 }
 
-void AovPixel::add(Aov aov, double a, double b, double c) {
-  Sums& s = sums_[static_cast<std::size_t>(aov)];
+void AovPixel::add(Aov aov, double a, double b, double c, std::size_t half) {
+  Sums& s = sums_[half][static_cast<std::size_t>(aov)];
   s[0] += a;
   s[1] += b;
   s[2] += c;
@@ -77,12 +78,14 @@ void AovPixel::add(Aov aov, double a, double b, double c) {
 
 void AovPixel::end_sample(int x, int y, std::uint64_t sample, bool usable) {
   if (wants_light_ && usable) add_light();
-  if (!wants_surface_) return;
+  if (!wants_surface_ && !wants_guide_) return;
   x += world_.origin_x;
   y += world_.origin_y;
   const SampleStream stream(world_.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y),
                             sample);
   const CameraRay ray = camera_ray(world_, stream, x, y);
+  if (wants_guide_) add_guide(ray, stream, sample & 1);
+  if (!wants_surface_) return;
   const auto first = PathTracer<Features{.passing = true}>(world_, stream).first_surface(ray);
   if (first) add_surface(*first, stream, ray);
 }
@@ -133,6 +136,13 @@ void AovPixel::add_surface(const FirstSurface& first, const SampleStream& stream
   if (wanted.has(Aov::material_id)) add_id(materials_, world_.material_ids[hit.surface]);
 }
 
+void AovPixel::add_guide(const CameraRay& ray, const SampleStream& stream, std::size_t half) {
+  const DenoisingGuide guide = PathTracer<kEveryScene>(world_, stream).denoising_guide(ray);
+  if (const C3& a = guide.albedo; is_finite(a)) add(Aov::denoising_albedo, a.x, a.y, a.z, half);
+  const V3d& n = guide.normal;
+  if (std::isfinite(n.x + n.y + n.z)) add(Aov::denoising_normal, n.x, n.y, n.z, half);
+}
+
 void AovPixel::add_id(std::vector<IdSlot>& seen, float id) {
   const auto known = std::find_if(seen.begin(), seen.end(), [&](const IdSlot& s) { return s.id == id; });
   if (known != seen.end())
@@ -144,9 +154,10 @@ void AovPixel::add_id(std::vector<IdSlot>& seen, float id) {
 void AovPixel::store(float* planes, std::size_t pixels, std::size_t i) const {
   for (std::size_t p = 0; p < planes_.sums.size(); ++p) {
     const AovPlane& plane = planes_.sums[p];
-    const double sum =
-        plane.hits ? hits_
-                   : sums_[static_cast<std::size_t>(plane.aov)][static_cast<std::size_t>(plane.component)];
+    const double sum = plane.hits
+                           ? hits_
+                           : sums_[static_cast<std::size_t>(plane.half)][static_cast<std::size_t>(plane.aov)]
+                                  [static_cast<std::size_t>(plane.component)];
     planes[p * pixels + i] = rounded(sum);
   }
   float* ids = planes + planes_.sums.size() * pixels + i;

@@ -33,16 +33,18 @@ class AovPixel {
 
  private:
   using Sums = std::array<double, 3>;
-  void add(Aov aov, double a, double b = 0, double c = 0);
+  void add(Aov aov, double a, double b = 0, double c = 0, std::size_t half = 0);
   void add_light();
   void add_surface(const FirstSurface& first, const SampleStream& stream, const CameraRay& ray);
+  void add_guide(const CameraRay& ray, const SampleStream& stream, std::size_t half);
   void add_id(std::vector<IdSlot>& seen, float id);
 
   const World& world_;
   AovPlanes planes_;
-  bool wants_surface_, wants_light_;
+  bool wants_surface_, wants_light_, wants_guide_;
   LightSplit split_;
-  std::array<Sums, kAovs> sums_{};
+  // Sums of both halves of the samples. Of guides, [0] is half A and [1] is half B; of others, all is in [0].
+  std::array<std::array<Sums, kAovs>, 2> sums_{};
   double hits_ = 0;
   std::vector<IdSlot> shapes_, materials_;
 };

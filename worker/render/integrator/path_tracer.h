@@ -51,6 +51,12 @@ struct FirstSurface {
   float not_passed = 1;
 };
 
+// What a denoiser is told about a camera ray (docs/reference/aovs.md: denoising_albedo, denoising_normal).
+struct DenoisingGuide {
+  C3 albedo{0, 0, 0};
+  V3d normal{0, 0, 0};
+};
+
 enum class Collision : std::uint8_t {
   escaped,    // the path reached the end of the segment
   absorbed,   // the path ends here
@@ -72,6 +78,8 @@ class PathTracer {
   // The first surface at which the path would be scattered if there were no media. The AOVs describe this
   // surface.
   std::optional<FirstSurface> first_surface(const CameraRay& ray);
+  // Follows the ray through boundaries, mirrors and clear glass to the first surface that is neither.
+  DenoisingGuide denoising_guide(const CameraRay& ray);
 
  private:
   friend class Light<F>;
@@ -254,6 +262,55 @@ std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay&
     ray_.origin = offset_point(hit, ray_.d);
   }
   return std::nullopt;
+}
+
+// The media on the way count with the share of the ray that they scatter or absorb: their albedo instead of
+// that of the surface behind, and no normal. This share is a transmittance, exact in homogeneous media, and
+// not the random decision of a flight: noisy guides make a denoiser keep noise.
+template <Features F, template <Features> class Light>
+DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
+  constexpr int kGuideSegments = 16;
+  DenoisingGuide guide;
+  double unscattered = 1;
+  ray_ = {ray.o, ray.o, ray.d};
+  medium_ = start_medium();
+  float reach = ray.t_max;
+  for (segment_ = 0; segment_ < kGuideSegments; ++segment_, reach = kInfinity) {
+    SurfaceHit hit;
+    const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, reach);
+    const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
+    if (met && world_.coincident) prefer_scatterer(hit, ray_.origin, ray_.d, kInfinity);
+    if (medium_.any()) {
+      const float t = met ? ray_.length_to(hit) : reach;
+      RandomStream tracker = stream_.stream(segment_, Purpose::track_guide);
+      const C3 through = through_media(medium_, ray_.start, ray_.d, t, tracker);
+      const V3 middle = std::isfinite(t) ? ray_.start + ray_.d * (t / 2) : ray_.start;
+      guide.albedo += beta_ * (C3(1) - through) * world_.media[medium_.one()].albedo_at(middle);
+      beta_ *= through;
+      unscattered *= double{mean(through)};
+    }
+    if (!met || is_black(beta_)) break;
+    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    if (surface.null || (surface.null_transmission && passes_null(hit))) {
+      pass_boundary(hit, surface);
+      continue;
+    }
+    const Group g = stream_.group(segment_, Purpose::guide);
+    const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), hit.shading.to_local(-ray_.d), g.u(2),
+                                       {g.u(0), g.u(1)});
+    if (!s) break;
+    // Refraction brightens radiance by eta^2, which is no property of the surface behind.
+    beta_ *= s->weight * (s->transmitted ? s->eta * s->eta : 1.f);
+    if (!s->delta) {
+      guide.albedo += beta_;
+      guide.normal = V3d(hit.shading.n) * (dot(hit.shading.n, ray_.d) > 0 ? -unscattered : unscattered);
+      break;
+    }
+    const V3 w = normalize(hit.shading.to_world(s->wi));
+    medium_ = beyond(hit, surface, w, ray_.d, medium_);
+    ray_.leave(hit, w);
+  }
+  return guide;
 }
 
 // Next-event estimation at a surface; wo is the direction back along the path, in the local frame.

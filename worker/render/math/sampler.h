@@ -30,6 +30,8 @@ enum class Purpose : std::uint32_t {
   overlap,
   overlap_emission,
   albedo,
+  guide,
+  track_guide,
   end  // not a purpose: their number
 };
 

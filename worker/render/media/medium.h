@@ -72,6 +72,14 @@ struct Medium {
     }
     return s;
   }
+  // The single-scattering albedo at the world point p; 0 in a channel without extinction.
+  C3 albedo_at(const V3& p) const {
+    const C3 s = grid ? scattering_at(p) : sigma_s;
+    C3 a(0);
+    for (int k = 0; k < 3; ++k)
+      if (sigma_t[k] > 0) a[k] = s[k] / sigma_t[k];
+    return a;
+  }
 };
 
 struct Flight {

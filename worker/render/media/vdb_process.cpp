@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -11,75 +10,20 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
-#include <string_view>
 #include <utility>
-#include <vector>
 
+#include "common/base/helper_program.h"
 #include "worker/render/media/vdb_reply.h"
 #include "worker/render/media/vdb_validate.h"
-
-extern char** environ;
 
 namespace ls::render {
 namespace {
 
-tl::unexpected<Error> no_program(const std::string& what, int error) {
-  return fail(Errc::internal, fmt::format("cannot read OpenVDB files: {}: {}", what, std::strerror(error)));
+tl::unexpected<Error> no_program(const std::string& why) {
+  return fail(Errc::internal, "cannot read OpenVDB files: " + why);
 }
-
-// An open file descriptor, closed by the destructor.
-struct Descriptor {
-  explicit Descriptor(int opened) : fd(opened) {}
-  ~Descriptor() {
-    if (fd >= 0) ::close(fd);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  const int fd;
-};
-
-// The environment of the child process: only the variables that the loader and the sanitizers need, so that
-// no secrets are passed to it.
-std::vector<char*> environment() {
-  std::vector<char*> kept;
-  for (char** e = environ; *e; ++e) {
-    const std::string_view variable(*e), name = variable.substr(0, variable.find('='));
-    if (name.starts_with("LD_") || name.starts_with("MALLOC_") || name.ends_with("SAN_OPTIONS"))
-      kept.push_back(*e);
-  }
-  kept.push_back(nullptr);
-  return kept;
-}
-
-// Runs the program and returns its exit status. The program inherits the file descriptor `reply` as
-// kVdbReplyFd.
-Result<int> run(const std::filesystem::path& program, std::vector<std::string> arguments, int reply) {
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  argv.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  int error = posix_spawn_file_actions_adddup2(&actions, reply, kVdbReplyFd);
-  for (const int standard : {0, 1})
-    if (error == 0) error = posix_spawn_file_actions_addopen(&actions, standard, "/dev/null", O_RDWR, 0);
-  if (error == 0) error = posix_spawn_file_actions_addclosefrom_np(&actions, kVdbReplyFd + 1);
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  sigset_t none, all;
-  sigemptyset(&none), sigfillset(&all);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setsigdefault(&attributes, &all);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-  pid_t pid = -1;
-  if (error == 0)
-    error = ::posix_spawn(&pid, program.c_str(), &actions, &attributes, argv.data(), environment().data());
-  posix_spawn_file_actions_destroy(&actions);
-  posix_spawnattr_destroy(&attributes);
-  if (error != 0) return no_program(program.string(), error);
-  int status = 0;
-  while (::waitpid(pid, &status, 0) < 0)
-    if (errno != EINTR) return no_program("waitpid", errno);
-  return status;
+tl::unexpected<Error> no_program(const char* what, int error) {
+  return no_program(fmt::format("{}: {}", what, std::strerror(error)));
 }
 
 tl::unexpected<Error> how_it_ended(int status) {
@@ -112,20 +56,13 @@ VdbFile::~VdbFile() {
   if (mapped_) ::munmap(mapped_, mapped_bytes_);
 }
 
-std::filesystem::path VdbFile::program_beside_us() {
-  std::error_code unknown;
-  return std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path() / "lightshaft-vdb";
-}
-
 Result<VdbFile> VdbFile::read(const std::filesystem::path& path, const std::string& grid_name,
                               std::uint64_t max_values, const std::filesystem::path& program) {
   const Descriptor reply(::memfd_create("lightshaft-vdb", MFD_CLOEXEC | MFD_ALLOW_SEALING));
   if (reply.fd < 0) return no_program("memfd_create", errno);
-  const auto status = run(
-      program,
-      {program.string(), path.string(), grid_name, std::to_string(max_values), std::to_string(data_left())},
-      reply.fd);
-  if (!status) return tl::unexpected(status.error());
+  const auto status = run_helper(
+      program, {path.string(), grid_name, std::to_string(max_values), std::to_string(data_left())}, reply.fd);
+  if (!status) return no_program(status.error().message);
   if (!WIFEXITED(*status) || WEXITSTATUS(*status) != 0) return how_it_ended(*status);
 
   // Processes that the program left behind may still have the reply open. So it is sealed against changes

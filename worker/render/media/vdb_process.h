@@ -10,6 +10,7 @@
 #include <string>
 
 #include "common/base/error.h"
+#include "common/base/helper_program.h"
 #include "worker/render/media/vdb_limit.h"
 #include "worker/render/media/vdb_module.h"
 
@@ -22,8 +23,7 @@ class VdbFile {
   // resource_exhausted if a limit is exceeded, and with internal if the program could not be started.
   static Result<VdbFile> read(const std::filesystem::path& path, const std::string& grid_name,
                               std::uint64_t max_values,
-                              const std::filesystem::path& program = program_beside_us());
-  static std::filesystem::path program_beside_us();
+                              const std::filesystem::path& program = program_beside_us("lightshaft-vdb"));
   VdbFile(VdbFile&& from) noexcept;
   VdbFile& operator=(VdbFile&&) = delete;
   ~VdbFile();

@@ -1,4 +1,4 @@
-// The reply of lightshaft-vdb, written to the file that it inherits as kVdbReplyFd: this header, then from
+// The reply of lightshaft-vdb, written to the file that it inherits as kHelperFd: this header, then from
 // kVdbValuesAt on the grid's values. Readers must treat it as untrusted: a malicious file may have written
 // it.
 #pragma once
@@ -9,7 +9,6 @@
 
 namespace ls::render {
 
-inline constexpr int kVdbReplyFd = 3;
 inline constexpr std::uint64_t kVdbValuesAt = 4096;  // bytes
 inline constexpr std::uint64_t kVdbMagic = 0x3162'6476'736c;
 

@@ -1,5 +1,5 @@
 // lightshaft-vdb FILE GRID MOST_VALUES MOST_BYTES: reads a grid for worker/render/media/vdb_process.h and
-// exits. Writes the reply to the inherited file kVdbReplyFd. MOST_VALUES is the largest number of values of
+// exits. Writes the reply to the inherited file kHelperFd. MOST_VALUES is the largest number of values of
 // the grid. MOST_BYTES limits the memory of this program and of the reply together.
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <limits>
 
+#include "common/base/helper_program.h"
 #include "worker/render/media/vdb_limit.h"
 #include "worker/render/media/vdb_reply.h"
 
@@ -46,8 +47,7 @@ bool write_all(const void* from, std::uint64_t bytes, std::uint64_t at) {
   constexpr std::uint64_t kAtOnce = 1 << 30;
   const auto* data = static_cast<const char*>(from);
   while (bytes > 0) {
-    const ssize_t n =
-        ::pwrite(ls::render::kVdbReplyFd, data, std::min(bytes, kAtOnce), static_cast<off_t>(at));
+    const ssize_t n = ::pwrite(ls::kHelperFd, data, std::min(bytes, kAtOnce), static_cast<off_t>(at));
     if (n <= 0) return false;
     data += n, at += static_cast<std::uint64_t>(n), bytes -= static_cast<std::uint64_t>(n);
   }
@@ -76,7 +76,7 @@ int main(int argc, char** argv) {
   reply.grid.values = nullptr;
   bool written = write_all(&reply, sizeof reply, 0);
   // The reply is padded, so that its file always extends to where the values begin.
-  written = written && ::ftruncate(ls::render::kVdbReplyFd, ls::render::kVdbValuesAt) == 0;
+  written = written && ::ftruncate(ls::kHelperFd, ls::render::kVdbValuesAt) == 0;
   if (reply.code == 0) written = written && write_all(grid.values, values, ls::render::kVdbValuesAt);
   ls_vdb_free(&grid);
   return written ? 0 : 1;

@@ -1,6 +1,7 @@
 // AOVs on scenes where their values are known, and the light's parts, which must add up to the whole.
 #include "common/image/aov/aov.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -154,6 +155,46 @@ TEST(Aovs, AlbedoIsTheShareOfLightThatAMaterialSendsOn) {
   EXPECT_NEAR(albedo([](SceneBuilder& k) { return k.glass(1.5); }), 1,
               kClose);  // not 1.5^-2 of what goes through
   EXPECT_NEAR(albedo([](SceneBuilder& k) { return k.diffuse(0); }), 0, 0);
+}
+
+// Sums of a guide over both halves of the samples, and that each half has its own.
+double guide(const Picture& p, const std::string& name, char component) {
+  const double a = p.sum(fmt::format("aov.{}.A.{}", name, component), 0),
+               b = p.sum(fmt::format("aov.{}.B.{}", name, component), 0);
+  EXPECT_NEAR(a, b, kClose * std::abs(a)) << "nothing here differs between samples";
+  return (a + b) / static_cast<double>(kSamples);
+}
+const std::vector<std::string> kGuides = {"denoising_albedo", "denoising_normal"};
+
+TEST(Aovs, GuidesOfADenoiserSeeThroughMirrorsGlassAndBoundaries) {
+  const Picture bare(wall(), kGuides);
+  EXPECT_NEAR(guide(bare, "denoising_albedo", 'R'), .3, kClose);
+  EXPECT_NEAR(guide(bare, "denoising_normal", 'Z'), 1, kClose);
+
+  // A mirror at 45 degrees turns the view from -y to -z, down to the wall.
+  SceneBuilder mirrored = wall();
+  mirrored.shape(RectangleShape{}, translate({0, 0, 3}) * test::rotate_x(-135), mirrored.mirror());
+  mirrored.look({0, 3, 3}, {0, 0, 3}, 1e-3);
+  const Picture mirror(mirrored, kGuides);
+  EXPECT_NEAR(guide(mirror, "denoising_albedo", 'R'), .3, 8 * kClose);
+  EXPECT_NEAR(guide(mirror, "denoising_normal", 'Z'), 1, 8 * kClose);
+
+  SceneBuilder empty = wall();
+  empty.container(CubeShape{}, translate({0, 0, 2}), empty.null(), empty.homogeneous({0, 0, 0}, {1, 1, 1}));
+  EXPECT_NEAR(guide(Picture(empty, kGuides), "denoising_albedo", 'R'), .3, kClose);
+}
+
+// A cube of side 2 with sigma_t 0.5: e^-1 of the light is not scattered in it.
+TEST(Aovs, GuidesOfADenoiserMixInMediaByTheirTransmittance) {
+  SceneBuilder builder = wall();
+  builder.container(CubeShape{}, translate({0, 0, 2}), builder.null(),
+                    builder.homogeneous({.5, .5, .5}, {.9, .9, .9}));
+
+  const Picture p(builder, kGuides);
+
+  const double through = std::exp(-1.);
+  EXPECT_NEAR(guide(p, "denoising_albedo", 'G'), .3 * through + .9 * (1 - through), 16 * kClose);
+  EXPECT_NEAR(guide(p, "denoising_normal", 'Z'), through, 16 * kClose);
 }
 
 TEST(Aovs, NothingIsZeroAndMeansAreOfHits) {

@@ -5,7 +5,9 @@ import { exposure as exposureText, jobName } from "../format.js";
 import { choice, safeClass } from "./pieces.js";
 
 const kLayers = [["picture", "Picture"], ["error", "Error"], ["samples", "Samples"]];
-const kNames = { picture: "as it is now", error: "error of each pixel", samples: "samples of each pixel" };
+const kDenoised = [kLayers[0], ["denoised", "Denoised"], ...kLayers.slice(1)]; // of a job that is to be denoised
+const isPicture = (layer) => layer === "picture" || layer === "denoised";
+const kNames = { picture: "as it is now", denoised: "denoised as it is now", error: "error of each pixel", samples: "samples of each pixel" };
 // The ends of the maps' colours (common/image/exr/maps.h), with equal factors between.
 const kLegends = { error: ["0.1 %", "100 % or more", "relative standard error of a pixel"], samples: ["2", "16,384 or more", "samples of a pixel"] };
 const kMarks = 512; // drawn at most; a thousand workers are not legible anyway
@@ -17,13 +19,13 @@ export function imagePanel(state, job, actions) {
     h("div", { class: "stage", style: { "--ratio": `${width} / ${height}` } },
       h("live-image", {
         key: job.id, "aria-label": `${jobName(job)}, ${kNames[open.layer]}`, role: "img",
-        ".size": width * 65536 + height, ".source": actions.image, ".exposure": open.layer === "picture" ? open.exposure : 0, ".version": `${open.layer} ${open.folds}`,
+        ".size": width * 65536 + height, ".source": actions.image, ".exposure": isPicture(open.layer) ? open.exposure : 0, ".version": `${open.layer} ${open.folds}`,
       }),
       open.showTiles ? overlay(state, width, height) : null,
       job.units_done ? null : h("p", { class: "stage-text" }, stageText(job))),
     h("figcaption", { class: "image-tools" },
-      choice("layer", "What is shown", kLayers, open.layer, actions.setLayer),
-      open.layer === "picture" ? exposureTool(open, actions) : legend(open.layer, job.few_hits),
+      choice("layer", "What is shown", job.denoise ? kDenoised : kLayers, open.layer, actions.setLayer),
+      isPicture(open.layer) ? exposureTool(open, actions) : legend(open.layer, job.few_hits),
       h("label", { class: "check" }, h("input", { type: "checkbox", ".checked": open.showTiles, onchange: actions.toggleTiles }), "Tiles in flight")));
 }
 

@@ -1,0 +1,44 @@
+#include "coordinator/service/denoising.h"
+
+#include "common/image/exr/final_image.h"
+
+namespace ls::coordinator {
+
+Result<void> Denoising::available() const {
+  const auto denoiser = Denoiser::find(threads_, library_);
+  if (!denoiser) return tl::unexpected(denoiser.error());
+  return {};
+}
+
+Result<Denoising::Denoised> Denoising::denoise(const Film& film,
+                                               const std::optional<Reference>& reference) const {
+  const TimePoint start = clock_->now();
+  const auto denoiser = Denoiser::find(threads_, library_);
+  if (!denoiser) return tl::unexpected(denoiser.error());
+  auto image = denoised_image(film, *denoiser);
+  if (!image) return tl::unexpected(image.error());
+  Denoised out{std::move(*image), {}};
+  out.figures = {out.image.by, {}, out.image.error, seconds(clock_->now() - start), {}};
+  if (reference && film.pixels_without_samples() == 0)
+    out.figures.true_error = true_error(*reference, out.image.rgb);
+  return out;
+}
+
+std::shared_ptr<const Denoising::Denoised> Denoising::of(const Film& film,
+                                                         const std::optional<Reference>& reference) {
+  const Digest pixels = pixels_sha256(film);
+  const std::lock_guard lock(mutex_);
+  if (last_ && last_pixels_ == pixels) return last_;
+  last_.reset();  // frees its memory first
+  auto made = denoise(film, reference);
+  if (!made) {
+    Denoised none;
+    none.figures.trouble = made.error().message;
+    return std::make_shared<const Denoised>(std::move(none));  // not kept: a later attempt may succeed
+  }
+  last_ = std::make_shared<const Denoised>(std::move(*made));
+  last_pixels_ = pixels;
+  return last_;
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,46 @@
+// Denoised images of jobs. Denoising takes seconds, gigabytes and all cores, so one image is denoised at a
+// time, and the last one is kept: report, image and preview of one state of a job share it. Thread-safe.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "common/base/clock.h"
+#include "common/base/digest.h"
+#include "common/denoise/denoised_image.h"
+#include "common/image/film/film.h"
+#include "common/image/reference/reference.h"
+#include "coordinator/assemble/job_report.h"
+
+namespace ls::coordinator {
+
+class Denoising {
+ public:
+  // `library` is the file of Open Image Denoise; empty: it is looked for (common/denoise/denoiser.h).
+  Denoising(int threads, std::string library, std::shared_ptr<const Clock> clock)
+      : threads_(threads), library_(std::move(library)), clock_(std::move(clock)) {}
+
+  // Fails as Denoiser::find() does if this machine cannot denoise.
+  Result<void> available() const;
+
+  struct Denoised {
+    DenoisedImage image;  // without pixels if figures.trouble says why there are none
+    DenoisedFigures figures;
+  };
+  // Denoises the film, which has the AOVs for it. Against `reference`, if it is given, the true error is
+  // computed, too.
+  std::shared_ptr<const Denoised> of(const Film& film, const std::optional<Reference>& reference);
+
+ private:
+  Result<Denoised> denoise(const Film& film, const std::optional<Reference>& reference) const;
+
+  const int threads_;
+  const std::string library_;
+  const std::shared_ptr<const Clock> clock_;
+  std::mutex mutex_;  // held while an image is denoised
+  Digest last_pixels_;
+  std::shared_ptr<const Denoised> last_;
+};
+
+}  // namespace ls::coordinator

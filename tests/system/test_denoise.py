@@ -1,0 +1,92 @@
+"""Denoised layers end to end, with a stand-in for Open Image Denoise (tests/support/fake_oidn.cpp): by the command and on a farm."""
+
+import json
+import os
+import shutil
+
+import pytest
+from cli_kit import digest, lightshaft, write_fog
+from exr_layers import read, read_header, write
+from local_farm import SCENE, HttpError, LocalFarm, bin_dir
+
+LIBRARY = bin_dir().parent / "fake_oidn" / "blurs.so"
+WITH = {"LIGHTSHAFT_OIDN": str(LIBRARY)}
+
+
+@pytest.fixture(scope="module")
+def fog(tmp_path_factory):
+    return write_fog(tmp_path_factory.mktemp("fog"))
+
+
+def render(scene, out, *flags, env=WITH, code=0):
+    return lightshaft("render", scene, "-o", out, "--spp", 12, *flags, env={**os.environ, **env}, code=code)
+
+
+def test_the_command_adds_layers_and_tells_their_error(fog, tmp_path):
+    plain = digest(render(fog, tmp_path / "plain.exr"))
+
+    done = render(fog, tmp_path / "out.exr", "--denoise", "--report", tmp_path / "report.json", "--html", tmp_path / "report.html")
+
+    assert digest(done) == plain
+    figures = json.loads((tmp_path / "report.json").read_text())["denoised"]
+    assert figures["by"] == "Open Image Denoise 2.99.7" and figures["relmse_ci95"][0] <= figures["relmse"] <= figures["relmse_ci95"][1]
+    assert f", denoised {figures['relmse']:.3g} (" in done.stderr
+    assert "relMSE, denoised" in (tmp_path / "report.html").read_text()
+    rows, strings, types = read(tmp_path / "out.exr")
+    assert {types[f"denoised.{c}"] for c in "RGB"} == {"e"} and rows["denoised.R"] != rows["R"]
+    assert strings["lightshaft:denoised_by"] == figures["by"]
+    assert json.loads(strings["lightshaft:job"])["aov"] == ["denoising_albedo", "denoising_normal"]
+    # The same image again, from other threads and a child process: guides and denoised layers, too.
+    render(fog, tmp_path / "again.exr", "--denoise", "--threads", 1, "--isolate")
+    assert read(tmp_path / "again.exr")[0] == rows
+
+
+def test_where_there_is_no_library_nothing_is_rendered(fog, tmp_path):
+    done = render(fog, tmp_path / "out.exr", "--denoise", env={"LIGHTSHAFT_OIDN": "/no/such/folder"}, code=1)
+
+    assert "/no/such/folder" in done.stderr and "deploy/install-denoiser.sh" in done.stderr
+    assert not (tmp_path / "out.exr").exists()
+
+
+def test_verify_finds_a_denoised_value_that_was_changed(fog, tmp_path):
+    image = tmp_path / "out.exr"
+    render(fog, image, "--denoise")
+    assert "as sealed" in lightshaft("verify", "--scene", fog, image, "--tiles", 1).stdout
+    rows, _, _ = read(image)
+    changed = {**rows, "denoised.G": [tuple(2 * v for v in row) for row in rows["denoised.G"]]}
+
+    write(image, read_header(image.read_bytes())[0], changed)
+
+    done = lightshaft("verify", "--scene", fog, image, "--tiles", 1, code=1)
+    assert "layer denoised.G" in done.stdout + done.stderr
+
+
+def test_on_a_farm_image_picture_and_report_have_it(tmp_path):
+    library = tmp_path / "oidn.so"
+    shutil.copy(LIBRARY, library)
+    with LocalFarm(tmp_path / "farm", environment={"LIGHTSHAFT_OIDN": str(library)}) as farm:
+        farm.add_workers(2)
+        job, plain = farm.submit(SCENE, spp=16, denoise="true"), farm.submit(SCENE, spp=16)
+        for wanted in (job, plain):
+            farm.wait_for_job(wanted)
+
+        assert farm.job(job)["denoise"] is True and farm.job(plain)["denoise"] is False
+        image = tmp_path / "image.exr"
+        image.write_bytes(farm.request("GET", f"/api/v1/jobs/{job}/image.exr"))
+        assert read(image)[1]["lightshaft:denoised_by"] == farm.report(job)["denoised"]["by"] == "Open Image Denoise 2.99.7"
+        assert "denoised" not in farm.report(plain)
+        picture = farm.request("GET", f"/api/v1/jobs/{job}/image.png?layer=denoised")
+        assert picture.startswith(b"\x89PNG") and picture != farm.request("GET", f"/api/v1/jobs/{job}/image.png")
+        for path, status, words in ((f"/api/v1/jobs/{plain}/image.png?layer=denoised", 409, "was submitted without"),
+                                    (f"/api/v1/jobs/{job}/image.png?layer=depth", 400, "'layer' must be")):
+            with pytest.raises(HttpError) as refused:
+                farm.request("GET", path)
+            assert refused.value.status == status and words in str(refused.value)
+
+        # The library goes away, and the coordinator starts anew: what was made stays, new jobs are refused with the reason.
+        library.unlink()
+        farm.restart_coordinator()
+        assert read(image)[0]["denoised.R"] and farm.request("GET", f"/api/v1/jobs/{job}/image.exr") == image.read_bytes()
+        with pytest.raises(HttpError) as refused:
+            farm.submit(SCENE, spp=16, denoise="true")
+        assert refused.value.status == 409 and "deploy/install-denoiser.sh" in str(refused.value)

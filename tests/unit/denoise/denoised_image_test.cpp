@@ -1,0 +1,160 @@
+// The error of a denoised image, against the truth of images whose noise is made here, and the way from a
+// film to its denoised image.
+#include "common/denoise/denoised_image.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "common/image/film/fake_pixels.h"
+
+namespace ls {
+namespace {
+
+constexpr int kSide = 48;
+constexpr std::size_t kPixels = std::size_t{kSide} * kSide;
+
+using Denoise = std::function<std::vector<float>(const std::vector<float>&)>;
+
+// The right image: waves with an edge.
+std::vector<float> truth() {
+  std::vector<float> out;
+  for (int y = 0; y < kSide; ++y)
+    for (int x = 0; x < kSide; ++x)
+      for (int c = 0; c < 3; ++c)
+        out.push_back(static_cast<float>((x > kSide / 2 ? 1.5 : .5) + .3 * std::sin(.4 * x + c) * std::cos(.3 * y)));
+  return out;
+}
+
+std::vector<float> blurred(const std::vector<float>& from) {
+  std::vector<float> out(from.size());
+  for (int y = 0; y < kSide; ++y)
+    for (int x = 0; x < kSide; ++x)
+      for (int c = 0; c < 3; ++c) {
+        double sum = 0;
+        int count = 0;
+        for (int v = std::max(0, y - 2); v <= std::min(kSide - 1, y + 2); ++v)
+          for (int u = std::max(0, x - 2); u <= std::min(kSide - 1, x + 2); ++u)
+            sum += from[static_cast<std::size_t>(3 * (v * kSide + u) + c)], ++count;
+        out[static_cast<std::size_t>(3 * (y * kSide + x) + c)] = static_cast<float>(.9 * sum / count);
+      }
+  return out;
+}
+
+// A half of the samples: skewed noise (gamma distributed, a third of the truth in size), the same in all
+// channels, as paths bring it.
+std::vector<float> noisy(const std::vector<float>& right, std::mt19937_64& random) {
+  std::gamma_distribution<double> gamma(8, 1. / 8);
+  std::vector<float> out(right.size());
+  for (std::size_t p = 0; p < kPixels; ++p) {
+    const double e = gamma(random);
+    for (std::size_t i = 3 * p; i < 3 * p + 3; ++i) out[i] = static_cast<float>(right[i] * e);
+  }
+  return out;
+}
+
+struct Trial {
+  DenoisedError estimate;
+  double mse = 0, relmse = 0;  // of the realised image, the latter relative to the denoised image
+};
+Trial trial(const Denoise& denoise, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  const std::vector<float> right = truth();
+  DenoisedHalves h{noisy(right, random), noisy(right, random), {}, {}, std::vector<bool>(kPixels, true)};
+  h.denoised_a = denoise(h.a);
+  h.denoised_b = denoise(h.b);
+  Trial out{denoised_error(h)};
+  for (std::size_t i = 0; i < right.size(); ++i) {
+    const double mean = (double{h.denoised_a[i]} + h.denoised_b[i]) / 2, e = mean - right[i];
+    out.mse += e * e / static_cast<double>(right.size());
+    out.relmse += e * e / (mean * mean + .01) / static_cast<double>(right.size());
+  }
+  return out;
+}
+
+const Denoise kDenoisers[] = {
+    blurred,                                                           // biased, and nearly free of noise
+    [](const std::vector<float>& half) { return half; },               // does nothing
+    [](const std::vector<float>& half) { return std::vector<float>(half.size(), .8f); },  // sees nothing
+};
+
+// The mean over trials of what the estimate says too much, within five standard errors of that mean, 6e-7
+// each of four means.
+void expect_right_on_average(const Denoise& denoise, double DenoisedError::*estimate, double Trial::*is) {
+  constexpr int kTrials = 500;
+  double sum = 0, squares = 0, size = 0;
+  for (int t = 0; t < kTrials; ++t) {
+    const Trial result = trial(denoise, static_cast<std::uint64_t>(t));
+    const double over = result.estimate.*estimate - result.*is;
+    sum += over;
+    squares += over * over;
+    size += result.*is / kTrials;
+  }
+  const double mean = sum / kTrials, error = std::sqrt((squares / kTrials - mean * mean) / kTrials);
+  EXPECT_NEAR(mean, 0, 5 * error) << "of " << size;
+  EXPECT_LT(5 * error, .05 * size) << "too few trials to tell";
+}
+
+TEST(DenoisedError, IsRightOnAverageWhateverTheDenoiserDoes) {
+  for (const Denoise& denoise : kDenoisers) {
+    expect_right_on_average(denoise, &DenoisedError::mse, &Trial::mse);
+  }
+  // The weight of a relative error may not depend on the pixel's own noise, as it does a little after a blur.
+  expect_right_on_average(kDenoisers[2], &DenoisedError::relmse, &Trial::relmse);
+}
+
+// Of 500 intervals of 95 % that are right, 463 to 487 cover with a probability of 0.99 (binomial, 475 +- 2.58
+// x 4.87). They may be too wide, not too narrow: there is no upper bound.
+TEST(DenoisedError, HasAnIntervalThatCovers) {
+  constexpr int kTrials = 500;
+  for (const Denoise& denoise : kDenoisers) {
+    int covered = 0;
+    for (int t = 0; t < kTrials; ++t) {
+      const Trial result = trial(denoise, 1000 + static_cast<std::uint64_t>(t));
+      const double rmse = std::sqrt(result.mse);
+      covered += result.estimate.rmse_lo <= rmse && rmse <= result.estimate.rmse_hi;
+    }
+    EXPECT_GE(covered, 463);
+  }
+}
+
+TEST(DenoisedError, LeavesOutPixelsWithoutSamples) {
+  DenoisedHalves h{{1, 1, 1, 0, 0, 0}, {3, 3, 3, 0, 0, 0}, {2, 2, 2, 9, 9, 9}, {2, 2, 2, 9, 9, 9}, {true, false}};
+  EXPECT_DOUBLE_EQ(denoised_error(h).mse, -1);  // (1 - 2) (3 - 2) + 0: chance can bring it below 0
+  EXPECT_EQ(denoised_error(h).rmse, 0);
+  h.counts = {false, false};
+  EXPECT_EQ(denoised_error(h).rmse_hi, 0);
+}
+
+// A film of three tiles of which the last has no samples, with a stand-in for the library that blurs over 3 x
+// 3 pixels.
+TEST(DenoisedImage, IsTheMeanOfTheDenoisedHalvesOfAFilm) {
+  const auto denoiser = Denoiser::find(1, (program_beside_us("../fake_oidn") / "blurs.so").string());
+  ASSERT_TRUE(denoiser) << denoiser.error().message;
+  const AovSet aovs = aovs_of(AovKind::guide);
+  const TileGrid grid{{24, 8}, 8};
+  Film film(grid, aovs);
+  for (const TileIndex t : {0u, 1u})
+    ASSERT_TRUE(film.fold(t, 0, fake_partial({{}, {}, {}, grid.rect(t), {0, 2}}, aovs)));
+
+  const auto image = denoised_image(film, *denoiser);
+
+  ASSERT_TRUE(image) << image.error().message;
+  EXPECT_EQ(image->by, "Open Image Denoise 2.99.7");
+  ASSERT_EQ(image->rgb.size(), 3u * 24 * 8);
+  // Pixel (3, 3) of the first tile, green: each guide's planes of a fake partial hold the red sum of both
+  // samples, of which half A has one.
+  const TilePixels pixels = film.pixels(0);
+  double sum = 0;
+  for (std::size_t y = 2; y <= 4; ++y)
+    for (std::size_t x = 2; x <= 4; ++x) sum += pixels.mean[3 * (8 * y + x) + 1];
+  const double red = 2 * pixels.mean[3 * (8 * 3 + 3)], guides = (red + red) / 2;
+  EXPECT_NEAR(image->rgb[3 * (24 * 3 + 3) + 1], sum / 9 + guides / 16, 1e-5);
+  for (std::size_t y = 0; y < 8; ++y)
+    EXPECT_EQ(image->rgb[3 * (24 * y + 20)], 0) << "no samples, no light";
+}
+
+}  // namespace
+}  // namespace ls

@@ -1,0 +1,96 @@
+// The program that denoises, run on stand-ins for Open Image Denoise (tests/support/fake_oidn.cpp).
+#include "common/denoise/denoiser.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace ls {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+std::string fake(const std::string& behaviour) {
+  return (program_beside_us("../fake_oidn") / (behaviour + ".so")).string();
+}
+
+constexpr FrameSize kSize{3, 2};
+NoisyImage image(float first) {
+  NoisyImage out;
+  for (int i = 0; i < 18; ++i) {
+    out.color.push_back(first + static_cast<float>(i));
+    out.albedo.push_back(static_cast<float>(i) / 32);
+    out.normal.push_back(-static_cast<float>(i) / 64);
+  }
+  return out;
+}
+
+TEST(Denoiser, DenoisesEachImageWithItsOwnGuides) {
+  const auto denoiser = Denoiser::find(2, fake("blurs"));
+  ASSERT_TRUE(denoiser) << denoiser.error().message;
+  EXPECT_EQ(denoiser->name(), "Open Image Denoise 2.99.7");
+  const std::vector<NoisyImage> images = {image(0), image(100)};
+
+  const auto denoised = denoiser->denoise(kSize, images);
+
+  ASSERT_TRUE(denoised) << denoised.error().message;
+  ASSERT_EQ(denoised->size(), 2u);
+  for (const int which : {0, 1}) {
+    const auto& color = images[static_cast<std::size_t>(which)].color;
+    for (std::size_t c = 0; c < 3; ++c) {
+      // Pixel (0, 0): the mean of four, and a sixteenth of the halved guides.
+      const float mean = (color[c] + color[3 + c] + color[9 + c] + color[12 + c]) / 4,
+                  guides = (static_cast<float>(c) / 32 - static_cast<float>(c) / 64) / 2;
+      EXPECT_FLOAT_EQ((*denoised)[static_cast<std::size_t>(which)][c], mean + guides / 16);
+    }
+  }
+}
+
+TEST(Denoiser, SaysHowToGetALibraryThatIsNotThere) {
+  const auto denoiser = Denoiser::find(1, "/no/such/libOpenImageDenoise.so.2");
+
+  ASSERT_FALSE(denoiser);
+  EXPECT_EQ(denoiser.error().code, Errc::failed_precondition);
+  EXPECT_THAT(denoiser.error().message,
+              AllOf(HasSubstr("/no/such/libOpenImageDenoise.so.2"), HasSubstr("deploy/install-denoiser.sh")));
+}
+
+TEST(Denoiser, RefusesVersion1) {
+  const auto denoiser = Denoiser::find(1, fake("old"));
+
+  ASSERT_FALSE(denoiser);
+  EXPECT_THAT(denoiser.error().message, HasSubstr("version 2 is needed"));
+}
+
+TEST(Denoiser, SaysThatItsOwnProgramIsMissing) {
+  const auto denoiser = Denoiser::find(1, fake("blurs"), "/no/such/lightshaft-denoise");
+
+  ASSERT_FALSE(denoiser);
+  EXPECT_THAT(denoiser.error().message, HasSubstr("/no/such/lightshaft-denoise: No such file"));
+}
+
+struct Fault {
+  const char* library;
+  const char* told;
+};
+class DenoiserFault : public ::testing::TestWithParam<Fault> {};
+
+TEST_P(DenoiserFault, IsAnErrorAndNothingMore) {
+  const auto denoiser = Denoiser::find(1, fake(GetParam().library));
+  ASSERT_TRUE(denoiser) << denoiser.error().message;
+  const std::vector<NoisyImage> images = {image(0)};
+
+  const auto denoised = denoiser->denoise(kSize, images);
+
+  ASSERT_FALSE(denoised);
+  EXPECT_THAT(denoised.error().message, AllOf(HasSubstr("cannot denoise"), HasSubstr(GetParam().told)));
+}
+
+INSTANTIATE_TEST_SUITE_P(All, DenoiserFault,
+                         ::testing::Values(Fault{"fails", "out of memory, says the stand-in"},
+                                           Fault{"crashes", "was killed (Aborted)"},
+                                           Fault{"nan", "not finite"}),
+                         [](const auto& fault) { return std::string(fault.param.library); });
+
+}  // namespace
+}  // namespace ls

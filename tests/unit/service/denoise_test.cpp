@@ -1,0 +1,149 @@
+// Jobs with denoised layers, with a stand-in for Open Image Denoise (tests/support/fake_oidn.cpp).
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "common/base/helper_program.h"
+#include "common/image/exr/final_image.h"
+#include "tests/unit/service/fake_farm.h"
+#include "tests/unit/store/temp_folder.h"
+
+namespace ls::coordinator {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+std::filesystem::path fake(const std::string& behaviour) {
+  return program_beside_us("../fake_oidn") / (behaviour + ".so");
+}
+
+std::unique_ptr<Coordinator> open_with(const std::filesystem::path& data, const std::filesystem::path& library) {
+  Coordinator::Options options;
+  options.data = data;
+  options.denoiser = library.string();
+  return Coordinator::open(std::move(options)).value();
+}
+
+JobSpec denoised_job(std::uint64_t spp = 16) {
+  JobSpec spec;
+  spec.spp = spp;
+  spec.denoise = true;
+  return spec;
+}
+
+FinalPicture image_of(const Coordinator& coordinator, const JobId& job) {
+  return read_final_exr(coordinator.image_exr(job).value(), "image.exr").value();
+}
+
+const ExrHalf& half(const FinalPicture& image, const std::string& layer) {
+  return std::get<ExrHalf>(image.channels.at(layer));
+}
+
+TEST(ServiceDenoise, AddsLayersToTheImageAndTheirErrorToTheReport) {
+  TempFolder dir;
+  for (const std::filesystem::path& data : {dir.path() / "disk", std::filesystem::path()}) {
+    auto coordinator = open_with(data, fake("blurs"));
+    const JobId job = submit(*coordinator, denoised_job());
+    FakeFarm farm(*coordinator, 2);
+    ASSERT_TRUE(farm.finish(job));
+
+    const FinalPicture image = image_of(*coordinator, job);
+    ASSERT_TRUE(image.changed && image.changed->empty()) << "the seal covers all layers";
+    EXPECT_NE(half(image, "denoised.R").values, half(image, "R").values);
+    EXPECT_TRUE(image.channels.contains("denoising_albedo.R"));
+    const auto told = report(*coordinator, job);
+    EXPECT_EQ(told["denoised"]["by"], "Open Image Denoise 2.99.7");
+    EXPECT_EQ(image.strings.at("lightshaft:denoised_by"), "Open Image Denoise 2.99.7");
+    const double relmse = told["denoised"]["relmse"];
+    EXPECT_LE(told["denoised"]["relmse_ci95"][0], relmse);
+    EXPECT_GE(told["denoised"]["relmse_ci95"][1], relmse);
+    EXPECT_EQ(image.strings.at("lightshaft:denoised_relmse"), fmt::format("{:.9g}", relmse));
+    EXPECT_TRUE(coordinator->job(job)->denoise);
+  }
+}
+
+// The colours, their digest and what is sealed of each tile know nothing of it but the guides.
+TEST(ServiceDenoise, LeavesTheImageItselfAlone) {
+  auto coordinator = open_with({}, fake("blurs"));
+  JobSpec plain = denoised_job();
+  plain.denoise = false;
+  plain.aov = {"denoising_albedo", "denoising_normal"};
+  const JobId with = submit(*coordinator, denoised_job()), without = submit(*coordinator, plain);
+  FakeFarm farm(*coordinator, 2);
+  ASSERT_TRUE(farm.finish(with) && farm.finish(without));
+
+  EXPECT_EQ(report(*coordinator, with)["pixels_sha256"], report(*coordinator, without)["pixels_sha256"]);
+  EXPECT_FALSE(report(*coordinator, without).contains("denoised"));
+}
+
+TEST(ServiceDenoise, AJobIsRejectedWhereThereIsNoDenoiser) {
+  auto coordinator = open_with({}, "/no/such/libOpenImageDenoise.so.2");
+
+  const auto submitted = coordinator->submit({"test.xml", kSceneText, {}, denoised_job()});
+
+  ASSERT_FALSE(submitted);
+  EXPECT_EQ(submitted.error().error.code, Errc::failed_precondition);
+  EXPECT_THAT(submitted.error().error.message, HasSubstr("deploy/install-denoiser.sh"));
+  EXPECT_TRUE(coordinator->jobs().empty());
+}
+
+TEST(ServiceDenoise, ADenoiserThatIsLostMeanwhileCostsTheLayersAlone) {
+  TempFolder dir;
+  const auto library = dir.path() / "oidn.so";
+  std::filesystem::copy_file(fake("blurs"), library);
+  auto coordinator = open_with(dir.path() / "data", library);
+  const JobId job = submit(*coordinator, denoised_job());
+  std::filesystem::remove(library);
+  FakeFarm farm(*coordinator, 2);
+  ASSERT_TRUE(farm.finish(job));
+
+  EXPECT_EQ(coordinator->job(job)->state, JobState::done);
+  const FinalPicture image = image_of(*coordinator, job);
+  EXPECT_FALSE(image.channels.contains("denoised.R"));
+  EXPECT_FALSE(image.strings.contains("lightshaft:denoised_by"));
+  EXPECT_THAT(report(*coordinator, job)["denoised"]["error"].get<std::string>(),
+              AllOf(HasSubstr("oidn.so"), HasSubstr("LIGHTSHAFT_OIDN")));
+}
+
+TEST(ServiceDenoise, ALargerJobIsDenoisedAgain) {
+  TempFolder dir;
+  auto coordinator = open_with(dir.path(), fake("blurs"));
+  const JobId job = submit(*coordinator, denoised_job(4)), whole = submit(*coordinator, denoised_job(16));
+  FakeFarm farm(*coordinator, 2);
+  ASSERT_TRUE(farm.finish(job));
+  const FinalPicture first = image_of(*coordinator, job);
+  ASSERT_TRUE(coordinator->extend(job, 16));
+  ASSERT_TRUE(farm.finish(job) && farm.finish(whole));
+
+  const FinalPicture extended = image_of(*coordinator, job);
+  EXPECT_NE(half(extended, "denoised.G").values, half(first, "denoised.G").values);
+  EXPECT_EQ(half(extended, "denoised.G").values, half(image_of(*coordinator, whole), "denoised.G").values);
+}
+
+TEST(ServiceDenoise, ThePictureIsShownWhileTheJobRenders) {
+  auto coordinator = open_with({}, fake("blurs"));
+  const JobId job = submit(*coordinator, denoised_job());
+  EXPECT_TRUE(coordinator->image_png(job, 0, true)) << "without a sample";
+  JobSpec plain = denoised_job();
+  plain.denoise = false;
+  const JobId other = submit(*coordinator, plain);
+  {
+    FakeFarm farm(*coordinator, 1);
+    farm.stop_after = 3;
+    farm.run([] { return false; });
+    const auto shown = coordinator->image_png(job, 0, true), raw = coordinator->image_png(job, 0, false);
+    ASSERT_TRUE(shown && raw);
+    EXPECT_NE(*shown, *raw);
+    EXPECT_EQ(report(*coordinator, job)["denoised"], nullptr) << "not before it has ended";
+  }
+
+  const auto none = coordinator->image_png(other, 0, true);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, Errc::failed_precondition);
+}
+
+}  // namespace
+}  // namespace ls::coordinator
