@@ -76,6 +76,8 @@ std::string report_summary(const std::string& report) {
     const auto ci = pair_field(*denoised, "relmse_ci95");
     if (relmse && ci)
       line += fmt::format(", denoised {:.3g} ({:.3g} to {:.3g})", *relmse, ci->first, ci->second);
+    else if (relmse)
+      line += fmt::format(", denoised {:.3g} (a few pixels carry its noise: no interval)", *relmse);
     else
       line += ", not denoised: " + text_field(*denoised, "error");
   }

@@ -60,8 +60,7 @@ Result<int> run_helper(const std::filesystem::path& program, std::vector<std::st
     error = ::posix_spawn(&pid, program.c_str(), &actions, &attributes, argv.data(), environment().data());
   posix_spawn_file_actions_destroy(&actions);
   posix_spawnattr_destroy(&attributes);
-  if (error != 0)
-    return fail(Errc::internal, fmt::format("{}: {}", program.string(), std::strerror(error)));
+  if (error != 0) return fail(Errc::internal, fmt::format("{}: {}", program.string(), std::strerror(error)));
   int status = 0;
   while (::waitpid(pid, &status, 0) < 0)
     if (errno != EINTR) return fail(Errc::internal, fmt::format("waitpid: {}", std::strerror(errno)));

@@ -12,7 +12,9 @@ namespace {
 
 constexpr double kInterval = 1.96;  // standard errors on either side of a 95 % interval
 
-constexpr double kFourthMoment = 12;  // E (a - b)^4 of two Gaussian variables, over the square of their variance
+constexpr double kFewestPixels = 4;  // that carry the noise of an estimate with an interval
+constexpr double kFourthMoment =
+    12;  // E (a - b)^4 of two Gaussian variables, over the square of their variance
 
 // Calls put(to, from) with the index of each of the tile's pixels in the frame and in the tile.
 template <class Put>
@@ -47,7 +49,8 @@ Noisy gather(const Film& film) {
   Noisy out;
   out.counts.assign(pixels, false);
   for (NoisyImage& half : out.halves)
-    for (std::vector<float>* plane : {&half.color, &half.albedo, &half.normal}) plane->assign(3 * pixels, 0.f);
+    for (std::vector<float>* plane : {&half.color, &half.albedo, &half.normal})
+      plane->assign(3 * pixels, 0.f);
   const AovPlanes planes = planes_of(film.aovs());
   for (TileIndex t = 0; t < film.grid().count(); ++t) {
     if (film.spp(t) == 0) continue;
@@ -73,9 +76,15 @@ Noisy gather(const Film& film) {
   return out;
 }
 
-// Sums of an estimate over pixels, and of the squares of its noise.
+// Sums over pixels of an estimate, and of the squares and fourth powers of its noise.
 struct Sums {
-  double estimate = 0, squares = 0;
+  double estimate = 0, squares = 0, fourths = 0;
+  void add_noise(double product, double apart) {
+    const double square = product * product + apart * apart / kFourthMoment;
+    squares += square;
+    fourths += square * square;
+  }
+  bool has_interval() const { return squares * squares >= kFewestPixels * fourths; }
 };
 
 }  // namespace
@@ -99,8 +108,8 @@ DenoisedError denoised_error(const DenoisedHalves& h) {
       weighted_product += weight * product;
       weighted_apart += weight * apart * apart;
     }
-    plain.squares += product_sum * product_sum + apart_sum * apart_sum / kFourthMoment;
-    relative.squares += weighted_product * weighted_product + weighted_apart * weighted_apart / kFourthMoment;
+    plain.add_noise(product_sum, apart_sum);
+    relative.add_noise(weighted_product, weighted_apart);
   }
   DenoisedError out;
   if (pixels == 0) return out;
@@ -110,10 +119,12 @@ DenoisedError denoised_error(const DenoisedHalves& h) {
   out.rmse = std::sqrt(std::max(0.0, out.mse));
   out.rmse_lo = std::sqrt(std::max(0.0, out.mse - half_width));
   out.rmse_hi = std::sqrt(std::max(0.0, out.mse + half_width));
+  out.rmse_interval = plain.has_interval();
   const double relative_half_width = kInterval * std::sqrt(relative.squares) / values;
   out.relmse = relative.estimate / values;
   out.relmse_lo = std::max(0.0, out.relmse - relative_half_width);
   out.relmse_hi = std::max(0.0, out.relmse + relative_half_width);
+  out.relmse_interval = relative.has_interval();
   return out;
 }
 

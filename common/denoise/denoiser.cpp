@@ -83,10 +83,10 @@ Result<void> run(const std::filesystem::path& program, const std::string& librar
   const auto status = run_helper(program, {library, std::to_string(threads)}, shared.fd());
   if (!status) return broken(status.error().message);
   if (WIFSIGNALED(*status))
-    return broken(fmt::format("{} was killed ({}){}", program.filename().string(),
-                              ::strsignal(WTERMSIG(*status)),
-                              WTERMSIG(*status) == SIGKILL ? ": is there enough memory?" : ""),
-                  WTERMSIG(*status) == SIGKILL ? Errc::resource_exhausted : Errc::internal);
+    return broken(
+        fmt::format("{} was killed ({}){}", program.filename().string(), ::strsignal(WTERMSIG(*status)),
+                    WTERMSIG(*status) == SIGKILL ? ": is there enough memory?" : ""),
+        WTERMSIG(*status) == SIGKILL ? Errc::resource_exhausted : Errc::internal);
   if (WEXITSTATUS(*status) != 0)
     return broken(fmt::format("{} ended with code {}", program.filename().string(), WEXITSTATUS(*status)));
   Header& header = shared.header();
@@ -106,7 +106,8 @@ Result<Denoiser> Denoiser::find(int threads, const std::string& library,
   auto shared = Shared::of({0, 0}, 0);
   if (!shared) return tl::unexpected(shared.error());
   if (const auto ran = run(program, out.library_, out.threads_, *shared); !ran) {
-    if (ran.error().code != Errc::internal || shared->header().version != 0) return tl::unexpected(ran.error());
+    if (ran.error().code != Errc::internal || shared->header().version != 0)
+      return tl::unexpected(ran.error());
     return fail(Errc::failed_precondition,
                 fmt::format("Open Image Denoise is not usable on this machine ({}). Install it with "
                             "deploy/install-denoiser.sh, or set LIGHTSHAFT_OIDN to the folder of {}",

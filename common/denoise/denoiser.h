@@ -28,10 +28,11 @@ struct NoisyImage {
 class Denoiser {
  public:
   // Finds the library and asks for its version. `library` is its file; if it is empty, the library is looked
-  // for as above. failed_precondition: it cannot be used on this machine; the message says why, and how to get
-  // it.
-  static Result<Denoiser> find(int threads, const std::string& library = {},
-                               const std::filesystem::path& program = program_beside_us("lightshaft-denoise"));
+  // for as above. failed_precondition: it cannot be used on this machine; the message says why, and how to
+  // get it.
+  static Result<Denoiser> find(
+      int threads, const std::string& library = {},
+      const std::filesystem::path& program = program_beside_us("lightshaft-denoise"));
 
   const std::string& name() const { return name_; }  // "Open Image Denoise 2.5.1"
 

@@ -90,12 +90,14 @@ json denoised_of(const ReportFacts& facts) {
   if (!facts.denoised) return {};
   const DenoisedFigures& d = *facts.denoised;
   if (d.by.empty()) return {{"error", d.trouble}};
-  json j{{"by", d.by},
-         {"seconds", number(d.seconds)},
-         {"rmse", number(d.error.rmse)},
-         {"rmse_ci95", {number(d.error.rmse_lo), number(d.error.rmse_hi)}},
-         {"relmse", number(std::max(0.0, d.error.relmse))},
-         {"relmse_ci95", {number(d.error.relmse_lo), number(d.error.relmse_hi)}}};
+  json j{
+      {"by", d.by},
+      {"seconds", number(d.seconds)},
+      {"rmse", number(d.error.rmse)},
+      {"rmse_ci95", d.error.rmse_interval ? json{number(d.error.rmse_lo), number(d.error.rmse_hi)} : json()},
+      {"relmse", number(std::max(0.0, d.error.relmse))},
+      {"relmse_ci95",
+       d.error.relmse_interval ? json{number(d.error.relmse_lo), number(d.error.relmse_hi)} : json()}};
   if (!d.true_error) return j;
   j["true_rmse"] = number(d.true_error->rmse);
   j["true_relmse"] = number(d.true_error->relmse);
@@ -217,8 +219,9 @@ std::map<std::string, std::string> header_notes(const ReportFacts& facts) {
   if (facts.denoised && !facts.denoised->by.empty()) {
     const DenoisedError& e = facts.denoised->error;
     notes["denoised_by"] = facts.denoised->by;
-    notes["denoised_rmse_ci95"] = fmt::format("{:.9g} {:.9g}", e.rmse_lo, e.rmse_hi);
-    notes["denoised_relmse_ci95"] = fmt::format("{:.9g} {:.9g}", e.relmse_lo, e.relmse_hi);
+    if (e.rmse_interval) notes["denoised_rmse_ci95"] = fmt::format("{:.9g} {:.9g}", e.rmse_lo, e.rmse_hi);
+    if (e.relmse_interval)
+      notes["denoised_relmse_ci95"] = fmt::format("{:.9g} {:.9g}", e.relmse_lo, e.relmse_hi);
   }
   const auto reference_error = last_reference_error(facts.convergence);
   if (!reference_error) return notes;

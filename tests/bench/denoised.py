@@ -5,7 +5,7 @@ usage: denoised.py SCENE.xml[@WxH]... [--seeds N] [--first SEED] [--spp N] [--re
 Renders each scene with N seeds and --denoise. The true relMSE is (x - ref0)(x - ref1) / (ref^2 + 0.01) against two references with
 seeds of their own: free of the references' noise in the mean. `told` is the mean over seeds of the report's estimate, `covered` the
 share of the report's 95 % intervals that hold the true value; a true value that is not known to a quarter of the interval's half
-width, because of the references' noise, has no say. Needs Open Image Denoise (deploy/install-denoiser.sh), numpy, and the OpenEXR
+width, because of the references' noise, has no say, nor has a seed without an interval. Needs Open Image Denoise (deploy/install-denoiser.sh), numpy, and the OpenEXR
 package of PyPI.
 """
 import argparse
@@ -59,12 +59,12 @@ def row(name, size, asked, folder):
         (relmse, relmse_error), (mse, mse_error) = against(denoised, *references)
         true.append(relmse)
         told.append(figures["relmse"])
-        low, high = figures["relmse_ci95"]
+        low, high = figures["relmse_ci95"] or (0, 0)
         if relmse_error < (high - low) / 8:
             covered.append(low <= relmse <= high)
         true_rmse.append(max(0, mse))
         told_rmse.append(figures["rmse"] ** 2)
-        low, high = (r * r for r in figures["rmse_ci95"])
+        low, high = (r * r for r in figures["rmse_ci95"] or (0, 0))
         if mse_error < (high - low) / 8:
             covered_rmse.append(low <= mse <= high)
 

@@ -1,6 +1,7 @@
 // A stand-in for Open Image Denoise's library: the part of its C API that lightshaft-denoise calls. Compiled
 // with one of
-//   FAKE_OIDN_BLURS   a colour becomes the mean of its 3 x 3 window, clipped to the image, plus 1/16 of albedo
+//   FAKE_OIDN_BLURS   a colour becomes the mean of its 3 x 3 window, clipped to the image, plus 1/16 of
+//   albedo
 //                     and normal, which were first halved by their own filters: so a test sees which planes
 //                     and settings arrived
 //   FAKE_OIDN_FAILS   every execution reports an error

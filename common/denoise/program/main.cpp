@@ -23,8 +23,8 @@ namespace {
 using ls::denoise::Header;
 using ls::denoise::Outcome;
 
-constexpr rlim_t kMostCpuSeconds = 7200;  // an image of 100 megapixels takes minutes
-constexpr int kMaxMemoryMegabytes = 2048;   // of the library itself: larger images are denoised in parts
+constexpr rlim_t kMostCpuSeconds = 7200;   // an image of 100 megapixels takes minutes
+constexpr int kMaxMemoryMegabytes = 2048;  // of the library itself: larger images are denoised in parts
 
 void confine() {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -34,7 +34,7 @@ void confine() {
   ::setrlimit(RLIMIT_CPU, &cpu);
 }
 
-void say(Header& header, const char* what, const char* why) {
+void set_error(Header& header, const char* what, const char* why) {
   if (header.error[0]) return;  // the first error is the cause
   std::snprintf(header.error, sizeof header.error, "%s: %s", what, why ? why : "no reason given");
 }
@@ -42,9 +42,10 @@ void say(Header& header, const char* what, const char* why) {
 // Open Image Denoise. A function that is missing leaves ok() false.
 class Library {
  public:
-  Library(const char* path, Header& header) : header_(header), library_(::dlopen(path, RTLD_NOW | RTLD_LOCAL)) {
+  Library(const char* path, Header& header)
+      : header_(header), library_(::dlopen(path, RTLD_NOW | RTLD_LOCAL)) {
     if (!library_) {
-      say(header_, path, ::dlerror());
+      set_error(header_, path, ::dlerror());
       return;
     }
     ok_ = find(new_device, "oidnNewDevice") && find(release_device, "oidnReleaseDevice") &&
@@ -81,7 +82,8 @@ class Library {
   template <class F>
   bool find(F& function, const char* name) {
     function = reinterpret_cast<F>(::dlsym(library_, name));
-    if (!function) say(header_, name, "this library of Open Image Denoise lacks the function; version 2 has it");
+    if (!function)
+      set_error(header_, name, "this library of Open Image Denoise lacks the function; version 2 has it");
     return function != nullptr;
   }
   Header& header_;
@@ -100,7 +102,7 @@ class Run {
     if (failed("a device for this processor")) return;
     header.version = oidn.device_int(device_, "version");
     ready_ = header.version >= 20000;
-    if (!ready_) say(header, "Open Image Denoise", "version 2 is needed");
+    if (!ready_) set_error(header, "Open Image Denoise", "version 2 is needed");
   }
   ~Run() {
     if (device_) oidn_.release_device(device_);
@@ -133,7 +135,7 @@ class Run {
   bool failed(const char* what) {
     const char* message = nullptr;
     if (oidn_.device_error(device_, &message) == 0) return false;
-    say(header_, what, message);
+    set_error(header_, what, message);
     return true;
   }
   bool execute(std::initializer_list<Image> images, bool color) {

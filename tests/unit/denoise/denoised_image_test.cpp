@@ -24,7 +24,8 @@ std::vector<float> truth() {
   for (int y = 0; y < kSide; ++y)
     for (int x = 0; x < kSide; ++x)
       for (int c = 0; c < 3; ++c)
-        out.push_back(static_cast<float>((x > kSide / 2 ? 1.5 : .5) + .3 * std::sin(.4 * x + c) * std::cos(.3 * y)));
+        out.push_back(
+            static_cast<float>((x > kSide / 2 ? 1.5 : .5) + .3 * std::sin(.4 * x + c) * std::cos(.3 * y)));
   return out;
 }
 
@@ -75,8 +76,8 @@ Trial trial(const Denoise& denoise, std::uint64_t seed) {
 }
 
 const Denoise kDenoisers[] = {
-    blurred,                                                           // biased, and nearly free of noise
-    [](const std::vector<float>& half) { return half; },               // does nothing
+    blurred,                                              // biased, and nearly free of noise
+    [](const std::vector<float>& half) { return half; },  // does nothing
     [](const std::vector<float>& half) { return std::vector<float>(half.size(), .8f); },  // sees nothing
 };
 
@@ -120,8 +121,24 @@ TEST(DenoisedError, HasAnIntervalThatCovers) {
   }
 }
 
+// One pixel, a lamp, that the denoiser leaves alone and that outshines all others: half of its samples say
+// nothing of the other half's noise.
+TEST(DenoisedError, HasNoIntervalWhereAFewPixelsCarryIt) {
+  std::mt19937_64 random(3);
+  const std::vector<float> right = truth();
+  DenoisedHalves h{noisy(right, random), noisy(right, random), {}, {}, std::vector<bool>(kPixels, true)};
+  h.denoised_a = blurred(h.a);
+  h.denoised_b = blurred(h.b);
+  EXPECT_TRUE(denoised_error(h).rmse_interval && denoised_error(h).relmse_interval);
+
+  for (std::size_t c = 0; c < 3; ++c) h.a[c] = h.denoised_a[c] = 1e4F, h.b[c] = h.denoised_b[c] = 2e4F;
+  EXPECT_FALSE(denoised_error(h).rmse_interval);
+  EXPECT_TRUE(denoised_error(h).relmse_interval) << "of all pixels, relatively, it is one";
+}
+
 TEST(DenoisedError, LeavesOutPixelsWithoutSamples) {
-  DenoisedHalves h{{1, 1, 1, 0, 0, 0}, {3, 3, 3, 0, 0, 0}, {2, 2, 2, 9, 9, 9}, {2, 2, 2, 9, 9, 9}, {true, false}};
+  DenoisedHalves h{
+      {1, 1, 1, 0, 0, 0}, {3, 3, 3, 0, 0, 0}, {2, 2, 2, 9, 9, 9}, {2, 2, 2, 9, 9, 9}, {true, false}};
   EXPECT_DOUBLE_EQ(denoised_error(h).mse, -1);  // (1 - 2) (3 - 2) + 0: chance can bring it below 0
   EXPECT_EQ(denoised_error(h).rmse, 0);
   h.counts = {false, false};
@@ -152,8 +169,7 @@ TEST(DenoisedImage, IsTheMeanOfTheDenoisedHalvesOfAFilm) {
     for (std::size_t x = 2; x <= 4; ++x) sum += pixels.mean[3 * (8 * y + x) + 1];
   const double red = 2 * pixels.mean[3 * (8 * 3 + 3)], guides = (red + red) / 2;
   EXPECT_NEAR(image->rgb[3 * (24 * 3 + 3) + 1], sum / 9 + guides / 16, 1e-5);
-  for (std::size_t y = 0; y < 8; ++y)
-    EXPECT_EQ(image->rgb[3 * (24 * y + 20)], 0) << "no samples, no light";
+  for (std::size_t y = 0; y < 8; ++y) EXPECT_EQ(image->rgb[3 * (24 * y + 20)], 0) << "no samples, no light";
 }
 
 }  // namespace
