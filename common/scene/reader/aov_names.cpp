@@ -23,6 +23,8 @@ constexpr ChannelRow kChannels[] = {
     {"duv_dx", ""},
     {"duv_dy", ""},
     {"coverage", "coverage", false},
+    {"denoising_albedo", "denoising_albedo", false},
+    {"denoising_normal", "denoising_normal", false},
     {"direct", "direct", false},
     {"emission", "emission", false},
     {"indirect", "indirect", false},

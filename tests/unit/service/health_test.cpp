@@ -60,6 +60,7 @@ TEST(ServiceHealth, IsTheSameShuffledDuplicatedAndInMemory) {
 
     EXPECT_EQ(coordinator->job(job)->health, expected(16)) << seed;
     EXPECT_EQ(report(*coordinator, job)["nonfinite_samples"], 2 * 6) << seed;
+    EXPECT_EQ(report(*coordinator, job)["majorant_violations"], 2 * 5) << seed << ": once of each tile";
     EXPECT_TRUE(farm.refusals.empty());
   }
 }
