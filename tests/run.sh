@@ -125,7 +125,7 @@ computing_lane() {
 deploy/install-deps.sh --tests >"$logs/install.log" 2>&1 || { tail -n 20 "$logs/install.log"; give_up "what the tests need could not be installed"; }
 step "lint" run_lint
 export LIGHTSHAFT_BIN="$PWD/build/release/bin"
-step "release build: programs" build release lightshaft lightshaft-coordinator lightshaft-worker
+step "release build: programs" build release lightshaft lightshaft-coordinator lightshaft-worker fake_oidn_blurs
 
 if [ "$quick" -eq 1 ]; then
   step "system tests, the fast ones" run_pytest system tests/system -m "not slow" &
