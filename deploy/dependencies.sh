@@ -7,7 +7,7 @@ here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 cat <<'HEAD'
 # Dependencies
 
-All of them are packages of Debian 12; there is nothing else, no bundled copy and no download. Made by `deploy/dependencies.sh` on a machine with
+All of them are packages of Debian 12; there is nothing else, no bundled copy and no download; Open Image Denoise is optional, and `deploy/install-denoiser.sh` fetches it. Made by `deploy/dependencies.sh` on a machine with
 the versions below; security fixes to them come with `apt-get upgrade` and, where a library is linked statically or headers are all
 of it (nlohmann-json, CLI11, Boost, expected, stb, spdlog), with a new build.
 HEAD
