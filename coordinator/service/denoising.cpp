@@ -10,8 +10,7 @@ Result<void> Denoising::available() const {
   return {};
 }
 
-Result<Denoising::Denoised> Denoising::denoise(const Film& film,
-                                               const std::optional<Reference>& reference) const {
+Result<Denoising::Denoised> Denoising::denoise(const Film& film) const {
   const TimePoint start = clock_->now();
   const auto denoiser = Denoiser::find(threads_, library_);
   if (!denoiser) return tl::unexpected(denoiser.error());
@@ -19,18 +18,15 @@ Result<Denoising::Denoised> Denoising::denoise(const Film& film,
   if (!image) return tl::unexpected(image.error());
   Denoised out{std::move(*image), {}};
   out.figures = {out.image.by, {}, out.image.error, seconds(clock_->now() - start), {}};
-  if (reference && film.pixels_without_samples() == 0)
-    out.figures.true_error = true_error(*reference, out.image.rgb);
   return out;
 }
 
-std::shared_ptr<const Denoising::Denoised> Denoising::of(const Film& film,
-                                                         const std::optional<Reference>& reference) {
+std::shared_ptr<const Denoising::Denoised> Denoising::of(const Film& film) {
   const Digest pixels = pixels_sha256(film);
   const std::lock_guard lock(mutex_);
   if (last_ && last_pixels_ == pixels) return last_;
   last_.reset();  // frees its memory first
-  auto made = denoise(film, reference);
+  auto made = denoise(film);
   if (!made) {
     Denoised none;
     none.figures.trouble = made.error().message;

@@ -10,7 +10,6 @@
 #include "common/base/digest.h"
 #include "common/denoise/denoised_image.h"
 #include "common/image/film/film.h"
-#include "common/image/reference/reference.h"
 #include "coordinator/assemble/job_report.h"
 
 namespace ls::coordinator {
@@ -28,12 +27,12 @@ class Denoising {
     DenoisedImage image;  // without pixels if figures.trouble says why there are none
     DenoisedFigures figures;
   };
-  // Denoises the film, which has the AOVs for it. Against `reference`, if it is given, the true error is
-  // computed, too.
-  std::shared_ptr<const Denoised> of(const Film& film, const std::optional<Reference>& reference);
+  // Denoises the film, which has the AOVs for it. Figures are without the true error, which depends on a
+  // job's reference.
+  std::shared_ptr<const Denoised> of(const Film& film);
 
  private:
-  Result<Denoised> denoise(const Film& film, const std::optional<Reference>& reference) const;
+  Result<Denoised> denoise(const Film& film) const;
 
   const int threads_;
   const std::string library_;

@@ -176,16 +176,19 @@ Result<void> Service::write_snapshot_now(const EntryPtr& entry) {
   return write_snapshot(entry, folded);
 }
 
-// Returns the denoised image of a job that asks for one, and puts its figures into the facts. Null if the job
-// asks for none or has no samples. Call without the lock: it takes seconds.
-std::shared_ptr<const Denoising::Denoised> Service::denoised(const Film& film, ReportFacts& facts) const {
+// Returns the denoised image of a job that asks for one, and puts its figures into the facts. `made` is that
+// image if it has been made already. Null if the job asks for none or has no samples. Call without the lock:
+// it takes seconds.
+std::shared_ptr<const Denoising::Denoised> Service::denoised(
+    const Film& film, ReportFacts& facts, std::shared_ptr<const Denoising::Denoised> made) const {
   if (!facts.job.spec.denoise || facts.samples == 0) return nullptr;
-  std::optional<Reference> reference;
-  if (facts.job.spec.reference && !facts.job.reference_same_seed)
-    if (auto read = load_reference(facts.job.spec, facts.job.settings.size, *blobs_))
-      reference = std::move(*read);
-  auto made = denoising_.of(film, reference);
+  if (!made) made = denoising_.of(film);
   facts.denoised = made->figures;
+  if (made->image.rgb.empty() || !facts.job.spec.reference || facts.job.reference_same_seed ||
+      facts.pixels_without_samples > 0)
+    return made;
+  if (const auto reference = load_reference(facts.job.spec, facts.job.settings.size, *blobs_))
+    facts.denoised->true_error = true_error(*reference, made->image.rgb);
   return made;
 }
 
@@ -194,9 +197,9 @@ void Service::denoise_final(const EntryPtr& entry, std::uint64_t number) {
   std::unique_lock lock(mutex_);
   if (entry->finishing != number || !entry->assembly) return;
   const Film film = entry->assembly->film();
-  ReportFacts facts = facts_locked(*entry);
+  if (film.samples() == 0) return;
   lock.unlock();
-  auto made = denoised(film, facts);
+  auto made = denoising_.of(film);
   lock.lock();
   if (entry->finishing == number) entry->denoised = std::move(made);
 }
@@ -239,10 +242,7 @@ void Service::finish(const EntryPtr& entry, std::uint64_t number) {
   if (on_disk()) {
     const auto written = [&]() -> Result<void> {
       const auto where = folder(facts.job.id);
-      if (denoised_image)
-        facts.denoised = denoised_image->figures;
-      else
-        denoised_image = denoised(film, facts);
+      denoised_image = denoised(film, facts, std::move(denoised_image));
       if (facts.denoised && facts.denoised->by.empty())
         log_warn(fmt::format("job={}", facts.job.id.value), "no denoised layers: " + facts.denoised->trouble);
       const auto clamped = write_image(

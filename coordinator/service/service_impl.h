@@ -328,7 +328,8 @@ class Service final : public Coordinator {
                bool last);
   std::shared_ptr<const Reference> reference_of(const StoredJob& job);
   void after_comparisons(const EntryPtr& entry, std::function<void()> write);
-  std::shared_ptr<const Denoising::Denoised> denoised(const Film& film, ReportFacts& facts) const;
+  std::shared_ptr<const Denoising::Denoised> denoised(
+      const Film& film, ReportFacts& facts, std::shared_ptr<const Denoising::Denoised> made = nullptr) const;
   void denoise_final(const EntryPtr& entry, std::uint64_t number);
 
   // Results (service_results.cpp)

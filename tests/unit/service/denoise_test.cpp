@@ -3,10 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <thread>
 
 #include "common/base/helper_program.h"
+#include "common/image/exr/exr_file.h"
 #include "common/image/exr/final_image.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
@@ -65,6 +67,40 @@ TEST(ServiceDenoise, AddsLayersToTheImageAndTheirErrorToTheReport) {
     EXPECT_GE(told["denoised"]["relmse_ci95"][1], relmse);
     EXPECT_EQ(image.strings.at("lightshaft:denoised_relmse"), fmt::format("{:.9g}", relmse));
     EXPECT_TRUE(coordinator->job(job)->denoise);
+  }
+}
+
+// Two jobs of the same pixels against references of their own: a cached image brings no figures of the
+// other's.
+TEST(ServiceDenoise, TheTrueErrorIsOfTheJobsOwnReference) {
+  TempFolder dir;
+  for (const std::filesystem::path& data : {dir.path(), std::filesystem::path()}) {
+    auto coordinator = open_with(data, fake("blurs"));
+    const std::vector<float> levels = {.5F, 2.F};
+    std::vector<JobId> jobs;
+    for (const float level : levels) {
+      ExrPicture grey{{40, 24}, {}, {}};
+      for (const char* c : {"R", "G", "B"}) grey.channels[c] = ExrFloat{std::vector<float>(40 * 24, level)};
+      const auto exr = write_exr(grey).value();
+      JobSpec spec = denoised_job();
+      spec.float_output = true;
+      spec.reference = sha256(std::span<const std::byte>(exr));
+      ASSERT_TRUE(coordinator->blobs().put(*spec.reference, exr));
+      jobs.push_back(submit(*coordinator, spec));
+    }
+    FakeFarm farm(*coordinator, 2);
+    ASSERT_TRUE(farm.finish(jobs[0]) && farm.finish(jobs[1]));
+
+    EXPECT_EQ(pixels(*coordinator, jobs[0]), pixels(*coordinator, jobs[1]));
+    for (std::size_t i = 0; i < 2; ++i) {
+      const FinalPicture image = image_of(*coordinator, jobs[i]);
+      double sum = 0;
+      for (const char* layer : {"denoised.R", "denoised.G", "denoised.B"})
+        for (const float v : std::get<ExrFloat>(image.channels.at(layer)).values)
+          sum += (double{v} - levels[i]) * (double{v} - levels[i]);
+      const double rmse = report(*coordinator, jobs[i])["denoised"]["true_rmse"];
+      EXPECT_NEAR(rmse, std::sqrt(sum / (3 * 40 * 24)), 1e-12);  // 2,880 doubles are added in another order
+    }
   }
 }
 
