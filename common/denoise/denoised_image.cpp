@@ -5,7 +5,8 @@
 #include <cmath>
 
 #include "common/base/check.h"
-#include "common/image/error/relative_weights.h"
+#include "common/image/error/error_estimate.h"
+#include "common/image/frame/each_pixel.h"
 
 namespace ls {
 namespace {
@@ -13,18 +14,8 @@ namespace {
 constexpr double kInterval = 1.96;  // standard errors on either side of a 95 % interval
 
 constexpr double kFewestPixels = 4;  // that carry the noise of an estimate with an interval
-constexpr double kFourthMoment =
-    12;  // E (a - b)^4 of two Gaussian variables, over the square of their variance
-
-// Calls put(to, from) with the index of each of the tile's pixels in the frame and in the tile.
-template <class Put>
-void each_pixel(const PixelRect& rect, FrameSize frame, Put put) {
-  std::size_t from = 0;
-  for (int y = rect.y0; y < rect.y1; ++y)
-    for (int x = rect.x0; x < rect.x1; ++x, ++from)
-      put(static_cast<std::size_t>(y) * static_cast<std::size_t>(frame.width) + static_cast<std::size_t>(x),
-          from);
-}
+// E (a - b)^4 of two Gaussian variables, over the square of their variance
+constexpr double kFourthMoment = 12;
 
 struct Noisy {
   std::array<NoisyImage, 2> halves;
@@ -100,7 +91,7 @@ DenoisedError denoised_error(const DenoisedHalves& h) {
       const double product = (double{h.a[i]} - h.denoised_a[i]) * (double{h.b[i]} - h.denoised_b[i]);
       const double apart = double{h.denoised_a[i]} - h.denoised_b[i];
       const double mean = (double{h.denoised_a[i]} + h.denoised_b[i]) / 2;
-      const double weight = 1 / (mean * mean + kRelMseDenominator), estimate = product + apart * apart / 4;
+      const double weight = relative_weight(mean, 0), estimate = product + apart * apart / 4;
       plain.estimate += estimate;
       relative.estimate += weight * estimate;
       product_sum += product;

@@ -6,22 +6,13 @@
 
 #include "common/image/aov/cryptomatte.h"
 #include "common/image/aov/id_slots.h"
+#include "common/image/frame/each_pixel.h"
 
 namespace ls {
 namespace {
 
 std::size_t pixels_of(FrameSize size) {
   return static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
-}
-
-// Calls put(to, from) with the index of each of the tile's pixels in the frame and in the tile.
-template <class Put>
-void each_pixel(const PixelRect& rect, FrameSize frame, Put put) {
-  std::size_t from = 0;
-  for (int y = rect.y0; y < rect.y1; ++y)
-    for (int x = rect.x0; x < rect.x1; ++x, ++from)
-      put(static_cast<std::size_t>(y) * static_cast<std::size_t>(frame.width) + static_cast<std::size_t>(x),
-          from);
 }
 
 class Layers {

@@ -106,8 +106,8 @@ TEST(DenoisedError, IsRightOnAverageWhateverTheDenoiserDoes) {
   expect_right_on_average(kDenoisers[2], &DenoisedError::relmse, &Trial::relmse);
 }
 
-// Of 500 intervals of 95 % that are right, 463 to 487 cover with a probability of 0.99 (binomial, 475 +- 2.58
-// x 4.87). They may be too wide, not too narrow: there is no upper bound.
+// A right 95 % interval covers the true error in 463 or more of 500 trials with a probability of 0.995: the
+// count is binomial, with mean 475 and standard deviation 4.87. Wider intervals also pass.
 TEST(DenoisedError, HasAnIntervalThatCovers) {
   constexpr int kTrials = 500;
   for (const Denoise& denoise : kDenoisers) {

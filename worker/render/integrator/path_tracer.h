@@ -51,7 +51,7 @@ struct FirstSurface {
   float not_passed = 1;
 };
 
-// What a denoiser is told about a camera ray (docs/reference/aovs.md: denoising_albedo, denoising_normal).
+// Albedo and normal that guide a denoiser: one sample of the AOVs denoising_albedo and denoising_normal.
 struct DenoisingGuide {
   C3 albedo{0, 0, 0};
   V3d normal{0, 0, 0};

@@ -1,0 +1,20 @@
+// The pixels of a tile, by their places in the frame and in the tile.
+#pragma once
+
+#include <cstddef>
+
+#include "common/image/frame/frame.h"
+
+namespace ls {
+
+// Calls put(to, from) with the index of each of the tile's pixels in the frame and in the tile, row by row.
+template <class Put>
+void each_pixel(const PixelRect& rect, FrameSize frame, Put put) {
+  std::size_t from = 0;
+  for (int y = rect.y0; y < rect.y1; ++y)
+    for (int x = rect.x0; x < rect.x1; ++x, ++from)
+      put(static_cast<std::size_t>(y) * static_cast<std::size_t>(frame.width) + static_cast<std::size_t>(x),
+          from);
+}
+
+}  // namespace ls
