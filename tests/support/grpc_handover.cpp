@@ -1,13 +1,14 @@
 // Tells ThreadSanitizer of the points where gRPC hands work from one thread to another. Debian's gRPC is not
-// compiled for ThreadSanitizer, which therefore sees none of gRPC's own synchronisation and takes every object
-// that crosses it for a race.
+// compiled for ThreadSanitizer, which therefore sees none of gRPC's own synchronisation and takes every
+// object that crosses it for a race.
 //
 // The functions below replace those of the library that start an operation or schedule a reaction; each calls
 // the library's. They state what gRPC promises and no more, so a race of our own code stays a race:
 //   - what a thread did before it started an operation happens before the operation's completion runs;
 //   - OnDone runs after every other reaction of its call, OnCancel after the call's handler;
 //   - a server is destroyed after the last reaction of its calls;
-//   - operations may be started before a reactor is bound to its call: gRPC's headers keep them under a mutex.
+//   - operations may be started before a reactor is bound to its call: gRPC's headers keep them under a
+//   mutex.
 // TSAN_OPTIONS=ignore_noninstrumented_modules=1 silences what the library itself allocates and frees. Linked
 // into tests built with -fsanitize=thread only.
 #include <absl/synchronization/mutex.h>
@@ -43,7 +44,8 @@ template <class Function>
 Function library(const char* name) {
   void* found = dlsym(RTLD_NEXT, name);
   if (!found) {
-    std::fprintf(stderr, "tests/support/grpc_handover.cpp: this gRPC has no %s; adapt the file to it\n", name);
+    std::fprintf(stderr, "tests/support/grpc_handover.cpp: this gRPC has no %s; adapt the file to it\n",
+                 name);
     std::abort();
   }
   return reinterpret_cast<Function>(found);
@@ -87,7 +89,8 @@ UNSEEN int find_code(dl_phdr_info* module, std::size_t, void* address) {
     const auto& part = module->dlpi_phdr[i];
     const auto start = module->dlpi_addr + part.p_vaddr;
     const auto at = reinterpret_cast<std::uintptr_t>(address);
-    if (part.p_type == PT_LOAD && at >= start && at < start + part.p_memsz) return part.p_flags & PF_X ? 2 : 1;
+    if (part.p_type == PT_LOAD && at >= start && at < start + part.p_memsz)
+      return part.p_flags & PF_X ? 2 : 1;
   }
   return 0;
 }
@@ -176,8 +179,8 @@ void grpc_server_destroy(grpc_server* server) {
 namespace grpc::internal {
 
 // The count of outstanding reactions is an atomic that the library decrements unseen. Two references more and
-// one less than it is read here by an instrumented operation, so that what the other reactions did before they
-// decremented it happens before OnDone. The reference that is left over is never counted again.
+// one less than it is read here by an instrumented operation, so that what the other reactions did before
+// they decremented it happens before OnDone. The reference that is left over is never counted again.
 void ServerCallbackCall::ScheduleOnDone(bool) {
   static const auto next =
       library<void (*)(ServerCallbackCall*, bool)>("_ZN4grpc8internal18ServerCallbackCall14ScheduleOnDoneEb");
