@@ -2,14 +2,13 @@
 
 #include <algorithm>
 
-#include "common/base/overloaded.h"
 #include "common/scene/schema/bsdf_traits.h"
 #include "common/scene/schema/describe.h"
+#include "common/scene/schema/emitter_traits.h"
+#include "common/scene/schema/medium_traits.h"
 
 namespace ls::scene {
 namespace {
-
-bool grey(const Rgb& c) { return c[0] == c[1] && c[1] == c[2]; }
 
 template <class... Ts>
 std::string kind_of(const std::variant<Ts...>& x) {
@@ -44,11 +43,7 @@ class Analyst {
  private:
   void shapes();
   void media();
-  void add(const HomogeneousMedium& m);
-  void add(const HeterogeneousMedium& m);
-  void note_phase(PhaseIndex p) {
-    n_.anisotropic = n_.anisotropic || !std::holds_alternative<IsotropicPhase>(s_.phases[p.value]);
-  }
+  void add(const Medium& medium);
   void lights();
   void files();
   void file(AssetIndex i, const std::string& use) {
@@ -74,25 +69,16 @@ void Analyst::shapes() {
   }
 }
 
-void Analyst::add(const HomogeneousMedium& m) {
-  Rgb sigma = m.sigma_t;
-  for (double& x : sigma) x *= m.scale;
-  const bool emits = !all_zero(m.emission) || (!all_zero(m.source_radiance) && !all_zero(sigma));
-  if (all_zero(sigma) && !emits) return;
+void Analyst::add(const Medium& medium) {
+  const MediumTraits m = traits_of(medium, s_.volumes);
+  if (!m.extinguishes && !m.emits && !m.grids) return;
   n_.media = true;
-  n_.chromatic = n_.chromatic || !grey(sigma);
-  n_.emission = n_.emission || emits;
-  note_phase(m.phase);
-}
-
-void Analyst::add(const HeterogeneousMedium& m) {
-  n_.media = n_.grids = true;
-  if (const auto* c = std::get_if<ConstVolume>(&s_.volumes[m.sigma_t.value]))
-    n_.chromatic = n_.chromatic || !grey(c->value);
-  else
-    n_.density_files = true;
-  n_.emission = n_.emission || m.emission || m.source_radiance || m.temperature;
-  note_phase(m.phase);
+  n_.grids = n_.grids || m.grids;
+  n_.chromatic = n_.chromatic || m.chromatic;
+  n_.density_files = n_.density_files || m.density_file;
+  n_.emission = n_.emission || m.emits;
+  const PhaseIndex phase = std::visit([](const auto& kind) { return kind.phase; }, medium);
+  n_.anisotropic = n_.anisotropic || !std::holds_alternative<IsotropicPhase>(s_.phases[phase.value]);
 }
 
 void Analyst::media() {
@@ -108,7 +94,7 @@ void Analyst::media() {
   for (std::size_t i = 0; i < used.size(); ++i) {
     if (!used[i]) continue;
     ++n_.media_kinds[kind_of(s_.media[i])];
-    std::visit([&](const auto& m) { add(m); }, s_.media[i]);
+    add(s_.media[i]);
   }
 }
 
@@ -116,9 +102,7 @@ void Analyst::lights() {
   bool extended = n_.area_lights > 0;
   for (const Emitter& e : s_.emitters) {
     ++n_.lights[kind_of(e)];
-    const auto* sun = std::get_if<DirectionalEmitter>(&e);
-    extended = extended || std::holds_alternative<ConstantEmitter>(e) ||
-               std::holds_alternative<EnvmapEmitter>(e) || (sun && sun->angular_radius > 0);
+    extended = extended || !traits_of(e, s_.textures).delta;
   }
   n_.only_delta_lights = !extended && !s_.emitters.empty();
 }

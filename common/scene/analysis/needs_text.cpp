@@ -74,8 +74,10 @@ class Words {
   void media() {
     const std::string none = n_.media_kinds.empty() ? "no medium" : "no such medium";
     say("participating media", n_.media, listed(n_.media_kinds), "no medium");
-    say("homogeneous media", count<HomogeneousMedium>(n_.media_kinds), "homogeneous media");
-    say("heterogeneous media", count<HeterogeneousMedium>(n_.media_kinds), "heterogeneous media");
+    for (const std::string_view kind : kKindsOf<Medium>) {
+      const std::string media = fmt::format("{} media", kind);
+      say(media, count(n_.media_kinds, kind), media);
+    }
     std::vector<std::string> grids;
     for (const FileNeed& f : n_.files)
       for (const std::string& use : f.uses)

@@ -6,11 +6,12 @@
 #include <limits>
 #include <utility>
 
-#include "common/base/overloaded.h"
 #include "common/scene/analysis/unreachable.h"
 #include "common/scene/limits.h"
 #include "common/scene/schema/bsdf_traits.h"
+#include "common/scene/schema/emitter_traits.h"
 #include "common/scene/schema/integrators.h"
+#include "common/scene/schema/medium_traits.h"
 #include "common/scene/schema/validate.h"
 
 namespace ls::scene {
@@ -51,20 +52,8 @@ class Pruner {
     return c && *c == Rgb{value, value, value};
   }
   bool black(TextureIndex t) const { return everywhere(t, 0); }
-  bool zero(VolumeIndex v) const {
-    const auto* c = std::get_if<ConstVolume>(&s_.volumes[v.value]);
-    return c && all_zero(c->value);
-  }
 
   void media();
-  bool dense(const HomogeneousMedium& m) const { return m.scale != 0 && !all_zero(m.sigma_t); }
-  bool dense(const HeterogeneousMedium& m) const { return m.scale != 0 && !zero(m.sigma_t); }
-  bool does_something(const HomogeneousMedium& m) const { return dense(m) || !all_zero(m.emission); }
-  bool does_something(const HeterogeneousMedium& m) const {
-    return dense(m) || (m.emission && m.emission_scale != 0 && !zero(*m.emission));
-  }
-  bool scatters(const HomogeneousMedium& m) const { return dense(m) && !all_zero(m.albedo); }
-  bool scatters(const HeterogeneousMedium& m) const { return dense(m) && !zero(m.albedo); }
   std::vector<bool> named_media() const;
   void drop_dark_sources();
   std::uint32_t drop_idle_media();
@@ -73,7 +62,6 @@ class Pruner {
   void materials();
   bool simplify(Bsdf& b);
   void lights();
-  bool has_power(const Emitter& e) const;
   void invisible();
   void files(const std::vector<Asset>& after);
 
@@ -111,7 +99,8 @@ std::vector<bool> Pruner::named_media() const {
 std::uint32_t Pruner::drop_idle_media() {
   const std::vector<bool> named = named_media();
   const auto idle = [&](const Medium& m) {
-    return !whom_.media || !std::visit([&](const auto& x) { return does_something(x); }, m);
+    const MediumTraits traits = traits_of(m, s_.volumes);
+    return !whom_.media || !(traits.extinguishes || traits.emits);
   };
   const auto priority = [](const Medium& m) {
     return std::visit([](const auto& x) { return x.priority; }, m);
@@ -178,7 +167,8 @@ void Pruner::phases() {
   for (std::size_t i = 0; i < named.size(); ++i)
     std::visit(
         [&](auto& m) {
-          if (!named[i] || scatters(m) || std::holds_alternative<IsotropicPhase>(s_.phases[m.phase.value]))
+          if (!named[i] || traits_of(s_.media[i], s_.volumes).scatters ||
+              std::holds_alternative<IsotropicPhase>(s_.phases[m.phase.value]))
             return;
           m.phase = isotropic;
           ++unasked;
@@ -226,18 +216,6 @@ void Pruner::materials() {
   note("mask", "its opacity is 0 or 1 everywhere", masks_);
 }
 
-bool Pruner::has_power(const Emitter& emitter) const {
-  return std::visit(
-      overloaded{
-          [](const ConstantEmitter& e) { return !all_zero(e.radiance); },
-          [](const DirectionalEmitter& e) { return !all_zero(e.irradiance); },
-          [](const PointEmitter& e) { return !all_zero(e.intensity); },
-          [&](const SpotEmitter& e) { return !all_zero(e.intensity) && !(e.texture && black(*e.texture)); },
-          [](const EnvmapEmitter& e) { return e.scale != 0; },
-          [&](const ProjectorEmitter& e) { return e.scale != 0 && !black(e.irradiance); }},
-      emitter);
-}
-
 void Pruner::lights() {
   std::uint32_t dark = 0;
   for (Shape& s : s_.shapes) {
@@ -245,8 +223,8 @@ void Pruner::lights() {
     s.emitter.reset();
     ++dark;
   }
-  dark +=
-      static_cast<std::uint32_t>(std::erase_if(s_.emitters, [&](const Emitter& e) { return !has_power(e); }));
+  dark += static_cast<std::uint32_t>(
+      std::erase_if(s_.emitters, [&](const Emitter& e) { return traits_of(e, s_.textures).dark; }));
   note("light", "it is black", dark);
 }
 

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 
-#include "common/base/overloaded.h"
 #include "common/scene/analysis/shape_place.h"
 #include "common/scene/limits.h"
 #include "common/scene/schema/bsdf_traits.h"
+#include "common/scene/schema/emitter_traits.h"
+#include "common/scene/schema/medium_traits.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene {
@@ -20,16 +21,6 @@ Box with_margin(const Box& b, const Box& beside) {
 
 Vec3 place_of(const Transform& t) { return {t.m[3], t.m[7], t.m[11]}; }
 Vec3 column(const Transform& t, std::size_t k) { return {t.m[k], t.m[4 + k], t.m[8 + k]}; }
-
-bool emits(const Medium& medium) {
-  return std::visit(overloaded{[](const HomogeneousMedium& m) {
-                                 return m.emission != Rgb{0, 0, 0} || m.source_radiance != Rgb{0, 0, 0};
-                               },
-                               [](const HeterogeneousMedium& m) {
-                                 return m.emission || m.source_radiance || m.temperature;
-                               }},
-                    medium);
-}
 
 // True if the camera and all of its near plane, where rays begin, are outside the box.
 bool camera_is_outside(const Sensor& s, const Box& tight) {
@@ -47,17 +38,6 @@ bool camera_is_outside(const Sensor& s, const Box& tight) {
     behind = behind && depth > s.near_clip * (1 + kApart);
   }
   return before || behind;
-}
-
-std::optional<Vec3> place_of(const Emitter& e) {
-  return std::visit(
-      []<class T>(const T& light) -> std::optional<Vec3> {
-        if constexpr (requires { light.position; }) return light.position;
-        if constexpr (std::is_same_v<T, SpotEmitter> || std::is_same_v<T, ProjectorEmitter>)
-          return place_of(light.to_world);
-        return std::nullopt;
-      },
-      e);
 }
 
 class Search {
@@ -80,12 +60,13 @@ class Search {
     std::size_t shape;
     std::optional<Box> box;  // nullopt: may be anywhere
   };
+  bool emits(MediumIndex m) const { return traits_of(s_.media[m.value], s_.volumes).emits; }
   static std::optional<Box> place_in_scene(const Shape& s) { return s.group ? std::nullopt : box_of(s); }
 
   // True if light may enter through the shape or come from it. Surfaces without any effect are removed later
   // (prune.cpp).
   bool is_entrance(const Shape& s) const {
-    const auto glowing = [&](const std::optional<MediumIndex>& m) { return m && emits(s_.media[m->value]); };
+    const auto glowing = [&](const std::optional<MediumIndex>& m) { return m && emits(*m); };
     if (s.emitter || glowing(s.interior) || glowing(s.exterior)) return true;
     const bool nothing = std::holds_alternative<NullBsdf>(s_.bsdfs[s.bsdf.value]) && !s.is_medium_transition;
     return traits_[s.bsdf.value].transmits && !nothing;
@@ -103,10 +84,10 @@ class Search {
     const bool closed =
         std::holds_alternative<SphereShape>(s.geometry) || std::holds_alternative<CubeShape>(s.geometry);
     if (!closed || s.flip_normals || s.emitter || traits_[s.bsdf.value].transmits ||
-        emits(s_.media[s.interior->value]))
+        emits(*s.interior))
       return false;
     const auto lit = [&](const Emitter& e) {
-      const auto p = place_of(e);
+      const auto p = traits_of(e, s_.textures).position;
       return p && touch(with_margin(box, {*p, *p}), {*p, *p});
     };
     if (std::any_of(s_.emitters.begin(), s_.emitters.end(), lit)) return false;

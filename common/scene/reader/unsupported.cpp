@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "common/scene/schema/describe.h"
 #include "common/scene/schema/integrators.h"
 
 namespace ls::scene {
@@ -19,6 +20,14 @@ Names integrator_names() {
   for (const IntegratorRow& row : integrators()) names.emplace_back(row.name);
   for (const WrapperRow& row : integrator_wrappers()) names.emplace_back(row.name);
   return names;
+}
+
+// The names of a variant's kinds, and `others`.
+template <class Variant>
+Names kinds_of(Names others = {}) {
+  others.insert(others.end(), kKindsOf<Variant>.begin(), kKindsOf<Variant>.end());
+  std::sort(others.begin(), others.end());
+  return others;
 }
 
 const std::map<std::string_view, PluginRow>& plugins() {
@@ -43,22 +52,21 @@ const std::map<std::string_view, PluginRow>& plugins() {
         {"bsplinecurve", "deformable", "ellipsoids", "ellipsoidsmesh", "hair", "heightfield", "linearcurve",
          "merge", "sdfgrid"}}},
       {"bsdf",
-       {{"blendbsdf", "bumpmap", "conductor", "dielectric", "diffuse", "mask", "normalmap", "null", "plastic",
-         "principled", "roughconductor", "roughdielectric", "roughplastic", "thindielectric", "twosided"},
+       {kinds_of<Bsdf>(),
         {"circular", "coating", "difftrans", "hair", "hk", "irawan", "measured", "measured_polarized",
          "mixturebsdf", "phong", "pplastic", "polarizer", "principledthin", "retarder", "roughcoating",
          "roughdiffuse", "ward"}}},
       {"emitter",
-       {{"area", "constant", "directional", "envmap", "point", "projector", "spot"},
+       {kinds_of<Emitter>({"area"}),
         {"collimated", "directionalarea", "sky", "sun", "sunsky", "timed_sunsky", "avg_sunsky"}}},
       {"texture",
        {{"bitmap", "checkerboard", "mesh_attribute", "peak", "srgb", "uniform"},
         {"scale", "sampledspectrum", "volume", "vertexcolors", "wireframe", "curvature", "gridtexture"}}},
       {"spectrum", {{"srgb", "uniform"}, {"blackbody", "d65", "irregular", "rawconstant", "regular"}}},
-      {"volume", {{"constvolume", "gridvolume"}, {"hgridvolume", "volcache"}}},
-      {"medium", {{"heterogeneous", "homogeneous"}, {}}},
+      {"volume", {kinds_of<Volume>(), {"hgridvolume", "volcache"}}},
+      {"medium", {kinds_of<Medium>(), {}}},
       {"phase",
-       {{"hg", "isotropic"},
+       {kinds_of<Phase>(),
         {"blendphase", "kkay", "microflake", "mixturephase", "rayleigh", "sggx", "tabphase"}}},
   };
   return table;

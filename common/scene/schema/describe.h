@@ -9,10 +9,12 @@
 // reader's table; a missing part is a compile error.
 #pragma once
 
+#include <array>
 #include <concepts>
 #include <limits>
 #include <string_view>
 #include <type_traits>
+#include <variant>
 
 #include "common/scene/limits.h"
 #include "common/scene/scene.h"
@@ -177,6 +179,16 @@ LS_TYPE(FilmSettings, "film", "hdrfilm", "", "size of the frame and its reconstr
 LS_TYPE(IntegratorSettings, "integrator", "volpath", "volpath, volpath_distant_mis, path",
         "how light is followed")
 #undef LS_TYPE
+
+template <class Variant>
+struct KindsOf;
+template <class... Kinds>
+struct KindsOf<std::variant<Kinds...>> {
+  static constexpr std::array<std::string_view, sizeof...(Kinds)> names{kInfo<Kinds>.name...};
+};
+// Names of the kinds of a variant, such as Medium, in its order.
+template <class Variant>
+inline constexpr auto& kKindsOf = KindsOf<Variant>::names;
 
 template <class T, class U>
 concept Of = std::same_as<std::remove_const_t<T>, U>;
