@@ -70,6 +70,7 @@ int watch(FarmApi& api, const FarmFlags& flags) {
   if (!end) return print_rejected(end.error());
   if (const int code = print_end(*end, flags.quiet || !flags.farm.json); code != kOk) return code;
   if (!flags.farm.json) print(job_text(*end));
+  if (!flags.quiet) print_denoised(api, *end);
   return kOk;
 }
 

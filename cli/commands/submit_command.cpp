@@ -64,6 +64,7 @@ int wait_and_fetch(const std::string& id, const SubmitFlags& flags) {
   const auto end = watch_job(*api, id, {flags.quiet, flags.farm.json});
   if (!end) return print_rejected(end.error());
   if (const int code = print_end(*end, flags.quiet); code != kOk) return code;
+  if (!flags.quiet) print_denoised(*api, *end);
   return fetch_results(*api, id, {flags.out, flags.report, flags.html, false, true});
 }
 

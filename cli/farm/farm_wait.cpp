@@ -85,4 +85,13 @@ int print_end(const json& job, bool quiet) {
   return kFailed;
 }
 
+void print_denoised(FarmApi& api, const json& job) {
+  // Those of a sequence are in the reports of its frames.
+  const auto frames = job.find("frames");
+  const bool sequence = frames != job.end() && frames->is_object();
+  if (!flag_field(job, "denoise") || sequence) return;
+  if (const auto report = api.get(job_path(text_field(job, "id")) + "/report"))
+    if (const std::string denoised = denoised_text(*report); !denoised.empty()) print_note(denoised);
+}
+
 }  // namespace ls::cli

@@ -85,4 +85,14 @@ std::string error_text(const json& job) {
   return verdict.doubtful ? out + ": " + verdict.words : out;
 }
 
+std::string denoised_text(const json& report) {
+  const auto denoised = report.find("denoised");
+  if (denoised == report.end() || !denoised->is_object()) return "";
+  const auto relmse = number_field(*denoised, "relmse");
+  if (!relmse) return "not denoised: " + text_field(*denoised, "error");
+  if (const auto ci = pair_field(*denoised, "relmse_ci95"))
+    return fmt::format("denoised {:.3g} ({:.3g} to {:.3g})", *relmse, ci->first, ci->second);
+  return fmt::format("denoised {:.3g} (a few pixels carry its noise: no interval)", *relmse);
+}
+
 }  // namespace ls::cli

@@ -33,5 +33,8 @@ std::string reference_error_text(const nlohmann::json& object, const char* key, 
                                  bool same_seed, int digits = 3);
 // Returns one line on the error of a job's image; empty: unknown.
 std::string error_text(const nlohmann::json& job);
+// Returns the error of the denoised image of a report (GET /jobs/ID/report): "denoised 0.0123 (0.0118 to
+// 0.0129)", or why there is none; empty: none was asked for.
+std::string denoised_text(const nlohmann::json& report);
 
 }  // namespace ls::cli

@@ -71,16 +71,7 @@ std::string report_summary(const std::string& report) {
       !reference_error.empty())
     line += ", true relMSE " + reference_error;
   if (const auto flip = number_field(j, "true_flip")) line += fmt::format(", FLIP {:.3g}", *flip);
-  if (const auto denoised = j.find("denoised"); denoised != j.end() && denoised->is_object()) {
-    const auto relmse = number_field(*denoised, "relmse");
-    const auto ci = pair_field(*denoised, "relmse_ci95");
-    if (relmse && ci)
-      line += fmt::format(", denoised {:.3g} ({:.3g} to {:.3g})", *relmse, ci->first, ci->second);
-    else if (relmse)
-      line += fmt::format(", denoised {:.3g} (a few pixels carry its noise: no interval)", *relmse);
-    else
-      line += ", not denoised: " + text_field(*denoised, "error");
-  }
+  if (const std::string denoised = denoised_text(j); !denoised.empty()) line += ", " + denoised;
   const bool news = verdict.doubtful || text_field(j, "verdict_kind") != "early";
   if (news && !verdict.words.empty()) line += ": " + verdict.words;
   return line + outlook(j, verdict.doubtful);

@@ -61,7 +61,7 @@ def test_verify_finds_a_denoised_value_that_was_changed(fog, tmp_path):
     assert "layer denoised.G" in done.stdout + done.stderr
 
 
-def test_on_a_farm_image_picture_and_report_have_it(tmp_path):
+def test_on_a_farm_image_picture_and_report_have_it(fog, tmp_path):
     library = tmp_path / "oidn.so"
     shutil.copy(LIBRARY, library)
     with LocalFarm(tmp_path / "farm", environment={"LIGHTSHAFT_OIDN": str(library)}) as farm:
@@ -75,6 +75,11 @@ def test_on_a_farm_image_picture_and_report_have_it(tmp_path):
         image.write_bytes(farm.request("GET", f"/api/v1/jobs/{job}/image.exr"))
         assert read(image)[1]["lightshaft:denoised_by"] == farm.report(job)["denoised"]["by"] == "Open Image Denoise 2.99.7"
         assert "denoised" not in farm.report(plain)
+        to = ("--to", f"http://127.0.0.1:{farm.http}", "--token-file", farm.data / "token")
+        waited = lightshaft("submit", fog, *to, "--spp", 16, "--denoise", "--wait")
+        denoised = farm.report(waited.stdout.split()[0])["denoised"]
+        assert f"denoised {denoised['relmse']:.3g} (" in waited.stderr
+        assert "denoised" not in lightshaft("submit", fog, *to, "--spp", 16, "--wait").stderr
         picture = farm.request("GET", f"/api/v1/jobs/{job}/image.png?layer=denoised")
         assert picture.startswith(b"\x89PNG") and picture != farm.request("GET", f"/api/v1/jobs/{job}/image.png")
         for path, status, words in ((f"/api/v1/jobs/{plain}/image.png?layer=denoised", 409, "was submitted without"),

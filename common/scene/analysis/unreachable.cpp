@@ -83,8 +83,7 @@ class Search {
   bool sealed(const Shape& s, std::size_t i, const Box& box) {
     const bool closed =
         std::holds_alternative<SphereShape>(s.geometry) || std::holds_alternative<CubeShape>(s.geometry);
-    if (!closed || s.flip_normals || s.emitter || traits_[s.bsdf.value].transmits ||
-        emits(*s.interior))
+    if (!closed || s.flip_normals || s.emitter || traits_[s.bsdf.value].transmits || emits(*s.interior))
       return false;
     const auto lit = [&](const Emitter& e) {
       const auto p = traits_of(e, s_.textures).position;

@@ -27,8 +27,7 @@ struct TraitsOfEmitter {
   }
   EmitterTraits operator()(const EnvmapEmitter& e) const { return {.dark = e.scale == 0}; }
   EmitterTraits operator()(const ProjectorEmitter& e) const {
-    return {
-        .dark = e.scale == 0 || black(e.irradiance), .delta = true, .position = origin_of(e.to_world)};
+    return {.dark = e.scale == 0 || black(e.irradiance), .delta = true, .position = origin_of(e.to_world)};
   }
 };
 
