@@ -22,8 +22,8 @@ ProgressFigures progress_of(const nlohmann::json& job);
 // Prints how a job ended. If it is done, prints the error of its image (with `quiet` only if the error is not
 // to be trusted) and returns kOk; otherwise prints why it is not done and returns kFailed.
 int print_end(const nlohmann::json& job, bool quiet);
-// Prints the error of the denoised image of a job that is done, which only its report has; nothing if none was
-// asked for.
+// Prints the error of the denoised image of a job that is done, which only its report has; nothing if none
+// was asked for.
 void print_denoised(FarmApi& api, const nlohmann::json& job);
 
 }  // namespace ls::cli
