@@ -97,15 +97,6 @@ std::vector<std::byte> RoundErrors::save_tile(TileIndex tile) const {
   return out;
 }
 
-std::vector<std::byte> RoundErrors::save() const {
-  std::vector<std::byte> out;
-  for (TileIndex t = 0; t < tiles_.size(); ++t) {
-    const auto tile = save_tile(t);
-    out.insert(out.end(), tile.begin(), tile.end());
-  }
-  return out;
-}
-
 namespace {
 // Reads the errors of one tile from the front of `in`. What follows them stays in `in`.
 template <class Rounds>
@@ -128,15 +119,6 @@ Result<void> RoundErrors::load_tile(TileIndex tile, std::span<const std::byte> b
   if (tile >= tiles_.size() || !read_tile(in, tiles_[tile].rounds, tiles_[tile].relative) || !in.empty())
     return damaged();
   return {};
-}
-
-Result<RoundErrors> RoundErrors::load(std::span<const std::byte> bytes, TileIndex tiles, bool keep_relative) {
-  RoundErrors loaded(tiles, keep_relative);
-  Reader in(bytes);
-  for (Tile& t : loaded.tiles_)
-    if (!read_tile(in, t.rounds, t.relative)) return damaged();
-  if (!in.empty()) return damaged();
-  return loaded;
 }
 
 }  // namespace ls::coordinator

@@ -38,10 +38,8 @@ class RoundErrors {
   // have not reached a round.
   std::vector<std::vector<double>> relative() const;
 
-  std::vector<std::byte> save() const;
   std::vector<std::byte> save_tile(TileIndex tile) const;
   Result<void> load_tile(TileIndex tile, std::span<const std::byte> bytes);
-  static Result<RoundErrors> load(std::span<const std::byte> bytes, TileIndex tiles, bool keep_relative);
   bool operator==(const RoundErrors&) const = default;
 
  private:

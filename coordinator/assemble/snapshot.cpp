@@ -5,7 +5,6 @@
 #include <bit>
 #include <cstring>
 
-#include "coordinator/assemble/snapshot_whole.h"
 
 namespace ls::coordinator {
 namespace {
@@ -139,10 +138,7 @@ std::optional<Assembly> load_snapshot(const std::filesystem::path& path, const T
   Source in(path);
   const auto expected = head_of(grid, aovs, format);
   const auto head = in.take(expected.size());
-  if (!head) return std::nullopt;
-  if (std::memcmp(head->data(), kWholeSnapshotMagic.data(), kWholeSnapshotMagic.size()) == 0)
-    return load_whole_snapshot(path, grid, keep_relative, format, aovs);
-  if (*head != expected) return std::nullopt;
+  if (!head || *head != expected) return std::nullopt;
   Film film(grid, aovs);
   RoundErrors errors(grid.count(), keep_relative);
   std::string health;

@@ -47,8 +47,7 @@ class SnapshotFile {
 };
 
 // Reads a snapshot. nullopt if the file is missing, damaged or of another grid, AOV set or format: then
-// everything is folded again from the partials (the stored results of units). Also reads the format of
-// earlier versions ("LSSNAP1\n", all in one piece).
+// everything is folded again from the partials (the stored results of units).
 std::optional<Assembly> load_snapshot(const std::filesystem::path& path, const TileGrid& grid,
                                       bool keep_relative, std::string_view format, AovSet aovs = {});
 

@@ -69,7 +69,8 @@ def row(scene, references, asked, folder):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", type=pathlib.Path)
-    parser.add_argument("--names", default="shafts,fogbox,cloud,tint,surface", help="not spotfog: Cycles' spot falls off otherwise")
+    parser.add_argument("--names", default="shafts,fogbox,cloud,tint",
+                        help="not spotfog and surface: the spot and the surfaces of Cycles differ from those of the others")
     parser.add_argument("--time", type=float, default=10, help="CPU seconds")
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--first", type=int, default=1)

@@ -94,10 +94,8 @@ class Film {
 
   // Saving and loading, for a restart of the coordinator.
   //
-  // The bytes have a version and end with a SHA-256. They hold the whole film or one tile; no bytes stand for
-  // a tile of which nothing is folded. Loading rejects damaged or foreign bytes.
-  std::vector<std::byte> save() const;
-  static Result<Film> load(std::span<const std::byte> bytes);
+  // The bytes of a tile have a version and end with a SHA-256; no bytes stand for a tile of which nothing is
+  // folded. Loading rejects damaged or foreign bytes.
   std::vector<std::byte> save_tile(TileIndex tile) const;
   // Returns a function that does save_tile() of the tile as it is now, for a later call. It keeps only that
   // tile alive, where a copy of the film would keep all tiles.

@@ -1,11 +1,7 @@
-// The film as bytes, for restarts:
-//   film: "LSFILM01", i32 width, height, tile, u32 tiles present, then per tile u32 tile, u64 length, tile
-//         record; SHA-256
-//   tile: "LSTILE03", u32 tile, full rounds, 32 bytes chain, u64 s0, s1 of the tail (0, 0: none), 32 bytes
-//         tail digest, f64 TileError::skew, 2 f64 plain.changes, 2 f64 relative.changes, 6 planes of doubles,
-//         with a tail 6 planes of floats; SHA-256 of everything before
-// With AOVs: "LSFILM02", with another u32 after the tile's side, the set of AOVs; the planes of their sums
-// follow the six, then those of identifiers in floats.
+// A tile of the film as bytes, for restarts: "LSTILE03", u32 tile, full rounds, 32 bytes chain, u64 s0, s1 of
+// the tail (0, 0: none), 32 bytes tail digest, f64 TileError::skew, 2 f64 plain.changes, 2 f64
+// relative.changes, 6 planes of doubles, with a tail 6 planes of floats; SHA-256 of everything before. With
+// AOVs the planes of their sums follow the six, then those of identifiers in floats.
 // Little endian. The error figures are recomputed, except those that need the tile before its last round.
 #include <fmt/format.h>
 
@@ -22,7 +18,7 @@ namespace ls {
 namespace {
 
 static_assert(std::endian::native == std::endian::little);
-constexpr std::string_view kFilmMagic = "LSFILM01", kAovFilmMagic = "LSFILM02", kTileMagic = "LSTILE03";
+constexpr std::string_view kTileMagic = "LSTILE03";
 
 class Writer {
  public:
@@ -176,52 +172,6 @@ Result<void> Film::load_tile(TileIndex index, std::span<const std::byte> bytes) 
   if (!tile) return tl::unexpected(tile.error());
   tiles_[index] = std::move(*tile);
   return {};
-}
-
-std::vector<std::byte> Film::save() const {
-  Writer out(aovs_.empty() ? kFilmMagic : kAovFilmMagic);
-  std::uint32_t present = 0;
-  for (const auto& tile : tiles_) present += tile != nullptr;
-  out.reserve(static_cast<std::size_t>(memory_bytes()) + 64 + std::size_t{256} * present);
-  out.value(grid_.frame.width);
-  out.value(grid_.frame.height);
-  out.value(grid_.tile);
-  if (!aovs_.empty()) out.value(aovs_.bits());
-  out.value(present);
-  for (TileIndex i = 0; i < tiles_.size(); ++i) {
-    if (!tiles_[i]) continue;
-    const auto bytes = save_tile(i);
-    out.value(i);
-    out.value(static_cast<std::uint64_t>(bytes.size()));
-    out.put(bytes);
-  }
-  return out.close();
-}
-
-Result<Film> Film::load(std::span<const std::byte> bytes) {
-  const auto magic = std::as_bytes(std::span(kAovFilmMagic));
-  const bool further = bytes.size() >= magic.size() && std::equal(magic.begin(), magic.end(), bytes.begin());
-  auto opened = Reader::open(bytes, further ? kAovFilmMagic : kFilmMagic);
-  if (!opened) return tl::unexpected(opened.error());
-  Reader& in = *opened;
-  TileGrid grid;
-  grid.frame.width = in.value<int>();
-  grid.frame.height = in.value<int>();
-  grid.tile = in.value<int>();
-  const AovSet aovs(further ? in.value<std::uint32_t>() : 0);
-  const auto present = in.value<std::uint32_t>();
-  for (const int side : {grid.frame.width, grid.frame.height, grid.tile})
-    if (side < 1 || side > kMaxFrameSide) return damaged("its size is impossible");
-  if (present > grid.count()) return damaged("it has more tiles than its frame");
-  Film film(grid, aovs);
-  for (std::uint32_t i = 0; i < present; ++i) {
-    const auto index = in.value<TileIndex>();
-    const auto raw = in.take(in.value<std::uint64_t>());
-    if (raw.empty()) return damaged("cut off in a tile");
-    if (const auto ok = film.load_tile(index, raw); !ok) return tl::unexpected(ok.error());
-  }
-  if (!in.ok() || in.left() != 0) return damaged("more bytes than its tiles need");
-  return film;
 }
 
 }  // namespace ls

@@ -231,11 +231,10 @@ TEST(Film, WithAovsIsContinuedToTheBitsOfOneShot) {
 TEST(Film, WithAovsSurvivesARestart) {
   const Film film = film_of(24);
 
-  const auto back = Film::load(film.save());
+  Film back(kGrid, kSome);
+  for (TileIndex t = 0; t < kGrid.count(); ++t) ASSERT_TRUE(back.load_tile(t, film.save_tile(t)));
 
-  ASSERT_TRUE(back) << back.error().message;
-  EXPECT_EQ(*back, film);
-  EXPECT_EQ(back->aovs(), kSome);
+  EXPECT_EQ(back, film);
   Film other(kGrid);
   EXPECT_FALSE(other.load_tile(0, film.save_tile(0)));
   EXPECT_EQ(film.memory_bytes(), 240 * (film_bytes_per_pixel(kSome) + partial_bytes_per_pixel(kSome)));

@@ -109,10 +109,6 @@ TEST(SkewedNoise, AFilmRemembersTheCorrectionOverARestart) {
   for (const RoundIndex k : {0, 1, 2, 3}) ASSERT_TRUE(film.fold(0, k, partial_of(grid, round_range(k), k)));
   ASSERT_NE(film.error(0).skew, 0);
 
-  const auto loaded = Film::load(film.save());
-  ASSERT_TRUE(loaded);
-  EXPECT_EQ(loaded->error(0), film.error(0));
-
   Film one(grid);
   ASSERT_TRUE(one.load_tile(0, film.save_tile(0)));
   EXPECT_EQ(one.error(0), film.error(0));
