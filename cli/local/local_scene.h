@@ -46,7 +46,7 @@ tl::expected<LocalScene, coordinator::Rejected> read_local_scene(
     const std::string& path, const std::map<std::string, std::string>& defines, bool strict,
     std::optional<std::uint32_t> frame = {}, bool labels = false);
 
-// Reads a scene once per frame; its files are examined only once.
+// Reads a scene once per frame; the files that it names are hashed only once.
 class SceneReader {
  public:
   static tl::expected<SceneReader, coordinator::Rejected> open(const std::string& path,

@@ -95,7 +95,7 @@ struct ReopenRound {
   JobId job;
   RoundIndex round = 0;
 };
-// All units that the image needs are folded. This follows the JobStateChanged to `done`.
+// The image contains all units that it needs. Sent after the JobStateChanged whose state is `done`.
 struct JobFinished {
   JobId job;
   StopReason stopped = StopReason::spp;

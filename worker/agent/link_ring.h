@@ -13,8 +13,8 @@
 
 namespace ls::worker {
 
-// A worker moves on after this many progress reports in which it had no lease; an idle worker sends one every
-// few seconds.
+// A worker tries the next coordinator after this many progress reports in which it had no lease. An idle
+// worker sends one every few seconds.
 inline constexpr int kIdleReports = 3;
 
 class LinkRing final : public CoordinatorLink {

@@ -56,7 +56,7 @@ class Process {
   std::atomic<bool> garbled{false};  // the child was killed because of a malformed answer
   std::atomic<bool> preparing{false};  // a world is being built
   std::mutex prepared_mutex;
-  // Numbers of the jobs whose worlds the child has; guarded by prepared_mutex.
+  // Numbers of the jobs whose scenes the child has built; guarded by prepared_mutex.
   std::set<std::uint64_t> prepared;
 
  private:

@@ -52,8 +52,8 @@ void Farm::State::on(const JobRestored& event) {
   if (job.state == JobState::paused || job.state == JobState::done) job.stand_still(now);
   if (job.state == JobState::failed || job.state == JobState::cancelled) return;
 
-  // If the film (the folded image) of a done job is lost, it is unknown where its tiles ended: the film is
-  // folded again from the job's results.
+  // A done job that has lost its film (the sums of its samples) no longer knows how many samples each tile
+  // got. The film is summed up again from the job's results.
   const bool with_film = event.folded.size() == job.units.tiles() &&
                          std::any_of(event.folded.begin(), event.folded.end(), [](auto r) { return r > 0; });
   if (job.state == JobState::done && with_film) {

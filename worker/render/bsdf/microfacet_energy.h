@@ -50,7 +50,7 @@ struct MicrofacetEnergy {
   CosineTable through;                  // plastics: light that the coat lets in, compensated likewise
   float mean = 1;                       // conductors: E_mean
 
-  // The factor f' / f, seen at the cosine `cos`, of a conductor whose mean Fresnel reflectance is F.
+  // The factor f' / f of a conductor whose mean Fresnel reflectance is F, for the view cosine `cos`.
   C3 factor(float cos, const C3& F) const {
     const float lacking = missing.at(cos), lost = 1 - mean;
     const auto again = [&](float f) { return f * mean / (1 - f * lost); };

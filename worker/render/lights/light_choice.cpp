@@ -19,8 +19,8 @@ float probability(std::uint64_t words) { return static_cast<float>(static_cast<d
 
 }  // namespace
 
-// Moves the lights with a position to the front of the list. The order of lights that are scene shapes does
-// not change: they have a position and come first anyway.
+// Moves the lights with a position to the front of the list. Area lights have a position and come first
+// already, so their order does not change.
 void Lights::sort_places_first() {
   const auto placed = [](const Light& l) { return has_place(l.kind); };
   if (std::count_if(lights_.begin(), lights_.end(), placed) < kTreeFrom) return;
