@@ -1,24 +1,24 @@
-// Opens and closes the service, and runs its threads.
 #include "coordinator/service/coordinator.h"
 
 #include <fmt/format.h>
 
-#include <chrono>
+#include <algorithm>
 #include <random>
+#include <thread>
 
-#include "common/base/log.h"
 #include "common/base/secret.h"
 #include "coordinator/base/periodic.h"
-#include "coordinator/service/service_impl.h"
+#include "coordinator/service/blob_watch.h"
+#include "coordinator/service/core.h"
+#include "coordinator/service/pictures.h"
+#include "coordinator/service/submission.h"
+#include "coordinator/service/takeover.h"
+#include "coordinator/service/worker_sessions.h"
 #include "coordinator/store/blobs/memory_blobs.h"
 #include "coordinator/store/blobs/open_blobs.h"
 #include "coordinator/store/redis/redis_job_store.h"
 
 namespace ls::coordinator {
-
-double unix_now() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 
 Result<void> check_store(const std::string& store) {
   if (store == "sqlite") return {};
@@ -55,13 +55,99 @@ std::uint64_t random_number() {
   return std::uint64_t{device()} << 32 | device();
 }
 
+std::string lease_prefix(std::uint64_t start) { return "l" + std::to_string(start); }
+
 }  // namespace
 
-Result<std::unique_ptr<Coordinator>> Coordinator::open(Options options) {
-  return Service::open(std::move(options));
+// The parts of the coordinator, each with its own state, in the order in which they need one another.
+struct Coordinator::Parts {
+  Parts(Options o, std::shared_ptr<BlobStore> inner, std::shared_ptr<JobStore> s, File l, std::uint64_t n)
+      : options(std::move(o)),
+        store(std::move(s)),
+        lock(std::move(l)),
+        start(n),
+        blobs(std::move(inner), options.clock, options.keep_unused) {}
+  ~Parts();
+  void start_threads();
+  void tick();
+
+  const Options options;
+  const std::shared_ptr<JobStore> store;
+  const File lock;
+  const std::uint64_t start;  // number of this start of the coordinator
+  const Clock& clock = *options.clock;
+  CollectedBlobs blobs;
+  const JobFiles files{options.data, options.shared};
+  Denoising denoising{options.denoise_threads > 0 ? options.denoise_threads
+                                                  : static_cast<int>(std::thread::hardware_concurrency()),
+                      options.denoiser, clock, blobs};
+  BackgroundWrites writes;
+  std::atomic<std::uint64_t> blob_bytes{0};
+
+  Guarded<Core> core{Farm::Options{lease_prefix(start), options.limits, options.audit_rate, random_number()},
+                     options.shared,
+                     clock,
+                     *store,
+                     files,
+                     hub,
+                     writes,
+                     images,
+                     comparer};
+  ReferenceComparer comparer{core, blobs};
+  ImageWriter images{core, files, blobs, denoising, comparer, writes, clock};
+  Pictures pictures{core, *store, files, blobs, denoising, clock};
+  Submission submission{core, *store, files, blobs, denoising, clock};
+  const Restore restore{*store, files, blobs, clock};
+  JobCommands commands{core, *store, files, restore, images, writes, clock};
+  BlobWatch blob_watch{core, blobs, commands, options.keep_unused, clock};
+  Takeover takeover{core, *store, files, blobs, restore, writes, clock};
+  ResultPipeline results{core, writes, clock};
+  WorkerSessions sessions{
+      core, results, {options.may_join, options.allow_fake, start, lease_prefix(start)}, clock};
+  // Destroyed before the core, since those who listen may ask for jobs
+  EventHub hub{[this](std::uint64_t count) { return store->reserve("events", count); }};
+  // This is the last member, so the threads are joined before anything that they use is destroyed
+  std::vector<std::jthread> threads;
+};
+
+void Coordinator::Parts::start_threads() {
+  using Stop = const std::stop_token&;
+  const auto run = [this](auto loop) { threads.emplace_back(std::move(loop)); };
+  for (int i = 0; i < limits::kVerifyThreads; ++i) run([this](Stop stop) { results.verify_loop(stop); });
+  run([this](Stop stop) { results.commit_loop(stop); });
+  run([this](Stop stop) {
+    while (!stop.stop_requested())
+      for (auto& write : writes.pop(1, stop)) write();
+  });
+  run([this](Stop stop) { comparer.loop(stop); });
+  run([this](Stop stop) { blob_watch.look_loop(stop); });
+  if (!options.tick) return;
+  if (files.on_disk()) run([this](Stop stop) { blob_watch.collect_loop(stop); });
+  if (!options.blobs_at.empty())
+    run([this](Stop stop) { every(kBlobsLookedAt, stop, [&] { blob_watch.check_store(); }); });
+  run([this](Stop stop) { every(*options.tick, stop, [&] { tick(); }); });
 }
 
-Result<std::unique_ptr<Coordinator>> Service::open(Options options) {
+// Accepted results are durable already, and workers send those again that were not acknowledged. So nothing
+// is flushed here, and after a clean shutdown the state is the same as after a crash.
+Coordinator::Parts::~Parts() {
+  sessions.abandon();
+  results.close();
+  for (auto& thread : threads) thread.request_stop();
+  threads.clear();
+  sessions.close();
+}
+
+void Coordinator::Parts::tick() {
+  if (options.shared) takeover.look_for_moved_jobs();
+  const auto locked = core.lock();
+  sessions.report_held_back(*locked);
+  locked->driver.run(Tick{});
+  blob_watch.look_if_due(*locked);
+  locked->publisher.publish_due();
+}
+
+Result<std::unique_ptr<Coordinator>> Coordinator::open(Options options) {
   if (!options.may_join) options.may_join = join_check(options.join_token);
   if (!options.clock) options.clock = std::make_shared<SystemClock>();
   std::shared_ptr<BlobStore> blobs = options.blobs;
@@ -90,106 +176,173 @@ Result<std::unique_ptr<Coordinator>> Service::open(Options options) {
   }
   const auto start = store->reserve("starts", 1);
   if (!start) return tl::unexpected(start.error());
-  auto collected = std::make_shared<CollectedBlobs>(std::move(blobs), options.clock, options.keep_unused);
-  std::unique_ptr<Service> service(
-      new Service(std::move(options), std::move(collected), std::move(store), std::move(lock), *start + 1));
-  if (auto restored = service->restore(); !restored) return tl::unexpected(restored.error());
-  service->start_threads();
-  return service;
+  auto parts = std::make_unique<Parts>(std::move(options), std::move(blobs), std::move(store),
+                                       std::move(lock), *start + 1);
+  if (auto restored = parts->restore.restart(*parts->core.lock()); !restored)
+    return tl::unexpected(restored.error());
+  parts->start_threads();
+  return std::unique_ptr<Coordinator>(new Coordinator(std::move(parts)));
 }
 
-Service::Service(Options options, std::shared_ptr<CollectedBlobs> blobs, std::shared_ptr<JobStore> store,
-                 File lock, std::uint64_t start)
-    : options_(std::move(options)),
-      blobs_(std::move(blobs)),
-      store_(std::move(store)),
-      lock_(std::move(lock)),
-      start_(start),
-      farm_(Farm::Options{lease_prefix(), options_.limits, options_.audit_rate, random_number()}),
-      last_epoch_(start << 32),
-      denoising_(options_.denoise_threads > 0 ? options_.denoise_threads
-                                              : static_cast<int>(std::thread::hardware_concurrency()),
-                 options_.denoiser, options_.clock),
-      hub_(std::make_unique<EventHub>([this](std::uint64_t n) { return store_->reserve("events", n); })) {}
+Coordinator::Coordinator(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+Coordinator::Coordinator() = default;
+Coordinator::~Coordinator() = default;
 
-void Service::start_threads() {
-  for (int i = 0; i < limits::kVerifyThreads; ++i)
-    threads_.emplace_back([this](const std::stop_token& token) { verify_loop(token); });
-  threads_.emplace_back([this](const std::stop_token& token) { commit_loop(token); });
-  threads_.emplace_back([this](const std::stop_token& token) {
-    while (!token.stop_requested())
-      for (auto& write : background_writes_.pop(1, token)) write();
-  });
-  threads_.emplace_back([this](const std::stop_token& token) {
-    while (!token.stop_requested())
-      for (auto& comparison : comparisons_.pop(1, token)) comparison();
-  });
-  threads_.emplace_back([this](const std::stop_token& token) {
-    while (!token.stop_requested())
-      for (const auto& missing_blobs : looks_.pop(1, token)) look_for(missing_blobs);
-  });
-  if (!options_.tick) return;
-  if (on_disk()) threads_.emplace_back([this](const std::stop_token& token) { collect_loop(token); });
-  if (!options_.blobs_at.empty())
-    threads_.emplace_back(
-        [this](const std::stop_token& token) { every(kBlobsLookedAt, token, [&] { look_at_blobs(); }); });
-  threads_.emplace_back(
-      [this](const std::stop_token& token) { every(*options_.tick, token, [&] { tick(); }); });
+// Jobs
+
+tl::expected<JobId, Rejected> Coordinator::submit(SubmitRequest request) {
+  return parts_->submission.submit(request);
 }
 
-// Accepted results are durable already, and workers send those again that were not acknowledged. So nothing
-// is flushed here, and after a clean shutdown the state is the same as after a crash.
-Service::~Service() {
-  *alive_ = false;
-  budget_.close();
-  for (auto& thread : threads_) thread.request_stop();
-  threads_.clear();
-  const std::lock_guard lock(mutex_);
-  for (auto& [id, worker] : workers_) {
-    if (worker.connection && worker.connection->open) {
-      worker.connection->open = false;
-      worker.connection->sink->close();
-    }
+std::vector<JobView> Coordinator::jobs() const {
+  const auto core = parts_->core.lock();
+  std::vector<JobView> all;
+  for (const JobId& id : core->jobs.order()) {
+    const Sequence* sequence = core->jobs.sequence(id);
+    all.push_back(sequence ? core->views.sequence(id, *sequence, false)
+                           : core->views.job(*core->jobs.find(id)));
   }
+  return all;
 }
 
-void Service::tick() {
-  look_for_moved_jobs();
-  const std::lock_guard lock(mutex_);
-  for (const auto& [id, worker] : workers_)
-    if (worker.connection && worker.connection->open && worker.connection->held_back)
-      run_locked(ResultsWait{id});
-  run_locked(Tick{});
-  look_for_missing_locked();
-  for (const auto& [id, entry] : entries_)
-    if (entry->progress_due) publish_progress_locked(*entry);
-  for (const auto& [id, sequence] : sequences_)
-    if (sequence.progress_due) publish_sequence_locked(id, false);
+Result<JobView> Coordinator::job(const JobId& id) const {
+  const auto core = parts_->core.lock();
+  if (const Sequence* sequence = core->jobs.sequence(id)) return core->views.sequence(id, *sequence, true);
+  const auto entry = core->jobs.job(id);
+  if (!entry) return tl::unexpected(entry.error());
+  return core->views.job(**entry);
 }
 
-bool Service::ready(std::string* why_not) const {
-  const std::lock_guard lock(mutex_);
-  const std::string& trouble = store_trouble_.empty() ? blobs_trouble_ : store_trouble_;
+Result<std::string> Coordinator::owner(const JobId& id) const { return parts_->core.lock()->jobs.owner(id); }
+
+Result<void> Coordinator::change(const JobId& id, const JobChange& change) {
+  return parts_->commands.change(id, change);
+}
+
+Result<void> Coordinator::remove(const JobId& id) { return parts_->commands.remove(id); }
+
+Result<void> Coordinator::cancel(const JobId& id) { return change(id, {JobState::cancelled, {}, {}, {}}); }
+
+Result<void> Coordinator::wait(const JobId& id) const {
+  auto core = parts_->core.lock();
+  const auto jobs = core->jobs.job_or_frames(id);
+  if (!jobs) return tl::unexpected(jobs.error());
+  core.wait(core->ended, [&] {
+    return std::all_of(jobs->begin(), jobs->end(), [&](const EntryPtr& entry) {
+      return entry->removed || is_terminal(entry->stored.state);
+    });
+  });
+  return {};
+}
+
+// What jobs have rendered
+
+Result<std::vector<std::byte>> Coordinator::image_exr(const JobId& id) const {
+  return parts_->pictures.image_exr(id);
+}
+
+Result<std::vector<std::byte>> Coordinator::image_png(const JobId& id, double exposure, bool denoised) const {
+  return parts_->pictures.image_png(id, exposure, denoised);
+}
+
+Result<std::vector<std::byte>> Coordinator::error_png(const JobId& id) const {
+  return parts_->pictures.error_png(id);
+}
+
+Result<std::vector<std::byte>> Coordinator::samples_png(const JobId& id) const {
+  return parts_->pictures.samples_png(id);
+}
+
+Result<std::string> Coordinator::report_json(const JobId& id) const {
+  return parts_->pictures.report_json(id);
+}
+
+Result<std::vector<ConvergencePoint>> Coordinator::convergence(const JobId& id) const {
+  const auto core = parts_->core.lock();
+  const auto entry = core->jobs.job(id);
+  if (!entry) return tl::unexpected(entry.error());
+  return (*entry)->points;
+}
+
+std::filesystem::path Coordinator::final_file(const JobId& id, const std::string& name) const {
+  return parts_->pictures.final_file(id, name);
+}
+
+Result<std::vector<TileView>> Coordinator::tiles(const JobId& id) const { return parts_->pictures.tiles(id); }
+
+Result<std::string> Coordinator::job_log(const JobId& id) const { return parts_->pictures.log(id); }
+
+// Workers
+
+std::vector<WorkerView> Coordinator::workers() const {
+  const auto core = parts_->core.lock();
+  std::vector<WorkerView> all;
+  for (const auto& [id, worker] : core->workers) all.push_back(core->views.worker(id, worker));
+  return all;
+}
+
+Result<std::unique_ptr<WorkerSession>> Coordinator::connect(const WorkerHello& hello,
+                                                            std::shared_ptr<WorkerSink> sink) {
+  return parts_->sessions.connect(hello, std::move(sink));
+}
+
+// Events
+
+std::shared_ptr<void> Coordinator::subscribe(std::uint64_t after_id,
+                                             std::function<void(const StreamEvent&)> on_event) {
+  return parts_->hub.subscribe(after_id, std::move(on_event));
+}
+
+std::uint64_t Coordinator::last_event_id() const { return parts_->hub.last_id(); }
+
+// Stores, other coordinators, figures
+
+BlobStore& Coordinator::blobs() { return parts_->blobs; }
+
+void Coordinator::blob_missing(const Digest& digest, const Error& why) {
+  parts_->blob_watch.missing(digest, why);
+}
+
+void Coordinator::blob_sent(std::uint64_t bytes) { parts_->blob_bytes += bytes; }
+
+void Coordinator::collect() { parts_->blob_watch.collect(); }
+
+bool Coordinator::ready(std::string* why_not) const {
+  const auto core = parts_->core.lock();
+  const std::string& trouble =
+      core->records.trouble().empty() ? parts_->blob_watch.trouble(*core) : core->records.trouble();
   if (why_not) *why_not = trouble;
   return trouble.empty();
 }
 
-// Checks whether the blob store is available. It may be that nobody requests a blob for hours, so requests
-// alone would not tell.
-void Service::look_at_blobs() {
-  const auto answer = blobs_->answers();
-  const std::string trouble = answer ? "" : "the store of blobs does not answer: " + answer.error().message;
-  const std::lock_guard lock(mutex_);
-  if (trouble.empty() != blobs_trouble_.empty())
-    trouble.empty() ? log_info("", "the store of blobs answers again") : log_warn("", trouble);
-  blobs_trouble_ = trouble;
+StoreStatus Coordinator::store_status() const { return parts_->store->status(); }
+
+void Coordinator::announce(const std::string& http, const std::string& grpc) {
+  parts_->store->announce(http, grpc);
 }
 
-std::shared_ptr<void> Service::subscribe(std::uint64_t after_id,
-                                         std::function<void(const StreamEvent&)> on_event) {
-  return hub_->subscribe(after_id, std::move(on_event));
+Result<std::optional<JobLocation>> Coordinator::locate_job(const JobId& id) {
+  return parts_->store->locate_job(id);
 }
 
-std::uint64_t Service::last_event_id() const { return hub_->last_id(); }
+AuditFigures Coordinator::audits() const { return parts_->core.lock()->driver.farm().audits(); }
+
+FarmFigures Coordinator::figures() const {
+  const auto core = parts_->core.lock();
+  FarmFigures f = core->figures;
+  f.blob_bytes = parts_->blob_bytes;
+  f.background_writes_now = parts_->writes.size();
+  parts_->results.put_figures(f);
+  for (const auto& [id, worker] : core->workers)
+    if (const auto figures = core->driver.farm().worker(id)) {
+      f.leases_now += figures->leases;
+      f.units_leased_now += figures->units_out;
+    }
+  for (const auto& [id, entry] : core->jobs.all())
+    if (entry->assembly) f.waiting_now += entry->assembly->waiting();
+  return f;
+}
+
+void Coordinator::tick() { parts_->tick(); }
 
 }  // namespace ls::coordinator

@@ -50,52 +50,47 @@ class Coordinator {
     std::optional<Duration> tick;
   };
   static Result<std::unique_ptr<Coordinator>> open(Options options);
-  virtual ~Coordinator() = default;
+  virtual ~Coordinator();
 
   // Jobs
 
   // If spec.frames is set, the job is a sequence (a job with frames), and the returned id is the sequence's.
   // Functions that change or show a job also accept a sequence's id; functions on a single image need the id
   // of a frame, which frame_job() gives.
-  virtual tl::expected<JobId, Rejected> submit(SubmitRequest request) = 0;
-  virtual std::vector<JobView> jobs() const = 0;  // a sequence counts as one job; its frames are not listed
-  virtual Result<JobView> job(const JobId& id) const = 0;
-  // Returns JobView::owner, at less cost than job()
-  virtual Result<std::string> owner(const JobId& id) const {
-    const auto view = job(id);
-    if (!view) return tl::unexpected(view.error());
-    return view->owner;
-  }
-  virtual Result<void> change(const JobId& id, const JobChange& change) = 0;
+  virtual tl::expected<JobId, Rejected> submit(SubmitRequest request);
+  virtual std::vector<JobView> jobs() const;  // a sequence counts as one job; its frames are not listed
+  virtual Result<JobView> job(const JobId& id) const;
+  virtual Result<std::string> owner(const JobId& id) const;  // JobView::owner, at less cost than job()
+  virtual Result<void> change(const JobId& id, const JobChange& change);
+  virtual Result<void> cancel(const JobId& id);
   // Removes an ended job with all its results; a job that has not ended is cancelled and kept.
-  virtual Result<void> remove(const JobId& id) = 0;
-  virtual Result<void> cancel(const JobId& id) = 0;
-  virtual Result<void> pause(const JobId& id) = 0;
-  virtual Result<void> resume(const JobId& id) = 0;
-  virtual Result<void> set_priority(const JobId& id, int priority) = 0;
-  virtual Result<void> extend(const JobId& id, std::uint64_t spp) = 0;  // `spp`: the new total
+  virtual Result<void> remove(const JobId& id);
+  virtual Result<void> wait(const JobId& id) const;  // returns when the job is done, failed or cancelled
+
+  // What jobs have rendered
+
   // The current image, or the final one
-  virtual Result<std::vector<std::byte>> image_exr(const JobId& id) const = 0;
+  virtual Result<std::vector<std::byte>> image_exr(const JobId& id) const;
   // As an 8-bit picture; with `denoised`, of a job with JobSpec::denoise, the denoised image, also of a job
   // that still renders. One image is denoised at a time, which takes seconds.
   virtual Result<std::vector<std::byte>> image_png(const JobId& id, double exposure,
-                                                   bool denoised = false) const = 0;
+                                                   bool denoised = false) const;
   // False-colour maps of the error and of the samples (common/image/exr/maps.h).
-  virtual Result<std::vector<std::byte>> error_png(const JobId& id) const = 0;
-  virtual Result<std::vector<std::byte>> samples_png(const JobId& id) const = 0;
-  virtual Result<std::string> report_json(const JobId& id) const = 0;
-  virtual Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const = 0;
+  virtual Result<std::vector<std::byte>> error_png(const JobId& id) const;
+  virtual Result<std::vector<std::byte>> samples_png(const JobId& id) const;
+  virtual Result<std::string> report_json(const JobId& id) const;
+  virtual Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const;
   // Returns the path of the file `name` (image.exr or report.json) of a done job. Empty if there is no such
   // file: then use the functions above.
-  virtual std::filesystem::path final_file(const JobId&, const std::string&) const { return {}; }
-  virtual Result<std::vector<TileView>> tiles(const JobId& id) const = 0;
-  virtual Result<std::string> job_log(const JobId& id) const = 0;
-  virtual Result<void> wait(const JobId& id) const = 0;  // returns when the job is done, failed or cancelled
+  virtual std::filesystem::path final_file(const JobId& id, const std::string& name) const;
+  virtual Result<std::vector<TileView>> tiles(const JobId& id) const;
+  virtual Result<std::string> job_log(const JobId& id) const;
 
   // Workers
-  virtual std::vector<WorkerView> workers() const = 0;
+
+  virtual std::vector<WorkerView> workers() const;
   virtual Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello,
-                                                         std::shared_ptr<WorkerSink> sink) = 0;
+                                                         std::shared_ptr<WorkerSink> sink);
 
   // Events
 
@@ -103,30 +98,41 @@ class Coordinator {
   // new ones. The subscription ends when the returned handle is destroyed. A reader that cannot keep up must
   // itself drop events.
   virtual std::shared_ptr<void> subscribe(std::uint64_t after_id,
-                                          std::function<void(const StreamEvent&)> on_event) = 0;
-  virtual std::uint64_t last_event_id() const = 0;
+                                          std::function<void(const StreamEvent&)> on_event);
+  virtual std::uint64_t last_event_id() const;
 
-  virtual BlobStore& blobs() = 0;
-  virtual bool ready(std::string* why_not) const = 0;
-  virtual StoreStatus store_status() const { return {}; }
+  // Blobs
+
+  virtual BlobStore& blobs();
+  // Says that a worker requested a blob that is missing or damaged here. The jobs that need it are paused
+  // until it is available again.
+  virtual void blob_missing(const Digest& digest, const Error& why);
+  virtual void blob_sent(std::uint64_t bytes);  // counts bytes sent to a worker
+  // Removes blobs that no job needs, and interrupted uploads, after Options::keep_unused. With Options::tick
+  // the coordinator calls this itself.
+  virtual void collect();
 
   // Other coordinators (Options::shared)
 
   // Tells the other coordinators, workers and clients where they reach this one: http://HOST:PORT and
   // HOST:PORT (gRPC).
-  virtual void announce(const std::string&, const std::string&) {}
+  virtual void announce(const std::string& http, const std::string& grpc);
   // Finds the coordinator of a job that this one does not have; may block for a second. nullopt: none has it.
-  virtual Result<std::optional<JobLocation>> locate_job(const JobId&) { return std::nullopt; }
-  virtual AuditFigures audits() const { return {}; }
-  virtual FarmFigures figures() const { return {}; }
-  // Says that a worker requested a blob that is missing or damaged here. The jobs that need it are paused
-  // until it is available again.
-  virtual void blob_missing(const Digest&, const Error&) {}
-  virtual void blob_sent(std::uint64_t bytes) { static_cast<void>(bytes); }  // counts bytes sent to a worker
-  virtual void tick() = 0;
-  // Removes blobs that no job needs, and interrupted uploads, after Options::keep_unused. With Options::tick
-  // the coordinator calls this itself.
-  virtual void collect() {}
+  virtual Result<std::optional<JobLocation>> locate_job(const JobId& id);
+
+  virtual bool ready(std::string* why_not) const;
+  virtual StoreStatus store_status() const;
+  virtual AuditFigures audits() const;
+  virtual FarmFigures figures() const;
+  virtual void tick();
+
+ protected:
+  Coordinator();  // of the fake one in tests/unit/http
+
+ private:
+  struct Parts;
+  explicit Coordinator(std::unique_ptr<Parts> parts);
+  const std::unique_ptr<Parts> parts_;
 };
 
 }  // namespace ls::coordinator

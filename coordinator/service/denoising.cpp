@@ -1,6 +1,7 @@
 #include "coordinator/service/denoising.h"
 
 #include "common/image/exr/final_image.h"
+#include "coordinator/admission/admission.h"
 
 namespace ls::coordinator {
 
@@ -10,18 +11,18 @@ Result<void> Denoising::available() const {
   return {};
 }
 
-Result<Denoising::Denoised> Denoising::denoise(const Film& film) const {
-  const TimePoint start = clock_->now();
+Result<Denoised> Denoising::denoise(const Film& film) const {
+  const TimePoint start = clock_.now();
   const auto denoiser = Denoiser::find(threads_, library_);
   if (!denoiser) return tl::unexpected(denoiser.error());
   auto image = denoised_image(film, *denoiser);
   if (!image) return tl::unexpected(image.error());
   Denoised out{std::move(*image), {}};
-  out.figures = {out.image.by, {}, out.image.error, seconds(clock_->now() - start), {}};
+  out.figures = {out.image.by, {}, out.image.error, seconds(clock_.now() - start), {}};
   return out;
 }
 
-std::shared_ptr<const Denoising::Denoised> Denoising::of(const Film& film) {
+std::shared_ptr<const Denoised> Denoising::of(const Film& film) {
   const Digest pixels = pixels_sha256(film);
   const std::lock_guard lock(mutex_);
   if (last_ && last_pixels_ == pixels) return last_;
@@ -35,6 +36,19 @@ std::shared_ptr<const Denoising::Denoised> Denoising::of(const Film& film) {
   last_ = std::make_shared<const Denoised>(std::move(*made));
   last_pixels_ = pixels;
   return last_;
+}
+
+std::shared_ptr<const Denoised> Denoising::of_job(const Film& film, ReportFacts& facts,
+                                                  std::shared_ptr<const Denoised> made) {
+  if (!facts.job.spec.denoise || facts.samples == 0) return nullptr;
+  if (!made) made = of(film);
+  facts.denoised = made->figures;
+  if (made->image.rgb.empty() || !facts.job.spec.reference || facts.job.reference_same_seed ||
+      facts.pixels_without_samples > 0)
+    return made;
+  if (const auto reference = load_reference(facts.job.spec, facts.job.settings.size, blobs_))
+    facts.denoised->true_error = true_error(*reference, made->image.rgb);
+  return made;
 }
 
 }  // namespace ls::coordinator

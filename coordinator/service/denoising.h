@@ -11,32 +11,39 @@
 #include "common/denoise/denoised_image.h"
 #include "common/image/film/film.h"
 #include "coordinator/assemble/job_report.h"
+#include "coordinator/store/blobs/blob_store.h"
 
 namespace ls::coordinator {
+
+struct Denoised {
+  DenoisedImage image;  // without pixels if figures.trouble says why there are none
+  DenoisedFigures figures;
+};
 
 class Denoising {
  public:
   // `library` is the file of Open Image Denoise; empty: it is looked for (common/denoise/denoiser.h).
-  Denoising(int threads, std::string library, std::shared_ptr<const Clock> clock)
-      : threads_(threads), library_(std::move(library)), clock_(std::move(clock)) {}
+  Denoising(int threads, std::string library, const Clock& clock, const BlobStore& blobs)
+      : threads_(threads), library_(std::move(library)), clock_(clock), blobs_(blobs) {}
 
   // Fails as Denoiser::find() does if this machine cannot denoise.
   Result<void> available() const;
 
-  struct Denoised {
-    DenoisedImage image;  // without pixels if figures.trouble says why there are none
-    DenoisedFigures figures;
-  };
   // Denoises the film, which has the AOVs for it. Figures are without the true error, which depends on a
   // job's reference.
   std::shared_ptr<const Denoised> of(const Film& film);
+  // Returns the denoised image of a job that asks for one, and puts its figures into the facts. `made` is
+  // that image if it has been made already. Null if the job asks for none or has no samples.
+  std::shared_ptr<const Denoised> of_job(const Film& film, ReportFacts& facts,
+                                         std::shared_ptr<const Denoised> made = nullptr);
 
  private:
   Result<Denoised> denoise(const Film& film) const;
 
   const int threads_;
   const std::string library_;
-  const std::shared_ptr<const Clock> clock_;
+  const Clock& clock_;
+  const BlobStore& blobs_;
   std::mutex mutex_;  // held while an image is denoised
   Digest last_pixels_;
   std::shared_ptr<const Denoised> last_;

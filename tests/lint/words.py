@@ -35,7 +35,7 @@ ALLOWED = {
     ("said", "worker/render/media/vdb_validate.cpp"): "what the other process replied",
     ("said", "coordinator/store/redis/redis_link.cpp"): "Redis' own words",
     **{("distrusted", path): "a field of stored records" for path in (
-        "coordinator/service/service_restore.cpp", "coordinator/service/service_shared.cpp", "coordinator/store/jobs/job_store.h",
+        "coordinator/service/restore.cpp", "coordinator/service/takeover.cpp", "coordinator/store/jobs/job_store.h",
         "coordinator/store/jobs/stored_job.cpp")},
 }
 

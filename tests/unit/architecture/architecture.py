@@ -94,7 +94,7 @@ CLOCK_EXCEPTIONS = {
     "coordinator/http/net/body_reader.cpp": "deadlines of sockets, which Asio takes as points in time",
     "coordinator/http/net/connection.cpp": "deadlines of sockets, which Asio takes as points in time",
     "coordinator/http/net/socket_io.cpp": "deadlines of sockets, which Asio takes as points in time",
-    "coordinator/service/coordinator.cpp": "the wall-clock time of a submission, for people",
+    "coordinator/service/state/job_entry.cpp": "the wall-clock time of a submission, for people",
     "coordinator/rpc/rpc_server.cpp": "gRPC's Shutdown takes a point in time",
     "worker/fake/fake.cpp": "plays a slow renderer",
 }

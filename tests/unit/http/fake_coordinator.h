@@ -149,14 +149,6 @@ class FakeCoordinator final : public Coordinator {
     return set_state(id, JobState::cancelled);
   }
   Result<void> cancel(const JobId& id) override { return set_state(id, JobState::cancelled); }
-  Result<void> pause(const JobId& id) override { return set_state(id, JobState::paused); }
-  Result<void> resume(const JobId& id) override { return set_state(id, JobState::running); }
-  Result<void> set_priority(const JobId& id, int priority) override {
-    return change(id, [=](JobView& job) { job.priority = priority; });
-  }
-  Result<void> extend(const JobId& id, std::uint64_t spp) override {
-    return change(id, [=](JobView& job) { job.spp = spp; });
-  }
   Result<std::vector<std::byte>> image_exr(const JobId& id) const override {
     if (auto found = job(id); !found) return tl::unexpected(found.error());
     return std::vector<std::byte>(exr_bytes, std::byte{7});
@@ -180,6 +172,11 @@ class FakeCoordinator final : public Coordinator {
     return std::vector<TileView>(3);
   }
   Result<std::string> job_log(const JobId& id) const override { return text_of(id, "submitted\n"); }
+  Result<std::string> owner(const JobId& id) const override {
+    const auto found = job(id);
+    if (!found) return tl::unexpected(found.error());
+    return found->owner;
+  }
   Result<void> wait(const JobId&) const override { return {}; }
 
   std::vector<WorkerView> workers() const override { return std::vector<WorkerView>(2); }
@@ -237,6 +234,13 @@ class FakeCoordinator final : public Coordinator {
     return is_ready;
   }
   void tick() override {}
+  void collect() override {}
+  void blob_missing(const Digest&, const Error&) override {}
+  void blob_sent(std::uint64_t) override {}
+  void announce(const std::string&, const std::string&) override {}
+  StoreStatus store_status() const override { return {}; }
+  AuditFigures audits() const override { return {}; }
+  FarmFigures figures() const override { return {}; }
 
   FakeBlobs store;
   SubmitRequest last_request;

@@ -238,7 +238,7 @@ TEST(Adaptive, ExtendedBySamplesItHasTheBitsOfAJobBySamples) {
   }
   const auto spp = spp_of_tiles(*coordinator, job);
   const std::uint64_t most = *std::max_element(spp.begin(), spp.end());
-  ASSERT_TRUE(coordinator->extend(job, most + 40));
+  ASSERT_TRUE(extend(*coordinator, job, most + 40));
   EXPECT_FALSE(coordinator->job(job)->target_error) << "it is reached";
   FakeFarm farm(*coordinator, 2);
   ASSERT_TRUE(farm.finish(job));

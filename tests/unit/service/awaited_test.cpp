@@ -125,7 +125,7 @@ TEST_F(Awaited, AJobThatItsUserPausedMeanwhileStaysPaused) {
   const JobId paused = job;
   damage();
   fetch();
-  ASSERT_TRUE(coordinator->pause(paused));
+  ASSERT_TRUE(pause(*coordinator, paused));
   job = submit_wood();  // brings the file
   coordinator->blob_missing(wood, {Errc::not_found, "there is no such blob"});
   ASSERT_EQ(state(), JobState::paused);

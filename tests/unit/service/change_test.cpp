@@ -49,7 +49,7 @@ TEST(Restore, ADamagedRecordFailsItsJobAloneUntilItIsRemoved) {
   EXPECT_THAT(coordinator->job(bad)->error, HasSubstr("damaged"));
   EXPECT_FALSE(coordinator->image_png(bad, 0));
   EXPECT_FALSE(coordinator->tiles(bad));
-  EXPECT_FALSE(coordinator->set_priority(bad, 3));
+  EXPECT_FALSE(set_priority(*coordinator, bad, 3));
   FakeFarm farm(*coordinator, 1);
   ASSERT_TRUE(farm.finish(good));
   EXPECT_EQ(pixels(*coordinator, good), reference_pixels());
@@ -101,11 +101,11 @@ TEST(Pin, AClassThatCannotBeStoredHoldsTheJobUntilItIs) {
   EXPECT_EQ(coordinator->job(job)->units_done, 0u) << "a restart could pin the job to another class";
   EXPECT_EQ(coordinator->job(job)->state, JobState::paused);
   EXPECT_THAT(coordinator->job(job)->error, HasSubstr("the disk is broken"));
-  EXPECT_FALSE(coordinator->resume(job));
+  EXPECT_FALSE(resume(*coordinator, job));
 
   sql(dir.path(), "DROP TRIGGER broken");
   farm.sessions()[0]->disconnected();
-  ASSERT_TRUE(coordinator->resume(job));
+  ASSERT_TRUE(resume(*coordinator, job));
   FakeFarm other(*coordinator, 1);
   ASSERT_TRUE(other.finish(job));
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels());
@@ -118,8 +118,8 @@ TEST(Done, AJobLeavesTheFarmsBooksAndCanStillBeExtended) {
   spec.spp = 11;
   const JobId job = finished(*coordinator, spec);
   EXPECT_EQ(coordinator->job(job)->units_done, 8u);
-  EXPECT_EQ(coordinator->extend(job, 12).error().code, Errc::invalid_argument);
-  ASSERT_TRUE(coordinator->extend(job, 70));
+  EXPECT_EQ(extend(*coordinator, job, 12).error().code, Errc::invalid_argument);
+  ASSERT_TRUE(extend(*coordinator, job, 70));
 
   FakeFarm farm(*coordinator, 1);  // with two, units that move to the idle one are rendered by both
   ASSERT_TRUE(farm.finish(job));
@@ -139,7 +139,7 @@ TEST(Done, AJobWhoseSnapshotIsLostIsFoldedAgainWhenItIsExtended) {
     fs::remove(dir.path() / "jobs" / job.value / "film.snap");
     if (results_too) fs::remove(dir.path() / "jobs" / job.value / "partials-000.seg");
     auto coordinator = open_at(dir.path());
-    ASSERT_TRUE(coordinator->extend(job, 70));
+    ASSERT_TRUE(extend(*coordinator, job, 70));
     FakeFarm farm(*coordinator, 2);
     ASSERT_TRUE(farm.finish(job));
     EXPECT_EQ(pixels(*coordinator, job), reference_pixels(70)) << results_too;
@@ -161,7 +161,7 @@ TEST(Done, WaitsForASnapshotThatCannotBeWritten) {
   EXPECT_EQ(coordinator->job(job)->state, JobState::running);
   EXPECT_THAT(coordinator->job(job)->error, HasSubstr("then resume the job"));
   fs::remove_all(in_the_way.parent_path());
-  ASSERT_TRUE(coordinator->resume(job));
+  ASSERT_TRUE(resume(*coordinator, job));
   ASSERT_TRUE(coordinator->wait(job));
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels());
 }

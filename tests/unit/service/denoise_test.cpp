@@ -154,7 +154,7 @@ TEST(ServiceDenoise, ALargerJobIsDenoisedAgain) {
   FakeFarm farm(*coordinator, 2);
   ASSERT_TRUE(farm.finish(job));
   const FinalPicture first = image_of(*coordinator, job);
-  ASSERT_TRUE(coordinator->extend(job, 16));
+  ASSERT_TRUE(extend(*coordinator, job, 16));
   ASSERT_TRUE(farm.finish(job) && farm.finish(whole));
 
   const FinalPicture extended = image_of(*coordinator, job);

@@ -1,5 +1,5 @@
 // When a job will be done: which end comes first, and what is known of it.
-#include "coordinator/service/eta.h"
+#include "coordinator/service/state/eta.h"
 
 #include <gtest/gtest.h>
 

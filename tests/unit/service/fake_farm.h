@@ -215,6 +215,19 @@ inline JobId submit(Coordinator& coordinator, JobSpec spec = {}) {
   return id.value_or(JobId{});
 }
 
+inline Result<void> pause(Coordinator& coordinator, const JobId& job) {
+  return coordinator.change(job, {.state = JobState::paused});
+}
+inline Result<void> resume(Coordinator& coordinator, const JobId& job) {
+  return coordinator.change(job, {.state = JobState::running});
+}
+inline Result<void> set_priority(Coordinator& coordinator, const JobId& job, int priority) {
+  return coordinator.change(job, {.priority = priority});
+}
+inline Result<void> extend(Coordinator& coordinator, const JobId& job, std::uint64_t spp) {
+  return coordinator.change(job, {.spp = spp});
+}
+
 inline nlohmann::json report(const Coordinator& coordinator, const JobId& job) {
   return nlohmann::json::parse(coordinator.report_json(job).value_or("{}"));
 }

@@ -107,7 +107,7 @@ TEST(ServiceHealth, OfAnExtendedJobIsThatOfOneRenderedAtOnce) {
       coordinator.reset();
       coordinator = open_at(folder);
     }
-    ASSERT_TRUE(coordinator->extend(job, 16));
+    ASSERT_TRUE(extend(*coordinator, job, 16));
     ASSERT_TRUE(render());
     EXPECT_EQ(coordinator->job(job)->health, expected(16)) << restart;
   }

@@ -150,13 +150,13 @@ TEST(Sequence, IsPausedResumedCancelledAndRemovedAsAWhole) {
       for (const auto& f : job->frames->all) all.insert(f.state);
       return all;
     };
-    ASSERT_TRUE(coordinator->pause(id));
+    ASSERT_TRUE(pause(*coordinator, id));
     EXPECT_EQ(states(), std::set{JobState::paused});
     EXPECT_EQ(coordinator->job(id)->state, JobState::paused);
-    ASSERT_TRUE(coordinator->resume(id));
-    ASSERT_TRUE(coordinator->set_priority(id, 7));
+    ASSERT_TRUE(resume(*coordinator, id));
+    ASSERT_TRUE(set_priority(*coordinator, id, 7));
     EXPECT_EQ(coordinator->job(frame_job(id, 3))->priority, 7);
-    EXPECT_FALSE(coordinator->set_priority(id, 2'000'000'000));
+    EXPECT_FALSE(set_priority(*coordinator, id, 2'000'000'000));
     ASSERT_TRUE(coordinator->cancel(frame_job(id, 2))) << "one frame alone";
     EXPECT_NE(coordinator->job(id)->state, JobState::cancelled);
     EXPECT_FALSE(coordinator->remove(frame_job(id, 2))) << "a sequence has no holes";
@@ -170,7 +170,7 @@ TEST(Sequence, IsPausedResumedCancelledAndRemovedAsAWhole) {
   const JobId id = coordinator->jobs()[0].id;
   EXPECT_EQ(coordinator->job(id)->state, JobState::cancelled);
   EXPECT_EQ(coordinator->job(id)->priority, 7);
-  EXPECT_EQ(coordinator->resume(id).error().code, Errc::failed_precondition);
+  EXPECT_EQ(resume(*coordinator, id).error().code, Errc::failed_precondition);
 
   std::mutex mutex;
   std::condition_variable heard;
@@ -200,12 +200,12 @@ TEST(Sequence, ExtendedGivesThePixelsOfOneRenderedSoAtOnce) {
   FakeFarm farm(*coordinator, 1);
   ASSERT_TRUE(farm.finish(id));
 
-  ASSERT_TRUE(coordinator->extend(id, 16));
+  ASSERT_TRUE(extend(*coordinator, id, 16));
   ASSERT_TRUE(farm.finish(id));
 
   for (std::uint32_t frame = 1; frame <= 2; ++frame)
     EXPECT_EQ(pixels(*coordinator, frame_job(id, frame)), pixels_with_seed(frame, 16));
-  EXPECT_EQ(coordinator->extend(id, 16).error().code, Errc::failed_precondition);
+  EXPECT_EQ(extend(*coordinator, id, 16).error().code, Errc::failed_precondition);
 }
 
 TEST(Sequence, WhatBelongsToOneImageAsksForTheFrame) {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "coordinator/service/sequence.h"
+#include "coordinator/service/state/sequence.h"
 
 namespace ls::coordinator {
 namespace {

@@ -190,8 +190,8 @@ TEST(Service, AnExtendedJobHasTheBitsOfOneRenderedAtOnce) {
       coordinator.reset();
       coordinator = open_at(data);
     }
-    EXPECT_FALSE(coordinator->extend(job, 12));
-    ASSERT_TRUE(coordinator->extend(job, 70));
+    EXPECT_FALSE(extend(*coordinator, job, 12));
+    ASSERT_TRUE(extend(*coordinator, job, 70));
     EXPECT_EQ(coordinator->job(job)->state, JobState::running);
 
     FakeFarm farm(*coordinator, 2);
@@ -216,7 +216,7 @@ TEST(Service, ACancelledJobIgnoresResults) {
   EXPECT_EQ(coordinator->job(job)->state, JobState::cancelled);
   EXPECT_EQ(coordinator->job(job)->units_done, 0u);
   EXPECT_TRUE(coordinator->cancel(job));
-  EXPECT_EQ(coordinator->extend(job, 64).error().code, Errc::failed_precondition);
+  EXPECT_EQ(extend(*coordinator, job, 64).error().code, Errc::failed_precondition);
 }
 
 // Read by the service's threads while the test moves it.
@@ -291,7 +291,7 @@ TEST(Service, AFullDiskPausesTheJobUntilAPersonResumesIt) {
 
   // The two held back are lost with their worker.
   farm.sessions()[0]->disconnected();
-  ASSERT_TRUE(coordinator->resume(job));
+  ASSERT_TRUE(resume(*coordinator, job));
   FakeFarm other(*coordinator, 1);
   ASSERT_TRUE(other.finish(job));
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels());

@@ -249,7 +249,7 @@ TEST_F(FoundElsewhere, AJobThatWasDoneBeforeIsExtendedWithoutTheLiarsPixels) {
       store->will_tell({.quarantined = {{coordinator->workers()[0].id, "it lied elsewhere"}}});
       coordinator->tick();
     }
-    ASSERT_TRUE(coordinator->extend(job, 64));
+    ASSERT_TRUE(extend(*coordinator, job, 64));
     FakeFarm honest(*coordinator, 1);
     if (on_disk) {  // and also after a restart in the middle of it
       honest.stop_after = 3;
@@ -277,9 +277,9 @@ TEST_F(FoundElsewhere, UntilItIsStoredThatAWorkerIsQuarantinedTheJobsWait) {
 
   EXPECT_EQ(coordinator->job(job)->state, JobState::paused);
   EXPECT_THAT(coordinator->job(job)->error, testing::HasSubstr("the disk is full"));
-  EXPECT_FALSE(coordinator->resume(job));
+  EXPECT_FALSE(resume(*coordinator, job));
   store->refuses_to_bar = false;
-  ASSERT_TRUE(coordinator->resume(job));
+  ASSERT_TRUE(resume(*coordinator, job));
   ASSERT_TRUE(farm.finish(job));
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels(64));
   EXPECT_EQ(store->quarantined().value().size(), 1u);
@@ -302,7 +302,7 @@ TEST_F(FoundElsewhere, AnErrorFromBeforeAJobWasResumedDoesNotPauseItAgain) {
       // The second refusal is of a result, if one is still under way
       for (int i = 0; i < 100000 && refusals < 2; ++i) std::this_thread::yield();
       store->refuses_to_bar = false;
-      EXPECT_TRUE(coordinator->resume(job));
+      EXPECT_TRUE(resume(*coordinator, job));
     });
     FakeFarm farm(*coordinator, 4);
     farm.ticks = true;

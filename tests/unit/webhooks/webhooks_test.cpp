@@ -101,7 +101,7 @@ TEST_F(WebhooksTest, TellsEveryStateOnceInOrderAndWhatTheJobIs) {
   const auto webhooks = start(receiver);
 
   const JobId job = submit();
-  ASSERT_TRUE(coordinator_->pause(job));
+  ASSERT_TRUE(coordinator_->change(job, {.state = JobState::paused}));
   ASSERT_TRUE(coordinator_->cancel(job));
 
   const auto posts = receiver.wait_for(3);

@@ -1,4 +1,4 @@
-#include "coordinator/service/eta.h"
+#include "coordinator/service/state/eta.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "coordinator/service/sequence.h"
+#include "coordinator/service/state/sequence.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "coordinator/service/event_hub.h"
+#include "coordinator/service/state/event_hub.h"
 
 #include <algorithm>
 #include <optional>

@@ -1,0 +1,166 @@
+#include "coordinator/service/blob_watch.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/base/log.h"
+#include "coordinator/base/limits.h"
+#include "coordinator/base/periodic.h"
+#include "coordinator/service/core.h"
+
+namespace ls::coordinator {
+namespace {
+
+constexpr Duration kLongestPause = std::chrono::hours(1);
+constexpr int kSweepsPerTime = 4;  // sweeps per keep_unused: so no blob stays longer than 1.25 times that
+constexpr std::size_t kJobsAtOnce = 256;  // jobs whose blobs are collected under one lock
+
+std::optional<BlobRef> file_of(const StoredJob& job, const Digest& digest) {
+  if (job.scene == digest) return BlobRef{digest, 0, job.name};
+  const auto asset = std::find_if(job.assets.begin(), job.assets.end(),
+                                  [&](const BlobRef& a) { return a.digest == digest; });
+  return asset == job.assets.end() ? std::nullopt : std::optional(*asset);
+}
+
+// Returns a text that tells the user what to send again. A file can be uploaded, but the scene is stored in
+// our own format, which only a submission makes.
+std::string what_to_do(const StoredJob& job, const BlobRef& file, bool damaged) {
+  const bool scene = file.digest == job.scene;
+  return fmt::format(
+      "it waits for its {} '{}', whose blob {} {}: {}hand in the same scene again with `lightshaft submit`, "
+      "and this job goes on by itself",
+      scene ? "scene" : "file", file.name, file.digest.hex(), damaged ? "was damaged here" : "is not here",
+      scene ? "" : fmt::format("upload the file again (PUT /api/v1/blobs/{}), or ", file.digest.hex()));
+}
+
+bool is_open(JobState state) { return state == JobState::queued || state == JobState::running; }
+
+}  // namespace
+
+Result<std::vector<BlobRef>> missing_blobs_of(const StoredJob& job, const BlobStore& blobs) {
+  std::vector<BlobRef> files = job.assets, missing;
+  files.push_back({job.scene, 0, job.name});
+  for (const BlobRef& file : files) {
+    const auto there = blobs.find(file.digest);
+    if (!there) return tl::unexpected(there.error());
+    if (!*there) missing.push_back(file);
+  }
+  return missing;
+}
+
+void await_blob(Core& core, JobEntry& entry, const BlobRef& file, bool damaged) {
+  entry.stored.missing_blobs.insert(file.digest);
+  entry.trouble = what_to_do(entry.stored, file, damaged);
+  log_error(fmt::format("job={}", entry.stored.id.value), entry.trouble);
+  core.records.log(entry.stored.id, entry.trouble);
+}
+
+void BlobWatch::missing(const Digest& digest, const Error& why) {
+  const auto core = core_.lock();
+  std::vector<EntryPtr> waiting;
+  for (const auto& [id, entry] : core->jobs.all()) {
+    const StoredJob& job = entry->stored;
+    const bool waits = !job.missing_blobs.empty() && !job.missing_blobs.contains(digest);
+    if (!entry->unloaded && !entry->finishing && (waits || is_open(job.state)) && file_of(job, digest))
+      waiting.push_back(entry);
+  }
+  if (waiting.empty()) return;
+  (void)core->records.put_together([&] {  // what cannot be stored is found again at the next start
+    for (const EntryPtr& entry : waiting) {
+      core->records.log(entry->stored.id, why.message);
+      await_blob(*core, *entry, *file_of(entry->stored, digest), why.code == Errc::failed_precondition);
+      if (is_open(entry->stored.state)) core->driver.run(JobPaused{entry->stored.id});
+      core->records.put(entry);
+      core->publisher.job(*entry);
+    }
+  });
+}
+
+void BlobWatch::look_if_due(Core& core) {
+  if (clock_.now() - last_look_ < limits::kMissingBlobLook || looks_.size() > 0) return;
+  std::set<Digest> digests;
+  for (const auto& [id, entry] : core.jobs.all())
+    digests.insert(entry->stored.missing_blobs.begin(), entry->stored.missing_blobs.end());
+  if (digests.empty()) return;
+  last_look_ = clock_.now();
+  looks_.push(std::move(digests));
+}
+
+void BlobWatch::look_loop(const std::stop_token& token) {
+  while (!token.stop_requested())
+    for (const auto& digests : looks_.pop(1, token)) look_for(digests);
+}
+
+void BlobWatch::look_for(const std::set<Digest>& digests) {
+  std::set<Digest> here;
+  for (const Digest& digest : digests) {
+    const auto found = blobs_.find(digest);
+    if (!found) break;  // the store is unavailable: this is tried again at the next lookup
+    if (*found) here.insert(digest);
+  }
+  if (here.empty()) return;
+  const auto core = core_.lock();
+  std::vector<EntryPtr> complete;
+  for (const auto& [id, entry] : core->jobs.all()) {
+    auto& left = entry->stored.missing_blobs;
+    if (std::erase_if(left, [&](const Digest& digest) { return here.contains(digest); }) > 0 && left.empty())
+      complete.push_back(entry);
+  }
+  if (complete.empty()) return;
+  (void)core->records.put_together([&] {
+    for (const EntryPtr& entry : complete) {
+      log_info(fmt::format("job={}", entry->stored.id.value), "its files are here again");
+      core->records.log(entry->stored.id, "its files are here again");
+      if (auto resumed = commands_.become(*core, entry, JobState::running); !resumed)
+        log_error(fmt::format("job={}", entry->stored.id.value), resumed.error().message);
+    }
+  });
+}
+
+void BlobWatch::check_store() {
+  const auto answer = blobs_.answers();
+  const std::string trouble = answer ? "" : "the store of blobs does not answer: " + answer.error().message;
+  const auto core = core_.lock();
+  if (trouble.empty() != trouble_.empty())
+    trouble.empty() ? log_info("", "the store of blobs answers again") : log_warn("", trouble);
+  trouble_ = trouble;
+}
+
+// Returns the digests of all blobs that jobs need. nullopt: the files of some job are unknown, because its
+// record is damaged.
+std::optional<std::set<Digest>> BlobWatch::needed_blobs() {
+  std::vector<EntryPtr> entries;
+  {
+    const auto core = core_.lock();
+    for (const auto& [id, entry] : core->jobs.all()) entries.push_back(entry);
+  }
+  std::set<Digest> needed;
+  for (std::size_t i = 0; i < entries.size(); i += kJobsAtOnce) {
+    const auto core = core_.lock();
+    for (std::size_t k = i; k < std::min(entries.size(), i + kJobsAtOnce); ++k) {
+      const StoredJob& job = entries[k]->stored;
+      if (job.damaged) return std::nullopt;
+      needed.insert(job.scene);
+      for (const BlobRef& asset : job.assets) needed.insert(asset.digest);
+      if (job.spec.reference) needed.insert(*job.spec.reference);
+    }
+  }
+  return needed;
+}
+
+void BlobWatch::collect() {
+  const auto needed = keep_unused_ ? needed_blobs() : std::nullopt;
+  const auto swept = needed ? blobs_.sweep(*needed) : blobs_.sweep_unfinished();
+  if (!swept) return log_warn("", "files that no job needs cannot be removed: " + swept.error().message);
+  if (swept->blobs + swept->unfinished > 0)
+    log_info("", fmt::format("{} files that no job needed and {} unfinished uploads are removed",
+                             swept->blobs, swept->unfinished));
+}
+
+void BlobWatch::collect_loop(const std::stop_token& token) {
+  const Duration pause = std::min(keep_unused_.value_or(kLongestPause) / kSweepsPerTime, kLongestPause);
+  every(pause, token, [this] { collect(); });
+}
+
+}  // namespace ls::coordinator

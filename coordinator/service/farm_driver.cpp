@@ -1,0 +1,350 @@
+#include "coordinator/service/farm_driver.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/base/failpoint.h"
+#include "common/base/log.h"
+#include "coordinator/service/core.h"
+#include "coordinator/service/image_writer.h"
+#include "coordinator/service/reference_comparer.h"
+
+namespace ls::coordinator {
+
+FarmDriver::FarmDriver(Core& core, Farm::Options options, const Clock& clock, const JobFiles& files,
+                       ImageWriter& images, ReferenceComparer& comparer)
+    : core_(core),
+      farm_(std::move(options)),
+      clock_(clock),
+      files_(files),
+      images_(images),
+      comparer_(comparer) {}
+
+void FarmDriver::run(Event first) {
+  todo_.push_back(std::move(first));
+  while (!todo_.empty()) {
+    const Event event = std::move(todo_.front());
+    todo_.pop_front();
+    for (const Effect& effect : farm_.handle(event, clock_.now()))
+      std::visit([&](const auto& e) { on(e); }, effect);
+  }
+  // Snapshots are taken only when all events are handled. A snapshot includes convergence points, and these
+  // must precede it in the writer's queue.
+  for (const EntryPtr& entry : std::exchange(folded_, {})) images_.snapshot_if_due(core_, entry);
+  for (const JobId& id : farm_.take_changed_audits())
+    if (const auto entry = core_.jobs.find(id)) images_.keep_audits(core_, entry, farm_.open_audits(id));
+}
+
+void FarmDriver::replay(JobEntry& entry, JobRestored event) {
+  core_.publisher.set_quiet(true);
+  run(std::move(event));
+  core_.publisher.set_quiet(false);
+  entry.replay_at.clear();
+}
+
+void FarmDriver::quarantine(const std::vector<QuarantinedWorker>& workers) {
+  for (const QuarantinedWorker& one : workers) run(WorkerQuarantined{one.worker, one.evidence});
+}
+
+void FarmDriver::unload(JobEntry& entry) {
+  const auto figures = farm_.job(entry.stored.id);
+  if (!files_.on_disk() || !figures || entry.unloaded || !is_terminal(figures->state)) return;
+  entry.free_image();
+  run(JobForgotten{entry.stored.id});
+}
+
+// Leases
+
+void FarmDriver::on(const Send& e) {
+  const auto found = core_.workers.find(e.worker);
+  if (found == core_.workers.end() || !found->second.connection || !found->second.connection->open) return;
+  Connection& connection = *found->second.connection;
+  if (const auto* assign = std::get_if<AssignLease>(&e.message)) {
+    ++core_.figures.leases_granted;
+    core_.figures.units_leased += assign->lease.units.size();
+    connection.note_lease(assign->lease.id);
+    found->second.last_job = assign->lease.job;
+    note_leased(assign->lease, e.worker);
+  }
+  connection.sink->send(e.message);
+  if (std::holds_alternative<AssignLease>(e.message)) failpoint("lease-sent");
+}
+
+void FarmDriver::note_leased(const Lease& lease, const WorkerId& worker) {
+  const auto entry = core_.jobs.find(lease.job);
+  if (!entry) return;
+  for (const LeaseUnit& unit : lease.units) {
+    auto& holders = entry->leased[{unit.tile, unit.round}];
+    if (std::find(holders.begin(), holders.end(), worker) == holders.end()) holders.push_back(worker);
+    core_.publisher.tile(*entry, unit.tile, unit.rect, "leased", unit.samples.s0, worker);
+  }
+}
+
+void FarmDriver::on(const UnitsFreed& e) {
+  const auto entry = core_.jobs.find(e.job);
+  if (!entry) return;
+  core_.figures.units_freed[e.cause] += e.units.size();
+  for (const UnitKey& unit : e.units) {
+    const auto held = entry->leased.find({unit.tile, unit.round});
+    if (held != entry->leased.end() && std::erase(held->second, e.worker) > 0 && held->second.empty())
+      entry->leased.erase(held);
+    core_.publisher.tile(*entry, unit.tile, entry->grid.rect(unit.tile), "free", round_range(unit.round).s0,
+                         e.worker);
+  }
+}
+
+// Results
+
+// The result is in the job's log already, so nothing is written here: this only starts the job's clock.
+void FarmDriver::on(const RecordUnit& e) {
+  const auto entry = core_.jobs.find(e.unit.job);
+  if (!entry) return;
+  entry->leased.erase({e.unit.tile, e.unit.round});
+  if (entry->clock_zero) return;
+  const auto figures = farm_.job(e.unit.job);
+  entry->clock_zero = figures && figures->first_ray ? *figures->first_ray : clock_.now();
+  if (entry->stored.totals.began_unix == 0)
+    entry->stored.totals.began_unix = unix_now() - entry->elapsed(clock_.now());
+}
+
+// Returns the accepted partial (the encoded pixel sums of one unit) that is to be folded. It is read from the
+// log if it is no longer in memory: it arrived before a restart, or too many partials are waiting.
+Result<WaitingPartial> FarmDriver::partial_for(JobEntry& entry, const Fold& e) const {
+  auto waiting = entry.assembly->take(e.unit.tile, e.unit.round, e.samples);
+  if (!waiting) return fail(Errc::internal, "an accepted partial is not at hand");
+  if (waiting->partial) return std::move(*waiting);
+  if (!waiting->place || !entry.log) return fail(Errc::internal, "an accepted partial has no place");
+  const auto exr = entry.log->read(*waiting->place);
+  if (!exr) return tl::unexpected(exr.error());
+  const UnitHeader expected{entry.stored.scene, entry.settings_digest,
+                            entry.stored.numeric_class.value_or(Digest{}), entry.grid.rect(e.unit.tile),
+                            e.samples};
+  auto partial = decode_partial(*exr, expected, entry.grid.frame, aovs_of(entry.stored.settings));
+  if (!partial) return tl::unexpected(partial.error());
+  waiting->partial = std::move(*partial);
+  return std::move(*waiting);
+}
+
+void FarmDriver::on(const Fold& e) {
+  const auto entry = core_.jobs.find(e.unit.job);
+  if (!entry || !entry->assembly) return;
+  const TimePoint begin = clock_.now();
+  const auto waiting = partial_for(*entry, e);
+  const auto error =
+      waiting ? entry->assembly->fold(e.unit.tile, e.unit.round, *waiting) : tl::unexpected(waiting.error());
+  if (!error) {
+    // A wrong pixel must never be folded: the tile stops and the job waits.
+    entry->trouble =
+        fmt::format("tile {} round {} cannot be folded: {}; restart the coordinator to render it again",
+                    e.unit.tile, e.unit.round, error.error().message);
+    log_error(fmt::format("job={} tile={} round={}", e.unit.job.value, e.unit.tile, e.unit.round),
+              entry->trouble);
+    core_.records.log(e.unit.job, entry->trouble);
+    todo_.push_back(JobPaused{e.unit.job});
+    return;
+  }
+  if (entry->reference_tiles)
+    entry->reference_tiles->folded(e.unit.tile, e.unit.round, entry->assembly->film());
+  if (const auto at = entry->replay_at.find({e.unit.tile, e.unit.round}); at != entry->replay_at.end())
+    entry->fold_seconds = std::max(entry->fold_seconds, at->second);
+  else
+    entry->fold_seconds = entry->elapsed(clock_.now());
+  todo_.push_back(UnitFolded{e.unit, e.samples, error->relative.squares});
+  entry->stored.totals.time.merge += seconds(clock_.now() - begin);
+  if (core_.publisher.quiet()) return;  // it was folded before already
+  failpoint("result-folded");
+  ++core_.figures.folded;
+  if (waiting->arrived != TimePoint{})
+    core_.figures.fold_lag_seconds += seconds(clock_.now() - waiting->arrived);
+  core_.publisher.tile(*entry, e.unit.tile, entry->grid.rect(e.unit.tile), "folded", e.samples.s1);
+  core_.publisher.progress(*entry);
+  if (folded_.empty() || folded_.back() != entry) folded_.push_back(entry);
+}
+
+void FarmDriver::on(const DropDuplicate&) { ++core_.figures.equal; }
+
+void FarmDriver::on(const DropUnwanted& e) {
+  ++core_.figures.unwanted;
+  log_debug(fmt::format("job={} tile={} round={} worker={}", e.unit.job.value, e.unit.tile, e.unit.round,
+                        e.worker.value),
+            "result dropped: " + e.why);
+}
+
+void FarmDriver::on(const DigestMismatch& e) {
+  ++core_.figures.differing;
+  const std::string text = fmt::format(
+      "tile {} round {}: {} rendered {}, {} rendered {}: one of them has bad memory or lies", e.unit.tile,
+      e.unit.round, e.first_worker.value, e.first.hex(), e.second_worker.value, e.second.hex());
+  log_error(fmt::format("job={}", e.unit.job.value), text);
+  core_.records.log(e.unit.job, text);
+}
+
+void FarmDriver::on(const TileDiscarded& e) {
+  const auto entry = core_.jobs.find(e.job);
+  if (!entry || !entry->assembly) return;
+  entry->assembly->discard(e.tile);
+  if (entry->reference_tiles) entry->reference_tiles->discard(e.tile);
+  core_.records.forget_curve(*entry);
+  core_.records.log(e.job, fmt::format("tile {} is rendered again from its first round", e.tile));
+  if (!core_.publisher.quiet()) core_.publisher.tile(*entry, e.tile, entry->grid.rect(e.tile), "free", 0);
+}
+
+void FarmDriver::on(const ReopenRound& e) {
+  const auto entry = core_.jobs.find(e.job);
+  if (entry && entry->assembly) entry->assembly->forget_round(e.round);
+}
+
+// Jobs
+
+void FarmDriver::on(const JobPinned& e) {
+  const auto entry = core_.jobs.find(e.job);
+  if (!entry) return;
+  entry->stored.numeric_class = e.numeric_class;
+  for (const auto& [id, worker] : core_.workers)
+    if (worker.hello.numeric_class == e.numeric_class) {
+      entry->stored.build = worker.hello.build;
+      entry->stored.fake |= worker.hello.fake;
+    }
+  entry->pin_unsaved = true;
+  if (!core_.records.put_pin(entry)) todo_.push_back(JobPaused{e.job});
+}
+
+// The state `done` is published and stored only when the final image is written: see ImageWriter.
+void FarmDriver::on(const JobStateChanged& e) {
+  const auto entry = core_.jobs.find(e.job);
+  // A job that is removed here continues at another coordinator or not at all.
+  if (!entry || entry->removed || e.to == JobState::done) return;
+  entry->stored.state = e.to;
+  entry->stored.stopped.reset();
+  if (e.to != JobState::paused) entry->stored.missing_blobs.clear();
+  log_info(fmt::format("job={} state={}", e.job.value, to_string(e.to)), entry->stored.name);
+  core_.records.log(e.job, fmt::format("{}", to_string(e.to)));
+  if (e.to == JobState::running && !entry->pin_unsaved) entry->trouble.clear();
+  if (e.to == JobState::paused) entry->still_since = clock_.now();
+  if (e.from == JobState::paused) {
+    if (const auto since = std::exchange(entry->still_since, std::nullopt); since && entry->clock_zero)
+      *entry->clock_zero += clock_.now() - std::max(*since, *entry->clock_zero);
+  }
+  if (is_terminal(e.to)) {
+    end_image(entry);
+    images_.retire(core_, entry);
+  }
+  core_.records.put(entry);
+  core_.publisher.job(*entry);
+  core_.ended.notify_all();
+}
+
+void FarmDriver::on(const JobFinished& e) {
+  const auto entry = core_.jobs.find(e.job);
+  if (!entry) return;
+  entry->stored.stopped = e.stopped;
+  end_image(entry);
+  if (e.unaudited > 0)
+    core_.records.log(
+        e.job, fmt::format("{} results were to be rendered again by another worker, but nobody else of their "
+                           "numeric class was there: who rendered them is believed",
+                           e.unaudited));
+  images_.finish(core_, entry);
+}
+
+// Takes down what the image of a job that has ended has cost, and ends its curve.
+void FarmDriver::end_image(const EntryPtr& entry) {
+  JobTotals& totals = entry->stored.totals;
+  totals.render_seconds = entry->fold_seconds;
+  totals.ended_unix = unix_now();
+  entry->clock_zero.reset();
+  entry->leased.clear();
+  if (!entry->assembly) return;
+  totals.health = entry->assembly->health().total();
+  entry->assembly->forget_waiting();
+  end_curve(entry);
+  comparer_.compare_last(core_, entry);
+}
+
+void FarmDriver::on(const JobFailed& e) {
+  const auto entry = core_.jobs.find(e.job);
+  if (!entry) return;
+  entry->stored.error = e.error;
+  log_error(fmt::format("job={}", e.job.value), e.error);
+  core_.records.log(e.job, "failed: " + e.error);
+  core_.records.put(entry);
+  core_.publisher.job(*entry);
+}
+
+// Curves
+
+void FarmDriver::on(const Checkpoint& e) {
+  const auto entry = core_.jobs.find(e.job);
+  if (!entry || !entry->assembly) return;
+  const bool exact = entry->assembly->errors().knows(e.rounds);
+  const ImageError error = image_error(entry->assembly->errors().at(e.rounds));
+  entry->assembly->checkpoint_taken(e.rounds);
+  entry->stored.totals.doubt = error.verdict;
+  entry->stored.totals.few_hits = error.few_hits;
+  if (!entry->points.empty() && entry->points.back().spp >= error.spp) {  // known from before the restart
+    const bool compared = std::none_of(entry->points.begin(), entry->points.end(), [&](const auto& p) {
+      return p.spp == error.spp && !p.reference_error;
+    });
+    if (!compared) comparer_.compare(core_, entry, e.rounds, error.spp);
+    return;
+  }
+  // If the errors are not exact, some tile is being rendered again, and earlier errors of the other tiles are
+  // no longer kept: this checkpoint gets no point.
+  if (!exact) return;
+  core_.records.add_point(
+      entry, {entry->fold_seconds, entry->assembly->costs().until(e.rounds), error.spp, figures_of(error)});
+  comparer_.compare(core_, entry, e.rounds, error.spp);
+}
+
+// If a job ends by time or is cancelled, its final image may have more samples than its last checkpoint. The
+// curve then gets a last point for that image, so that all views agree.
+void FarmDriver::end_curve(const EntryPtr& entry) {
+  if (entry->assembly->film().pixels_without_samples() > 0) return;
+  const ImageError error = image_error(entry->assembly->film().error());
+  if (!entry->points.empty() && entry->points.back().spp >= error.spp) return;
+  entry->stored.totals.doubt = error.verdict;
+  entry->stored.totals.few_hits = error.few_hits;
+  core_.records.add_point(
+      entry, {entry->fold_seconds, entry->stored.totals.core_seconds, error.spp, figures_of(error)});
+}
+
+// Workers
+
+void FarmDriver::on(const WorkerStateChanged& e) {
+  log_info(fmt::format("worker={} state={}", e.worker.value, to_string(e.to)), e.why);
+  if (e.to == WorkerState::unhealthy) log_error(fmt::format("worker={}", e.worker.value), "sick: " + e.why);
+  if (const auto w = core_.workers.find(e.worker); w != core_.workers.end())
+    w->second.trouble = e.to == WorkerState::unhealthy ? e.why : "";
+  core_.publisher.worker(e.worker, true);
+}
+
+void FarmDriver::on(const WorkerBlocked& e) {
+  log_warn(fmt::format("worker={} job={}", e.worker.value, e.job.value),
+           "gets no more of this job: " + e.why);
+  core_.records.log(e.job, fmt::format("worker {} gets no more of it: {}", e.worker.value, e.why));
+}
+
+// A faulty worker is stored apart from the jobs, and for longer: none of its results is accepted after a
+// restart, or in jobs that are extended then. Until it is stored every job waits, since a restart would
+// accept the worker's results that are in the log.
+void FarmDriver::on(const WorkerFoundFaulty& e) {
+  log_error(fmt::format("worker={} job={} tile={} round={}", e.worker.value, e.unit.job.value, e.unit.tile,
+                        e.unit.round),
+            "barred: " + e.evidence);
+  core_.records.add_quarantined({e.worker, e.evidence});
+  if (const auto saved = core_.records.put_quarantined(); !saved)
+    for (const auto& [id, entry] : core_.jobs.all()) {
+      if (entry->unloaded || !entry->assembly) continue;
+      entry->trouble = saved.error().message;
+      todo_.push_back(JobPaused{id});
+    }
+  core_.records.log(e.unit.job, fmt::format("worker {} is barred: {}", e.worker.value, e.evidence));
+}
+
+void FarmDriver::on(const WorkerForgotten& e) {
+  core_.workers.erase(e.worker);
+  core_.publisher.worker_gone(e.worker);
+}
+
+}  // namespace ls::coordinator

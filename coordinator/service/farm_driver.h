@@ -1,0 +1,67 @@
+// Drives the farm: hands it events, and carries out its effects (domain/effect.h), in order. Part of the core
+// (core.h), so all of it runs under the lock.
+#pragma once
+
+#include <deque>
+#include <string>
+#include <vector>
+
+#include "coordinator/domain/farm/farm.h"
+#include "coordinator/service/state/job_files.h"
+#include "coordinator/service/state/records.h"
+
+namespace ls::coordinator {
+
+struct Core;
+class ImageWriter;
+class ReferenceComparer;
+
+class FarmDriver {
+ public:
+  FarmDriver(Core& core, Farm::Options options, const Clock& clock, const JobFiles& files,
+             ImageWriter& images, ReferenceComparer& comparer);
+
+  const Farm& farm() const { return farm_; }
+  void run(Event first);
+  // Gives a stored job to the farm. Of folds that are repeated for it, no events are published.
+  void replay(JobEntry& entry, JobRestored event);
+  void quarantine(const std::vector<QuarantinedWorker>& workers);  // these are stored already
+  // Unloads a job if it has ended and is on disk: what the farm knows of it and its image in memory are
+  // freed; only its files and its record remain. Results that still arrive for it are dropped.
+  void unload(JobEntry& entry);
+
+ private:
+  void on(const Send& e);
+  void on(const UnitsFreed& e);
+  void on(const RecordUnit& e);
+  void on(const Fold& e);
+  void on(const DropDuplicate& e);
+  void on(const DropUnwanted& e);
+  void on(const DigestMismatch& e);
+  void on(const JobPinned& e);
+  void on(const JobStateChanged& e);
+  void on(const Checkpoint& e);
+  void on(const ReopenRound& e);
+  void on(const JobFinished& e);
+  void on(const JobFailed& e);
+  void on(const WorkerStateChanged& e);
+  void on(const WorkerBlocked& e);
+  void on(const WorkerFoundFaulty& e);
+  void on(const TileDiscarded& e);
+  void on(const WorkerForgotten& e);
+  Result<WaitingPartial> partial_for(JobEntry& entry, const Fold& e) const;
+  void note_leased(const Lease& lease, const WorkerId& worker);
+  void end_image(const EntryPtr& entry);
+  void end_curve(const EntryPtr& entry);
+
+  Core& core_;
+  Farm farm_;
+  const Clock& clock_;
+  const JobFiles& files_;
+  ImageWriter& images_;
+  ReferenceComparer& comparer_;
+  std::deque<Event> todo_;        // events that effects have raised
+  std::vector<EntryPtr> folded_;  // jobs of which units were folded by the events that are being handled
+};
+
+}  // namespace ls::coordinator

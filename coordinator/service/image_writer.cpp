@@ -1,0 +1,242 @@
+#include "coordinator/service/image_writer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/base/failpoint.h"
+#include "common/base/log.h"
+#include "common/image/exr/final_image.h"
+#include "coordinator/base/limits.h"
+#include "coordinator/service/core.h"
+#include "coordinator/service/provenance.h"
+#include "coordinator/store/log/audit_file.h"
+
+namespace ls::coordinator {
+namespace {
+
+constexpr TileIndex kTilesAtOnce = 64;  // tiles of a snapshot that are copied under one lock
+
+std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
+
+class ImageFile final : public ByteSink {
+ public:
+  explicit ImageFile(AtomicFile& file) : file_(file) {}
+  Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) override {
+    return file_.write_at(at, bytes);
+  }
+
+ private:
+  AtomicFile& file_;
+};
+
+// Writes the final image. Returns how many values it cannot represent.
+Result<std::uint64_t> write_image(const std::filesystem::path& path, const Film& film,
+                                  const ReportFacts& facts, const BlobStore& blobs,
+                                  const Denoised* denoised) {
+  auto file = AtomicFile::create(path);
+  if (!file) return tl::unexpected(file.error());
+  ImageFile sink(*file);
+  const auto clamped = write_final_exr(film, provenance_of(facts, blobs), facts.job.spec.float_output, sink,
+                                       denoised ? std::span(denoised->image.rgb) : std::span<const float>());
+  if (!clamped) return clamped;
+  if (auto done = file->commit(); !done) return tl::unexpected(done.error());
+  failpoint("image-written");
+  return clamped;
+}
+
+void count_units(JobTotals& totals, const Farm& farm, const JobId& id) {
+  const JobFigures figures = farm.job(id).value_or(JobFigures{});
+  totals.units = figures.units_done;
+  totals.units_planned = figures.units_total;
+}
+
+}  // namespace
+
+void ImageWriter::keep_audits(Core&, const EntryPtr& entry, const std::vector<JobRestored::Audit>& audits) {
+  if (!files_.on_disk() || entry->removed) return;
+  std::string text = audits_text(audits);
+  if (text == entry->audits) return;
+  entry->audits = text;
+  writes_.push([this, entry, text = std::move(text)] {
+    {
+      const auto core = core_.lock();
+      if (entry->removed) return;
+    }
+    if (const auto written = write_audits(files_.folder(entry->stored.id), text); !written)
+      log_warn(fmt::format("job={}", entry->stored.id.value), "audits: " + written.error().message);
+  });
+}
+
+void ImageWriter::snapshot_if_due(Core&, const EntryPtr& entry) {
+  if (!files_.on_disk() || entry->snapshot_running || !entry->assembly) return;
+  const std::uint64_t folds = entry->assembly->folds_since_snapshot;
+  if (folds < limits::kSnapshotUnits &&
+      seconds(clock_.now() - entry->last_snapshot) < limits::kSnapshotSeconds)
+    return;
+  entry->snapshot_running = true;
+  entry->assembly->folds_since_snapshot = 0;
+  entry->last_snapshot = clock_.now();
+  writes_.push([this, entry] { take_snapshot(entry); });
+}
+
+// Takes a snapshot while folding continues. What is folded into a tile after it was copied is folded again
+// after a restart. The convergence points that the snapshot includes must be stored before it; they are in
+// the writer's queue already, so the snapshot is queued behind them.
+void ImageWriter::take_snapshot(const EntryPtr& entry) {
+  const auto done = [this, entry](const Result<void>& written) {
+    if (!written) log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
+    const auto core = core_.lock();
+    entry->snapshot_running = false;
+  };
+  auto file = copy_folded(entry);
+  if (!file) return done(tl::unexpected(file.error()));
+  writes_.push([this, entry, done, before = entry->snapshots,
+                file = std::make_shared<SnapshotFile>(std::move(*file))] {
+    auto core = core_.lock();
+    // The snapshot is dropped if the job was removed or a later snapshot has been written meanwhile
+    const bool wanted = entry->assembly && !entry->removed && entry->snapshots == before;
+    core.unlock();
+    if (!wanted) return done({});
+    ++entry->snapshots;
+    const auto written = file->commit();
+    failpoint("snapshot-written");
+    done(written);
+  });
+}
+
+Result<SnapshotFile> ImageWriter::copy_folded(const EntryPtr& entry) {
+  auto file = files_.create_snapshot(entry->stored, entry->grid, ".new");
+  if (!file) return file;
+  for (TileIndex first = 0; first < entry->grid.count(); first += kTilesAtOnce) {
+    std::vector<TileSnapshot> tiles;
+    {
+      const auto core = core_.lock();
+      if (!entry->assembly || entry->removed)
+        return fail(Errc::failed_precondition, "it has ended: no snapshot is needed");
+      for (TileIndex t = first; t < std::min(first + kTilesAtOnce, entry->grid.count()); ++t)
+        tiles.push_back(
+            snapshot_of(entry->assembly->film(), entry->assembly->errors(), entry->assembly->health(), t));
+    }
+    for (const TileSnapshot& tile : tiles)
+      if (auto written = file->add(tile); !written) return tl::unexpected(written.error());
+  }
+  if (auto sealed = file->finish(); !sealed) return tl::unexpected(sealed.error());
+  return file;
+}
+
+// Writes a snapshot of a film that is no longer changing.
+Result<void> ImageWriter::write_snapshot(const EntryPtr& entry, const Folded& folded) {
+  auto file = files_.create_snapshot(entry->stored, entry->grid, ".tmp");
+  if (!file) return tl::unexpected(file.error());
+  for (TileIndex t = 0; t < entry->grid.count(); ++t)
+    if (auto added = file->add(snapshot_of(folded.film, folded.errors, folded.health, t)); !added)
+      return added;
+  if (auto sealed = file->finish(); !sealed) return sealed;
+  ++entry->snapshots;
+  const auto written = file->commit();
+  failpoint("snapshot-written");
+  return written;
+}
+
+void ImageWriter::finish(Core&, const EntryPtr& entry) {
+  const std::uint64_t number = entry->finishing = ++last_final_;
+  const auto write = [this, entry, number] { write_final(entry, number); };
+  const bool denoised = entry->stored.spec.denoise && files_.on_disk();
+  if (!entry->reference_tiles && !denoised) return writes_.push(write);
+  if (denoised) comparer_.run_afterwards([this, entry, number] { denoise(entry, number); });
+  comparer_.run_afterwards([this, write] { writes_.push(write); });
+}
+
+void ImageWriter::finish_again(Core&, const EntryPtr& entry) {
+  entry->finishing = ++last_final_;
+  writes_.push([this, entry, number = last_final_] { write_final(entry, number); });
+}
+
+// Denoises the final image of a job before it is written, on another thread than that of the writes.
+void ImageWriter::denoise(const EntryPtr& entry, std::uint64_t number) {
+  auto core = core_.lock();
+  if (entry->finishing != number || !entry->assembly) return;
+  const Film film = entry->assembly->film();
+  if (film.samples() == 0) return;
+  core.unlock();
+  auto made = denoising_.of(film);
+  core.lock();
+  if (entry->finishing == number) entry->denoised = std::move(made);
+}
+
+void ImageWriter::write_final(const EntryPtr& entry, std::uint64_t number) {
+  auto core = core_.lock();
+  if (entry->finishing != number || !entry->assembly) return;
+  const Folded folded{entry->assembly->film(), entry->assembly->errors(), entry->assembly->health()};
+  ReportFacts facts = facts_of(*entry, clock_.now());
+  facts.job.state = JobState::done;
+  count_units(facts.job.totals, core->driver.farm(), entry->stored.id);
+  auto denoised = std::exchange(entry->denoised, nullptr);
+  core.unlock();
+
+  const auto written =
+      files_.on_disk() ? write_files(entry, folded, facts, std::move(denoised)) : Result<void>();
+
+  core.lock();
+  if (entry->finishing != number) return;  // extended or removed meanwhile
+  if (!written) {
+    entry->trouble =
+        "the final image cannot be written: " + written.error().message + "; then resume the job";
+    log_error(fmt::format("job={}", facts.job.id.value), entry->trouble);
+    core->publisher.job(*entry);
+    return;
+  }
+  entry->finishing = 0;
+  entry->trouble.clear();
+  entry->stored.state = JobState::done;
+  entry->stored.totals.spp_done = facts.job.totals.spp_done;
+  entry->stored.totals.units = facts.job.totals.units;
+  entry->stored.totals.units_planned = facts.job.totals.units_planned;
+  core->records.put(entry);
+  failpoint("job-done");
+  core->driver.unload(*entry);
+  log_info(fmt::format("job={} state=done stopped={}", facts.job.id.value, to_string(*facts.job.stopped)),
+           facts.job.name);
+  core->publisher.job(*entry);
+  core->ended.notify_all();
+}
+
+Result<void> ImageWriter::write_files(const EntryPtr& entry, const Folded& folded, ReportFacts& facts,
+                                      std::shared_ptr<const Denoised> denoised) {
+  const auto where = files_.folder(facts.job.id);
+  denoised = denoising_.of_job(folded.film, facts, std::move(denoised));
+  if (facts.denoised && facts.denoised->by.empty())
+    log_warn(fmt::format("job={}", facts.job.id.value), "no denoised layers: " + facts.denoised->trouble);
+  const auto clamped = write_image(where / "image.exr", folded.film, facts, blobs_, denoised.get());
+  if (!clamped) return tl::unexpected(clamped.error());
+  facts.clamped_values = *clamped;
+  facts.pixels = pixels_sha256(folded.film);
+  if (auto done = write_atomically(where / "report.json", bytes_of(report_json(facts))); !done) return done;
+  // The snapshot comes last and must succeed: an extension continues from it.
+  return write_snapshot(entry, folded);
+}
+
+void ImageWriter::retire(Core&, const EntryPtr& entry) {
+  if (files_.on_disk()) writes_.push([this, entry] { write_retired(entry); });
+}
+
+void ImageWriter::write_retired(const EntryPtr& entry) {
+  auto core = core_.lock();
+  if (!entry->assembly || entry->removed) return;
+  const Folded folded{entry->assembly->film(), entry->assembly->errors(), entry->assembly->health()};
+  core.unlock();
+  const auto written = write_snapshot(entry, folded);
+  core.lock();
+  if (!entry->assembly || entry->removed) return;
+  if (!written) {  // its image stays in memory
+    log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
+    return;
+  }
+  entry->stored.totals.spp_done = facts_of(*entry, clock_.now()).job.totals.spp_done;
+  count_units(entry->stored.totals, core->driver.farm(), entry->stored.id);
+  core->records.put(entry);
+  core->driver.unload(*entry);
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,359 @@
+#include "coordinator/service/job_commands.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "common/base/log.h"
+#include "common/job/limits.h"
+#include "coordinator/base/limits.h"
+#include "coordinator/service/core.h"
+
+namespace ls::coordinator {
+namespace {
+
+// Checks what holds for jobs and sequences alike.
+Result<void> check(const JobChange& change) {
+  if (change.priority && std::abs(std::int64_t{*change.priority}) > kMaxPriority)
+    return fail(Errc::invalid_argument, fmt::format("priority must be within +-{}", kMaxPriority));
+  if (change.spp && change.target_error)
+    return fail(Errc::invalid_argument,
+                "samples (spp) and target_error cannot be changed at once: one decides "
+                "how far the job goes; change one, then the other");
+  return {};
+}
+
+std::string_view done_to_become(JobState asked) {
+  if (asked == JobState::paused) return "paused";
+  return asked == JobState::running ? "resumed" : "cancelled";
+}
+
+Result<void> may_become(const JobEntry& entry, JobState asked, bool extended) {
+  JobState state = entry.stored.state;
+  const bool finishing = entry.finishing != 0 && !extended;
+  if (extended && state == JobState::done) state = JobState::running;
+  if (state == asked && !finishing) return {};
+  const bool possible =
+      asked == JobState::running ? !is_terminal(state) || finishing : !is_terminal(state) && !finishing;
+  if (possible) return {};
+  return fail(Errc::failed_precondition,
+              fmt::format("job {} is {}: it cannot be {}", entry.stored.id.value,
+                          to_string(finishing ? JobState::done : state), done_to_become(asked)));
+}
+
+Error in_frame(const JobId& job, Error error) {
+  if (const auto id = frame_of(job)) error.message = fmt::format("frame {}: {}", id->frame, error.message);
+  return error;
+}
+
+double pixels_of(const StoredJob& job) {
+  return static_cast<double>(job.settings.size.width) * job.settings.size.height;
+}
+
+// Checks that done frames with this many pixels in total may be resumed together.
+Result<void> may_wake(double pixels) {
+  if (pixels <= static_cast<double>(limits::kMaxWokenPixels)) return {};
+  return fail(Errc::failed_precondition,
+              fmt::format("the frames that are done have {:.0f} pixels; {} can be taken up again at once: "
+                          "extend the frames one by one",
+                          pixels, limits::kMaxWokenPixels));
+}
+
+// Returns the frames that a new target error concerns: those whose end is not decided yet, and those that
+// ended because they reached a larger target.
+Result<std::vector<EntryPtr>> may_retarget(const Farm& farm, const JobId& id,
+                                           const std::vector<EntryPtr>& sound, double target_error) {
+  std::vector<EntryPtr> chosen;
+  Error last{
+      Errc::failed_precondition,
+      fmt::format("all frames of job {} have ended: its target error can no longer be changed", id.value)};
+  double woken = 0;
+  for (const EntryPtr& frame : sound) {
+    if (frame->unloaded) {
+      const StoredJob& job = frame->stored;
+      if (job.state != JobState::done || job.stopped != StopReason::error ||
+          !(target_error < job.spec.target_error.value_or(0)))
+        continue;
+      woken += pixels_of(job);
+      chosen.push_back(frame);
+    } else if (auto ok = farm.may_retarget(frame->stored.id, target_error); !ok)
+      last = in_frame(frame->stored.id, ok.error());
+    else
+      chosen.push_back(frame);
+  }
+  if (chosen.empty()) return tl::unexpected(last);
+  if (auto few = may_wake(woken); !few) return tl::unexpected(few.error());
+  return chosen;
+}
+
+// Returns all frames except those that have `spp` samples already, as after a change that was interrupted.
+Result<std::vector<EntryPtr>> may_extend(const Farm& farm, const Sequence& sequence, std::uint64_t spp) {
+  std::vector<EntryPtr> chosen;
+  double woken = 0;
+  for (const EntryPtr& frame : sequence.frames) {
+    const JobId& id = frame->stored.id;
+    const JobState state = frame->stored.state;
+    if (!frame->broken.empty() || state == JobState::failed || state == JobState::cancelled)
+      return tl::unexpected(
+          in_frame(id, {Errc::failed_precondition,
+                        fmt::format("it is {}: extend the other frames one by one", to_string(state))}));
+    if (frame->stored.spp == even_spp(spp)) continue;
+    if (frame->unloaded || frame->finishing)
+      woken += frame->unloaded ? pixels_of(frame->stored) : 0;
+    else if (auto ok = farm.may_extend(id, spp); !ok)
+      return tl::unexpected(in_frame(id, ok.error()));
+    chosen.push_back(frame);
+  }
+  if (chosen.empty())
+    return fail(Errc::failed_precondition, fmt::format("all frames have {} samples per pixel", spp));
+  if (auto few = may_wake(woken); !few) return tl::unexpected(few.error());
+  return chosen;
+}
+
+}  // namespace
+
+Result<void> JobCommands::change(const JobId& id, const JobChange& change) const {
+  const auto core = core_.lock();
+  if (const Sequence* sequence = core->jobs.sequence(id))
+    return change_sequence(*core, id, *sequence, change);
+  const auto entry = core->jobs.usable(id);
+  return entry ? change_job(*core, *entry, change) : tl::unexpected(entry.error());
+}
+
+Result<void> JobCommands::remove(const JobId& id) const {
+  const auto core = core_.lock();
+  if (const Sequence* sequence = core->jobs.sequence(id)) return remove_sequence(*core, id, *sequence);
+  const auto found = core->jobs.job(id);
+  if (!found) return tl::unexpected(found.error());
+  const EntryPtr entry = *found;
+  if (const auto frame = frame_of(id))
+    return fail(Errc::failed_precondition,
+                fmt::format("{} is a frame of job {}: it can be cancelled, and is removed with all frames",
+                            id.value, frame->sequence.value));
+  if (!is_terminal(entry->stored.state) && entry->finishing == 0) {
+    core->driver.run(JobCancelled{id});
+    return {};
+  }
+  if (auto removed = store_.remove_job(id); !removed) return removed;
+  drop(*core, entry);
+  core->publisher.job_removed(id, entry->stored.owner);
+  return {};
+}
+
+// One job
+
+Result<void> JobCommands::change_job(Core& core, const EntryPtr& entry, const JobChange& change) const {
+  if (change.state)
+    if (auto ok = may_become(*entry, *change.state, change.spp || change.target_error); !ok) return ok;
+  if (auto ok = check(change); !ok) return ok;
+  // These functions check first; if one fails, nothing has been changed.
+  if (change.spp)
+    if (auto done = extend(core, *entry, *change.spp); !done) return done;
+  if (change.target_error)
+    if (auto done = set_target(core, *entry, *change.target_error); !done) return done;
+  if (change.priority)
+    if (auto done = set_priority(core, *entry, *change.priority); !done) return done;
+  return change.state ? become(core, entry, *change.state) : Result<void>{};
+}
+
+Result<void> JobCommands::become(Core& core, const EntryPtr& entry, JobState asked) const {
+  const JobId& id = entry->stored.id;
+  const JobState state = entry->stored.state;
+  if (asked == JobState::cancelled) {
+    if (state != asked) core.driver.run(JobCancelled{id});
+  } else if (asked == JobState::paused) {
+    entry->stored.missing_blobs.clear();  // from now on the job is paused by its user
+    if (state != asked)
+      core.driver.run(JobPaused{id});
+    else
+      core.records.put(entry);
+  } else if (entry->finishing) {  // its final image could not be written: this is tried again
+    entry->trouble.clear();
+    images_.finish_again(core, entry);
+  } else if (state == JobState::paused) {
+    if (auto saved = core.records.put_pin(entry); !saved) return saved;
+    if (auto saved = core.records.put_quarantined(); !saved) return saved;
+    entry->trouble.clear();
+    ++entry->resumes;
+    core.driver.run(JobResumed{id});
+  }
+  return {};
+}
+
+Result<void> JobCommands::set_priority(Core& core, JobEntry& entry, int priority) const {
+  const int before = std::exchange(entry.stored.spec.priority, priority);
+  if (auto put = store_.put_job(entry.stored); !put) {
+    entry.stored.spec.priority = before;
+    return put;
+  }
+  if (!entry.unloaded) core.driver.run(JobPriority{entry.stored.id, priority});
+  core.publisher.job(entry);
+  return {};
+}
+
+Result<void> JobCommands::extend(Core& core, JobEntry& entry, std::uint64_t spp) const {
+  if (spp == 0 || spp > limits::kMaxSpp)
+    return fail(Errc::invalid_argument,
+                fmt::format("{} samples per pixel: it must be 1 to {}", spp, limits::kMaxSpp));
+  const JobId id = entry.stored.id;
+  const JobState state = entry.stored.state;
+  if (state == JobState::failed || state == JobState::cancelled)
+    return fail(Errc::failed_precondition,
+                fmt::format("job {} is {}: it cannot be extended", id.value, to_string(state)));
+  if (auto woken = restore_.wake(core, entry); !woken) return woken;
+  return go_on(core, entry, core.driver.farm().may_extend(id, spp), JobExtended{id, spp},
+               fmt::format("extended to {} samples per pixel", spp));
+}
+
+Result<void> JobCommands::set_target(Core& core, JobEntry& entry, double target_error) const {
+  const JobId id = entry.stored.id;
+  const JobState state = entry.stored.state;
+  if (state == JobState::failed || state == JobState::cancelled)
+    return fail(Errc::failed_precondition,
+                fmt::format("job {} is {}: its target error can no longer be changed; submit it again",
+                            id.value, to_string(state)));
+  if (auto woken = restore_.wake(core, entry); !woken) return woken;
+  auto possible = core.driver.farm().may_retarget(id, target_error);
+  if (possible) {
+    const auto before = std::exchange(entry.stored.spec.target_error, target_error);
+    possible = store_.put_job(entry.stored);
+    if (!possible) entry.stored.spec.target_error = before;
+  }
+  return go_on(core, entry, possible, JobRetargeted{id, target_error},
+               fmt::format("target error {} from now on", target_error));
+}
+
+// Applies an extension (more samples or a tighter target) to the farm and to the stored job.
+Result<void> JobCommands::go_on(Core& core, JobEntry& entry, const Result<void>& possible,
+                                const Event& change, std::string log_line) const {
+  const JobState state = entry.stored.state;
+  if (!possible) {
+    if (state == JobState::done && !entry.finishing) core.driver.unload(entry);
+    return possible;
+  }
+  const JobId id = entry.stored.id;
+  const auto spp = entry.stored.spp;
+  const bool at_end = entry.finishing != 0 || state == JobState::done;
+  if (at_end) entry.clock_zero = clock_.now() - from_seconds(entry.stored.totals.render_seconds);
+  entry.finishing = 0;
+  core.driver.run(change);
+  const JobPlan plan = core.driver.farm().plan(id).value();
+  entry.stored.spec.target_error = plan.target_error;
+  entry.stored.spec.time = plan.time;
+  if (plan.spp != spp) entry.stored.spp = entry.stored.spec.spp = plan.spp;
+  core.records.log(id, std::move(log_line));
+  if (const auto put = store_.put_job(entry.stored); !put) return put;
+  core.publisher.job(entry);
+  return {};
+}
+
+// Drops the job from memory, after its record in the store was removed.
+void JobCommands::drop(Core& core, const EntryPtr& entry) const {
+  const JobId id = entry->stored.id;
+  entry->removed = true;
+  entry->finishing = 0;
+  if (!entry->unloaded) core.driver.run(JobForgotten{id});
+  core.jobs.remove(entry);
+  log_info(fmt::format("job={}", id.value), "removed");
+  // Background writes of the job may still be queued; what they leave behind is removed with the folder.
+  writes_.push([this, id] {
+    (void)store_.remove_job(id);
+    files_.discard_folder(id);
+  });
+}
+
+// Sequences
+
+Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Sequence& sequence,
+                                          const JobChange& change) const {
+  const Farm& farm = core.driver.farm();
+  Entries sound, open, retargeted, extended;  // `sound`: frames whose record can be read
+  for (const EntryPtr& frame : sequence.frames) {
+    if (!frame->broken.empty()) continue;
+    sound.push_back(frame);
+    if (!is_terminal(frame->stored.state)) open.push_back(frame);
+  }
+  if (auto ok = check(change); !ok) return ok;
+  if (change.target_error) {
+    auto chosen = may_retarget(farm, id, sound, *change.target_error);
+    if (!chosen) return tl::unexpected(chosen.error());
+    retargeted = std::move(*chosen);
+  }
+  if (change.spp) {
+    auto chosen = may_extend(farm, sequence, *change.spp);
+    if (!chosen) return tl::unexpected(chosen.error());
+    extended = std::move(*chosen);
+  }
+  if (change.state && open.empty() && !change.spp) {
+    const JobState state = core.views.sequence(id, sequence, false).state;
+    if (state != *change.state)
+      return fail(Errc::failed_precondition,
+                  fmt::format("all frames of job {} have ended: it is {}", id.value, to_string(state)));
+  }
+  for (const EntryPtr& frame : extended)
+    if (auto done = extend(core, *frame, *change.spp); !done)
+      return tl::unexpected(in_frame(frame->stored.id, done.error()));
+  for (const EntryPtr& frame : retargeted)
+    if (auto done = set_target(core, *frame, *change.target_error); !done)
+      return tl::unexpected(in_frame(frame->stored.id, done.error()));
+  if (change.priority)
+    if (auto done = set_priority_of_all(core, sound, *change.priority); !done) return done;
+  if (change.state) {
+    open.insert(open.end(), extended.begin(), extended.end());
+    if (auto done = become_all(core, open, *change.state); !done) return done;
+  }
+  core.publisher.sequence(id, true);
+  return {};
+}
+
+// The priority of all frames is stored in one transaction: either all are stored or nothing is changed.
+Result<void> JobCommands::set_priority_of_all(Core& core, const Entries& frames, int priority) const {
+  std::vector<StoredJob> edited;
+  for (const EntryPtr& frame : frames) {
+    edited.push_back(frame->stored);
+    edited.back().spec.priority = priority;
+  }
+  if (auto put = store_.put_jobs(edited); !put) return put;
+  for (const EntryPtr& frame : frames) frame->stored.spec.priority = priority;
+  for (const EntryPtr& frame : frames)
+    if (!frame->unloaded) core.driver.run(JobPriority{frame->stored.id, priority});
+  return {};
+}
+
+// Changes the state of the frames and stores them together. A frame whose image is being written is left to
+// end, unless the writing has failed and is to be repeated.
+Result<void> JobCommands::become_all(Core& core, const Entries& frames, JobState asked) const {
+  Result<void> done;
+  const auto saved = core.records.put_together([&] {
+    for (const EntryPtr& frame : frames) {
+      if (frame->finishing && (asked != JobState::running || frame->trouble.empty())) continue;
+      if (auto became = become(core, frame, asked); !became && done)
+        done = tl::unexpected(in_frame(frame->stored.id, became.error()));
+    }
+  });
+  return done ? saved : done;
+}
+
+// As for a single job, open frames are cancelled and kept.
+Result<void> JobCommands::remove_sequence(Core& core, const JobId& id, const Sequence& sequence) const {
+  Entries open;
+  std::vector<JobId> ids;
+  for (const EntryPtr& frame : sequence.frames) {
+    ids.push_back(frame->stored.id);
+    if (!is_terminal(frame->stored.state) && !frame->finishing) open.push_back(frame);
+  }
+  if (!open.empty()) {
+    auto done = become_all(core, open, JobState::cancelled);
+    core.publisher.sequence(id, true);
+    return done;
+  }
+  if (auto removed = store_.remove_jobs(ids); !removed) return removed;
+  const Entries frames = sequence.frames;
+  core.jobs.unlist(id);
+  for (const EntryPtr& frame : frames) drop(core, frame);
+  core.publisher.job_removed(id, frames.front()->stored.owner);
+  return {};
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,62 @@
+// What users do to jobs and sequences: change and remove them. Every change is checked completely before any
+// part of it is applied.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "coordinator/base/guarded.h"
+#include "coordinator/domain/event.h"
+#include "coordinator/service/image_writer.h"
+#include "coordinator/service/restore.h"
+
+namespace ls::coordinator {
+
+class JobCommands {
+ public:
+  JobCommands(Guarded<Core>& core, JobStore& store, const JobFiles& files, const Restore& restore,
+              ImageWriter& images, BackgroundWrites& writes, const Clock& clock)
+      : core_(core),
+        store_(store),
+        files_(files),
+        restore_(restore),
+        images_(images),
+        writes_(writes),
+        clock_(clock) {}
+
+  // A sequence is changed as its frames are; frames that have ended change only if they are to get more
+  // samples.
+  Result<void> change(const JobId& id, const JobChange& change) const;
+  // Removes an ended job with all its results, a sequence with all frames. What has not ended is cancelled
+  // and kept.
+  Result<void> remove(const JobId& id) const;
+  // Changes the state of a job, which must be possible.
+  Result<void> become(Core& core, const EntryPtr& entry, JobState asked) const;
+
+ private:
+  using Entries = std::vector<EntryPtr>;
+  Result<void> change_job(Core& core, const EntryPtr& entry, const JobChange& change) const;
+  Result<void> set_priority(Core& core, JobEntry& entry, int priority) const;
+  Result<void> extend(Core& core, JobEntry& entry, std::uint64_t spp) const;
+  Result<void> set_target(Core& core, JobEntry& entry, double target_error) const;
+  Result<void> go_on(Core& core, JobEntry& entry, const Result<void>& possible, const Event& change,
+                     std::string log_line) const;
+
+  Result<void> change_sequence(Core& core, const JobId& id, const Sequence& sequence,
+                               const JobChange& change) const;
+  Result<void> set_priority_of_all(Core& core, const Entries& frames, int priority) const;
+  Result<void> become_all(Core& core, const Entries& frames, JobState asked) const;
+  Result<void> remove_sequence(Core& core, const JobId& id, const Sequence& sequence) const;
+  void drop(Core& core, const EntryPtr& entry) const;
+
+  Guarded<Core>& core_;
+  JobStore& store_;
+  const JobFiles& files_;
+  const Restore& restore_;
+  ImageWriter& images_;
+  BackgroundWrites& writes_;
+  const Clock& clock_;
+};
+
+}  // namespace ls::coordinator

@@ -1,0 +1,253 @@
+#include "coordinator/service/pictures.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "common/image/exr/maps.h"
+#include "coordinator/base/limits.h"
+#include "coordinator/service/core.h"
+#include "coordinator/service/provenance.h"
+#include "coordinator/views/views.h"
+
+namespace ls::coordinator {
+namespace {
+
+using nlohmann::json;
+
+std::string log_text(const std::vector<LogLine>& lines) {
+  std::string text;
+  for (const LogLine& line : lines)
+    text += fmt::format("{:%Y-%m-%dT%H:%M:%SZ} {}\n", fmt::gmtime(static_cast<std::time_t>(line.unix_time)),
+                        line.text);
+  return text;
+}
+
+// Sorts the lines by time and keeps the latest ones.
+void shorten(std::vector<LogLine>& lines, std::size_t most) {
+  std::stable_sort(lines.begin(), lines.end(),
+                   [](const LogLine& a, const LogLine& b) { return a.unix_time < b.unix_time; });
+  if (lines.size() > most) lines.erase(lines.begin(), lines.end() - static_cast<std::ptrdiff_t>(most));
+}
+
+}  // namespace
+
+// Returns the job's current film (its image) and facts.
+Result<Pictures::Picture> Pictures::picture(const JobId& id) const {
+  auto core = core_.lock();
+  const auto entry = core->jobs.usable(id);
+  if (!entry) return tl::unexpected(entry.error());
+  ReportFacts facts = facts_of(**entry, clock_.now());
+  if ((*entry)->assembly) return Picture{(*entry)->assembly->film(), std::move(facts)};
+  const TileGrid grid = (*entry)->grid;
+  core.unlock();
+  Film film = files_.load_image(facts.job, grid).film();
+  put_film(facts, film);
+  return Picture{std::move(film), std::move(facts)};
+}
+
+std::filesystem::path Pictures::final_file(const JobId& id, const std::string& name) const {
+  const auto core = core_.lock();
+  const auto entry = core->jobs.usable(id);
+  if (!entry || !files_.on_disk() || (*entry)->stored.state != JobState::done) return {};
+  return files_.folder(id) / name;
+}
+
+Result<std::vector<std::byte>> Pictures::image_exr(const JobId& id) const {
+  if (const auto file = final_file(id, "image.exr"); !file.empty())
+    return read_file(file, std::uint64_t{1} << 33);
+  auto shown = picture(id);
+  if (!shown) return tl::unexpected(shown.error());
+  const auto made = denoising_.of_job(shown->film, shown->facts);
+  auto image = final_exr(shown->film, provenance_of(shown->facts, blobs_), shown->facts.job.spec.float_output,
+                         made ? std::span(made->image.rgb) : std::span<const float>());
+  if (!image) return tl::unexpected(image.error());
+  return std::move(image->exr);
+}
+
+Result<std::vector<std::byte>> Pictures::image_png(const JobId& id, double exposure, bool denoised) const {
+  auto shown = picture(id);
+  if (!shown) return tl::unexpected(shown.error());
+  if (!denoised) return preview_png(shown->film, exposure);
+  if (!shown->facts.job.spec.denoise)
+    return fail(Errc::failed_precondition,
+                fmt::format("job {} was submitted without \"denoise\": it has no denoised image", id.value));
+  const auto made = denoising_.of_job(shown->film, shown->facts);
+  if (!made) return preview_png(shown->film, exposure);  // without samples there is nothing to denoise
+  if (made->image.rgb.empty()) return fail(Errc::unavailable, made->figures.trouble);
+  return preview_png(shown->film, exposure, made->image.rgb);
+}
+
+Result<std::vector<std::byte>> Pictures::error_png(const JobId& id) const {
+  const auto shown = picture(id);
+  if (!shown) return tl::unexpected(shown.error());
+  return error_map_png(shown->film);
+}
+
+Result<std::vector<std::byte>> Pictures::samples_png(const JobId& id) const {
+  const auto shown = picture(id);
+  if (!shown) return tl::unexpected(shown.error());
+  return samples_map_png(shown->film);
+}
+
+Result<std::vector<TileView>> Pictures::tiles(const JobId& id) const {
+  const auto shown = picture(id);
+  if (!shown) return tl::unexpected(shown.error());
+  const auto core = core_.lock();
+  std::vector<TileView> all;
+  const TileGrid& grid = shown->film.grid();
+  for (TileIndex t = 0; t < grid.count(); ++t) {
+    const TileError error = shown->film.error(t);
+    const auto relmse = error.samples > 0 ? std::optional(image_error(error).relmse) : std::nullopt;
+    all.push_back({t, grid.rect(t), shown->film.rounds_folded(t), shown->film.spp(t), relmse, {}});
+  }
+  const auto entry = core->jobs.find(id);
+  if (!entry) return all;
+  for (const auto& [unit, holders] : entry->leased)
+    for (const WorkerId& worker : holders) {
+      const auto known = core->workers.find(worker);
+      const std::string& name = known == core->workers.end() ? worker.value : known->second.hello.name;
+      auto& names = all[unit.first].workers;
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
+  return all;
+}
+
+Result<std::string> Pictures::report_json(const JobId& id) const {
+  {
+    auto core = core_.lock();
+    if (const Sequence* sequence = core->jobs.sequence(id)) {
+      const JobView view = core->views.sequence(id, *sequence, true);
+      core.unlock();
+      return sequence_report(view);
+    }
+  }
+  if (const auto file = final_file(id, "report.json"); !file.empty()) {
+    const auto bytes = read_file(file, std::uint64_t{1} << 28);
+    if (!bytes) return tl::unexpected(bytes.error());
+    return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  }
+  auto shown = picture(id);
+  if (!shown) return tl::unexpected(shown.error());
+  ReportFacts& facts = shown->facts;
+  facts.pixels = pixels_sha256(shown->film);
+  // While a job renders its report is asked for often, and is not to wait for a denoiser.
+  if (is_terminal(facts.job.state)) denoising_.of_job(shown->film, facts);
+  if (!facts.job.spec.float_output) facts.clamped_values = values_above_half(shown->film);
+  return coordinator::report_json(facts);
+}
+
+// Returns the lines of a job's log; of a sequence, those of all frames. If there are more than kLogLinesKept,
+// the oldest are left out.
+Result<std::string> Pictures::log(const JobId& id) const {
+  std::vector<JobId> jobs;
+  {
+    const auto core = core_.lock();
+    const auto found = core->jobs.job_or_frames(id);
+    if (!found) return tl::unexpected(found.error());
+    for (const EntryPtr& entry : *found) jobs.push_back(entry->stored.id);
+  }
+  std::vector<LogLine> all;
+  for (const JobId& job : jobs) {
+    auto lines = store_.log(job);
+    if (!lines) return tl::unexpected(lines.error());
+    if (job == id) return log_text(*lines);
+    for (LogLine& line : *lines)
+      all.push_back({line.unix_time, fmt::format("frame {}: {}", frame_of(job)->frame, line.text)});
+    if (all.size() > 4 * limits::kLogLinesKept) shorten(all, limits::kLogLinesKept);
+  }
+  shorten(all, limits::kLogLinesKept);
+  return log_text(all);
+}
+
+// Frames without results have no pixel digest.
+std::string Pictures::sequence_report(const JobView& view) const {
+  static constexpr const char* kKept[] = {"seed",
+                                          "scene",
+                                          "spp",
+                                          "samples",
+                                          "load_seconds",
+                                          "render_seconds",
+                                          "core_seconds",
+                                          "time",
+                                          "peak_rss_bytes",
+                                          "rmse",
+                                          "rmse_ci95",
+                                          "relmse",
+                                          "relmse_ci95",
+                                          "verdict",
+                                          "verdict_kind",
+                                          "trusted",
+                                          "few_hits_pixels",
+                                          "slope",
+                                          "forecast",
+                                          "efficiency",
+                                          "efficiency_per_core",
+                                          "nonfinite_samples",
+                                          "health",
+                                          "pixels_sha256",
+                                          "numeric_class",
+                                          "fake",
+                                          "stopped"};
+  json frames = json::array();
+  std::uint64_t samples = 0, rss = 0;
+  double load = 0;
+  bool all_done = true;
+  Sha256 chain;
+  json last;
+  for (const FrameView& f : view.frames->all) {
+    json row{{"frame", f.frame}, {"job", f.job.value}, {"state", to_string(f.state)}};
+    all_done &= f.state == JobState::done;
+    const auto text = f.spp_done > 0 ? report_json(f.job) : fail(Errc::not_found, "nothing came of it yet");
+    const json report = text ? json::parse(*text, nullptr, false) : json();
+    if (report.is_object()) {
+      for (const char* key : kKept) row[key] = report.value(key, json());
+      samples += report.value("samples", std::uint64_t{0});
+      rss = std::max(rss, report.value("peak_rss_bytes", std::uint64_t{0}));
+      load += report.value("load_seconds", 0.0);
+      const auto pixels = Digest::parse(report.value("pixels_sha256", ""));
+      if (pixels) chain.update(std::as_bytes(std::span(pixels->bytes)));
+      all_done &= pixels.has_value();
+      last = report;
+    }
+    frames.push_back(std::move(row));
+  }
+  const auto number = [](double x) { return std::isfinite(x) ? json(x) : json(); };
+  json j{{"job", view.id.value},
+         {"state", to_string(view.state)},
+         {"size", {view.size.width, view.size.height}},
+         {"spp", number(view.spp_done)},
+         {"samples", samples},
+         {"load_seconds", load},
+         {"render_seconds", number(view.elapsed_seconds)},
+         {"core_seconds", number(view.core_seconds)},
+         {"time", json::parse(time_json(view.time))},
+         {"peak_rss_bytes", rss},
+         {"nonfinite_samples", view.health.nonfinite},
+         {"negative_samples", view.health.negative},
+         {"majorant_violations", view.health.majorant_violations},
+         {"health", json::parse(health_json(view.health, view.notes))},
+         {"pixels_sha256", all_done ? json(chain.finish().hex()) : json()},
+         {"features_used", last.is_object() ? last.value("features_used", json()) : json::array()},
+         {"features_left_out", last.is_object() ? last.value("features_left_out", json()) : json::array()},
+         {"numeric_class", last.is_object() ? last.value("numeric_class", json()) : json()},
+         {"stopped", view.stopped.empty() ? json() : json(view.stopped)},
+         {"warnings", view.warnings},
+         {"fake", view.fake},
+         {"convergence", json::array()},  // every frame has its own
+         {"frames", std::move(frames)}};
+  const auto& e = view.error_now;
+  j["rmse"] = e ? number(e->rmse) : json();
+  j["relmse"] = e ? number(e->relmse) : json();
+  j["relmse_ci95"] = e ? json{number(e->relmse_lo), number(e->relmse_hi)} : json();
+  j["trusted"] = view.convergence_status && view.convergence_status->trusted;
+  j["verdict"] = view.convergence_status ? json(view.convergence_status->words) : json();
+  j["verdict_kind"] = view.convergence_status ? json(to_string(view.convergence_status->kind)) : json();
+  j["few_hits_pixels"] = view.few_hits ? json(*view.few_hits) : json();
+  return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,201 @@
+#include "coordinator/service/restore.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <unordered_set>
+
+#include "common/base/log.h"
+#include "coordinator/admission/admission.h"
+#include "coordinator/domain/limits.h"
+#include "coordinator/domain/unit_table.h"
+#include "coordinator/service/blob_watch.h"
+#include "coordinator/service/core.h"
+#include "coordinator/store/log/audit_file.h"
+
+namespace ls::coordinator {
+namespace {
+
+bool has_quarantined(const Farm& farm, const JobEntry& entry) {
+  if (!entry.log) return false;
+  const auto& found = entry.log->found();
+  return std::any_of(found.begin(), found.end(),
+                     [&](const PartialLog::Entry& e) { return farm.quarantined(e.record.worker); });
+}
+
+void set_aside(JobEntry& entry, const Error& why) {
+  entry.broken =
+      entry.stored.damaged
+          ? why.message
+          : fmt::format(
+                "the job could not be taken up: {}; repair this and restart the coordinator, or delete "
+                "the job",
+                why.message);
+  entry.stored.state = JobState::failed;  // this is what is shown; the record in the store stays unchanged
+  entry.stored.error = entry.broken;
+  entry.free_image();
+  log_error(fmt::format("job={}", entry.stored.id.value), entry.broken);
+}
+
+}  // namespace
+
+Result<void> Restore::restart(Core& core) const {
+  files_.remove_discarded();
+  const auto quarantined = store_.quarantined();
+  if (!quarantined) return tl::unexpected(quarantined.error());
+  core.driver.quarantine(*quarantined);
+  auto jobs = store_.jobs();
+  if (!jobs) return tl::unexpected(jobs.error());
+  files_.remove_unknown(*jobs);
+  for (const StoredJob& job : *jobs)
+    for (const WorkerId& worker : job.distrusted) {  // record of an earlier version
+      const QuarantinedWorker known{worker, fmt::format("it rendered wrong pixels of job {}", job.id.value)};
+      core.driver.quarantine({known});
+      if (auto kept = store_.quarantine(known); !kept) return kept;
+    }
+  for (StoredJob& job : *jobs) {
+    // The files of an ended job are looked up only if it is to be rendered again.
+    const bool needs_files = !job.damaged && (!is_terminal(job.state) || files_.image_is_lost(job));
+    const auto missing = needs_files ? missing_blobs_of(job, blobs_) : std::vector<BlobRef>();
+    add(core, std::move(job), missing);
+  }
+  return {};
+}
+
+EntryPtr Restore::add(Core& core, StoredJob job, const Result<std::vector<BlobRef>>& missing) const {
+  if (files_.image_is_lost(job)) {
+    // The same samples give the same bits, so only time is lost.
+    log_warn(fmt::format("job={}", job.id.value),
+             "its image is not in --data any more: it is rendered again");
+    job.state = JobState::queued;
+    job.stopped.reset();
+    job.totals = {};
+  }
+  const auto entry = std::make_shared<JobEntry>(std::move(job), clock_.now());
+  entry->unloaded = is_terminal(entry->stored.state);
+  core.jobs.add(entry);
+  if (entry->stored.damaged)
+    set_aside(*entry, {Errc::internal, entry->stored.error});
+  else if (auto taken = take_up(core, *entry, missing); !taken)
+    set_aside(*entry, taken.error());
+  return entry;
+}
+
+Result<void> Restore::take_up(Core& core, JobEntry& entry,
+                              const Result<std::vector<BlobRef>>& missing) const {
+  const JobId& id = entry.stored.id;
+  auto points = store_.points(id);
+  if (!points) return tl::unexpected(points.error());
+  entry.points = std::move(*points);
+  if (entry.unloaded) return {};
+  if (!missing) return tl::unexpected(missing.error());
+  // A job paused by its user stays paused.
+  if (entry.stored.state != JobState::paused || !entry.stored.missing_blobs.empty()) {
+    for (const BlobRef& file : *missing) await_blob(core, entry, file, false);
+    if (!missing->empty()) entry.stored.state = JobState::paused;
+  }
+  if (auto loaded = load(core, entry); !loaded) return loaded;
+  const bool begins_again =
+      entry.assembly->film().samples() == 0 && (!entry.log || entry.log->found().empty());
+  if (begins_again || has_quarantined(core.driver.farm(), entry)) core.records.forget_curve(entry);
+  const JobState state = entry.stored.state;
+  JobRestored event = restored(core, entry, state);
+  if (auto sound = check_plan(event.plan); !sound) return sound;
+  log_info(fmt::format("job={} state={} units={}", id.value, to_string(state), event.accepted.size()),
+           "restored");
+  if (event.elapsed_seconds > 0) {
+    entry.clock_zero = clock_.now() - from_seconds(event.elapsed_seconds);
+    if (entry.stored.totals.began_unix == 0)
+      entry.stored.totals.began_unix = unix_now() - event.elapsed_seconds;
+  }
+  if (state == JobState::paused) entry.still_since = clock_.now();
+  core.driver.replay(entry, std::move(event));
+  return {};
+}
+
+Result<void> Restore::wake(Core& core, JobEntry& entry) const {
+  if (!entry.unloaded) return {};
+  if (auto loaded = load(core, entry); !loaded) return loaded;
+  entry.unloaded = false;
+  core.driver.replay(entry, restored(core, entry, JobState::done));
+  return {};
+}
+
+Result<void> Restore::load(Core& core, JobEntry& entry) const {
+  if (files_.on_disk()) {
+    auto log = PartialLog::open(files_.folder(entry.stored.id));
+    if (!log) return tl::unexpected(log.error());
+    entry.log = std::move(*log);
+  }
+  // The snapshot may be older than the discovery that a worker is faulty. So everything is folded again from
+  // the results of the other workers.
+  if (has_quarantined(core.driver.farm(), entry))
+    entry.begin_image();
+  else
+    entry.assembly = files_.load_image(entry.stored, entry.grid);
+  entry.begin_comparison();
+  return {};
+}
+
+JobRestored Restore::restored(Core& core, JobEntry& entry, JobState state) const {
+  JobRestored event;
+  event.plan = plan_of(entry.stored);
+  event.state = state;
+  event.stopped = entry.stored.stopped;
+  event.numeric_class = entry.stored.numeric_class;
+  const std::uint64_t spp = entry.stored.spp.value_or(kMaxSppWithoutLimit);
+  event.folded = entry.assembly->rounds_for(spp);
+  if (entry.stored.spec.target_error) event.rel_error = entry.assembly->errors().relative();
+  take_up_records(core, entry, event);
+  if (files_.on_disk()) event.audits = read_audits(files_.folder(entry.stored.id));
+  entry.audits = audits_text(event.audits);
+  return event;
+}
+
+void Restore::take_up_records(Core& core, JobEntry& entry, JobRestored& event) const {
+  if (!entry.log) return;
+  const std::uint64_t spp = entry.stored.spp.value_or(kMaxSppWithoutLimit);
+  JobTotals& totals = entry.stored.totals;
+  totals.core_seconds = 0;
+  // Which units have been seen. Units of full rounds are identified by their code alone, since there may be
+  // millions; those of truncated rounds by code and end of their sample range.
+  std::unordered_set<UnitCode> seen;
+  std::set<std::pair<UnitCode, std::uint64_t>> seen_cut;
+  seen.reserve(entry.log->found().size());
+  const auto first_of = [&](const PartialRecord& r) {
+    const UnitCode code = unit_code(r.round, r.tile);
+    return r.samples == round_range(r.round) ? seen.insert(code).second
+                                             : seen_cut.emplace(code, r.samples.s1).second;
+  };
+  const auto not_seen = [&](const PartialRecord& r) {
+    seen.erase(unit_code(r.round, r.tile));
+    seen_cut.erase({unit_code(r.round, r.tile), r.samples.s1});
+  };
+  for (const auto& [record, place] : entry.log->found()) {
+    if (core.driver.farm().quarantined(record.worker)) continue;
+    if (record.tile >= entry.grid.count() || !first_of(record)) continue;
+    const bool folded = record.round < event.folded[record.tile];
+    if (!folded && record.samples == cut_range(record.round, spp)) {
+      // A result that cannot be read does not count as accepted: it is rendered again, to the same bits.
+      if (const auto readable = entry.log->read(place); !readable) {
+        log_warn(fmt::format("job={} tile={} round={}", entry.stored.id.value, record.tile, record.round),
+                 readable.error().message);
+        not_seen(record);
+        continue;
+      }
+      entry.assembly->hold(record.tile, record.round,
+                           {std::nullopt, place, record.samples, record.digest, record.health});
+      entry.replay_at[{record.tile, record.round}] = record.at_seconds;
+    }
+    event.accepted.push_back({record.tile, record.round, record.samples, record.digest, record.worker});
+    event.elapsed_seconds = std::max(event.elapsed_seconds, record.at_seconds);
+    const double cpu = plausible_seconds(record.cpu_seconds);
+    totals.core_seconds += cpu;
+    entry.assembly->costs().add(record.tile, record.round, cpu);
+    if (folded) entry.fold_seconds = std::max(entry.fold_seconds, record.at_seconds);
+  }
+  entry.log->forget_found();
+}
+
+}  // namespace ls::coordinator

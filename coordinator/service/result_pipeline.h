@@ -1,0 +1,75 @@
+// The path of a result: each is verified by itself, made durable together with others, then reported to the
+// farm and acknowledged to its worker.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <vector>
+
+#include "coordinator/assemble/verify.h"
+#include "coordinator/base/guarded.h"
+#include "coordinator/base/limits.h"
+#include "coordinator/base/work_queue.h"
+#include "coordinator/domain/farm_figures.h"
+#include "coordinator/service/state/records.h"
+#include "coordinator/service/state/worker_entry.h"
+
+namespace ls::coordinator {
+
+struct Core;
+
+class ResultPipeline {
+ public:
+  ResultPipeline(Guarded<Core>& core, BackgroundWrites& writes, const Clock& clock)
+      : core_(core), writes_(writes), clock_(clock) {}
+
+  // Takes a result. Calls `next` when the worker's next message may come: when this result was dropped, or
+  // when there is room for it.
+  void receive(const std::shared_ptr<Connection>& from, UnitResult result, std::function<void()> next);
+  void close() { budget_.close(); }  // after this, no `next` is called
+  void put_figures(FarmFigures& figures) const;
+
+  void verify_loop(const std::stop_token& token);
+  void commit_loop(const std::stop_token& token);
+
+ private:
+  struct Arrived {
+    std::shared_ptr<Connection> from;
+    UnitResult result;
+    EntryPtr job;
+    UnitHeader expected;
+    std::size_t bytes = 0;  // bytes requested from budget_
+    TimePoint at{};         // time of arrival
+  };
+  struct Checked {
+    Arrived arrived;
+    Verified verified;
+    double seconds = 0;  // time spent on verification
+  };
+  // What storing a result has come to
+  struct Stored {
+    std::shared_ptr<PartialLog> log;  // where it is to be stored; null: it is not
+    double at_seconds = 0;            // on its job's clock
+    std::uint64_t resumes = 0;        // of its job, when storing began
+    std::optional<PartialLog::Place> place;
+    std::optional<Error> error;
+  };
+  void commit(std::vector<Checked> batch);
+  std::vector<Stored> prepare(const std::vector<Checked>& batch);
+  static void append(const std::vector<Checked>& batch, std::vector<Stored>& stored);
+  void conclude(Core& core, Checked& item, const Stored& stored);
+  void accept(Core& core, Checked& item, std::optional<PartialLog::Place> place);
+  void refuse(Core& core, const Arrived& arrived, const Error& error);
+  void cannot_store(Core& core, const Arrived& arrived, const Error& error, std::uint64_t resumes);
+
+  Guarded<Core>& core_;
+  BackgroundWrites& writes_;
+  const Clock& clock_;
+  ByteBudget budget_{limits::kMaxResultsWaiting};
+  WorkQueue<Arrived> arrived_;
+  WorkQueue<Checked> checked_;
+};
+
+}  // namespace ls::coordinator

@@ -1,0 +1,131 @@
+#include "coordinator/service/state/job_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <random>
+
+#include "coordinator/base/limits.h"
+
+namespace ls::coordinator {
+namespace {
+
+// Returns a random job id of 32 bits; if `wide`, of 64 bits. That is for a store in which other coordinators
+// make ids, too, and cannot be asked which they have used.
+JobId random_job_id(bool wide) {
+  std::random_device device;
+  return {wide ? fmt::format("j-{:08x}{:08x}", device(), device()) : fmt::format("j-{:08x}", device())};
+}
+
+Error no_such_job(const JobId& id) { return {Errc::not_found, fmt::format("there is no job {}", id.value)}; }
+
+}  // namespace
+
+EntryPtr JobTable::find(const JobId& id) const {
+  const auto found = jobs_.find(id);
+  return found == jobs_.end() ? nullptr : found->second;
+}
+
+Sequence* JobTable::sequence(const JobId& id) {
+  const auto found = sequences_.find(id);
+  return found == sequences_.end() ? nullptr : &found->second;
+}
+
+Result<EntryPtr> JobTable::job(const JobId& id) const {
+  if (auto entry = find(id)) return entry;
+  const auto frame = frame_of(id);
+  const auto sequence = sequences_.find(frame ? frame->sequence : id);
+  if (sequence == sequences_.end()) return tl::unexpected(no_such_job(id));
+  const std::string frames = to_string(sequence->second.range());
+  if (frame)
+    return fail(Errc::not_found, fmt::format("job {} has no frame {}: its frames are {}",
+                                             frame->sequence.value, frame->frame, frames));
+  return fail(Errc::invalid_argument,
+              fmt::format("job {} is a sequence: say which of its frames {} is meant", id.value, frames));
+}
+
+Result<EntryPtr> JobTable::usable(const JobId& id) const {
+  auto entry = job(id);
+  if (entry && !(*entry)->broken.empty()) return fail(Errc::failed_precondition, (*entry)->broken);
+  return entry;
+}
+
+Result<std::vector<EntryPtr>> JobTable::job_or_frames(const JobId& id) const {
+  if (const auto sequence = sequences_.find(id); sequence != sequences_.end()) return sequence->second.frames;
+  const auto entry = job(id);
+  if (!entry) return tl::unexpected(entry.error());
+  return std::vector<EntryPtr>{*entry};
+}
+
+Result<std::string> JobTable::owner(const JobId& id) const {
+  if (const auto entry = find(id)) return entry->stored.owner;
+  // The id may be that of a frame that does not exist, of a sequence that does. Its owner is that of the
+  // sequence, who then gets an error that names the frames.
+  const auto frame = frame_of(id);
+  const auto sequence = sequences_.find(frame ? frame->sequence : id);
+  if (sequence != sequences_.end()) return sequence->second.frames.front()->stored.owner;
+  return tl::unexpected(no_such_job(id));
+}
+
+JobId JobTable::unused_id() const {
+  JobId id = random_job_id(shared_);
+  while (jobs_.contains(id) || sequences_.contains(id)) id = random_job_id(shared_);
+  return id;
+}
+
+// The limit per user is lower than that for all, so that no single user can use up all jobs.
+Result<void> JobTable::room_for(const std::string& owner, std::size_t jobs) const {
+  if (jobs_.size() + jobs > limits::kMaxJobs)
+    return fail(Errc::resource_exhausted,
+                fmt::format("{} jobs are kept already, and {} more are more than {}", jobs_.size(), jobs,
+                            limits::kMaxJobs));
+  if (owner.empty()) return {};
+  const auto own = static_cast<std::size_t>(std::count_if(
+      jobs_.begin(), jobs_.end(), [&](const auto& job) { return job.second->stored.owner == owner; }));
+  if (own + jobs <= limits::kMaxJobsOfUser) return {};
+  return fail(
+      Errc::resource_exhausted,
+      fmt::format(
+          "{} jobs of user {} are kept already, and {} more are more than {}: remove some that are done", own,
+          owner, jobs, limits::kMaxJobsOfUser));
+}
+
+void JobTable::add(const EntryPtr& entry) {
+  const JobId& id = entry->stored.id;
+  jobs_.emplace(id, entry);
+  const auto frame = frame_of(id);
+  if (!frame) return order_.push_back(id);
+  auto [found, fresh] = sequences_.try_emplace(frame->sequence);
+  if (fresh) order_.push_back(frame->sequence);
+  auto& frames = found->second.frames;
+  const auto place = std::upper_bound(
+      frames.begin(), frames.end(), frame->frame,
+      [](std::uint32_t number, const EntryPtr& e) { return number < frame_of(e->stored.id)->frame; });
+  frames.insert(place, entry);
+  auto& warnings = found->second.warnings;
+  for (const std::string& warning : entry->stored.warnings)
+    if (warnings.size() < limits::kMaxWarnings &&
+        std::find(warnings.begin(), warnings.end(), warning) == warnings.end())
+      warnings.push_back(warning);
+}
+
+void JobTable::unlist(const JobId& id) {
+  sequences_.erase(id);
+  std::erase(order_, id);
+}
+
+std::optional<JobId> JobTable::remove(const EntryPtr& entry) {
+  JobId listed = entry->stored.id;
+  jobs_.erase(listed);
+  if (const auto frame = frame_of(listed)) {
+    listed = frame->sequence;
+    const auto found = sequences_.find(listed);
+    if (found == sequences_.end()) return std::nullopt;
+    std::erase(found->second.frames, entry);
+    if (!found->second.frames.empty()) return std::nullopt;
+  }
+  unlist(listed);
+  return listed;
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,166 @@
+#include "coordinator/service/state/job_views.h"
+
+#include <algorithm>
+
+#include "common/image/error/convergence.h"
+#include "coordinator/admission/admission.h"
+#include "coordinator/domain/limits.h"
+#include "coordinator/service/state/sequence.h"
+
+namespace ls::coordinator {
+namespace {
+
+double pixels_of(const TileGrid& grid) { return static_cast<double>(grid.frame.width) * grid.frame.height; }
+
+// Returns the progress of a job with a number of samples, from 0 to 1. It counts samples, not units: units of
+// late rounds have many times the samples of the first ones.
+double done_of(const StoredJob& job, double spp_done) {
+  return job.spp ? std::min(1.0, spp_done / static_cast<double>(even_spp(*job.spp))) : 0;
+}
+
+// Sets the convergence status, trend and efficiency of `v` from its curve.
+void put_curve(JobView& v, const std::vector<ConvergencePoint>& all, const std::string& doubt) {
+  const std::vector<ErrorPoint> points = error_points(all, !v.reference_same_seed);
+  v.convergence_status = judge(points, doubt);
+  v.trend = trend_of(points);
+  const double cost = points.empty() ? 0 : points.back().relmse * points.back().core_seconds;
+  if (cost > 0) v.efficiency = 1 / cost;
+}
+
+}  // namespace
+
+// Predicts when the job is done. `v` must have its times and its samples so far already.
+Eta JobViews::eta(const JobEntry& entry, const JobFigures& figures, const JobView& v) const {
+  const StoredJob& job = entry.stored;
+  EtaInputs facts;
+  facts.done = done_of(job, v.spp_done);
+  facts.core_seconds = v.core_seconds;
+  facts.core_left = figures.core_seconds_left;
+  facts.core_to_limit = figures.core_seconds_to_limit;
+  facts.target = job.spec.target_error;
+  facts.time = job.spec.time;
+  facts.elapsed = v.elapsed_seconds;
+  const double cores = farm_.cores_connected();
+  const int workers = farm_.workers_connected();
+  facts.cores = figures.cores > 0 ? figures.cores : cores;
+  const int room =
+      job.spec.max_workers ? std::max(0, static_cast<int>(*job.spec.max_workers) - workers) : kMoreWorkers;
+  if (workers > 0)
+    facts.cores_with_more = facts.cores + static_cast<double>(std::min(room, kMoreWorkers)) * cores / workers;
+  facts.units_at_once = static_cast<double>(entry.grid.count()) * kRoundsAhead;
+  if (job.spec.max_units) facts.units_at_once = std::min<double>(facts.units_at_once, *job.spec.max_units);
+  if (figures.units_total > figures.units_done)
+    facts.unit_seconds =
+        figures.core_seconds_to_limit / static_cast<double>(figures.units_total - figures.units_done);
+  return eta_of(facts, error_points(entry.points));
+}
+
+JobView JobViews::job(const JobEntry& entry) const {
+  const StoredJob& job = entry.stored;
+  JobView v;
+  v.id = job.id;
+  v.name = job.name;
+  v.owner = job.owner;
+  v.state = job.state;
+  v.stopped = v.state == JobState::done && job.stopped ? std::string(to_string(*job.stopped)) : "";
+  if (v.state == JobState::cancelled) v.stopped = to_string(StopReason::user);
+  v.target_error = job.spec.target_error;
+  v.denoise = job.spec.denoise;
+  v.error = job.error.empty() ? entry.trouble : job.error;
+  v.warnings = job.warnings;
+  v.fake = job.fake;
+  v.size = job.settings.size;
+  v.tile = job.settings.tile;
+  v.priority = job.spec.priority;
+  v.max_workers = job.spec.max_workers;
+  v.max_units = job.spec.max_units;
+  v.memory_bytes = memory_need(job);
+  v.elapsed_seconds = entry.elapsed(clock_.now());
+  v.core_seconds = job.totals.core_seconds;
+  v.time = split_of(job.totals);
+  v.submitted_unix = job.submitted_unix;
+  v.health = entry.assembly ? entry.assembly->health().total() : job.totals.health;
+  v.notes = health_notes(v.health, replay_of(job));
+  v.spp = even_spp(job.spp.value_or(kMaxSppWithoutLimit));
+  v.spp_asked = job.spp.has_value();
+  v.spp_done = job.totals.spp_done;
+  v.units_done = job.totals.units;
+  v.units_total = std::max(job.totals.units, job.totals.units_planned);
+  if (!entry.points.empty()) v.error_now = entry.points.back().error;
+  v.reference_error = last_reference_error(entry.points);
+  v.reference_same_seed = job.reference_same_seed;
+  v.few_hits = job.totals.few_hits;
+  if (v.few_hits) put_curve(v, entry.points, job.totals.doubt);
+  if (entry.assembly) v.pixels_without_samples = entry.assembly->film().pixels_without_samples();
+  if (entry.assembly)
+    v.spp_done = static_cast<double>(entry.assembly->film().samples()) / pixels_of(entry.grid);
+  v.progress = done_of(job, v.spp_done);
+  const auto figures = entry.unloaded ? std::nullopt : farm_.job(job.id);
+  if (figures) {
+    v.spp = figures->spp;
+    v.units_done = figures->units_done;
+    v.units_total = figures->units_total;
+    v.queued_core_seconds = figures->core_seconds_queued;
+    const Eta out = eta(entry, *figures, v);
+    v.progress = out.progress;
+    const std::string waits = !entry.finishing && figures->units_leased == 0 ? farm_.why_waiting(job.id) : "";
+    if (v.error.empty()) v.error = waits;
+    if (waits.empty() && (v.state == JobState::running || v.state == JobState::queued)) {
+      v.eta_seconds = out.seconds;
+      v.eta_ci95 = out.ci95;
+      v.eta_with_more = out.with_more;
+      v.eta_with_more_ci95 = out.with_more_ci95;
+    }
+  }
+  if (v.state == JobState::done) v.progress = 1;
+  return v;
+}
+
+JobView JobViews::sequence(const JobId& id, const Sequence& sequence, bool with_frames) const {
+  std::vector<JobView> views;
+  views.reserve(sequence.frames.size());
+  bool open = false;
+  double began = 0, ended = 0;
+  for (const EntryPtr& frame : sequence.frames) {
+    views.push_back(job(*frame));
+    const JobState state = views.back().state;
+    open |= state == JobState::queued || state == JobState::running || state == JobState::paused;
+    const JobTotals& totals = frame->stored.totals;
+    if (totals.began_unix > 0) began = began > 0 ? std::min(began, totals.began_unix) : totals.began_unix;
+    ended = std::max(ended, totals.ended_unix);
+  }
+  SequenceFacts facts;
+  facts.id = id;
+  facts.range = sequence.range();
+  facts.warnings = sequence.warnings;
+  facts.cores = farm_.cores_connected();
+  facts.workers = farm_.workers_connected();
+  if (began > 0) facts.elapsed_seconds = std::max(0.0, (open || ended == 0 ? unix_now() : ended) - began);
+  JobView view = sequence_view(facts, views);
+  if (with_frames)
+    for (const JobView& v : views) view.frames->all.push_back(frame_view(v));
+  return view;
+}
+
+WorkerView JobViews::worker(const WorkerId& id, const WorkerEntry& worker) const {
+  const auto figures = farm_.worker(id).value_or(WorkerFigures{WorkerState::lost, 1, 0, 0, 0, {}});
+  WorkerView v;
+  v.id = id;
+  v.name = worker.hello.name;
+  v.build = worker.hello.build;
+  v.numeric_class = worker.hello.numeric_class;
+  v.fake = worker.hello.fake;
+  v.threads = worker.hello.threads;
+  v.tags = worker.hello.tags;
+  v.state = to_string(figures.state);
+  v.activity = worker.trouble.empty() ? worker.activity : worker.trouble;
+  v.job = figures.job.value;
+  v.units_done = figures.units_done;
+  v.cpu_seconds = worker.cpu_seconds;
+  v.rss_bytes = worker.rss_bytes;
+  v.memory_bytes = worker.hello.memory_bytes;
+  v.last_seen_seconds = std::max(0.0, seconds(clock_.now() - worker.last_seen));
+  return v;
+}
+
+}  // namespace ls::coordinator

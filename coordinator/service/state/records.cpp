@@ -1,0 +1,104 @@
+#include "coordinator/service/state/records.h"
+
+#include <fmt/format.h>
+
+#include "common/base/failpoint.h"
+#include "common/base/log.h"
+
+namespace ls::coordinator {
+namespace {
+// Writes that wait for the disk; above this number, log lines are dropped
+constexpr std::size_t kMaxLogWrites = 1024;
+}  // namespace
+
+bool Records::put(const EntryPtr& entry) {
+  if (entry->removed) return true;
+  if (together_ && !entry->pin_unsaved) {
+    together_->insert(entry);
+    return true;
+  }
+  if (const auto put = store_.put_job(entry->stored); !put) {
+    trouble_ = put.error().message;
+    log_error(fmt::format("job={}", entry->stored.id.value), put.error().message);
+    return false;
+  }
+  entry->pin_unsaved = false;
+  return true;
+}
+
+Result<void> Records::put_together(const std::function<void()>& changes) {
+  std::set<EntryPtr> unsaved;
+  together_ = &unsaved;
+  changes();
+  together_ = nullptr;
+  std::vector<StoredJob> records;
+  for (const EntryPtr& entry : unsaved) records.push_back(entry->stored);
+  auto put = store_.put_jobs(records);
+  if (put) return put;
+  trouble_ = put.error().message;
+  log_error("", put.error().message);
+  return put;
+}
+
+Result<void> Records::put_pin(const EntryPtr& entry) {
+  if (!entry->pin_unsaved || put(entry)) return {};
+  entry->trouble = fmt::format("the job's numeric class cannot be stored: {}; then resume the job", trouble_);
+  return fail(Errc::unavailable, entry->trouble);
+}
+
+Result<void> Records::put_quarantined() {
+  while (!quarantined_.empty()) {
+    if (const auto kept = store_.quarantine(quarantined_.back()); !kept) {
+      trouble_ = kept.error().message;
+      log_error(fmt::format("worker={}", quarantined_.back().worker.value), kept.error().message);
+      return fail(Errc::unavailable,
+                  fmt::format("that a worker is barred cannot be stored: {}; then resume the job", trouble_));
+    }
+    quarantined_.pop_back();
+  }
+  return {};
+}
+
+void Records::log(const JobId& id, std::string text) {
+  if (!jobs_.find(id)) return;
+  if (writes_.size() >= kMaxLogWrites) {  // slow disk, or too many messages
+    ++lines_left_out_;
+    return;
+  }
+  if (const auto lost = std::exchange(lines_left_out_, 0))
+    text += fmt::format(" (before it {} lines of this and other logs were left out: the disk is slow)", lost);
+  writes_.push([this, id, line = LogLine{unix_now(), std::move(text)}] {
+    if (const auto added = store_.add_log(id, line); !added)
+      log_warn(fmt::format("job={}", id.value), added.error().message);
+  });
+}
+
+void Records::add_point(const EntryPtr& entry, const ConvergencePoint& point) {
+  entry->points.push_back(point);
+  writes_.push([this, id = entry->stored.id, point] {
+    if (const auto added = store_.add_point(id, point); !added)
+      log_error(fmt::format("job={}", id.value), added.error().message);
+    failpoint("checkpoint-stored");
+  });
+}
+
+void Records::forget_curve(JobEntry& entry) {
+  ++entry.curve;
+  entry.stored.totals.doubt.clear();
+  entry.stored.totals.few_hits.reset();
+  if (entry.points.empty()) return;
+  entry.points.clear();
+  writes_.push([this, id = entry.stored.id] {
+    if (const auto removed = store_.remove_points(id); !removed)
+      log_error(fmt::format("job={}", id.value), removed.error().message);
+  });
+}
+
+void Records::set_reference_error(const JobId& id, double spp, const ReferenceError& error) {
+  writes_.push([this, id, spp, error] {
+    if (const auto added = store_.set_reference_error(id, spp, error); !added)
+      log_error(fmt::format("job={}", id.value), added.error().message);
+  });
+}
+
+}  // namespace ls::coordinator

@@ -1,0 +1,57 @@
+// Stores what must survive a restart: records of jobs, their logs and curves, quarantined workers. What the
+// farm depends on is stored at once, the rest in the background.
+#pragma once
+
+#include <functional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "coordinator/base/work_queue.h"
+#include "coordinator/service/state/job_table.h"
+
+namespace ls::coordinator {
+
+// Writes of one thread, strictly in order. Those of one job are few at a time, except its log lines.
+using BackgroundWrites = WorkQueue<std::function<void()>>;
+
+class Records {
+ public:
+  Records(JobStore& store, const JobTable& jobs, BackgroundWrites& writes)
+      : store_(store), jobs_(jobs), writes_(writes) {}
+
+  // Stores the job's record. If it cannot, returns false, and trouble() says why.
+  bool put(const EntryPtr& entry);
+  // Calls `changes` and then stores all jobs that it has put, in one transaction: a sequence may have
+  // thousands of frames.
+  Result<void> put_together(const std::function<void()>& changes);
+  bool puts_together() const { return together_ != nullptr; }
+  // Stores the numeric class that the job is pinned to, if it is not stored yet. After a restart a class that
+  // was not stored would be forgotten, and the job could be pinned to another one. So until it is stored, the
+  // job waits and none of its results is accepted.
+  Result<void> put_pin(const EntryPtr& entry);
+  void add_quarantined(QuarantinedWorker worker) { quarantined_.push_back(std::move(worker)); }
+  // Stores the quarantined workers that are not stored yet. Until they are, no result may be stored.
+  Result<void> put_quarantined();
+  // Why a record or a result could not be stored lately; empty if the last result was stored
+  const std::string& trouble() const { return trouble_; }
+  void set_trouble(std::string why) { trouble_ = std::move(why); }
+
+  void log(const JobId& id, std::string text);
+  void add_point(const EntryPtr& entry, const ConvergencePoint& point);
+  // Drops the curve's points, which are of wrong or lost pixels. Checkpoints are taken again as tiles are
+  // folded again.
+  void forget_curve(JobEntry& entry);
+  void set_reference_error(const JobId& id, double spp, const ReferenceError& error);
+
+ private:
+  JobStore& store_;
+  const JobTable& jobs_;
+  BackgroundWrites& writes_;
+  std::set<EntryPtr>* together_ = nullptr;  // the jobs that put_together() stores afterwards
+  std::vector<QuarantinedWorker> quarantined_;
+  std::string trouble_;
+  std::uint64_t lines_left_out_ = 0;
+};
+
+}  // namespace ls::coordinator

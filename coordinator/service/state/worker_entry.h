@@ -1,0 +1,49 @@
+// A worker as the coordinator keeps it in memory, and its connection. Both are guarded by the service's mutex
+// (service/core.h), except where a member says otherwise.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "coordinator/views/worker_session.h"
+
+namespace ls::coordinator {
+
+struct Connection {
+  Connection(WorkerId id, std::uint64_t number, const WorkerHello& hello, std::shared_ptr<WorkerSink> to,
+             std::string prefix);
+  void close();
+  void note_lease(const LeaseId& lease);  // a lease was assigned over this stream
+  // False for a lease of an earlier stream of the worker
+  bool assigned(const LeaseId& lease) const;
+
+  const WorkerId worker;
+  const std::uint64_t epoch;
+  const Digest numeric_class;
+  const bool fake;
+  const std::shared_ptr<WorkerSink> sink;
+  bool open = true;
+  // True if a result of this worker waits for room, and its stream is not read meanwhile. Not guarded.
+  std::atomic<bool> held_back{false};
+
+ private:
+  const std::string lease_prefix_;
+  std::optional<std::uint64_t> first_lease_;  // number of the first lease assigned over this stream
+};
+
+struct WorkerEntry {
+  WorkerHello hello;
+  std::shared_ptr<Connection> connection;
+  TimePoint last_seen{}, last_event{};
+  std::string activity, trouble;
+  double cpu_seconds = 0;
+  std::uint64_t rss_bytes = 0;
+  JobId last_job;
+};
+using WorkerTable = std::map<WorkerId, WorkerEntry>;
+
+}  // namespace ls::coordinator

@@ -1,0 +1,196 @@
+#include "coordinator/service/worker_sessions.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <future>
+#include <random>
+
+#include "common/base/log.h"
+#include "common/base/overloaded.h"
+#include "common/protocol/limits.h"
+#include "coordinator/service/core.h"
+
+namespace ls::coordinator {
+namespace {
+
+Result<void> check_hello(const WorkerHello& hello, const JoinCheck& may_join, bool allow_fake) {
+  if (!may_join(hello.join_token))
+    return fail(Errc::unauthenticated,
+                "the join token is missing or wrong; the coordinator keeps it in the file `join-token` of "
+                "its data folder");
+  if (hello.protocol != kProtocolVersion)
+    return fail(Errc::failed_precondition,
+                fmt::format("this worker speaks protocol {}, the coordinator {}: use the same build on both",
+                            hello.protocol, kProtocolVersion));
+  if (hello.fake && !allow_fake)
+    return fail(
+        Errc::failed_precondition,
+        "this worker runs with --fake: it makes pixels up instead of rendering. Start it without --fake, "
+        "or, for tests, start the coordinator with --allow-fake");
+  if (hello.name.size() > ls::limits::kNameBytes || hello.build.size() > ls::limits::kNameBytes ||
+      hello.previous_id.value.size() > ls::limits::kIdBytes)
+    return fail(Errc::invalid_argument, "the worker's name, build or id is too long");
+  if (hello.tags.size() > limits::kMaxTags)
+    return fail(Errc::invalid_argument,
+                fmt::format("{} tags are more than {}", hello.tags.size(), limits::kMaxTags));
+  if (hello.threads < 1 || hello.threads > ls::limits::kThreads)
+    return fail(Errc::invalid_argument,
+                fmt::format("{} threads: it must be 1 to {}", hello.threads, ls::limits::kThreads));
+  return {};
+}
+
+bool well_formed(const WorkerId& id) {
+  return id.value.starts_with("w-") && std::all_of(id.value.begin() + 2, id.value.end(), [](char c) {
+           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || c == '-';
+         });
+}
+
+// Makes the id of a new worker. A client that names an id gets the stream of that worker, so that the worker
+// can continue after a broken connection. Therefore ids must not be guessable.
+std::string new_worker_id(std::uint64_t start, std::uint64_t number) {
+  std::random_device device;
+  const std::uint64_t secret = (std::uint64_t{device()} << 32 | device()) & 0xffff'ffff'ffff;
+  return fmt::format("w-{:x}-{:x}-{:012x}", start, number, secret);
+}
+
+}  // namespace
+
+class WorkerSessions::Session final : public WorkerSession {
+ public:
+  Session(WorkerSessions& sessions, std::shared_ptr<Connection> connection)
+      : sessions_(sessions), alive_(sessions.alive_), connection_(std::move(connection)) {}
+  ~Session() override { disconnected(); }
+  void receive(FromWorker message) override {
+    // This blocks until there is room or the coordinator ends (then the promise is broken).
+    auto room = std::make_shared<std::promise<void>>();
+    const auto granted = room->get_future();
+    receive(std::move(message), [room = std::move(room)] { room->set_value(); });
+    granted.wait();
+  }
+  void receive(FromWorker message, std::function<void()> next) override {
+    if (*alive_) sessions_.receive(connection_, std::move(message), std::move(next));
+  }
+  void disconnected() override {
+    if (*alive_) sessions_.disconnected(*connection_);
+  }
+
+ private:
+  WorkerSessions& sessions_;
+  const std::shared_ptr<const std::atomic<bool>> alive_;
+  const std::shared_ptr<Connection> connection_;
+};
+
+Result<std::unique_ptr<WorkerSession>> WorkerSessions::connect(const WorkerHello& hello,
+                                                               std::shared_ptr<WorkerSink> sink) {
+  if (auto ok = check_hello(hello, options_.may_join, options_.allow_fake); !ok)
+    return tl::unexpected(ok.error());
+  const auto core = core_.lock();
+  WorkerTable& workers = core->workers;
+  WorkerId id = hello.previous_id;
+  const auto known = workers.find(id);
+  // The worker may have its id from a copied folder. Then the id stays with the worker that uses it already,
+  // and this one gets a new id.
+  const bool taken = known != workers.end() && known->second.hello.name != hello.name;
+  if (id.empty() || !well_formed(id) || taken)
+    id.value = new_worker_id(options_.start, last_epoch_ & 0xffffffff);
+  if (workers.size() >= limits::kMaxWorkers && !workers.contains(id))
+    return fail(Errc::resource_exhausted,
+                fmt::format("{} workers are known; more are not taken", workers.size()));
+
+  auto connection =
+      std::make_shared<Connection>(id, ++last_epoch_, hello, std::move(sink), options_.lease_prefix);
+  WorkerEntry& worker = workers[id];
+  if (worker.connection) worker.connection->close();
+  worker.hello = hello;
+  worker.hello.join_token.clear();
+  worker.hello.blobs_held.clear();  // the farm keeps those that it needs
+  worker.connection = connection;
+  worker.last_seen = clock_.now();
+  connection->sink->send(Welcome{id, connection->epoch});
+  log_info(fmt::format("worker={} name={} epoch={}", id.value, log_value(hello.name), connection->epoch),
+           "joined");
+  core->driver.run(WorkerJoined{id, connection->epoch, hello.name, hello.numeric_class, hello.threads,
+                                hello.tags, hello.memory_bytes, hello.blobs_held});
+  return std::make_unique<Session>(*this, std::move(connection));
+}
+
+void WorkerSessions::disconnected(Connection& connection) {
+  const auto core = core_.lock();
+  if (!std::exchange(connection.open, false)) return;
+  log_info(fmt::format("worker={} epoch={}", connection.worker.value, connection.epoch), "disconnected");
+  core->driver.run(WorkerLost{connection.worker, connection.epoch});
+}
+
+void WorkerSessions::receive(const std::shared_ptr<Connection>& from, FromWorker message,
+                             std::function<void()> next) {
+  if (auto* result = std::get_if<UnitResult>(&message)) {
+    {
+      const auto core = core_.lock();
+      if (const auto w = core->workers.find(from->worker); w != core->workers.end())
+        w->second.last_seen = clock_.now();
+    }
+    return results_.receive(from, std::move(*result), std::move(next));
+  }
+  {
+    const auto core = core_.lock();
+    handle(*core, *from, std::move(message));
+  }
+  next();
+}
+
+void WorkerSessions::handle(Core& core, Connection& from, FromWorker message) {
+  const auto found = core.workers.find(from.worker);
+  if (!from.open || found == core.workers.end()) return;
+  found->second.last_seen = clock_.now();
+  std::visit(overloaded{[](const UnitResult&) {},
+                        [](const WorkerHello&) {},  // handled by connect(); a second one is rejected earlier
+                        [&](const WorkerProgress& m) { note_progress(core, from, found->second, m); },
+                        [&](const UnitFailure& m) {
+                          // The acknowledgement goes first, so that the worker does not take it for the
+                          // answer to its next attempt.
+                          from.sink->send(ResultAck{m.unit, std::nullopt});
+                          if (!core.jobs.find(m.unit.job)) return;  // no log for a job that does not exist
+                          core.records.log(m.unit.job,
+                                           fmt::format("tile {} round {} failed on {}: {}", m.unit.tile,
+                                                       m.unit.round, from.worker.value, m.reason));
+                          core.driver.run(UnitFailed{from.worker, m});
+                        },
+                        [&](const LeaseReturned& m) {
+                          core.driver.run(LeaseCameBack{from.worker, m});
+                        },
+                        [&](const WorkerDraining&) { core.driver.run(WorkerDrains{from.worker}); }},
+             message);
+}
+
+void WorkerSessions::note_progress(Core& core, Connection& from, WorkerEntry& worker,
+                                   const WorkerProgress& m) {
+  worker.activity = m.activity.substr(0, ls::limits::kNameBytes);
+  worker.cpu_seconds = m.cpu_seconds_total;
+  worker.rss_bytes = m.rss_bytes;
+  if (const auto entry = core.jobs.find(worker.last_job)) {
+    JobTotals& totals = entry->stored.totals;
+    totals.peak_rss_bytes = std::max(totals.peak_rss_bytes, m.rss_bytes);
+    if (m.load_seconds < 1e9) totals.load_seconds = std::max(totals.load_seconds, m.load_seconds);
+  }
+  // The worker may still report leases of an earlier stream; their units went to others when that stream
+  // broke.
+  for (const auto& lease : m.leases)
+    if (!from.assigned(lease.lease)) from.sink->send(CancelLease{lease.lease});
+  core.driver.run(LeaseProgress{from.worker, m.leases});
+  core.publisher.worker(from.worker, false);
+}
+
+void WorkerSessions::report_held_back(Core& core) const {
+  for (const auto& [id, worker] : core.workers)
+    if (worker.connection && worker.connection->open && worker.connection->held_back)
+      core.driver.run(ResultsWait{id});
+}
+
+void WorkerSessions::close() {
+  const auto core = core_.lock();
+  for (auto& [id, worker] : core->workers)
+    if (worker.connection) worker.connection->close();
+}
+
+}  // namespace ls::coordinator
