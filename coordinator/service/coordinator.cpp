@@ -185,7 +185,6 @@ Result<std::unique_ptr<Coordinator>> Coordinator::open(Options options) {
 }
 
 Coordinator::Coordinator(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
-Coordinator::Coordinator() = default;
 Coordinator::~Coordinator() = default;
 
 // Jobs

@@ -50,84 +50,78 @@ class Coordinator {
     std::optional<Duration> tick;
   };
   static Result<std::unique_ptr<Coordinator>> open(Options options);
-  virtual ~Coordinator();
+  ~Coordinator();
 
   // Jobs
 
   // If spec.frames is set, the job is a sequence (a job with frames), and the returned id is the sequence's.
   // Functions that change or show a job also accept a sequence's id; functions on a single image need the id
   // of a frame, which frame_job() gives.
-  virtual tl::expected<JobId, Rejected> submit(SubmitRequest request);
-  virtual std::vector<JobView> jobs() const;  // a sequence counts as one job; its frames are not listed
-  virtual Result<JobView> job(const JobId& id) const;
-  virtual Result<std::string> owner(const JobId& id) const;  // JobView::owner, at less cost than job()
-  virtual Result<void> change(const JobId& id, const JobChange& change);
-  virtual Result<void> cancel(const JobId& id);
+  tl::expected<JobId, Rejected> submit(SubmitRequest request);
+  std::vector<JobView> jobs() const;  // a sequence counts as one job; its frames are not listed
+  Result<JobView> job(const JobId& id) const;
+  Result<std::string> owner(const JobId& id) const;  // JobView::owner, at less cost than job()
+  Result<void> change(const JobId& id, const JobChange& change);
+  Result<void> cancel(const JobId& id);
   // Removes an ended job with all its results; a job that has not ended is cancelled and kept.
-  virtual Result<void> remove(const JobId& id);
-  virtual Result<void> wait(const JobId& id) const;  // returns when the job is done, failed or cancelled
+  Result<void> remove(const JobId& id);
+  Result<void> wait(const JobId& id) const;  // returns when the job is done, failed or cancelled
 
   // What jobs have rendered
 
   // The current image, or the final one
-  virtual Result<std::vector<std::byte>> image_exr(const JobId& id) const;
+  Result<std::vector<std::byte>> image_exr(const JobId& id) const;
   // As an 8-bit picture; with `denoised`, of a job with JobSpec::denoise, the denoised image, also of a job
   // that still renders. One image is denoised at a time, which takes seconds.
-  virtual Result<std::vector<std::byte>> image_png(const JobId& id, double exposure,
-                                                   bool denoised = false) const;
+  Result<std::vector<std::byte>> image_png(const JobId& id, double exposure, bool denoised = false) const;
   // False-colour maps of the error and of the samples (common/image/exr/maps.h).
-  virtual Result<std::vector<std::byte>> error_png(const JobId& id) const;
-  virtual Result<std::vector<std::byte>> samples_png(const JobId& id) const;
-  virtual Result<std::string> report_json(const JobId& id) const;
-  virtual Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const;
+  Result<std::vector<std::byte>> error_png(const JobId& id) const;
+  Result<std::vector<std::byte>> samples_png(const JobId& id) const;
+  Result<std::string> report_json(const JobId& id) const;
+  Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const;
   // Returns the path of the file `name` (image.exr or report.json) of a done job. Empty if there is no such
   // file: then use the functions above.
-  virtual std::filesystem::path final_file(const JobId& id, const std::string& name) const;
-  virtual Result<std::vector<TileView>> tiles(const JobId& id) const;
-  virtual Result<std::string> job_log(const JobId& id) const;
+  std::filesystem::path final_file(const JobId& id, const std::string& name) const;
+  Result<std::vector<TileView>> tiles(const JobId& id) const;
+  Result<std::string> job_log(const JobId& id) const;
 
   // Workers
 
-  virtual std::vector<WorkerView> workers() const;
-  virtual Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello,
-                                                         std::shared_ptr<WorkerSink> sink);
+  std::vector<WorkerView> workers() const;
+  Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink);
 
   // Events
 
   // Calls `on_event` (on any thread, in order) for every event after `after_id` that is still kept, then for
   // new ones. The subscription ends when the returned handle is destroyed. A reader that cannot keep up must
   // itself drop events.
-  virtual std::shared_ptr<void> subscribe(std::uint64_t after_id,
-                                          std::function<void(const StreamEvent&)> on_event);
-  virtual std::uint64_t last_event_id() const;
+  std::shared_ptr<void> subscribe(std::uint64_t after_id, std::function<void(const StreamEvent&)> on_event);
+  std::uint64_t last_event_id() const;
 
   // Blobs
 
-  virtual BlobStore& blobs();
+  BlobStore& blobs();
   // Says that a worker requested a blob that is missing or damaged here. The jobs that need it are paused
   // until it is available again.
-  virtual void blob_missing(const Digest& digest, const Error& why);
-  virtual void blob_sent(std::uint64_t bytes);  // counts bytes sent to a worker
+  void blob_missing(const Digest& digest, const Error& why);
+  void blob_sent(std::uint64_t bytes);  // counts bytes sent to a worker
   // Removes blobs that no job needs, and interrupted uploads, after Options::keep_unused. With Options::tick
   // the coordinator calls this itself.
-  virtual void collect();
+  void collect();
 
   // Other coordinators (Options::shared)
 
   // Tells the other coordinators, workers and clients where they reach this one: http://HOST:PORT and
   // HOST:PORT (gRPC).
-  virtual void announce(const std::string& http, const std::string& grpc);
+  void announce(const std::string& http, const std::string& grpc);
   // Finds the coordinator of a job that this one does not have; may block for a second. nullopt: none has it.
-  virtual Result<std::optional<JobLocation>> locate_job(const JobId& id);
+  Result<std::optional<JobLocation>> locate_job(const JobId& id);
 
-  virtual bool ready(std::string* why_not) const;
-  virtual StoreStatus store_status() const;
-  virtual AuditFigures audits() const;
-  virtual FarmFigures figures() const;
-  virtual void tick();
-
- protected:
-  Coordinator();  // of the fake one in tests/unit/http
+  bool ready(std::string* why_not) const;
+  StoreStatus store_status() const;
+  AuditFigures audits() const;
+  FarmFigures figures() const;
+  void tick();
 
  private:
   struct Parts;

@@ -6,6 +6,7 @@
 
 #include "coordinator/http/api/process_figures.h"
 #include "tests/unit/http/server_fixture.h"
+#include "tests/unit/store/temp_folder.h"
 
 namespace ls::http::testing {
 namespace {
@@ -15,7 +16,7 @@ TEST_F(ServerTest, QuestionsToOtherMachinesKeepNoQuickAnswerWaiting) {
   std::promise<void> answered;
   const auto answer = answered.get_future().share();
   std::atomic<int> asking{0};
-  coordinator.store.before_look = coordinator.before_asking_others = [&] {
+  blobs->before_look = records->before_asking_others = [&] {
     ++asking;
     answer.wait();
   };
@@ -45,12 +46,12 @@ TEST_F(ServerTest, QuestionsToOtherMachinesKeepNoQuickAnswerWaiting) {
   server.reset();
 }
 
-// Clients that ask for an image and do not read it.
-std::vector<std::unique_ptr<RawClient>> slow_readers(int port, int count) {
+// Clients that ask for something and do not read it.
+std::vector<std::unique_ptr<RawClient>> slow_readers(int port, int count, const std::string& request) {
   std::vector<std::unique_ptr<RawClient>> all;
   for (int i = 0; i < count; ++i) {
     all.push_back(std::make_unique<RawClient>(port));
-    all.back()->send("GET /api/v1/jobs/j-1/image.exr HTTP/1.1\r\nHost: x\r\n" + kAuth + "\r\n");
+    all.back()->send(request);
     EXPECT_TRUE(all.back()->readable());
   }
   return all;
@@ -58,43 +59,44 @@ std::vector<std::unique_ptr<RawClient>> slow_readers(int port, int count) {
 
 TEST_F(ServerTest, SlowReadersOfFinishedImagesTakeNoMemory) {
   constexpr std::uint64_t kImage = 50u << 20;
-  coordinator.files = std::filesystem::path(::testing::TempDir()) / "finished";
-  std::filesystem::create_directories(coordinator.files);
-  std::ofstream(coordinator.files / "image.exr") << "a sparse image";
-  std::filesystem::resize_file(coordinator.files / "image.exr", kImage);
-  coordinator.exr_bytes = kImage;
+  const TempFolder data;
+  coordinator = open({.data = data.path()});
+  const JobId job = coordinator::submit(*coordinator);
+  ASSERT_TRUE(FakeFarm(*coordinator, 1).finish(job));
+  const auto image = data.path() / "jobs" / job.value / "image.exr";
+  std::ofstream(image) << "a sparse image";
+  std::filesystem::resize_file(image, kImage);
   Limits limits = quick_limits();
   limits.body_grace_seconds = 60;
   limits.connections = 64;
   start(limits);
-  ASSERT_TRUE(coordinator.submit({"s.xml", "<scene/>", {}, {}}));
   const std::uint64_t before = process_figures().resident_bytes;
 
-  auto readers = slow_readers(server->port(), 20);
+  auto readers =
+      slow_readers(server->port(), 20,
+                   "GET /api/v1/jobs/" + job.value + "/image.exr HTTP/1.1\r\nHost: x\r\n" + kAuth + "\r\n");
 
   EXPECT_LT(process_figures().resident_bytes, before + (200u << 20));
   const std::string whole = readers[7]->response();
   EXPECT_EQ(RawClient::status(whole), 200);
   EXPECT_EQ(whole.size() - whole.find("\r\n\r\n") - 4, kImage);
   EXPECT_NE(whole.find("a sparse image"), std::string::npos);
-  std::filesystem::remove_all(coordinator.files);
+  server->stop();  // before the folder is removed
 }
 
 TEST_F(ServerTest, AnswersInMemoryAreBoundedAndLaterOnesAreToldToComeAgain) {
-  coordinator.exr_bytes = 100u << 20;
+  records->log_bytes = 100u << 20;
   Limits limits = quick_limits();
   limits.body_grace_seconds = 60;
   start(limits);
-  ASSERT_TRUE(coordinator.submit({"s.xml", "<scene/>", {}, {}}));
-  auto readers = slow_readers(server->port(), 2);
+  const std::string get_log =
+      "GET /api/v1/jobs/" + coordinator::submit(*coordinator).value + "/log HTTP/1.1\r\nHost: x\r\n" + kAuth;
+  auto readers = slow_readers(server->port(), 2, get_log + "\r\n");
 
-  EXPECT_EQ(ask("GET /api/v1/jobs/j-1/image.exr HTTP/1.1\r\nHost: x\r\n" + kAuth + "\r\n"), 503);
+  EXPECT_EQ(ask(get_log + "\r\n"), 503);
   EXPECT_EQ(ask(kGet), 200);
   readers.clear();
-  EXPECT_TRUE(eventually([&] {
-    return ask("GET /api/v1/jobs/j-1/image.exr HTTP/1.1\r\nHost: x\r\nConnection: close\r\n" + kAuth +
-               "\r\n") == 200;
-  }));
+  EXPECT_TRUE(eventually([&] { return ask(get_log + "Connection: close\r\n\r\n") == 200; }));
 }
 
 }  // namespace

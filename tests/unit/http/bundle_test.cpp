@@ -94,7 +94,7 @@ class Bundles : public ::testing::Test {
     return got.error().message;
   }
 
-  FakeBlobs store;
+  WatchedBlobs store;
   std::stop_source stop;
 };
 
@@ -311,7 +311,7 @@ TEST_F(Bundles, AreGivenUpWhenTheCoordinatorStops) {
 class BundleJobs : public ApiTest {};
 
 TEST_F(BundleJobs, AreSubmittedWithTheQueryBeforeTheJobFile) {
-  const Items items{{"bath.xml", "<scene/>"},
+  const Items items{{"bath.xml", with_mesh("ball.ply")},
                     {"ball.ply", "ply"},
                     {"job.json", R"({"spp": 8, "seed": 3, "defines": {"a": "1", "b": "2"}})"}};
   for (const auto& [packing, type] :
@@ -321,10 +321,10 @@ TEST_F(BundleJobs, AreSubmittedWithTheQueryBeforeTheJobFile) {
 
     ASSERT_EQ(r.status, 201) << text(r);
     EXPECT_TRUE(json_of(r)["id"].is_string());
-    const auto& got = coordinator.last_request;
-    EXPECT_EQ(got.scene_text, "<scene/>");
-    EXPECT_EQ(got.scene_name, "bath.xml");
-    EXPECT_EQ(got.assets.at("ball.ply"), sha256("ply"));
+    const auto got = records->last_job();
+    EXPECT_EQ(got.name, "bath.xml");
+    ASSERT_EQ(got.assets.size(), 1u);
+    EXPECT_EQ(got.assets[0].digest, sha256("ply"));
     EXPECT_EQ(got.spec.spp, 64u);
     EXPECT_EQ(got.spec.seed, 3u);
     EXPECT_EQ(got.spec.defines, (std::map<std::string, std::string>{{"a", "1"}, {"b", "7"}}));
@@ -336,10 +336,10 @@ TEST_F(BundleJobs, SayWhatIsWrong) {
     const Response r = ask(Method::post, target, packed(kZip, items), "application/zip");
     return std::pair(r.status, json_of(r));
   };
-  const auto [status, misspelt] = answer({{"s/bath.xml", "misspelt"}});
+  const auto [status, misspelt] = answer({{"s/bath.xml", kMisspeltScene}});
   EXPECT_EQ(status, 400);
   EXPECT_EQ(misspelt["diagnostics"][0]["file"], "s/bath.xml");
-  EXPECT_EQ(misspelt["diagnostics"][0]["line"], 14);
+  EXPECT_EQ(misspelt["diagnostics"][0]["line"], 7);
 
   EXPECT_EQ(answer({{"a.xml", "x"}}, "/api/v1/jobs?sp=4").first, 400);
   EXPECT_EQ(answer({{"a.xml", "x"}, {"job.json", R"({"sp": 4})"}}).first, 400);
@@ -351,7 +351,7 @@ TEST_F(BundleJobs, SayWhatIsWrong) {
               {{"authorization", std::string("Bearer ") + kToken}, {"content-type", "application/zip"}});
   long_one.content_length = limits.bundle_bytes + 1;
   EXPECT_EQ(ask(long_one).status, 413);
-  EXPECT_TRUE(coordinator.jobs().empty());
+  EXPECT_TRUE(coordinator->jobs().empty());
 }
 
 }  // namespace

@@ -1,19 +1,33 @@
-// An Api over a FakeCoordinator, and requests to it as one line.
+// An Api over a coordinator in memory, and requests to it as one line.
 #pragma once
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/message/uri.h"
-#include "tests/unit/http/fake_coordinator.h"
+#include "tests/unit/http/watched_stores.h"
+#include "tests/unit/service/fake_farm.h"
 
 namespace ls::http::testing {
 
 inline constexpr const char* kToken = "0123456789abcdef0123456789abcdef";
 
 inline constexpr const char* kJoinToken = "join-join-join-join-join";
+
+// Scenes like kSceneText, with another shape in line 7
+inline std::string with_shape(const std::string& shape) {
+  std::string text = kSceneText;
+  return text.replace(text.find("<shape type=\"sphere\"/>"), 22, shape);
+}
+inline std::string with_mesh(const std::string& name) {
+  return with_shape("<shape type=\"ply\"><string name=\"filename\" value=\"" + name + "\"/></shape>");
+}
+inline const std::string kMisspeltScene =
+    with_shape("<shape type=\"sphere\"><float name=\"radiuss\" value=\"1\"/></shape>");
 
 inline constexpr char kPage[] = "<!doctype html><title>dashboard</title>";
 inline const StaticFile kPages[] = {{"index.html", std::as_bytes(std::span(kPage, sizeof kPage - 1))},
@@ -36,7 +50,30 @@ inline Request request(Method method, std::string_view target, Fields headers = 
   return r;
 }
 
-class ApiTest : public ::testing::Test {
+// A coordinator in memory, and what it stores.
+class CoordinatorTest : public ::testing::Test {
+ protected:
+  static std::unique_ptr<Coordinator> open(Coordinator::Options options) {
+    auto opened = Coordinator::open(std::move(options));
+    EXPECT_TRUE(opened) << opened.error().message;
+    return std::move(*opened);
+  }
+  // Waits for what another thread brings about; the test's own time limit ends it otherwise.
+  template <class Condition>
+  static bool eventually(Condition condition) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (!condition()) {
+      if (std::chrono::steady_clock::now() > end) return false;
+      std::this_thread::yield();
+    }
+    return true;
+  }
+  const std::shared_ptr<WatchedBlobs> blobs = std::make_shared<WatchedBlobs>();
+  const std::shared_ptr<WatchedRecords> records = std::make_shared<WatchedRecords>();
+  std::unique_ptr<Coordinator> coordinator = open({.jobs = records, .blobs = blobs});
+};
+
+class ApiTest : public CoordinatorTest {
  protected:
   // As the server loop does: admit, then the handler or the upload.
   Response ask(Request r) {
@@ -63,8 +100,8 @@ class ApiTest : public ::testing::Test {
     if (!body.empty()) headers.emplace_back("content-type", std::move(type));
     return ask(request(method, target, std::move(headers), std::move(body)));
   }
-  std::string submit() {
-    const Response r = ask(Method::post, "/api/v1/jobs", "<scene/>", "application/xml");
+  std::string submit(const std::string& query = "") {
+    const Response r = ask(Method::post, "/api/v1/jobs" + query, kSceneText, "application/xml");
     EXPECT_EQ(r.status, 201);
     return json_of(r)["id"];
   }
@@ -78,10 +115,9 @@ class ApiTest : public ::testing::Test {
     return {};
   }
 
-  FakeCoordinator coordinator;
   Limits limits{.blob_bytes = 1000};
   TokenRegistry tokens{kToken, kJoinToken};
-  Api api{coordinator, tokens, limits, StaticFiles(kPages)};
+  Api api{*coordinator, tokens, limits, StaticFiles(kPages)};
 };
 
 }  // namespace ls::http::testing

@@ -8,15 +8,15 @@ namespace {
 using FramesTest = ApiTest;
 
 TEST_F(FramesTest, TakesTheRangeFromTheQueryAndFromJson) {
-  EXPECT_EQ(ask(Method::post, "/api/v1/jobs?frames=1-10x2", "<scene/>", "application/xml").status, 201);
-  EXPECT_EQ(coordinator.last_request.spec.frames, (FrameRange{1, 10, 2}));
-  const std::string scene = coordinator.store.add("<scene/>").hex();
+  EXPECT_EQ(ask(Method::post, "/api/v1/jobs?frames=1-10x2", kSceneText, "application/xml").status, 201);
+  EXPECT_EQ(records->last_job().spec.frames, (FrameRange{1, 10, 2}));
+  const std::string scene = blobs->add(kSceneText).hex();
   EXPECT_EQ(
       ask(Method::post, "/api/v1/jobs", R"({"scene": ")" + scene + R"(", "spec": {"frames": "3-4"}})").status,
       201);
-  EXPECT_EQ(coordinator.last_request.spec.frames, (FrameRange{3, 4, 1}));
+  EXPECT_EQ(records->last_job().spec.frames, (FrameRange{3, 4, 1}));
 
-  const auto refused = ask(Method::post, "/api/v1/jobs?frames=1-1000000000", "<scene/>", "application/xml");
+  const auto refused = ask(Method::post, "/api/v1/jobs?frames=1-1000000000", kSceneText, "application/xml");
 
   EXPECT_EQ(refused.status, 400);
   EXPECT_NE(json_of(refused)["detail"].get<std::string>().find("frames"), std::string::npos);

@@ -17,7 +17,7 @@ class Ownership : public ApiTest {
     return ask(request(method, target, std::move(headers), std::move(body)));
   }
   std::string submit_as(const std::string& token) {
-    const Response r = ask_as(token, Method::post, "/api/v1/jobs", "<scene/>");
+    const Response r = ask_as(token, Method::post, "/api/v1/jobs", kSceneText);
     EXPECT_EQ(r.status, 201);
     return json_of(r)["id"];
   }
@@ -27,9 +27,9 @@ class Ownership : public ApiTest {
 
 TEST_F(Ownership, IsThatOfTheTokenThatSubmits) {
   submit_as(anna);
-  EXPECT_EQ(coordinator.last_request.owner, "anna");
+  EXPECT_EQ(records->last_job().owner, "anna");
   submit();
-  EXPECT_EQ(coordinator.last_request.owner, "");
+  EXPECT_EQ(records->last_job().owner, "");
 }
 
 TEST_F(Ownership, TheListHasTheCallersJobsAlone) {
@@ -40,11 +40,11 @@ TEST_F(Ownership, TheListHasTheCallersJobsAlone) {
 
 TEST_F(Ownership, ATokenThatReadsSubmitsNothing) {
   const std::string reader = tokens.add(Role::read, "").value().token;
-  EXPECT_EQ(ask_as(reader, Method::post, "/api/v1/jobs", "<scene/>").status, 403);
+  EXPECT_EQ(ask_as(reader, Method::post, "/api/v1/jobs", kSceneText).status, 403);
 }
 
 TEST_F(Ownership, AJobThatAnotherCoordinatorHasIsAskedForThereWhoeverAsks) {
-  coordinator.others["j-away"] = {.http = "http://other:8080", .alive = true};
+  records->others["j-away"] = {.http = "http://other:8080", .alive = true};
   for (const std::string& token : {anna, bert, std::string(kToken)}) {
     const Response moved = ask_as(token, Method::get, "/api/v1/jobs/j-away");
     EXPECT_EQ(moved.status, 307);
@@ -54,7 +54,7 @@ TEST_F(Ownership, AJobThatAnotherCoordinatorHasIsAskedForThereWhoeverAsks) {
 
 TEST_F(Ownership, AJobThatIsHereLooksLikeNoneToOthersWhateverOthersHave) {
   const std::string id = submit_as(anna);
-  coordinator.others[id] = {.http = "http://other:8080", .alive = true};
+  records->others[id] = {.http = "http://other:8080", .alive = true};
   const Response none = ask_as(bert, Method::get, "/api/v1/jobs/j-none");
   const Response annas = ask_as(bert, Method::get, "/api/v1/jobs/" + id);
   EXPECT_EQ(annas.status, 404);
@@ -78,10 +78,10 @@ TEST(Visible, EventsOfOthersAreLeftOutAndWorkersKeepTheirSecrets) {
 }
 
 TEST_F(Ownership, NoUserGoesBeforeOthersByPriority) {
-  const Response refused = ask_as(anna, Method::post, "/api/v1/jobs?priority=1", "<scene/>");
+  const Response refused = ask_as(anna, Method::post, "/api/v1/jobs?priority=1", kSceneText);
   EXPECT_EQ(refused.status, 403);
   EXPECT_NE(text(refused).find("--user-priority"), std::string::npos);
-  EXPECT_EQ(ask_as(kToken, Method::post, "/api/v1/jobs?priority=1000000", "<scene/>").status, 201);
+  EXPECT_EQ(ask_as(kToken, Method::post, "/api/v1/jobs?priority=1000000", kSceneText).status, 201);
 
   const std::string id = submit_as(anna);
   const auto patch = [&](const std::string& token, int priority) {
@@ -90,7 +90,7 @@ TEST_F(Ownership, NoUserGoesBeforeOthersByPriority) {
         .status;
   };
   EXPECT_EQ(patch(anna, 1), 403);
-  EXPECT_EQ(coordinator.job({id})->priority, 0);
+  EXPECT_EQ(coordinator->job({id})->priority, 0);
   EXPECT_EQ(patch(anna, -5), 200);
   EXPECT_EQ(patch(kToken, 7), 200);
 }

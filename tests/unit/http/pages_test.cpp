@@ -7,8 +7,10 @@ namespace {
 using PagesTest = ApiTest;
 
 TEST_F(PagesTest, NeedNothingElseAndMayRunNothing) {
-  const std::string url = "/api/v1/jobs/" + submit() + "/report.html";
-  const Response page = ask(Method::get, url);
+  const std::string job = submit();
+  ASSERT_TRUE(FakeFarm(*coordinator, 1).finish({job}));
+
+  const Response page = ask(Method::get, "/api/v1/jobs/" + job + "/report.html");
 
   EXPECT_EQ(page.status, 200);
   EXPECT_EQ(page.content_type, "text/html; charset=utf-8");

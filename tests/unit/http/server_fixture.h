@@ -3,9 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <optional>
-#include <thread>
 
 #include "coordinator/http/net/http_server.h"
 #include "tests/unit/http/fixture.h"
@@ -31,27 +29,17 @@ inline Limits quick_limits() {
   return limits;
 }
 
-class ServerTest : public ::testing::Test {
+class ServerTest : public CoordinatorTest {
  protected:
   void start(Limits limits = quick_limits()) {
     auto listening = Server::listen("127.0.0.1:0");
     ASSERT_TRUE(listening) << listening.error().message;
     server = std::move(*listening);
-    api.emplace(coordinator, tokens, limits, StaticFiles(kPages));
+    api.emplace(*coordinator, tokens, limits, StaticFiles(kPages));
     server->start(*api);
   }
   void TearDown() override {
     if (server) server->stop();
-  }
-  // Waits for what another thread brings about; the test's own time limit ends it otherwise.
-  template <class Condition>
-  static bool eventually(Condition condition) {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-    while (!condition()) {
-      if (std::chrono::steady_clock::now() > end) return false;
-      std::this_thread::yield();
-    }
-    return true;
   }
   int ask(const std::string& text) {
     RawClient client(server->port());
@@ -66,7 +54,6 @@ class ServerTest : public ::testing::Test {
     return "GET /api/v1/events HTTP/1.1\r\nHost: x\r\n" + kAuth + more + "\r\n";
   }
 
-  FakeCoordinator coordinator;
   TokenRegistry tokens{kToken};
   std::optional<Api> api;
   std::unique_ptr<Server> server;

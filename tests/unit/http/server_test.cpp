@@ -87,11 +87,11 @@ TEST_F(ServerTest, CutsABodyThatComesTooSlowlyAndKeepsNothingOfIt) {
   start();
   RawClient slow(server->port());
   ASSERT_TRUE(slow.send(put("never whole", 1'000'000) + "never"));
-  EXPECT_TRUE(eventually([&] { return coordinator.store.open_uploads == 1; }));
+  EXPECT_TRUE(eventually([&] { return blobs->open_uploads == 1; }));
 
   EXPECT_EQ(ask(kGet), 200);
   EXPECT_EQ(RawClient::status(slow.read_all()), 408);
-  EXPECT_TRUE(eventually([&] { return coordinator.store.open_uploads == 0; }));
+  EXPECT_TRUE(eventually([&] { return blobs->open_uploads == 0; }));
 }
 
 TEST_F(ServerTest, KeepsNothingOfAnUploadThatIsCutOff) {
@@ -99,10 +99,10 @@ TEST_F(ServerTest, KeepsNothingOfAnUploadThatIsCutOff) {
   {
     RawClient client(server->port());
     ASSERT_TRUE(client.send(put("whole", 5) + "who"));
-    EXPECT_TRUE(eventually([&] { return coordinator.store.open_uploads == 1; }));
+    EXPECT_TRUE(eventually([&] { return blobs->open_uploads == 1; }));
   }
-  EXPECT_TRUE(eventually([&] { return coordinator.store.open_uploads == 0; }));
-  EXPECT_FALSE(coordinator.store.has(sha256("whole")));
+  EXPECT_TRUE(eventually([&] { return blobs->open_uploads == 0; }));
+  EXPECT_FALSE(blobs->has(sha256("whole")));
 }
 
 TEST_F(ServerTest, StreamsABlobOfManyChunksIntoTheStore) {
@@ -111,7 +111,7 @@ TEST_F(ServerTest, StreamsABlobOfManyChunksIntoTheStore) {
   for (std::size_t i = 0; i < body.size(); ++i) body[i] = static_cast<char>(i * 2654435761u >> 13);
 
   EXPECT_EQ(ask(put(body, body.size()) + body), 201);
-  EXPECT_EQ(coordinator.store.size(sha256(body)).value_or(0), body.size());
+  EXPECT_EQ(blobs->size(sha256(body)).value_or(0), body.size());
 }
 
 TEST_F(ServerTest, TakesChunkedBodiesWithinTheSameBounds) {
@@ -120,7 +120,7 @@ TEST_F(ServerTest, TakesChunkedBodiesWithinTheSameBounds) {
                            "Transfer-Encoding: chunked\r\n\r\n";
 
   EXPECT_EQ(ask(head + "2\r\ngr\r\n2;a=b\r\nid\r\n0\r\n\r\n"), 201);
-  EXPECT_TRUE(coordinator.store.has(sha256("grid")));
+  EXPECT_TRUE(blobs->has(sha256("grid")));
   EXPECT_EQ(ask(head + "zz\r\ngr\r\n"), 400);
 
   const std::string session =
@@ -133,7 +133,7 @@ TEST_F(ServerTest, RefusesTooLongABodyBeforeItComes) {
   start();
 
   EXPECT_EQ(ask(put("x", 5u << 20)), 413);
-  EXPECT_EQ(coordinator.store.open_uploads, 0);
+  EXPECT_EQ(blobs->open_uploads, 0);
 }
 
 TEST_F(ServerTest, StreamsABundleToTheDiskWithinItsBounds) {
@@ -153,7 +153,7 @@ TEST_F(ServerTest, StreamsABundleToTheDiskWithinItsBounds) {
   EXPECT_EQ(ask(head + "Transfer-Encoding: chunked\r\n\r\n" + chunk + chunk), 413);
   EXPECT_EQ(ask(head + "Content-Length: 700001\r\n\r\n"), 413);
   EXPECT_EQ(ask(head + "Content-Length: 0\r\n\r\n"), 400);
-  EXPECT_TRUE(coordinator.jobs().empty());
+  EXPECT_TRUE(coordinator->jobs().empty());
 }
 
 TEST_F(ServerTest, AnswersARefusedUploadThatIsStillBeingSent) {
@@ -185,21 +185,20 @@ TEST_F(ServerTest, ServesOthersWhileTheSlowWorkIsBusy) {
   start();
   std::promise<void> release;
   auto gate = release.get_future().share();
-  coordinator.slow_image = [gate](double) { gate.wait(); };
-  SubmitRequest job;
-  job.scene_text = "<scene/>";
-  ASSERT_TRUE(coordinator.submit(job));
+  const std::string body = "{\"scene\":\"" + blobs->add(kSceneText).hex() + "\"}";
+  blobs->before_look = [gate] { gate.wait(); };
   std::vector<std::unique_ptr<RawClient>> waiting;
   for (int i = 0; i < 6; ++i) {  // more than there are slow threads
     waiting.push_back(std::make_unique<RawClient>(server->port()));
-    waiting.back()->send("GET /api/v1/jobs/j-1/image.png HTTP/1.1\r\nHost: x\r\n" + kAuth + "\r\n");
+    waiting.back()->send("POST /api/v1/jobs HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n" +
+                         kAuth + "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
   }
 
   EXPECT_EQ(ask("GET /api/v1/jobs HTTP/1.1\r\nHost: x\r\n" + kAuth + "\r\n"), 200);
   EXPECT_EQ(ask(kGet), 200);
 
   release.set_value();
-  for (auto& client : waiting) EXPECT_EQ(RawClient::status(client->response()), 200);
+  for (auto& client : waiting) EXPECT_EQ(RawClient::status(client->response()), 201);
 }
 
 TEST_F(ServerTest, BoundsTheNumberOfConnections) {
@@ -209,7 +208,7 @@ TEST_F(ServerTest, BoundsTheNumberOfConnections) {
     open.push_back(std::make_unique<RawClient>(server->port()));
     open.back()->send(put("whole", 5) + "who");
   }
-  ASSERT_TRUE(eventually([&] { return coordinator.store.open_uploads == 16; }));  // all under way, none idle
+  ASSERT_TRUE(eventually([&] { return blobs->open_uploads == 16; }));  // all under way, none idle
 
   RawClient more(server->port());
   EXPECT_EQ(RawClient::status(more.read_all()), 503);
@@ -231,24 +230,26 @@ TEST_F(ServerTest, LetsIdleConnectionsGiveWay) {
 
 TEST_F(ServerTest, StreamsEventsFromWhereTheReaderLeftOff) {
   start();
-  for (int i = 1; i <= 5; ++i) coordinator.tell("job", "old" + std::to_string(i));
+  const JobId job = coordinator::submit(*coordinator);  // event 1
+  for (int i = 2; i <= 5; ++i) ASSERT_TRUE(set_priority(*coordinator, job, 10 + i));
+  ASSERT_EQ(coordinator->last_event_id(), 5u);
 
   RawClient fresh(server->port());
   fresh.send(events());
   ASSERT_TRUE(fresh.read_until("id: 5\n\n"));
   RawClient back(server->port());
   back.send(events("Last-Event-ID: 3\r\n"));
-  ASSERT_TRUE(back.read_until("old5\n\n"));
-  EXPECT_EQ(back.received.find("old3"), std::string::npos);
-  EXPECT_NE(back.received.find("id: 4\nevent: job\ndata: old4\n\n"), std::string::npos);
+  ASSERT_TRUE(back.read_until("\"priority\":15"));
+  EXPECT_EQ(back.received.find("\"priority\":13"), std::string::npos);
+  EXPECT_NE(back.received.find("id: 4\nevent: job\ndata: {"), std::string::npos);
   RawClient other_life(server->port());
   other_life.send(events("Last-Event-ID: 99\r\n"));
   EXPECT_TRUE(other_life.read_until("event: reset\n"));
 
-  ASSERT_TRUE(eventually([&] { return coordinator.readers() == 3; }));
-  coordinator.tell("tile", "new");
-  EXPECT_TRUE(fresh.read_until("id: 6\nevent: tile\ndata: new\n\n"));
-  EXPECT_EQ(fresh.received.find("old"), std::string::npos);
+  ASSERT_TRUE(set_priority(*coordinator, job, 16));
+  EXPECT_TRUE(fresh.read_until("id: 6\nevent: job\ndata: {"));
+  EXPECT_TRUE(fresh.read_until("\"priority\":16"));
+  EXPECT_EQ(fresh.received.find("\"priority\":15"), std::string::npos);
   EXPECT_NE(fresh.received.find("Content-Type: text/event-stream"), std::string::npos);
   EXPECT_TRUE(fresh.read_until("\n:\n\n"));  // the heartbeat of a silent stream
 }
@@ -258,9 +259,8 @@ TEST_F(ServerTest, ForgetsReadersThatLeave) {
   {
     RawClient reader(server->port());
     reader.send(events());
-    ASSERT_TRUE(eventually([&] { return coordinator.readers() == 1; }));
+    ASSERT_TRUE(eventually([&] { return api->counters().event_streams == 1; }));
   }
-  EXPECT_TRUE(eventually([&] { return coordinator.readers() == 0; }));
   EXPECT_TRUE(eventually([&] { return api->counters().event_streams == 0; }));
 }
 
@@ -272,16 +272,16 @@ TEST_F(ServerTest, SendsAwayAReaderThatDoesNotKeepUp) {
   lazy.send(events());
   RawClient keen(server->port());
   keen.send(events());
-  ASSERT_TRUE(eventually([&] { return coordinator.readers() == 2; }));
+  ASSERT_TRUE(keen.read_until("id: 0\n\n"));
+  ASSERT_TRUE(eventually([&] { return api->counters().event_streams == 2; }));
 
-  const std::string data(10'000, 'x');
-  std::uint64_t told = 0;
+  const JobId job = coordinator::submit(*coordinator);
+  int sent = 1;
   EXPECT_TRUE(eventually([&] {  // the lazy one reads nothing: its socket fills, then its queue
-    coordinator.tell("job", data);
-    ++told;
-    EXPECT_TRUE(keen.read_until("id: " + std::to_string(told) + "\n"));
+    EXPECT_TRUE(set_priority(*coordinator, job, ++sent));
+    EXPECT_TRUE(keen.read_until("id: " + std::to_string(sent) + "\n"));
     keen.received.clear();
-    return coordinator.readers() == 1;
+    return api->counters().event_streams == 1;
   }));
   EXPECT_EQ(ask(kGet), 200);
 }
@@ -306,12 +306,12 @@ TEST_F(ServerTest, StopsWithReadersIdlersAndHalfRequestsOpen) {
   half.send("GET /");
   upload.send(put("whole", 5) + "who");
   ASSERT_TRUE(reader.read_until("\n\n"));
-  ASSERT_TRUE(eventually([&] { return coordinator.store.open_uploads == 1; }));
+  ASSERT_TRUE(eventually([&] { return blobs->open_uploads == 1; }));
 
   server->stop();
 
-  EXPECT_EQ(coordinator.readers(), 0u);
-  EXPECT_EQ(coordinator.store.open_uploads, 0);
+  EXPECT_EQ(api->counters().event_streams, 0u);
+  EXPECT_EQ(blobs->open_uploads, 0);
   reader.read_all();
   EXPECT_EQ(idler.read_all(), "");
 }

@@ -41,14 +41,13 @@ TEST_F(Uploads, InPartsAreKeptUntilTheyAreWhole) {
     EXPECT_EQ(part(nonsense, "id").status, 400) << nonsense;
 
   EXPECT_EQ(part("bytes 2-3/4", "id").status, 201);
-  EXPECT_TRUE(coordinator.store.has(sha256("grid")));
+  EXPECT_TRUE(blobs->has(sha256("grid")));
   EXPECT_EQ(part("bytes 2-3/4", "id").status, 204);
 }
 
 TEST_F(Uploads, WhoSentAllOfABlobMayAskForItsEndWithoutABody) {
   const Digest digest = sha256("grid");
-  ASSERT_TRUE(
-      coordinator.store.resume_upload(digest, 0).value()->append(std::as_bytes(std::span("grid", 4))));
+  ASSERT_TRUE(blobs->resume_upload(digest, 0).value()->append(std::as_bytes(std::span("grid", 4))));
 
   const Response answer =
       ask(request(Method::put, "/api/v1/blobs/" + digest.hex(),
@@ -64,12 +63,12 @@ TEST_F(Uploads, APartOfABlobThatWouldBeTooLargeIsRefusedBeforeAnyByteIsKept) {
       {{"authorization", std::string("Bearer ") + kToken}, {"content-range", "bytes 0-3/99999999"}}, "grid"));
 
   EXPECT_EQ(answer.status, 413);
-  EXPECT_EQ(coordinator.store.received(digest), 0u);
+  EXPECT_EQ(blobs->received(digest), 0u);
 }
 
 TEST_F(Uploads, AJobThatAnotherCoordinatorHasIsRedirected) {
-  coordinator.others["j-77"] = {"http://there:8080", true};
-  coordinator.others["j-78"] = {"http://there:8080", false};
+  records->others["j-77"] = {"http://there:8080", true};
+  records->others["j-78"] = {"http://there:8080", false};
 
   const Response moved = ask(Method::get, "/api/v1/jobs/j-77/image.png?exposure=-1");
   EXPECT_EQ(moved.status, 307);

@@ -11,7 +11,7 @@
 
 namespace ls::coordinator {
 
-class MovingStore final : public JobStore {
+class MovingStore : public JobStore {
  public:
   explicit MovingStore(std::shared_ptr<JobStore> inner = make_memory_job_store())
       : inner_(std::move(inner)) {}

@@ -7,12 +7,13 @@
 #include <condition_variable>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <mutex>
 #include <nlohmann/json.hpp>
 
 #include "common/base/digest.h"
 #include "common/base/secret.h"
-#include "tests/unit/http/fake_coordinator.h"
+#include "coordinator/base/limits.h"
 
 namespace ls::coordinator {
 namespace {
@@ -195,26 +196,34 @@ TEST_F(WebhooksTest, RefusesWhatIsNoWebAddress) {
 }
 
 TEST_F(WebhooksTest, WhatWentByUnseenIsToldAfterAll) {
-  http::testing::FakeCoordinator farm;
-  const JobId ends = farm.submit({"a.xml", "<scene/>", {}, {}}).value(),
-              stays = farm.submit({"b.xml", "<scene/>", {}, {}}).value();
+  const auto farm = Coordinator::open({}).value();
+  const JobId ends = farm->submit({"a.xml", kScene, {}, {}}).value(),
+              stays = farm->submit({"b.xml", kScene, {}, {}}).value();
   Receiver receiver;
-  auto webhooks = Webhooks::start(farm, {{"http://receiver/hook"},
-                                         "the secret",
-                                         folder_ / "outbox",
-                                         std::make_shared<SystemClock>(),
-                                         [] { return 1700000000.5; },
-                                         [&](const webhooks::Post& post) { return receiver.take(post); }});
+  std::promise<void> held_up, go_on;
+  std::atomic<bool> first{true};
+  auto webhooks = Webhooks::start(*farm, {{"http://receiver/hook"},
+                                          "the secret",
+                                          folder_ / "outbox",
+                                          std::make_shared<SystemClock>(),
+                                          [&, released = go_on.get_future().share()] {
+                                            if (first.exchange(false)) held_up.set_value();
+                                            released.wait();
+                                            return 1700000000.5;
+                                          },
+                                          [&](const webhooks::Post& post) { return receiver.take(post); }});
   ASSERT_TRUE(webhooks);
-  farm.tell("tile", "{}", ends.value);
+  ASSERT_TRUE(farm->change(stays, {.state = JobState::paused}));
+  held_up.get_future().wait();  // in the event of this change
 
-  ASSERT_TRUE(farm.cancel(ends));  // the event is lost
-  farm.miss_events(20'000);
-  farm.tell("tile", "{}", stays.value);
+  ASSERT_TRUE(farm->cancel(ends));
+  for (int i = 0; i < static_cast<int>(limits::kEventsKept); ++i)  // so the event of its end is lost
+    ASSERT_TRUE(farm->change(stays, {.priority = i}));
+  go_on.set_value();
 
-  const auto posts = receiver.wait_for(1);
-  EXPECT_EQ(events(posts), Names{"job.cancelled"});
-  EXPECT_EQ(nlohmann::json::parse(posts[0].body)["job"]["id"], ends.value);
+  const auto posts = receiver.wait_for(2);
+  EXPECT_EQ(events(posts), (Names{"job.paused", "job.cancelled"}));
+  EXPECT_EQ(nlohmann::json::parse(posts[1].body)["job"]["id"], ends.value);
 }
 
 TEST_F(WebhooksTest, ASecondStartWritesNothingOfJobsThatAreKnownToBeOpen) {
