@@ -3,6 +3,7 @@
 #pragma once
 
 #include "coordinator/base/guarded.h"
+#include "coordinator/domain/event.h"
 #include "coordinator/service/denoising.h"
 #include "coordinator/service/reference_comparer.h"
 #include "coordinator/service/state/job_files.h"

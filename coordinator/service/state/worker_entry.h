@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "common/base/clock.h"
 #include "coordinator/views/worker_session.h"
 
 namespace ls::coordinator {

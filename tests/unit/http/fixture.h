@@ -18,14 +18,6 @@ inline constexpr const char* kToken = "0123456789abcdef0123456789abcdef";
 
 inline constexpr const char* kJoinToken = "join-join-join-join-join";
 
-// Scenes like kSceneText, with another shape in line 7
-inline std::string with_shape(const std::string& shape) {
-  std::string text = kSceneText;
-  return text.replace(text.find("<shape type=\"sphere\"/>"), 22, shape);
-}
-inline std::string with_mesh(const std::string& name) {
-  return with_shape("<shape type=\"ply\"><string name=\"filename\" value=\"" + name + "\"/></shape>");
-}
 inline const std::string kMisspeltScene =
     with_shape("<shape type=\"sphere\"><float name=\"radiuss\" value=\"1\"/></shape>");
 

@@ -28,6 +28,15 @@ inline const std::string kSceneText = R"(<scene version="3.0.0">
   <emitter type="constant"/>
 </scene>)";
 
+// Scenes like kSceneText, with another shape in line 7.
+inline std::string with_shape(const std::string& shape) {
+  std::string text = kSceneText;
+  return text.replace(text.find("<shape type=\"sphere\"/>"), 22, shape);
+}
+inline std::string with_mesh(const std::string& name) {
+  return with_shape("<shape type=\"ply\"><string name=\"filename\" value=\"" + name + "\"/></shape>");
+}
+
 // Messages to all fake workers, in order of arrival.
 class Mailbox {
  public:

@@ -32,14 +32,7 @@ std::string pixels_with_seed(std::uint64_t seed, std::uint64_t spp = 4) {
   return pixels(*coordinator, job);
 }
 
-// The test scene with a mesh, whose file is one per frame.
-std::string with_mesh(const std::string& name) {
-  std::string text = kSceneText;
-  text.replace(text.find("<shape type=\"sphere\"/>"), 22,
-               "<shape type=\"ply\"><string name=\"filename\" value=\"" + name + "\"/></shape>");
-  return text;
-}
-
+// The file of the mesh is one per frame.
 SubmitRequest meshes(Coordinator& coordinator, const std::set<int>& present, JobSpec spec) {
   SubmitRequest request{"mesh.xml", with_mesh("mesh.###.ply"), {}, std::move(spec)};
   for (const int frame : present) {
