@@ -12,10 +12,10 @@ constexpr std::string_view to_string(JobState state) {
   constexpr std::string_view kWords[] = {"queued", "running", "paused", "done", "failed", "cancelled"};
   return kWords[static_cast<std::size_t>(state)];
 }
+// True for states that a job never leaves.
+constexpr bool is_closed(JobState state) { return state == JobState::failed || state == JobState::cancelled; }
 // True for final states. A job leaves one only if it is done and then extended.
-constexpr bool is_terminal(JobState state) {
-  return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
-}
+constexpr bool is_terminal(JobState state) { return state == JobState::done || is_closed(state); }
 
 // Why a done job ended: it has its samples per pixel, has reached its target error, has used up its time, or
 // its user stopped it.

@@ -94,7 +94,7 @@ Result<std::vector<EntryPtr>> may_extend(const Farm& farm, const Sequence& seque
   for (const EntryPtr& frame : sequence.frames) {
     const JobId& id = frame->stored.id;
     const JobState state = frame->stored.state;
-    if (!frame->broken.empty() || state == JobState::failed || state == JobState::cancelled)
+    if (!frame->broken.empty() || is_closed(state))
       return tl::unexpected(
           in_frame(id, {Errc::failed_precondition,
                         fmt::format("it is {}: extend the other frames one by one", to_string(state))}));
@@ -198,7 +198,7 @@ Result<void> JobCommands::extend(Core& core, JobEntry& entry, std::uint64_t spp)
                 fmt::format("{} samples per pixel: it must be 1 to {}", spp, limits::kMaxSpp));
   const JobId id = entry.stored.id;
   const JobState state = entry.stored.state;
-  if (state == JobState::failed || state == JobState::cancelled)
+  if (is_closed(state))
     return fail(Errc::failed_precondition,
                 fmt::format("job {} is {}: it cannot be extended", id.value, to_string(state)));
   if (auto woken = restore_.wake(core, entry); !woken) return woken;
@@ -209,7 +209,7 @@ Result<void> JobCommands::extend(Core& core, JobEntry& entry, std::uint64_t spp)
 Result<void> JobCommands::set_target(Core& core, JobEntry& entry, double target_error) const {
   const JobId id = entry.stored.id;
   const JobState state = entry.stored.state;
-  if (state == JobState::failed || state == JobState::cancelled)
+  if (is_closed(state))
     return fail(Errc::failed_precondition,
                 fmt::format("job {} is {}: its target error can no longer be changed; submit it again",
                             id.value, to_string(state)));

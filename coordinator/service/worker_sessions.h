@@ -24,7 +24,7 @@ class WorkerSessions {
         last_epoch_(options_.start << 32) {}
 
   Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink);
-  // Says to the core that streams whose results wait for room are held back, as the farm must know.
+  // Tells the farm which workers have results that wait for room here: they are not late.
   void report_held_back(Core& core) const;
   // Sessions may outlive this object. After abandon() they do nothing; close() closes their streams.
   void abandon() { *alive_ = false; }

@@ -12,7 +12,7 @@ Result<void> Farm::State::may_retarget(const Job& job, double target_error) {
   const std::string& id = job.plan.brief.job.value;
   if (!(target_error > 0 && std::isfinite(target_error)))
     return ls::fail(Errc::invalid_argument, "target_error must be positive");
-  if (job.state == JobState::failed || job.state == JobState::cancelled)
+  if (is_closed(job.state))
     return ls::fail(Errc::failed_precondition,
                     fmt::format("job {} is {}: its target error can no longer be changed; submit it again",
                                 id, to_string(job.state)));
@@ -38,7 +38,7 @@ Result<void> Farm::State::may_retarget(const Job& job, double target_error) {
 
 Result<void> Farm::State::may_extend(const Job& job, std::uint64_t spp) {
   const std::string& id = job.plan.brief.job.value;
-  if (job.state == JobState::failed || job.state == JobState::cancelled)
+  if (is_closed(job.state))
     return ls::fail(Errc::failed_precondition,
                     fmt::format("job {} is {}: it cannot be extended", id, to_string(job.state)));
   // now_spp is the job's current total of samples per pixel. If the job's end was decided by something else

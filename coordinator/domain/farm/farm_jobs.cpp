@@ -50,7 +50,7 @@ void Farm::State::on(const JobRestored& event) {
   job.numeric_class = event.numeric_class;
   if (event.elapsed_seconds > 0) job.first_ray = now - from_seconds(event.elapsed_seconds);
   if (job.state == JobState::paused || job.state == JobState::done) job.stand_still(now);
-  if (job.state == JobState::failed || job.state == JobState::cancelled) return;
+  if (is_closed(job.state)) return;
 
   // A done job that has lost its film (the sums of its samples) no longer knows how many samples each tile
   // got. The film is summed up again from the job's results.

@@ -45,7 +45,7 @@ Wanted Farm::wanted(const UnitKey& unit) const {
   const Job* job = state_->find(unit.job);
   const auto no = [](std::string why) { return Wanted{.why = std::move(why)}; };
   if (job == nullptr) return no("no such job");
-  if (job->state == JobState::failed || job->state == JobState::cancelled) return no("the job has ended");
+  if (is_closed(job->state)) return no("the job has ended");
   const UnitCode code = unit_code(unit.round, unit.tile);
   if (unit.tile >= job->units.tiles() || !job->queue.plans(code)) return no("not a unit of this job");
   const auto verdict = job->units.accepted(code) ? Wanted::Verdict::duplicate : Wanted::Verdict::yes;

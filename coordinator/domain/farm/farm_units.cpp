@@ -18,7 +18,7 @@ void Farm::State::on(const UnitAccepted& event) {
   if (found == nullptr) return unwanted("no such job");
   Job& job = *found;
   const UnitCode code = unit_code(event.unit.round, event.unit.tile);
-  if (job.state == JobState::failed || job.state == JobState::cancelled) return unwanted("the job has ended");
+  if (is_closed(job.state)) return unwanted("the job has ended");
   if (quarantined.contains(event.worker)) return unwanted("the worker is barred");
   if (event.unit.tile >= job.units.tiles() || !job.queue.plans(code))
     return unwanted("not a unit of this job");

@@ -22,10 +22,6 @@ void single(std::string& out, std::string_view name, std::string_view type, std:
   fmt::format_to(std::back_inserter(out), "{} {}\n", name, value);
 }
 
-bool unfinished(JobState state) {
-  return state == JobState::queued || state == JobState::running || state == JobState::paused;
-}
-
 void write_jobs(std::string& out, std::span<const coordinator::JobView> jobs) {
   static constexpr JobState kStates[] = {JobState::queued, JobState::running, JobState::paused,
                                          JobState::done,   JobState::failed,  JobState::cancelled};
@@ -38,7 +34,7 @@ void write_jobs(std::string& out, std::span<const coordinator::JobView> jobs) {
     core_seconds += job.core_seconds;
     health.nonfinite += job.health.nonfinite;
     health.majorant_violations += job.health.majorant_violations;
-    if (!unfinished(job.state)) continue;
+    if (is_terminal(job.state)) continue;
     done += job.units_done;
     planned += job.units_total;
     eta += job.eta_seconds.value_or(0);

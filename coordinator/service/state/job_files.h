@@ -1,6 +1,6 @@
 // The folders of jobs in --data: DATA/jobs/ID has the partial log, the snapshot film.snap, and of a done job
-// image.exr and report.json. There are none if everything is in memory. Thread-safe: each job's files are
-// written by one thread at a time.
+// image.exr and report.json. There are none if everything is in memory. It has no state that changes, so
+// it is used by several threads.
 #pragma once
 
 #include <filesystem>

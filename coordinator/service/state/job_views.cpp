@@ -123,8 +123,7 @@ JobView JobViews::sequence(const JobId& id, const Sequence& sequence, bool with_
   double began = 0, ended = 0;
   for (const EntryPtr& frame : sequence.frames) {
     views.push_back(job(*frame));
-    const JobState state = views.back().state;
-    open |= state == JobState::queued || state == JobState::running || state == JobState::paused;
+    open |= !is_terminal(views.back().state);
     const JobTotals& totals = frame->stored.totals;
     if (totals.began_unix > 0) began = began > 0 ? std::min(began, totals.began_unix) : totals.began_unix;
     ended = std::max(ended, totals.ended_unix);

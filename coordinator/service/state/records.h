@@ -12,7 +12,7 @@
 
 namespace ls::coordinator {
 
-// Writes of one thread, strictly in order. Those of one job are few at a time, except its log lines.
+// Writes to disk, made by one thread strictly in the order in which they were pushed.
 using BackgroundWrites = WorkQueue<std::function<void()>>;
 
 class Records {
