@@ -28,7 +28,7 @@ inline constexpr std::pair<FreedCause, std::string_view> kFreedCauses[] = {
     {FreedCause::moved, "moved to an idle worker"},
     {FreedCause::paused, "job paused"},
     {FreedCause::round_reopened, "round reopened"},
-    {FreedCause::worker_quarantined, "worker barred"},
+    {FreedCause::worker_quarantined, "worker quarantined"},
     {FreedCause::not_wanted, "not wanted"},
     {FreedCause::job_ended, "job ended"}};
 

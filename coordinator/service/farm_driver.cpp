@@ -331,7 +331,7 @@ void FarmDriver::on(const WorkerBlocked& e) {
 void FarmDriver::on(const WorkerFoundFaulty& e) {
   log_error(fmt::format("worker={} job={} tile={} round={}", e.worker.value, e.unit.job.value, e.unit.tile,
                         e.unit.round),
-            "barred: " + e.evidence);
+            "quarantined: " + e.evidence);
   core_.records.add_quarantined({e.worker, e.evidence});
   if (const auto saved = core_.records.put_quarantined(); !saved)
     for (const auto& [id, entry] : core_.jobs.all()) {
@@ -339,7 +339,7 @@ void FarmDriver::on(const WorkerFoundFaulty& e) {
       entry->trouble = saved.error().message;
       todo_.push_back(JobPaused{id});
     }
-  core_.records.log(e.unit.job, fmt::format("worker {} is barred: {}", e.worker.value, e.evidence));
+  core_.records.log(e.unit.job, fmt::format("worker {} is quarantined: {}", e.worker.value, e.evidence));
 }
 
 void FarmDriver::on(const WorkerForgotten& e) {

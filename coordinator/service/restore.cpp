@@ -48,12 +48,6 @@ Result<void> Restore::restart(Core& core) const {
   auto jobs = store_.jobs();
   if (!jobs) return tl::unexpected(jobs.error());
   files_.remove_unknown(*jobs);
-  for (const StoredJob& job : *jobs)
-    for (const WorkerId& worker : job.distrusted) {  // record of an earlier version
-      const QuarantinedWorker known{worker, fmt::format("it rendered wrong pixels of job {}", job.id.value)};
-      core.driver.quarantine({known});
-      if (auto kept = store_.quarantine(known); !kept) return kept;
-    }
   for (StoredJob& job : *jobs) {
     // The files of an ended job are looked up only if it is to be rendered again.
     const bool needs_files = !job.damaged && (!is_terminal(job.state) || files_.image_is_lost(job));

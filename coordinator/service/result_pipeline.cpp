@@ -166,7 +166,7 @@ void ResultPipeline::conclude(Core& core, Checked& item, const Stored& stored) {
   const Arrived& a = item.arrived;
   if (core.driver.farm().quarantined(a.from->worker))
     acknowledge(core, *a.from, a.result.unit,
-                Error{Errc::failed_precondition, "this worker is barred: it rendered wrong pixels"});
+                Error{Errc::failed_precondition, "this worker is quarantined: it rendered wrong pixels"});
   else if (stored.error)
     cannot_store(core, a, *stored.error, stored.resumes);
   else if (const auto* bad = std::get_if<BadResult>(&item.verified))

@@ -54,7 +54,8 @@ int main(int argc, char** argv) {
   fmt::print(
       "| day | events | jobs ended | units | workers so far | crashes | restarts + jobs taken over | results "
       "rendered "
-      "again | barred | jobs | units kept | leases | workers | of workers | names | shares | allocated KiB | "
+      "again | quarantined | jobs | units kept | leases | workers | of workers | names | shares | allocated "
+      "KiB | "
       "resident "
       "KiB |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (int day = 1; day <= days; ++day) {
@@ -71,7 +72,7 @@ int main(int argc, char** argv) {
   }
   bool grown = false;
   for (const auto& [what, size] : late) {
-    if (what == "barred" || size <= early[what] * 5 / 4 + 32) continue;
+    if (what == "quarantined" || size <= early[what] * 5 / 4 + 32) continue;
     grown = true;
     fmt::print("grown: {}: {} at most at first, {} in the end\n", what, early[what], size);
   }

@@ -195,8 +195,8 @@ for _step in WORKER_STEPS:
 
 # ---- lies ----
 
-def barred(farm):
-    return [w for w in farm.get("/api/v1/workers")["workers"] if w["activity"].startswith("barred")]
+def quarantined(farm):
+    return [w for w in farm.get("/api/v1/workers")["workers"] if w["activity"].startswith("quarantined")]
 
 
 def a_liar(percent, spec):
@@ -207,7 +207,7 @@ def a_liar(percent, spec):
             farm.wait_for_workers(3)
             farm.submit_storm(**spec)
             yield farm
-            assert [w["name"] for w in barred(farm)] == [liar.name], "the liar is found, and nobody else"
+            assert [w["name"] for w in quarantined(farm)] == [liar.name], "the liar is found, and nobody else"
     run.__name__ = f"a worker that returns wrong pixels, audits of {percent} %"
     storm(run)
 

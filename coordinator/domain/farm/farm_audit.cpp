@@ -140,7 +140,7 @@ std::vector<std::pair<std::string, std::size_t>> Farm::sizes() const {
           {"shares", s.shares.kept()},
           {"loads", s.users.size() + s.groups.size()},
           {"changed audits", s.audits_changed.size()},
-          {"barred", s.quarantined.size()}};
+          {"quarantined", s.quarantined.size()}};
 }
 
 std::string Farm::audit() const {

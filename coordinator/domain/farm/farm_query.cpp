@@ -161,7 +161,7 @@ std::string Farm::why_waiting(const JobId& id) const {
     if (job->numeric_class && *job->numeric_class != worker->numeric_class)
       why = "is of another numeric class";
     else if (worker->quarantined)
-      why = "is barred, since it rendered wrong pixels";
+      why = "is quarantined, since it rendered wrong pixels";
     else if (worker->memory_bytes != 0 && job->plan.memory_bytes > worker->memory_bytes)
       why = fmt::format("has {} of memory and the job needs at least {}", in_words(worker->memory_bytes),
                         in_words(job->plan.memory_bytes));

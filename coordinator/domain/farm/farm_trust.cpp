@@ -262,7 +262,7 @@ void Farm::State::bar(const WorkerId& id, const std::string& why) {
     workers.quarantine(*worker);
     while (!worker->leases.empty()) free_lease(*worker->leases.begin(), FreedCause::worker_quarantined, true);
     workers.settle(*worker);
-    effects.emplace_back(WorkerStateChanged{id, worker->state(), "barred: " + why});
+    effects.emplace_back(WorkerStateChanged{id, worker->state(), "quarantined: " + why});
   }
   const WorkerIndex faulty = workers.index_of(id);
   for (const auto& [seq, job] : jobs)

@@ -19,7 +19,7 @@ void Farm::State::on(const UnitAccepted& event) {
   Job& job = *found;
   const UnitCode code = unit_code(event.unit.round, event.unit.tile);
   if (is_closed(job.state)) return unwanted("the job has ended");
-  if (quarantined.contains(event.worker)) return unwanted("the worker is barred");
+  if (quarantined.contains(event.worker)) return unwanted("the worker is quarantined");
   if (event.unit.tile >= job.units.tiles() || !job.queue.plans(code))
     return unwanted("not a unit of this job");
   if (event.samples != job.range(code)) return unwanted("another sample range is wanted");

@@ -40,7 +40,7 @@ void Farm::State::on(const WorkerJoined& event) {
   worker.warmed_up.clear();
   workers.connected(worker, true);
   effects.emplace_back(WorkerStateChanged{worker.id, worker.state(),
-                                          worker.quarantined ? "barred: " + known->second : "joined"});
+                                          worker.quarantined ? "quarantined: " + known->second : "joined"});
   for (const auto& [seq, job] : jobs) {
     if (!job->leasable() || !job->plan.target_error) continue;
     job->move_windows(workers.threads());

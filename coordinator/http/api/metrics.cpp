@@ -127,8 +127,10 @@ void write_audits(std::string& out, const coordinator::AuditFigures& a) {
   for (const auto& [what, count] : {std::pair("asked", a.asked), std::pair("equal", a.equal),
                                     std::pair("differ", a.differ), std::pair("dropped", a.dropped)})
     fmt::format_to(std::back_inserter(out), "lightshaft_audits_total{{verdict=\"{}\"}} {}\n", what, count);
-  single(out, "lightshaft_workers_barred_total", "counter", "Workers found to render wrong pixels.",
+  single(out, "lightshaft_workers_quarantined_total", "counter", "Workers found to render wrong pixels.",
          a.workers_quarantined);
+  single(out, "lightshaft_workers_barred_total", "counter",
+         "Alias of lightshaft_workers_quarantined_total, for one version.", a.workers_quarantined);
   single(out, "lightshaft_tiles_discarded_total", "counter",
          "Tiles rendered again since such a worker had a hand in them.", a.tiles_discarded);
 }

@@ -90,7 +90,7 @@ Response get_workers(Api& api, const Request& request, const Params&) {
   for (auto& worker : workers) {
     if (request.caller.role != Role::submit) continue;
     // A worker without a job is hidden, too: its status may reveal what it did for others (why it failed, or
-    // is barred).
+    // is quarantined).
     const auto owner = api.coordinator().owner(JobId{worker.job});
     if (!owner || !request.caller.sees(*owner)) hide_work(worker);
   }

@@ -51,8 +51,9 @@ Result<void> Records::put_quarantined() {
     if (const auto kept = store_.quarantine(quarantined_.back()); !kept) {
       trouble_ = kept.error().message;
       log_error(fmt::format("worker={}", quarantined_.back().worker.value), kept.error().message);
-      return fail(Errc::unavailable,
-                  fmt::format("that a worker is barred cannot be stored: {}; then resume the job", trouble_));
+      return fail(
+          Errc::unavailable,
+          fmt::format("that a worker is quarantined cannot be stored: {}; then resume the job", trouble_));
     }
     quarantined_.pop_back();
   }

@@ -81,8 +81,6 @@ struct StoredJob {
   std::string build;  // of the worker whose class the job was pinned to
   bool fake = false;  // pinned to a fake worker; then only fake workers may render its units
   JobTotals totals;
-  // Quarantined workers in records of earlier versions; now JobStore::quarantined().
-  std::vector<WorkerId> distrusted;
   // Missing or damaged blobs: the job is paused until they are available
   std::set<Digest> missing_blobs;
   std::uint64_t revision = 0;  // number of changes, in stores that count them (Redis)

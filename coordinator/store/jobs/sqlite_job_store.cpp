@@ -258,14 +258,14 @@ class SqliteJobStore final : public JobStore {
     return Statement(db_.get(), "INSERT OR IGNORE INTO barred(worker, evidence) VALUES(?, ?)")
         .bind(worker.worker.value)
         .bind(worker.evidence)
-        .run("store that a worker is barred");
+        .run("store that a worker is quarantined");
   }
   Result<std::vector<QuarantinedWorker>> quarantined() const override {
     const std::lock_guard lock(mutex_);
     std::vector<QuarantinedWorker> all;
     Statement rows(db_.get(), "SELECT worker, evidence FROM barred ORDER BY worker");
-    auto row = rows.step("read the barred workers");
-    for (; row && *row; row = rows.step("read the barred workers"))
+    auto row = rows.step("read the quarantined workers");
+    for (; row && *row; row = rows.step("read the quarantined workers"))
       all.push_back({{rows.text(0)}, rows.text(1)});
     if (!row) return tl::unexpected(row.error());
     return all;

@@ -117,8 +117,6 @@ StoredJob stored_from(const json& j) {
   job.build = j.at("build");
   job.fake = j.value("fake", false);  // missing in earlier versions
   job.totals = totals_of(j.at("totals"));
-  if (const auto distrusted = j.find("distrusted"); distrusted != j.end())
-    for (const auto& worker : *distrusted) job.distrusted.push_back({worker.get<std::string>()});
   if (const auto missing_blobs = j.find("awaited"); missing_blobs != j.end())
     for (const auto& digest : *missing_blobs) job.missing_blobs.insert(digest_from(digest));
   job.revision = count_or_none(j, "revision");
@@ -152,7 +150,6 @@ std::string to_json(const StoredJob& job) {
          {"numeric_class", job.numeric_class ? json(job.numeric_class->hex()) : json()},
          {"build", job.build},
          {"totals", to_value(job.totals)}};
-  for (const WorkerId& worker : job.distrusted) j["distrusted"].push_back(worker.value);
   for (const Digest& digest : job.missing_blobs) j["awaited"].push_back(digest.hex());
   if (job.reference_same_seed) j["reference_same_seed"] = true;
   if (job.fake) j["fake"] = true;

@@ -118,7 +118,7 @@ void Month::see(int home, const Effect& effect) {
                           if (!job.accepted.emplace(std::pair(e.unit.tile, e.unit.round), e).second)
                             blame("a unit is accepted twice");
                           if (quarantined_[at].contains(e.worker.value))
-                            blame("a result of a barred worker is accepted");
+                            blame("a result of a quarantined worker is accepted");
                           ++counts_.units;
                         },
                         [&](const Fold& e) { see_fold(home, e); },
@@ -130,7 +130,7 @@ void Month::see(int home, const Effect& effect) {
                         [&](const JobFinished& e) { see_end(e.job); },
                         [&](const WorkerFoundFaulty& e) {
                           if (!liars_.contains(e.worker.value))
-                            blame("an honest worker is barred: " + e.evidence);
+                            blame("an honest worker is quarantined: " + e.evidence);
                           ++counts_.quarantined;
                           quarantined_[at].insert(e.worker.value);
                         },
@@ -187,7 +187,7 @@ void Month::see_end(const JobId& id) {
     for (RoundIndex k = 0; k < job.film[t].size(); ++k) {
       const RecordUnit& by = job.accepted.at({t, k});
       if (quarantined_[static_cast<std::size_t>(job.home)].contains(by.worker.value))
-        return blame("something of a barred worker's is in an image");
+        return blame("something of a quarantined worker's is in an image");
       if (job.film[t][k] != honest({id, t, k}, cut_range(k, *job.plan.spp)) &&
           !liars_.contains(by.worker.value))
         return blame("a wrong image");

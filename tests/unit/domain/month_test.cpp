@@ -21,7 +21,7 @@ TEST(Month, FourDaysKeepEveryInvariantAndNothingGrows) {
       half = std::max(half, size);
     }
   }
-  most.erase("barred");  // one entry for each worker that lied: it must never be believed again
+  most.erase("quarantined");  // one entry for each worker that lied: it must never be believed again
   for (const auto& [what, halves] : most) EXPECT_LE(halves.second, halves.first * 3 / 2 + 32) << what;
   const Month::Counts& c = month.counts();
   for (const std::uint64_t happened :

@@ -423,7 +423,7 @@ TEST(FaultyWorker, ThatIsHereAlreadyGetsNothingFromWhenItIsKnown) {
   rig.submit(plan_of("j", 6, 2));
   ASSERT_GT(rig.worker("a").units_out, 0u);
 
-  const auto effects = rig.send(WorkerQuarantined{{"a"}, "barred: it lied"});
+  const auto effects = rig.send(WorkerQuarantined{{"a"}, "quarantined: it lied"});
 
   EXPECT_EQ(rig.worker("a").units_out, 0u);
   EXPECT_EQ(rig.worker("a").state, WorkerState::unhealthy);
@@ -440,7 +440,7 @@ TEST(FaultyWorker, NothingItSendsIsTakenAndItGetsNothingAfterARestart) {
   rig.join("a", 1);
   rig.submit(plan_of("j", 6, 2));
   EXPECT_TRUE(rig.held[{"a"}].empty());
-  EXPECT_EQ(rig.farm.why_waiting({"j"}), "a is barred, since it rendered wrong pixels");
+  EXPECT_EQ(rig.farm.why_waiting({"j"}), "a is quarantined, since it rendered wrong pixels");
 
   const auto effects = rig.send(UnitAccepted{{{"j"}, 0, 0}, {0, 2}, digest_number(1), {"a"}, .1});
 

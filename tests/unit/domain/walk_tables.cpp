@@ -39,7 +39,7 @@ void Walk::see(const Effect& effect) {
 }
 
 void Walk::see_faulty_worker(const WorkerFoundFaulty& found) {
-  if (found.worker.value != faulty_) blame("an honest worker is barred: " + found.evidence);
+  if (found.worker.value != faulty_) blame("an honest worker is quarantined: " + found.evidence);
   found_ = true;
   for (const auto& [id, job] : jobs_)
     if (farm_.job(id)->state == JobState::done) ended_before_.insert(id);
@@ -68,7 +68,7 @@ void Walk::see_film(const JobId& id) {
       const auto it = job.accepted.find({t, k});
       if (found_ && it != job.accepted.end() && it->second.worker.value == faulty_ &&
           !ended_before_.contains(id))
-        blame("something of the barred worker's is in an image");
+        blame("something of the quarantined worker's is in an image");
       if (faulty_.empty() && job.film[t][k] != honest({id, t, k}, cut_range(k, spp))) blame("a wrong image");
     }
   }
@@ -78,7 +78,7 @@ void Walk::see(const Send& sent) {
   FakeWorker& worker = workers_[sent.worker.value];
   if (!worker.connected) blame("a message to a worker that is gone");
   if (found_ && sent.worker.value == faulty_ && std::holds_alternative<AssignLease>(sent.message))
-    blame("work for a barred worker");
+    blame("work for a quarantined worker");
   std::visit(overloaded{[&](const AssignLease& m) {
                           if (m.lease.units.empty()) blame("an empty lease");
                           for (const LeaseUnit& u : m.lease.units)

@@ -97,7 +97,7 @@ TEST_F(Ownership, NoUserGoesBeforeOthersByPriority) {
 
 TEST(Visible, AWorkerWithoutAJobMayNotSayWhatItDidOfOthers) {
   const coordinator::StreamEvent quarantined{
-      3, "worker", R"({"job":null,"activity":"barred: it rendered tile 3 of job j-1"})", "", ""};
+      3, "worker", R"({"job":null,"activity":"quarantined: it rendered tile 3 of job j-1"})", "", ""};
   const auto hidden = visible(quarantined, {Role::submit, "anna", "a"});
   ASSERT_TRUE(hidden);
   EXPECT_EQ(json::parse(hidden->data)["activity"], "");

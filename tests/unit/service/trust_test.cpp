@@ -1,4 +1,4 @@
-// A worker that renders wrong pixels: found, barred, and nothing of it left in the image, also over a
+// A worker that renders wrong pixels: found, quarantined, and nothing of it left in the image, also over a
 // restart.
 #include <gmock/gmock.h>
 
@@ -65,7 +65,7 @@ TEST(Trust, TheImageOfAFarmWithALiarIsThatOfHonestWorkers) {
   for (const WorkerView& worker : coordinator->workers()) {
     EXPECT_EQ(worker.state, worker.name == "fake-2" ? "sick" : "connected") << worker.name;
     if (worker.name == "fake-2") {
-      EXPECT_THAT(worker.activity, testing::HasSubstr("barred: it rendered tile"));
+      EXPECT_THAT(worker.activity, testing::HasSubstr("quarantined: it rendered tile"));
     }
   }
 }
@@ -155,7 +155,7 @@ TEST(Trust, AQuarantinedWorkerStaysQuarantinedOverARestart) {
   ASSERT_EQ(coordinator->workers().size(), 1u);
   EXPECT_EQ(coordinator->workers()[0].id, faulty);
   EXPECT_EQ(coordinator->workers()[0].state, "sick");
-  EXPECT_THAT(coordinator->workers()[0].activity, testing::StartsWith("barred: it rendered tile"));
+  EXPECT_THAT(coordinator->workers()[0].activity, testing::StartsWith("quarantined: it rendered tile"));
 }
 
 TEST(Trust, AQuarantinedWorkerStaysQuarantinedWhenTheJobThatItWasFoundByIsGone) {
@@ -215,25 +215,9 @@ TEST_F(FoundElsewhere, AWorkerHereIsQuarantinedAtOnceAndItsTilesAreRenderedAgain
   coordinator->tick();
 
   EXPECT_EQ(coordinator->workers()[1].state, "sick");
-  EXPECT_EQ(coordinator->workers()[1].activity, "barred: it lied to the coordinator next door");
+  EXPECT_EQ(coordinator->workers()[1].activity, "quarantined: it lied to the coordinator next door");
   ASSERT_TRUE(farm.finish(job));
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels(64));
-}
-
-TEST_F(FoundElsewhere, AJobThatNamesALiarBringsItsNameAlong) {
-  auto coordinator = open(false);
-  const JobId known = submit(*coordinator, samples(16));
-  StoredJob job = store->jobs().value().at(0);
-  FakeFarm farm(*coordinator, 2);
-  job.id = {"j-inherited"};
-  job.distrusted = {coordinator->workers()[1].id};
-  store->will_tell({.inherited = {{job, "the one next door"}}});
-
-  coordinator->tick();
-  while (!coordinator->job(job.id)) std::this_thread::yield();
-
-  EXPECT_EQ(coordinator->workers()[1].state, "sick");
-  EXPECT_EQ(coordinator->workers()[0].state, "connected");
 }
 
 // Its image of before stands; but nothing of it goes into a larger one.
