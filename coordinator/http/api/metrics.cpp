@@ -130,7 +130,7 @@ void write_audits(std::string& out, const coordinator::AuditFigures& a) {
   single(out, "lightshaft_workers_quarantined_total", "counter", "Workers found to render wrong pixels.",
          a.workers_quarantined);
   single(out, "lightshaft_workers_barred_total", "counter",
-         "Alias of lightshaft_workers_quarantined_total, for one version.", a.workers_quarantined);
+         "Older name of lightshaft_workers_quarantined_total.", a.workers_quarantined);
   single(out, "lightshaft_tiles_discarded_total", "counter",
          "Tiles rendered again since such a worker had a hand in them.", a.tiles_discarded);
 }
