@@ -90,8 +90,11 @@ void print_denoised(FarmApi& api, const json& job) {
   const auto frames = job.find("frames");
   const bool sequence = frames != job.end() && frames->is_object();
   if (!flag_field(job, "denoise") || sequence) return;
-  if (const auto report = api.get(job_path(text_field(job, "id")) + "/report"))
-    if (const std::string denoised = denoised_text(*report); !denoised.empty()) print_note(denoised);
+  const auto report = api.get(job_path(text_field(job, "id")) + "/report");
+  if (!report)
+    print_note("the error of the denoised image is unknown: " + report.error().error.message);
+  else if (const std::string denoised = denoised_text(*report); !denoised.empty())
+    print_note(denoised);
 }
 
 }  // namespace ls::cli

@@ -1,6 +1,7 @@
 // The state of the coordinator's jobs and workers. One mutex guards all of it: it can be reached only through
 // Guarded<Core>::lock(), so a function that takes a Core& runs under the lock, and one that takes none does
-// not need it. Slow work has its own threads, which lock the core for short:
+// not need it. What never changes in a JobEntry (id, scene, settings, grid) is also read without the lock.
+// Slow work has its own threads, which lock the core for short:
 //
 //   receive() -> [verify threads: decode, digest] -> [commit thread: append, one fdatasync for all]
 //     -> farm -> acknowledge

@@ -144,9 +144,9 @@ Result<void> JobCommands::remove(const JobId& id) const {
 // One job
 
 Result<void> JobCommands::change_job(Core& core, const EntryPtr& entry, const JobChange& change) const {
+  if (auto ok = check(change); !ok) return ok;
   if (change.state)
     if (auto ok = may_become(*entry, *change.state, change.spp || change.target_error); !ok) return ok;
-  if (auto ok = check(change); !ok) return ok;
   // These functions check first; if one fails, nothing has been changed.
   if (change.spp)
     if (auto done = extend(core, *entry, *change.spp); !done) return done;

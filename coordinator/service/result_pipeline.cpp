@@ -183,7 +183,8 @@ void ResultPipeline::accept(Core& core, Checked& item, std::optional<PartialLog:
   JobEntry& entry = *a.job;
   core.records.set_trouble("");
   const Wanted wanted = core.driver.farm().wanted(r.unit);
-  const bool accepted = disposition(wanted, *a.from) == Disposition::accept;
+  const Disposition what = disposition(wanted, *a.from);
+  const bool accepted = what == Disposition::accept;
   const bool lost = entry.log && !place;  // a race has left it unstored
   if (accepted && wanted.samples == a.expected.samples && !lost) {
     ++core.figures.accepted;
@@ -198,8 +199,9 @@ void ResultPipeline::accept(Core& core, Checked& item, std::optional<PartialLog:
     }
   }
   // The farm compares duplicates it knows about. Of a copy that is not stored just the lease is returned: the
-  // stored copy stands, and a further copy would be equal or evidence.
-  if (accepted && lost)
+  // stored copy stands, and a further copy would be equal or evidence. So of a result of another class: the
+  // farm knows the worker's class of now, which may be the job's if the worker has joined again meanwhile.
+  if ((accepted && lost) || what == Disposition::other_class)
     core.driver.run(LeaseCameBack{a.from->worker, {r.lease, {r.unit}}});
   else
     core.driver.run(
