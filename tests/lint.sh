@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Checks the form of the code: the links of its pages, the words of its identifiers, clang-format on every source file, clang-tidy on those that changed since BASE.
-#   tests/lint.sh            links, words and format only
+# Checks the form of the code: the links of its pages, the words of its identifiers, the generated parts of the Python package, clang-format on every source file, clang-tidy on those that changed since BASE.
+#   tests/lint.sh            all but clang-tidy
 #   tests/lint.sh BASE       clang-tidy too, on files that differ from the commit BASE (needs the dev preset configured)
 #   tests/lint.sh --fix      formats in place
 set -euo pipefail
@@ -17,4 +17,5 @@ case "${1:-}" in
 esac
 /usr/bin/python3 tests/lint/links.py
 /usr/bin/python3 tests/lint/words.py
+/usr/bin/python3 python/generate.py --check
 clang-format-14 --dry-run --Werror "${files[@]}" && echo "${#files[@]} files are formatted"

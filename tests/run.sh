@@ -63,9 +63,9 @@ run_ctest() {  # preset, label, log name
   echo "$3: $p passed, $f failed, $s skipped$([ "$rc" -eq 0 ] || echo ', ctest says failed')"
 }
 
-run_pytest() {  # name, arguments...
+run_pytest() {  # name, arguments...; by $PYTHON if it is set
   local name="$1" log="$logs/$1.log"; shift
-  /usr/bin/python3 -m pytest -q -ra --durations=0 -p no:cacheprovider "$@" >"$log" 2>&1
+  "${PYTHON:-/usr/bin/python3}" -m pytest -q -ra --durations=0 -p no:cacheprovider "$@" >"$log" 2>&1
   local rc=$? last
   last=$(grep -E '[0-9]+ (passed|failed|skipped|error)' "$log" | tail -n 1)
   local p f s e
@@ -84,6 +84,12 @@ run_pytest() {  # name, arguments...
 run_lint() {
   if tests/lint.sh >"$logs/lint.log" 2>&1; then count 1 0 0; else count 0 1 0; tail -n 20 "$logs/lint.log"; fi
   echo "lint: $(tail -n 1 "$logs/lint.log")"
+}
+
+run_python() {
+  local python
+  if python=$(tests/python/venv.sh 2>"$logs/python-venv.log"); then PYTHON="$python" run_pytest python tests/python
+  else count 0 1 0; tail -n 20 "$logs/python-venv.log"; echo "python: the package could not be built or installed"; fi
 }
 
 run_compose() {
@@ -106,6 +112,7 @@ run_packages() {
 waiting_lane() {
   step "system tests" run_pytest system tests/system
   step "browser tests" run_pytest web tests/web
+  step "Python package" run_python
   step "compose" run_compose
   step "packages" run_packages
 }

@@ -1,0 +1,58 @@
+"""Client of a Lightshaft render farm.
+
+farm = lightshaft.Farm("http://localhost:8080", token=...)
+job = farm.submit("scene.xml", spp=64).wait(progress=True)
+pixels = job.image()
+"""
+
+from . import models
+from .aio import AsyncFarm, AsyncJob
+from .errors import (
+    BadAnswer,
+    Conflict,
+    Diagnostic,
+    FarmBusy,
+    FarmUnreachable,
+    FileRefused,
+    Forbidden,
+    JobCancelled,
+    JobFailed,
+    LightshaftError,
+    MissingPackage,
+    NotFound,
+    RequestRejected,
+    SceneDictError,
+    SceneRejected,
+    Unauthorised,
+    WaitTimeout,
+)
+from .farm import Farm, Job
+from .scene_dict import scene_of_dict
+from .snapshot import Snapshot
+
+__all__ = [
+    "AsyncFarm",
+    "AsyncJob",
+    "BadAnswer",
+    "Conflict",
+    "Diagnostic",
+    "Farm",
+    "FarmBusy",
+    "FarmUnreachable",
+    "FileRefused",
+    "Forbidden",
+    "Job",
+    "JobCancelled",
+    "JobFailed",
+    "LightshaftError",
+    "MissingPackage",
+    "NotFound",
+    "RequestRejected",
+    "SceneDictError",
+    "SceneRejected",
+    "Snapshot",
+    "Unauthorised",
+    "WaitTimeout",
+    "models",
+    "scene_of_dict",
+]

@@ -1,0 +1,178 @@
+"""AsyncFarm and AsyncJob: AsyncFarm and AsyncJob for event loops. Made by python/generate.py; do not edit."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from types import TracebackType
+from typing import Self, Unpack
+
+from . import job as jobs_of
+from . import models, snapshot, steps, submission, watching
+from .images import Array
+from .job import JobState
+from .scene_files import PathLike
+from .snapshot import Curve, Snapshot
+from .submission import Scene
+from .transport import Address, AsyncTransport
+from .watching import Progress
+
+
+class AsyncFarm:
+    """A render farm. `url` and `token` default to LIGHTSHAFT_URL and LIGHTSHAFT_TOKEN; `ca` is a file of
+    certificates to trust instead of the system's (LIGHTSHAFT_CA)."""
+
+    def __init__(
+        self,
+        url: str | None = None,
+        token: str | None = None,
+        *,
+        ca: str | os.PathLike[str] | None = None,
+    ) -> None:
+        self._address = Address(url, token, ca)
+        self._transport = AsyncTransport(self._address)
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    def __repr__(self) -> str:
+        return f"<AsyncFarm {self._address.url}>"
+
+    async def close(self) -> None:
+        await self._transport.close()
+
+    async def submit(
+        self,
+        scene: Scene,
+        *,
+        name: str | None = None,
+        folder: PathLike | None = None,
+        allow: Iterable[PathLike] = (),
+        assets: Mapping[str, PathLike | bytes] | None = None,
+        **spec: Unpack[models.JobSpec],
+    ) -> AsyncJob:
+        """Hands in a scene with the files that it names.
+
+        `scene`: the path of an XML file, a string of XML, or a dictionary as for Mitsuba's load_dict. Files
+        are looked for in `folder` (default: that of the scene's file, else the working directory); files
+        outside of it are sent only if they lie in one of the folders `allow`. `assets`: {name in the scene:
+        path or bytes}, which go first. The rest are the job's settings (models.JobSpec): spp, target_error,
+        time, size, denoise, aov, ... `reference` may be a path.
+        """
+        answer = await self._transport.run(
+            submission.submit(scene, spec, submission.Options(name, folder, allow, assets))
+        )
+        return await self.job(answer["id"])
+
+    async def job(self, id: str) -> AsyncJob:
+        return AsyncJob(self._transport, await self._transport.run(steps.get_job(id)))
+
+    async def jobs(self) -> list[AsyncJob]:
+        return [
+            AsyncJob(self._transport, view)
+            for view in await self._transport.run(steps.listed("/api/v1/jobs", "jobs"))
+        ]
+
+    async def workers(self) -> list[models.Worker]:
+        return await self._transport.run(steps.listed("/api/v1/workers", "workers"))
+
+
+class AsyncJob(JobState):
+    """A job of a farm. In a notebook `await job.snapshot()` shows it."""
+
+    def __init__(self, transport: AsyncTransport, view: models.Job) -> None:
+        super().__init__(view)
+        self._transport = transport
+
+    async def refresh(self) -> models.Job:
+        return self._keep(await self._transport.run(steps.get_job(self.id)))
+
+    async def wait(self, progress: Progress = None, timeout: float | None = None) -> AsyncJob:
+        """Returns when the job is done; raises JobFailed if it ends otherwise, and WaitTimeout after
+        `timeout` seconds. `progress`: True prints a line, a function is called with each view
+        (models.Job)."""
+        self._keep(await self._transport.run(watching.wait(self.id, progress, timeout)))
+        return self
+
+    async def live(self, interval: float = watching.LIVE_SECONDS) -> AsyncJob:
+        """In a notebook: shows picture and curve, anew while they change, and returns when the job is
+        done."""
+        self._keep(await self._transport.run(watching.live(self.id, interval)))
+        return self
+
+    async def image(self, layer: str = "color") -> Array:
+        """(height, width, 3), linear RGB as float32: the image, or another layer ('denoised'), as far as it
+        has come."""
+        return await self._transport.run(jobs_of.image(self.id, layer))
+
+    async def layers(self) -> dict[str, Array]:
+        """All layers of the image by name: 'color', 'stderr', 'spp', those asked for by `aov`, and
+        'denoised'."""
+        return await self._transport.run(jobs_of.layers(self.id))
+
+    async def png(self, exposure: float = 0, denoised: bool = False) -> bytes:
+        return await self._transport.run(jobs_of.png(self.id, exposure, denoised))
+
+    async def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the image as OpenEXR, with all layers and the header that tells how it was made."""
+        await self._transport.run(jobs_of.save(self.id, path))
+
+    async def report(self) -> models.Report:
+        return await self._transport.run(jobs_of.report(self.id))
+
+    async def convergence(self) -> Curve:
+        """{column: values at each checkpoint}: seconds, core_seconds, spp, relmse, ... NaN where there is
+        no value."""
+        return await self._transport.run(snapshot.get_curve(self.id))
+
+    async def tiles(self) -> list[models.Tile]:
+        return await self._transport.run(jobs_of.tiles(self.id))
+
+    async def log(self) -> str:
+        return await self._transport.run(jobs_of.log(self.id))
+
+    async def snapshot(self) -> Snapshot:
+        """Picture, figures and curve as they are now, which a notebook shows."""
+        return await self._transport.run(snapshot.take(self.id))
+
+    async def frames(self) -> list[AsyncJob]:
+        """Of a sequence: its frames, which are jobs."""
+        return [
+            AsyncJob(self._transport, await self._transport.run(steps.get_job(id)))
+            for id in jobs_of.frame_ids(await self.refresh())
+        ]
+
+    async def pause(self) -> AsyncJob:
+        return await self._change({"state": "paused"})
+
+    async def resume(self) -> AsyncJob:
+        return await self._change({"state": "running"})
+
+    async def cancel(self) -> AsyncJob:
+        return await self._change({"state": "cancelled"})
+
+    async def prioritise(self, priority: int) -> AsyncJob:
+        return await self._change({"priority": priority})
+
+    async def extend(self, *, spp: int | None = None, target_error: float | None = None) -> AsyncJob:
+        """Goes on to `spp` samples per pixel in all, or to a smaller error: the pixels of a job that had it
+        from the first."""
+        self._keep(await self._transport.run(jobs_of.extend(self.id, spp, target_error)))
+        return self
+
+    async def remove(self) -> None:
+        """Cancels the job if it has not ended, and removes it with its images."""
+        await self._transport.run(jobs_of.remove(self.id))
+
+    async def _change(self, change: models.JobChange) -> AsyncJob:
+        self._keep(await self._transport.run(steps.change_job(self.id, change)))
+        return self
+
+    def _keep(self, view: models.Job) -> models.Job:
+        self._view = view
+        return view

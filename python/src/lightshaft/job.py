@@ -1,0 +1,126 @@
+"""What can be done with a job, as steps, and what is known of it. Job and AsyncJob run them."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import tempfile
+from typing import Any
+from urllib.parse import urlencode
+
+from . import models
+from .errors import NotFound, RequestRejected
+from .images import Array, decode_layers, layer_of
+from .steps import Call, Steps, ask_json, change_job, fetch, get_job, job_path, listed, succeed, work
+
+
+class JobState:
+    """The id of a job, and its figures as they were when the farm was last asked."""
+
+    def __init__(self, view: models.Job) -> None:
+        self._view = view
+
+    @property
+    def id(self) -> str:
+        return self._view["id"]
+
+    @property
+    def view(self) -> models.Job:
+        """All that the farm told last; refresh() asks again."""
+        return self._view
+
+    @property
+    def state(self) -> str:
+        """queued, running, paused, done, failed or cancelled."""
+        return self._view["state"]
+
+    @property
+    def progress(self) -> float:
+        """From 0 to 1."""
+        return self._view["progress"]
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.id}: {self.state}, {100 * self.progress:.0f} %>"
+
+
+def layers(job: str) -> Steps[dict[str, Array]]:
+    data = yield from fetch(job_path(job, "/image.exr"))
+    return (yield from work(lambda: decode_layers(data)))
+
+
+def image(job: str, layer: str) -> Steps[Array]:
+    return layer_of((yield from layers(job)), layer)
+
+
+def save(job: str, path: str | os.PathLike[str]) -> Steps[None]:
+    data = yield from fetch(job_path(job, "/image.exr"))
+    yield from work(lambda: _write(pathlib.Path(path), data))
+
+
+def _write(path: pathlib.Path, data: bytes) -> None:
+    """Whole or not at all."""
+    handle, aside = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        os.chmod(aside, 0o666 & ~_umask())
+        os.replace(aside, path)
+    except BaseException:
+        pathlib.Path(aside).unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0o077)
+    os.umask(mask)
+    return mask
+
+
+def png(job: str, exposure: float, denoised: bool) -> Steps[bytes]:
+    query = {
+        **({"exposure": repr(float(exposure))} if exposure else {}),
+        **({"layer": "denoised"} if denoised else {}),
+    }
+    return fetch(job_path(job, "/image.png") + (f"?{urlencode(query)}" if query else ""))
+
+
+def report(job: str) -> Steps[models.Report]:
+    return ask_json(Call("GET", job_path(job, "/report")))  # type: ignore[return-value]
+
+
+def tiles(job: str) -> Steps[list[models.Tile]]:
+    return listed(job_path(job, "/tiles"), "tiles")
+
+
+def log(job: str) -> Steps[str]:
+    reply = yield from succeed(Call("GET", job_path(job, "/log")))
+    return reply.body.decode("utf-8", "replace")
+
+
+def extend(job: str, spp: int | None, target_error: float | None) -> Steps[models.Job]:
+    if (spp is None) == (target_error is None):
+        raise RequestRejected(
+            "extend() takes either spp, the new total of samples per pixel, or target_error"
+        )
+    return (
+        yield from change_job(
+            job, {"spp": int(spp)} if spp is not None else {"target_error": float(target_error or 0)}
+        )
+    )
+
+
+def remove(job: str) -> Steps[None]:
+    """Cancels a job that has not ended, and removes it with its images."""
+    view = yield from get_job(job)
+    yield from succeed(Call("DELETE", job_path(job)))
+    if view["state"] in ("done", "failed", "cancelled"):
+        return
+    try:
+        yield from succeed(Call("DELETE", job_path(job)))
+    except NotFound:  # it had ended in between, so that it is removed
+        pass
+
+
+def frame_ids(view: models.Job) -> list[str]:
+    frames: Any = view.get("frames") or {}
+    return [frame["id"] for frame in frames.get("list", [])]

@@ -1,0 +1,215 @@
+"""Makes the XML of a scene from a dictionary in the style of Mitsuba's mi.load_dict.
+
+Each element stands on a line of its own, and SceneText remembers which keys led to it: an error that the
+farm reports for a line is told as one of the dictionary.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import os
+import re
+from collections.abc import Mapping
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from ._plugins import ELEMENTS
+from .errors import Diagnostic, SceneDictError
+
+MAX_NESTING = 64  # as the scene format allows
+MAX_ELEMENTS = 500_000
+FORBIDDEN = re.compile("[\x00-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
+
+
+@dataclasses.dataclass(frozen=True)
+class SceneText:
+    xml: str
+    paths: tuple[str, ...]
+    """For each line the keys that led to it, joined by dots."""
+
+    def path_of(self, line: int) -> str:
+        return self.paths[line - 1] if 0 < line <= len(self.paths) else ""
+
+
+def scene_of_dict(scene: Mapping[str, Any]) -> SceneText:
+    """The scene as Mitsuba XML. SceneDictError names the keys that lead to what cannot be a scene."""
+    if scene.get("type") != "scene":
+        raise _wrong(
+            "", f"the outermost dictionary must have 'type': 'scene', not {scene.get('type')!r}"
+        )
+    writer = _Writer()
+    writer.add(0, "", '<scene version="3.0.0">')
+    for key, value in scene.items():
+        if key != "type":
+            writer.write(1, "", key, value, names_it=True)
+    writer.add(0, "", "</scene>")
+    return SceneText("\n".join(writer.lines) + "\n", tuple(writer.paths))
+
+
+def _wrong(path: str, text: str) -> SceneDictError:
+    return SceneDictError(text, diagnostics=[Diagnostic(text=text, path=path or "scene")])
+
+
+class _Writer:
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.paths: list[str] = []
+
+    def add(self, depth: int, path: str, line: str) -> None:
+        if len(self.lines) >= MAX_ELEMENTS:
+            raise _wrong(path, f"the scene has more than {MAX_ELEMENTS} elements")
+        self.lines.append("  " * depth + line)
+        self.paths.append(path)
+
+    def write(self, depth: int, parent: str, key: Any, value: Any, names_it: bool = False) -> None:
+        """`names_it`: objects directly in the scene are called by their keys, and can be referred to by
+        them."""
+        if not isinstance(key, str):
+            raise _wrong(parent, f"keys must be strings, not {key!r}")
+        path = f"{parent}.{key}" if parent else key
+        if depth > MAX_NESTING:
+            raise _wrong(
+                path,
+                f"dictionaries stand within each other more than {MAX_NESTING} deep (does one hold itself?)",
+            )
+        if isinstance(value, Mapping):
+            self.write_dict(depth, path, key, value, names_it)
+        else:
+            self.write_value(depth, path, key, value)
+
+    def write_dict(
+        self, depth: int, path: str, key: str, value: Mapping[str, Any], names_it: bool
+    ) -> None:
+        kind = value.get("type")
+        if not isinstance(kind, str):
+            raise _wrong(path, "a dictionary needs a 'type' that is a string")
+        if kind == "ref":
+            self.write_reference(depth, path, key, value)
+        elif kind == "rgb" or (kind == "spectrum" and "value" in value):
+            self.write_colour(depth, path, key, kind, value)
+        else:
+            self.write_object(depth, path, key, kind, value, names_it)
+
+    def write_reference(self, depth: int, path: str, key: str, value: Mapping[str, Any]) -> None:
+        if not isinstance(value.get("id"), str) or set(value) != {"type", "id"}:
+            raise _wrong(path, "a reference is {'type': 'ref', 'id': NAME}")
+        self.add(depth, path, f"<ref name={_quoted(path, key)} id={_quoted(path, value['id'])}/>")
+
+    def write_colour(
+        self, depth: int, path: str, key: str, kind: str, value: Mapping[str, Any]
+    ) -> None:
+        if set(value) != {"type", "value"}:
+            raise _wrong(path, f"a colour is {{'type': '{kind}', 'value': ...}} and has nothing else")
+        given = value["value"]
+        if isinstance(given, str):  # '#ff8000', or a spectrum as XML has it
+            text = given
+        elif (
+            kind == "spectrum" and isinstance(given, (list, tuple)) and given and np.ndim(given[0]) == 1
+        ):
+            text = ", ".join(":".join(map(_number, _numbers(path, pair, (2,)))) for pair in given)
+        else:
+            text = " ".join(map(_number, _numbers(path, given, (1, 3))))
+        self.add(depth, path, f"<{kind} name={_quoted(path, key)} value={_quoted(path, text)}/>")
+
+    def write_object(
+        self, depth: int, path: str, key: str, kind: str, value: Mapping[str, Any], names_it: bool
+    ) -> None:
+        element = _element_of(path, key, kind)
+        name = value.get("id", key if names_it else None)
+        if name is not None and not isinstance(name, str):
+            raise _wrong(path, "an 'id' must be a string")
+        head = f"<{element} type={_quoted(path, kind)}"
+        if not names_it:
+            head += f" name={_quoted(path, key)}"
+        if name is not None:
+            head += f" id={_quoted(path, name)}"
+        inner = {k: v for k, v in value.items() if k not in ("type", "id")}
+        if not inner:
+            return self.add(depth, path, f"{head}/>")
+        self.add(depth, path, f"{head}>")
+        for inner_key, inner_value in inner.items():
+            self.write(depth + 1, path, inner_key, inner_value)
+        self.add(depth, path, f"</{element}>")
+
+    def write_value(self, depth: int, path: str, key: str, value: Any) -> None:
+        name = _quoted(path, key)
+        if isinstance(value, (bool, np.bool_)):
+            self.add(depth, path, f'<boolean name={name} value="{str(bool(value)).lower()}"/>')
+        elif isinstance(value, (int, np.integer)):
+            self.add(depth, path, f'<integer name={name} value="{int(value)}"/>')
+        elif isinstance(value, (float, np.floating)):
+            self.add(
+                depth, path, f'<float name={name} value="{_number(_numbers(path, value, (1,))[0])}"/>'
+            )
+        elif isinstance(value, (str, os.PathLike)):
+            self.add(depth, path, f"<string name={name} value={_quoted(path, os.fspath(value))}/>")
+        else:
+            self.write_array(depth, path, key, value)
+
+    def write_array(self, depth: int, path: str, key: str, value: Any) -> None:
+        """Three numbers are a point or a vector, which the format takes for each other; 9 or 16 are a
+        transform."""
+        given = getattr(value, "matrix", value)
+        try:
+            array = np.asarray(given, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise _wrong(
+                path,
+                f"a {type(value).__name__} cannot stand here: only dictionaries, numbers, strings, three "
+                "numbers, and transforms (4 x 4 numbers, or an object with a .matrix)",
+            ) from None
+        if array.ndim == 3 and array.shape[-1] == 1:  # a transform of Dr.Jit, with one entry
+            array = array[..., 0]
+        if array.shape == (3,):
+            text = " ".join(map(_number, _numbers(path, array, (3,))))
+            self.add(depth, path, f'<point name={_quoted(path, key)} value="{text}"/>')
+        elif array.shape in ((3, 3), (4, 4)):
+            text = " ".join(map(_number, _numbers(path, array.ravel(), (9, 16))))
+            self.add(
+                depth,
+                path,
+                f'<transform name={_quoted(path, key)}><matrix value="{text}"/></transform>',
+            )
+        else:
+            raise _wrong(
+                path,
+                f"an array of shape {array.shape} cannot stand here: three numbers are a point or vector, "
+                "4 x 4 a transform; a colour is {'type': 'rgb', 'value': ...}",
+            )
+
+
+def _element_of(path: str, key: str, kind: str) -> str:
+    elements = ELEMENTS.get(kind)
+    if elements is None:
+        near = difflib.get_close_matches(kind, ELEMENTS, 1)
+        raise _wrong(
+            path,
+            f"there is no plugin of type {kind!r}" + (f"; did you mean {near[0]!r}?" if near else ""),
+        )
+    return key if key in elements else elements[0]
+
+
+def _numbers(path: str, value: Any, counts: tuple[int, ...]) -> list[float]:
+    try:
+        array = np.asarray(value, dtype=np.float64).ravel()
+    except (TypeError, ValueError):
+        raise _wrong(path, f"numbers are wanted here, not {str(value)[:80]!r}") from None
+    if array.size not in counts:
+        raise _wrong(path, f"{' or '.join(map(str, counts))} numbers are wanted here, not {array.size}")
+    if not np.isfinite(array).all():
+        raise _wrong(path, "a number is infinite or none (nan)")
+    return [float(x) for x in array]
+
+
+def _number(value: float) -> str:
+    return repr(value)  # the shortest text that reads back to the same bits
+
+
+def _quoted(path: str, text: str) -> str:
+    """As an attribute. `$` is escaped: in a dictionary it stands for itself and names no parameter."""
+    if FORBIDDEN.search(text):
+        raise _wrong(path, f"{text[:80]!r} has characters that no scene can have")
+    return quoteattr(text.replace("$", "\\$"))

@@ -1,0 +1,166 @@
+"""A job as it is at one moment, as notebooks show it: its figures, its picture and the curve of its
+error."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import dataclasses
+import html
+import io
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import models
+from .errors import BadAnswer, Conflict, NotFound
+from .steps import Call, Steps, fetch, get_job, job_path, succeed
+
+Curve = dict[str, npt.NDArray[np.float64]]
+ENDED = ("done", "failed", "cancelled")
+WIDTH, HEIGHT, MARGIN = 420, 180, 46  # of the curve, in CSS pixels
+MAX_ROWS = 1_000_000
+
+
+def get_curve(job: str) -> Steps[Curve]:
+    reply = yield from succeed(Call("GET", job_path(job, "/convergence.csv")))
+    return parse_curve(reply.body.decode("utf-8", "replace"))
+
+
+def parse_curve(text: str) -> Curve:
+    """{column: its values}; NaN where there is none."""
+    rows = list(csv.reader(io.StringIO(text)))
+    names = rows[0] if rows else []
+    if len(rows) > MAX_ROWS or any(len(row) != len(names) for row in rows if row):
+        raise BadAnswer("the farm's table of errors is not one")
+    try:
+        return {
+            name: np.array([float(row[i] or "nan") for row in rows[1:] if row])
+            for i, name in enumerate(names)
+        }
+    except ValueError:
+        raise BadAnswer("the farm's table of errors has something that is no number") from None
+
+
+def take(job: str) -> Steps[Snapshot]:
+    view = yield from get_job(job)
+    return (yield from of_view(view))
+
+
+def of_view(view: models.Job) -> Steps[Snapshot]:
+    shown = view["id"]
+    frames = view.get("frames")
+    if frames:  # of a sequence: the frame to look at
+        shown = next(
+            (
+                frame["id"]
+                for frame in frames.get("list", [])
+                if frame.get("frame") == frames["current"]
+            ),
+            shown,
+        )
+    try:
+        png = yield from fetch(job_path(shown, "/image.png"))
+        curve = yield from get_curve(shown)
+    except (NotFound, Conflict):  # nothing is rendered yet
+        png, curve = b"", {}
+    return Snapshot(view, png if png.startswith(b"\x89PNG") else b"", curve)
+
+
+def summary(view: models.Job) -> str:
+    """One line for people, as the progress of a wait shows it."""
+    parts = [
+        f"{view['state']} {100 * _figure(view.get('progress')):.0f} %",
+        f"{_figure(view.get('spp_done')):.4g} samples per pixel",
+    ]
+    relmse, interval, left = view.get("relmse"), view.get("relmse_ci95"), view.get("eta_seconds")
+    if relmse is not None:
+        parts.append(
+            f"relMSE {_figure(relmse):.3g}"
+            + (
+                f" ({_figure(interval[0]):.3g} to {_figure(interval[1]):.3g})"
+                if interval and len(interval) == 2
+                else ""
+            )
+        )
+    if left is not None and view["state"] not in ENDED:
+        parts.append(f"{_figure(left):.0f} s left")
+    return ", ".join(parts)
+
+
+def _figure(value: Any) -> float:
+    return float(value) if isinstance(value, (int, float)) else math.nan
+
+
+@dataclasses.dataclass(frozen=True)
+class Snapshot:
+    view: models.Job
+    png: bytes
+    """Empty while there is no picture."""
+    curve: Curve
+
+    def __repr__(self) -> str:
+        return f"<job {self.view['id']}: {summary(self.view)}>"
+
+    def _repr_png_(self) -> bytes | None:
+        return self.png or None
+
+    def _repr_html_(self) -> str:
+        view = self.view
+        lines = [
+            f"<b>{html.escape(str(view.get('name') or 'job'))}</b> {html.escape(view['id'])}",
+            html.escape(summary(view)),
+        ]
+        for text in (view.get("error"), (view.get("verdict") or {}).get("words")):
+            if text:
+                lines.append(html.escape(str(text)))
+        picture = (
+            '<img alt="the image so far" style="max-width:480px" src="data:image/png;base64,'
+            f'{base64.b64encode(self.png).decode()}">'
+            if self.png
+            else "<i>no picture yet</i>"
+        )
+        return (
+            f'<div>{"<br>".join(lines)}<div style="display:flex;flex-wrap:wrap;gap:12px">'
+            f"{picture}{self._curve_svg()}</div></div>"
+        )
+
+    def _curve_svg(self) -> str:
+        """relMSE over core seconds, both logarithmic."""
+        x, y = (
+            np.asarray(self.curve.get(name, []), dtype=float) for name in ("core_seconds", "relmse")
+        )
+        good = (
+            np.isfinite(x) & np.isfinite(y) & (x > 0) & (y > 0)
+            if x.shape == y.shape
+            else np.zeros(0, bool)
+        )
+        if np.count_nonzero(good) < 2:
+            return ""
+        x, y = x[good], y[good]
+        u, v = (_spread(np.log10(values)) for values in (x, y))
+        points = " ".join(
+            f"{MARGIN + a * (WIDTH - MARGIN - 8):.1f},{8 + (1 - b) * (HEIGHT - 40):.1f}"
+            for a, b in zip(u, v)
+        )
+        style = 'fill="currentColor" font-size="11"'
+        bottom = HEIGHT - 32
+        return (
+            f'<svg width="{WIDTH}" height="{HEIGHT}" role="img" aria-label="relMSE over core seconds">'
+            f'<path d="M{MARGIN} 8V{bottom}H{WIDTH - 8}" fill="none" stroke="currentColor" opacity=".5"/>'
+            f'<polyline points="{points}" fill="none" stroke="#d97706" stroke-width="2"/>'
+            f'<text x="{MARGIN - 4}" y="16" text-anchor="end" {style}>{y.max():.1e}</text>'
+            f'<text x="{MARGIN - 4}" y="{bottom}" text-anchor="end" {style}>{y.min():.1e}</text>'
+            f'<text x="{MARGIN}" y="{bottom + 14}" {style}>{x.min():.3g}</text>'
+            f'<text x="{WIDTH - 8}" y="{bottom + 14}" text-anchor="end" {style}>{x.max():.3g}</text>'
+            f'<text x="{(MARGIN + WIDTH) // 2}" y="{bottom + 28}" text-anchor="middle" {style}>'
+            "relMSE over core seconds</text></svg>"
+        )
+
+
+def _spread(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """From 0 to 1."""
+    low, width = values.min(), np.ptp(values)
+    return (values - low) / width if width > 0 else np.full(values.shape, 0.5)

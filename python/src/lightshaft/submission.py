@@ -1,0 +1,221 @@
+"""Submits a scene: finds its files, sends those that the farm lacks, and hands in the job."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import pathlib
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeAlias
+
+from . import models
+from .errors import BadAnswer, FarmBusy, LightshaftError, RequestRejected, SceneRejected
+from .scene_dict import SceneText, scene_of_dict
+from .scene_files import MAX_SCENE_BYTES, Folders, PathLike, Source, find_files, read_scene
+from .steps import (
+    DIGESTS_PER_QUESTION,
+    UPLOAD_PART_BYTES,
+    Call,
+    Retry,
+    Steps,
+    ask,
+    post_json,
+    problem_of,
+    succeed,
+    with_retries,
+    work,
+)
+
+Scene: TypeAlias = str | os.PathLike[str] | Mapping[str, Any]
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """What submit() is told besides the scene and the job's settings."""
+
+    name: str | None = None
+    folder: PathLike | None = None
+    allow: Iterable[PathLike] = ()
+    assets: Mapping[str, PathLike | bytes] | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Prepared:
+    name: str
+    scene: Source
+    files: Mapping[str, Source]
+    dictionary: SceneText | None = None
+    """If it was made from a dictionary."""
+
+
+def submit(scene: Scene, spec: Mapping[str, Any], options: Options) -> Steps[models.SubmitJobAnswer]:
+    settings = {name: value for name, value in spec.items() if value is not None}
+    prepared = yield from work(lambda: prepare(scene, settings, options))
+    yield from _send_reference(settings)
+    yield from _send_missing(
+        {source.digest: source for source in (prepared.scene, *prepared.files.values())}
+    )
+    body = {
+        "scene": prepared.scene.digest,
+        "assets": {name: source.digest for name, source in prepared.files.items()},
+        "name": prepared.name,
+        "spec": _as_json(settings),
+    }
+    try:
+        answer = yield from post_json("/api/v1/jobs", body)
+    except SceneRejected as error:
+        raise _with_paths(error, prepared.dictionary) from None
+    if not isinstance(answer.get("id"), str):
+        raise BadAnswer("the farm's answer names no job")
+    return answer  # type: ignore[return-value]
+
+
+def prepare(scene: Scene, spec: Mapping[str, Any], options: Options) -> Prepared:
+    """The scene's text, and its files with their digests."""
+    dictionary = None
+    if isinstance(scene, Mapping):
+        dictionary = scene_of_dict(scene)
+        text, name, folder = dictionary.xml.encode(), "scene.xml", pathlib.Path()
+    elif isinstance(scene, str) and scene.lstrip("\ufeff \t\r\n").startswith("<"):
+        text, name, folder = scene.encode("utf-8", "surrogatepass"), "scene.xml", pathlib.Path()
+    elif isinstance(scene, (str, os.PathLike)):
+        path = pathlib.Path(scene)
+        if path.name.lower().endswith((".zip", ".tar", ".tar.gz", ".tgz")):
+            raise RequestRejected(
+                f"{path} is an archive: unpack it and submit its scene, or use `lightshaft submit`"
+            )
+        text, name, folder = read_scene(path), path.name, path.parent
+    else:
+        raise RequestRejected(
+            f"a scene is a path, a string of XML or a dictionary, not a {type(scene).__name__}"
+        )
+    if len(text) > MAX_SCENE_BYTES:
+        raise RequestRejected(
+            f"the scene is larger than the {MAX_SCENE_BYTES >> 20} MiB of a scene file"
+        )
+    folders = Folders(
+        folder if options.folder is None else options.folder, options.allow, options.assets
+    )
+    files = find_files(text, folders, spec.get("defines"), spec.get("frames"))
+    return Prepared(options.name or name, Source.of_bytes(text), files, dictionary)
+
+
+def _as_json(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """Numbers of NumPy and tuples as JSON has them."""
+
+    def plain(value: Any) -> Any:
+        if hasattr(value, "tolist"):
+            return value.tolist()
+        raise RequestRejected(f"a {type(value).__name__} cannot be the setting of a job")
+
+    settings = (
+        {**spec, "defines": {str(k): str(v) for k, v in spec["defines"].items()}}
+        if "defines" in spec
+        else dict(spec)
+    )
+    loaded: dict[str, Any] = json.loads(json.dumps(settings, default=plain))
+    return loaded
+
+
+def _with_paths(error: SceneRejected, dictionary: SceneText | None) -> SceneRejected:
+    """Of a dictionary, the places in the XML that was made of it mean nothing to its author: tell the
+    keys."""
+    if dictionary is None:
+        return error
+    diagnostics = [dataclasses.replace(d, path=dictionary.path_of(d.line)) for d in error.diagnostics]
+    return SceneRejected(error.message, diagnostics=diagnostics, status=error.status)
+
+
+def _send_reference(spec: dict[str, Any]) -> Steps[None]:
+    """`reference` may also be the path of an image, which is sent before the job."""
+    given = spec.get("reference")
+    if given is None or re.fullmatch("[0-9a-f]{64}", str(given)):
+        return
+    source = yield from work(lambda: Source.of_file(pathlib.Path(given)))
+    yield from _send_missing({source.digest: source})
+    spec["reference"] = source.digest
+
+
+def _send_missing(sources: Mapping[str, Source]) -> Steps[None]:
+    digests = sorted(sources)
+    for begin in range(0, len(digests), DIGESTS_PER_QUESTION):
+        answer = yield from post_json(
+            "/api/v1/blobs/missing", {"digests": digests[begin : begin + DIGESTS_PER_QUESTION]}
+        )
+        missing = answer.get("missing")
+        if not isinstance(missing, list):
+            raise BadAnswer("the farm's answer does not say which files it lacks")
+        for digest in missing:
+            if (
+                isinstance(digest, str) and digest in sources
+            ):  # nothing else is sent, whatever it asks for
+                yield from _send(sources[digest])
+
+
+def _send(source: Source) -> Steps[None]:
+    path = f"/api/v1/blobs/{source.digest}"
+    if source.size > UPLOAD_PART_BYTES:
+        yield from _send_in_parts(path, source)
+        return
+    data = yield from work(lambda: source.read(0, source.size))
+    yield from with_retries(lambda: succeed(Call("PUT", path, data, "application/octet-stream")))
+
+
+def _send_in_parts(path: str, source: Source) -> Steps[None]:
+    """From where an earlier attempt ended. After a broken connection it goes on where the farm says."""
+    retry = Retry()
+    reached = -1
+    while True:
+        try:
+            there = yield from ask(Call("HEAD", path))
+            if there.status == 200:
+                return
+            if there.status != 404:
+                raise problem_of(there)
+            offset = _offset(there.headers)
+            if offset > reached:
+                retry.answered()
+            reached = max(reached, offset)
+            if (yield from _send_rest(path, source, offset, retry)):
+                return
+        except LightshaftError as error:
+            pause = retry.pause(error)
+        else:  # another request has gone on with the upload: ask again where
+            pause = retry.pause(
+                FarmBusy(f"the upload of {path} does not go on: is it sent from elsewhere, too?")
+            )
+        yield pause
+
+
+def _send_rest(path: str, source: Source, offset: int, retry: Retry) -> Steps[bool]:
+    """Whether all of it has arrived; False: the farm has another place to go on."""
+    while True:
+        begin, size = offset, min(UPLOAD_PART_BYTES, source.size - offset)
+        data = yield from work(lambda: source.read(begin, size))
+        place = f"{begin}-{begin + size - 1}" if size > 0 else "*"
+        reply = yield from ask(
+            Call(
+                "PUT",
+                path,
+                data,
+                "application/octet-stream",
+                headers={"Content-Range": f"bytes {place}/{source.size}"},
+            )
+        )
+        if reply.status == 409:
+            return False
+        if reply.status // 100 != 2:
+            raise problem_of(reply)
+        if reply.status != 202:
+            return True
+        retry.answered()
+        offset = _offset(reply.headers)
+        if offset <= begin or offset > source.size:
+            return False
+
+
+def _offset(headers: Mapping[str, str]) -> int:
+    text = headers.get("upload-offset", "0")
+    return int(text) if re.fullmatch("[0-9]{1,18}", text) else 0

@@ -1,0 +1,107 @@
+"""Follows a job until it ends: progress for callables and terminals, picture and curve for notebooks."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+from . import models, snapshot
+from .errors import JobCancelled, JobFailed, LightshaftError, MissingPackage, WaitTimeout
+from .steps import Pause, Retry, Steps, get_job
+
+POLL_SECONDS, LIVE_SECONDS = 0.25, 1.0
+
+Progress: TypeAlias = Callable[[models.Job], Any] | bool | None
+
+
+def wait(job: str, progress: Progress, timeout: float | None) -> Steps[models.Job]:
+    """The job when it is done. It is asked for again over restarts of the coordinator."""
+    show = _printer() if progress is True else progress or None
+    return _follow(job, show, timeout, POLL_SECONDS)
+
+
+def live(job: str, interval: float) -> Steps[models.Job]:
+    """Shows the job below the cell that calls, anew whenever it has come further; ends when the job has
+    ended."""
+    try:
+        from IPython.display import display
+    except ImportError:
+        raise MissingPackage(
+            "job.live() needs IPython: run it in a notebook, or pip install 'lightshaft[notebook]'; "
+            "job.wait(progress=True) needs nothing"
+        ) from None
+    handle: Any = None
+    shown: Any = None
+    retry = Retry()
+    while True:
+        try:
+            view = yield from get_job(job)
+            state = (view["state"], view.get("units_done"), view.get("progress"))
+            if state != shown:
+                now = yield from snapshot.of_view(view)
+                shown = state
+                if handle is None:
+                    handle = display(now, display_id=True)  # type: ignore[no-untyped-call]
+                else:
+                    handle.update(now)
+            if view["state"] in snapshot.ENDED:
+                return _ended(view)
+            retry.answered()
+            pause = Pause(interval)
+        except (JobFailed, MissingPackage):
+            raise
+        except LightshaftError as error:
+            pause = retry.pause(error)
+        yield pause
+
+
+def _follow(
+    job: str, show: Callable[[models.Job], Any] | None, timeout: float | None, interval: float
+) -> Steps[models.Job]:
+    deadline = None if timeout is None else time.monotonic() + timeout
+    retry = Retry()
+    while True:
+        view = None
+        try:
+            view = yield from get_job(job)
+            retry.answered()
+            pause = Pause(interval)
+        except LightshaftError as error:
+            pause = retry.pause(error)
+        if view is not None:
+            if show:
+                show(view)
+            if view["state"] in snapshot.ENDED:
+                return _ended(view)
+        if deadline is not None and time.monotonic() >= deadline:
+            raise WaitTimeout(f"job {job} has not ended within {timeout:g} s; it goes on")
+        yield pause
+
+
+def _ended(view: models.Job) -> models.Job:
+    if view["state"] == "done":
+        return view
+    why = f": {view['error']}" if view.get("error") else ""
+    if view["state"] == "cancelled":
+        raise JobCancelled(f"job {view['id']} was cancelled{why}")
+    raise JobFailed(f"job {view['id']} was given up{why}")
+
+
+def _printer() -> Callable[[models.Job], None]:
+    """Writes one line to the standard error stream, over and over in a terminal, once for each change
+    elsewhere."""
+    last = ""
+
+    def show(view: models.Job) -> None:
+        nonlocal last
+        line = snapshot.summary(view)
+        ended = view["state"] in snapshot.ENDED
+        if sys.stderr.isatty():
+            print(f"\r\x1b[K{line}", end="\n" if ended else "", file=sys.stderr, flush=True)
+        elif line != last:
+            print(line, file=sys.stderr, flush=True)
+        last = line
+
+    return show
