@@ -14,7 +14,9 @@ import lightshaft
 
 
 def check(root):
-    return subprocess.run([sys.executable, root / "python/generate.py", "--check"], capture_output=True, text=True)
+    return subprocess.run(
+        [sys.executable, root / "python/generate.py", "--check"], capture_output=True, text=True
+    )
 
 
 @pytest.fixture
@@ -56,10 +58,12 @@ def test_a_new_plugin_and_a_method_that_only_waits_are_found(copy):
 
 def test_the_wheel_is_pure_typed_and_of_the_programs_version():
     project = tomllib.loads((ROOT / "python/pyproject.toml").read_text())["project"]
-    wheel, = (ROOT / "build/python/dist").glob("*.whl")
+    (wheel,) = (ROOT / "build/python/dist").glob("*.whl")
     names = zipfile.ZipFile(wheel).namelist()
 
     assert wheel.name == f"lightshaft-{project['version']}-py3-none-any.whl"
     assert "lightshaft/py.typed" in names and not any(name.endswith((".so", ".c")) for name in names)
     assert f"project(lightshaft VERSION {project['version']} " in (ROOT / "CMakeLists.txt").read_text()
-    assert not lightshaft.__file__.startswith(str(ROOT / "python")), "the tests are to use the wheel, not the sources"
+    assert not lightshaft.__file__.startswith(str(ROOT / "python")), (
+        "the tests are to use the wheel, not the sources"
+    )

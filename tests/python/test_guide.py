@@ -1,4 +1,4 @@
-"""docs/guide/python.md: its Python blocks run one after the other as they stand, and its shell block is what venv.sh does."""
+"""docs/guide/python.md: its Python blocks run as they stand, one after the other; venv.sh does what its shell block does."""
 
 import re
 
@@ -14,7 +14,7 @@ def test_every_block_is_marked():
 
 
 def test_the_wheel_is_built_as_the_page_says():
-    shell, = (text for kind, text in BLOCKS if kind == "sh")
+    (shell,) = (text for kind, text in BLOCKS if kind == "sh")
     command = re.search(r"pip (wheel --no-deps) -w \S+ (\./python)", shell)
     script = (ROOT / "tests/python/venv.sh").read_text()
     assert command and all(part in script for part in command.groups())
@@ -35,5 +35,9 @@ def test_the_blocks_run_as_they_stand(local_farm, tmp_path, monkeypatch, capsys)
     assert (tmp_path / "ball.exr").stat().st_size > 0
     assert not np.array_equal(names["one"], names["two"])
     printed = capsys.readouterr().out
-    assert "\nscene.xml 3 " in printed and "did you mean 'sigma_t'?" in printed and "\nball.radius\n" in printed
+    assert (
+        "\nscene.xml 3 " in printed
+        and "did you mean 'sigma_t'?" in printed
+        and "\nball.radius\n" in printed
+    )
     names["farm"].close()

@@ -1,4 +1,4 @@
-"""Dictionaries in the style of mi.load_dict become XML, or are refused with the keys that lead to what is wrong."""
+"""Dictionaries in the style of mi.load_dict become XML, or are refused with the keys of what is wrong."""
 
 import pathlib
 
@@ -16,26 +16,35 @@ def lines(**objects):
 
 def test_objects_get_the_element_of_their_plugin_and_keys_name_them():
     assert lines(ball={"type": "sphere", "bsdf": {"type": "diffuse", "id": "white"}}) == [
-        '<shape type="sphere" id="ball">', '<bsdf type="diffuse" name="bsdf" id="white"/>', "</shape>"]
+        '<shape type="sphere" id="ball">',
+        '<bsdf type="diffuse" name="bsdf" id="white"/>',
+        "</shape>",
+    ]
 
 
-@pytest.mark.parametrize("value, line", [
-    (True, '<boolean name="x" value="true"/>'),
-    (np.bool_(False), '<boolean name="x" value="false"/>'),
-    (3, '<integer name="x" value="3"/>'),
-    (np.int64(-4), '<integer name="x" value="-4"/>'),
-    (0.1, '<float name="x" value="0.1"/>'),
-    (np.float32(0.1), '<float name="x" value="0.10000000149011612"/>'),
-    ("a<b & \"c\"", """<string name="x" value='a&lt;b &amp; "c"'/>"""),
-    (pathlib.PurePosixPath("a/b.ply"), '<string name="x" value="a/b.ply"/>'),
-    ("costs $5", '<string name="x" value="costs \\$5"/>'),
-    ([1, 2.5, -3], '<point name="x" value="1.0 2.5 -3.0"/>'),
-    (np.array([1, 2, 3]), '<point name="x" value="1.0 2.0 3.0"/>'),
-    ({"type": "rgb", "value": [0.1, 0.2, 0.3]}, '<rgb name="x" value="0.1 0.2 0.3"/>'),
-    ({"type": "rgb", "value": 0.5}, '<rgb name="x" value="0.5"/>'),
-    ({"type": "spectrum", "value": [(400, 0.1), (700, 0.9)]}, '<spectrum name="x" value="400.0:0.1, 700.0:0.9"/>'),
-    ({"type": "ref", "id": "white"}, '<ref name="x" id="white"/>'),
-])
+@pytest.mark.parametrize(
+    "value, line",
+    [
+        (True, '<boolean name="x" value="true"/>'),
+        (np.bool_(False), '<boolean name="x" value="false"/>'),
+        (3, '<integer name="x" value="3"/>'),
+        (np.int64(-4), '<integer name="x" value="-4"/>'),
+        (0.1, '<float name="x" value="0.1"/>'),
+        (np.float32(0.1), '<float name="x" value="0.10000000149011612"/>'),
+        ('a<b & "c"', """<string name="x" value='a&lt;b &amp; "c"'/>"""),
+        (pathlib.PurePosixPath("a/b.ply"), '<string name="x" value="a/b.ply"/>'),
+        ("costs $5", '<string name="x" value="costs \\$5"/>'),
+        ([1, 2.5, -3], '<point name="x" value="1.0 2.5 -3.0"/>'),
+        (np.array([1, 2, 3]), '<point name="x" value="1.0 2.0 3.0"/>'),
+        ({"type": "rgb", "value": [0.1, 0.2, 0.3]}, '<rgb name="x" value="0.1 0.2 0.3"/>'),
+        ({"type": "rgb", "value": 0.5}, '<rgb name="x" value="0.5"/>'),
+        (
+            {"type": "spectrum", "value": [(400, 0.1), (700, 0.9)]},
+            '<spectrum name="x" value="400.0:0.1, 700.0:0.9"/>',
+        ),
+        ({"type": "ref", "id": "white"}, '<ref name="x" id="white"/>'),
+    ],
+)
 def test_values_of_each_kind(value, line):
     assert lines(ball={"type": "sphere", "x": value})[1:-1] == [line]
 
@@ -50,13 +59,21 @@ class LikeMitsuba:
 MATRIX = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1]]
 
 
-@pytest.mark.parametrize("transform", [
-    MATRIX, np.array(MATRIX, np.float32), LikeMitsuba(np.array(MATRIX)), LikeMitsuba(np.array(MATRIX)[..., None])],
-    ids=["lists", "numpy", "object", "one entry of many"])
+@pytest.mark.parametrize(
+    "transform",
+    [
+        MATRIX,
+        np.array(MATRIX, np.float32),
+        LikeMitsuba(np.array(MATRIX)),
+        LikeMitsuba(np.array(MATRIX)[..., None]),
+    ],
+    ids=["lists", "numpy", "object", "one entry of many"],
+)
 def test_transforms_are_matrices_row_by_row(transform):
     numbers = " ".join(f"{float(x)!r}" for row in MATRIX for x in row)
     assert lines(ball={"type": "sphere", "to_world": transform})[1] == (
-        f'<transform name="to_world"><matrix value="{numbers}"/></transform>')
+        f'<transform name="to_world"><matrix value="{numbers}"/></transform>'
+    )
 
 
 def test_a_key_decides_between_plugins_of_one_name():
@@ -68,19 +85,30 @@ RING = {"type": "sphere"}
 RING["again"] = RING
 
 
-@pytest.mark.parametrize("objects, path, words", [
-    ({"ball": {"type": "sfere"}}, "ball", "did you mean 'sphere'?"),
-    ({"ball": {"type": "sphere", "bsdf": {"reflectance": 1}}}, "ball.bsdf", "needs a 'type'"),
-    ({"ball": {"type": "sphere", "radius": float("nan")}}, "ball.radius", "nan"),
-    ({"ball": {"type": "sphere", "center": [1, 2]}}, "ball.center", "shape (2,)"),
-    ({"ball": {"type": "sphere", "center": object()}}, "ball.center", "object cannot stand here"),
-    ({"ball": {"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [1, 2]}}}},
-     "ball.bsdf.reflectance", "1 or 3 numbers"),
-    ({"ball": {"type": "sphere", "x": {"type": "ref"}}}, "ball.x", "a reference is"),
-    ({"ball": {"type": "sphere", "name": "a\x00b"}}, "ball.name", "no scene can have"),
-    ({"ball": {"type": "sphere", 3: 4}}, "ball", "keys must be strings"),
-    ({"ball": RING}, None, "more than 64 deep"),
-])
+@pytest.mark.parametrize(
+    "objects, path, words",
+    [
+        ({"ball": {"type": "sfere"}}, "ball", "did you mean 'sphere'?"),
+        ({"ball": {"type": "sphere", "bsdf": {"reflectance": 1}}}, "ball.bsdf", "needs a 'type'"),
+        ({"ball": {"type": "sphere", "radius": float("nan")}}, "ball.radius", "nan"),
+        ({"ball": {"type": "sphere", "center": [1, 2]}}, "ball.center", "shape (2,)"),
+        ({"ball": {"type": "sphere", "center": object()}}, "ball.center", "object cannot stand here"),
+        (
+            {
+                "ball": {
+                    "type": "sphere",
+                    "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [1, 2]}},
+                }
+            },
+            "ball.bsdf.reflectance",
+            "1 or 3 numbers",
+        ),
+        ({"ball": {"type": "sphere", "x": {"type": "ref"}}}, "ball.x", "a reference is"),
+        ({"ball": {"type": "sphere", "name": "a\x00b"}}, "ball.name", "no scene can have"),
+        ({"ball": {"type": "sphere", 3: 4}}, "ball", "keys must be strings"),
+        ({"ball": RING}, None, "more than 64 deep"),
+    ],
+)
 def test_what_is_wrong_is_told_with_its_keys(objects, path, words):
     with pytest.raises(SceneDictError) as error:
         scene_of_dict({"type": "scene", **objects})

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes build/python/venv: Debian's Python with the wheel of python/, built as docs/guide/python.md says, and what
-# the tests of tests/python need besides. Prints the path of its interpreter.
+# Makes build/python/venv: Debian's Python with the wheel of python/, built as docs/guide/python.md says, and
+# what tests/python needs besides. Prints the path of its interpreter.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 out=build/python

@@ -1,0 +1,137 @@
+"""Which files are sent with a scene: those that it names, where the farm looks for them, none from outside."""
+
+import os
+
+import pytest
+
+from lightshaft import FileRefused
+from lightshaft.scene_files import Folders, find_files, join
+
+
+def found(folder, text, given=None, allow=(), **options):
+    """{name: bytes} of what would be sent with a scene of this text."""
+    files = find_files(text.encode(), Folders(folder, allow, given), **options)
+    return {name: source.read(0, source.size) for name, source in files.items()}
+
+
+def mesh(name):
+    return f'<shape type="ply"><string name="filename" value="{name}"/></shape>'
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A scene's folder, beside a secret."""
+    (tmp_path / "secret").write_bytes(b"secret")
+    inside = tmp_path / "scene"
+    for name in ("a.ply", "parts/b.ply", "frame_007.ply"):
+        (inside / name).parent.mkdir(parents=True, exist_ok=True)
+        (inside / name).write_bytes(name.encode())
+    return inside
+
+
+def test_files_are_known_by_the_names_that_the_farm_looks_for(folder):
+    meshes = mesh("./a.ply") + mesh("b.ply") + mesh("gone.ply")
+    text = f'<scene version="3.0.0"><path value="parts"/>{meshes}</scene>'
+    assert found(folder, text) == {"a.ply": b"a.ply", "parts/b.ply": b"parts/b.ply"}
+
+
+def test_parameters_are_put_in_the_longest_name_first(folder):
+    text = (
+        f'<scene version="3.0.0"><default name="dir" value="parts"/><default name="d" value="x"/>'
+        f"{mesh('$dir/b.ply')}{mesh('$name')}</scene>"
+    )
+    assert set(found(folder, text, defines={"name": "a.ply"})) == {"parts/b.ply", "a.ply"}
+
+
+def test_each_frame_has_its_files(folder):
+    (folder / "frame_009.ply").write_bytes(b"9")
+    text = f'<scene version="3.0.0">{mesh("frame_###.ply")}{mesh("f$frame")}</scene>'
+    (folder / "f8").write_bytes(b"8")
+    assert set(found(folder, text, frames="7-9")) == {"frame_007.ply", "frame_009.ply", "f8"}
+
+
+def test_included_files_are_sent_with_what_they_name(folder):
+    (folder / "parts/more.xml").write_text(
+        f'<scene version="3.0.0"><include filename="last.xml"/>{mesh("a.ply")}</scene>'
+    )
+    (folder / "parts/last.xml").write_text(
+        f'<scene version="3.0.0">{mesh("parts/b.ply")}<include filename="more.xml"/></scene>'
+    )
+    text = '<scene version="3.0.0"><include filename="parts/more.xml"/></scene>'
+    assert set(found(folder, text)) == {"parts/more.xml", "parts/last.xml", "a.ply", "parts/b.ply"}
+
+
+@pytest.mark.parametrize(
+    "name", ["../secret", "parts/../../secret", "{tmp}/secret", "link", "parts/link/secret"]
+)
+def test_nothing_outside_the_folder_is_sent(folder, tmp_path, name):
+    (folder / "link").symlink_to(tmp_path / "secret")
+    (folder / "parts/link").symlink_to(tmp_path)
+    text = f'<scene version="3.0.0">{mesh(name.format(tmp=tmp_path))}</scene>'
+
+    with pytest.raises(FileRefused, match="allow="):
+        found(folder, text)
+
+    assert list(found(folder, text, allow=[tmp_path]).values()) == [b"secret"]
+
+
+def test_an_included_file_outside_is_not_read(folder, tmp_path):
+    (tmp_path / "outside.xml").write_text('<scene version="3.0.0"/>')
+    with pytest.raises(FileRefused, match="outside.xml"):
+        found(folder, '<scene version="3.0.0"><include filename="../outside.xml"/></scene>')
+
+
+def test_given_files_go_first_and_may_be_in_memory(folder, tmp_path):
+    text = f'<scene version="3.0.0">{mesh("a.ply")}{mesh("cloud.vol")}</scene>'
+    given = {"./a.ply": b"mine", "cloud.vol": tmp_path / "secret", "unused": b"x"}
+    assert found(folder, text, given) == {"a.ply": b"mine", "cloud.vol": b"secret"}
+
+
+def test_folders_and_pipes_are_left_to_the_farm(folder):
+    os.mkfifo(folder / "pipe")  # whoever opens it to read would wait for ever
+    assert found(folder, f'<scene version="3.0.0">{mesh("pipe")}{mesh("parts")}{mesh("")}</scene>') == {}
+    with pytest.raises(FileRefused, match="not a regular file"):
+        found(folder, f'<scene version="3.0.0">{mesh("x")}</scene>', {"x": folder / "pipe"})
+
+
+LAUGHS = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 9}">' for i in range(1, 40))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "<scene",
+        "\x00\x01",
+        f'<!DOCTYPE s [<!ENTITY l0 "l">{LAUGHS}]><scene version="3.0.0">{mesh("&l39;")}</scene>',
+        '<!DOCTYPE s [<!ENTITY e SYSTEM "/etc/passwd">]><scene version="3.0.0">' + mesh("&e;") + "</scene>",
+    ],
+    ids=["empty", "cut", "no text", "entities of entities", "entity of a file"],
+)
+def test_what_cannot_be_read_names_no_files(folder, text):
+    assert found(folder, text) == {}
+
+
+def test_a_parameter_of_parameters_does_not_grow_without_bound(folder):
+    doubled = "".join(f'<default name="p{i}" value="$p{i - 1}$p{i - 1}"/>' for i in range(1, 200))
+    assert (
+        found(
+            folder,
+            f'<scene version="3.0.0"><default name="p0" value="ab"/>{doubled}{mesh("$p199")}</scene>',
+        )
+        == {}
+    )
+
+
+@pytest.mark.parametrize(
+    "folder_name, name, expected",
+    [
+        ("", "a/./b/../c", "a/c"),
+        ("x/y", "../z", "x/z"),
+        ("x", "/abs", "/abs"),
+        ("", "../../a", "../../a"),
+        ("/a", "b//c", "/a/b/c"),
+    ],
+)
+def test_names_are_joined_as_the_farm_does(folder_name, name, expected):
+    assert join(folder_name, name) == expected
