@@ -225,6 +225,11 @@ def test_a_missing_file_is_told_with_its_place(farm):
     assert error.value.line == FOG[: FOG.index("fog.vol")].count("\n") + 1
 
 
+def test_what_the_farm_finds_odd_is_a_warning(farm):
+    with pytest.warns(lightshaft.SceneWarning, match="nothing in the scene asks for .*nothing_asks"):
+        farm.submit(SCENE, spp=2, defines={"nothing_asks": 1})
+
+
 def test_an_error_of_a_dictionary_tells_its_keys(farm):
     with pytest.raises(lightshaft.SceneRejected) as error:
         farm.submit(

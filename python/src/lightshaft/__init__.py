@@ -23,6 +23,7 @@ from .errors import (
     RequestRejected,
     SceneDictError,
     SceneRejected,
+    SceneWarning,
     Unauthorised,
     WaitTimeout,
 )
@@ -50,6 +51,7 @@ __all__ = [
     "RequestRejected",
     "SceneDictError",
     "SceneRejected",
+    "SceneWarning",
     "Snapshot",
     "Unauthorised",
     "WaitTimeout",

@@ -81,6 +81,10 @@ class LightshaftError(Exception):
         return "\n".join(map(str, self.diagnostics)) or self.message
 
 
+class SceneWarning(UserWarning):
+    """What the farm found odd in a scene that it took, such as a parameter that has no effect."""
+
+
 class SceneRejected(LightshaftError):
     """The scene is wrong; `diagnostics` has every error with its place."""
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterable, Mapping
 from types import TracebackType
 from typing import Self, Unpack
 
 from . import job as jobs_of
 from . import models, snapshot, steps, submission, watching
+from .errors import SceneWarning
 from .images import Array
 from .job import JobState
 from .scene_files import PathLike
@@ -67,6 +69,8 @@ class Farm:
         answer = self._transport.run(
             submission.submit(scene, spec, submission.Options(name, folder, allow, assets))
         )
+        for text in submission.warnings_of(answer):
+            warnings.warn(text, SceneWarning, stacklevel=2)
         return self.job(answer["id"])
 
     def job(self, id: str) -> Job:

@@ -72,6 +72,13 @@ def submit(scene: Scene, spec: Mapping[str, Any], options: Options) -> Steps[mod
     return answer  # type: ignore[return-value]
 
 
+def warnings_of(answer: models.SubmitJobAnswer) -> list[str]:
+    texts = [text for text in answer.get("warnings", []) if isinstance(text, str)]
+    if answer.get("reference_same_seed"):
+        texts.append("the reference was rendered of this scene with this seed: the true errors will mean nothing")
+    return texts
+
+
 def prepare(scene: Scene, spec: Mapping[str, Any], options: Options) -> Prepared:
     """The scene's text, and its files with their digests."""
     dictionary = None
