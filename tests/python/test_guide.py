@@ -1,4 +1,4 @@
-"""docs/guide/python.md: its Python blocks run as they stand, one after the other; venv.sh does what its shell block does."""
+"""docs/guide/python.md: its Python blocks run as they stand; venv.sh does what its shell block does."""
 
 import re
 

@@ -226,6 +226,6 @@ def test_every_cut_of_an_image_is_refused(image):
 def test_an_image_that_claims_to_be_huge_is_refused_before_memory_is_taken(image):
     window = struct.pack("<4i", 0, 0, 7, 3)
     assert image.count(window) == 2
-    for corner in ((7, 30_000_000), (2_000_000_000, 3), (30_000, 30_000)):
-        with pytest.raises(lightshaft.BadAnswer):
+    for corner in ((7, 30_000_000), (2_000_000, 3), (30_000, 30_000)):
+        with pytest.raises(lightshaft.BadAnswer, match="claims .* more than a farm makes"):
             decode_layers(image.replace(window, struct.pack("<4i", 0, 0, *corner)))

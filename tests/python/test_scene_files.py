@@ -1,4 +1,4 @@
-"""Which files are sent with a scene: those that it names, where the farm looks for them, none from outside."""
+"""Which files are sent with a scene: those that it names, as the farm looks for them, none from outside."""
 
 import os
 
