@@ -58,11 +58,18 @@ def test_included_files_and_frames_and_defines_are_sent(farm, fog, tmp_path):
     for frame in (3, 4):
         (inside / f"grids/fog_{frame:02}.vol").parent.mkdir(exist_ok=True)
         (inside / f"grids/fog_{frame:02}.vol").write_bytes((fog.parent / "fog.vol").read_bytes())
-    (inside / "main.xml").write_text('<scene version="3.0.0"><include filename="parts/fog.xml"/></scene>')
+    (inside / "main.xml").write_text(
+        '<scene version="3.0.0"><include filename="parts/$what$n.xml"/></scene>'
+    )
+    (inside / "parts/fog.xml").rename(inside / "parts/fog7.xml")
 
-    job = farm.submit(inside / "main.xml", spp=2, frames="3-4", defines={"density": 3})
+    job = farm.submit(
+        inside / "main.xml", spp=2, frames="3-4", defines={"density": 3, "what": "fog", "n": 7}
+    )
 
     frames = job.wait().frames()
+    one = farm.submit(inside / "main.xml", spp=2, frames=4, defines={"density": 3, "what": "fog", "n": 7})
+    assert pixels(one.wait().frames()[0]) == pixels(frames[1])
     assert [frame.view["frame"] for frame in frames] == [3, 4] and all(
         frame.state == "done" for frame in frames
     )
@@ -248,7 +255,14 @@ def test_an_error_of_a_dictionary_tells_its_keys(farm):
 
 @pytest.mark.parametrize(
     "spec, words",
-    [({"spq": 3}, "did you mean 'spp'?"), ({"size": (0, 3)}, "0 x 3"), ({"spp": "many"}, "spp")],
+    [
+        ({"spq": 3}, "did you mean 'spp'?"),
+        ({"size": (0, 3)}, "0 x 3"),
+        ({"spp": "many"}, "spp"),
+        ({"defines": ["a"]}, "defines"),
+        ({"frames": [3]}, "frames"),
+        ({"seed": {1}}, "a set cannot"),
+    ],
 )
 def test_a_wrong_setting_is_told(farm, spec, words):
     with pytest.raises(lightshaft.RequestRejected, match="(?s).*" + words.replace("?", r"\?")):
@@ -291,6 +305,16 @@ def test_a_farm_that_is_down_is_named(local_farm):
             assert farm.workers()
     with pytest.raises(lightshaft.RequestRejected, match="http://"):
         lightshaft.Farm("localhost:8080", "x")
+
+
+def test_certificates_are_checked(tmp_path):
+    with LocalFarm(tmp_path, tls=True) as local:
+        with lightshaft.Farm(local.url(), local.token, ca=local.secrets / "tls/ca.pem") as farm:
+            assert farm.jobs() == []
+        with pytest.raises(lightshaft.FarmUnreachable, match="(?i)certificate"):
+            lightshaft.Farm(local.url(), local.token).jobs()
+    with pytest.raises(lightshaft.RequestRejected, match="no-ca.pem"):
+        lightshaft.Farm("https://farm", "x", ca="no-ca.pem")
 
 
 def test_a_job_that_fails_says_why(farm):

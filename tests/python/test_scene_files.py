@@ -105,8 +105,9 @@ LAUGHS = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 9}">' for i in range(1, 40))
         "\x00\x01",
         f'<!DOCTYPE s [<!ENTITY l0 "l">{LAUGHS}]><scene version="3.0.0">{mesh("&l39;")}</scene>',
         '<!DOCTYPE s [<!ENTITY e SYSTEM "/etc/passwd">]><scene version="3.0.0">' + mesh("&e;") + "</scene>",
+        '<!DOCTYPE s [<!ENTITY e "a.ply">]><scene version="3.0.0">' + mesh("&e;") + "</scene>",
     ],
-    ids=["empty", "cut", "no text", "entities of entities", "entity of a file"],
+    ids=["empty", "cut", "no text", "entities of entities", "entity of a file", "entity"],
 )
 def test_what_cannot_be_read_names_no_files(folder, text):
     assert found(folder, text) == {}

@@ -52,6 +52,8 @@ class Prepared:
 
 def submit(scene: Scene, spec: Mapping[str, Any], options: Options) -> Steps[models.SubmitJobAnswer]:
     settings = {name: value for name, value in spec.items() if value is not None}
+    if isinstance(settings.get("defines"), Mapping):
+        settings["defines"] = {str(name): str(value) for name, value in settings["defines"].items()}
     prepared = yield from work(lambda: prepare(scene, settings, options))
     yield from _send_reference(settings)
     yield from _send_missing(
@@ -105,7 +107,14 @@ def prepare(scene: Scene, spec: Mapping[str, Any], options: Options) -> Prepared
     folders = Folders(
         folder if options.folder is None else options.folder, options.allow, options.assets
     )
-    files = find_files(text, folders, spec.get("defines"), spec.get("frames"))
+    # Settings of a wrong kind are left to the farm, which tells what it wants.
+    defines, frames = spec.get("defines"), spec.get("frames")
+    files = find_files(
+        text,
+        folders,
+        defines if isinstance(defines, Mapping) else None,
+        None if frames is None else str(frames),  # the farm takes the number of one frame, too
+    )
     return Prepared(options.name or name, Source.of_bytes(text), files, dictionary)
 
 
@@ -117,12 +126,7 @@ def _as_json(spec: Mapping[str, Any]) -> dict[str, Any]:
             return value.tolist()
         raise RequestRejected(f"a {type(value).__name__} cannot be the setting of a job")
 
-    settings = (
-        {**spec, "defines": {str(k): str(v) for k, v in spec["defines"].items()}}
-        if "defines" in spec
-        else dict(spec)
-    )
-    loaded: dict[str, Any] = json.loads(json.dumps(settings, default=plain))
+    loaded: dict[str, Any] = json.loads(json.dumps(spec, default=plain))
     return loaded
 
 

@@ -18,13 +18,18 @@ Progress: TypeAlias = Callable[[models.Job], Any] | bool | None
 
 def wait(job: str, progress: Progress, timeout: float | None) -> Steps[models.Job]:
     """The job when it is done. It is asked for again over restarts of the coordinator."""
-    show = _printer() if progress is True else progress or None
+    report = _printer() if progress is True else progress or None
+
+    def show(view: models.Job) -> Steps[None]:
+        if report:
+            report(view)
+        yield from ()
+
     return _follow(job, show, timeout, POLL_SECONDS)
 
 
 def live(job: str, interval: float) -> Steps[models.Job]:
-    """Shows the job below the cell that calls, anew whenever it has come further; ends when the job has
-    ended."""
+    """Shows the job below the cell that calls, anew whenever it has come further; ends when it has ended."""
     try:
         from IPython.display import display
     except ImportError:
@@ -34,45 +39,36 @@ def live(job: str, interval: float) -> Steps[models.Job]:
         ) from None
     handle: Any = None
     shown: Any = None
-    retry = Retry()
-    while True:
-        try:
-            view = yield from get_job(job)
-            state = (view["state"], view.get("units_done"), view.get("progress"))
-            if state != shown:
-                now = yield from snapshot.of_view(view)
-                shown = state
-                if handle is None:
-                    handle = display(now, display_id=True)  # type: ignore[no-untyped-call]
-                else:
-                    handle.update(now)
-            if view["state"] in snapshot.ENDED:
-                return _ended(view)
-            retry.answered()
-            pause = Pause(interval)
-        except (JobFailed, MissingPackage):
-            raise
-        except LightshaftError as error:
-            pause = retry.pause(error)
-        yield pause
+
+    def show(view: models.Job) -> Steps[None]:
+        nonlocal handle, shown
+        state = (view["state"], view.get("units_done"), view.get("progress"))
+        if state == shown:
+            return
+        now = yield from snapshot.of_view(view)
+        shown = state
+        if handle is None:
+            handle = display(now, display_id=True)  # type: ignore[no-untyped-call]
+        else:
+            handle.update(now)
+
+    return (yield from _follow(job, show, None, interval))
 
 
 def _follow(
-    job: str, show: Callable[[models.Job], Any] | None, timeout: float | None, interval: float
+    job: str, show: Callable[[models.Job], Steps[None]], timeout: float | None, interval: float
 ) -> Steps[models.Job]:
     deadline = None if timeout is None else time.monotonic() + timeout
     retry = Retry()
     while True:
-        view = None
         try:
             view = yield from get_job(job)
+            yield from show(view)
             retry.answered()
             pause = Pause(interval)
         except LightshaftError as error:
             pause = retry.pause(error)
-        if view is not None:
-            if show:
-                show(view)
+        else:
             if view["state"] in snapshot.ENDED:
                 return _ended(view)
         if deadline is not None and time.monotonic() >= deadline:
