@@ -140,19 +140,33 @@ def test_progress_goes_to_a_function_or_to_the_standard_error_stream(farm, capsy
     assert capsys.readouterr().err.startswith("done 100 %, 64 samples per pixel, relMSE ")
 
 
-def test_a_wait_goes_on_over_a_restart_of_the_coordinator(tmp_path):
+def test_a_wait_goes_on_over_a_restart_of_the_coordinator(tmp_path, monkeypatch):
     with LocalFarm(tmp_path) as local, lightshaft.Farm(local.url(), local.token) as farm:
         job = farm.submit(SCENE, spp=4)
-        views = []
+        views, failures = [], []
 
-        def restart(view):
+        def kill_at_first(view):
             if not views:
                 local.coordinator.kill()
-                local.start_coordinator()
-                local.add_worker(fake=False)
             views.append(view)
 
-        assert job.wait(progress=restart).state == "done" and views[0]["state"] == "queued"
+        send = transport.SyncTransport._send
+
+        def start_after_a_failure(self, call):
+            try:
+                return send(self, call)
+            except lightshaft.FarmUnreachable as error:
+                if not failures:
+                    local.start_coordinator()
+                    local.add_worker(fake=False)
+                failures.append(error)
+                raise
+
+        monkeypatch.setattr(transport.SyncTransport, "_send", start_after_a_failure)
+
+        assert job.wait(progress=kill_at_first).state == "done"
+
+        assert views[0]["state"] == "queued" and failures
 
 
 def test_a_job_is_changed_and_removed(farm, local_farm):

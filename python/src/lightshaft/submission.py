@@ -77,7 +77,7 @@ def submit(scene: Scene, spec: Mapping[str, Any], options: Options) -> Steps[mod
 def warnings_of(answer: models.SubmitJobAnswer) -> list[str]:
     texts = [text for text in answer.get("warnings", []) if isinstance(text, str)]
     if answer.get("reference_same_seed"):
-        texts.append("the reference was rendered of this scene with this seed: the true errors will mean nothing")
+        texts.append("the reference has this scene and this seed: the true errors will mean nothing")
     return texts
 
 
