@@ -56,7 +56,7 @@ struct Factors {
   bool light, heat;
 };
 
-void check_emission(const Params& p, const Factors& given, const HeterogeneousMedium& m, Report& report) {
+void check_medium(const Params& p, const Factors& given, const HeterogeneousMedium& m, Report& report) {
   const int sources = m.emission.has_value() + m.source_radiance.has_value() + m.temperature.has_value();
   if (sources > 1)
     report.error(p.object().at,
@@ -71,7 +71,7 @@ void check_emission(const Params& p, const Factors& given, const HeterogeneousMe
                  fmt::format("{} gives emission_scale, but none of emission, source_radiance and temperature",
                              p.title()));
 }
-void check_emission(const Params&, const Factors&, const HomogeneousMedium&, Report&) {}
+void check_medium(const Params&, const Factors&, const HomogeneousMedium&, Report&) {}
 
 }  // namespace
 
@@ -125,10 +125,12 @@ std::optional<PhaseIndex> Reader::read_phase(const Element& e) {
 }
 
 std::optional<MediumIndex> Reader::read_medium(const Element& e) {
-  if (e.get("type") == "homogeneous") return read_any_medium<HomogeneousMedium>(e);
-  if (e.get("type") == "heterogeneous") return read_any_medium<HeterogeneousMedium>(e);
-  unknown_plugin(e, report_);
-  return std::nullopt;
+  std::optional<MediumIndex> read;
+  const auto read_as = [&]<class... Kinds>(std::type_identity<std::variant<Kinds...>>) {
+    return ((e.get("type") == kInfo<Kinds>.name && (read = read_any_medium<Kinds>(e), true)) || ...);
+  };
+  if (!read_as(std::type_identity<Medium>{})) unknown_plugin(e, report_);
+  return read;
 }
 
 template <class T>
@@ -138,7 +140,7 @@ std::optional<MediumIndex> Reader::read_any_medium(const Element& e) {
   if (e.old) read_old_coefficients(p, medium, report_);
   const Factors given(p);
   bind(p, medium);
-  check_emission(p, given, medium, report_);
+  check_medium(p, given, medium, report_);
   if constexpr (std::is_same_v<T, HeterogeneousMedium>)
     if (const Rgb* t = medium.temperature ? constant(*medium.temperature) : nullptr;
         t && ((*t)[0] != (*t)[1] || (*t)[1] != (*t)[2]))

@@ -5,8 +5,7 @@
 //
 //   describe(visitor, value)  calls  visitor.field(Field{...}, value.member)  for each member.
 //
-// To add a type: its struct and variant row in scene.h, its kInfo and describe() here, and its row in the
-// reader's table; a missing part is a compile error.
+// CONTRIBUTING.md says what else a new type needs.
 #pragma once
 
 #include <array>

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/base/overloaded.h"
+#include "common/scene/schema/medium_traits.h"
 #include "worker/render/math/blackbody.h"
 #include "worker/render/math/color.h"
 #include "worker/render/media/grid_load.h"
@@ -198,7 +199,8 @@ Result<Medium> heterogeneous(const Scene& scene, const HeterogeneousMedium& m, c
   b.out.phase = *phase;
   if (auto ok = b.density(); !ok) return tl::unexpected(ok.error());
   if (auto ok = b.albedo(); !ok) return tl::unexpected(ok.error());
-  if (auto ok = b.set_emission(); !ok) return tl::unexpected(ok.error());
+  if (scene::traits_of(m, scene.volumes).emits)
+    if (auto ok = b.set_emission(); !ok) return tl::unexpected(ok.error());
   return b.out;
 }
 
