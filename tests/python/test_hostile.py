@@ -10,7 +10,7 @@ import exr_layers
 import pytest
 
 import lightshaft
-from lightshaft import steps
+from lightshaft import snapshot, steps
 from lightshaft.errors import LightshaftError
 from lightshaft.images import decode_layers
 
@@ -229,3 +229,32 @@ def test_an_image_that_claims_to_be_huge_is_refused_before_memory_is_taken(image
     for corner in ((7, 30_000_000), (2_000_000, 3), (30_000, 30_000)):
         with pytest.raises(lightshaft.BadAnswer, match="claims .* more than a farm makes"):
             decode_layers(image.replace(window, struct.pack("<4i", 0, 0, *corner)))
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        {"relmse_ci95": 5},
+        {"relmse": "small"},
+        {"verdict": "x"},
+        {"frames": "all"},
+        {"frames": {"list": [{"frame": 1}]}},
+        {"frames": {"list": [7], "current": 1}},
+        {"state": "\x1b[2Jdone"},
+    ],
+    ids=str,
+)
+def test_a_job_whose_figures_are_of_other_kinds_is_refused(stub, broken):
+    stub.answers["/api/v1/jobs/j-1"] = (200, {}, json.dumps({**JOB, **broken}).encode())
+    with pytest.raises(lightshaft.BadAnswer):
+        lightshaft.Farm(stub.url).job("j-1")
+
+
+def test_a_sequence_without_a_current_frame_is_shown_without_a_picture(stub):
+    stub.answers["/api/v1/jobs/j-1"] = (200, {}, json.dumps({**JOB, "frames": {"list": []}}).encode())
+    assert "no picture yet" in lightshaft.Farm(stub.url).job("j-1").snapshot()._repr_html_()
+
+
+def test_a_table_with_a_field_without_end_is_refused():
+    with pytest.raises(lightshaft.BadAnswer):
+        snapshot.parse_curve("seconds\n" + "1" * 200_000)

@@ -31,7 +31,10 @@ def get_curve(job: str) -> Steps[Curve]:
 
 def parse_curve(text: str) -> Curve:
     """{column: its values}; NaN where there is none."""
-    rows = list(csv.reader(io.StringIO(text)))
+    try:
+        rows = list(csv.reader(io.StringIO(text)))
+    except csv.Error:
+        raise BadAnswer("the farm's table of errors is not one") from None
     names = rows[0] if rows else []
     if len(rows) > MAX_ROWS or any(len(row) != len(names) for row in rows if row):
         raise BadAnswer("the farm's table of errors is not one")
@@ -57,7 +60,7 @@ def of_view(view: models.Job) -> Steps[Snapshot]:
             (
                 frame["id"]
                 for frame in frames.get("list", [])
-                if frame.get("frame") == frames["current"]
+                if frame.get("frame") == frames.get("current")
             ),
             shown,
         )

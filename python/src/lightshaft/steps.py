@@ -191,6 +191,30 @@ def change_job(job: str, change: Mapping[str, Any]) -> Steps[models.Job]:
 
 def _checked(steps: Steps[dict[str, Any]]) -> Steps[models.Job]:
     view = yield from steps
-    if not isinstance(view.get("id"), str) or not isinstance(view.get("state"), str):
+    if not _describes_a_job(view):
         raise BadAnswer("the farm's answer describes no job")
     return view  # type: ignore[return-value]
+
+
+def _describes_a_job(view: dict[str, Any]) -> bool:
+    """Whether what this package reads of a job has the kinds that the OpenAPI document gives it."""
+
+    def number(value: object) -> bool:
+        return value is None or isinstance(value, (int, float))
+
+    interval, verdict, frames = view.get("relmse_ci95"), view.get("verdict"), view.get("frames")
+    return (
+        isinstance(view.get("id"), str)
+        and isinstance(view.get("state"), str)
+        and view["state"].isalpha()  # it is printed in terminals
+        and all(number(view.get(key)) for key in ("progress", "spp_done", "relmse", "eta_seconds"))
+        and (interval is None or (isinstance(interval, list) and all(map(number, interval))))
+        and (verdict is None or isinstance(verdict, dict))
+        and (frames is None or (isinstance(frames, dict) and _lists_frames(frames.get("list", []))))
+    )
+
+
+def _lists_frames(frames: object) -> bool:
+    return isinstance(frames, list) and all(
+        isinstance(frame, dict) and isinstance(frame.get("id"), str) for frame in frames
+    )
