@@ -2,12 +2,14 @@
 """Denoised images of Lightshaft and of Blender Cycles after the same CPU time.
 
 usage: denoised_race.py [--scenes DIR] [--names a,b,c] [--time S] [--seeds N] [--first SEED] [--out PAGE.md]
+       denoised_race.py --difference SPP [--scenes DIR] [--names a,b,c] [--first SEED]
 DIR holds NAME.xml and refs/NAME.0.exr, refs/NAME.1.exr (two independent references); without, the bench scenes are made and measured.
 Cycles renders each seed for S CPU seconds (over two threads), denoised by its own Open Image Denoise; Lightshaft then renders as many
 samples as fit into the CPU time that Cycles took, with --denoise. What both need before the first sample and for denoising is not
 counted. relMSE is (x - ref0)(x - ref1) / (ref^2 + 0.01), free of the references' noise in the mean; its standard error is that over
-seeds. The references are Lightshaft's: where the two renderers differ (a texture filter, a step through a grid), Cycles pays for it,
-so a share of its error that more samples would not remove is no reproach to it.
+seeds. The references of the default scenes are Cycles' own: where the two renderers differ (a texture filter, a step through a grid),
+Lightshaft pays for it. --difference tells by how much: the mean of (a - ref0)(b - ref1) / (ref^2 + 0.01) over two images of
+Lightshaft with seeds and SPP samples of their own, which is the squared difference of what both renderers converge to.
 Needs the packages bpy, numpy and OpenEXR, and Open Image Denoise (deploy/install-denoiser.sh).
 """
 import argparse
@@ -66,6 +68,14 @@ def row(scene, references, asked, folder):
             f"| {statistics.mean(s[1] for s in spps):.0f} | {spread(cycles)} | {statistics.mean(cycles) / statistics.mean(denoised):.1f} |")
 
 
+def difference(scene, references, asked, folder):
+    first, second = (load(r) for r in references)
+    a, b = (ours(scene, folder, asked.difference, seed)[0][0] for seed in (asked.first, asked.first + 1))
+    mean = (first + second) / 2
+    products = ((a - first) * (b - second) + (a - second) * (b - first)) / 2 / (mean * mean + .01)
+    return f"{scene.stem}: {products.mean():.2g} ± {products.std() / products.size ** .5:.1g}"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", type=pathlib.Path)
@@ -74,14 +84,20 @@ def main():
     parser.add_argument("--time", type=float, default=10, help="CPU seconds")
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--first", type=int, default=1)
+    parser.add_argument("--difference", type=int, metavar="SPP")
     parser.add_argument("--out", type=pathlib.Path)
     asked = parser.parse_args()
     scenes = bench_scenes.scenes(asked.scenes)
     lines = ["| scene | spp | relMSE | denoised | told | Cycles' spp | denoised | Cycles / Lightshaft |", "|---|---|---|---|---|---|---|---|"]
     for name in asked.names.split(","):
         with tempfile.TemporaryDirectory() as folder:
+            if asked.difference:
+                print(difference(scenes / f"{name}.xml", bench_scenes.references(scenes, name), asked, pathlib.Path(folder)), flush=True)
+                continue
             lines.append(row(scenes / f"{name}.xml", bench_scenes.references(scenes, name), asked, pathlib.Path(folder)))
         print(lines[-1], flush=True)
+    if asked.difference:
+        return
     commit = subprocess.run(["git", "describe", "--always", "--dirty", "--abbrev=8"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
     command = " ".join(pathlib.Path(a).name if "/" in a else a for a in sys.argv[1:])
     page = (f"# Denoised images beside Cycles\n\nMade by `tests/bench/denoised_race.py {command}`, commit {commit}: {asked.time:g} CPU seconds an image, "
