@@ -72,7 +72,7 @@ def difference(scene, references, asked, folder):
     first, second = (load(r) for r in references)
     a, b = (ours(scene, folder, asked.difference, seed)[0][0] for seed in (asked.first, asked.first + 1))
     mean = (first + second) / 2
-    products = ((a - first) * (b - second) + (a - second) * (b - first)) / 2 / (mean * mean + .01)
+    products = (((a - first) * (b - second) + (a - second) * (b - first)) / 2 / (mean * mean + .01)).mean(axis=-1)
     return f"{scene.stem}: {products.mean():.2g} ± {products.std() / products.size ** .5:.1g}"
 
 
