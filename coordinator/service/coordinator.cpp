@@ -234,7 +234,7 @@ Result<void> Coordinator::wait(const JobId& id) const {
   return {};
 }
 
-// What jobs have rendered
+// Images and reports
 
 Result<std::vector<std::byte>> Coordinator::image_exr(const JobId& id) const {
   return parts_->pictures.image_exr(id);

@@ -67,7 +67,7 @@ class Coordinator {
   Result<void> remove(const JobId& id);
   Result<void> wait(const JobId& id) const;  // returns when the job is done, failed or cancelled
 
-  // What jobs have rendered
+  // Images and reports
 
   // The current image, or the final one
   Result<std::vector<std::byte>> image_exr(const JobId& id) const;

@@ -1,4 +1,4 @@
-// What users do to jobs and sequences: change and remove them. Every change is checked completely before any
+// Changes and removes jobs and sequences for their users. Every change is checked completely before any
 // part of it is applied.
 #pragma once
 

@@ -26,9 +26,9 @@ class Pictures {
   Result<std::vector<std::byte>> error_png(const JobId& id) const;
   Result<std::vector<std::byte>> samples_png(const JobId& id) const;
   Result<std::vector<TileView>> tiles(const JobId& id) const;
-  // Of a sequence: values of every frame, and of all together
+  // The report of a sequence has the values of each frame and those of all frames together.
   Result<std::string> report_json(const JobId& id) const;
-  // Of a sequence: the lines of all frames, by time
+  // The log of a sequence has the lines of all frames, ordered by time.
   Result<std::string> log(const JobId& id) const;
   // Returns the path of the file `name` of a done job; empty if there is none.
   std::filesystem::path final_file(const JobId& id, const std::string& name) const;

@@ -1,4 +1,4 @@
-// What the header of a final image says about the job.
+// Makes the header of a final image, which describes the job.
 #pragma once
 
 #include "common/image/exr/final_image.h"

@@ -16,8 +16,8 @@ namespace {
 // Writes that wait for the disk; above this number, results wait, too
 constexpr std::size_t kMaxBackgroundWrites = 4096;
 
-// What is to become of a result. It is asked when the result arrives, before it is stored and before it is
-// accepted, since the farm goes on meanwhile.
+// How to handle a result. It is decided anew when the result arrives, before it is stored and before it is
+// accepted, since the farm's state may have changed.
 enum class Disposition {
   drop,         // nobody needs it
   other_class,  // it is of another numeric class than its job

@@ -48,7 +48,7 @@ class ResultPipeline {
     Verified verified;
     double seconds = 0;  // time spent on verification
   };
-  // What storing a result has come to
+  // The outcome of storing a result
   struct Stored {
     std::shared_ptr<PartialLog> log;  // where it is to be stored; null: it is not
     double at_seconds = 0;            // on its job's clock

@@ -75,6 +75,17 @@ def row(name, size, asked, folder):
             f"| {mean(true_rmse) ** .5:.3g} | {mean(told_rmse) ** .5:.3g} | {share(covered_rmse)} |")
 
 
+def publish(title, about, lines, out):
+    """Writes the page with the table to the file `out`, or prints it. `{made}` in `about` is the command and its commit."""
+    commit = subprocess.run(["git", "describe", "--always", "--dirty", "--abbrev=8"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
+    command = " ".join(pathlib.Path(a).name if "/" in a else a for a in sys.argv)
+    page = f"# {title}\n\n" + about.format(made=f"Made by `tests/bench/{command}`, commit {commit}") + "\n\n" + "\n".join(lines) + "\n"
+    if out:
+        out.write_text(page)
+    else:
+        print(page)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="+")
@@ -90,14 +101,8 @@ def main():
             name, _, size = named.partition("@")
             lines.append(row(name, size, asked, pathlib.Path(folder)))
             print(lines[-1], flush=True)
-    commit = subprocess.run(["git", "describe", "--always", "--dirty", "--abbrev=8"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
-    command = " ".join(pathlib.Path(a).name if "/" in a else a for a in sys.argv)
-    page = (f"# The error of denoised images\n\nMade by `tests/bench/{command}`, commit {commit}. What the columns are: see the script, and "
-            "[design/denoising.md](../design/denoising.md) for the estimate.\n\n" + "\n".join(lines) + "\n")
-    if asked.out:
-        asked.out.write_text(page)
-    else:
-        print(page)
+    publish("The error of denoised images", "{made}. What the columns are: see the script, and "
+            "[design/denoising.md](../design/denoising.md) for the estimate.", lines, asked.out)
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ import sys
 import tempfile
 
 import bench_scenes
-from denoised import layers
+from denoised import layers, publish
 from efficiency import BIN, ROOT, load, relmse
 
 ADAPTER = ROOT / "tests" / "bench" / "adapters" / "blender_cycles.py"
@@ -98,14 +98,8 @@ def main():
         print(lines[-1], flush=True)
     if asked.difference:
         return
-    commit = subprocess.run(["git", "describe", "--always", "--dirty", "--abbrev=8"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
-    command = " ".join(pathlib.Path(a).name if "/" in a else a for a in sys.argv[1:])
-    page = (f"# Denoised images beside Cycles\n\nMade by `tests/bench/denoised_race.py {command}`, commit {commit}: {asked.time:g} CPU seconds an image, "
-            f"{asked.seeds} seeds, mean and its standard error. What the columns are and what is counted: see the script.\n\n" + "\n".join(lines) + "\n")
-    if asked.out:
-        asked.out.write_text(page)
-    else:
-        print(page)
+    publish("Denoised images beside Cycles", f"{{made}}: {asked.time:g} CPU seconds an image, {asked.seeds} seeds, mean and its standard "
+            "error. What the columns are and what is counted: see the script.", lines, asked.out)
 
 
 if __name__ == "__main__":

@@ -174,7 +174,7 @@ def test_nothing_is_sent_from_tls_to_plain_text_or_to_what_is_no_http(place):
     call = steps.ask(steps.Call("GET", "/x"))
     next(call)
     with pytest.raises(lightshaft.BadAnswer, match="not https"):
-        call.send(steps.Reply(307, {"location": place}, b"", "https://farm/x"))
+        call.send(steps.Reply(307, {"location": place}, b"", "https://farm.example/x"))
 
 
 def test_names_are_shown_and_do_nothing(farm, stub):

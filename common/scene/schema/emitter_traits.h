@@ -1,4 +1,4 @@
-// What the scene's description says of an emitter without a shape.
+// Properties of an emitter without a shape that follow from its parameters.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// What the scene's description says of a medium, before any grid is read.
+// Properties of a medium that follow from its parameters. Grid files are not read.
 #pragma once
 
 #include "common/scene/scene.h"

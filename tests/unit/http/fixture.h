@@ -9,10 +9,13 @@
 
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/message/uri.h"
+#include "tests/support/eventually.h"
 #include "tests/unit/http/watched_stores.h"
 #include "tests/unit/service/fake_farm.h"
 
 namespace ls::http::testing {
+
+using test::eventually;
 
 inline constexpr const char* kToken = "0123456789abcdef0123456789abcdef";
 
@@ -49,16 +52,6 @@ class CoordinatorTest : public ::testing::Test {
     auto opened = Coordinator::open(std::move(options));
     EXPECT_TRUE(opened) << opened.error().message;
     return std::move(*opened);
-  }
-  // Waits for what another thread brings about; the test's own time limit ends it otherwise.
-  template <class Condition>
-  static bool eventually(Condition condition) {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-    while (!condition()) {
-      if (std::chrono::steady_clock::now() > end) return false;
-      std::this_thread::yield();
-    }
-    return true;
   }
   const std::shared_ptr<WatchedBlobs> blobs = std::make_shared<WatchedBlobs>();
   const std::shared_ptr<WatchedRecords> records = std::make_shared<WatchedRecords>();

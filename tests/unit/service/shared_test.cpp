@@ -6,11 +6,14 @@
 #include <thread>
 
 #include "coordinator/store/blobs/memory_blobs.h"
+#include "tests/support/eventually.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/service/moving_store.h"
 #include "tests/unit/store/temp_folder.h"
 
 namespace ls::coordinator {
+
+using test::eventually;
 namespace {
 
 // Blobs a network away that answers when a test lets it.
@@ -67,16 +70,6 @@ struct Shared : ::testing::Test {
   void inherit(const StoredJob& job) {
     store->will_tell({.inherited = {{job, "next-door"}}});
     coordinator->tick();
-  }
-  // Waits for what the keeper's thread brings about.
-  template <class Condition>
-  static bool eventually(Condition condition) {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-    while (!condition()) {
-      if (std::chrono::steady_clock::now() > end) return false;
-      std::this_thread::yield();
-    }
-    return true;
   }
 };
 

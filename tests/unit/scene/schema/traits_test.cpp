@@ -1,4 +1,4 @@
-// What is known of media and emitters before anything is rendered.
+// Properties of media and emitters that follow from their parameters.
 #include <gtest/gtest.h>
 
 #include "common/scene/schema/emitter_traits.h"

@@ -1,0 +1,20 @@
+// Waits for a condition that another thread brings about.
+#pragma once
+
+#include <chrono>
+#include <thread>
+
+namespace ls::test {
+
+// Returns true once `condition()` holds, and false if it does not within 20 s: a test hangs no longer.
+template <class Condition>
+bool eventually(Condition condition) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::yield();
+  }
+  return true;
+}
+
+}  // namespace ls::test
