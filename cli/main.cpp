@@ -7,13 +7,15 @@
 #include <string_view>
 
 #include "cli/commands/commands.h"
+#include "cli/doctor/machine_facts.h"
 #include "cli/local/local_farm.h"
 #include "cli/output/console.h"
 #include "common/base/log.h"
+#include "common/command_line/command.h"
 
 namespace {
 
-// Commands report what matters; the log of coordinator and worker is for debugging.
+// Shows only important log lines of coordinator and worker: commands report everything relevant themselves.
 void set_log_level() {
   const char* level = std::getenv("LIGHTSHAFT_LOG");
   const std::string_view wanted = level ? level : "off";
@@ -28,6 +30,7 @@ void set_log_level() {
 int main(int argc, char** argv) {
   using namespace ls::cli;
   if (argc == 3 && std::string_view(argv[1]) == kRenderChildFlag) return run_render_child(argv[2]);
+  if (argc == 2 && std::string_view(argv[1]) == kSandboxProbeFlag) return run_sandbox_probe();
   ::signal(SIGPIPE, SIG_IGN);
   set_log_level();
   CLI::App app("Renders light in smoke, steam, clouds and fire: on this machine, or on a farm of many.",
@@ -42,11 +45,15 @@ int main(int argc, char** argv) {
   add_convert(app, action);
   add_submit(app, action);
   add_farm_commands(app, action);
+  add_farm_up(app, action);
   add_tokens(app, action);
   add_merge(app, action);
   add_validate(app, action);
   add_verify(app, action);
   add_compare(app, action);
+  add_doctor(app, action);
+  add_completion(app, action);
+  ls::add_man_page_option(app, LIGHTSHAFT_VERSION);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

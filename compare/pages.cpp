@@ -100,4 +100,14 @@ std::string html_page(const Results& results) {
   return report::document(kTitle, std::string(kCss) + std::string(report::plot_css()), body);
 }
 
+std::map<std::string, std::string> files_of(const Results& results) {
+  std::map<std::string, std::string> files{{"points.csv", points_csv(results)},
+                                           {"summary.csv", summary_csv(results)},
+                                           {"forecasts.csv", forecasts_csv(results)},
+                                           {"report.md", markdown(results)},
+                                           {"index.html", html_page(results)}};
+  for (const Race& race : results.races) files[file_name(race.scene) + ".svg"] = plot_svg(race);
+  return files;
+}
+
 }  // namespace ls::race

@@ -77,18 +77,18 @@ class Sum {
   double weights_ = 0;
 };
 
-// Returns our entrant with the smallest error as estimated by its final images, of those that render
+// Returns the entrant with the smallest error as estimated by its final images, of those that render
 // everything.
-std::optional<std::size_t> best_of_ours(const Race& race, const Lanes& lanes, std::size_t seeds) {
+std::optional<std::size_t> best_of(const Race& race, const Lanes& lanes, std::size_t seeds) {
   std::optional<std::size_t> best;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t e = 0; e < race.entrants.size(); ++e) {
-    if (!race.entrants[e].ours || !race.entrants[e].whole) continue;
+    if (!race.entrants[e].whole) continue;
     double error = 0;
     std::size_t found = 0;
     for (const Lane& lane : lanes.lanes)
       if (lane.entrant == e && !lane.checkpoints.empty())
-        error += lane.checkpoints.back().estimate->relmse, ++found;
+        error += lane.checkpoints.back().estimate.relmse, ++found;
     if (found == seeds && error < least) best = e, least = error;
   }
   return best;
@@ -130,8 +130,7 @@ void take_notes(Race& race, const Lanes& lanes) {
 tl::unexpected<Error> no_judge() {
   return fail(Errc::invalid_argument,
               "without --reference the pictures are measured against those of the other seeds by an "
-              "integrator of ours that "
-              "sees all of the scene: there must be one, and two seeds at least");
+              "integrator that sees all of the scene: there must be one, and two seeds at least");
 }
 
 }  // namespace
@@ -150,8 +149,8 @@ Result<Lanes> run_lanes(std::size_t entrants, std::size_t seeds, const MakeRacer
 }
 
 Result<void> judges_itself(const Race& race, std::size_t seeds) {
-  const bool sees_all = std::any_of(race.entrants.begin(), race.entrants.end(),
-                                    [](const Entrant& e) { return e.ours && e.whole; });
+  const bool sees_all =
+      std::any_of(race.entrants.begin(), race.entrants.end(), [](const Entrant& e) { return e.whole; });
   return seeds >= 2 && sees_all ? Result<void>() : no_judge();
 }
 
@@ -162,7 +161,7 @@ Result<void> judge(Race& race, const Lanes& lanes, std::size_t seeds,
   std::optional<std::size_t> best;
   if (!reference) {
     if (auto possible = judges_itself(race, seeds); !possible) return possible;
-    best = best_of_ours(race, lanes, seeds);
+    best = best_of(race, lanes, seeds);
     if (!best) return no_judge();
     race.reference = fmt::format(
         "the final pictures of all other seeds by {}: the means of their halves are two references, "

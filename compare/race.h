@@ -1,9 +1,10 @@
-// A race on one scene. An entrant is an integrator or a program that takes part; it runs once per seed, and
-// each of these runs is a lane. Lanes run in turns, then their images are judged.
+// A race on one scene. An entrant is an integrator that takes part; it runs once per seed, and each of these
+// runs is a lane. Lanes run in turns, then their images are judged.
 #pragma once
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,7 +15,6 @@ namespace ls::race {
 
 struct Entrant {
   std::string name;
-  bool ours = false;
   // It renders everything that the scene has, so its images can serve as references.
   bool whole = false;
 };
@@ -68,12 +68,12 @@ struct Race {
   std::vector<std::string> notes;
 };
 
-// Checks that judge() can work without a reference. invalid_argument: no entrant of ours renders everything
-// that the scene has, or there are not enough seeds.
+// Checks that judge() can work without a reference. invalid_argument: no entrant renders everything that
+// the scene has, or there are not enough seeds.
 Result<void> judges_itself(const Race& race, std::size_t seeds);
 
 // Measures the errors of all images against `reference`. Without a reference, it makes one for each seed s
-// from the final images of the best of our own entrants for all other seeds: one image from the means of
+// from the final images of the best entrant for all other seeds: one image from the means of
 // their halves A (even samples), another from those of their halves B (odd samples). These two are
 // independent of the images of seed s and of each other. invalid_argument: there is no such entrant, or only
 // one seed.

@@ -29,14 +29,13 @@ double seconds_of(const timeval& t) {
   return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
 }
 
-double cpu_seconds(int whose) {
+// User and system time of this process.
+double cpu_seconds() {
   rusage usage{};
-  return ::getrusage(whose, &usage) == 0 ? race::cpu_seconds(usage) : 0;
+  return ::getrusage(RUSAGE_SELF, &usage) == 0 ? seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime) : 0;
 }
 
 }  // namespace
-
-double cpu_seconds(const rusage& usage) { return seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime); }
 
 Result<void> use_cores(int count) {
   cpu_set_t all, some;
@@ -80,7 +79,7 @@ Others::Times Others::taken() {
     if (i != kIdle && i != kWaiting) times.busy += ticks / tick;
   }
   if (!file || name != "cpu") return {};
-  times.own = cpu_seconds(RUSAGE_SELF) + cpu_seconds(RUSAGE_CHILDREN);
+  times.own = cpu_seconds();
   return times;
 }
 

@@ -1,28 +1,24 @@
-// The machine that a race runs on, and the cores that every racer may use.
+// The machine that a race runs on, and the cores that it may use.
 #pragma once
-
-#include <sys/resource.h>
 
 #include "common/base/error.h"
 #include "compare/results.h"
 
 namespace ls::race {
 
-// Restricts this process, its threads and the programs it starts to `count` of its cores. Call before any
+// Restricts this process and its threads to `count` of its cores. Call before any
 // thread is created. resource_exhausted: the process has fewer cores.
 Result<void> use_cores(int count);
 
 // Returns the machine's processor and the number of cores used, such as "AMD EPYC 7B13, 2 of 8 cores".
 std::string machine_words(int cores);
-double cpu_seconds(const rusage& usage);  // user and system
-double load_average();                    // the kernel's one-minute average; negative: unknown
+double load_average();  // the kernel's one-minute average; negative: unknown
 
 // Measures the load of other processes since its construction.
 class Others {
  public:
   Others() : start_(taken()) {}
-  // Returns the share, 0 to 1, of the time of all cores that was used neither by this process nor by the
-  // programs it waited for. Negative: unknown.
+  // Returns the share, 0 to 1, of the time of all cores that was not used by this process. Negative: unknown.
   double share() const;
 
  private:

@@ -1,9 +1,8 @@
-// A participant in a race: one of our integrators or an external program, on one scene with one seed.
+// A participant in a race: an integrator on one scene with one seed.
 #pragma once
 
 #include <atomic>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,8 +31,8 @@ struct Conditions {
 struct Checkpoint {
   double spp = 0;
   Cost cost;
-  bool last = false;                   // true for the racer's last image
-  std::optional<ImageError> estimate;  // the image's own error estimate; ours only
+  bool last = false;    // true for the racer's last image
+  ImageError estimate;  // the image's own error estimate
   std::filesystem::path picture;
 };
 
@@ -44,9 +43,8 @@ class Racer {
   // Runs the racer for one turn. An error ends its participation. failed_precondition: `stop` was set.
   virtual Result<void> take_turn(const std::atomic<bool>& stop) = 0;
   virtual std::vector<Checkpoint> checkpoints() const = 0;
-  // The files with the means of the two halves of the samples of the last image, written by keep(); empty for
-  // external programs.
-  virtual std::vector<std::filesystem::path> halves() const { return {}; }
+  // The files with the means of the two halves of the samples of the last image, written by keep().
+  virtual std::vector<std::filesystem::path> halves() const = 0;
   virtual std::vector<std::string> notes() const { return {}; }  // remarks for the report
 };
 

@@ -1,4 +1,4 @@
-// Lightshaft itself in a race: renders and folds the rounds of a job as usual, on threads of this process.
+// An integrator in a race: renders and folds the rounds of a job as usual, on threads of this process.
 // Its time includes rendering, folding and estimating the error, but not loading the scene.
 #pragma once
 

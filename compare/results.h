@@ -1,8 +1,8 @@
 // The files of a comparison: tables for programs (CSV), a page for people (HTML), the same in Markdown, and a
-// plot of each scene (SVG). All functions are pure: the same results give the same text. An entrant is an
-// integrator or a program that takes part.
+// plot of each scene (SVG). All functions are pure: the same results give the same text.
 #pragma once
 
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,8 +31,7 @@ struct Results {
 };
 
 // A row per image, with the columns scene, entrant, seed, spp, wall_seconds, cpu_seconds, seconds (on the
-// race's clock), relmse, rmse, estimated_relmse, estimated_lo, estimated_hi (these three for our integrators
-// only), last.
+// race's clock), relmse, rmse, estimated_relmse, estimated_lo, estimated_hi, last.
 std::string points_csv(const Results& results);
 // A row per entrant and scene, with the columns scene, entrant, seeds, spp, seconds, relmse, efficiency,
 // slope, ratio, spread; relmse, efficiency, slope and ratio are followed by the columns _lo and _hi of their
@@ -44,6 +43,9 @@ std::string forecasts_csv(const Results& results);
 
 std::string markdown(const Results& results);
 std::string html_page(const Results& results);
+
+// All of these with their plots, by the names that the files have.
+std::map<std::string, std::string> files_of(const Results& results);
 
 // The plot of one race, as a separate SVG file; file_name() makes the scene's name safe for a path.
 std::string plot_svg(const Race& race);

@@ -1,12 +1,10 @@
-// Decides which racer (a participant in a race) runs next, and for how long. The functions are pure: times
-// are arguments, no clock is read.
+// Decides which racer (an integrator with one seed) runs next, and for how long. The functions are pure:
+// times are arguments, no clock is read.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <string>
-#include <vector>
 
 #include "common/image/frame/rounds.h"
 
@@ -16,7 +14,6 @@ namespace ls::race {
 // by the number of threads: on a quiet machine this equals wall time, and other programs on a busy machine
 // change it only through shared caches and memory.
 enum class RaceClock { wall, cpu };
-std::string to_string(RaceClock clock);
 
 // A cost: wall seconds, and CPU seconds of all threads.
 struct Cost {
@@ -34,9 +31,8 @@ struct Turn {
   double expected = 0;  // seconds expected for the next turn; 0: unknown
 };
 // Returns the index of the racer that runs next: the one for which used + expected / 2, the middle of its
-// next turn, is smallest. So short turns of the racers alternate, and a single long turn falls into the
-// middle of the others' turns. Among equals, the first one counting cyclically from index `lap` runs, so that
-// no racer always goes first. nullopt: all are done.
+// next turn, is smallest. So turns alternate. Among equals, the first one counting cyclically from index
+// `lap` runs, so that no racer always goes first. nullopt: all are done.
 std::optional<std::size_t> next_turn(std::span<const Turn> turns, std::size_t lap);
 
 // Returns the samples that a render adds next: those of round `k` (a fixed range of samples), cut to what
@@ -46,20 +42,5 @@ std::optional<std::size_t> next_turn(std::span<const Turn> turns, std::size_t la
 // sixteenth to the existing samples.
 std::optional<SampleRange> next_range(RoundIndex k, double seconds_per_sample, double seconds_left,
                                       std::uint64_t most_spp);
-
-// Returns the number of samples for the next run of a program that starts anew for each image. `past` are its
-// runs so far, in ascending order of samples. The first run has `first` samples per pixel, each next run four
-// times as many, and the last run as many as fill `time`. The time of a run is modelled as a constant plus a
-// cost per sample (a line through the last two runs). nullopt: there is no further run.
-struct PastRun {
-  std::uint64_t spp = 0;
-  double seconds = 0;
-};
-struct NextRun {
-  std::uint64_t spp = 0;
-  double expected = 0;  // seconds; 0: unknown
-};
-std::optional<NextRun> next_run(std::span<const PastRun> past, std::uint64_t first, double time,
-                                std::uint64_t most_spp);
 
 }  // namespace ls::race

@@ -1,4 +1,4 @@
-// The results of a race: for each entrant (an integrator or a program that takes part) its final error, its
+// The results of a race: for each entrant its final error, its
 // efficiency and its curve of error over time, as means over the seeds.
 #pragma once
 

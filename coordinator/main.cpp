@@ -21,11 +21,11 @@
 #include "common/base/clock.h"
 #include "common/base/digest.h"
 #include "common/base/log.h"
+#include "common/trace/tracer.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/auth/throttle.h"
 #include "coordinator/http/auth/token_file.h"
 #include "coordinator/http/net/http_server.h"
-#include "coordinator/http/net/tls_identity.h"
 #include "coordinator/options.h"
 #include "coordinator/rpc/rpc_server.h"
 #include "coordinator/service/coordinator.h"
@@ -42,7 +42,7 @@ namespace fs = std::filesystem;
 
 enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
 
-// Locks the folder until the process ends: two coordinators on one folder would destroy each other's work.
+// Locks the folder until the process ends: two coordinators in one folder would destroy each other's data.
 Result<int> lock_folder(const fs::path& folder) {
   std::error_code ec;
   fs::create_directories(folder, ec);
@@ -62,7 +62,8 @@ Result<int> lock_folder(const fs::path& folder) {
   return fd;
 }
 
-// Every connection needs a file descriptor: this raises the limit on them to what the system allows.
+// Raises the limit on file descriptors, of which every connection needs one, to the highest that the system
+// allows.
 void raise_file_limit() {
   rlimit limit{};
   if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == limit.rlim_max) return;
@@ -71,7 +72,7 @@ void raise_file_limit() {
 }
 
 // Writes the ports to ports.json, for scripts and tests that let the system choose them (port 0). The file is
-// renamed into place, so that readers see all of it or nothing.
+// renamed into place, so that readers never see a part of it.
 Result<void> write_ports(const fs::path& folder, int http, int grpc) {
   const fs::path aside = folder / "ports.json.new", file = folder / "ports.json";
   std::ofstream out(aside, std::ios::trunc);
@@ -84,8 +85,8 @@ Result<void> write_ports(const fs::path& folder, int http, int grpc) {
 }
 
 // Keeps freed memory in the process. Results of units and images, of 100 KB to some MB each, are allocated
-// many times a second: giving their memory back to the system each time would cost page faults again and
-// again.
+// many times a second; without this, malloc would return their memory to the system each time, and the next
+// use would cost page faults.
 void keep_freed_memory() {
   ::mallopt(M_MMAP_THRESHOLD, 32 << 20);
   ::mallopt(M_TRIM_THRESHOLD, 256 << 20);
@@ -105,7 +106,7 @@ Result<std::optional<ls::tls::Texts>> tls_of(const Flags& flags) {
 }
 
 // Warns if an address on the network is served without encryption: others could read and change the traffic,
-// above all the tokens.
+// including the tokens.
 void warn_of_open_lines(const std::string& address, std::string_view what) {
   const std::string host = address.substr(0, address.rfind(':'));
   if (host != "127.0.0.1" && host != "localhost" && host != "[::1]")
@@ -117,21 +118,28 @@ std::string with_port(const std::string& address, int port) {
   return fmt::format("{}:{}", address.substr(0, address.rfind(':')), port);
 }
 
-// Starts notifications to the receivers in `flags`: the operator names them, users cannot add any. They are
+// Starts notifications to the receivers in `flags`. Only the operator can name receivers. Notifications are
 // signed with the secret in DIR/webhook-secret.
-Result<std::unique_ptr<ls::coordinator::Webhooks>> start_webhooks(ls::coordinator::Coordinator& coordinator,
-                                                                  const Flags& flags, const fs::path& data) {
+Result<std::unique_ptr<ls::coordinator::Webhooks>> start_webhooks(
+    ls::coordinator::Coordinator& coordinator, const Flags& flags, const fs::path& data,
+    const std::shared_ptr<ls::trace::Tracer>& tracer) {
   if (flags.webhooks.empty()) return nullptr;
   auto secret = ls::http::read_or_make_token(data / "webhook-secret");
   if (!secret) return tl::unexpected(secret.error());
   const auto unix_time = [] {
     return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
   };
-  return ls::coordinator::Webhooks::start(coordinator, {flags.webhooks, *secret, data / "webhooks",
-                                                        std::make_shared<ls::SystemClock>(), unix_time});
+  return ls::coordinator::Webhooks::start(coordinator, {flags.webhooks,
+                                                        *secret,
+                                                        data / "webhooks",
+                                                        std::make_shared<ls::SystemClock>(),
+                                                        unix_time,
+                                                        {},
+                                                        tracer});
 }
 
-// Returns a guard that limits wrong join tokens per address, as HTTP limits other wrong tokens.
+// Returns a guard that limits wrong join tokens per address, with the same limits as for wrong tokens over
+// HTTP.
 ls::coordinator::JoinGuard guard_of(const ls::http::Limits& limits) {
   const double a_minute = limits.wrong_tokens_per_minute;
   const auto throttle = std::make_shared<ls::http::Throttle>(
@@ -159,8 +167,10 @@ sigset_t block_signals() {
 
 Result<void> serve(const Flags& flags, const sigset_t& signals) {
   const fs::path data = flags.data;
-  // The port is opened first: if it is taken, this is reported before anything is changed. Connections wait
-  // until all is ready.
+  const auto tracer = ls::trace::tracer_from_environment("lightshaft-coordinator", LIGHTSHAFT_VERSION, "");
+  if (!tracer) return tl::unexpected(tracer.error());
+  // The port is opened first, so that a port in use is reported before anything is changed. Connections wait
+  // until the coordinator is ready.
   auto http = ls::http::Server::listen(flags.http);
   if (!http) return tl::unexpected(http.error());
   if (auto lock = lock_folder(data); !lock) return tl::unexpected(lock.error());
@@ -168,7 +178,7 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   fs::remove(data / "ports.json", ignored);
   const fs::path secrets = secrets_of(flags);
   fs::create_directories(secrets, ignored);
-  // This lock keeps out coordinators that start with the same folder at the same time
+  // This lock makes other coordinators wait that start with the same folder at the same time
   std::optional<ls::http::FolderLock> others(secrets);
   auto tokens = ls::http::TokenRegistry::open(secrets);
   if (!tokens) return tl::unexpected(tokens.error());
@@ -206,12 +216,14 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   options.limits = flags.shares;
   options.audit_rate = flags.audit_percent / 100;
   options.allow_fake = flags.allow_fake;
+  options.version = LIGHTSHAFT_VERSION;
   options.clock = std::make_shared<ls::SystemClock>();
   options.tick = std::chrono::milliseconds(100);
+  options.tracer = *tracer;
   auto coordinator = ls::coordinator::Coordinator::open(std::move(options));
   if (!coordinator) return tl::unexpected(coordinator.error());
 
-  auto webhooks = start_webhooks(**coordinator, flags, data);
+  auto webhooks = start_webhooks(**coordinator, flags, data, *tracer);
   if (!webhooks) return tl::unexpected(webhooks.error());
   ls::coordinator::GrpcServer grpc(**coordinator, may_join, guard_of(flags.limits));
   std::optional<ls::coordinator::GrpcServer::Tls> grpc_tls;
@@ -227,6 +239,7 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
       const auto f = hooks.figures();
       return ls::http::WebhookFigures{f.delivered, f.failed_attempts, f.given_up, f.waiting};
     });
+  if (*tracer) api.traces([tracer = *tracer] { return tracer->figures(); });
   (*coordinator)
       ->announce(flags.public_http.empty()
                      ? (identity ? "https://" : "http://") + with_port(flags.http, (*http)->port())
@@ -261,7 +274,8 @@ int main(int argc, char** argv) {
   ls::log_format(flags.log_format);
   raise_file_limit();
   keep_freed_memory();
-  const sigset_t signals = block_signals();  // before any thread starts
+  // Signals are blocked before any thread starts, since threads inherit the mask
+  const sigset_t signals = block_signals();
   if (const auto served = serve(flags, signals); !served) {
     fmt::print(stderr, "lightshaft-coordinator: error: {}\n", served.error().message);
     return served.error().code == Errc::invalid_argument ? kUsage : kFailed;

@@ -4,13 +4,15 @@
 
 #include <CLI/CLI.hpp>
 
+#include "common/command_line/command.h"
+
 namespace ls::coordinator {
 namespace {
 
 constexpr int kUsage = 2;
 
-// Adds hidden options for the limits that the HTTP server sets to slow and greedy clients: for the config
-// file and for tests.
+// Adds hidden options for the limits that the HTTP server imposes on slow and greedy clients. They are meant
+// for the config file and for tests.
 void add_limits(CLI::App& app, http::Limits& limits) {
   const auto hidden = [&app](const char* name, auto& value, double least) {
     app.add_option(name, value)->check(CLI::Range(least, 1e15))->group("");
@@ -31,7 +33,7 @@ void add_limits(CLI::App& app, http::Limits& limits) {
   hidden("--http-bundle-bytes", limits.bundle_bytes, 1);
 }
 
-// Adds the options that limit what is leased at the same time (docs/design/scheduling.md).
+// Adds the options that limit how many units are leased at the same time (docs/design/scheduling.md).
 void add_shares(CLI::App& app, Flags& flags) {
   const auto limit = [&app](const char* name, std::uint32_t& value, const char* text) {
     app.add_option(name, value, text)->check(CLI::Range(0, 1'000'000))->capture_default_str();
@@ -94,8 +96,8 @@ void add_files(CLI::App& app, Flags& flags) {
                  "with --shared: HOST:PORT where workers reach this one, if not as --grpc says");
 }
 
-// Checks the flags for --shared: other coordinators must be able to read what this one writes, or they could
-// not take its jobs over.
+// Checks the flags that --shared requires: other coordinators must be able to read this one's data, or they
+// could not take over its jobs.
 Result<void> check_shared(const Flags& flags) {
   if (!flags.shared) return {};
   if (flags.store == "sqlite" || flags.blobs.empty())
@@ -147,6 +149,7 @@ std::variant<Flags, int> parse_flags(int argc, char** argv) {
   app.set_config("--config", "", "file with these options, one 'name = value' a line");
   app.allow_config_extras(false);
   add_limits(app, flags.limits);
+  add_man_page_option(app, LIGHTSHAFT_VERSION);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

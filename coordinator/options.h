@@ -23,9 +23,9 @@ struct Flags {
   std::string blobs;
   bool shared = false;
   std::string public_http, public_grpc;
-  std::string secrets;  // folder of tokens and TLS files; empty: --data
-  // Hours for which a blob (file of a scene) is kept that no job needs. nullopt: 24, or for good if other
-  // coordinators may share the blob store
+  std::string secrets;  // folder of tokens and TLS files; empty: the folder of --data
+  // Hours for which a blob (file of a scene) is kept that no job needs. nullopt: 24 hours, or forever if
+  // other coordinators may share the blob store
   std::optional<double> keep_unused_hours;
   std::vector<std::string> webhooks;
   LogFormat log_format = LogFormat::text;
@@ -35,8 +35,8 @@ struct Flags {
   bool allow_fake = false;
 };
 
-// Returns the flags. Returns an exit code instead if there is nothing to run: 0 for help, 2 for wrong usage
-// (reported on stderr).
+// Returns the flags. Returns an exit code instead if the program is to end at once: 0 after help, 2 after
+// wrong usage (reported on stderr).
 std::variant<Flags, int> parse_flags(int argc, char** argv);
 
 }  // namespace ls::coordinator

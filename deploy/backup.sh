@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Writes all that a coordinator keeps in its --data folder, and in its --secrets folder where it has one, to one archive, while it
-# works or not. Its secrets are in it: the archive is readable by its owner only. What the farm accepts while this runs may be
-# missing in the archive: after a restore it is rendered again, to the same bits.
+# Writes a coordinator's --data folder, and its --secrets folder if it has one, to one archive. The coordinator may be running.
+# The archive contains secrets, so only its owner can read it. Results that the farm accepts during the backup may be missing in
+# the archive: after a restore they are rendered again, to the same bits.
 #   deploy/backup.sh DATA OUT.tar.gz [SECRETS]          needs python3 (for SQLite's online backup)
 set -euo pipefail
 [ $# = 2 ] || [ $# = 3 ] || { echo "usage: deploy/backup.sh DATA OUT.tar.gz [SECRETS]" >&2; exit 2; }
@@ -13,14 +13,15 @@ stage=$(mktemp -d "$out.XXXXXX")
 trap 'rm -rf "$stage"' EXIT
 mkdir "$stage/jobs"
 
-# The order makes it whole. A film is copied before the results that it was folded from, so that none it needs is missing; the
-# database after both, so that it knows of every job that has results; blobs, which never change, last, so that no job lacks one.
+# The order makes the archive consistent. A film is copied before the results that it was folded from, so that
+# no result that it needs is missing. The database is copied after both, so that it has every job that has
+# results. Blobs, which never change, are copied last, so that no job lacks one.
 for job in "$data"/jobs/*/; do
   [ -d "$job" ] || continue
   to="$stage/jobs/$(basename "$job")"
   mkdir "$to"
   if [ -e "$job/film.snap" ]; then cp -a "$job/film.snap" "$to/" 2>/dev/null || true; fi
-  # A job that is removed meanwhile goes, a file being written aside is not wanted.
+  # Jobs that are removed meanwhile and files that are still being written are left out.
   find "$job" -mindepth 1 -maxdepth 1 ! -name film.snap ! -name '*.new' ! -name '*.tmp*' -exec cp -a -t "$to" {} + 2>/dev/null || true
 done
 python3 - "$data/jobs.sqlite" "$stage/jobs.sqlite" <<'END'
@@ -40,7 +41,7 @@ if [ -n "$secrets" ]; then
   done
   [ -e "$stage/secrets/token" ] || { echo "error: $secrets is no folder of secrets: it has no token" >&2; exit 1; }
 fi
-# Status 1: something changed while it was read, such as an upload in progress, which nobody needs.
+# Status 1 means that a file changed while it was read, such as an upload in progress, which is not needed.
 tar -czf "$out.new" --exclude '*.tmp' -C "$stage" jobs jobs.sqlite ${secrets:+secrets} -C "$(realpath "$data")" "${kept[@]}" 2>/dev/null || [ $? = 1 ]
 mv "$out.new" "$out"
 echo "$out: $(du -h "$out" | cut -f 1), $(find "$stage/jobs" -mindepth 1 -maxdepth 1 | wc -l) jobs"

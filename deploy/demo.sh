@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# From a fresh Debian 12 to a rendered picture: installs what is missing, builds, starts a local farm (a coordinator with its
-# embedded store and two workers), submits the demo scene over HTTP, waits, and says where image and dashboard are.
-#   deploy/demo.sh            at a terminal the farm runs until Ctrl-C, so that the dashboard can be looked at; else it ends
+# Renders the demo scene on a fresh Debian 12: installs missing packages, builds, starts a local farm (a coordinator with its
+# embedded store and two workers), submits the scene over HTTP, waits, and prints where the image and the dashboard are.
+#   deploy/demo.sh            at a terminal the farm runs until Ctrl-C, so that one can look at the dashboard; else it ends
 #   deploy/demo.sh --detach   leaves the farm running
 #   deploy/demo.sh --stop     ends a farm left running
 #   deploy/demo.sh --full     the large setting: more pixels, more samples, a finer grid
@@ -27,7 +27,7 @@ stop_farm() {
   for file in "$home"/*.pid; do
     [ -e "$file" ] || continue
     pid=$(cat "$file")
-    # Only what we started: process ids are used again.
+    # Only processes that this script started are ended: process ids are reused.
     if grep -q lightshaft "/proc/$pid/cmdline" 2>/dev/null; then kill -TERM "$pid" 2>/dev/null || true; fi
   done
   for file in "$home"/*.pid; do
@@ -61,14 +61,14 @@ stop_farm
 
 /usr/bin/python3 scenes/bath/make_bath.py "$home/bath" --setting "$setting"
 
-launch() {  # name, command...
+launch() {  # usage: launch NAME COMMAND...
   local name="$1"; shift
   setsid "$@" >"$home/$name.log" 2>&1 </dev/null &
   echo $! >"$home/$name.pid"
 }
 rm -f "$home/data/ports.json"
 http=127.0.0.1:8080
-# If somebody has the usual port already, any free one will do.
+# If the usual port is in use, any free one will do.
 if (exec 3<>/dev/tcp/127.0.0.1/8080) 2>/dev/null; then http=127.0.0.1:0; fi
 launch coordinator "$bin/lightshaft-coordinator" --http "$http" --grpc 127.0.0.1:0 --data "$home/data"
 coordinator=$(cat "$home/coordinator.pid")

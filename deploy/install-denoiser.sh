@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs Intel Open Image Denoise 2 for `--denoise`, from the wheel `pyoidn` of the Python Package Index, where this build
-# looks for it: build/oidn, or the folder given. Needs Python 3.10 or later with pip; no privileges.
+# Installs Intel Open Image Denoise 2, the library behind `--denoise`, from the wheel `pyoidn` of the Python Package Index into
+# FOLDER. The default, build/oidn, is where this build looks for it. Needs Python 3.10 or later with pip; no privileges.
 #
 # usage: deploy/install-denoiser.sh [FOLDER]
 set -euo pipefail
@@ -27,8 +27,8 @@ if ! "$python" -m pip --version >/dev/null 2>&1; then
 fi
 "$python" -m pip download --quiet --disable-pip-version-check --no-deps --only-binary=:all: --dest "$work" "pyoidn==$version"
 
-# Of the wheel only what denoises on processors: not the modules for graphics cards.
-mkdir -p "$folder/lib"  # the libraries look for one another in ../lib
+# Installs the parts of the wheel that denoise on processors, not the modules for graphics cards.
+mkdir -p "$folder/lib"  # the libraries search for one another in ../lib
 "$python" - "$work"/pyoidn-*.whl "$folder" <<'PY'
 import pathlib
 import re

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs the Debian packages that Lightshaft builds with, and with --tests those that its tests need. Does nothing, and
-# needs no privileges, if all of them are there.
+# Installs the Debian packages that are needed to build Lightshaft, and with --tests those that its tests
+# need. If all of them are installed, it does nothing and needs no privileges.
 set -euo pipefail
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 

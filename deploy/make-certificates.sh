@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Makes a certificate authority of a farm's own and certificates of it, with the openssl program: for those who want to
-# keep the authority's key off the coordinator. (`lightshaft-coordinator --tls` alone makes what it needs by itself.)
+# Makes a certificate authority for a farm, and certificates signed by it, with the openssl program. It is for farms whose
+# authority's key must not lie on the coordinator; `lightshaft-coordinator --tls` makes its own authority.
 #   deploy/make-certificates.sh DIR NAME[,NAME...] [WORKERS]
-# NAME: host names and addresses that users and workers call the coordinator by. In DIR afterwards:
-#   ca.pem ca.key              made once, ten years; the key belongs in a safe
+# NAME: host names and addresses under which users and workers reach the coordinator. Files in DIR afterwards:
+#   ca.pem ca.key              made at the first run, valid for ten years; keep the key in a safe place
 #   server.pem server.key      for the coordinator: --tls-ca ca.pem --tls-cert server.pem --tls-key server.key
 #   worker-1.pem worker-1.key  ... WORKERS (default 1) of them: --tls-ca ca.pem --tls-cert worker-1.pem --tls-key worker-1.key
-# Run again it makes new certificates of the same authority: before a year has passed.
+# Run it again within a year: it then makes new certificates, signed by the same authority.
 set -euo pipefail
 [ $# -ge 2 ] && [ $# -le 3 ] || { sed -n '2,10s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 dir=$1 names=$2 workers=${3:-1}
@@ -35,7 +35,7 @@ if [ ! -f ca.pem ]; then
     -addext "keyUsage=critical,keyCertSign,cRLSign"
 fi
 
-issue() {  # NAME EXTENSIONS
+issue() {  # usage: issue NAME EXTENSIONS
   new_key "$1.key"
   openssl req -new -key "$1.key" -subj "/O=Lightshaft/CN=$1" -out "$1.csr"
   openssl x509 -req -in "$1.csr" -CA ca.pem -CAkey ca.key -sha256 -days "$days" -out "$1.pem" 2>/dev/null \

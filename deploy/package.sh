@@ -20,7 +20,7 @@ done
 
 programs=(lightshaft lightshaft-coordinator lightshaft-worker lightshaft-vdb lightshaft-denoise)
 if [ "$prebuilt" = 0 ]; then
-  # A build folder that has the tests keeps them.
+  # A build folder that was configured with tests stays so.
   [ -f build/release/CMakeCache.txt ] || cmake --preset release -DLIGHTSHAFT_TESTS=OFF
   cmake --build --preset release --target "${programs[@]}"
 else

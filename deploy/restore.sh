@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Makes a coordinator's --data folder of an archive of deploy/backup.sh, and its --secrets folder where it had one. The folders
-# must be new or empty. Run it as the user that the coordinator runs as, and never let two coordinators of one archive run: each
-# would be the other, by its node-id.
-#   deploy/restore.sh BACKUP.tar.gz DATA [SECRETS]          without SECRETS these are in DATA/secrets
+# Restores a coordinator's --data folder, and its --secrets folder if it had one, from an archive made by deploy/backup.sh. The
+# folders must be new or empty. Run it as the user who runs the coordinator. Never run two coordinators from one archive: both
+# would have the same node-id.
+#   deploy/restore.sh BACKUP.tar.gz DATA [SECRETS]          without SECRETS, secrets are restored to DATA/secrets
 set -euo pipefail
 [ $# = 2 ] || [ $# = 3 ] || { echo "usage: deploy/restore.sh BACKUP.tar.gz DATA [SECRETS]" >&2; exit 2; }
 data="$2" secrets="${3:-}"

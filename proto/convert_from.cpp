@@ -123,7 +123,7 @@ Result<Health> health_from(const pb::UnitResult& in) {
     return Health{};
   auto health = parse_health(in.health().empty() ? "{}" : in.health());
   if (!health) return wrong("result.health", health.error().message);
-  // A sender that knows no causes sends only three counts. What such a count has more than `health` is added
+  // A sender that knows no causes sends only three counts. The excess of each count over `health` is added
   // below under a cause of its own.
   const auto rest = [](std::uint64_t stated, std::uint64_t named) {
     return stated > named ? stated - named : 0;
@@ -154,8 +154,15 @@ Result<FromWorker> result_from(const pb::UnitResult& in) {
   LS_TRY(health, health_from(in));
   LS_TRY(times, times_from(in.times()));
   const auto* bytes = reinterpret_cast<const std::byte*>(in.exr().data());
-  return UnitResult{unit, LeaseId{lease}, {bytes, bytes + in.exr().size()}, digest, cpu, std::move(health),
-                    times};
+  return UnitResult{unit,
+                    LeaseId{lease},
+                    {bytes, bytes + in.exr().size()},
+                    digest,
+                    cpu,
+                    std::move(health),
+                    times,
+                    TechniqueSet::of_bits(in.techniques()),
+                    in.held_unix_ns()};
 }
 
 Result<FromWorker> failure_from(const pb::UnitFailure& in) {
@@ -202,6 +209,7 @@ Result<ToWorker> assign_from(const pb::AssignLease& in) {
     if (brief.job != assign.lease.job) return wrong("assign.brief", "is of another job");
     assign.brief = brief;
   }
+  assign.trace = trace::parse_traceparent(in.traceparent());
   return assign;
 }
 

@@ -71,6 +71,8 @@ void put(const UnitResult& result, pb::FromWorker& out) {
   r->set_negative(result.health.negative);
   r->set_majorant_violations(result.health.majorant_violations);
   if (!result.health.clean()) r->set_health(canonical_json(result.health));
+  r->set_techniques(result.techniques.bits());
+  r->set_held_unix_ns(result.held_unix_ns);
   if (result.times == UnitTimes{}) return;
   pb::UnitTimes* times = r->mutable_times();
   times->set_load(result.times.load);
@@ -126,6 +128,7 @@ void put(const AssignLease& assign, pb::ToWorker& out) {
     u->set_s1(unit.samples.s1);
   }
   if (assign.brief) put(*assign.brief, a->mutable_brief());
+  if (assign.trace) a->set_traceparent(to_traceparent(*assign.trace));
 }
 
 void put(const ResultAck& ack, pb::ToWorker& out) {

@@ -5,8 +5,8 @@
     python/generate.py --check    ends with 1 if one of them differs from what would be written
 
 In src/lightshaft: models.py is made from coordinator/http/openapi.json, a TypedDict for each object of the
-HTTP interface. _plugins.py is made from docs/reference/scene-format.md: the XML element of each plugin of the
-scene format, which dictionaries do not name. aio.py is made from farm.py beside it: the same methods, for
+HTTP interface. _plugins.py is made from docs/reference/mitsuba.md: the XML element of each plugin of the scene
+format, which dictionaries do not name. aio.py is made from farm.py beside it: the same methods, for
 event loops.
 """
 
@@ -19,7 +19,7 @@ import textwrap
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 DOCUMENT = ROOT / "coordinator/http/openapi.json"
-FORMAT_PAGE = ROOT / "docs/reference/scene-format.md"
+PLUGIN_PAGE = ROOT / "docs/reference/mitsuba.md"
 PACKAGE = ROOT / "python/src/lightshaft"
 
 SIMPLE = {
@@ -117,34 +117,17 @@ from typing import Any, Literal, NotRequired, TypedDict, Union
 
 
 def plugins():
-    """{type: its elements} of the page's headings and of the plugins that it lists by name."""
-    page = FORMAT_PAGE.read_text(encoding="utf-8")
-    before, _, after = page.partition("\n## Files of version 0.x")
+    """{type: its elements} of the rows of the page. A texture that is a spectrum as well is a texture."""
     found = {}
-
-    def note(element, types):
-        for name in types:
-            if element not in found.setdefault(name, []):
-                found[name].append(element)
-
-    for element, types in re.findall(r"^### (\w+) (`.*)$", before, re.MULTILINE):
-        note(element, re.findall(r"`([^`]+)`", types))
-    integrators = before.partition("Integrators by their names")[2].split("\n\n")[1]
-    note("integrator", re.findall(r"^\| `([^`]+)`", integrators, re.MULTILINE))
-    refused = after.partition("\n## Not supported")[2].split("\n## ")[0]
-    for element, types in re.findall(r"^\| (\w+) \| (`.*) \|$", refused, re.MULTILINE):
-        note(element, re.findall(r"`([^`]+)`", types))
-    # Any type of a sampler is read; these are Mitsuba's. The films are read as `hdrfilm`, and a spectrum with
-    # a type is an object of its own.
-    note("sampler", ["independent", "stratified", "multijitter", "orthogonal", "ldsampler"])
-    note("film", ["ldrfilm", "mfilm", "tiledhdrfilm"])
-    note("spectrum", ["regular", "irregular", "blackbody", "d65"])
+    page = PLUGIN_PAGE.read_text(encoding="utf-8")
+    for element, name in re.findall(r"^\| (\w+) \| `(\w+)` \|", page, re.MULTILINE):
+        found.setdefault(name, []).append(element)
     lines = "".join(
         f"    {json.dumps(name)}: ({', '.join(map(json.dumps, elements))},),\n"
         for name, elements in sorted(found.items())
     )
     return (
-        f'"""The XML elements of the plugins that scene-format.md lists. {MADE}"""\n\n'
+        f'"""The XML elements of the plugins that mitsuba.md lists. {MADE}"""\n\n'
         f"ELEMENTS: dict[str, tuple[str, ...]] = {{\n{lines}}}\n"
     )
 

@@ -2,18 +2,24 @@
 # Installs what is missing, builds, and runs every test.
 #   tests/run.sh                everything: release build, unit, statistical, system and browser tests; sanitizer builds
 #   tests/run.sh --quick        the inner loop: release build, unit tests, the fast system tests
+#   tests/run.sh --blender      also the tests of the add-on that need Blender, a download of 350 MB and some minutes
+#   tests/run.sh --kubernetes   also the tests that need Kubernetes' API server, which the first time takes minutes to build
+#   tests/run.sh --upgrade      also the upgrade from the last release, whose programs are built the first time
 #   tests/run.sh --require-all  a test that cannot run here is a failure, not a skip
 # System and browser tests mostly wait, for farms and pages; builds and unit tests mostly compute. So these are two lanes
 # that run side by side once the programs are built. Logs, and the seconds of each step, are in build/test-logs.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-quick=0 require_all=0
+quick=0 blender=0 kubernetes=0 upgrade=0 require_all=0
 for arg in "$@"; do
   case "$arg" in
     --quick) quick=1 ;;
+    --blender) blender=1 ;;
+    --kubernetes) kubernetes=1 ;;
+    --upgrade) upgrade=1 ;;
     --require-all) require_all=1 ;;
-    *) echo "usage: tests/run.sh [--quick] [--require-all]" >&2; exit 2 ;;
+    *) echo "usage: tests/run.sh [--quick] [--blender] [--kubernetes] [--upgrade] [--require-all]" >&2; exit 2 ;;
   esac
 done
 
@@ -57,7 +63,9 @@ run_ctest() {  # preset, label, log name
   s=$(grep -oE '\[  SKIPPED \] [0-9]+ test' "$log" | awk '{ n += $4 } END { print n + 0 }')
   if [ "$rc" -ne 0 ]; then
     [ "$f" -gt 0 ] || f=1
-    grep -E '\[  FAILED  \]|Failure|ERROR|Expected|Which is|\*\*\*|SUMMARY|WARNING: ThreadSanitizer' "$log" | head -n 60
+    # Tests of hostile messages make libprotobuf complain.
+    grep -v 'libprotobuf ERROR' "$log" | grep -E -A 4 ': Failure$|: ERROR: |WARNING: ThreadSanitizer' | head -n 80
+    grep -E '\[  FAILED  \]|\*\*\*|SUMMARY' "$log" | head -n 40
   fi
   count "$p" "$f" "$s"
   echo "$3: $p passed, $f failed, $s skipped$([ "$rc" -eq 0 ] || echo ', ctest says failed')"
@@ -88,8 +96,35 @@ run_lint() {
 
 run_python() {
   local python
-  if python=$(tests/python/venv.sh 2>"$logs/python-venv.log"); then PYTHON="$python" run_pytest python tests/python
+  if python=$(tests/python/venv.sh 2>"$logs/python-venv.log"); then PYTHON="$python" run_pytest python tests/python tests/packages
   else count 0 1 0; tail -n 20 "$logs/python-venv.log"; echo "python: the package could not be built or installed"; fi
+}
+
+run_openjd() {
+  local python
+  if python=$(tests/openjd/venv.sh 2>"$logs/openjd-venv.log"); then PYTHON="$python" run_pytest openjd tests/openjd
+  else count 0 1 0; tail -n 20 "$logs/openjd-venv.log"; echo "openjd: its packages could not be installed"; fi
+}
+
+run_blender() {
+  if [ "$blender" -eq 0 ]; then run_pytest blender tests/blender/test_files.py; return; fi
+  local python
+  if python=$(tests/blender/venv.sh 2>"$logs/blender-venv.log"); then PYTHON="$python" run_pytest blender tests/blender
+  else count 0 1 0; tail -n 20 "$logs/blender-venv.log"; echo "blender: Blender could not be installed as a module"; fi
+}
+
+run_kubernetes() {
+  [ "$kubernetes" -eq 1 ] || return 0
+  local programs
+  if programs=$(tests/kubernetes/tools.sh 2>"$logs/kubernetes-tools.log"); then LIGHTSHAFT_KUBERNETES="$programs" run_pytest kubernetes tests/kubernetes
+  else count 0 1 0; tail -n 20 "$logs/kubernetes-tools.log"; echo "kubernetes: the API server could not be built"; fi
+}
+
+run_upgrade() {
+  [ "$upgrade" -eq 1 ] || return 0
+  local programs
+  if programs=$(tests/upgrade/build.sh 2>"$logs/upgrade-build.log"); then LIGHTSHAFT_OLD_BIN="$programs" run_pytest upgrade tests/upgrade
+  else count 0 1 0; tail -n 20 "$logs/upgrade-build.log"; echo "upgrade: the last release could not be built"; fi
 }
 
 run_compose() {
@@ -98,6 +133,14 @@ run_compose() {
     echo "compose: Docker builds nothing here, so it is not part of this run (tests/compose/run.sh; $logs/docker.log)"
   elif tests/compose/run.sh --prebuilt >"$logs/compose.log" 2>&1; then count 1 0 0; echo "compose: passed"
   else count 0 1 0; tail -n 40 "$logs/compose.log"; echo "compose: failed"; fi
+}
+
+run_docker() {
+  # Docker may be missing, have no engine, or not have the image that deploy/images.sh makes.
+  local why
+  why=$(PYTHONPATH=tests/support /usr/bin/python3 -c 'import docker_engine; print(docker_engine.missing())')
+  if [ -z "$why" ]; then run_pytest docker tests/docker
+  else echo "docker: not part of this run: $why"; fi
 }
 
 run_packages() {
@@ -113,7 +156,12 @@ waiting_lane() {
   step "system tests" run_pytest system tests/system
   step "browser tests" run_pytest web tests/web
   step "Python package" run_python
+  step "Open Job Description" run_openjd
+  step "Blender" run_blender
+  step "Kubernetes" run_kubernetes
+  step "upgrade" run_upgrade
   step "compose" run_compose
+  step "Docker" run_docker
   step "packages" run_packages
 }
 
@@ -132,7 +180,7 @@ computing_lane() {
 deploy/install-deps.sh --tests >"$logs/install.log" 2>&1 || { tail -n 20 "$logs/install.log"; give_up "what the tests need could not be installed"; }
 step "lint" run_lint
 export LIGHTSHAFT_BIN="$PWD/build/release/bin"
-step "release build: programs" build release lightshaft lightshaft-coordinator lightshaft-worker fake_oidn_blurs
+step "release build: programs" build release lightshaft lightshaft-coordinator lightshaft-worker fake_oidn_blurs race_pages
 
 if [ "$quick" -eq 1 ]; then
   step "system tests, the fast ones" run_pytest system tests/system -m "not slow" &

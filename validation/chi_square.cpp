@@ -75,8 +75,8 @@ class BinTable {
     return p;
   }
 
-  std::vector<std::uint64_t> observed(std::uint64_t samples, render::RandomStream stream) const {
-    std::vector<std::uint64_t> n(cells(), 0);
+  std::vector<double> observed(std::uint64_t samples, render::RandomStream stream) const {
+    std::vector<double> n(cells(), 0);
     for (std::uint64_t k = 0; k < samples; ++k) {
       const float lobe = stream.uniform(), u = stream.uniform(), v = stream.uniform();
       const auto s = bsdfs_.sample(index_, V2(.5f, .5f), wo_, lobe, V2(u, v));
@@ -122,34 +122,6 @@ class BinTable {
   V3 wo_;
 };
 
-// Merges cells of fewer than `least` expected samples, the smallest first, until no such cell is left, and
-// computes the statistic of the resulting cells.
-void compare(const std::vector<double>& p, const std::vector<std::uint64_t>& n, std::uint64_t samples,
-             double least, ValidateCase& c) {
-  std::vector<std::size_t> order(p.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return p[a] < p[b]; });
-  const auto total = static_cast<double>(samples);
-  double wanted = 0, met = 0, statistic = 0;
-  int classes = 0;
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    wanted += std::max(0., p[order[k]]) * total;
-    met += static_cast<double>(n[order[k]]);
-    if (wanted < least && k + 1 < order.size()) continue;
-    if (wanted > 0)
-      statistic += (met - wanted) * (met - wanted) / wanted;
-    else if (met > 0)
-      c.why = fmt::format("{} samples lie where the density is 0", met);
-    classes += wanted > 0 ? 1 : 0;
-    wanted = met = 0;
-  }
-  c.expected = std::max(1, classes - 1);
-  c.got = statistic;
-  c.standard_error = std::sqrt(2 * c.expected);
-  c.z = (c.got - c.expected) / c.standard_error;
-  c.p = chi2_tail(statistic, c.expected);
-}
-
 }  // namespace
 
 Result<ValidateCase> chi2_case(const NoriTest& test, std::size_t bsdf, const render::AssetFiles& files,
@@ -169,10 +141,18 @@ Result<ValidateCase> chi2_case(const NoriTest& test, std::size_t bsdf, const ren
   const BinTable table(surface->bsdfs, surface->index, test.resolution, direction(std::sqrt(1 - u), phi));
   const std::uint64_t samples =
       test.sample_count > 0 ? test.sample_count : kSamplesPerCell * (table.cells() - 1);
-  const std::vector<double> p = table.expected();
+  std::vector<double> expected = table.expected();
+  const double missing = expected.back();
+  for (double& share : expected) share *= static_cast<double>(samples);
+  const ChiSquare found = chi_square(expected, table.observed(samples, stream), test.min_expected);
   ValidateCase c;
-  compare(p, table.observed(samples, stream), samples, test.min_expected, c);
-  if (p.back() < -kExcess) c.why = fmt::format("the density adds up to {:.6g}", 1 - p.back());
+  c.expected = found.freedom;
+  c.got = found.statistic;
+  c.standard_error = std::sqrt(2 * c.expected);
+  c.z = (c.got - c.expected) / c.standard_error;
+  c.p = found.p;
+  if (found.impossible > 0) c.why = fmt::format("{} samples lie where the density is 0", found.impossible);
+  if (missing < -kExcess) c.why = fmt::format("the density adds up to {:.6g}", 1 - missing);
   c.seconds = seconds(clock.now() - start);
   return c;
 }

@@ -24,15 +24,15 @@ double thread_cpu_seconds() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-// Makes a UnitFailure from an error. An invalid_argument is the scene's fault; after any other error (no
-// memory, an unreadable file) the unit may succeed on another machine.
+// Makes a UnitFailure from an error. invalid_argument means that the scene is at fault; after any other error
+// (no memory, an unreadable file) the unit may succeed on another machine.
 tl::unexpected<UnitFailure> failed(const Error& error) {
   return tl::unexpected<UnitFailure>(
       UnitFailure{.scene_at_fault = error.code == Errc::invalid_argument, .reason = error.message});
 }
 
-// Compares the files that this worker finds the scene to need with the needs in the job's brief. By these
-// needs the coordinator decides which files to send, so both must use the same rules.
+// Compares the needs of the scene, as this worker finds them, with the needs in the job's brief. The
+// coordinator decides by its needs which files to send, so both must use the same rules.
 tl::expected<void, UnitFailure> check_needs(const Scene& scene, const JobBrief& brief) {
   if (brief.needs.empty()) return {};
   const std::string own =
@@ -93,11 +93,12 @@ class InProcessBackend final : public LocalBackend {
     out.wall_seconds = seconds(clock_.now() - begin);
     out.health = std::move(tile.health);
     out.health.merge(render::changed_inputs(*ready));
+    out.techniques = render::techniques_of(*ready);
     return out;
   }
 
   void forget(const JobId& job) override {
-    std::vector<std::shared_ptr<const render::World>> last;  // frees the worlds after the mutex was unlocked
+    std::vector<std::shared_ptr<const render::World>> last;  // frees the worlds, after the mutex was unlocked
     const std::lock_guard lock(mutex_);
     std::erase_if(worlds_, [&](auto& entry) {
       const bool gone = entry.first.job == job;

@@ -42,7 +42,7 @@ std::filesystem::path default_cache() {
 void raise_file_limit() {
   rlimit files{};
   if (::getrlimit(RLIMIT_NOFILE, &files) != 0) return;
-  files.rlim_cur = std::min<rlim_t>(files.rlim_max, 65536);
+  files.rlim_cur = std::min<rlim_t>(files.rlim_max, kWantedFiles);
   ::setrlimit(RLIMIT_NOFILE, &files);
 }
 

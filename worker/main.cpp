@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "common/base/log.h"
+#include "common/trace/tracer.h"
 #include "worker/agent/agent.h"
 #include "worker/agent/link_ring.h"
 #include "worker/cache/cache.h"
@@ -26,6 +27,8 @@
 namespace {
 
 using namespace ls;
+
+constexpr int kUsage = 2;
 
 std::unique_ptr<worker::LocalBackend> local_backend(const worker::Options& options) {
 #ifdef LIGHTSHAFT_RENDERER
@@ -57,8 +60,8 @@ int failed(const Error& error) {
   return 1;
 }
 
-// Waits for signals. The first SIGTERM or SIGINT lets the agent drain (finish its running units and end), the
-// second makes it stop now.
+// Handles signals. The first SIGTERM or SIGINT makes the agent drain (finish its running units and end), the
+// second stops it immediately.
 void obey_signals(worker::Agent& agent, const sigset_t& signals) {
   int signal = 0;
   for (int count = 0; sigwait(&signals, &signal) == 0; ++count) {
@@ -81,6 +84,11 @@ std::unique_ptr<worker::CoordinatorLink> link_to(const worker::Options& options)
 }
 
 int run_worker(const worker::Options& options, const sigset_t& signals) {
+  const auto tracer = trace::tracer_from_environment("lightshaft-worker", LIGHTSHAFT_VERSION, options.name);
+  if (!tracer) {
+    failed(tracer.error());
+    return kUsage;
+  }
   worker::raise_file_limit();
   const auto link = link_to(options);
   auto cache = worker::BlobCache::open(
@@ -89,8 +97,8 @@ int run_worker(const worker::Options& options, const sigset_t& signals) {
         return link->fetch_blob(wanted, sink);
       });
   if (!cache) return failed(cache.error());
-  // The cache was opened before, because its folder, which the child may read, must exist when the child
-  // starts.
+  // The cache must be opened before this, because the child may read its folder, which must exist when the
+  // child starts.
   worker::ChildOptions child_options{.arguments = child_arguments(options),
                                      .slots = options.threads,
                                      .hang_limit = from_seconds(options.hang_seconds),
@@ -100,12 +108,14 @@ int run_worker(const worker::Options& options, const sigset_t& signals) {
 
   worker::AgentOptions agent_options;
   agent_options.threads = options.threads;
+  agent_options.idle_limit = from_seconds(options.idle_seconds);
   agent_options.hello.name = options.name;
   agent_options.hello.build = LIGHTSHAFT_VERSION;
   agent_options.hello.memory_bytes = options.memory_limit;
   agent_options.hello.tags = options.tags;
   agent_options.hello.join_token = options.join_token;
   agent_options.hello.fake = options.fake;
+  agent_options.tracer = *tracer;
   agent_options.backoff_seed = std::random_device{}();
   const SystemClock clock;
   worker::Agent agent(std::move(agent_options), *link, **backend, **cache, clock);
@@ -123,7 +133,7 @@ int main(int argc, char** argv) {
   const auto& options = std::get<ls::worker::Options>(parsed);
   log_format(options.log_format);
   if (options.render_child) return run_child(options);
-  // These signals are blocked before any thread starts (including gRPC's), so that only obey_signals receives
+  // The signals are blocked before any thread starts (including gRPC's), so that only obey_signals receives
   // them.
   sigset_t signals;
   sigemptyset(&signals);

@@ -8,6 +8,7 @@
 #include <iostream>
 
 #include "common/base/secret.h"
+#include "common/command_line/command.h"
 #include "common/protocol/limits.h"
 #include "worker/child/child.h"
 #include "worker/machine.h"
@@ -16,8 +17,8 @@ namespace ls::worker {
 namespace {
 
 constexpr const char* kBuild = "lightshaft-worker " LIGHTSHAFT_VERSION;
-// The render child may use this share of the machine's memory by default; the system and the agent need the
-// rest.
+// The share of the machine's memory that the render child may use by default; the rest is for the system and
+// the agent.
 constexpr double kMemoryShare = 0.9;
 
 struct Files {
@@ -44,6 +45,10 @@ void describe(CLI::App& app, Options& o, Files& files) {
                  "Seconds that reading a scene's files and building its world may take; no other scene is "
                  "built meanwhile; default: 1800")
       ->check(CLI::PositiveNumber);
+  app.add_option("--idle-exit", o.idle_seconds,
+                 "End after this many seconds without work, with an error if the coordinator has not been "
+                 "reached; default: wait for work")
+      ->check(CLI::PositiveNumber);
   app.add_option("--name", o.name, "Name shown to people; default: the host's");
   app.add_option("--tags", o.tags, "What jobs may ask for, separated by commas")->delimiter(',');
   app.add_option("--token-file", files.token, "File with the farm's join token (or LIGHTSHAFT_JOIN_TOKEN)");
@@ -67,6 +72,7 @@ void describe(CLI::App& app, Options& o, Files& files) {
   app.add_option("--fake-fault", o.fake_fault_text)->group("");
   app.add_option("--fake-class", o.fake_class)->group("");
   app.set_version_flag("--version", kBuild);
+  add_man_page_option(app, LIGHTSHAFT_VERSION);
 }
 
 Result<std::string> join_token(const std::string& file) {

@@ -13,13 +13,14 @@
 namespace ls::worker {
 
 struct Options {
-  std::vector<std::string> coordinators;  // HOST:PORT
+  std::vector<std::string> coordinators;  // addresses HOST:PORT
   int threads = 1;
   std::filesystem::path cache;
-  std::uint64_t cache_limit = 0;   // most bytes in the cache; 0: no limit
+  std::uint64_t cache_limit = 0;   // most bytes of the cache; 0: no limit
   std::uint64_t memory_limit = 0;  // most bytes of memory that the render child may use; 0: no limit
   double hang_seconds = 300;
   double build_seconds = 1800;
+  double idle_seconds = 0;  // 0: no limit
   std::string name;
   std::vector<std::string> tags;
   std::string join_token;
@@ -27,18 +28,17 @@ struct Options {
   bool fake = false;
   FakeOptions fake_options;
   std::string fake_fault_text;
-  std::string fake_class;  // uses the SHA-256 of this text as the numeric class; empty: the usual class
+  std::string fake_class;  // if not empty, the SHA-256 of this text replaces the numeric class
   LogFormat log_format = LogFormat::text;
-  bool render_child = false;  // this process is a render child; set by workers only
+  bool render_child = false;  // this process is a render child; only workers pass this flag
 };
 
 // Parses the command line. Returns the process's exit code instead of Options if there is nothing to run
-// (after
-// --help), or if the usage is wrong (2, and the reason is on stderr).
+// (after --help), or if the usage is wrong (2, and the reason is on stderr).
 std::variant<Options, int> parse_options(int argc, char** argv);
 
-// Returns the arguments with which a worker with these options starts its render child, which is this same
-// executable (worker/child).
+// Returns the arguments with which a worker with these options starts its render child, the same executable
+// (worker/child).
 std::vector<std::string> child_arguments(const Options& options);
 
 }  // namespace ls::worker

@@ -1,4 +1,4 @@
-// lightshaft compare: error against time, for our integrators and other programs.
+// lightshaft compare: compares our integrators by their error against time.
 #include <fmt/format.h>
 
 #include <atomic>
@@ -22,7 +22,7 @@ namespace {
 constexpr std::uint64_t kMostSeeds = 100;
 
 struct CompareFlags {
-  std::vector<std::string> scenes, integrators, programs, reference, defines;
+  std::vector<std::string> scenes, integrators, reference, defines;
   std::string time, spp, seeds, first_seed, threads, size, references, report, clock = "wall";
   bool strict = false, quiet = false;
 };
@@ -56,20 +56,6 @@ Result<void> take_numbers(const CompareFlags& flags, CompareOptions& options) {
   const auto size = parse_size(flags.size);
   if (!size) return tl::unexpected(size.error());
   options.size = *size;
-  return {};
-}
-
-Result<void> take_programs(const CompareFlags& flags, CompareOptions& options) {
-  for (const std::string& file : flags.programs) {
-    auto adapter = race::read_adapter(file);
-    if (!adapter) return bad_argument("--program: " + adapter.error().message);
-    options.programs.push_back(std::move(*adapter));
-  }
-  if (!options.programs.empty() && !options.defines.empty())
-    return bad_argument(
-        "-D sets names in the scene that other programs read without it: leave out either -D or --program");
-  if (options.programs.size() + std::max<std::size_t>(1, flags.integrators.size()) > report::kMostCurves)
-    return bad_argument(fmt::format("at most {} entrants in one race", report::kMostCurves));
   return {};
 }
 
@@ -110,22 +96,18 @@ Result<CompareOptions> options_of(const CompareFlags& flags) {
   auto defines = parse_defines(flags.defines);
   if (!defines) return tl::unexpected(defines.error());
   options.defines = std::move(*defines);
-  for (const auto take_part : {take_numbers, take_programs, take_reference})
+  for (const auto take_part : {take_numbers, take_reference})
     if (auto ok = take_part(flags, options); !ok) return tl::unexpected(ok.error());
+  if (options.integrators.size() > report::kMostCurves)
+    return bad_argument(fmt::format("at most {} entrants in one race", report::kMostCurves));
   if (auto ok = make_folder(options.report); !ok) return tl::unexpected(ok.error());
   return options;
 }
 
 Result<void> write(const std::filesystem::path& folder, const race::Results& results) {
-  const auto save = [&](const std::string& name, const std::string& text) {
-    return write_output(folder / name, text);
-  };
-  for (const auto& ok : {save("points.csv", points_csv(results)), save("summary.csv", summary_csv(results)),
-                         save("forecasts.csv", forecasts_csv(results)), save("report.md", markdown(results)),
-                         save("index.html", html_page(results))})
-    if (!ok) return ok;
-  const race::Race& last = results.races.back();
-  return save(race::file_name(last.scene) + ".svg", plot_svg(last));
+  for (const auto& [name, text] : files_of(results))
+    if (auto ok = write_output(folder / name, text); !ok) return ok;
+  return {};
 }
 
 void print_rows(const race::Race& race) {
@@ -151,7 +133,7 @@ void warn_if_busy(const CompareOptions& options) {
 }
 
 int run(const CompareFlags& flags) {
-  std::atomic<bool> stop{false};  // outlives the thread that sets it
+  std::atomic<bool> stop{false};  // declared first, so that it outlives the thread that sets it
   Interrupt interrupt;
   auto options = options_of(flags);
   if (!options) return print_error(options.error());
@@ -183,15 +165,10 @@ int run(const CompareFlags& flags) {
 
 void add_options(CLI::App& compare, const std::shared_ptr<CompareFlags>& flags) {
   compare.add_option("scenes", flags->scenes, "one scene, or a set")->required()->type_name("SCENE...");
-  compare.add_option("--integrators", flags->integrators, "ours that race; default: the scene's")
+  compare.add_option("--integrators", flags->integrators, "those that race; default: the scene's")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("A,B");
-  compare
-      .add_option("--program", flags->programs,
-                  "another program that races, by its adapter (docs/reference/compare.md); may be repeated")
-      ->allow_extra_args(false)
-      ->type_name("ADAPTER.json");
   compare.add_option("--time", flags->time, "that each entrant has for each seed, after loading")
       ->required()
       ->type_name("SECONDS");
@@ -227,8 +204,7 @@ void add_options(CLI::App& compare, const std::shared_ptr<CompareFlags>& flags) 
 
 void add_compare(CLI::App& app, Action& action) {
   auto flags = std::make_shared<CompareFlags>();
-  CLI::App* compare = app.add_subcommand(
-      "compare", "race integrators and other programs: error against time, with intervals");
+  CLI::App* compare = app.add_subcommand("compare", "race integrators: error against time, with intervals");
   add_options(*compare, flags);
   compare->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }

@@ -8,7 +8,6 @@
 #include "cli/local/local_world.h"
 #include "cli/output/console.h"
 #include "common/scene/schema/integrators.h"
-#include "compare/program_racer.h"
 #include "compare/references.h"
 #include "compare/render_racer.h"
 
@@ -50,11 +49,11 @@ class SceneRace {
   struct Ours {
     std::string name;
     JobSpec spec;
-    std::optional<LocalWorld> world;  // for the first seed, until it is used
+    std::optional<LocalWorld> world;  // the world for the first seed, until it is used
   };
 
-  // Prepares every integrator and program of the race. Each integrator is tried now, before the race begins,
-  // so that errors in the scene show before hours of rendering.
+  // Prepares every integrator of the race. Each is tried before the race begins, so that errors in the scene
+  // are found before hours of rendering.
   tl::expected<void, Rejected> line_up() {
     std::vector<std::string> wanted = options_.integrators;
     if (wanted.empty()) wanted.emplace_back();
@@ -71,16 +70,12 @@ class SceneRace {
       scenes_.push_back(world->job.scene);
       if (ours.name.empty()) ours.name = world->job.settings.integrator;
       const bool whole = scene_.scene.media.empty() || scene::sees_media(world->job.settings.integrator);
-      race_.entrants.push_back({"Lightshaft " + ours.name, true, whole});
-      if (first) ours.world = std::move(*world);  // the others' would only take memory
+      race_.entrants.push_back({"Lightshaft " + ours.name, whole});
+      // Only the first world is kept: all of them together would take too much memory
+      if (first) ours.world = std::move(*world);
       ours_.push_back(std::move(ours));
       first = false;
     }
-    for (const race::Adapter& program : options_.programs)
-      if (program.scenes.empty() || program.scenes.contains(race_.scene)) {
-        race_.entrants.push_back({program.name});
-        programs_.push_back(&program);
-      }
     return {};
   }
 
@@ -103,7 +98,7 @@ class SceneRace {
     return std::optional(race::combine(read));
   }
 
-  // Rejects a reference of the same scene and seed as an image of the race: the two would share their noise,
+  // Rejects a reference of the same scene and seed as an image of the race. The two would share their noise,
   // and the image would seem much better than it is.
   Result<void> refuse_own_noise(const race::ReferenceFile& file) const {
     for (const Digest& scene : scenes_)
@@ -120,11 +115,6 @@ class SceneRace {
 
   Result<std::unique_ptr<race::Racer>> racer(std::size_t entrant, std::size_t seed) {
     const std::string name = fmt::format("{}-{}", entrant, seed);
-    if (entrant >= ours_.size())
-      return race::make_program_racer(
-          {*programs_[entrant - ours_.size()], std::filesystem::absolute(scene_.name),
-           options_.first_seed + seed, name, folder_},
-          race_.conditions, clock_);
     Ours& ours = ours_[entrant];
     ours.spec.seed = options_.first_seed + seed;
     std::optional<LocalWorld> world = std::exchange(ours.world, std::nullopt);
@@ -143,8 +133,7 @@ class SceneRace {
   const SystemClock clock_;
   race::Race race_;
   std::vector<Ours> ours_;
-  std::vector<Digest> scenes_;  // the digests that our images have
-  std::vector<const race::Adapter*> programs_;
+  std::vector<Digest> scenes_;  // digests of the scene that our images contain
   std::filesystem::path folder_;
 };
 

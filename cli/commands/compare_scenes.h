@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "compare/adapter.h"
 #include "compare/race.h"
 #include "coordinator/service/coordinator.h"
 
@@ -14,14 +13,13 @@ namespace ls::cli {
 
 struct CompareOptions {
   std::vector<std::string> scenes;
-  std::vector<std::string> integrators;  // empty: the scene's
-  std::vector<race::Adapter> programs;
-  race::Conditions conditions;    // all conditions except the size of the image
-  std::optional<FrameSize> size;  // empty: the scene's
+  std::vector<std::string> integrators;  // empty: the integrator that the scene names
+  race::Conditions conditions;           // all conditions except the size of the image
+  std::optional<FrameSize> size;         // nullopt: the size that the scene gives
   std::size_t seeds = 5;
   std::uint64_t first_seed = 0;
   std::vector<std::filesystem::path> reference;  // one or two images, for a single scene
-  std::filesystem::path references;  // a folder with reference images for several scenes; may be empty
+  std::filesystem::path references;  // a folder with reference images for several scenes; empty: none
   std::map<std::string, std::string> defines;
   std::filesystem::path report;
   bool strict = false, quiet = false;
@@ -32,7 +30,7 @@ struct CompareOptions {
 std::vector<std::string> scene_names(const std::vector<std::string>& files);
 
 // Returns the reference images in `folder` for the scene called `name`: NAME.0.exr and NAME.1.exr, or
-// NAME.exr; empty: there are none.
+// NAME.exr. Empty if there are none.
 std::vector<std::filesystem::path> references_in(const std::filesystem::path& folder,
                                                  const std::string& name);
 

@@ -1,15 +1,19 @@
-// lightshaft convert: any scene as canonical Mitsuba 3 XML, with its files beside it.
+// lightshaft convert: writes any scene as canonical Mitsuba 3 XML, with its files beside it.
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "cli/commands/commands.h"
-#include "cli/commands/converted.h"
 #include "cli/local/local_scene.h"
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
 #include "common/scene/json/serialize.h"
+#include "common/scene/reader/xml_write.h"
 
 namespace ls::cli {
 namespace {
@@ -19,6 +23,138 @@ struct ConvertFlags {
   std::vector<std::string> defines;
   bool strict = false, quiet = false;
 };
+
+namespace fs = std::filesystem;
+
+struct FileCopy {
+  std::string name_before;  // the name in the original scene
+  std::filesystem::path from, to;
+  Digest digest;
+  bool renamed = false;
+};
+
+// A scene's canonical XML.
+struct Converted {
+  std::string text;
+  Digest digest;                 // digest of the scene that the text describes
+  std::vector<FileCopy> copies;  // files that must be copied
+};
+
+// Finds only the assets of a scene that has already been read.
+class KnownAssets final : public AssetSource {
+ public:
+  explicit KnownAssets(const Scene& scene) {
+    for (const Asset& a : scene.assets) assets_.emplace(a.name, a);
+  }
+  Result<Asset> find(std::string_view name) override {
+    if (const auto it = assets_.find(name); it != assets_.end()) return it->second;
+    return fail(Errc::not_found, fmt::format("there is no file \"{}\"", name));
+  }
+  Result<std::string> text(std::string_view name) override {
+    return fail(Errc::not_found, fmt::format("nothing includes \"{}\"", name));
+  }
+
+ private:
+  std::map<std::string, Asset, std::less<>> assets_;
+};
+
+fs::path folder_of(const fs::path& file) {
+  std::error_code error;
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  const fs::path real = fs::weakly_canonical(folder, error);
+  return error ? folder : real;
+}
+
+bool leads_out(const std::string& name) {
+  return name.starts_with('/') || name == ".." || name.starts_with("../");
+}
+
+// Renames assets whose names lead out of the new folder. The new names are within the folder and differ from
+// all others.
+void rename_those_outside(Scene& scene) {
+  std::set<std::string> taken;
+  for (const Asset& a : scene.assets)
+    if (!leads_out(a.name)) taken.insert(a.name);
+  for (Asset& a : scene.assets) {
+    if (!leads_out(a.name)) continue;
+    std::string name = fs::path(a.name).filename().string();
+    if (!taken.insert(name).second) {
+      name = a.digest.hex().substr(0, 12) + "-" + name;
+      taken.insert(name);
+    }
+    a.name = std::move(name);
+  }
+}
+
+// If `all` is false, only files that were made of numbers in the scene's text are copied.
+Result<std::vector<FileCopy>> copies_for(const LocalScene& scene, const Scene& written,
+                                         const fs::path& folder, bool all) {
+  std::vector<FileCopy> copies;
+  std::set<fs::path> planned;
+  for (std::size_t i = 0; i < written.assets.size(); ++i) {
+    const std::string& before = scene.scene.assets[i].name;
+    const auto file = scene.files.find(before);
+    if (file == scene.files.end())
+      return fail(Errc::internal, fmt::format("it is not known where {} is", before));
+    if (!all && !file->second.is_made) continue;
+    const fs::path to = folder / written.assets[i].name;
+    std::error_code error;
+    if (!planned.insert(to).second) continue;
+    if (!fs::exists(to, error)) {
+      copies.push_back(
+          {before, file->second.path, to, file->second.digest, before != written.assets[i].name});
+      continue;
+    }
+    const auto there = sha256_file(to);
+    if (!there || *there != file->second.digest)
+      return fail(Errc::already_exists,
+                  fmt::format("{} is there already, and is not the scene's {}: choose another folder for OUT",
+                              to.string(), before));
+  }
+  return copies;
+}
+
+// Converts a scene for the file `out`. If `out` is in the folder of the original scene, file names are
+// unchanged and nothing is copied. If it is in another folder, files keep their names relative to it; files
+// whose name is absolute or leads out by ".." are put directly into that folder. The text is then read again
+// and compared. internal: the text does not give the same scene; already_exists: the folder contains another
+// file with a name that is needed.
+Result<Converted> convert_scene(const LocalScene& scene, const fs::path& out) {
+  Scene written = scene.scene;
+  Converted converted;
+  const fs::path folder = folder_of(out);
+  const bool other_folder = folder != folder_of(scene.name);
+  if (other_folder) rename_those_outside(written);
+  auto copies = copies_for(scene, written, folder, other_folder);
+  if (!copies) return tl::unexpected(copies.error());
+  converted.copies = std::move(*copies);
+  converted.text = write_xml(written);
+  converted.digest = digest_of(written);
+  KnownAssets assets(written);
+  const ReadResult again = read_scene(out.filename().string(), converted.text, assets);
+  if (!again.scene || digest_of(*again.scene) != converted.digest)
+    return fail(
+        Errc::internal,
+        fmt::format(
+            "{} cannot be written as XML that reads back to the same scene; nothing was written. This "
+            "is a fault of this program: please report it with the scene. {}",
+            scene.name, format_diagnostics(again.diagnostics)));
+  return converted;
+}
+
+// Copies a file to its place beside the converted scene, completely or not at all; creates missing folders.
+Result<void> copy_beside(const FileCopy& copy) {
+  std::error_code error;
+  fs::create_directories(copy.to.parent_path(), error);
+  const fs::path aside = copy.to.string() + ".part";
+  if (!error) fs::copy_file(copy.from, aside, fs::copy_options::overwrite_existing, error);
+  if (!error) fs::rename(aside, copy.to, error);
+  if (!error) return {};
+  std::error_code ignored;
+  fs::remove(aside, ignored);
+  return fail(Errc::unavailable, fmt::format("{} cannot be copied to {}: {}", copy.from.string(),
+                                             copy.to.string(), error.message()));
+}
 
 int run(const ConvertFlags& flags) {
   const auto defines = parse_defines(flags.defines);

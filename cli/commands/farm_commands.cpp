@@ -1,6 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <thread>
 
 #include "cli/commands/commands.h"
 #include "cli/farm/farm_api.h"
@@ -9,9 +12,12 @@
 #include "cli/farm/fetch_results.h"
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
+#include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
+#include "common/base/parse_number.h"
 #include "common/base/plain_text.h"
 #include "common/job/limits.h"
+#include "coordinator/base/limits.h"
 
 namespace ls::cli {
 namespace {
@@ -20,9 +26,10 @@ using nlohmann::json;
 
 struct FarmFlags {
   FarmOptions farm;
-  std::string id, frame, spp, target_error, out, report, html;
-  bool quiet = false;
+  std::string id, frame, spp, target_error, out, report, html, region, fps, exposure;
+  bool quiet = false, none = false, denoised = false;
 };
+constexpr std::chrono::milliseconds kVideoPause(500);  // between two questions whether a video is ready
 using Run = int (*)(FarmApi& api, const FarmFlags& flags);
 
 int show_answer(const FarmApi::Answer<json>& answer, const FarmFlags& flags,
@@ -65,6 +72,62 @@ int extend(FarmApi& api, const FarmFlags& flags) {
   return change(api, flags, {{"spp", *spp}});
 }
 
+// Parses "X0,Y0,X1,Y1".
+Result<json> parse_region(const std::string& text) {
+  json rect = json::parse('[' + text + ']', nullptr, false);
+  const bool pixels =
+      rect.is_array() && rect.size() == 4 &&
+      std::all_of(rect.begin(), rect.end(), [](const json& v) { return v.is_number_unsigned(); });
+  if (!pixels)
+    return bad_argument(fmt::format("--region '{}': it must be X0,Y0,X1,Y1 in pixels, 0,0,64,64 say", text));
+  return rect;
+}
+
+int focus(FarmApi& api, const FarmFlags& flags) {
+  if (flags.region.empty() != flags.none)
+    return usage_error("focus needs either --region X0,Y0,X1,Y1 or --none");
+  if (flags.none) return change(api, flags, {{"focus", nullptr}});
+  const auto region = parse_region(flags.region);
+  if (!region) return print_error(region.error());
+  return change(api, flags, {{"focus", *region}});
+}
+
+// Asks for a video, waits until it is made, and downloads it.
+int video(FarmApi& api, const FarmFlags& flags) {
+  if (const auto ok = check_output("-o", flags.out); !ok) return print_error(ok.error());
+  json asked = json::object();
+  if (!flags.fps.empty()) {
+    const auto fps = parse_positive("--fps", flags.fps, coordinator::limits::kMaxVideoFps);
+    if (!fps) return print_error(fps.error());
+    asked["fps"] = *fps;
+  }
+  if (!flags.exposure.empty()) {
+    const auto stops = parse_number<double>(flags.exposure);
+    if (!stops || !(std::abs(*stops) <= coordinator::limits::kMaxVideoStops))
+      return usage_error(fmt::format("--exposure '{}': it must be a number of stops from -{} to {}",
+                                     flags.exposure, coordinator::limits::kMaxVideoStops,
+                                     coordinator::limits::kMaxVideoStops));
+    asked["exposure"] = *stops;
+  }
+  if (flags.denoised) asked["layer"] = "denoised";
+  auto made = api.post(job_path(flags.id) + "/video", asked);
+  for (; made; made = with_retries([&] { return api.get(job_path(flags.id) + "/video"); })) {
+    const std::string state = text_field(*made, "state");
+    if (state == "ready") break;
+    if (state != "waiting" && state != "making") {
+      complain(state == "failed" ? plain_text(text_field(*made, "error"))
+                                 : "the coordinator was started again meanwhile: ask for the video again");
+      return kFailed;
+    }
+    std::this_thread::sleep_for(kVideoPause);
+  }
+  if (!made) return print_rejected(made.error());
+  if (const auto got = api.download(job_path(flags.id) + "/video.mp4", flags.out); !got)
+    return print_rejected(got.error());
+  if (flags.farm.json) print(dump(*made));
+  return kOk;
+}
+
 int watch(FarmApi& api, const FarmFlags& flags) {
   const auto end = watch_job(api, flags.id, {flags.quiet, flags.farm.json});
   if (!end) return print_rejected(end.error());
@@ -80,7 +143,7 @@ int fetch(FarmApi& api, const FarmFlags& flags) {
   return fetch_results(api, flags.id, {flags.out, flags.report, flags.html, flags.farm.json, false});
 }
 
-// Makes `flags` name the job of one frame: each frame of a sequence is a separate job with its own id.
+// Changes `flags` to the job of one frame: each frame of a sequence is a separate job with its own id.
 Result<void> choose_frame(FarmFlags& flags) {
   if (flags.frame.empty()) return {};
   const auto frame = parse_whole("--frame", flags.frame, 0, kMaxFrameNumber);
@@ -144,6 +207,19 @@ void add_farm_commands(CLI::App& app, Action& action) {
       ->add_option("--html", fetching->html,
                    "its report as a page; of a sequence every frame's, with # in the name")
       ->type_name("REPORT.html");
+  auto looking = std::make_shared<FarmFlags>();
+  CLI::App* focus_command = add(
+      app, action, "focus", "which part of a job's image gets the next samples first", focus, looking, true);
+  focus_command->add_option("--region", looking->region, "the tiles of these pixels go before all others")
+      ->type_name("X0,Y0,X1,Y1");
+  focus_command->add_flag("--none", looking->none, "all tiles are treated alike again");
+  auto filming = std::make_shared<FarmFlags>();
+  CLI::App* video_command =
+      add(app, action, "video", "a video of the finished frames of a sequence", video, filming, true);
+  video_command->add_option("-o,--output", filming->out, "the video")->required()->type_name("OUT.mp4");
+  video_command->add_option("--fps", filming->fps, "pictures per second; without it 24")->type_name("N");
+  video_command->add_option("--exposure", filming->exposure, "in stops; without it 0")->type_name("STOPS");
+  video_command->add_flag("--denoised", filming->denoised, "of the denoised images");
   plain("workers", "the workers of a farm", workers, false);
 }
 

@@ -5,8 +5,8 @@
 
 #include "cli/commands/commands.h"
 #include "cli/commands/inspection.h"
+#include "cli/local/instructions.h"
 #include "cli/local/local_world.h"
-#include "cli/local/variants.h"
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "worker/machine.h"
@@ -21,8 +21,8 @@ struct InspectFlags {
   bool json = false, strict = false, variants = false, work = false;
 };
 
-// --variants renders a small image with every instantiation. Its longer side in pixels: large enough that
-// paths meet all parts of a scene, small enough to be fast.
+// Longer side of the small image that --variants renders with every instantiation, in pixels. It is large
+// enough that paths hit all parts of a scene, and small enough to be fast.
 constexpr int kSmallSide = 32;
 constexpr SampleRange kSmallSamples{0, 4};
 
@@ -32,7 +32,7 @@ FrameSize small(FrameSize size) {
   return {scaled(size.width), scaled(size.height)};
 }
 
-// Renders a small image with every integrator variant that covers the scene; the result has the digest of
+// Renders a small image with every integrator variant that has the scene's features. Returns the digest of
 // each variant's sums.
 tl::expected<VariantBitsList, coordinator::Rejected> render_variants(const LocalScene& scene, JobSpec spec,
                                                                      FrameSize full) {
@@ -111,7 +111,9 @@ void add_inspect(CLI::App& app, Action& action) {
   auto flags = std::make_shared<InspectFlags>();
   CLI::App* inspect =
       app.add_subcommand("inspect", "read and check a scene without rendering; say what it needs");
-  inspect->add_option("scene", flags->scene, "Mitsuba XML")->required()->type_name("SCENE");
+  inspect->add_option("scene", flags->scene, "Mitsuba XML, .pbrt, .gltf or .glb")
+      ->required()
+      ->type_name("SCENE");
   inspect->add_option("-D,--define", flags->defines, "sets the scene's $name")
       ->allow_extra_args(false)
       ->type_name("name=value");

@@ -14,7 +14,7 @@ namespace {
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-// The size of the coordinator's sums of both halves of the samples, R, G and B each, in double.
+// Bytes per pixel of the coordinator's film: R, G and B sums of the two halves of the samples, in double.
 constexpr std::uint64_t kFilmBytesPerPixel = 6 * sizeof(double);
 
 ordered_json files_that_stay(const LocalScene& scene, const JobSpec& spec) {
@@ -28,7 +28,7 @@ std::string times(std::uint64_t count, const std::string& what) {
   return count == 1 ? what : fmt::format("{} x {}", count, what);
 }
 
-// A list with a title and aligned columns; the last column is not padded.
+// Formats a list with a title and aligned columns. The last column is not padded.
 class TextTable {
  public:
   explicit TextTable(std::string title) : title_(std::move(title)) {}
@@ -97,6 +97,15 @@ std::string made_ready(const ordered_json& j) {
                      listed("features_left_out"));
 }
 
+std::string technique_table(const ordered_json& j) {
+  TextTable table("techniques at work, and what switches each off in the scene's integrator");
+  for (const auto& t : j.at("techniques"))
+    table.add({text_at(t, "name"),
+               fmt::format("{}=\"{}\"", text_at(t.at("off"), "parameter"), text_at(t.at("off"), "value")),
+               text_at(t, "what")});
+  return table.text();
+}
+
 std::string pruned(const ordered_json& j) {
   TextTable table("taken out of the scene, as no pixel depends on it");
   for (const auto& x : j.at("pruned")) {
@@ -123,7 +132,7 @@ std::string files(const ordered_json& j) {
   return (travel.empty() ? none : going.text()) + staying.text();
 }
 
-// Draws a bar of up to 24 marks; `largest` has all of them.
+// Draws a bar of up to 24 marks; the bar for `largest` has all 24.
 std::string bar(std::uint64_t bytes, std::uint64_t largest) {
   if (bytes == 0 || largest == 0) return "";
   const auto marks =
@@ -144,7 +153,7 @@ std::string memory(const ordered_json& j) {
   return table.text() + fmt::format("in the coordinator's: {} of film\n", show_bytes(j.at("film_bytes")));
 }
 
-// Describes the instructions per path, and how many more the omitted parts of the renderer would take. Either
+// Describes the instructions per path, and how many more the unused parts of the renderer would take. Either
 // argument is null if the instructions could not be counted.
 std::string instructions(const ordered_json& per_path, const ordered_json& cheapest) {
   if (per_path.is_null()) return "";
@@ -187,6 +196,8 @@ ordered_json inspection(const LocalScene& scene, const LocalWorld& built, const 
                  {"variants", world.variants},
                  {"features_used", world.used},
                  {"features_left_out", world.left_out},
+                 {"techniques", ordered_json::parse(techniques_json(render::techniques_of(*built.world),
+                                                                    job.settings.integrator))},
                  {"needs", ordered_json::parse(job.needs)},
                  {"parts", analysis.at("parts")},
                  {"pruned", analysis.at("left_out")},
@@ -221,8 +232,8 @@ ordered_json inspection(const LocalScene& scene, const LocalWorld& built, const 
 }
 
 std::string inspection_text(const ordered_json& j) {
-  std::string out = head(j) + parts(j, true) + parts(j, false) + made_ready(j) + pruned(j) + files(j) +
-                    memory(j) + variants(j);
+  std::string out = head(j) + parts(j, true) + parts(j, false) + made_ready(j) + technique_table(j) +
+                    pruned(j) + files(j) + memory(j) + variants(j);
   if (const auto work = j.find("work"); work != j.end()) {
     TextTable table("work of a small image");
     for (const auto& [name, count] : work->items()) table.add({name, count.dump()});

@@ -31,8 +31,8 @@ struct MergeFlags {
   bool float_output = false;
 };
 
-// Returns the given files. A folder stands for the EXR files in it, sorted by name, because there may be more
-// of them than a command line can hold.
+// Returns the given files. A folder means all EXR files in it, sorted by name: there may be more of them than
+// a command line can contain.
 Result<std::vector<fs::path>> files_of(const std::vector<std::string>& arguments) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -75,8 +75,9 @@ Result<void> write_report(const MergeFlags& flags, const Merged& merged, const s
   return save_result(flags.report, j.dump(2) + "\n");
 }
 
-// True if `digest` is that of the scene as some job renders it. A job's scene is pruned, which depends on the
-// integrator, and partials (files with pixel sums) do not name the integrator; so all kinds are tried.
+// True if `digest` is that of the scene in the form in which a job renders it. A job's scene is pruned, which
+// depends on the integrator. Since partials (files with pixel sums) do not name the integrator, all possible
+// forms are tried.
 bool is_of(const Scene& scene, const Digest& digest) {
   const std::string own = scene.integrator.name;
   return std::ranges::any_of(
@@ -86,7 +87,7 @@ bool is_of(const Scene& scene, const Digest& digest) {
       });
 }
 
-// Returns the names for the Cryptomatte manifests, which come from the scene, because partials contain only
+// Returns the names for the Cryptomatte manifests. They come from the scene, because partials contain only
 // identifiers.
 tl::expected<CryptomatteManifests, coordinator::Rejected> manifests(const MergeFlags& flags,
                                                                     const Merged& merged) {
@@ -120,7 +121,7 @@ int run(const MergeFlags& flags) {
   if (!merged) return print_error(merged.error());
   Provenance provenance;
   provenance.scene = merged->scene;
-  // Partials identify the settings by digest only.
+  // Partials contain only the digest of the settings.
   provenance.settings_json = nlohmann::json{{"sha256", merged->settings.hex()}}.dump();
   provenance.build = LIGHTSHAFT_VERSION;
   provenance.numeric_class = merged->numeric_class;

@@ -1,11 +1,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <utility>
 
 #include "cli/commands/commands.h"
 #include "cli/local/local_render.h"
-#include "cli/local/replay.h"
-#include "cli/local/sequence_render.h"
+#include "cli/local/local_scene.h"
+#include "cli/local/local_world.h"
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
@@ -19,7 +21,7 @@ namespace {
 struct RenderFlags {
   std::string scene, out, threads, pixel, sample, reference, report, html, partial_dir;
   JobOptions job;
-  bool isolate = false, quiet = false;
+  bool isolate = false, quiet = false, progress = false;
 };
 
 std::optional<std::filesystem::path> path_of(const std::string& text) {
@@ -40,6 +42,9 @@ Result<LocalRenderOptions> options_of(const RenderFlags& flags) {
   }
   options.isolate = flags.isolate;
   options.quiet = flags.quiet;
+  options.progress = flags.quiet      ? ProgressForm::none
+                     : flags.progress ? ProgressForm::lines
+                                      : ProgressForm::bar;
   options.strict = flags.job.strict;
   const char* ending = options.spec.frames ? "_####.exr" : ".exr";
   options.out = flags.out.empty() ? std::filesystem::path(flags.scene).stem().string() + ending : flags.out;
@@ -50,6 +55,23 @@ Result<LocalRenderOptions> options_of(const RenderFlags& flags) {
   return options;
 }
 
+// Renders one sample of one pixel again, for debugging, and prints its value; returns the exit code.
+int replay_sample(const LocalScene& scene, const JobSpec& spec, int threads, std::pair<int, int> pixel,
+                  std::uint64_t sample) {
+  const auto built = build_local_world(scene, spec, threads);
+  if (!built) return print_rejected(built.error());
+  const auto [x, y] = pixel;
+  const FrameSize size = built->job.settings.size;
+  if (x >= size.width || y >= size.height)
+    return usage_error(
+        fmt::format("--pixel {},{}: the image is {} x {}, counted from 0", x, y, size.width, size.height));
+  const render::SampleValue value = render::render_sample(*built->world, x, y, sample);
+  print(fmt::format("pixel {},{} sample {}: {:.9g} {:.9g} {:.9g}", x, y, sample, value.rgb[0], value.rgb[1],
+                    value.rgb[2]));
+  for (const auto& [cause, entry] : value.health.causes) print(sentence(cause, entry.count));
+  return kOk;
+}
+
 int replay(const RenderFlags& flags, const LocalScene& scene, const LocalRenderOptions& options) {
   if (flags.pixel.empty() || flags.sample.empty())
     return usage_error("--pixel and --sample belong together: one sample of one pixel");
@@ -58,6 +80,53 @@ int replay(const RenderFlags& flags, const LocalScene& scene, const LocalRenderO
   const auto sample = parse_whole("--sample", flags.sample, 0, limits::kSampleIndex);
   if (!sample) return print_error(sample.error());
   return replay_sample(scene, options.spec, options.threads, *pixel, *sample);
+}
+
+std::filesystem::path of_frame(const std::filesystem::path& path, std::uint32_t frame) {
+  return numbered(path.string(), frame);
+}
+
+LocalRenderOptions of_frame(const LocalRenderOptions& options, std::uint32_t frame) {
+  LocalRenderOptions o = options;
+  o.spec.frames = FrameRange{frame, frame, 1};
+  o.out = of_frame(options.out, frame);
+  for (auto* path : {&o.report, &o.html, &o.partial_dir, &o.reference})
+    if (*path) *path = of_frame(**path, frame);
+  return o;
+}
+
+Result<void> check_frames_outputs(const FrameRange& frames, const LocalRenderOptions& options) {
+  const auto check = [&](const char* option, const std::filesystem::path& path,
+                         bool is_file) -> Result<void> {
+    if (auto ok = check_numbered(option, path.string(), frames); !ok) return ok;
+    for (const std::uint32_t frame : frames.frames())
+      if (is_file)
+        if (auto ok = check_output(option, of_frame(path, frame)); !ok) return ok;
+    return {};
+  };
+  if (auto ok = check("-o", options.out, true); !ok) return ok;
+  if (options.report)
+    if (auto ok = check("--report", *options.report, true); !ok) return ok;
+  if (options.html)
+    if (auto ok = check("--html", *options.html, true); !ok) return ok;
+  return options.partial_dir ? check("--partial-dir", *options.partial_dir, false) : Result<void>{};
+}
+
+// Renders the frames, with the same pixels as on a farm. `options` are those for one image; a run of # in
+// their paths is replaced by the frame number. Everything is checked before the first frame is rendered.
+// Returns the exit code, and stops at the first frame whose exit code is not 0.
+int render_sequence(const std::string& path, const FrameRange& frames, const LocalRenderOptions& options) {
+  if (const auto ok = check_frames_outputs(frames, options); !ok) return print_error(ok.error());
+  auto reader = SceneReader::open(path, options.spec.defines, options.strict);
+  if (!reader) return print_rejected(reader.error());
+  if (const auto all = reader->read_all(frames); !all) return print_rejected(all.error());
+  for (const std::uint32_t frame : frames.frames()) {
+    const auto scene = reader->read(frame);
+    if (!scene) return print_rejected(scene.error());
+    if (!options.quiet && frames.count() > 1) print_note(fmt::format("lightshaft: frame {}", frame));
+    if (const int code = render_locally(*scene, of_frame(options, frame)); code != kOk) return code;
+  }
+  return kOk;
 }
 
 int run(const RenderFlags& flags) {
@@ -86,7 +155,9 @@ int run(const RenderFlags& flags) {
 void add_render(CLI::App& app, Action& action) {
   auto flags = std::make_shared<RenderFlags>();
   CLI::App* render = app.add_subcommand("render", "render a scene on this machine");
-  render->add_option("scene", flags->scene, "Mitsuba XML")->required()->type_name("SCENE");
+  render->add_option("scene", flags->scene, "Mitsuba XML, .pbrt, .gltf or .glb")
+      ->required()
+      ->type_name("SCENE");
   render
       ->add_option("-o,--output", flags->out,
                    "the image; default: the scene's name, with .exr, in this folder. Of a sequence: with # "
@@ -110,7 +181,11 @@ void add_render(CLI::App& app, Action& action) {
                    "keep every unit's partial image: `lightshaft merge` folds them")
       ->type_name("DIR");
   render->add_flag("--isolate", flags->isolate, "render in a child process, which may crash");
-  render->add_flag("--quiet", flags->quiet, "only warnings and errors");
+  auto* quiet = render->add_flag("--quiet", flags->quiet, "only warnings and errors");
+  render
+      ->add_flag("--progress", flags->progress,
+                 "progress as lines, one for each percent, for logs and programs")
+      ->excludes(quiet);
   render->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }
 

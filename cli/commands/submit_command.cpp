@@ -6,7 +6,6 @@
 #include "cli/farm/farm_api.h"
 #include "cli/farm/farm_wait.h"
 #include "cli/farm/fetch_results.h"
-#include "cli/farm/upload_bundle.h"
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
@@ -26,7 +25,7 @@ struct SubmitFlags {
 
 using Job = FarmApi::Answer<FarmApi::Json>;
 
-// Reads the scene here first, so that its errors are reported before anything is sent.
+// Reads the scene before submitting it, so that its errors are reported before anything is sent.
 Job submit_scene(const SubmitFlags& flags, const JobSpec& spec) {
   auto reader = SceneReader::open(flags.scene, spec.defines, flags.job.strict);
   if (!reader) return tl::unexpected(reader.error());
@@ -112,7 +111,7 @@ void add_submit(CLI::App& app, Action& action) {
       app.add_subcommand("submit", "send a scene and its files to a farm; prints the job's id");
   submit
       ->add_option("scene", flags->scene,
-                   "Mitsuba XML, or a .zip, .tar or .tar.gz with one and all its files")
+                   "Mitsuba XML, .pbrt, .gltf or .glb, or a .zip, .tar or .tar.gz with one and all its files")
       ->required()
       ->type_name("SCENE");
   flags->farm.add_to(*submit);

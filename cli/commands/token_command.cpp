@@ -1,4 +1,5 @@
-// `lightshaft token add | list | revoke`: manages access to a farm, for its admin.
+// `lightshaft token add | list | revoke`: manages the tokens that give access to a farm. Only for its
+// administrator.
 #include <fmt/format.h>
 
 #include "cli/commands/commands.h"

@@ -1,4 +1,4 @@
-// lightshaft validate: the table of stiff and extreme cases, or, with FILE, the tests of a Nori file.
+// lightshaft validate: runs the table of cases with known answers or, with FILE, the tests of a Nori file.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
@@ -24,7 +24,7 @@ struct ValidateFlags {
   bool strict = false, quick = false;
 };
 
-// Records from which renderer and options the figures come, so that tables of different ones cannot be mixed.
+// Records the renderer and the options of the figures, so that tables of different ones cannot be mixed.
 void add_origin(nlohmann::ordered_json& json, const ValidateFlags& flags) {
   json["build"] = render::kBuildId;
   json["numeric_class"] = render::numeric_class().hex();
@@ -54,8 +54,6 @@ nlohmann::ordered_json table_with_rows(const cases::Table& table, const std::vec
   json["left_out"] = nlohmann::ordered_json::array();
   for (const cases::Case& c : table.cases())
     if (quick && c.options.slow) json["left_out"].push_back({{"name", c.id}, {"rows", c.rows}});
-  for (const cases::CoveredByTests& e : cases::covered_by_tests())
-    json["elsewhere"].push_back({{"row", e.row}, {"file", e.file}, {"test", e.test}});
   return json;
 }
 

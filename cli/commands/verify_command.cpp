@@ -42,8 +42,8 @@ Result<FinalPicture> open_image(const std::string& path) {
   return read_final_exr(*bytes, path);
 }
 
-// Checks what a comparison requires: that image and scene are of the same scene, and that this machine has
-// the numeric class of the image (its machines give the same bits).
+// Checks the conditions of a comparison: image and scene belong together, and this machine has the numeric
+// class of the image (machines of one class give the same bits).
 Result<void> check_same(const SealedImage& image, const LocalScene& scene, const VerifyFlags& flags) {
   if (const Digest mine = digest_of(scene.scene); mine != image.scene)
     return fail(
@@ -77,10 +77,10 @@ std::string tile_verdict(const VerifiedTile& t) {
   return t.stopped ? "stopped" : t.wrong() ? "fail" : "pass";
 }
 
-// Results of checking the seal of the whole file, and of recomputing headers.
+// The results of checking the seal of the whole file, and of recomputing headers.
 struct Contents {
   bool sealed = false;
-  std::vector<std::string> changed;  // "layer depth.Z"
+  std::vector<std::string> changed;  // changed parts, such as "layer depth.Z"
 
   bool as_sealed() const { return sealed && changed.empty(); }
   std::string verdict() const { return !changed.empty() ? "fail" : sealed ? "pass" : "unsealed"; }
@@ -117,7 +117,7 @@ std::string line_of(const VerifiedTile& t) {
                      t.rect.y1, t.spp, t.wrong() ? t.problem : "as sealed");
 }
 
-// Each thread renders one tile at a time.
+// Verifies the tiles in parallel; each thread renders one tile at a time.
 std::vector<VerifiedTile> verify_all(const render::World& world, const SealedImage& image,
                                      const std::vector<TileIndex>& tiles, int threads, bool quiet,
                                      const std::atomic<bool>& stop) {
@@ -165,7 +165,7 @@ Result<Numbers> numbers_of(const VerifyFlags& flags) {
 }
 
 int run(const VerifyFlags& flags) {
-  std::atomic<bool> stop{false};  // outlives the thread that sets it
+  std::atomic<bool> stop{false};  // declared first, so that it outlives the thread that sets it
   Interrupt interrupt;
   interrupt.on_signal([&] { stop = true; });
   const auto numbers = numbers_of(flags);
@@ -175,14 +175,14 @@ int run(const VerifyFlags& flags) {
   auto picture = open_image(flags.image);
   if (!picture) return print_error(picture.error());
   Contents contents = contents_of(*picture);
-  // This is reported first, because later steps may fail because of it.
+  // This is reported before the next steps, which may fail because of it.
   if (!contents.changed.empty()) complain(fmt::format("{}: {}", flags.image, line_of(contents)));
   const auto image = read_sealed_image(std::move(*picture), flags.image);
   if (!image) return print_error(image.error());
   auto scene = read_local_scene(flags.scene, *defines, false, numbers->frame,
                                 coordinator::wants_labels(image->settings));
   if (!scene) return print_rejected(scene.error());
-  // The scene as a job renders it.
+  // The scene is pruned to the form in which a job renders it.
   scene->scene =
       scene::pruned(scene->scene, scene::pruned_for(image->settings.integrator, image->settings.max_depth))
           .scene;

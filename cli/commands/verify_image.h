@@ -16,26 +16,26 @@ struct VerifiedTile {
   TileIndex tile = 0;
   PixelRect rect;
   std::uint64_t spp = 0;
-  // True if verifying was interrupted before the tile was rendered, so that nothing is known about it.
+  // True if verification was interrupted before the tile was rendered: its result is unknown.
   bool stopped = false;
-  TileError error;      // estimated from its samples
+  TileError error;      // error of the tile, estimated from its samples
   std::string problem;  // empty: the digest and all layers match
 
   bool wrong() const { return !problem.empty(); }
 };
 
-// Returns `count` distinct tiles of 0 to `all` - 1, or all of them if there are fewer, in ascending order.
+// Returns `count` distinct tiles from 0 to `all` - 1, or all of them if there are fewer, in ascending order.
 // The choice is a function of `seed`.
 std::vector<TileIndex> random_tiles(TileIndex all, std::uint64_t count, std::uint64_t seed);
 
 // Renders all rounds (ranges of samples) of the tile again. Compares the hash chain over the digests of its
-// units with the one sealed in the image, and its values in every layer with those of the image. The world
-// must be that of the image's scene and settings.
+// units with the chain sealed in the image, and its values in every layer with the image's. The world must
+// have been built from the image's scene and settings.
 VerifiedTile verify_tile(const render::World& world, const SealedImage& image, TileIndex tile,
                          const std::atomic<bool>& stop);
 
-// Returns, as "header NAME", the image's headers that contradict its settings or the names of the scene. If
-// `tiles` has all tiles of the image, also returns those that contradict their samples. The other headers
+// Returns, as "header NAME", the image's headers that contradict its settings or the names in the scene. If
+// `tiles` has all tiles of the image, also returns headers that contradict their samples. The other headers
 // (seconds, health, ...) are protected by the seal only.
 std::vector<std::string> wrong_headers(const SealedImage& image, const CryptomatteManifests& names,
                                        const std::vector<VerifiedTile>& tiles);

@@ -1,11 +1,14 @@
 #include "cli/farm/farm_api.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cctype>
 #include <cstdlib>
+#include <string_view>
 
-#include "cli/farm/retry.h"
+#include "cli/farm/http_client.h"
 #include "cli/output/reply_fields.h"
 #include "common/base/secret.h"
 
@@ -20,7 +23,7 @@ constexpr std::size_t kDigestsPerQuestion = 10'000;
 // Files of at least this size are sent in parts, so that an upload can continue after a broken connection.
 // Smaller files are sent again as a whole, which costs one request instead of two.
 constexpr std::uintmax_t kSentInParts = 1u << 20;
-constexpr int kBarrenAttempts = 8;  // consecutive attempts without progress before giving up
+constexpr int kBarrenAttempts = 8;  // give up after this many consecutive attempts without progress
 
 std::string environment(const char* name) {
   const char* value = std::getenv(name);
@@ -115,7 +118,7 @@ void FarmOptions::add_to(CLI::App& app) {
   app.add_flag("--json", json, "answer as JSON");
 }
 
-Result<FarmApi> FarmApi::open(const FarmOptions& options) {
+Result<HttpClient::Options> connection_of(const FarmOptions& options) {
   HttpClient::Options o;
   o.url = options.url.empty() ? environment("LIGHTSHAFT_URL") : options.url;
   if (o.url.empty())
@@ -128,7 +131,13 @@ Result<FarmApi> FarmApi::open(const FarmOptions& options) {
     if (!token) return fail(Errc::invalid_argument, "--token-file: " + token.error().message);
     o.token = std::move(*token);
   }
-  auto client = HttpClient::open(std::move(o));
+  return o;
+}
+
+Result<FarmApi> FarmApi::open(const FarmOptions& options) {
+  auto connection = connection_of(options);
+  if (!connection) return tl::unexpected(connection.error());
+  auto client = HttpClient::open(std::move(*connection));
   if (!client) return tl::unexpected(client.error());
   return FarmApi(std::move(*client));
 }
@@ -164,7 +173,8 @@ FarmApi::Answer<void> FarmApi::download(const std::string& path, const std::file
 FarmApi::Answer<void> FarmApi::upload_missing(const LocalScene& scene, const JobSpec& spec,
                                               const Digest& text,
                                               const std::function<void(const std::string&)>& on_progress) {
-  std::map<std::string, const LocalFile*> by_digest{{text.hex(), nullptr}};  // null: the scene's text
+  // Null stands for the scene's text
+  std::map<std::string, const LocalFile*> by_digest{{text.hex(), nullptr}};
   for (const auto& [name, file] : scene.files)
     if (is_needed(scene, spec, file)) by_digest.emplace(file.digest.hex(), &file);
   for (auto next = by_digest.begin(); next != by_digest.end();) {
@@ -190,7 +200,7 @@ FarmApi::Answer<void> FarmApi::upload_missing(const LocalScene& scene, const Job
   return {};
 }
 
-// Sending again is safe, because blobs are identified by digest.
+// Sending the same file again is safe, because blobs are identified by digest.
 FarmApi::Answer<HttpResponse> FarmApi::send_file(const std::string& path, const std::filesystem::path& file) {
   std::error_code error;
   if (std::filesystem::file_size(file, error) < kSentInParts || error)
@@ -214,7 +224,7 @@ FarmApi::Answer<HttpResponse> FarmApi::send_rest(const std::string& path, const 
   sending.reached = std::max(sending.reached, offset);
   auto put = client_.upload(path, file, offset);
   sending.retry.answered();
-  // 409: an earlier connection delivered more bytes between the two requests.
+  // 409: between the two requests, an earlier connection has delivered more bytes.
   if (put && put->status == 409) return refused({Errc::unavailable, problem_of(*put).error.message});
   return checked(std::move(put));
 }
@@ -258,6 +268,66 @@ std::string job_path(const std::string& id) {
     path += std::isalnum(c) || c == '-' || c == '_' || c == '.' ? std::string(1, static_cast<char>(c))
                                                                 : fmt::format("%{:02X}", c);
   return path;
+}
+
+namespace {
+
+std::string escaped(std::string_view text) {
+  std::string out;
+  for (const unsigned char c : text)
+    out += std::isalnum(c) || c == '-' || c == '_' || c == '.' ? std::string(1, static_cast<char>(c))
+                                                               : fmt::format("%{:02X}", c);
+  return out;
+}
+
+class Query {
+ public:
+  void add(std::string_view key, std::string_view value) {
+    text_ += fmt::format("{}{}={}", text_.empty() ? "?" : "&", key, escaped(value));
+  }
+  template <class T>
+  void add(std::string_view key, const std::optional<T>& value) {
+    if (value) add(key, fmt::format("{}", *value));
+  }
+  std::string take() { return std::move(text_); }
+
+ private:
+  std::string text_;
+};
+
+}  // namespace
+
+std::optional<std::string> bundle_type(const std::string& file) {
+  std::string name = file;
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (name.ends_with(".zip")) return "application/zip";
+  for (const char* end : {".tar", ".tar.gz", ".tgz"})
+    if (name.ends_with(end)) return "application/x-tar";
+  return std::nullopt;
+}
+
+std::string spec_query(const JobSpec& spec, bool with_priority) {
+  Query query;
+  query.add("spp", spec.spp);
+  query.add("target_error", spec.target_error);
+  if (spec.target_layer != TargetLayer::raw)
+    query.add("target_layer", std::string(to_string(spec.target_layer)));
+  query.add("time", spec.time);
+  query.add("seed", spec.seed);
+  if (spec.size) query.add("size", fmt::format("{}x{}", spec.size->width, spec.size->height));
+  query.add("integrator", spec.integrator);
+  if (!spec.aov.empty()) query.add("aov", fmt::format("{}", fmt::join(spec.aov, ",")));
+  for (const auto& [name, value] : spec.defines) query.add("define", name + "=" + value);
+  if (with_priority) query.add("priority", fmt::format("{}", spec.priority));
+  if (spec.float_output) query.add("float", "true");
+  if (spec.denoise) query.add("denoise", "true");
+  if (!spec.tags.empty()) query.add("tags", fmt::format("{}", fmt::join(spec.tags, ",")));
+  if (spec.frames) query.add("frames", to_string(*spec.frames));
+  query.add("max_workers", spec.max_workers);
+  query.add("max_units", spec.max_units);
+  query.add("memory", spec.memory);
+  if (spec.reference) query.add("reference", spec.reference->hex());
+  return query.take();
 }
 
 }  // namespace ls::cli

@@ -1,15 +1,16 @@
-// A coordinator's HTTP API as function calls. Addresses and tokens come from options and environment; error
+// A coordinator's HTTP API as functions. Addresses and tokens come from options and the environment; error
 // responses ("problem details", RFC 9457) become errors.
 #pragma once
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "cli/farm/http_client.h"
-#include "cli/farm/retry.h"
 #include "cli/local/local_scene.h"
+#include "common/job/settings.h"
 #include "coordinator/service/coordinator.h"
 
 namespace ls::cli {
@@ -19,6 +20,10 @@ struct FarmOptions {
   bool json = false;
   void add_to(CLI::App& app);
 };
+
+// Returns the address, token and CA file that options and environment give. invalid_argument: there is no
+// address, or the file of the token cannot be read.
+Result<HttpClient::Options> connection_of(const FarmOptions& options);
 
 class FarmApi {
  public:
@@ -35,11 +40,11 @@ class FarmApi {
   Answer<std::string> get_text(const std::string& path);
   Answer<void> download(const std::string& path, const std::filesystem::path& file);
 
-  // Uploads the scene and files that the coordinator does not have, then creates the job. `on_progress`
-  // receives a message for each upload.
+  // Uploads the scene and those of its files that the coordinator does not have, then creates the job.
+  // `on_progress` receives a message for each upload.
   Answer<Json> submit(const LocalScene& scene, const JobSpec& spec,
                       const std::function<void(const std::string&)>& on_progress);
-  // Uploads a file unless the coordinator has it. Returns its digest, by which a spec refers to it.
+  // Uploads a file unless the coordinator has it. Returns its digest, which a spec can refer to.
   Answer<Digest> upload(const std::filesystem::path& file,
                         const std::function<void(const std::string&)>& on_progress);
   // Sends an archive of a scene unchanged, to create a job from it. `type` comes from bundle_type(), `query`
@@ -64,9 +69,19 @@ class FarmApi {
   HttpClient client_;
 };
 
-std::string job_path(const std::string& id);  // "/api/v1/jobs/ID", escaped
+std::string job_path(const std::string& id);  // returns "/api/v1/jobs/ID", escaped
 
 // Converts a response with an error status to an error, including its diagnostics.
 coordinator::Rejected problem_of(const HttpResponse& response);
+
+// For `submit` with an archive (a scene with its files), which is sent unchanged; the options are in the
+// query of the request. Returns "application/zip" or "application/x-tar" according to the file's name (.zip,
+// .tar, .tar.gz, .tgz); nullopt: the file is a scene, not an archive.
+std::optional<std::string> bundle_type(const std::string& file);
+
+// Returns the spec as query parameters, such as "?spp=8&define=a%3D1", or an empty text. Options that were
+// not given are left out, because the archive may set them. `with_priority`: the priority was given (its
+// value alone does not show this).
+std::string spec_query(const JobSpec& spec, bool with_priority);
 
 }  // namespace ls::cli

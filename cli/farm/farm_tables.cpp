@@ -8,7 +8,6 @@
 
 #include "cli/output/console.h"
 #include "cli/output/convergence_text.h"
-#include "cli/output/health_lines.h"
 #include "cli/output/reply_fields.h"
 #include "common/base/plain_text.h"
 #include "common/image/exr/final_image.h"
@@ -55,7 +54,8 @@ std::string table(const std::vector<Row>& rows) {
   return out;
 }
 
-constexpr std::size_t kMostFrames = 100;  // maximum listed; if there are more, only those with remarks
+// Most frames listed; if there are more, only those with remarks are listed
+constexpr std::size_t kMostFrames = 100;
 
 const json* frames_of(const json& job) {
   const auto frames = job.find("frames");
@@ -94,7 +94,7 @@ bool is_over(const json& job) {
   return state == "done" || state == "failed" || state == "cancelled";
 }
 
-// Describes the samples done and to be done. For a job that ends by target error or time only, `spp` is a
+// Describes the samples done and requested. For a job that ends by target error or time only, `spp` is a
 // limit that the user did not set.
 std::string samples(const json& job) {
   const std::string done = number(job, "spp_done", "{:.6g}"), limit = number(job, "spp", "{:.0f}");
@@ -117,9 +117,20 @@ void add_pixels(std::vector<Row>& rows, const char* name, const json& job, const
     rows.push_back({name, fmt::format("{} pixels: {}", report::count(n), meaning)});
 }
 
+// The error of the denoised layers when it was last compared with the target.
+std::string denoised_check_text(const json& check) {
+  const auto at_most = number_field(check, "at_most");
+  return fmt::format("{}, {} (with {} samples per pixel)", number(check, "relmse", "{:.3g}"),
+                     at_most ? fmt::format("at most {:.3g}", *at_most) : "without an interval",
+                     number(check, "spp", "{:.4g}"));
+}
+
 void add_error_rows(std::vector<Row>& rows, const json& job) {
   rows.push_back({"relMSE", estimate_text(job, "relmse", "relmse_ci95")});
-  add_known(rows, "target relMSE", job, "target_error", "{:g}");
+  const bool denoised = text_field(job, "target_layer") == "denoised";
+  add_known(rows, denoised ? "target relMSE, denoised" : "target relMSE", job, "target_error", "{:g}");
+  if (const auto check = job.find("denoised_check"); check != job.end() && check->is_object())
+    rows.push_back({"relMSE, denoised", denoised_check_text(*check)});
   rows.push_back({"RMSE", estimate_text(job, "rmse", "rmse_ci95")});
   if (const auto reference = job.find("reference"); reference != job.end() && reference->is_object()) {
     const auto add_reference_error = [&](const char* name, const char* key, const char* below) {

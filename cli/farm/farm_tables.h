@@ -1,4 +1,4 @@
-// Formats a farm's answers for people.
+// Formats a farm's answers for users.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -6,9 +6,9 @@
 
 namespace ls::cli {
 
-std::string jobs_table(const nlohmann::json& answer);     // of GET /jobs
-std::string tokens_table(const nlohmann::json& answer);   // of GET /tokens
-std::string workers_table(const nlohmann::json& answer);  // of GET /workers
-std::string job_text(const nlohmann::json& job);          // of GET /jobs/ID
+std::string jobs_table(const nlohmann::json& answer);     // formats the answer to GET /jobs
+std::string tokens_table(const nlohmann::json& answer);   // formats the answer to GET /tokens
+std::string workers_table(const nlohmann::json& answer);  // formats the answer to GET /workers
+std::string job_text(const nlohmann::json& job);          // formats the answer to GET /jobs/ID
 
 }  // namespace ls::cli

@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 #include <poll.h>
 
-#include "cli/farm/retry.h"
+#include "cli/farm/http_client.h"
 #include "cli/output/console.h"
 #include "cli/output/convergence_text.h"
-#include "cli/output/health_lines.h"
 #include "cli/output/reply_fields.h"
 
 namespace ls::cli {
@@ -33,6 +32,9 @@ ProgressFigures progress_of(const json& job) {
   f.eta_ci95 = pair_field(job, "eta_ci95");
   f.relmse_ci95 = pair_field(job, "relmse_ci95");
   f.target_error = number_field(job, "target_error");
+  f.target_denoised = text_field(job, "target_layer") == "denoised";
+  if (const auto check = job.find("denoised_check"); check != job.end() && check->is_object())
+    f.denoised_at_most = number_field(*check, "at_most");
   if (const auto more = job.find("eta_with_more"); more != job.end() && more->is_object()) {
     f.eta_with_more = number_field(*more, "seconds");
     f.more_workers = int_field(*more, "workers", f.more_workers);
@@ -44,14 +46,15 @@ ProgressFigures progress_of(const json& job) {
     f.samples_per_second = f.spp_done * size->first * size->second / elapsed;
   if (const auto frames = job.find("frames"); frames != job.end() && frames->is_object()) {
     const int total = int_field(*frames, "total", 0);
-    f.samples_per_second *= total;  // spp_done is the mean over all frames
+    // Multiplied by the number of frames, since spp_done is the mean over them
+    f.samples_per_second *= total;
     f.frames = fmt::format("{} of {} frames", int_field(*frames, "done", 0), total);
   }
   return f;
 }
 
 FarmApi::Answer<json> watch_job(FarmApi& api, const std::string& id, const WatchOptions& options) {
-  ProgressBar bar(options.quiet || options.json);
+  ProgressBar bar(options.quiet || options.json ? ProgressForm::none : ProgressForm::bar);
   RetryPolicy retry;
   std::string reported;
   for (;; ::poll(nullptr, 0, kPollMilliseconds)) {
@@ -86,7 +89,7 @@ int print_end(const json& job, bool quiet) {
 }
 
 void print_denoised(FarmApi& api, const json& job) {
-  // Those of a sequence are in the reports of its frames.
+  // A sequence has no error of its own: those are in the reports of its frames.
   const auto frames = job.find("frames");
   const bool sequence = frames != job.end() && frames->is_object();
   if (!flag_field(job, "denoise") || sequence) return;

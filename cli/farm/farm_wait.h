@@ -11,19 +11,19 @@ namespace ls::cli {
 
 struct WatchOptions {
   bool quiet = false;
-  bool json = false;  // print the job as one JSON line on stdout after each change
+  bool json = false;  // print the job as a line of JSON on stdout after each change
 };
-// Waits until the job `id` ends and returns it, or the error because of which it cannot be followed. If the
+// Waits until the job `id` ends and returns the job. Returns an error if the job cannot be followed. If the
 // coordinator cannot be reached for a while (a restart), keeps trying.
 FarmApi::Answer<nlohmann::json> watch_job(FarmApi& api, const std::string& id, const WatchOptions& options);
 
 ProgressFigures progress_of(const nlohmann::json& job);
 
-// Prints how a job ended. If it is done, prints the error of its image (with `quiet` only if the error is not
-// to be trusted) and returns kOk; otherwise prints why it is not done and returns kFailed.
+// Prints how a job ended. If it is done, prints the error of its image (with `quiet` only if the error cannot
+// be trusted) and returns kOk; otherwise prints the reason and returns kFailed.
 int print_end(const nlohmann::json& job, bool quiet);
-// Prints the error of the denoised image of a job that is done, which only its report has; nothing if none
-// was asked for.
+// Prints the error of the denoised image of a job that is done; this is only in the job's report. Prints
+// nothing if no denoising was requested.
 void print_denoised(FarmApi& api, const nlohmann::json& job);
 
 }  // namespace ls::cli

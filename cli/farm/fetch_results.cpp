@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "cli/farm/retry.h"
+#include "cli/farm/http_client.h"
 #include "cli/output/console.h"
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
@@ -19,8 +19,8 @@ struct Download {
   std::string path, option, file;
 };
 
-// Returns the frame number in a farm's answer. Only bounded whole numbers are accepted, because they are
-// untrusted and become part of file names.
+// Returns the frame number in a farm's answer. Only small non-negative integers are accepted: answers are
+// untrusted, and the number becomes part of file names.
 std::optional<std::uint32_t> frame_number(const json& frame) {
   const int number = frame.is_object() ? int_field(frame, "frame", -1) : -1;
   if (number < 0 || number > static_cast<int>(kMaxFrameNumber)) return std::nullopt;
@@ -29,7 +29,7 @@ std::optional<std::uint32_t> frame_number(const json& frame) {
 
 struct Plan {
   std::vector<Download> downloads;
-  std::vector<std::uint32_t> empty;  // frames without results
+  std::vector<std::uint32_t> empty;  // frames that have no results
 };
 
 Result<Plan> plan_sequence(const std::string& id, const json& frames, const Results& wanted) {

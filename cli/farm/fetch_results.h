@@ -9,9 +9,10 @@
 namespace ls::cli {
 
 struct Results {
-  std::string image, report, html;  // file names; empty: not wanted. A run of # stands for the frame number
-  bool json = false;                // print each file as a line of JSON on stdout
-  bool patient = false;             // wait for a coordinator that is unreachable for a while
+  // File names; empty: not wanted. A run of # is replaced by the frame number
+  std::string image, report, html;
+  bool json = false;     // print each file as a line of JSON on stdout
+  bool patient = false;  // keep trying if the coordinator is unreachable for a while
 };
 
 // Checks, before a job is submitted, that files of this name (or one per frame) can be written.

@@ -2,7 +2,7 @@
 
 #include <curl/curl.h>
 #include <fmt/format.h>
-
+#include <poll.h>
 #include <strings.h>
 
 #include <algorithm>
@@ -17,9 +17,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr long kConnectSeconds = 15;
-constexpr long kStallSeconds = 60;  // longest time without a byte
+constexpr long kStallSeconds = 60;  // longest time without a byte of an answer
 constexpr long kRedirects = 3;
-constexpr long kWorkSeconds = 3600;  // the same while the server is working
+constexpr long kWorkSeconds = 3600;  // the same for requests on which the server works for long
 
 struct CloseFile {
   void operator()(std::FILE* file) const { std::fclose(file); }
@@ -34,7 +34,7 @@ void add(Headers& headers, const std::string& line) {
   headers.reset(curl_slist_append(headers.release(), line.c_str()));
 }
 
-// Receives an answer's body: into a file if one is wanted and the answer is a success.
+// Receives an answer's body: into a file, if one is given and the request succeeds; otherwise into memory.
 struct Receiver {
   CURL* curl = nullptr;
   HttpResponse* response = nullptr;
@@ -57,16 +57,27 @@ struct Receiver {
   }
 };
 
-std::size_t take_header(char* data, std::size_t size, std::size_t count, void* response_pointer) {
-  constexpr std::string_view kName = "Upload-Offset:";
-  std::string_view line(data, size * count);
-  if (line.size() < kName.size() || ::strncasecmp(line.data(), kName.data(), kName.size()) != 0)
-    return size * count;
-  line.remove_prefix(kName.size());
+// Returns the value of the header `name` if `line` contains it.
+std::optional<std::string> header_value(std::string_view line, std::string_view name) {
+  if (line.size() <= name.size() || line[name.size()] != ':' ||
+      ::strncasecmp(line.data(), name.data(), name.size()) != 0)
+    return std::nullopt;
+  line.remove_prefix(name.size() + 1);
   line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
-  std::uint64_t offset = 0;
-  if (std::from_chars(line.data(), line.data() + line.size(), offset).ec == std::errc())
-    static_cast<HttpResponse*>(response_pointer)->upload_offset = offset;
+  return std::string(line.substr(0, line.find_first_of("\r\n")));
+}
+
+std::size_t take_header(char* data, std::size_t size, std::size_t count, void* response_pointer) {
+  auto& response = *static_cast<HttpResponse*>(response_pointer);
+  const std::string_view line(data, size * count);
+  if (const auto text = header_value(line, "Upload-Offset")) {
+    std::uint64_t offset = 0;
+    if (std::from_chars(text->data(), text->data() + text->size(), offset).ec == std::errc())
+      response.upload_offset = offset;
+  } else if (const auto date_text = header_value(line, "Date")) {
+    const std::time_t date = curl_getdate(date_text->c_str(), nullptr);
+    if (date != -1) response.date = date;
+  }
   return size * count;
 }
 
@@ -90,7 +101,7 @@ Result<void> check_url(const std::string& url) {
 struct HttpClient::State {
   Options options;
   std::vector<std::string> urls;
-  std::size_t current = 0;  // index of the one that answered last
+  std::size_t current = 0;  // index of the address that answered last
   CURL* curl = nullptr;
   long stall_seconds = kStallSeconds;
   ~State() { curl_easy_cleanup(curl); }
@@ -142,8 +153,8 @@ void HttpClient::State::set_common(const std::string& url, const Headers& header
   curl_easy_setopt(curl, CURLOPT_USERAGENT, "lightshaft/" LIGHTSHAFT_VERSION);
   curl_easy_setopt(curl, CURLOPT_NOSIGNAL, 1L);
   curl_easy_setopt(curl, CURLOPT_PROTOCOLS_STR, "http,https");
-  // A coordinator may redirect to the one that has a job; both belong to the farm that the token is for. But
-  // a request made with TLS is never redirected to one without.
+  // A coordinator may redirect to another one that has the job. Both belong to the farm that the token is
+  // for. A redirect from TLS to an address without TLS is not followed.
   curl_easy_setopt(curl, CURLOPT_FOLLOWLOCATION, 1L);
   curl_easy_setopt(curl, CURLOPT_MAXREDIRS, kRedirects);
   curl_easy_setopt(curl, CURLOPT_REDIR_PROTOCOLS_STR, url.starts_with("https:") ? "https" : "http,https");
@@ -170,7 +181,7 @@ Result<HttpResponse> HttpClient::State::perform(const std::string& path, const H
     set_common(urls[current] + path, headers);
     code = curl_easy_perform(curl);
     if (code != CURLE_COULDNT_CONNECT || urls.size() == 1) break;
-    current = (current + 1) % urls.size();  // nothing was sent yet
+    current = (current + 1) % urls.size();  // nothing was sent yet, so the next address is tried
   }
   long status = 0;
   char* type = nullptr;
@@ -185,7 +196,8 @@ Result<HttpResponse> HttpClient::State::perform(const std::string& path, const H
                 fmt::format("the answer to {} is larger than {} bytes", path, kMaxAnswerBytes));
   if (receiver.write_failed)
     return fail(Errc::resource_exhausted, "the answer cannot be written: is the disk full?");
-  // The server rejected an upload midway: its response is more informative than the broken connection.
+  // The server rejected an upload before its end. Its response is more informative than the broken
+  // connection.
   if (code == CURLE_SEND_ERROR && status >= 400) return response;
   const std::string asked = urls[current];
   if (code == CURLE_UNSUPPORTED_PROTOCOL)
@@ -250,7 +262,7 @@ Result<HttpResponse> HttpClient::post_file(const std::string& path, const fs::pa
   state_->stall_seconds = kWorkSeconds;
   auto response = state_->send(path, file, content_type);
   state_->stall_seconds = kStallSeconds;
-  curl_easy_reset(state_->curl);  // in case nothing was sent
+  curl_easy_reset(state_->curl);  // needed if nothing was sent
   return response;
 }
 
@@ -273,6 +285,24 @@ Result<HttpResponse> HttpClient::download(const std::string& path, const fs::pat
   if (!response || response->status / 100 != 2) return response;
   return fail(Errc::resource_exhausted,
               fmt::format("{} cannot be written{}", file.string(), error ? ": " + error.message() : ""));
+}
+
+namespace {
+constexpr double kRemoteSeconds = 120;
+constexpr int kFirstPauseMilliseconds = 250, kLongestPauseMilliseconds = 4000;
+}  // namespace
+
+bool RetryPolicy::again(const Error& error) {
+  if (error.code != Errc::unavailable || seconds(clock_.now() - last_answer_) > kRemoteSeconds) return false;
+  pause_milliseconds_ =
+      std::clamp(2 * pause_milliseconds_, kFirstPauseMilliseconds, kLongestPauseMilliseconds);
+  ::poll(nullptr, 0, pause_milliseconds_);
+  return true;
+}
+
+void RetryPolicy::answered() {
+  last_answer_ = clock_.now();
+  pause_milliseconds_ = 0;
 }
 
 }  // namespace ls::cli

@@ -1,4 +1,4 @@
-// The interface to libcurl: requests to a coordinator's HTTP API over one persistent connection.
+// The interface to libcurl: sends requests to a coordinator's HTTP API over one persistent connection.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "common/base/clock.h"
 #include "common/base/error.h"
 
 namespace ls::cli {
@@ -16,15 +17,16 @@ struct HttpResponse {
   int status = 0;
   std::string content_type;
   std::string body;
-  std::optional<std::uint64_t> upload_offset;  // the header Upload-Offset
+  std::optional<std::uint64_t> upload_offset;  // value of the header Upload-Offset
+  std::optional<std::int64_t> date;            // value of the header Date, in seconds since 1970
 };
 
 class HttpClient {
  public:
   struct Options {
     // The coordinator's address, such as "https://farm.example:8080": http or https, with or without a path
-    // before /api. If several coordinators share a farm, these are their addresses separated by commas: if
-    // one does not answer, the client tries the next.
+    // before /api. If several coordinators share a farm, their addresses separated by commas: if one does not
+    // answer, the client tries the next.
     std::string url;
     std::string token;  // sent as a bearer token; may be empty
     std::string ca;     // file of CA certificates to trust instead of the system's; may be empty
@@ -39,15 +41,17 @@ class HttpClient {
   // resource_exhausted (the response is larger than kMaxAnswerBytes).
   Result<HttpResponse> request(std::string_view method, const std::string& path, std::string_view body = {},
                                std::string_view content_type = "application/json");
-  // PUTs the bytes of a file without holding them all in memory. With `offset`, sends only the bytes from
-  // there on; the server appends them to those that it has, and keeps what arrives if the connection breaks.
+  // Sends the bytes of a file by PUT without holding them all in memory. With `offset`, sends only the bytes
+  // from there on; the server appends them to those that it has, and keeps them even if the connection
+  // breaks.
   Result<HttpResponse> upload(const std::string& path, const std::filesystem::path& file,
                               std::optional<std::uint64_t> offset = std::nullopt);
-  // POSTs a file; the coordinator may take up to an hour to answer, because it unpacks the archive first.
+  // Sends a file by POST. The coordinator may take up to an hour to answer, because it unpacks the archive
+  // first.
   Result<HttpResponse> post_file(const std::string& path, const std::filesystem::path& file,
                                  std::string_view content_type);
-  // Writes the body of a 2xx answer to `file` through a temporary file beside it, or directly if it is a pipe
-  // or a device. For other answers the body is returned.
+  // Writes the body of a 2xx answer to `file`: through a temporary file beside it, or directly if it is a
+  // pipe or a device. The body of any other answer is returned.
   Result<HttpResponse> download(const std::string& path, const std::filesystem::path& file);
 
   static constexpr std::size_t kMaxAnswerBytes = std::size_t{256} << 20;
@@ -57,5 +61,30 @@ class HttpClient {
   explicit HttpClient(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
+
+// Decides whether to repeat a failed request: a coordinator may be unreachable for a while because of a
+// restart, a proxy in between, or too many requests.
+class RetryPolicy {
+ public:
+  // Waits, each time longer, and returns true if the failed request should be repeated. Returns false without
+  // waiting if `error` is permanent, or if the coordinator has been unreachable for two minutes since the
+  // last answered().
+  bool again(const Error& error);
+  void answered();
+
+ private:
+  SystemClock clock_;
+  TimePoint last_answer_ = clock_.now();
+  int pause_milliseconds_ = 0;
+};
+
+// Runs `call`, which must be repeatable, until it succeeds or RetryPolicy::again() returns false.
+template <class Call>
+auto with_retries(Call call) {
+  RetryPolicy retry;
+  auto answer = call();
+  while (!answer && retry.again(answer.error().error)) answer = call();
+  return answer;
+}
 
 }  // namespace ls::cli

@@ -1,8 +1,14 @@
-// Counts the instructions executed by a thread and the threads it starts, with the processor's counter.
+// Counts the instructions executed by a thread and the threads that it starts, with the processor's counter.
+// Measures with it what the variants of the integrator cost.
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
 
+#include "common/base/digest.h"
 #include "common/base/error.h"
 
 namespace ls::cli {
@@ -26,5 +32,26 @@ class InstructionCounter {
   explicit InstructionCounter(int fd) : fd_(fd) {}
   int fd_;
 };
+
+// Results of rendering the same small image with each variant of the integrator that has the scene's features
+// (a variant is compiled for a subset of features). It shows whether all variants give the same bits, and
+// what each costs.
+struct VariantBits {
+  std::string name;
+  Digest sums;
+  std::optional<double> instructions;  // instructions per path; nullopt if they cannot be counted
+};
+// The results for all variants that have the scene's features, cheapest first; renders use the first one.
+struct VariantBitsList {
+  std::vector<VariantBits> all;  // empty: the measurement was not requested
+  std::string uncounted;         // why instructions are missing; empty: all were counted
+};
+
+// Measures the variants called `names`. `render` renders `paths` paths with the variant of the given name and
+// returns the digest of their sums. `counter` counts the instructions of this thread, or is the reason why
+// they cannot be counted. If counting fails for one variant, only its number is missing, with the reason.
+VariantBitsList measure_variants(const std::vector<std::string>& names, double paths,
+                                 const Result<InstructionCounter>& counter,
+                                 const std::function<Digest(const std::string&)>& render);
 
 }  // namespace ls::cli

@@ -1,9 +1,17 @@
 #include "cli/local/local_farm.h"
 
-#include <charconv>
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
 #include <cstring>
 #include <utility>
 
+#include "common/base/parse_number.h"
+#include "common/protocol/limits.h"
+#include "coordinator/store/files.h"
 #include "worker/child/child.h"
 #include "worker/child/serve.h"
 #include "worker/inprocess.h"
@@ -11,8 +19,90 @@
 #include "worker/render/base/thread_limit.h"
 
 namespace ls::cli {
+namespace {
 
-// Forwards all calls; records how long loading took and whether the scene was at fault.
+class ObserverSink final : public coordinator::WorkerSink {
+ public:
+  explicit ObserverSink(std::shared_ptr<worker::LinkObserver> observer) : observer_(std::move(observer)) {}
+  void send(ToWorker message) override { observer_->received(std::move(message)); }
+  void close() override { observer_->lost({Errc::unavailable, "the coordinator has closed the stream"}); }
+
+ private:
+  std::shared_ptr<worker::LinkObserver> observer_;
+};
+
+}  // namespace
+
+Result<void> LocalLink::connect(const WorkerHello& hello, std::shared_ptr<worker::LinkObserver> observer) {
+  auto session = coordinator_.connect(hello, std::make_shared<ObserverSink>(std::move(observer)));
+  if (!session) return tl::unexpected(session.error());
+  session_ = std::move(*session);
+  return {};
+}
+
+void LocalLink::send(FromWorker message) {
+  if (!session_) return;
+  if (const auto* result = std::get_if<UnitResult>(&message); result && on_result_) on_result_(*result);
+  session_->receive(std::move(message));
+}
+
+void LocalLink::close() {
+  if (!session_) return;
+  session_->disconnected();
+  session_.reset();
+}
+
+Result<void> LocalLink::fetch_blob(const worker::BlobRequest& wanted,
+                                   const std::function<Result<void>(std::span<const std::byte>)>& sink) {
+  const auto size = coordinator_.blobs().size(wanted.digest);
+  if (!size) return tl::unexpected(size.error());
+  for (std::uint64_t offset = wanted.offset; offset < *size;) {
+    const auto length = std::min<std::uint64_t>(limits::kBlobChunkBytes, *size - offset);
+    const auto bytes = coordinator_.blobs().read(wanted.digest, offset, length);
+    if (!bytes) return tl::unexpected(bytes.error());
+    if (auto taken = sink(*bytes); !taken) return taken;
+    offset += length;
+  }
+  return {};
+}
+
+namespace {
+
+struct HereFile final : worker::BlobFile {
+  explicit HereFile(std::filesystem::path p) : file(std::move(p)) {}
+  const std::filesystem::path& path() const override { return file; }
+  std::filesystem::path file;
+};
+
+// A file in memory. Its path leads through this process's /proc entry, so that a render child can open it
+// too.
+struct MemoryFile final : worker::BlobFile {
+  explicit MemoryFile(coordinator::File f)
+      : file(std::move(f)), name(fmt::format("/proc/{}/fd/{}", ::getpid(), file.fd())) {}
+  const std::filesystem::path& path() const override { return name; }
+  coordinator::File file;
+  std::filesystem::path name;
+};
+
+}  // namespace
+
+Result<std::shared_ptr<const worker::BlobFile>> LocalBlobFiles::acquire(const BlobRef& blob) {
+  if (auto path = blobs_->adopted(blob.digest)) return std::make_shared<const HereFile>(std::move(*path));
+  const auto size = blobs_->size(blob.digest);
+  if (!size) return tl::unexpected(size.error());
+  const auto bytes = blobs_->read(blob.digest, 0, *size);
+  if (!bytes) return fail(Errc::failed_precondition, bytes.error().message);
+  coordinator::File file(::memfd_create("lightshaft-blob", MFD_CLOEXEC));
+  if (!file)
+    return fail(Errc::failed_precondition,
+                fmt::format("no file in memory can be made: {}", std::strerror(errno)));
+  auto memory = std::make_shared<const MemoryFile>(std::move(file));
+  if (auto written = coordinator::write_all(memory->file, *bytes, memory->path()); !written)
+    return fail(Errc::failed_precondition, written.error().message);
+  return memory;
+}
+
+// Forwards all calls to a backend, and records how long loading took and whether the scene was at fault.
 struct LocalFarm::Watched final : worker::RenderBackend {
   Watched(std::unique_ptr<worker::RenderBackend> b, const Clock& c) : backend(std::move(b)), clock(c) {}
 
@@ -126,9 +216,8 @@ std::optional<Error> LocalFarm::agent_error() const {
 }
 
 int run_render_child(const char* threads) {
-  int count = 0;
-  const char* end = threads + std::strlen(threads);
-  if (std::from_chars(threads, end, count).ptr != end || count < 1) return 2;
+  const int count = parse_number<int>(threads).value_or(0);
+  if (count < 1) return 2;
   worker::child::confine(worker::usable_memory_bytes());
   const auto limit = render::limit_threads(count);
   const auto backend = worker::make_inprocess_backend(count);

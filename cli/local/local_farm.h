@@ -1,5 +1,5 @@
-// A whole farm in this process: the coordinator without sockets and one worker agent with all threads.
-// `lightshaft render` uses it, and so renders the same pixels as a farm of many machines.
+// A whole farm in this process: the coordinator without sockets, and one worker agent with all threads.
+// `lightshaft render` uses it, so it renders the same pixels as a farm of many machines.
 #pragma once
 
 #include <atomic>
@@ -10,20 +10,56 @@
 #include <string>
 #include <thread>
 
-#include "cli/local/local_files.h"
-#include "cli/local/local_link.h"
 #include "cli/local/local_scene.h"
 #include "coordinator/service/coordinator.h"
 #include "coordinator/store/blobs/memory_blobs.h"
 #include "worker/agent/agent.h"
+#include "worker/agent/blob_files.h"
+#include "worker/agent/link.h"
 
 namespace ls::cli {
+
+// The agent's link to a coordinator in the same process. It passes the same messages as a network link,
+// without sockets or encoding.
+class LocalLink final : public worker::CoordinatorLink {
+ public:
+  // `coordinator` must outlive the link. `on_result`, if given, is called with every result before the
+  // coordinator receives it.
+  explicit LocalLink(coordinator::Coordinator& coordinator,
+                     std::function<void(const UnitResult&)> on_result = {})
+      : coordinator_(coordinator), on_result_(std::move(on_result)) {}
+
+  Result<void> connect(const WorkerHello& hello, std::shared_ptr<worker::LinkObserver> observer) override;
+  void send(FromWorker message) override;
+  void close() override;
+  Result<void> fetch_blob(const worker::BlobRequest& wanted,
+                          const std::function<Result<void>(std::span<const std::byte>)>& sink) override;
+
+ private:
+  coordinator::Coordinator& coordinator_;
+  std::function<void(const UnitResult&)> on_result_;
+  std::unique_ptr<coordinator::WorkerSession> session_;
+};
+
+// Provides the blobs (files by digest) of the in-memory coordinator to the worker agent in this process as
+// files. Adopted files stay where they are; blobs in memory (the canonical scene) become memory files, which
+// leave nothing behind.
+class LocalBlobFiles final : public worker::BlobFiles {
+ public:
+  explicit LocalBlobFiles(std::shared_ptr<coordinator::MemoryBlobs> blobs) : blobs_(std::move(blobs)) {}
+  // Errors of acquire() are final: there is no point in waiting for this machine to recover.
+  Result<std::shared_ptr<const worker::BlobFile>> acquire(const BlobRef& blob) override;
+  std::vector<Digest> held(std::size_t) const override { return {}; }
+
+ private:
+  std::shared_ptr<coordinator::MemoryBlobs> blobs_;
+};
 
 class LocalFarm {
  public:
   struct Options {
     int threads = 1;
-    bool isolate = false;  // render in a child process
+    bool isolate = false;  // true: render in a child process
   };
   static Result<std::unique_ptr<LocalFarm>> open(Options options);
   ~LocalFarm();
@@ -38,13 +74,14 @@ class LocalFarm {
   Result<void> start(std::function<void(const UnitResult&)> on_result);
   void stop();
 
-  // What has been observed of the worker.
+  // Observations of the worker.
   double load_seconds() const;
-  std::optional<std::string> scene_fault() const;  // why the scene could not be prepared for rendering
-  std::optional<Error> agent_error() const;        // the error with which the agent ended
+  // Why the scene could not be prepared for rendering; nullopt: it could
+  std::optional<std::string> scene_fault() const;
+  std::optional<Error> agent_error() const;  // the error with which the agent ended; nullopt: none
 
  private:
-  struct Watched;  // wraps the render backend and records how it fares
+  struct Watched;  // wraps the render backend and records its results
   explicit LocalFarm(Options options);
   Result<std::unique_ptr<worker::RenderBackend>> make_backend() const;
 

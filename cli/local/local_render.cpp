@@ -4,20 +4,21 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <filesystem>
 #include <mutex>
+#include <string>
 #include <thread>
 
 #include "cli/local/instructions.h"
 #include "cli/local/local_farm.h"
 #include "cli/local/local_world.h"
-#include "cli/local/partial_dir.h"
 #include "cli/output/console.h"
 #include "cli/output/final_report.h"
-#include "cli/output/html_report.h"
 #include "cli/output/interrupt.h"
 #include "cli/output/output_file.h"
-#include "cli/output/progress.h"
 #include "common/image/reference/reference.h"
+#include "common/report/job_page.h"
+#include "coordinator/service/coordinator.h"
 #include "worker/render/base/thread_limit.h"
 
 namespace ls::cli {
@@ -26,9 +27,20 @@ namespace {
 using coordinator::JobState;
 using coordinator::JobView;
 
+// Writes the report as an HTML page to `file`. `report` is the JSON report of this job.
+Result<void> save_html_report(const std::filesystem::path& file, const coordinator::Coordinator& coordinator,
+                              const JobId& job, const std::string& report) {
+  auto image = coordinator.image_png(job, 0);
+  if (!image) return tl::unexpected(image.error());
+  const auto page = report::job_page({report, std::move(*image),
+                                      coordinator.error_png(job).value_or(std::vector<std::byte>{}),
+                                      coordinator.samples_png(job).value_or(std::vector<std::byte>{})});
+  return page ? save_result(file, *page) : tl::unexpected(page.error());
+}
+
 constexpr auto kProgressPeriod = std::chrono::milliseconds(200);
 
-// Stores the results of units in other places than the image. add() is called on the worker agent's thread,
+// Stores the results of units in places other than the image. add() is called on the worker agent's thread,
 // everything else before or after that thread runs.
 struct Keepers {
   std::optional<PartialDir> partials;
@@ -66,11 +78,14 @@ ProgressFigures figures_of(const JobView& job) {
                         : std::nullopt,
           job.target_error,
           {},
-          doubtful(job.convergence_status)};
+          {},
+          doubtful(job.convergence_status),
+          job.target_layer == TargetLayer::denoised,
+          job.denoised_check ? job.denoised_check->at_most : std::nullopt};
 }
 
-void wait_with_progress(coordinator::Coordinator& coordinator, const JobId& id, bool quiet) {
-  ProgressBar bar(quiet);
+void wait_with_progress(coordinator::Coordinator& coordinator, const JobId& id, ProgressForm form) {
+  ProgressBar bar(form);
   std::jthread shower;
   if (bar.shown())
     shower = std::jthread([&](const std::stop_token& token) {
@@ -114,7 +129,7 @@ class LocalRender {
     if (options_.strict && !view->warnings.empty()) return usage_error("--strict: the scene has warnings");
     if (const auto opened = open_keepers(keepers_, options_); !opened) return print_error(opened.error());
     if (const auto started = start(); !started) return print_error(started.error());
-    wait_with_progress(farm_->coordinator(), job_, options_.quiet);
+    wait_with_progress(farm_->coordinator(), job_, options_.progress);
     farm_->stop();
     return finish();
   }
@@ -141,6 +156,11 @@ class LocalRender {
     if (view->state == JobState::failed) {
       if (const auto fault = farm_->scene_fault()) return print_rejected(cli::scene_fault(scene_, *fault));
       return print_error({Errc::internal, view->error});
+    }
+    // Nobody can resume the job: what there is is written, and the error ends the program.
+    if (view->state == JobState::paused) {
+      if (const auto written = write_results(true); !written) complain(written.error().message);
+      return print_error({Errc::unavailable, view->error});
     }
     // An error in the folder of partials, such as a full disk, does not affect the image.
     if (keepers_.trouble) complain(keepers_.trouble->message);
@@ -194,7 +214,7 @@ class LocalRender {
 
   const LocalScene& scene_;
   const LocalRenderOptions& options_;
-  Interrupt interrupt_;  // created before anything that has threads
+  Interrupt interrupt_;  // created before any member that has threads
   Result<InstructionCounter> counter_ = InstructionCounter::open();
   Keepers keepers_;
   std::unique_ptr<LocalFarm> farm_;

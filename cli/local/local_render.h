@@ -6,6 +6,7 @@
 #include <string>
 
 #include "cli/local/local_scene.h"
+#include "cli/output/progress.h"
 
 namespace ls::cli {
 
@@ -13,6 +14,7 @@ struct LocalRenderOptions {
   JobSpec spec;
   int threads = 1;
   bool isolate = false, quiet = false, strict = false;
+  ProgressForm progress = ProgressForm::bar;
   std::filesystem::path out;
   std::optional<std::filesystem::path> report, html, partial_dir, reference;
 };

@@ -11,7 +11,9 @@
 
 #include "common/job/frame_diagnostics.h"
 #include "common/scene/analysis/prune.h"
+#include "common/scene/file_names.h"
 #include "common/scene/folder_assets.h"
+#include "common/scene/gltf/load.h"
 #include "common/scene/limits.h"
 #include "common/scene/schema/integrators.h"
 
@@ -20,9 +22,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostShown = 200;  // characters of names in one message
+constexpr std::size_t kMostShown = 200;  // most characters of names in one message
 
-// A folder of assets that records which files were requested.
+// A folder of assets that also records which files were requested.
 class RecordedFolder final : public AssetSource {
  public:
   explicit RecordedFolder(fs::path folder) : folder_(std::move(folder)) {}
@@ -31,7 +33,7 @@ class RecordedFolder final : public AssetSource {
     auto asset = folder_.find(name);
     if (asset)
       if (const auto path = folder_.path_of(name))
-        files_.insert_or_assign(std::string(name), LocalFile{*path, asset->digest, asset->bytes});
+        files_.try_emplace(std::string(name), LocalFile{*path, asset->digest, asset->bytes});
     return asset;
   }
   Result<std::string> text(std::string_view name) override {
@@ -42,6 +44,15 @@ class RecordedFolder final : public AssetSource {
     texts_ += *text;
     return text;
   }
+  Result<Asset> keep(std::string_view name, const std::string& bytes) override {
+    auto asset = folder_.keep(name, bytes);
+    if (!asset) return asset;
+    LocalFile file{*folder_.path_of(name), asset->digest, asset->bytes};
+    file.is_made = true;
+    files_.insert_or_assign(std::string(name), std::move(file));
+    return asset;
+  }
+  std::shared_ptr<const KeptFolder> kept() const { return folder_.kept(); }
   // Returns the files requested since the last call.
   std::map<std::string, LocalFile> take_files() { return std::exchange(files_, {}); }
   std::string take_included_texts() { return std::exchange(texts_, {}); }
@@ -49,7 +60,7 @@ class RecordedFolder final : public AssetSource {
  private:
   FolderAssets folder_;
   std::map<std::string, LocalFile> files_;
-  std::string texts_;  // the reader limits its size
+  std::string texts_;  // the included texts; the reader limits their size
 };
 
 // Returns the $names in a text, each as long as possible.
@@ -64,8 +75,8 @@ std::set<std::string> parameters_in(const std::string& text) {
   return names;
 }
 
-// Returns the name of a -D option that nothing in the scene uses, which is probably a typing error. ($ab in
-// the scene may also mean the value of $a followed by the letter b.)
+// Returns the name of a -D option that nothing in the scene uses, which is probably misspelt. ($ab in the
+// scene may also mean the value of $a followed by the letter b.)
 std::optional<std::string> unused_define(const std::map<std::string, std::string>& defines,
                                          const std::string& texts) {
   if (defines.empty()) return std::nullopt;
@@ -88,6 +99,7 @@ tl::unexpected<coordinator::Rejected> refused(const std::string& path, std::stri
 }
 
 tl::expected<std::string, coordinator::Rejected> read_text(const std::string& path) {
+  if (std::string why = scene::why_no_scene(path); !why.empty()) return refused(path, std::move(why));
   std::error_code error;
   const auto status = fs::status(path, error);
   if (status.type() == fs::file_type::not_found) return refused(path, "there is no such file");
@@ -95,7 +107,9 @@ tl::expected<std::string, coordinator::Rejected> read_text(const std::string& pa
   if (status.type() != fs::file_type::regular) return refused(path, "is not a regular file");
   const auto bytes = fs::file_size(path, error);
   if (!error && bytes > scene::kMaxTextBytes)
-    return refused(path, fmt::format("has {} bytes; a scene file may have {}", bytes, scene::kMaxTextBytes));
+    return refused(path, scene::gltf::is_gltf(path) ? scene::gltf::too_large(bytes)
+                                                    : fmt::format("has {} bytes; a scene file may have {}",
+                                                                  bytes, scene::kMaxTextBytes));
   std::ifstream file(path, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file) return refused(path, "cannot be read");
@@ -133,10 +147,13 @@ tl::expected<LocalScene, coordinator::Rejected> SceneReader::read(std::optional<
   if (!read.scene)
     return tl::unexpected(coordinator::Rejected{
         {Errc::invalid_argument, fmt::format("{} cannot be read", in.path)}, std::move(read.diagnostics)});
-  if (auto unused = unused_define(in.defines, in.text + included))
-    return refused(in.path, std::move(*unused));
+  // The reader of glTF knows each -D itself.
+  if (!scene::gltf::is_gltf(in.path))
+    if (auto unused = unused_define(in.defines, in.text + included))
+      return refused(in.path, std::move(*unused));
   LocalScene scene{in.path,          in.text, std::move(*read.scene), std::move(read.diagnostics),
                    std::move(files), frame};
+  scene.made = in.folder.kept();
   for (const bool sees_media : {false, true})
     for (const Asset& a : scene::pruned(scene.scene, {sees_media, !sees_media}).scene.assets)
       scene.needed[sees_media].insert(a.digest);

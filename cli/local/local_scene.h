@@ -1,4 +1,4 @@
-// A scene on this machine's disk: read, checked, and with every file that it names.
+// A scene on this machine's disk: read and checked, with every file that it names.
 #pragma once
 
 #include <array>
@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "common/scene/folder_assets.h"
 #include "common/scene/read.h"
 #include "common/scene/reader/nori_test.h"
 #include "coordinator/service/coordinator.h"
@@ -21,7 +22,9 @@ struct LocalFile {
   std::filesystem::path path;
   Digest digest;
   std::uint64_t bytes = 0;
-  bool is_text = false;  // an included scene file
+  bool is_text = false;  // true for an included scene file
+  // True for a file that was made of numbers in the scene's text; it is in LocalScene::made
+  bool is_made = false;
 };
 
 struct LocalScene {
@@ -29,11 +32,12 @@ struct LocalScene {
   std::string text;
   Scene scene;
   std::vector<Diagnostic> warnings;
-  std::map<std::string, LocalFile> files;  // by the name in the scene: assets and included scene files
+  std::map<std::string, LocalFile> files;  // assets and included scene files, by their names in the scene
   std::optional<std::uint32_t> frame;      // the frame for which it was read
-  // The assets that a job uses: first with an integrator that ignores media, second with one that does not.
-  // Other assets need not be uploaded.
+  // The assets that a job uses: first with an integrator that ignores media, second with any other. Assets
+  // that are not needed are not uploaded.
   std::array<std::set<Digest>, 2> needed = {};
+  std::shared_ptr<const KeptFolder> made = {};
 };
 
 // True if the job uses this file of the scene.
@@ -46,7 +50,7 @@ tl::expected<LocalScene, coordinator::Rejected> read_local_scene(
     const std::string& path, const std::map<std::string, std::string>& defines, bool strict,
     std::optional<std::uint32_t> frame = {}, bool labels = false);
 
-// Reads a scene once per frame; the files that it names are hashed only once.
+// Reads a scene once per frame. The files that it names are hashed only once.
 class SceneReader {
  public:
   static tl::expected<SceneReader, coordinator::Rejected> open(const std::string& path,
@@ -58,7 +62,8 @@ class SceneReader {
   tl::expected<LocalScene, coordinator::Rejected> read(std::optional<std::uint32_t> frame,
                                                        bool labels = false);
   // Reads the scene for all frames. Returns the scene of the first frame, the files of all frames, and each
-  // warning once; or, if a frame has errors, the errors of all frames (up to 20), such as every missing file.
+  // warning once. If a frame has errors, returns the errors of all frames (up to 20), so that, for example,
+  // all missing files are reported.
   tl::expected<LocalScene, coordinator::Rejected> read_all(const FrameRange& frames);
 
  private:

@@ -19,7 +19,7 @@ tl::expected<LocalWorld, coordinator::Rejected> build_local_world(const LocalSce
   auto admission = coordinator::admit(submit_request(scene, spec), blobs, scene.frame);
   if (!admission) return tl::unexpected(std::move(admission.error()));
   const auto limit = render::limit_threads(threads);
-  // The scene as a worker receives it.
+  // The scene in the form that a worker receives.
   const auto stored = deserialize_scene(admission->scene_json);
   if (!stored) return tl::unexpected(coordinator::Rejected{stored.error(), {}});
   auto world = render::build_world(*stored, admission->job.settings, files, threads);

@@ -1,5 +1,5 @@
-// A scene prepared for tracing in this process, without a farm: for `inspect` and for the replay of one
-// sample.
+// A scene prepared for tracing in this process, without a farm: for `inspect` and for rendering one sample
+// again.
 #pragma once
 
 #include <memory>
@@ -12,17 +12,17 @@
 namespace ls::cli {
 
 struct LocalWorld {
-  coordinator::StoredJob job;  // settings, samples and warnings as for a job
+  coordinator::StoredJob job;  // settings, samples and warnings, as for a job
   std::shared_ptr<const render::World> world;
   scene::Needs needs;
-  std::uint64_t scene_bytes = 0;  // of the canonical scene, as sent to workers
+  std::uint64_t scene_bytes = 0;  // size of the canonical scene that is sent to workers
 };
 // Builds the world (the scene prepared for tracing). Resolves the settings and checks the limits exactly as
 // for a job.
 tl::expected<LocalWorld, coordinator::Rejected> build_local_world(const LocalScene& scene,
                                                                   const JobSpec& spec, int threads);
 
-// Builds the world for the settings with which an image was rendered; no setting is taken from the scene.
+// Builds the world for the settings with which an image was rendered. The scene's own settings are ignored.
 tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> build_world_again(
     const LocalScene& scene, const RenderSettings& settings, int threads);
 

@@ -1,4 +1,4 @@
-// Output and exit codes of commands. Diagnostics and errors go to stderr, answers to stdout.
+// Output and exit codes of commands. Diagnostics and errors go to stderr, results to stdout.
 #pragma once
 
 #include <functional>
@@ -13,24 +13,24 @@ namespace ls::cli {
 
 enum ExitCode : int { kOk = 0, kFailed = 1, kUsage = 2 };
 
-// Each of these prints what is wrong and returns the exit code with which the command is to end.
-int usage_error(const std::string& text);  // kUsage
-int print_error(const Error& error);       // kUsage if the input is at fault, otherwise kFailed
+// Each of these prints the error and returns the exit code with which the command should end.
+int usage_error(const std::string& text);  // returns kUsage
+int print_error(const Error& error);       // returns kUsage if the input is at fault, otherwise kFailed
 // Prints why a scene or job was rejected, with its diagnostics if any. Returns kUsage if the input is at
 // fault, otherwise kFailed.
 int print_rejected(const coordinator::Rejected& rejected);
 
-void complain(const std::string& text);  // "lightshaft: error: text" to stderr
+void complain(const std::string& text);  // prints "lightshaft: error: text" to stderr
 
 // Runs `action` and returns its exit code. If it throws, prints the exception's message and returns kFailed.
 // `command` is the command's name, for that message.
 int run_guarded(const std::string& command, const std::function<int()>& action);
 
 void print_diagnostics(const std::vector<Diagnostic>& diagnostics);
-void print_note(const std::string& line);  // to stderr, as plain_text()
-void print(const std::string& line);       // to stdout, unmodified and flushed
+void print_note(const std::string& line);  // prints to stderr, as plain_text()
+void print(const std::string& line);       // prints to stdout, unmodified and flushed
 
-std::string show_bytes(std::uint64_t bytes);  // "3.2 MiB"
-std::string show_seconds(double seconds);     // "0.8 s", "42 s", "3:07", "2:05:11"
+std::string show_bytes(std::uint64_t bytes);  // returns, for example, "3.2 MiB"
+std::string show_seconds(double seconds);     // returns, for example, "0.8 s", "42 s", "3:07", "2:05:11"
 
 }  // namespace ls::cli

@@ -11,8 +11,8 @@ namespace {
 
 using nlohmann::json;
 
-// Reads a verdict. `object` has the fields `trusted` and, under `kind_key`, the kind; older coordinators send
-// only the kind.
+// Reads a convergence status. `object` has the fields `trusted` and, under `kind_key`, the kind; older
+// coordinators send only the kind.
 Verdict verdict(const json& object, const char* kind_key, const char* words_key) {
   const std::string kind = text_field(object, kind_key);
   const bool untrusted = object.value("trusted", json()) == json(false);
@@ -23,7 +23,7 @@ Verdict verdict(const json& object, const char* kind_key, const char* words_key)
   return out;
 }
 
-// Returns the errors against a reference image, each preceded by a comma.
+// Returns the errors against a reference image, each preceded by a comma and a space.
 std::string reference_errors_text(const json& job) {
   const auto reference = job.find("reference");
   if (reference == job.end() || !reference->is_object()) return "";
@@ -57,7 +57,8 @@ std::string estimate_text(const json& job, const char* key, const char* interval
 std::string time_left_text(const json& job, const json& times, const char* key, const char* interval) {
   const auto value = number_field(times, key);
   if (!value) return "-";
-  // A job that ends after a fixed number of samples takes the same time whatever the error.
+  // The doubt matters only with a target error: a job that ends after a fixed number of samples takes the
+  // same time whatever its error.
   if (number_field(job, "target_error") && verdict_of(job).doubtful)
     return "at least " + show_seconds(*value);
   const auto ci = interval ? pair_field(times, interval) : std::nullopt;
@@ -71,7 +72,7 @@ std::string reference_error_text(const json& object, const char* key, const char
   if (!value) return "";
   if (same_seed)
     return fmt::format("{:.{}g} (not to be trusted: the reference has this job's seed)", *value, digits);
-  return flag_field(object, below) ? "below the reference's noise" : fmt::format("{:.{}g}", *value, digits);
+  return flag_field(object, below) ? report::phrase("belowNoise") : fmt::format("{:.{}g}", *value, digits);
 }
 
 std::string error_text(const json& job) {
@@ -93,6 +94,60 @@ std::string denoised_text(const json& report) {
   if (const auto ci = pair_field(*denoised, "relmse_ci95"))
     return fmt::format("denoised {:.3g} ({:.3g} to {:.3g})", *relmse, ci->first, ci->second);
   return fmt::format("denoised {:.3g} (a few pixels carry its noise: no interval)", *relmse);
+}
+
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMostCauses = 64;  // most causes that are read from a farm's answer
+
+const json* causes_of(const json& job) {
+  const auto health = job.find("health");
+  if (health == job.end() || !health->is_object()) return nullptr;
+  const auto causes = health->find("causes");
+  return causes != health->end() && causes->is_array() ? &*causes : nullptr;
+}
+
+// Returns, for example, "; first at pixel 3,4 sample 7"; empty for a cause without a location.
+std::string place_of(const json& cause) {
+  const auto first = cause.find("first");
+  if (first == cause.end() || !first->is_array() || first->empty() || !(*first)[0].is_object()) return "";
+  const json& spot = (*first)[0];
+  const auto pixel = pair_field(spot, "pixel");
+  const auto sample = number_field(spot, "sample");
+  if (!pixel || !sample) return "";
+  const auto frame = number_field(cause, "frame");
+  return fmt::format("; first {}at pixel {:.0f},{:.0f} sample {:.0f}",
+                     frame ? fmt::format("in frame {:.0f} ", *frame) : "", pixel->first, pixel->second,
+                     *sample);
+}
+
+}  // namespace
+
+std::vector<std::string> health_lines(const json& job) {
+  std::vector<std::string> lines;
+  const json* causes = causes_of(job);
+  if (!causes) return lines;
+  for (const json& cause : *causes) {
+    if (!cause.is_object() || lines.size() >= 2 * kMostCauses) continue;
+    lines.push_back(plain_text(text_field(cause, "text")) + place_of(cause));
+    if (const std::string replay = text_field(cause, "replay"); !replay.empty())
+      lines.push_back("  see it again: " + plain_text(replay));
+  }
+  return lines;
+}
+
+bool unclean(const json& job) {
+  const json* causes = causes_of(job);
+  return causes && !causes->empty();
+}
+
+void print_health(const json& job) {
+  const auto lines = health_lines(job);
+  if (lines.empty()) return;
+  print_note("the numbers of this image are not clean:");
+  for (const std::string& line : lines) print_note("  " + line);
 }
 
 }  // namespace ls::cli

@@ -1,8 +1,11 @@
-// Words for a terminal about a job's error and whether it can be trusted.
+// Texts for a terminal about a job's error, whether it can be trusted, and its numeric health.
 #pragma once
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
+
+#include "common/report/phrases.h"
 
 namespace ls::cli {
 
@@ -12,10 +15,10 @@ struct Verdict {
   bool doubtful = false;
   std::string words;  // plain text; begins with kDoubt if doubtful
 };
-inline constexpr const char* kDoubt = "don't trust yet";
+inline constexpr const char* kDoubt = report::phrase("doubt");
 
-Verdict verdict_of(const nlohmann::json& job);            // of GET /jobs/ID
-Verdict verdict_of_report(const nlohmann::json& report);  // of GET /jobs/ID/report
+Verdict verdict_of(const nlohmann::json& job);            // from the answer to GET /jobs/ID
+Verdict verdict_of_report(const nlohmann::json& report);  // from the answer to GET /jobs/ID/report
 
 // Returns the error that `job` has under `key`, as "0.0123 (0.0118 to 0.0129)", "0.0123 (don't trust yet)",
 // or "-" if it is unknown. `interval` is the key of its interval.
@@ -28,13 +31,22 @@ std::string time_left_text(const nlohmann::json& job, const nlohmann::json& time
 // Returns the error against the reference image that `object` has under `key`: "0.0123", "below the
 // reference's noise", or "0.0123 (not to be trusted: ...)" if `same_seed`, that is, image and reference were
 // rendered with the same seed; empty: unknown. `below` is the key of the flag that says that the error cannot
-// be told from the reference's noise. `digits` is the number of significant digits.
+// be distinguished from the reference's noise. `digits` is the number of significant digits.
 std::string reference_error_text(const nlohmann::json& object, const char* key, const char* below,
                                  bool same_seed, int digits = 3);
 // Returns one line on the error of a job's image; empty: unknown.
 std::string error_text(const nlohmann::json& job);
 // Returns the error of the denoised image of a report (GET /jobs/ID/report): "denoised 0.0123 (0.0118 to
-// 0.0129)", or why there is none; empty: none was asked for.
+// 0.0129)", or why there is no such image; empty: no denoising was requested.
 std::string denoised_text(const nlohmann::json& report);
+
+// Returns lines for the user about the `health` of `job`, which is a report or a farm's answer about a job:
+// each cause with its first location and the command that renders that sample again. Empty: the job is
+// healthy, or its health is unknown.
+std::vector<std::string> health_lines(const nlohmann::json& job);
+bool unclean(const nlohmann::json& job);
+
+// Prints the health_lines() to stderr, under a heading.
+void print_health(const nlohmann::json& job);
 
 }  // namespace ls::cli

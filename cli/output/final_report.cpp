@@ -9,7 +9,6 @@
 
 #include "cli/output/console.h"
 #include "cli/output/convergence_text.h"
-#include "cli/output/health_lines.h"
 #include "cli/output/reply_fields.h"
 
 namespace ls::cli {
@@ -72,6 +71,9 @@ std::string report_summary(const std::string& report) {
     line += ", true relMSE " + reference_error;
   if (const auto flip = number_field(j, "true_flip")) line += fmt::format(", FLIP {:.3g}", *flip);
   if (const std::string denoised = denoised_text(j); !denoised.empty()) line += ", " + denoised;
+  if (const auto target = number_field(j, "target_error"))
+    line += fmt::format(", target {:g}{}", *target,
+                        text_field(j, "target_layer") == "denoised" ? " for the denoised layers" : "");
   const bool news = verdict.doubtful || text_field(j, "verdict_kind") != "early";
   if (news && !verdict.words.empty()) line += ": " + verdict.words;
   return line + outlook(j, verdict.doubtful);

@@ -1,4 +1,4 @@
-// The report of a local render: the coordinator's report, with additions that only this process knows.
+// The report of a local render: the coordinator's report, with additions that only this process can measure.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,8 @@ struct LocalFacts {
   std::uint64_t peak_rss_bytes = 0;
   int threads = 1;
   bool interrupted = false;
-  Result<std::uint64_t> instructions = 0;  // of the whole process; an error: why they were not counted
+  // Instructions of the whole process; an error: why they were not counted
+  Result<std::uint64_t> instructions = 0;
 };
 Result<std::string> local_report(const std::string& report, const LocalFacts& facts);
 
@@ -23,8 +24,9 @@ Result<std::string> local_report(const std::string& report, const LocalFacts& fa
 std::string report_summary(const std::string& report);
 // Prints numeric health problems to stderr; usually nothing.
 void print_report_health(const std::string& report);
-std::string pixels_digest(const std::string& report);  // empty: none
+// Returns the digest of the pixels; empty: the report has none
+std::string pixels_digest(const std::string& report);
 
-std::uint64_t peak_rss_bytes();  // the maximum of this process and its ended children
+std::uint64_t peak_rss_bytes();  // returns the maximum of this process and its ended children
 
 }  // namespace ls::cli

@@ -8,7 +8,7 @@
 namespace ls::cli {
 namespace {
 
-// The signals that are waited for. SIGUSR1 wakes the waiting thread when the Interrupt is destroyed.
+// Returns the signals to wait for. SIGUSR1 wakes the waiting thread when the Interrupt is destroyed.
 sigset_t watched() {
   sigset_t set;
   sigemptyset(&set);

@@ -2,28 +2,20 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cmath>
 #include <optional>
 
+#include "common/base/parse_number.h"
 #include "common/job/limits.h"
 
 namespace ls::cli {
 namespace {
 
-template <class T>
-std::optional<T> number(std::string_view text) {
-  T value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
 // Splits "640x360" at `between`.
 std::optional<std::pair<int, int>> two_numbers(std::string_view text, char between) {
   const auto at = text.find(between);
   if (at == std::string_view::npos) return std::nullopt;
-  const auto first = number<int>(text.substr(0, at)), second = number<int>(text.substr(at + 1));
+  const auto first = parse_number<int>(text.substr(0, at)), second = parse_number<int>(text.substr(at + 1));
   if (!first || !second) return std::nullopt;
   return std::pair(*first, *second);
 }
@@ -38,8 +30,14 @@ Result<void> take(const std::string& text, std::optional<T>& field, Parse parse)
   return {};
 }
 
+Result<TargetLayer> parse_layer(const std::string& text) {
+  const auto layer = parse_target_layer(text);
+  return layer ? Result<TargetLayer>(*layer)
+               : bad_argument(fmt::format("--target-layer '{}': it must be raw or denoised", text));
+}
+
 Result<int> parse_priority(const std::string& text) {
-  const auto value = number<int>(text);
+  const auto value = parse_number<int>(text);
   if (!value || std::abs(std::int64_t{*value}) > kMaxPriority)
     return bad_argument(fmt::format("--priority '{}': it must be a whole number from -{} to {}", text,
                                     kMaxPriority, kMaxPriority));
@@ -50,7 +48,7 @@ Result<int> parse_priority(const std::string& text) {
 
 Result<std::uint64_t> parse_whole(const std::string& what, const std::string& text, std::uint64_t least,
                                   std::uint64_t most) {
-  const auto value = number<std::uint64_t>(text);
+  const auto value = parse_number<std::uint64_t>(text);
   if (!value || *value < least || *value > most)
     return bad_argument(
         fmt::format("{} '{}': it must be a whole number from {} to {}", what, text, least, most));
@@ -61,7 +59,7 @@ Result<std::uint64_t> parse_bytes(const std::string& what, const std::string& te
   const std::string_view units = "KMGT";
   const std::size_t unit = text.empty() ? std::string_view::npos : units.find(text.back());
   const bool scaled = unit != std::string_view::npos;
-  const auto value = number<std::uint64_t>(scaled ? text.substr(0, text.size() - 1) : text);
+  const auto value = parse_number<std::uint64_t>(scaled ? text.substr(0, text.size() - 1) : text);
   const int shift = scaled ? 10 * (static_cast<int>(unit) + 1) : 0;
   if (!value || *value == 0 || *value > kMaxMemory >> shift)
     return bad_argument(fmt::format("{} '{}': write it as bytes, or with K, M, G or T as 8G, at most {}T",
@@ -70,7 +68,7 @@ Result<std::uint64_t> parse_bytes(const std::string& what, const std::string& te
 }
 
 Result<double> parse_positive(const std::string& what, const std::string& text, double most) {
-  const auto value = number<double>(text);
+  const auto value = parse_number<double>(text);
   if (!value || !std::isfinite(*value) || !(*value > 0) || *value > most)
     return bad_argument(fmt::format("{} '{}': it must be a number above 0, at most {:g}", what, text, most));
   return *value;
@@ -112,6 +110,10 @@ void JobOptions::add_to(CLI::App& app) {
   app.add_option("--spp", spp, "samples per pixel; default: the scene's")->type_name("N");
   app.add_option("--target-error", target_error, "stop when the image's relMSE is below this")
       ->type_name("E");
+  app.add_option("--target-layer", target_layer,
+                 "whose relMSE --target-error means: raw, the image as rendered (default), or denoised, its "
+                 "denoised layers, which --denoise adds")
+      ->type_name("LAYER");
   app.add_option("--time", time, "stop after this many seconds, counted from the first ray")
       ->type_name("SECONDS");
   app.add_option("--seed", seed, "default 0")->type_name("N");
@@ -121,7 +123,8 @@ void JobOptions::add_to(CLI::App& app) {
          "$frame is it, too")
       ->type_name("A-B");
   app.add_option("--size", size, "size of the image instead of the scene's")->type_name("WxH");
-  app.add_option("--integrator", integrator, "volpath, volpath_distant_mis or path instead of the scene's")
+  app.add_option("--integrator", integrator,
+                 "volpath, volpath_distant_mis, path or whitted instead of the scene's")
       ->type_name("NAME");
   app.add_option("--aov", aov, "further layers of the image: " + known_aovs() + " (docs/reference/aovs.md)")
       ->delimiter(',')
@@ -147,10 +150,11 @@ Result<JobSpec> JobOptions::parse() const {
   };
   std::optional<int> priority_value;
   std::optional<std::uint64_t> workers, units;
+  std::optional<TargetLayer> layer;
   for (const auto& taken :
        {take(spp, spec.spp, whole("--spp", 1, kMaxSpp)),
         take(target_error, spec.target_error, positive("--target-error", kMaxTargetError)),
-        take(time, spec.time, positive("--time", kMaxSeconds)),
+        take(target_layer, layer, parse_layer), take(time, spec.time, positive("--time", kMaxSeconds)),
         take(seed, spec.seed, whole("--seed", 0, ~std::uint64_t{0})), take(size, spec.size, parse_size),
         take(priority, priority_value, parse_priority),
         take(max_workers, workers, whole("--max-workers", 1, kMaxAtOnce)),
@@ -172,7 +176,10 @@ Result<JobSpec> JobOptions::parse() const {
   spec.aov = aov;
   spec.priority = priority_value.value_or(0);
   spec.float_output = float_output;
-  spec.denoise = denoise;
+  spec.target_layer = layer.value_or(TargetLayer::raw);
+  if (layer && !spec.target_error)
+    return bad_argument("--target-layer says which error --target-error means: give that, too");
+  spec.denoise = denoise || spec.target_layer == TargetLayer::denoised;
   spec.tags = tags;
   if (workers) spec.max_workers = static_cast<std::uint32_t>(*workers);
   if (units) spec.max_units = static_cast<std::uint32_t>(*units);

@@ -12,9 +12,9 @@
 
 namespace ls::cli {
 
-// Numbers are kept as text until parse(), so that it can compose the error messages.
+// Numbers are kept as text until parse(), which makes the error messages.
 struct JobOptions {
-  std::string spp, target_error, time, seed, size, integrator, priority, frames;
+  std::string spp, target_error, target_layer, time, seed, size, integrator, priority, frames;
   std::string max_workers, max_units, memory;
   std::vector<std::string> aov, defines, tags;
   bool float_output = false;
@@ -22,18 +22,19 @@ struct JobOptions {
   bool strict = false;
 
   void add_to(CLI::App& app);
-  // invalid_argument: names the option, the given text and what is allowed.
+  // invalid_argument: the message has the option, the given text and the allowed values.
   Result<JobSpec> parse() const;
 };
 
-// Parses a whole number such as in "--spp 64". `what` is the option's name, for the message.
+// Parses a whole number, as in "--spp 64". `what` is the option's name, for the message.
 Result<std::uint64_t> parse_whole(const std::string& what, const std::string& text, std::uint64_t least,
                                   std::uint64_t most);
-Result<std::uint64_t> parse_bytes(const std::string& what, const std::string& text);  // "8G": powers of 1024
+// parses, for example, "8G"; the units are powers of 1024
+Result<std::uint64_t> parse_bytes(const std::string& what, const std::string& text);
 Result<double> parse_positive(const std::string& what, const std::string& text, double most);
-Result<FrameSize> parse_size(const std::string& text);             // "640x360"
-Result<std::pair<int, int>> parse_pixel(const std::string& text);  // "12,34"
+Result<FrameSize> parse_size(const std::string& text);             // parses, for example, "640x360"
+Result<std::pair<int, int>> parse_pixel(const std::string& text);  // parses, for example, "12,34"
 Result<std::map<std::string, std::string>> parse_defines(
-    const std::vector<std::string>& defines);  // "name=value"
+    const std::vector<std::string>& defines);  // each is "name=value"
 
 }  // namespace ls::cli

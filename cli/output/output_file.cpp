@@ -55,7 +55,8 @@ Result<void> write_output(const fs::path& file, std::span<const std::byte> bytes
   const fs::file_status status = fs::status(file, error);
   if (!fs::exists(status) || fs::is_regular_file(status))
     return coordinator::write_atomically(fs::absolute(file, error), bytes);
-  std::ofstream out(file, std::ios::binary);  // a pipe or device cannot be replaced by renaming
+  // A pipe or device cannot be replaced by renaming, so it is written directly
+  std::ofstream out(file, std::ios::binary);
   out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   out.close();
   if (!out) return fail(Errc::unavailable, fmt::format("{} cannot be written", file.string()));
@@ -85,6 +86,45 @@ Result<void> save_result(const fs::path& file, std::span<const std::byte> bytes)
 
 Result<void> save_result(const fs::path& file, const std::string& text) {
   return save_result(file, std::as_bytes(std::span(text)));
+}
+
+namespace fs = std::filesystem;
+
+Result<PartialDir> PartialDir::open(fs::path folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error)
+    return fail(Errc::unavailable,
+                fmt::format("--partial-dir {} cannot be made: {}", folder.string(), error.message()));
+  if (auto ok = check_folder("--partial-dir", folder); !ok) return tl::unexpected(ok.error());
+  return PartialDir(std::move(folder));
+}
+
+fs::path PartialDir::path(TileIndex tile, RoundIndex round) const {
+  return folder_ / fmt::format("tile-{:06}-round-{:05}.exr", tile, round);
+}
+
+Result<void> PartialDir::keep(const UnitResult& result) {
+  const fs::path file = path(result.unit.tile, result.unit.round);
+  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  out.write(reinterpret_cast<const char*>(result.exr.data()),
+            static_cast<std::streamsize>(result.exr.size()));
+  out.close();
+  if (!out) return fail(Errc::resource_exhausted, fmt::format("{} cannot be written", file.string()));
+  kept_.emplace_back(result.unit.tile, result.unit.round);
+  return {};
+}
+
+Result<void> PartialDir::drop_unfolded(std::span<const RoundIndex> folded) {
+  for (const auto& [tile, round] : kept_) {
+    if (tile < folded.size() && round < folded[tile]) continue;
+    std::error_code error;
+    fs::remove(path(tile, round), error);
+    if (error)
+      return fail(Errc::unavailable,
+                  fmt::format("{} cannot be removed: {}", path(tile, round).string(), error.message()));
+  }
+  return {};
 }
 
 }  // namespace ls::cli

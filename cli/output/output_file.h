@@ -2,11 +2,16 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
+#include <optional>
 #include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "common/base/error.h"
 #include "common/base/frame_range.h"
+#include "common/protocol/messages.h"
 
 namespace ls::cli {
 
@@ -24,5 +29,27 @@ Result<void> write_output(const std::filesystem::path& file, const std::string& 
 // the folder for temporary files, and the returned error names that file.
 Result<void> save_result(const std::filesystem::path& file, std::span<const std::byte> bytes);
 Result<void> save_result(const std::filesystem::path& file, const std::string& text);
+
+// Stores the partial (the pixel sums) of every unit of a render as an EXR file in a folder, for `lightshaft
+// merge`. A unit is one tile and one round (range of samples).
+class PartialDir {
+ public:
+  // Creates the folder if it is missing. Files of earlier renders stay, except those of the same tile and
+  // round, which are replaced.
+  static Result<PartialDir> open(std::filesystem::path folder);
+
+  Result<void> keep(const UnitResult& result);
+  // Removes stored rounds that are not part of the image: a tile that reaches the target error may have
+  // rounds that were rendered ahead. `folded` is the number of rounds of each tile that are part of the
+  // image.
+  Result<void> drop_unfolded(std::span<const RoundIndex> folded);
+
+  std::filesystem::path path(TileIndex tile, RoundIndex round) const;
+
+ private:
+  explicit PartialDir(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  std::filesystem::path folder_;
+  std::vector<std::pair<TileIndex, RoundIndex>> kept_;
+};
 
 }  // namespace ls::cli

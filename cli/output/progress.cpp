@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "cli/output/console.h"
@@ -27,8 +28,12 @@ std::string show_rate(double per_second) {
   return fmt::format("{:.3g}{} samples/s", per_second, kUnits[unit]);
 }
 
+double part_done(const ProgressFigures& f) {
+  return std::isfinite(f.progress) ? std::clamp(f.progress, 0.0, 1.0) : 0;
+}
+
 struct Part {
-  int rank;  // the highest rank is omitted first; 0: never omitted
+  int rank;  // if the line is too long, the part with the highest rank is left out first; 0: never left out
   std::string text;
 };
 
@@ -63,7 +68,10 @@ void add_error(const ProgressFigures& f, const Add& add) {
   } else if (f.relmse_ci95) {
     add(4, fmt::format(" ({:.3g} to {:.3g})", f.relmse_ci95->first, f.relmse_ci95->second));
   }
-  if (f.target_error) add(1, fmt::format(", target {:g}", *f.target_error));
+  if (f.denoised_at_most) add(1, fmt::format(", denoised at most {:.3g}", *f.denoised_at_most));
+  if (f.target_error)
+    add(1, fmt::format(", target {:g}{}", *f.target_error,
+                       f.target_denoised && !f.denoised_at_most ? " denoised" : ""));
 }
 
 void add_time_left(const ProgressFigures& f, const Add& add) {
@@ -78,13 +86,13 @@ void add_time_left(const ProgressFigures& f, const Add& add) {
 
 }  // namespace
 
-std::string progress_line(const ProgressFigures& f, int columns) {
-  const double part = std::isfinite(f.progress) ? std::clamp(f.progress, 0.0, 1.0) : 0;
+std::string progress_line(const ProgressFigures& f, int columns, bool with_bar) {
+  const double part = part_done(f);
   const int full = static_cast<int>(std::floor(kBarCells * part));
   std::vector<Part> parts;
   const auto add = [&](int rank, std::string text) { parts.push_back({rank, std::move(text)}); };
   add(0, fmt::format("{:3.0f} %", std::floor(100 * part)));
-  add(3, fmt::format(" [{}{}]", std::string(full, '#'), std::string(kBarCells - full, ' ')));
+  if (with_bar) add(3, fmt::format(" [{}{}]", std::string(full, '#'), std::string(kBarCells - full, ' ')));
   if (f.state != "running") add(0, " " + plain_text(f.state));
   if (!f.frames.empty()) add(0, " " + plain_text(f.frames));
   add(0, fmt::format(" {:.1f} spp", f.spp_done));
@@ -95,10 +103,17 @@ std::string progress_line(const ProgressFigures& f, int columns) {
   return fitted(parts, columns);
 }
 
-ProgressBar::ProgressBar(bool quiet) : shown_(!quiet && ::isatty(STDERR_FILENO) == 1) {}
+ProgressBar::ProgressBar(ProgressForm form)
+    : form_(form),
+      shown_(form == ProgressForm::lines || (form == ProgressForm::bar && ::isatty(STDERR_FILENO) == 1)) {}
 
 void ProgressBar::show(const ProgressFigures& figures) {
   if (!shown_) return;
+  if (form_ == ProgressForm::lines) {
+    const double percent = std::floor(100 * part_done(figures));
+    if (percent != std::exchange(percent_, percent)) print_note(progress_line(figures, 0, false));
+    return;
+  }
   fmt::print(stderr, "\r\x1b[K{}", progress_line(figures, terminal_columns()));
   std::fflush(stderr);
   dirty_ = true;

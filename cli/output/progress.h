@@ -10,31 +10,41 @@ namespace ls::cli {
 
 struct ProgressFigures {
   std::string state;    // "running", ...
-  double progress = 0;  // 0..1
-  double spp_done = 0;  // mean over pixels
+  double progress = 0;  // from 0 to 1
+  double spp_done = 0;  // samples per pixel, mean over pixels
   double samples_per_second = 0;
   std::optional<double> relmse;
   std::optional<double> eta_seconds;
-  std::string trouble;      // why the job is waiting, if it is
+  std::string trouble;      // why the job waits; empty: it does not wait
   std::string frames = {};  // for sequences: "3 of 10 frames"
   std::optional<std::pair<double, double>> eta_ci95 = {};
   std::optional<std::pair<double, double>> relmse_ci95 = {};
-  std::optional<double> target_error = {};   // requested relMSE
-  std::optional<double> eta_with_more = {};  // time left with `more_workers` more
+  std::optional<double> target_error = {};   // requested target, in relMSE
+  std::optional<double> eta_with_more = {};  // remaining time with `more_workers` more workers
   int more_workers = 8;
-  bool doubtful = false;  // the error is not reliable yet, nor is the time to a target
+  bool doubtful = false;         // the error is not reliable yet, nor is the time to a target
+  bool target_denoised = false;  // target_error means the denoised layers
+  // The largest relMSE of these that the interval of the last check allows
+  std::optional<double> denoised_at_most = {};
 };
 // Returns the line for the terminal: " 42 % [######          ] 26.9 spp  3.1 M samples/s  relMSE 0.0123
 // (0.0118 to 0.0129), target 0.001  4:12 left (3:06 to 5:30), 1:06 with 8 more". If it is longer than
 // `columns`, whole parts are omitted, in this order: the rate, the effect of more workers, the error's
 // interval, the bar, the forecast's interval, the target. The line of a doubtful job has no intervals but
-// "don't trust yet" and, with a target, "at least 4:12 left", which are never omitted.
-std::string progress_line(const ProgressFigures& figures, int columns);
+// "don't trust yet" and, with a target, "at least 4:12 left", which are never omitted. If the target means
+// the denoised layers, it reads ", denoised at most 0.0012, target 0.001". `columns` 0: any length.
+std::string progress_line(const ProgressFigures& figures, int columns, bool with_bar = true);
 
-// Draws the line on stderr, only if stderr is a terminal.
+enum class ProgressForm {
+  none,
+  bar,    // one line that is overwritten, only if stderr is a terminal
+  lines,  // for logs and programs: a line without bar whenever the whole percent has changed
+};
+
+// Shows the line on stderr.
 class ProgressBar {
  public:
-  explicit ProgressBar(bool quiet);
+  explicit ProgressBar(ProgressForm form);
   ~ProgressBar() { clear(); }
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
@@ -43,8 +53,10 @@ class ProgressBar {
   void clear();
 
  private:
+  ProgressForm form_;
   bool shown_;
   bool dirty_ = false;
+  std::optional<double> percent_ = {};  // that of the last line of the form `lines`
 };
 
 }  // namespace ls::cli

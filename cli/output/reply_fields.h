@@ -1,4 +1,4 @@
-// Fields of a farm's answers, which may be missing or of the wrong type.
+// Reads fields of a farm's answers, which may be missing or of the wrong type.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,12 +8,40 @@
 
 namespace ls::cli {
 
-std::string text_field(const nlohmann::json& object, const char* key, const std::string& otherwise = "");
-std::optional<double> number_field(const nlohmann::json& object, const char* key);
-bool flag_field(const nlohmann::json& object, const char* key);  // false if missing or of another type
-int int_field(const nlohmann::json& object, const char* key, int otherwise);
-std::optional<std::pair<double, double>> pair_field(const nlohmann::json& object,
-                                                    const char* key);  // [1.5, 2]
-std::string dump(const nlohmann::json& value);  // indented, for --json; invalid UTF-8 is replaced
+inline std::string text_field(const nlohmann::json& object, const char* key,
+                              const std::string& otherwise = "") {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_string() ? found->get<std::string>() : otherwise;
+}
+
+// Returns false if the field is missing or of another type.
+inline bool flag_field(const nlohmann::json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && *found == nlohmann::json(true);
+}
+
+inline std::optional<double> number_field(const nlohmann::json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number() ? std::optional(found->get<double>()) : std::nullopt;
+}
+
+inline int int_field(const nlohmann::json& object, const char* key, int otherwise) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number_integer() ? found->get<int>() : otherwise;
+}
+
+// reads a field like [1.5, 2]
+inline std::optional<std::pair<double, double>> pair_field(const nlohmann::json& object, const char* key) {
+  const auto found = object.find(key);
+  if (found == object.end() || !found->is_array() || found->size() != 2 || !(*found)[0].is_number() ||
+      !(*found)[1].is_number())
+    return std::nullopt;
+  return std::pair((*found)[0].get<double>(), (*found)[1].get<double>());
+}
+
+// Returns indented JSON, for --json. Invalid UTF-8 is replaced.
+inline std::string dump(const nlohmann::json& value) {
+  return value.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+}
 
 }  // namespace ls::cli

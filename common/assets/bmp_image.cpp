@@ -1,4 +1,5 @@
-// Windows bitmaps as written by painting programs: 24 or 32 bits per pixel, uncompressed, without a palette.
+// Decodes Windows bitmaps as written by painting programs: 24 or 32 bits per pixel, uncompressed, without a
+// palette.
 #include <fmt/format.h>
 
 #include "common/assets/bytes.h"
@@ -10,7 +11,7 @@ namespace {
 // The relevant fields of the two headers, in order.
 struct BmpHeader {
   std::uint32_t pixels_at = 0;
-  std::int32_t width = 0, height = 0;  // rows from the bottom; from the top if the height is negative
+  std::int32_t width = 0, height = 0;  // rows from the bottom up; from the top down if the height is negative
   std::uint16_t bits = 0;
   std::uint32_t compression = 0;
 };

@@ -18,7 +18,7 @@ inline std::string_view as_text(std::span<const std::byte> b) {
   return {reinterpret_cast<const char*>(b.data()), b.size()};
 }
 
-// A bounds-checked cursor: a take() of more bytes than are left returns nullopt and does not advance.
+// A bounds-checked cursor. A take() of more bytes than are left returns nullopt and does not advance.
 class ByteReader {
  public:
   explicit ByteReader(std::span<const std::byte> data) : data_(data) {}
@@ -47,8 +47,8 @@ class ByteReader {
   std::size_t position_ = 0;
 };
 
-// Cuts the next word (non-blank characters) off the front of `line` and returns it; an empty word means that
-// `line` has no more.
+// Removes the next word (non-blank characters) from the front of `line` and returns it; an empty word means
+// that `line` has no more.
 inline std::string_view next_word(std::string_view& line) {
   const std::size_t a = line.find_first_not_of(" \t\r\v\f");
   if (a == line.npos) return line = {};
@@ -57,8 +57,8 @@ inline std::string_view next_word(std::string_view& line) {
   line.remove_prefix(b);
   return word;
 }
-// Cuts the text up to and including the next line feed off the front of `text`, and returns it without the
-// line feed.
+// Removes the text up to and including the next line feed from the front of `text`, and returns it without
+// the line feed.
 inline std::string_view next_line(std::string_view& text) {
   const std::size_t n = std::min(text.find('\n'), text.size());
   const std::string_view line = text.substr(0, n);

@@ -1,5 +1,5 @@
-// Results of the decoders, and limits for every file that a scene names. Sizes are checked against a limit
-// and against the bytes present before anything is allocated.
+// The results of the decoders, and limits for every file that a scene names. Sizes are checked against a
+// limit and against the available bytes before anything is allocated.
 #pragma once
 
 #include <array>
@@ -28,41 +28,42 @@ struct MeshAttribute {
   std::string name;  // "vertex_..." or "face_..."
   std::uint32_t components = 1;
   bool bytes = false;         // values are 0 to 255, as in the file
-  std::vector<float> values;  // components interleaved
+  std::vector<float> values;  // one or three components per vertex or triangle, adjacent in memory
 };
 
 // A triangle mesh: three floats per vertex in `positions` and (if the file has any) in `normals`, two in
-// `uvs`; three indices per triangle, all below vertex_count(). The uvs are as in the file.
+// `uvs`; three indices per triangle, all below vertex_count(). The uvs are those of the file, without a flip.
 struct MeshData {
   std::vector<float> positions, normals, uvs;
   std::vector<std::uint32_t> indices;
-  bool face_normals = false;  // the file asks for flat triangles
+  bool face_normals = false;  // true if the file requests flat triangles
   std::uint64_t dropped_triangles =
-      0;  // triangles of zero area or with a non-finite vertex; left out of indices
-  std::vector<MeshAttribute> attributes;     // the requested ones
-  std::vector<std::string> attribute_names;  // all names in the file
+      0;  // number of triangles without area or with a non-finite vertex; they are left out of `indices`
+  std::vector<MeshAttribute> attributes;     // the requested attributes
+  std::vector<std::string> attribute_names;  // names of all attributes in the file
 
   std::size_t vertex_count() const { return positions.size() / 3; }
   std::size_t triangle_count() const { return indices.size() / 3; }
 };
 
-// An image, row by row from the top. Exactly one of `u8` (codes 0..255) and `f32` is filled, channels
-// interleaved. channels: 1 grey, 2 grey + alpha, 3 RGB, 4 RGBA; alpha is never premultiplied here.
+// An image, row by row from the top; the channels of a pixel are adjacent. Exactly one of `u8` (codes 0..255)
+// and `f32` is filled. channels: 1 grey, 2 grey + alpha, 3 RGB, 4 RGBA; alpha is never premultiplied here.
 struct ImageData {
   std::uint32_t width = 0, height = 0, channels = 0;
   std::vector<std::uint8_t> u8;
   std::vector<float> f32;
-  bool srgb = false;  // the values are sRGB-encoded (8- and 16-bit files); else linear
+  bool srgb = false;  // true: the values are sRGB-encoded (8- and 16-bit files); false: linear
 
   bool operator==(const ImageData&) const = default;
 };
 
-// A dense grid: x fastest, then y, then z, channels interleaved. All values are finite and not negative.
+// A dense grid: x fastest, then y, then z; the channels of a node are adjacent. All values are finite and not
+// negative.
 struct GridData {
   std::uint32_t nx = 0, ny = 0, nz = 0, channels = 0;
   std::vector<float> values;
   std::array<float, 3> bbox_min{0, 0, 0}, bbox_max{1, 1, 1};
-  std::uint64_t negatives = 0;  // values below zero in the file, set to 0
+  std::uint64_t negatives = 0;  // number of values below zero in the file, which were set to 0
 };
 
 // Reads a file of at most `limit` bytes. `name` is the file's name as written in the scene, for messages.

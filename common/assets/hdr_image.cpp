@@ -19,7 +19,7 @@ struct HdrSize {
   std::uint32_t width = 0, height = 0;
 };
 
-// Parses "-Y height +X width", which means rows from the top, the only orientation in use.
+// Parses "-Y height +X width", which means rows from the top. Other orientations are not in use.
 std::optional<HdrSize> resolution(std::string_view line) {
   const auto count = [](std::string_view w) -> std::uint32_t {
     std::uint32_t n = 0;
@@ -36,8 +36,8 @@ std::optional<HdrSize> resolution(std::string_view line) {
   return s;
 }
 
-// Reads a row as four planes, each run-length coded: a length above 128 means that the next byte is repeated
-// (length - 128 times), a length up to 128 that so many bytes follow as they are.
+// Reads a row as four planes, each run-length coded. After a length above 128 the next byte is repeated
+// (length - 128 times); after a length up to 128 that number of plain bytes follows.
 bool read_planes(ByteReader& r, std::vector<Rgbe>& row) {
   for (std::size_t plane = 0; plane < 4; ++plane)
     for (std::size_t x = 0; x < row.size();) {
@@ -92,7 +92,7 @@ Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> f
   if (std::uint64_t{size->width} * size->height > max_pixels)
     return too_many_pixels(name, size->width, size->height, max_pixels);
   ByteReader r(file.subspan(file.size() - text.size()));
-  // Run-length codes pack at most 127 values of a plane into two bytes: a file that is too short for the
+  // Run-length codes pack at most 127 values of a plane into two bytes. A file that is too short for the
   // claimed size is rejected before memory is allocated.
   if (std::uint64_t{size->width} * size->height / 16 > r.left() || r.left() < std::uint64_t{size->height} * 4)
     return bad("it is too short for its size");

@@ -34,7 +34,7 @@ Result<ImageData> decode_exr(std::string_view name, std::span<const std::byte> f
 Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
 
-// Returns the error that all these decoders give for an image of more than max_pixels.
+// Returns the error for an image of more than max_pixels, which all these decoders use.
 tl::unexpected<Error> too_many_pixels(std::string_view name, std::uint64_t width, std::uint64_t height,
                                       std::uint64_t max_pixels);
 

@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include <csetjmp>
-#include <cstdio>  // jpeglib.h needs it first
+#include <cstdio>  // jpeglib.h requires it
 
 #include <jpeglib.h>
 
@@ -22,8 +22,8 @@ void on_error(j_common_ptr info) {
   f->base.format_message(info, f->message);
   std::longjmp(f->escape, 1);
 }
-// Treats the library's warnings as errors: the library would replace missing data by grey, but here a broken
-// file is an error.
+// Treats the library's warnings as errors. The library would replace missing data by grey, but a broken file
+// should be an error.
 void on_message(j_common_ptr info, int level) {
   if (level < 0) on_error(info);
 }
@@ -41,7 +41,7 @@ struct Decoder {
   ~Decoder() { jpeg_destroy_decompress(&info); }
 };
 
-// These two functions must not have objects with destructors, which longjmp would skip.
+// read_header() and the next function must not have objects with destructors, which longjmp would skip.
 bool read_header(Decoder& d, const unsigned char* data, unsigned long size) {
   if (setjmp(d.failure.escape)) return false;
   jpeg_create_decompress(&d.info);
@@ -82,7 +82,7 @@ Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> 
     return bad("its size is not believable");
   if (pixels > max_pixels) return too_many_pixels(name, image.width, image.height, max_pixels);
   if (pixels / 64 / 64 >
-      file.size())  // an 8 x 8 block takes at least two bits, shared by up to 4 blocks of chroma
+      file.size())  // an 8 x 8 block takes at least two bits, and up to 4 blocks share their chroma
     return bad("it is too short for its size");
   image.u8.resize(pixels * image.channels);
   if (!read_rows(d, image.u8.data(), std::size_t{image.width} * image.channels))

@@ -12,9 +12,9 @@
 
 namespace ls {
 
-// Reads the statements v, vt, vn and f of an OBJ file; indices may be negative (counted back from the last).
-// Grouping, material and smoothing statements, points, lines and comments are ignored. Each distinct (v, vt,
-// vn) becomes one vertex. Normals and uvs are kept if any face uses them; corners without them get 0.
+// Reads the statements v, vt, vn and f of an OBJ file; indices may be negative (counted back from the last
+// one). Statements for groups, materials and smoothing, points, lines and comments are ignored. Each distinct
+// (v, vt, vn) becomes one vertex. Normals and uvs are kept if any face uses them; corners without them get 0.
 Result<MeshData> decode_obj(std::string_view name, std::span<const std::byte> file);
 
 // Reads a PLY file: ascii, binary_little_endian or binary_big_endian, version 1.0. It must have an element
@@ -31,8 +31,8 @@ Result<MeshData> decode_ply_with(std::span<const std::string> attributes, std::s
 bool is_serialized(std::span<const std::byte> file);
 Result<MeshData> decode_serialized(std::string_view name, std::span<const std::byte> file, int index);
 
-// Chooses the format by the first bytes: "ply" is PLY, 0x041C `.serialized`, everything else OBJ. `index` is
-// used for `.serialized` only, `attributes` for PLY only.
+// Loads a mesh file. Its first bytes decide the format: "ply" is PLY, 0x041C `.serialized`, everything else
+// OBJ. `index` is used for `.serialized` only, `attributes` for PLY only.
 Result<MeshData> load_mesh(const std::filesystem::path& path, std::string_view name, int index = 0,
                            std::span<const std::string> attributes = {});
 

@@ -59,7 +59,8 @@ class ObjReader {
     return complain(fmt::format("unknown statement '{}'", key.substr(0, 40)));
   }
 
-  // Parses N numbers, of which the first `needed` are required; ignores what follows (w, vertex colours).
+  // Parses N numbers, of which the first `needed` are required; ignores the rest of the line (w, vertex
+  // colours).
   template <std::size_t N>
   bool numbers(std::string_view line, std::vector<std::array<float, N>>& into, std::size_t needed) {
     std::array<float, N> a{};
@@ -68,8 +69,8 @@ class ObjReader {
       if (w.empty() && i >= needed) break;
       if (!w.empty() && w[0] == '+') w.remove_prefix(1);
       const auto [end, ec] = std::from_chars(w.data(), w.data() + w.size(), a[i]);
-      if (ec ==
-          std::errc::result_out_of_range)  // too small becomes 0; too large makes a triangle that is dropped
+      // A number that is too small becomes 0; one that is too large leads to a triangle that is left out
+      if (ec == std::errc::result_out_of_range)
         a[i] = static_cast<float>(std::strtod(std::string(w.substr(0, 64)).c_str(), nullptr));
       else if (ec != std::errc{} || end != w.data() + w.size())
         return complain(fmt::format("expected {} numbers, found '{}'", needed, w.substr(0, 40)));

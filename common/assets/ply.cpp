@@ -40,14 +40,14 @@ const TypeName* type_named(std::string_view name) {
 struct Property {
   std::string_view name;
   const TypeName* type = nullptr;
-  const TypeName* count = nullptr;  // type of a list's length; null for other properties
+  const TypeName* count = nullptr;  // type of the length of a list; null for a property that is no list
 };
 struct Element {
   std::string_view name;
   std::uint64_t count = 0;
   std::vector<Property> properties;
 
-  // Returns the least number of bytes that one element can take.
+  // Returns the least number of bytes of one element.
   std::uint64_t least_bytes(Coding c) const {
     if (c == Coding::ascii) return properties.size();
     std::uint64_t n = 0;
@@ -56,7 +56,7 @@ struct Element {
   }
 };
 
-// Returns where a vertex property is stored: positions 0-2, normals 3-5, uvs 6-7; -1: nowhere.
+// Returns the place of a vertex property: positions 0-2, normals 3-5, uvs 6-7; -1: the property is skipped.
 int vertex_slot(std::string_view name) {
   constexpr std::pair<std::string_view, int> kSlots[] = {
       {"x", 0}, {"y", 1}, {"z", 2}, {"nx", 3},        {"ny", 4},        {"nz", 5},        {"u", 6},
@@ -159,7 +159,8 @@ class PlyReader {
       if (!ok) return false;
     }
     if (mesh_.indices.empty() && mesh_.dropped_triangles == 0) return complain("has no faces");
-    for (const MeshAttribute& a : mesh_.attributes)  // the file may have several elements 'face', say
+    // A file may have several elements of one name, such as 'face'
+    for (const MeshAttribute& a : mesh_.attributes)
       if (a.values.size() !=
           a.components * (a.name.starts_with("face_") ? mesh_.triangle_count() : mesh_.vertex_count()))
         return complain(fmt::format("not all of it has the attribute '{}'", a.name));
@@ -177,7 +178,7 @@ class PlyReader {
       const auto [end, ec] = std::from_chars(rest_.data() + a, last, v);
       if (ec == std::errc::invalid_argument) return std::nullopt;
       if (ec == std::errc::result_out_of_range)
-        v = 0;  // outside the range of double: not a meaningful coordinate
+        v = 0;  // outside of the range of double, so not a meaningful coordinate
       if (end != last && std::string_view(" \t\r\n\v\f").find(*end) == std::string_view::npos)
         return std::nullopt;
       rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
@@ -305,7 +306,7 @@ class PlyReader {
     return true;
   }
 
-  // Requested attributes: the destination of each property of an element.
+  // The place in the mesh where a property of an element is stored, if it belongs to a requested attribute.
   struct Place {
     int attribute = -1;  // index in mesh_.attributes; -1: none
     std::size_t component = 0;
@@ -327,7 +328,7 @@ class PlyReader {
     }
     return places;
   }
-  // Makes room for one more vertex or face.
+  // Makes room for the attributes of one more vertex or face.
   void make_room(const std::vector<Place>& places) {
     for (const Place& p : places)
       if (p.attribute >= 0 && p.component == 0) {
@@ -358,7 +359,7 @@ class PlyReader {
       }
     return v;
   }
-  // Stores a face's attributes once for each of its triangles, of which there may be none.
+  // Stores a face's attributes once for each of its triangles. There may be no triangles.
   void share_among_triangles(const std::vector<Place>& places, std::size_t triangles) {
     for (const Place& p : places) {
       if (p.attribute < 0 || p.component > 0) continue;
@@ -373,8 +374,8 @@ class PlyReader {
   std::string_view name_;
   std::span<const std::byte> file_;
   std::span<const std::string> wanted_;
-  ByteReader body_;        // the bytes after the header, if binary
-  std::string_view rest_;  // the same, if ascii
+  ByteReader body_;        // rest of a binary file after the header
+  std::string_view rest_;  // rest of an ascii file after the header
   Coding coding_ = Coding::ascii;
   std::vector<Element> elements_;
   std::uint64_t vertex_count_ = 0;

@@ -1,11 +1,11 @@
-// Groups the properties of a PLY element into the attributes that Mitsuba 3.9 sees.
+// Groups the properties of a PLY element into attributes, by the rules of Mitsuba 3.9.
 //
 // Properties r g b, or red green blue, at any position are the attribute "color"; a fourth property, a or
 // alpha, is ignored. Of the other properties only those count whose name ends in an underscore and one
-// character. Of these, neighbours with one prefix form a group: foo_x foo_y foo_z, foo_0 foo_1 foo_2 or foo_1
-// foo_2 foo_3 are the attribute "foo", foo_r foo_g foo_b are "foo_color", each of three numbers. A group that
-// consists only of its first property is an attribute of one number. Groups of two or four are no attribute.
-// If a group with the same prefix has become an attribute before, later ones are ignored.
+// character. Consecutive ones of these with the same prefix form a group: foo_x foo_y foo_z, foo_0 foo_1
+// foo_2 or foo_1 foo_2 foo_3 are the attribute "foo", foo_r foo_g foo_b are "foo_color", each of three
+// numbers. A group that consists only of its first property is an attribute of one number. Groups of two or
+// four are no attribute. If several groups with the same prefix would be attributes, only the first one is.
 #pragma once
 
 #include <span>
@@ -17,10 +17,10 @@ namespace ls {
 
 struct PlyAttribute {
   std::string name;                     // without "vertex_" or "face_"
-  std::vector<std::size_t> properties;  // one or three
+  std::vector<std::size_t> properties;  // indices of its properties: one or three
 };
 
-// Returns the attributes of an element. `names` are those of its properties in order; empty names are
+// Returns the attributes of an element. `names` are the names of its properties in order; empty names are
 // skipped.
 std::vector<PlyAttribute> ply_attributes(std::span<const std::string_view> names);
 

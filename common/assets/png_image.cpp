@@ -11,7 +11,8 @@ namespace ls {
 
 namespace {
 
-// Data for libpng's callbacks. They must not throw: errors return by longjmp, over plain data only.
+// Data for libpng's callbacks. The callbacks must not throw: errors return by longjmp, which skips only plain
+// data.
 struct Source {
   const std::byte* data;
   std::size_t left;
@@ -43,7 +44,7 @@ struct PngShape {
   std::size_t row_bytes = 0;
 };
 
-// These two functions must not have objects with destructors, which longjmp would skip.
+// read_header() and the next function must not have objects with destructors, which longjmp would skip.
 bool read_header(Png& p, PngShape& shape) {
   if (setjmp(png_jmpbuf(p.png))) return false;
   png_set_user_limits(p.png, kMaxImageSide, kMaxImageSide);
@@ -82,7 +83,7 @@ Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> f
   PngShape shape;
   if (!read_header(p, shape)) return bad(source.message);
   const std::uint64_t pixels = std::uint64_t{shape.width} * shape.height;
-  // Deflate packs at most 1032 to 1, and a palette of one bit expands to four bytes: a header that claims a
+  // Deflate packs at most 1032 to 1, and a palette of one bit expands to four bytes. A header that claims a
   // larger image than this allows is false.
   if (pixels == 0 || pixels > kMaxImagePixels ||
       shape.row_bytes * std::uint64_t{shape.height} / 1032 / 32 > file.size())

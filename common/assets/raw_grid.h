@@ -1,6 +1,6 @@
 // Raw `.bin` grids, little endian: int32 nx, ny, nz; float32 minimum x, y, z and maximum x, y, z of the box
 // in the world; nx ny nz float32 values, x fastest or (called "x-major" by some converters) z fastest. The
-// values are nodes: the outermost ones lie on the faces of the box. Nothing may follow.
+// values are nodes: the outermost ones are on the faces of the box. No bytes may follow.
 #pragma once
 
 #include <cstddef>

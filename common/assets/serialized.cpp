@@ -1,5 +1,5 @@
-// The format is described in the documentation of Mitsuba's `serialized` shape. In version 3 meshes have no
-// names, and the table at the end has 32-bit offsets.
+// Reads Mitsuba's `serialized` meshes. Their format is described in the documentation of Mitsuba's
+// `serialized` shape. In version 3 meshes have no names, and the table at the end has 32-bit offsets.
 #include <fmt/format.h>
 #include <zlib.h>
 
@@ -23,11 +23,11 @@ enum Flags : std::uint32_t {
   kHasUvs = 0x2,
   kHasColours = 0x8,
   kFaceNormals = 0x10,
-  kDouble = 0x2000  // else single precision
+  kDouble = 0x2000  // if absent: single precision
 };
 
-// A zlib stream, unpacked on demand, so that memory use never exceeds the data actually unpacked, whatever
-// the file claims.
+// A zlib stream, unpacked on demand. So memory never exceeds the data actually unpacked, whatever size the
+// file claims.
 class Inflater {
  public:
   explicit Inflater(std::span<const std::byte> data) : data_(data) { ok_ = inflateInit(&z_) == Z_OK; }
@@ -91,7 +91,7 @@ class SerializedReader {
     return false;
   }
 
-  // Returns the bytes of mesh number `index` from its compressed part on; sets version_.
+  // Returns the bytes of mesh number `index`, starting at its compressed part; sets version_.
   std::optional<std::span<const std::byte>> find(int index) {
     if (!header(file_)) return std::nullopt;
     if (index == 0) return file_.subspan(4);
@@ -165,8 +165,8 @@ class SerializedReader {
     return false;
   }
 
-  // zlib packs at most 1032 to 1: larger counts in the header are false, and are rejected before memory is
-  // allocated.
+  // True if the counts in the header may be right: zlib packs at most 1032 to 1. False counts are rejected
+  // before memory is allocated.
   bool plausible(std::uint32_t flags, std::uint64_t vertices, std::uint64_t triangles) {
     const std::uint64_t per_vertex =
         3 + (flags & kHasNormals ? 3 : 0) + (flags & kHasUvs ? 2 : 0) + (flags & kHasColours ? 3 : 0);

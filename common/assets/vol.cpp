@@ -30,7 +30,7 @@ tl::unexpected<Error> bad_vol(std::string_view name, const std::string& text) {
 }
 
 struct Header {
-  GridData grid;  // without values
+  GridData grid;  // dimensions and channels, without values
   std::int32_t type = 0;
   std::uint64_t count = 0;
 };

@@ -1,5 +1,5 @@
-// CHECK(cond, fmt, args...): a violated condition is a programming error and ends the process with a message
-// that names the values. Active in release builds. Not for bad input, which yields an Error.
+// CHECK(cond, fmt, args...) is for programming errors: a violated condition ends the process with a message
+// that contains the values. It is active in release builds. Bad input must yield an Error instead.
 #pragma once
 
 #include <fmt/format.h>

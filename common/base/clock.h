@@ -1,7 +1,8 @@
-// Time is passed as an argument: only main() and SystemClock read a clock.
+// Time is passed as an argument: only main() and SystemClock read the system's clock.
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 
 namespace ls {
 
@@ -22,15 +23,10 @@ class SystemClock final : public Clock {
   }
 };
 
-// A clock that advances only when it is told to; for tests and simulation.
-class FakeClock final : public Clock {
- public:
-  TimePoint now() const override { return now_; }
-  void advance(Duration d) { now_ += d; }
-
- private:
-  TimePoint now_{};
-};
+// The wall clock: nanoseconds since 1970 (UTC). It may be set while a program runs.
+inline std::int64_t system_unix_ns() {
+  return std::chrono::duration_cast<Duration>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
 
 inline double seconds(Duration d) { return std::chrono::duration<double>(d).count(); }
 inline Duration from_seconds(double s) {

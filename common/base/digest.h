@@ -20,12 +20,13 @@ namespace ls {
 struct Digest {
   std::array<std::uint8_t, 32> bytes{};
 
-  std::string hex() const;                                   // 64 lower-case hexadecimal digits
-  static std::optional<Digest> parse(std::string_view hex);  // nullopt unless exactly 64 digits
+  std::string hex() const;  // returns 64 lower-case hexadecimal digits
+  // Returns nullopt unless `hex` is exactly 64 digits
+  static std::optional<Digest> parse(std::string_view hex);
   auto operator<=>(const Digest&) const = default;
 };
 
-// Incremental SHA-256. finish() may be called once.
+// Incremental SHA-256. finish() may be called only once.
 class Sha256 {
  public:
   Sha256();

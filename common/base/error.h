@@ -9,17 +9,17 @@
 
 namespace ls {
 
-// The gRPC status codes that this project uses. One table maps them to gRPC's numbers, another to HTTP status
-// codes.
+// The gRPC status codes that this project uses. One table maps them to gRPC's numbers, another one to HTTP
+// status codes.
 enum class Errc {
   invalid_argument,  // the input is wrong; sending it again will not help
-  not_found,         // no such job, blob, worker, file
+  not_found,         // there is no such job, blob, worker or file
   already_exists,
-  failed_precondition,  // valid input, but the wrong state (cancelled job, other numeric class)
-  resource_exhausted,   // a limit or a full disk
+  failed_precondition,  // valid input, but the state is wrong (cancelled job, other numeric class)
+  resource_exhausted,   // a limit is exceeded, or a disk is full
   permission_denied,
   unauthenticated,
-  unavailable,  // try again later
+  unavailable,  // temporary: try again later
   internal,     // a bug of this program
 };
 
@@ -39,6 +39,6 @@ inline tl::unexpected<Error> bad_argument(std::string message) {
   return fail(Errc::invalid_argument, std::move(message));
 }
 
-std::string_view to_string(Errc code);  // "invalid_argument" ...
+std::string_view to_string(Errc code);  // returns "invalid_argument" ...
 
 }  // namespace ls

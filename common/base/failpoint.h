@@ -1,4 +1,4 @@
-// Failpoints: named steps of a unit's life at which the chaos tests kill a process. With
+// Failpoints: named steps in the life of a unit at which the chaos tests kill a process. With
 // LIGHTSHAFT_KILL_AT=STEP or STEP:N in the environment, the process dies as by kill -9 when it reaches the
 // step (for the N-th time). Otherwise a failpoint costs one comparison.
 #pragma once

@@ -10,9 +10,9 @@
 namespace ls {
 namespace {
 
-constexpr std::size_t kMostShown = 40;  // characters of an invalid text in a message
+constexpr std::size_t kMostShown = 40;  // characters of an invalid text that a message quotes
 
-// Parses a number at the front of `text` and removes it.
+// Parses a number at the front of `text` and removes it from `text`.
 std::optional<std::uint32_t> take_number(std::string_view& text) {
   std::uint32_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);

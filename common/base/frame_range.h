@@ -1,5 +1,5 @@
 // The frames of a sequence (a job that renders one image per frame), as text: "1-10", "1-10x2" (every second
-// frame), "7". In file names a run of # stands for the frame number, zero-padded to the run's length.
+// frame), "7". In file names a run of # is replaced by the frame number, zero-padded to the run's length.
 #pragma once
 
 #include <cstdint>
@@ -21,18 +21,18 @@ struct FrameRange {
   bool contains(std::uint32_t frame) const {
     return frame >= first && frame <= last && (frame - first) % step == 0;
   }
-  std::vector<std::uint32_t> frames() const;  // ascending
+  std::vector<std::uint32_t> frames() const;  // returns the numbers in ascending order
   bool operator==(const FrameRange&) const = default;
 };
 
-// invalid_argument: `text` is not a range of frames; the message quotes it, and says the correct syntax and
-// any limit exceeded.
+// Parses a range of frames. invalid_argument: `text` is not such a range; the message quotes it, with the
+// correct syntax and any limit exceeded.
 Result<FrameRange> parse_frames(std::string_view text);
 std::string to_string(const FrameRange& range);
 
 // Returns `name` with every run of # replaced by the frame number: "fog.####.vdb" of frame 7 is
 // "fog.0007.vdb". A number with more digits than its run is written in full.
 std::string numbered(std::string_view name, std::uint32_t frame);
-bool has_frame_number(std::string_view name);  // true if it contains a #
+bool has_frame_number(std::string_view name);  // true if the name contains a #
 
 }  // namespace ls

@@ -1,29 +1,18 @@
 #include "common/base/helper_program.h"
 
-#include <fcntl.h>
-#include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
-#include <cerrno>
-#include <csignal>
-#include <cstring>
+#include <utility>
 
-extern char** environ;
+#include "common/base/spawn.h"
 
 namespace ls {
 namespace {
 
-std::vector<char*> environment() {
-  std::vector<char*> kept;
-  for (char** e = environ; *e; ++e) {
-    const std::string_view variable(*e), name = variable.substr(0, variable.find('='));
-    if (name.starts_with("LD_") || name.starts_with("MALLOC_") || name.ends_with("SAN_OPTIONS"))
-      kept.push_back(*e);
-  }
-  kept.push_back(nullptr);
-  return kept;
+// Returns true for variables that the loader, the allocator and the sanitizers read.
+bool inherits(std::string_view variable) {
+  const std::string_view name = variable.substr(0, variable.find('='));
+  return name.starts_with("LD_") || name.starts_with("MALLOC_") || name.ends_with("SAN_OPTIONS");
 }
 
 }  // namespace
@@ -39,32 +28,10 @@ Descriptor::~Descriptor() {
 
 Result<int> run_helper(const std::filesystem::path& program, std::vector<std::string> arguments, int shared) {
   arguments.insert(arguments.begin(), program.string());
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  argv.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  int error = posix_spawn_file_actions_adddup2(&actions, shared, kHelperFd);
-  for (const int standard : {0, 1})
-    if (error == 0) error = posix_spawn_file_actions_addopen(&actions, standard, "/dev/null", O_RDWR, 0);
-  if (error == 0) error = posix_spawn_file_actions_addclosefrom_np(&actions, kHelperFd + 1);
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  sigset_t none, all;
-  sigemptyset(&none), sigfillset(&all);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setsigdefault(&attributes, &all);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-  pid_t pid = -1;
-  if (error == 0)
-    error = ::posix_spawn(&pid, program.c_str(), &actions, &attributes, argv.data(), environment().data());
-  posix_spawn_file_actions_destroy(&actions);
-  posix_spawnattr_destroy(&attributes);
-  if (error != 0) return fail(Errc::internal, fmt::format("{}: {}", program.string(), std::strerror(error)));
-  int status = 0;
-  while (::waitpid(pid, &status, 0) < 0)
-    if (errno != EINTR) return fail(Errc::internal, fmt::format("waitpid: {}", std::strerror(errno)));
-  return status;
+  const auto pid =
+      spawn({program.string(), std::move(arguments), {kDevNull, kDevNull, STDERR_FILENO, shared}, inherits});
+  if (!pid) return fail(Errc::internal, pid.error().message);
+  return wait_for_end(*pid);
 }
 
 }  // namespace ls

@@ -1,6 +1,6 @@
-// Runs the programs that are installed beside ours and do work that may crash, hang or take too much memory
-// in a library that is not ours: reading OpenVDB files, denoising. They share memory with us through one
-// file that they inherit.
+// Runs the programs that are installed beside ours. They do work in third-party libraries that may crash,
+// hang or take too much memory: reading OpenVDB files, denoising. They share memory with us through one file
+// that they inherit.
 #pragma once
 
 #include <filesystem>
@@ -12,10 +12,10 @@
 
 namespace ls {
 
-// The number under which a helper finds the file that it shares with us.
+// The number of the file descriptor that a helper shares with us.
 inline constexpr int kHelperFd = 3;
 
-// The path of a program in the folder of the running executable.
+// Returns the path of a program in the folder of the running executable.
 std::filesystem::path program_beside_us(std::string_view name);
 
 // An open file descriptor, closed by the destructor.
@@ -29,8 +29,9 @@ class Descriptor {
 };
 
 // Runs the program, waits for its end, and returns its wait status, as waitpid() gives it. The program
-// inherits `shared` as kHelperFd and no other file but standard error, and of the environment only what the
-// loader and the sanitizers read, so that no secrets are passed to it. internal: it could not be started.
+// inherits only two files: `shared` as kHelperFd, and standard error. Of the environment it inherits only
+// the variables that the loader and the sanitizers read, so that it gets no secrets. internal: it could
+// not be started.
 Result<int> run_helper(const std::filesystem::path& program, std::vector<std::string> arguments, int shared);
 
 }  // namespace ls

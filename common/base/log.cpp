@@ -28,14 +28,15 @@ spdlog::logger& logger() {
 
 bool control(char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }
 
-// Prevents names and file contents in a message from forging log lines.
+// Keeps a message on one line, so that names and file contents in it cannot forge log lines.
 std::string one_line(std::string_view text) {
   std::string line(text);
   std::replace_if(line.begin(), line.end(), control, ' ');
   return line;
 }
 
-// "a=1 b=two words c=3": a word without '=' belongs to the value before it. Of equal keys the first is kept.
+// Splits "a=1 b=two words c=3" into keys and values: a word without '=' belongs to the value before it. Of
+// equal keys the first is kept.
 void add_keys(nlohmann::ordered_json& line, std::string_view keys) {
   std::string key, value;
   const auto flush = [&] {
@@ -97,7 +98,8 @@ std::string log_line(LogFormat format, std::string_view keys, std::string_view t
   nlohmann::ordered_json line;
   line["text"] = text;
   add_keys(line, keys);
-  // The line is valid JSON whatever bytes a name has. The pattern already contains its beginning.
+  // dump() with `replace` gives valid JSON whatever bytes a name contains. Its first character is removed,
+  // since the log pattern already contains it.
   return line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).substr(1);
 }
 

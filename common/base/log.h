@@ -1,5 +1,6 @@
 // One line per event, with keys: log_info("job=j-12 tile=4 worker=w-3", "unit accepted"). info = a state
-// changed, warn = something was retried, error = a person must act. Never both log and return an error.
+// changed, warn = something was retried, error = a person must act. An error is either logged or returned,
+// never both.
 #pragma once
 
 #include <optional>
@@ -15,15 +16,15 @@ enum class LogFormat { text, json };
 
 void log_level(LogLevel level);
 void log_format(LogFormat format);
-std::optional<LogFormat> log_format_of(std::string_view name);  // "text" or "json"
+std::optional<LogFormat> log_format_of(std::string_view name);  // parses "text" or "json"
 
 void log_debug(std::string_view keys, std::string_view text);
 void log_info(std::string_view keys, std::string_view text);
 void log_warn(std::string_view keys, std::string_view text);
 void log_error(std::string_view keys, std::string_view text);
 
-// Escapes external text for use as the value of a key, so that the text cannot end the value, nor begin
-// another key or another line.
+// Escapes external text for use as the value of a key, so that it cannot end the value or begin another key
+// or line.
 std::string log_value(std::string_view text);
 
 // Returns the line that is logged, without its time and level; for tests.

@@ -1,4 +1,4 @@
-// overloaded{...} joins lambdas into one visitor: std::visit(overloaded{...}, variant).
+// overloaded{...} combines lambdas into one visitor: std::visit(overloaded{...}, variant).
 #pragma once
 
 namespace ls {

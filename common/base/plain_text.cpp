@@ -31,7 +31,8 @@ bool is_shown(std::uint32_t code) {
   const auto within = [code](std::uint32_t first, std::uint32_t last) {
     return code >= first && code <= last;
   };
-  // Controls; line and paragraph separator with the embeddings and overrides; the isolates.
+  // Excluded ranges: control characters; line and paragraph separator with the directional embeddings and
+  // overrides; the directional isolates.
   return !within(0, 0x1F) && !within(0x7F, 0x9F) && !within(0x2028, 0x202E) && !within(0x2066, 0x2069);
 }
 

@@ -6,9 +6,9 @@
 
 namespace ls {
 
-// Replaces what could move the cursor, colour the terminal, forge lines or reorder letters: each control
-// character (C0, DEL, C1, also single bytes that are not UTF-8), line and paragraph separator and directional
-// override becomes one space, so that columns are kept.
+// Replaces characters that could move the cursor, colour the terminal, forge lines or reorder letters. Each
+// control character (C0, DEL, C1, also single bytes that are not UTF-8), line and paragraph separator and
+// directional override becomes one space, so that columns are kept.
 std::string plain_text(std::string_view text);
 
 }  // namespace ls

@@ -11,7 +11,7 @@
 namespace ls {
 
 bool equal_secret(std::string_view a, std::string_view b) {
-  // Their digests have equal length, and an attacker cannot predict them.
+  // The digests of the two are compared: they have equal length, and an attacker cannot predict them.
   return equal_secret(sha256(a), sha256(b));
 }
 
@@ -22,7 +22,7 @@ bool equal_secret(const Digest& a, const Digest& b) {
 std::string hmac_sha256(std::string_view key, std::string_view text) {
   Digest mac;
   unsigned int length = 0;
-  // HMAC() fails only if memory runs out; then no signature is better than a weak one.
+  // HMAC() fails only if memory runs out. The result is then empty: no signature is better than a weak one.
   if (!HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()),
             reinterpret_cast<const unsigned char*>(text.data()), text.size(),
             reinterpret_cast<unsigned char*>(mac.bytes.data()), &length))

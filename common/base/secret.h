@@ -10,7 +10,7 @@
 
 namespace ls {
 
-// Compares a given text with a secret. The run time reveals neither where the two differ nor the secret's
+// True if the text equals the secret. The run time reveals neither where the two differ nor the secret's
 // length.
 bool equal_secret(std::string_view a, std::string_view b);
 bool equal_secret(const Digest& a, const Digest& b);

@@ -18,7 +18,8 @@ bool plain(char c) {
 
 std::string shell_word(std::string_view text) {
   if (!text.empty() && std::all_of(text.begin(), text.end(), plain)) return std::string(text);
-  const bool escapes = plain_text(text) != text;  // contains characters that are unsafe for a terminal
+  // True if there are characters that are unsafe for a terminal
+  const bool escapes = plain_text(text) != text;
   std::string word = escapes ? "$'" : "'";
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);

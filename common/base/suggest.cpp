@@ -10,7 +10,7 @@
 namespace ls {
 namespace {
 
-constexpr std::size_t kMaxName = 64;    // longer names are not compared: the cost is quadratic
+constexpr std::size_t kMaxName = 64;    // longer names are not compared, since the cost is quadratic
 constexpr std::size_t kMaxListed = 24;  // more alternatives would make a message unreadable
 
 std::string folded(std::string_view name) {
@@ -20,7 +20,7 @@ std::string folded(std::string_view name) {
   return out;
 }
 
-// Optimal string alignment distance.
+// Returns the optimal string alignment distance.
 std::size_t distance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;

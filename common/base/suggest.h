@@ -9,7 +9,7 @@
 
 namespace ls {
 
-// the most cells of edit distance tables that are computed for one suggestion
+// Most cells of edit-distance tables that are computed for one suggestion
 inline constexpr std::size_t kMaxNameWork = 4'000'000;
 
 // Returns the name in `known` that is nearest to `given` by edit distance (a swap of neighbouring letters
@@ -18,7 +18,7 @@ inline constexpr std::size_t kMaxNameWork = 4'000'000;
 // kMaxNameWork allows.
 std::optional<std::string> nearest_name(std::string_view given, std::span<const std::string> known);
 
-// Returns "; known here: a, b, c", or an empty text if there are no names, or too many for a message.
+// Returns "; known here: a, b, c". Empty if there are no names, or too many for a message.
 std::string listing(std::span<const std::string> known);
 
 // Returns "; did you mean 'x'?", or listing(known) if no name is near.

@@ -11,10 +11,11 @@
 namespace ls {
 namespace {
 
-constexpr double kInterval = 1.96;  // standard errors on either side of a 95 % interval
+constexpr double kInterval = 1.96;  // half the width of a 95 % interval, in standard errors
 
-constexpr double kFewestPixels = 4;  // that carry the noise of an estimate with an interval
-// E (a - b)^4 of two Gaussian variables, over the square of their variance
+// An interval is given only if at least this many pixels carry the noise of the estimate
+constexpr double kFewestPixels = 4;
+// E (a - b)^4 of two Gaussian variables, divided by the square of their variance
 constexpr double kFourthMoment = 12;
 
 struct Noisy {
@@ -67,7 +68,7 @@ Noisy gather(const Film& film) {
   return out;
 }
 
-// Sums over pixels of an estimate, and of the squares and fourth powers of its noise.
+// Sums over pixels of an estimate, and of the second and fourth powers of its noise.
 struct Sums {
   double estimate = 0, squares = 0, fourths = 0;
   void add_noise(double product, double apart) {

@@ -46,7 +46,7 @@ struct Unmap {
   void operator()(std::byte* p) const { ::munmap(p, bytes); }
 };
 
-// The memory that is shared with the program.
+// The memory that is shared with the helper program.
 class Shared {
  public:
   static Result<Shared> of(FrameSize size, std::size_t images) {

@@ -1,10 +1,10 @@
-// Denoises images with Intel Open Image Denoise (https://www.openimagedenoise.org), version 2, which is
-// looked for at run time and never needed. It runs in a program of its own, lightshaft-denoise, installed
-// beside the executable: a crash or a lack of memory in it is an error here and nothing more.
+// Denoises images with Intel Open Image Denoise (https://www.openimagedenoise.org), version 2. The library is
+// optional and is searched for at run time. It runs in a separate program, lightshaft-denoise, installed
+// beside the executable: a crash or a lack of memory in it is merely an error here.
 //
-// The library is looked for in this order: the environment variable LIGHTSHAFT_OIDN (the library's file, its
-// folder, or the folder above that); `oidn/lib` beside the executable, and `oidn/lib` two folders above it,
-// where deploy/install-denoiser.sh puts it in a build; the loader's own places.
+// The library is searched for in this order: the environment variable LIGHTSHAFT_OIDN (the library's file,
+// its folder, or the folder above that); `oidn/lib` beside the executable, and `oidn/lib` two folders above
+// it, where deploy/install-denoiser.sh puts it in a build; the places where the system's loader looks.
 #pragma once
 
 #include <filesystem>
@@ -18,7 +18,7 @@
 
 namespace ls {
 
-// An image with its guides, all of width x height interleaved triples, row by row.
+// An image with its guides. All have three values per pixel, row by row.
 struct NoisyImage {
   std::vector<float> color;   // linear, finite; negative values count as 0
   std::vector<float> albedo;  // in [0, 1]
@@ -27,17 +27,17 @@ struct NoisyImage {
 
 class Denoiser {
  public:
-  // Finds the library and asks for its version. `library` is its file; if it is empty, the library is looked
-  // for as above. failed_precondition: it cannot be used on this machine; the message says why, and how to
-  // get it.
+  // Finds the library and reads its version. `library` is its file; if it is empty, the library is searched
+  // for as described above. failed_precondition: it cannot be used on this machine; the message says why, and
+  // how to install it.
   static Result<Denoiser> find(
       int threads, const std::string& library = {},
       const std::filesystem::path& program = program_beside_us("lightshaft-denoise"));
 
-  const std::string& name() const { return name_; }  // "Open Image Denoise 2.5.1"
+  const std::string& name() const { return name_; }  // for example "Open Image Denoise 2.5.1"
 
-  // Returns the denoised colours, one for each image, finite. All images have the size `size`.
-  // resource_exhausted: there was not enough memory; internal: the library fails.
+  // Returns the denoised colours, one for each image, all finite. All images have the size `size`.
+  // resource_exhausted: there was not enough memory; internal: the library failed.
   Result<std::vector<std::vector<float>>> denoise(FrameSize size, std::span<const NoisyImage> images) const;
 
  private:

@@ -1,6 +1,6 @@
-// The memory that we share with lightshaft-denoise (common/denoise/program/main.cpp): a header, then from
-// kPlanesAt on the images, each as three planes of interleaved RGB or XYZ floats, row by row: colour, albedo,
-// normal. The program overwrites each colour with the denoised one.
+// The memory shared with lightshaft-denoise (common/denoise/program/main.cpp): a header, followed from
+// kPlanesAt on by the images. Each image has three planes, row by row, of three floats per pixel: colour,
+// albedo, normal. The program overwrites each colour with the denoised one.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace ls::denoise {
 
-inline constexpr std::size_t kPlanesAt = 4096;  // bytes
+inline constexpr std::size_t kPlanesAt = 4096;  // offset of the images in bytes
 inline constexpr std::uint64_t kMagic = 0x6573'696f'6e73'6c;
 inline constexpr std::size_t kPlanesPerImage = 3;
 
@@ -16,9 +16,9 @@ enum class Outcome : std::int32_t { none, done, failed };
 
 struct Header {
   std::uint64_t magic;
-  std::int32_t width, height, images;  // 0 images: only the version is asked
+  std::int32_t width, height, images;  // 0 images: only the version is requested
   Outcome outcome;
-  std::int32_t version;  // of the library, 20501 for 2.5.1; 0: it was not found
+  std::int32_t version;  // version of the library, 20501 for 2.5.1; 0: it was not found
   char error[512];       // null-terminated
 };
 static_assert(sizeof(Header) <= kPlanesAt);

@@ -1,4 +1,4 @@
-// The health of a job for people and programs: for each cause a sentence, its first location, and the command
+// The health of a job for users and programs: for each cause a sentence, its first location, and the command
 // that reproduces it.
 #pragma once
 
@@ -17,7 +17,7 @@ struct HealthNote {
   std::vector<HealthLocation> first;
   std::optional<std::uint32_t>
       frame;           // for sequences: the first frame with this cause, to which `first` and `replay` refer
-  std::string replay;  // command for the first location; empty: none
+  std::string replay;  // command that reproduces the first location; empty: there is no location
   bool operator==(const HealthNote&) const = default;
 };
 

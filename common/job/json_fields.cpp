@@ -12,7 +12,7 @@
 namespace ls::job {
 namespace {
 
-// Letters, digits and "_-.:": safe for file names, labels and layers.
+// True if the text has only letters, digits and "_-.:", which are safe for file names, labels and layers.
 bool is_name(const std::string& s) {
   if (s.empty() || s.size() > kMaxNameBytes) return false;
   for (const char c : s) {
@@ -58,7 +58,7 @@ Result<Json> parse_object(std::string_view text, std::string_view what) {
   bool too_deep = false;
   const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
     too_deep |= depth > kMaxNesting;
-    if (too_deep) return false;  // do not keep it: deep values are destroyed and printed recursively
+    if (too_deep) return false;  // deep values are not kept, since destroying and printing them is recursive
     if (event == Json::parse_event_t::key && depth <= 2) {
       const auto& key = parsed.get_ref<const std::string&>();
       if (!keys.emplace(depth, key).second && !twice) twice = key;
@@ -119,7 +119,7 @@ std::optional<std::uint64_t> Fields::whole(const char* key, std::uint64_t least,
 std::optional<std::int64_t> Fields::integer(const char* key, std::int64_t least, std::int64_t most) {
   const Json* v = find(key);
   if (!v) return std::nullopt;
-  // A value above the signed range is rejected, because it would become negative.
+  // A value above the signed range is rejected, because the conversion would make it negative.
   const bool fits =
       v->is_number_integer() && !(v->is_number_unsigned() && v->get<std::uint64_t>() > INT64_MAX);
   if (fits && v->get<std::int64_t>() >= least && v->get<std::int64_t>() <= most)

@@ -1,5 +1,6 @@
-// Strict extraction of fields from a JSON object: every key must be known, every value of its type and range;
-// the first error is recorded with the key's name. For the .cpp files of this folder.
+// Strict extraction of fields from a JSON object: every key must be known, and every value must have the
+// right type and range. The first error is recorded with the key's name. Used by the .cpp files of this
+// folder only.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +17,7 @@ namespace ls::job {
 
 using Json = nlohmann::json;
 
-// Returns `text` cut to `most` bytes and made ASCII, so that any input can go into a log line or a JSON
+// Returns `text` truncated to `most` bytes and made ASCII, so that it can be part of a log line or a JSON
 // string.
 std::string printable(std::string_view text, std::size_t most);
 
@@ -37,8 +38,8 @@ class Fields {
   std::optional<bool> boolean(const char* key);
   std::optional<std::string> name(const char* key);
   std::optional<std::vector<std::string>> names(const char* key);
-  std::optional<FrameSize> size(const char* key);  // [w, h] or "WxH"
-  const Json* find(const char* key) const;         // null if absent
+  std::optional<FrameSize> size(const char* key);  // parses [w, h] or "WxH"
+  const Json* find(const char* key) const;         // returns null if the key is absent
   void wrong(std::string_view key, std::string_view problem);
   void require(const char* key);
 

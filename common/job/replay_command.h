@@ -1,4 +1,4 @@
-// The command that renders one sample of a job again on its own, for a person to copy and debug.
+// The command that renders one sample of a job again, which a person can copy to debug it.
 #pragma once
 
 #include <cstdint>
@@ -9,9 +9,9 @@
 
 namespace ls {
 
-// Returns "lightshaft render SCENE" with all options that determine the value of a sample, each word quoted
-// for a shell. `scene` is the name by which the job calls its scene. `frame` is the frame number, for jobs
-// with frames.
+// Returns "lightshaft render SCENE" with all options that determine the value of a sample; each word is
+// quoted for a shell. `scene` is the job's name for its scene. `frame` is the frame number, for jobs with
+// frames.
 std::string replay_command(const std::string& scene, const JobSpec& spec,
                            std::optional<std::uint32_t> frame = {});
 // Returns the command for one sample of the pixel (x, y). `command` is a result of the function above.

@@ -1,5 +1,5 @@
-// A final EXR of this program, read back with its provenance, so that it can be rendered again and compared.
-// The file is untrusted: sizes are bounded, and headers and layers must be as final_exr() writes them.
+// Reads a final EXR of this program with its provenance, so that it can be rendered again and compared. The
+// file is untrusted: sizes are limited, and headers and layers must have the form that final_exr() writes.
 #pragma once
 
 #include <cstddef>
@@ -23,20 +23,22 @@ struct SealedImage {
   Digest scene, numeric_class;
   RenderSettings settings;
   std::string build;
-  std::vector<Digest> tiles;  // one per tile, see Film::tile_digest
+  std::vector<Digest> tiles;  // one per tile: Film::tile_digest
 
   TileGrid grid() const { return {picture.size, settings.tile}; }
 };
 
-// invalid_argument: a header or a layer is missing or wrong; the message names it.
+// Checks the headers and layers of the image. invalid_argument: one is missing or wrong; the message names
+// it.
 Result<SealedImage> read_sealed_image(FinalPicture picture, const std::string& name);
 
 // Returns the number of samples of each pixel of the tile, according to the image's layer `spp`.
 // invalid_argument: the tile's pixels have different numbers, or one that this program never renders.
 Result<std::uint64_t> tile_samples(const SealedImage& image, TileIndex tile);
 
-// The place of the first value of a tile, in the order of layers, that differs from what final_exr() would
-// store for the film. If the image lacks a whole layer, it is that layer's first pixel in the tile.
+// The place of the first value of a tile, in the order of layers, that differs from the value that
+// final_exr() would store for the film. If the image lacks a whole layer, the place is that layer's first
+// pixel in the tile.
 struct PixelDifference {
   int x = 0, y = 0;
   std::string layer;

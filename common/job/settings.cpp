@@ -15,7 +15,8 @@ namespace {
 using job::Fields;
 using job::Json;
 
-// nlohmann's objects are sorted by key, and dump() without indentation writes no spaces.
+// Returns canonical JSON: nlohmann's objects are sorted by key, and dump() without indentation writes no
+// spaces.
 std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 Json size_json(FrameSize size) { return Json::array({size.width, size.height}); }
@@ -54,6 +55,20 @@ void read_frames(Fields& fields, JobSpec& spec) {
     fields.wrong("defines", "gives $frame, which in a job with 'frames' is the number of the frame");
 }
 
+// A target of the denoised layers needs these layers, so `denoise` may be left out.
+void read_denoise(Fields& fields, JobSpec& spec) {
+  const auto layer = fields.name("target_layer");
+  if (layer) {
+    const auto known = parse_target_layer(*layer);
+    if (!known) return fields.wrong("target_layer", "must be \"raw\" or \"denoised\"");
+    spec.target_layer = *known;
+  }
+  const bool needed = spec.target_layer == TargetLayer::denoised;
+  spec.denoise = fields.boolean("denoise").value_or(needed);
+  if (needed && !spec.denoise)
+    fields.wrong("denoise", "is false, but target_layer is \"denoised\": leave it out, or set it to true");
+}
+
 void read_reference(Fields& fields, JobSpec& spec) {
   const Json* v = fields.find("reference");
   if (!v) return;
@@ -74,6 +89,14 @@ std::string canonical_json(const RenderSettings& s) {
                    {"seed", s.seed},
                    {"size", size_json(s.size)},
                    {"tile", s.tile}});
+}
+
+std::string_view to_string(TargetLayer layer) { return layer == TargetLayer::raw ? "raw" : "denoised"; }
+
+std::optional<TargetLayer> parse_target_layer(std::string_view text) {
+  for (const TargetLayer layer : {TargetLayer::raw, TargetLayer::denoised})
+    if (to_string(layer) == text) return layer;
+  return std::nullopt;
 }
 
 AovSet aovs_of(const RenderSettings& settings) { return parse_aovs(settings.aov).value_or(AovSet{}); }
@@ -142,6 +165,7 @@ std::string canonical_json(const JobSpec& spec) {
   if (spec.denoise) json["denoise"] = true;
   if (spec.spp) json["spp"] = *spec.spp;
   if (spec.target_error) json["target_error"] = *spec.target_error;
+  if (spec.target_layer != TargetLayer::raw) json["target_layer"] = to_string(spec.target_layer);
   if (spec.time) json["time"] = *spec.time;
   if (spec.seed) json["seed"] = *spec.seed;
   if (spec.size) json["size"] = size_json(*spec.size);
@@ -163,9 +187,10 @@ Result<JobSpec> parse_job_spec(std::string_view text) {
 
 Result<JobSpec> job_spec_of(const nlohmann::json& object) {
   if (!object.is_object()) return fail(Errc::invalid_argument, "spec: must be a JSON object {...}");
-  Fields fields(object, "spec",
-                {"spp", "target_error", "time", "seed", "size", "integrator", "aov", "defines", "priority",
-                 "float", "denoise", "tags", "frames", "max_workers", "max_units", "memory", "reference"});
+  Fields fields(
+      object, "spec",
+      {"spp", "target_error", "target_layer", "time", "seed", "size", "integrator", "aov", "defines",
+       "priority", "float", "denoise", "tags", "frames", "max_workers", "max_units", "memory", "reference"});
   JobSpec spec;
   spec.spp = fields.whole("spp", 1, kMaxSpp);
   spec.target_error = fields.positive("target_error", kMaxTargetError);
@@ -177,7 +202,7 @@ Result<JobSpec> job_spec_of(const nlohmann::json& object) {
   read_defines(fields, spec);
   spec.priority = static_cast<int>(fields.integer("priority", -kMaxPriority, kMaxPriority).value_or(0));
   spec.float_output = fields.boolean("float").value_or(false);
-  spec.denoise = fields.boolean("denoise").value_or(false);
+  read_denoise(fields, spec);
   spec.tags = fields.names("tags").value_or(spec.tags);
   read_frames(fields, spec);
   const auto some = [&](const char* key) -> std::optional<std::uint32_t> {

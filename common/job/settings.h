@@ -1,5 +1,5 @@
-// A job's request in two parts: RenderSettings determines the pixels of a unit (one tile and range of
-// samples); JobSpec has what concerns only the job as a whole. Raising a job's number of samples must not
+// The request for a job, in two parts. RenderSettings determines the pixels of a unit (one tile and range of
+// samples); JobSpec also has the settings of the job as a whole. Raising a job's number of samples must not
 // change the identity of its units, so `spp` is in JobSpec.
 #pragma once
 
@@ -8,6 +8,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/digest.h"
@@ -24,37 +25,44 @@ struct RenderSettings {
   FrameSize size;
   int tile = 32;
   std::uint64_t seed = 0;
-  std::string integrator;        // as IntegratorSettings::name: resolved, never empty
-  int max_depth = -1;            // -1: unlimited; counts path segments, as in the dialect
+  std::string integrator;        // as IntegratorSettings::name; never empty
+  int max_depth = -1;            // -1: unlimited; counts path segments, as in Mitsuba
   int rr_depth = 5;              // first depth at which Russian roulette may act
   std::vector<std::string> aov;  // sorted names, as returned by names_of(AovSet); empty: colour only
   bool operator==(const RenderSettings&) const = default;
 };
 AovSet aovs_of(const RenderSettings& settings);
 
+// The layers that a target error applies to: the image as rendered, or its denoised layers
+enum class TargetLayer { raw, denoised };
+std::string_view to_string(TargetLayer layer);
+std::optional<TargetLayer> parse_target_layer(std::string_view text);
+
 // The request, as in `spec` of the HTTP API and the options of the command line. For a member without a
 // value, the scene's setting applies.
 struct JobSpec {
   std::optional<std::uint64_t> spp;
   std::optional<double> target_error;  // relMSE
-  std::optional<double> time;          // seconds
+  TargetLayer target_layer = TargetLayer::raw;
+  std::optional<double> time;  // seconds
   std::optional<std::uint64_t> seed;
   std::optional<FrameSize> size;
   std::optional<std::string> integrator;
   std::vector<std::string> aov;
-  std::map<std::string, std::string> defines;  // Mitsuba's $name parameters
+  std::map<std::string, std::string> defines;  // values of Mitsuba's $name parameters
   int priority = 0;
   bool float_output = false;
-  // True: the image also has denoised layers (common/denoise/denoised_image.h). The coordinator makes them
-  // from the film, which gets the AOVs that this needs.
+  // True: the image also has denoised layers (common/denoise/denoised_image.h). The coordinator computes them
+  // from the film, to which it adds the AOVs that the denoiser needs.
   bool denoise = false;
   std::vector<std::string> tags;
-  std::optional<FrameRange> frames;          // a sequence: one film per frame; absent: one image
+  // The frames of a sequence, which has one film per frame; nullopt: a single image
+  std::optional<FrameRange> frames;
   std::optional<std::uint32_t> max_workers;  // maximum number of workers at the same time
   std::optional<std::uint32_t> max_units;    // maximum number of leased units at the same time
-  // bytes that a worker must have; in any case at least the size of its files
+  // bytes of memory that a worker must have; a job always requires at least the size of its files
   std::optional<std::uint64_t> memory;
-  std::optional<Digest> reference;  // blob of the reference image, an EXR of the job's size
+  std::optional<Digest> reference;  // digest of the reference image, an EXR of the job's size
   bool operator==(const JobSpec&) const = default;
 };
 

@@ -1,5 +1,5 @@
 // All size limits of the worker protocol. Both sides check received data against them before allocating or
-// storing anything, and stay within them when sending.
+// storing anything, and obey them when sending.
 #pragma once
 
 #include <cstddef>
@@ -9,17 +9,17 @@
 
 namespace ls::limits {
 
-inline constexpr std::size_t kMessageBytes = 1 << 20;  // one gRPC message
+inline constexpr std::size_t kMessageBytes = 1 << 20;  // size of one gRPC message
 // Largest encoded partial (the pixel sums of one unit, which is one tile and one range of samples). With 6
 // floats per pixel this allows tiles of about 200 x 200 pixels; 32 KiB are left for the rest of the
 // UnitResult message.
 inline constexpr std::size_t kPartialBytes = kMessageBytes - (32 << 10);
 inline constexpr std::size_t kBlobChunkBytes = 256 << 10;
 
-inline constexpr std::size_t kIdBytes = 64;  // identifiers of jobs, leases and workers
-// names of workers, assets, tags and builds, and a worker's activity
+inline constexpr std::size_t kIdBytes = 64;  // length of the ids of jobs, leases and workers
+// length of the names of workers, assets, tags and builds, and of a worker's activity
 inline constexpr std::size_t kNameBytes = 128;
-inline constexpr std::size_t kTextBytes = 4096;  // reasons of failures, descriptions of problems
+inline constexpr std::size_t kTextBytes = 4096;  // length of reasons of failures and descriptions of problems
 inline constexpr std::size_t kTokenBytes = 512;
 inline constexpr std::size_t kSettingsBytes = 64 << 10;
 inline constexpr std::size_t kNeedsBytes = 16 << 10;
@@ -30,7 +30,7 @@ inline constexpr std::size_t kAssetsPerJob = 4096;
 inline constexpr std::size_t kTags = 64;
 inline constexpr std::size_t kBlobsHeld = 8192;
 inline constexpr int kThreads = 4096;
-// The most seconds that a worker may report for any duration, so that sums of durations stay finite.
+// Most seconds that a worker may report for any duration, so that sums of durations stay finite.
 inline constexpr double kSeconds = 1e12;
 
 inline constexpr int kFrameSide = kMaxFrameSide;  // pixels

@@ -1,6 +1,6 @@
-// Messages between coordinator and worker, as plain values. proto/farm.proto defines the same on the wire and
-// documents the exchange; `lightshaft render` passes these values inside one process. Conversions:
-// proto/convert.h.
+// Messages between coordinator and worker, as plain values. proto/farm.proto defines their form on the wire
+// and documents the exchange; `lightshaft render` passes these values inside one process. proto/convert.h
+// converts between the two.
 #pragma once
 
 #include <cstddef>
@@ -17,6 +17,8 @@
 #include "common/image/frame/frame.h"
 #include "common/image/frame/rounds.h"
 #include "common/job/settings.h"
+#include "common/job/techniques.h"
+#include "common/trace/context.h"
 
 namespace ls {
 
@@ -34,20 +36,20 @@ struct UnitKey {
 struct BlobRef {
   Digest digest;
   std::uint64_t bytes = 0;
-  std::string name;  // as the scene calls it; for messages only, never a path
+  std::string name;  // the scene's name for the file; for messages only, never a path
   bool operator==(const BlobRef&) const = default;
 };
 
-// Everything that a worker needs to know about a job. The coordinator sends it before the job's first lease
-// on a connection.
+// The data about a job that a worker needs. The coordinator sends them before the job's first lease on a
+// connection.
 struct JobBrief {
   JobId job;
-  Digest scene;  // blob: the canonical scene (common/scene/json/serialize.h)
+  Digest scene;  // digest of the blob with the canonical scene (common/scene/json/serialize.h)
   RenderSettings settings;
   Digest settings_digest;
-  std::vector<BlobRef> assets;  // only those that the scene uses
-  // What the scene needs of the renderer, according to the coordinator (common/scene/analysis/needs.h). The
-  // worker compares it with its own analysis. Empty: not sent.
+  std::vector<BlobRef> assets;  // assets that the scene uses
+  // The features that the scene needs of the renderer, according to the coordinator
+  // (common/scene/analysis/needs.h). The worker compares it with its own analysis. Empty: not sent.
   std::string needs;
   bool operator==(const JobBrief&) const = default;
 };
@@ -60,8 +62,8 @@ struct LeaseUnit {
   bool operator==(const LeaseUnit&) const = default;
 };
 
-// Units that the coordinator has assigned to one worker until a deadline. The worker renders and reports them
-// one by one, in order.
+// Units that the coordinator has assigned to one worker until a deadline. The worker renders them and reports
+// their results one by one, in order.
 struct Lease {
   LeaseId id;
   JobId job;
@@ -69,14 +71,16 @@ struct Lease {
   bool operator==(const Lease&) const = default;
 };
 
-// Seconds that a worker spent on a unit besides rendering it. Two of them concern the job's world (the scene
-// prepared for rendering) and are sent only with the first result rendered from it: `load` is the time to
-// fetch the job's files, `build` the wall time in which the loading thread read them and built the world.
+// Seconds that a worker spent on a unit besides rendering it. Two of them are about the job's world (the
+// scene prepared for rendering) and are sent only with the first result rendered from it: `load` is the time
+// to fetch the job's files, `build` the wall-clock time in which the loading thread read them and built the
+// world.
 struct UnitTimes {
   double load = 0, build = 0;
-  double transfer = 0;  // packing the result: encoding and digest
+  double transfer = 0;  // encoding the result and computing its digest
   double idle = 0;      // idle time of its thread since the last unit of the job
-  double wait = 0;      // time its thread waited for a core while rendering: wall seconds minus cpu_seconds
+  // Time its thread waited for a core while rendering: wall-clock seconds minus cpu_seconds
+  double wait = 0;
   bool operator==(const UnitTimes&) const = default;
 };
 
@@ -88,24 +92,28 @@ struct UnitResult {
   double cpu_seconds = 0;      // CPU time of the thread that rendered the unit
   Health health;
   UnitTimes times;
+  TechniqueSet techniques;  // of the world that it was rendered in; none: not known
+  // If its lease is traced: when the worker received the unit, by its clock in nanoseconds since 1970; 0: not
+  // told
+  std::uint64_t held_unix_ns = 0;
   bool operator==(const UnitResult&) const = default;
 };
 
-// A unit that could not be rendered. `scene_at_fault`: the world cannot be built from the scene (because of a
-// truncated grid, say), so the coordinator fails the job immediately: another worker cannot succeed either.
-// Otherwise only this unit failed (crash, hang, memory).
+// A unit that could not be rendered. `scene_at_fault`: the world cannot be built from the scene (for example
+// because a grid is truncated). The coordinator then fails the job immediately, since no other worker can
+// succeed. Otherwise only this unit failed (crash, hang, memory).
 struct UnitFailure {
   UnitKey unit;
   LeaseId lease;
   bool scene_at_fault = false;
-  std::string reason;                        // for a person
+  std::string reason;                        // text for the user
   std::optional<int> signal;                 // signal that ended the render child
-  std::optional<std::pair<int, int>> pixel;  // the pixel that was being rendered
+  std::optional<std::pair<int, int>> pixel;  // the pixel that was being rendered then
   std::optional<std::uint64_t> sample;
   bool operator==(const UnitFailure&) const = default;
 };
 
-// Messages from worker to coordinator, from here on.
+// Messages from worker to coordinator.
 struct WorkerHello {
   int protocol = kProtocolVersion;
   std::string name;
@@ -116,13 +124,13 @@ struct WorkerHello {
   std::vector<std::string> tags;
   std::vector<Digest> blobs_held;
   std::string join_token;
-  // Assigned by the coordinator in an earlier Welcome; empty for a new worker. A worker keeps its id over
-  // reconnects.
+  // Id that the coordinator assigned in an earlier Welcome; empty for a new worker. A worker keeps its id
+  // over reconnects.
   WorkerId previous_id;
-  bool fake = false;  // it does not render but generates fake pixels
+  bool fake = false;  // true if the worker generates fake pixels instead of rendering
   bool operator==(const WorkerHello&) const = default;
 };
-// Renews the deadlines of the named leases. The worker sends it about once a second while it has work.
+// Renews the deadlines of the given leases. The worker sends it about once a second while it has work.
 struct WorkerProgress {
   struct Entry {
     LeaseId lease;
@@ -130,19 +138,18 @@ struct WorkerProgress {
     bool operator==(const Entry&) const = default;
   };
   std::vector<Entry> leases;
-  std::string activity;  // "loading bath.vdb", "rendering", "idle": for the dashboard
+  std::string activity;  // text for the dashboard: "loading bath.vdb", "rendering", "idle"
   double cpu_seconds_total = 0;
   std::uint64_t rss_bytes = 0;
   double load_seconds = 0;  // duration of the last build of a world
   bool operator==(const WorkerProgress&) const = default;
 };
-// The worker asks for no more leases. It still delivers finished units, and returns the others by
-// LeaseReturned.
+// The worker wants no more leases. It still delivers finished units, and returns the others by LeaseReturned.
 struct WorkerDraining {
   bool operator==(const WorkerDraining&) const = default;
 };
-// Units of this lease that this worker has not rendered and will not render (because it drains, or was told
-// to cancel them).
+// Units of this lease that this worker has not rendered and will not render, because it drains, or because
+// they were cancelled.
 struct LeaseReturned {
   LeaseId lease;
   std::vector<UnitKey> unrendered;
@@ -151,15 +158,15 @@ struct LeaseReturned {
 using FromWorker =
     std::variant<WorkerHello, WorkerProgress, UnitResult, UnitFailure, LeaseReturned, WorkerDraining>;
 
-// Messages from coordinator to worker, from here on.
+// Messages from coordinator to worker.
 struct Welcome {
   WorkerId worker;
-  // A number that grows with every registration of this worker; the coordinator closes the connections of
-  // older ones.
+  // A number that grows with every registration of this worker; the coordinator closes the connections with
+  // smaller ones.
   std::uint64_t epoch = 0;
   bool operator==(const Welcome&) const = default;
 };
-struct Refused {  // after it the coordinator closes the connection
+struct Refused {  // after this message the coordinator closes the connection
   Error error;
   bool retry = false;
   bool operator==(const Refused&) const = default;
@@ -167,15 +174,18 @@ struct Refused {  // after it the coordinator closes the connection
 struct AssignLease {
   Lease lease;
   std::optional<JobBrief> brief;  // sent with a job's first lease on this connection
+  // The lease's span, below which the worker records its own; nullopt: the lease is not traced
+  std::optional<trace::SpanContext> trace = std::nullopt;
   bool operator==(const AssignLease&) const = default;
 };
-// The result is stored durably, or rejected with a reason: the worker removes it from its outbox.
+// The coordinator has stored the result durably, or rejected it with a reason. The worker removes the result
+// from its outbox.
 struct ResultAck {
   UnitKey unit;
   std::optional<Error> refused;
   bool operator==(const ResultAck&) const = default;
 };
-// The worker stops rendering the job's units immediately; results of the job are discarded.
+// The worker stops rendering the job's units immediately; results of the job are dropped.
 struct CancelJob {
   JobId job;
   bool operator==(const CancelJob&) const = default;

@@ -16,11 +16,11 @@ std::string escape_html(std::string_view text);
 std::string base64(std::span<const std::byte> bytes);  // RFC 4648, with padding
 std::string data_url(std::string_view media_type, std::span<const std::byte> bytes);
 
-// Returns a whole HTML document without scripts and external addresses. Its content security policy forbids
-// both: it permits only the styles given here (by digest), and images only as data URLs. `title` is text;
-// `css` and `body` are trusted markup.
+// Returns a whole HTML document. It has no scripts and no external addresses, and its content security policy
+// forbids both: the policy permits only the given styles (by digest), and images only as data URLs. `title`
+// is text; `css` and `body` are trusted markup.
 std::string document(std::string_view title, std::string_view css, std::string_view body);
-// Returns the same policy, for the header of an HTTP response.
+// Returns the content security policy of document(), for the header of an HTTP response.
 std::string document_policy(std::string_view css);
 
 }  // namespace ls::report

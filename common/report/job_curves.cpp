@@ -6,12 +6,13 @@
 #include "common/report/html.h"
 #include "common/report/job_sections.h"
 #include "common/report/log_plot.h"
+#include "common/report/phrases.h"
 #include "common/report/words.h"
 
 namespace ls::report {
 namespace {
 
-constexpr std::size_t kMostRows = 256;  // of the table; if there are more, the last ones
+constexpr std::size_t kMostRows = 256;  // most rows of the table; if there are more, the last ones are shown
 
 struct Clock {
   const char* key;
@@ -26,8 +27,8 @@ std::string range(const std::optional<std::pair<double, double>>& ci, std::strin
   return ci ? fmt::format("{} to {}", words(ci->first), words(ci->second)) : std::string();
 }
 
-// Returns the interval of the error at a checkpoint. Whether the figures of a single checkpoint can be
-// trusted is not stored: if those of the last one are in doubt (`doubt`), no interval is shown.
+// Returns the interval of the error at a checkpoint. It is not known for single checkpoints whether their
+// figures can be trusted: if those of the last one cannot (`doubt`), no interval is shown.
 std::optional<std::pair<double, double>> shown_interval(const Json& point, bool doubt) {
   return doubt ? std::nullopt : interval(point, "relmse_ci95");
 }
@@ -56,7 +57,7 @@ LogPlot plot_of(const Json& report, const std::vector<Json>& points, const Clock
   plot.y_title = "relMSE";
   const bool doubt = doubtful(report);
   Curve estimate{doubt ? "estimate, not to be trusted yet" : "estimate, with its 95 % interval", {}};
-  Curve reference_error{"against the reference", {}, true};
+  Curve reference_error{phrase("againstReference"), {}, true};
   for (const Json& p : points) {
     const double x = number(p, clock.key);
     const auto ci = shown_interval(p, doubt).value_or(std::pair(0.0, 0.0));
@@ -68,7 +69,8 @@ LogPlot plot_of(const Json& report, const std::vector<Json>& points, const Clock
   plot.curves.push_back(std::move(estimate));
   if (has_reference_error) plot.curves.push_back(std::move(reference_error));
   const Json& last = points.back();
-  if (const double target = number(report, "target_error"); target > 0) plot.target = target;
+  const double target = number(report, "target_error");
+  if (target > 0 && !denoised_target(report)) plot.target = target;
   plot.ahead = ahead_of(report, last, clock);
   plot.summary = fmt::format("{} points; the last: relMSE {} after {}", points.size(),
                              figure(number(last, "relmse")), duration(number(last, clock.key)));
@@ -113,16 +115,15 @@ std::string table(const std::vector<Json>& points, bool doubt) {
 std::string slope(const Json& report) {
   const double value = number(report, "slope");
   const bool doubt = doubtful(report);
-  const std::string verdict =
-      doubt ? "No intervals are shown: the estimate can&#39;t be trusted yet. " : verdict_words(report);
+  const std::string verdict = doubt ? escape_html(phrase("noIntervals")) + " " : verdict_words(report);
   if (!std::isfinite(value)) return verdict;
   const auto with_sign = [](double x) { return fmt::format("{}{:.2f}", x < 0 ? "−" : "", std::abs(x)); };
   std::string out = fmt::format("Slope <b>{}</b>", with_sign(value));
   const auto ci = interval(report, "slope_ci95");
-  if (ci && doubt) out += " (independent samples give −1)";
-  if (ci && !doubt)
-    out +=
-        fmt::format(" ({} to {}; independent samples give −1)", with_sign(ci->first), with_sign(ci->second));
+  if (ci)
+    out += fmt::format(" ({}{})",
+                       doubt ? "" : fmt::format("{} to {}; ", with_sign(ci->first), with_sign(ci->second)),
+                       phrase("independentSamples"));
   return out + ". " + verdict;
 }
 

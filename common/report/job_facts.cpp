@@ -44,7 +44,7 @@ std::string feature_list(const Json& report, bool used) {
                      used ? "" : " out", items);
 }
 
-// Lists the parts of the scene that affect no pixel, and were neither stored nor sent.
+// Lists the parts of the scene that affect no pixel, and were therefore not stored or sent.
 std::string pruned(const Json& report) {
   std::string items;
   for (const Json& one : objects(member(report, "analysis"), "left_out")) {
@@ -65,6 +65,13 @@ std::string row(const char* name, const std::string& value, bool code = false) {
 
 std::string whole(double n) { return std::isfinite(n) ? fmt::format("{:.0f}", n) : std::string(); }
 
+// The target error, and whose error it means if that is not the image's own.
+std::string target_of(const Json& report) {
+  const double target = number(report, "target_error");
+  if (!(target > 0)) return "";
+  return given(target) + (denoised_target(report) ? " of the denoised layers" : "");
+}
+
 // Describes the requested path limits and end conditions, those that were given.
 std::string asked(const Json& report) {
   const double depth = number(report, "max_depth"), spp = number(report, "spp_asked");
@@ -72,8 +79,7 @@ std::string asked(const Json& report) {
   return row("Maximum depth", depth == -1 ? "unlimited" : whole(depth)) +
          row("Russian roulette", roulette.empty() ? "" : "from depth " + roulette) +
          row("Samples asked", spp > 0 ? count(spp) + " per pixel" : "") +
-         row("Target relMSE", given(number(report, "target_error"))) +
-         row("Time asked", duration(number(report, "time_asked")));
+         row("Target relMSE", target_of(report)) + row("Time asked", duration(number(report, "time_asked")));
 }
 
 }  // namespace
@@ -109,6 +115,24 @@ std::string features(const Json& report) {
   if (used.empty() && out.empty() && pruned(report).empty()) return "";
   return section("What the scene needs, and what was left out",
                  pruned(report) + "<div class=\"features\">" + used + out + "</div>");
+}
+
+std::string techniques(const Json& report) {
+  std::string rows;
+  for (const Json& one : objects(report, "techniques")) {
+    const Json& off = member(one, "off");
+    rows += fmt::format(
+        "<tr><th scope=\"row\">{}</th><td>{}</td><td "
+        "class=\"why\"><code>{}=&quot;{}&quot;</code></td></tr>\n",
+        escape_html(text(one, "name")), escape_html(text(one, "what")), escape_html(text(off, "parameter")),
+        escape_html(text(off, "value")));
+  }
+  if (rows.empty()) return "";
+  return section("How it looked for light",
+                 "<div class=\"wide\"><table><caption class=\"unseen\">Techniques</caption><thead><tr><th "
+                 "scope=\"col\">Technique</th><th scope=\"col\">What it does</th><th scope=\"col\">Switched "
+                 "off by</th></tr></thead><tbody>\n" +
+                     rows + "</tbody></table></div>");
 }
 
 std::string provenance(const Json& report) {

@@ -6,23 +6,20 @@
 
 #include "common/report/html.h"
 #include "common/report/job_sections.h"
+#include "common/report/phrases.h"
 #include "common/report/words.h"
 
 namespace ls::report {
 namespace {
 
 struct Part {
-  const char* key;
-  const char* name;
+  const char* name;  // and the key in the report
   const char* meaning;
 };
 constexpr std::array kParts{
-    Part{"load", "load", "getting the files that the scene names"},
-    Part{"build", "build", "reading them and building the world"},
-    Part{"render", "render", "tracing"},
-    Part{"transfer", "transfer", "packing results to be sent"},
-    Part{"merge", "merge", "folding and measuring, in the coordinator"},
-    Part{"idle", "idle", "threads between two units of the job"},
+    Part{"load", phrase("timeLoad")},     Part{"build", phrase("timeBuild")},
+    Part{"render", phrase("timeRender")}, Part{"transfer", phrase("timeTransfer")},
+    Part{"merge", phrase("timeMerge")},   Part{"idle", phrase("timeIdle")},
 };
 
 std::string fact(const char* name, const std::string& value, const std::string& note,
@@ -33,16 +30,29 @@ std::string fact(const char* name, const std::string& value, const std::string& 
 }
 
 std::string within(const Json& report, const char* key) {
-  if (doubtful(report)) return "don&#39;t trust yet";
+  if (doubtful(report)) return escape_html(phrase("doubt"));
   const auto ci = interval(report, key);
   return ci ? fmt::format("95 %: {} to {}", figure(ci->first), figure(ci->second)) : std::string();
+}
+
+std::string denoised_figure(const Json& report, const std::string& note, const char* css_class = "") {
+  const Json& denoised = member(report, "denoised");
+  if (!denoised.is_object() || !denoised.contains("relmse")) return "";
+  const auto ci = interval(denoised, "relmse_ci95");
+  std::string notes = ci ? fmt::format("95 %: {} to {}", figure(ci->first), figure(ci->second)) : "";
+  if (!note.empty()) notes += (notes.empty() ? "" : "; ") + note;
+  return fact("relMSE, denoised", figure(number(denoised, "relmse")), notes, css_class);
 }
 
 std::string key_figures(const Json& report) {
   constexpr const char* kKey = " class=\"key\"";
   std::string out = fact("relMSE", figure(number(report, "relmse")), within(report, "relmse_ci95"), kKey);
-  if (const double target = number(report, "target_error"); target > 0 && !out.empty())
-    out.insert(out.rfind("</dd>"), fmt::format("<small>target {}</small>", given(target)));
+  const double target = number(report, "target_error");
+  const std::string note = target > 0 ? fmt::format("target {}", given(target)) : "";
+  if (denoised_target(report))
+    out += denoised_figure(report, note, kKey);
+  else if (!note.empty() && !out.empty())
+    out.insert(out.rfind("</dd>"), fmt::format("<small>{}</small>", note));
   out += fact("Samples per pixel", given(number(report, "spp")), "", kKey);
   out += fact("Render time", duration(number(report, "render_seconds")), "first ray to last fold", kKey);
   return out + fact("Core time", duration(number(report, "core_seconds")), "spent on rendering", kKey);
@@ -54,9 +64,9 @@ std::string true_figures(const Json& report) {
   const double relmse = nested ? number(reference, "relmse") : number(report, "true_relmse");
   const double rmse = nested ? number(reference, "rmse") : number(report, "true_rmse");
   const double noise = number(reference, "noise_relmse");
-  const std::string note = flag(reference, "same_seed", false) ? "not to be trusted: one seed"
+  const std::string note = flag(reference, "same_seed", false) ? phrase("oneSeed")
                            : noise > 0 ? fmt::format("the reference's own, {}, taken off", figure(noise))
-                                       : "against the reference";
+                                       : phrase("againstReference");
   return fact("True relMSE", true_figure(relmse, flag(reference, "below_noise", false)), note) +
          fact("True RMSE", true_figure(rmse, flag(reference, "rmse_below_noise", false)), "") +
          fact("FLIP", figure(number(reference, "flip")), "0: looks the same");
@@ -71,8 +81,7 @@ std::string threads_of(const Json& report) {
 std::string lesser_figures(const Json& report) {
   std::string out = fact("RMSE", figure(number(report, "rmse")), within(report, "rmse_ci95"));
   out += true_figures(report);
-  if (const Json& denoised = member(report, "denoised"); denoised.is_object() && denoised.contains("relmse"))
-    out += fact("relMSE, denoised", figure(number(denoised, "relmse")), within(denoised, "relmse_ci95"));
+  if (!denoised_target(report)) out += denoised_figure(report, "");
   out +=
       fact("Efficiency", figure(number(report, "efficiency")), "1 / (relMSE × seconds)" + threads_of(report));
   out += fact("Efficiency per core", figure(number(report, "efficiency_per_core")),
@@ -82,13 +91,14 @@ std::string lesser_figures(const Json& report) {
   return out + fact("Memory", byte_size(number(report, "peak_rss_bytes")), "at its peak");
 }
 
-// Draws stacked bars. Their widths are attributes, because the page's policy forbids style attributes.
+// Draws a stacked bar. Widths are attributes of SVG elements, because the page's policy forbids style
+// attributes.
 std::string bar(const Json& time, double total) {
   std::string out =
       R"(<svg class="bar" viewBox="0 0 1000 26" preserveAspectRatio="none" aria-hidden="true">)";
   double x = 0;
   for (std::size_t i = 0; i < kParts.size(); ++i) {
-    const double seconds = number(time, kParts[i].key);
+    const double seconds = number(time, kParts[i].name);
     if (!(seconds > 0)) continue;
     const double width = 1000 * seconds / total;
     fmt::format_to(std::back_inserter(out),
@@ -110,12 +120,12 @@ std::string time_split(const Json& report) {
   const Json& time = member(report, "time");
   double total = 0;
   for (const Part& part : kParts)
-    if (const double seconds = number(time, part.key); std::isfinite(seconds) && seconds > 0)
+    if (const double seconds = number(time, part.name); std::isfinite(seconds) && seconds > 0)
       total += seconds;
   if (!(total > 0) || !std::isfinite(total)) return "";
   std::string rows;
   for (std::size_t i = 0; i < kParts.size(); ++i) {
-    const double seconds = number(time, kParts[i].key);
+    const double seconds = number(time, kParts[i].name);
     if (!(seconds >= 0)) continue;
     rows += fmt::format(
         "<tr><th scope=\"row\"><svg class=\"swatch\" viewBox=\"0 0 10 10\" aria-hidden=\"true\"><rect "
@@ -125,9 +135,8 @@ std::string time_split(const Json& report) {
   }
   return section("Where the time went",
                  bar(time, total) +
-                     "<table class=\"split\"><caption>Seconds of threads: of <i>render</i> their CPU "
-                     "time, of the others by the clock.</caption><tbody>\n" +
-                     rows + "</tbody></table>");
+                     fmt::format("<table class=\"split\"><caption>{}</caption><tbody>\n{}</tbody></table>",
+                                 phrase("timeUnit"), rows));
 }
 
 }  // namespace ls::report

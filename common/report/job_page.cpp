@@ -9,6 +9,7 @@
 #include "common/report/html.h"
 #include "common/report/job_sections.h"
 #include "common/report/log_plot.h"
+#include "common/report/phrases.h"
 #include "common/report/words.h"
 
 namespace ls::report {
@@ -27,18 +28,15 @@ std::string name_of(const Json& report) {
   return "render";
 }
 
-std::string target_reached(const Json& report) {
-  return doubtful(report) ? "the target error is reached by its own estimate: don't trust yet"
-                          : "the target error is reached";
-}
-
 std::string how_it_ended(const Json& report) {
   const std::string state = text(report, "state"), stopped = text(report, "stopped");
-  const std::string why = stopped == "spp"     ? "all its samples are in"
-                          : stopped == "error" ? target_reached(report)
-                          : stopped == "time"  ? "its time was up"
-                          : stopped == "user"  ? "someone stopped it"
-                                               : "";
+  const std::string why = stopped == "spp"                                ? phrase("stoppedSpp")
+                          : stopped == "error" && denoised_target(report) ? phrase("stoppedErrorDenoised")
+                          : stopped == "error" && doubtful(report)        ? phrase("stoppedErrorInDoubt")
+                          : stopped == "error"                            ? phrase("stoppedError")
+                          : stopped == "time"                             ? phrase("stoppedTime")
+                          : stopped == "user"                             ? phrase("stoppedUser")
+                                                                          : "";
   if (state == "running") return "running: figures so far";
   return why.empty() ? state : (state.empty() ? "done" : state) + ": " + why;
 }
@@ -61,7 +59,7 @@ std::string picture(const std::vector<std::byte>& png, const std::string& alt) {
   return fmt::format("<img alt=\"{}\" src=\"{}\">", alt, data_url("image/png", png));
 }
 
-// The colour scale of the maps, in equal factors.
+// Draws the colour scale of the maps, divided in equal factors.
 std::string legend(const std::string& least, const std::string& most) {
   std::string out = R"(<svg class="ramp" viewBox="0 0 64 4" preserveAspectRatio="none" aria-hidden="true">)";
   for (int i = 0; i < 64; ++i) {
@@ -104,7 +102,8 @@ Result<std::string> job_page(const JobPage& page) {
     return fail(Errc::invalid_argument, "the report is no JSON object, so no page can be made of it");
   const std::string body = "<main>\n" + header(report) + failure(report) + pictures(page, report) +
                            figures(report) + verdict(report) + curves(report) + time_split(report) +
-                           health(report) + features(report) + provenance(report) + "</main>";
+                           health(report) + techniques(report) + features(report) + provenance(report) +
+                           "</main>";
   return document(name_of(report) + " · Lightshaft report", css(), body);
 }
 

@@ -2,22 +2,39 @@
 // has no data for it.
 #pragma once
 
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
-
-#include "common/report/report_json.h"
+#include <utility>
+#include <vector>
 
 namespace ls::report {
 
+// Fields of a report that another version of this program, or another program, may have written
+// (report_json.cpp). Each function returns the field's value, or a default if the field is missing.
+using Json = nlohmann::json;
+
+const Json& member(const Json& j, const char* key);  // null if missing
+double number(const Json& j, const char* key);       // NaN if missing
+std::string text(const Json& j, const char* key);    // empty if missing
+bool flag(const Json& j, const char* key, bool otherwise);
+std::optional<std::pair<double, double>> interval(const Json& j, const char* key);  // [lo, hi]
+std::vector<Json> objects(const Json& j, const char* key);       // the elements of a list that are objects
+std::vector<std::string> texts(const Json& j, const char* key);  // the elements of a list that are strings
+
 // Convergence status (job_verdict.cpp).
-bool doubtful(const Json& report);              // true if the error figures are not reliable yet
-std::string verdict(const Json& report);        // why they are not reliable, with further notes
-std::string verdict_words(const Json& report);  // a sentence for a report that is not doubtful; empty: none
+bool doubtful(const Json& report);        // true if the error figures are not reliable yet
+std::string verdict(const Json& report);  // why they are not reliable, with further notes
+// A sentence for a report that is not doubtful; empty: no sentence
+std::string verdict_words(const Json& report);
 std::string failure(const Json& report);
+bool denoised_target(const Json& report);  // true if its target error means its denoised layers
 
 // Error against time (job_curves.cpp).
 std::string curves(const Json& report);
-std::string outlook(const Json& report);  // a sentence on the cost of less error; empty: unknown
+std::string outlook(const Json& report);  // a sentence on the cost of a smaller error; empty: unknown
 
 // Figures (job_figures.cpp).
 std::string figures(const Json& report);
@@ -25,6 +42,7 @@ std::string time_split(const Json& report);
 
 // Facts about the job (job_facts.cpp).
 std::string health(const Json& report);
+std::string techniques(const Json& report);
 std::string features(const Json& report);
 std::string provenance(const Json& report);
 

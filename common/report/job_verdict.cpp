@@ -2,6 +2,7 @@
 
 #include "common/report/html.h"
 #include "common/report/job_sections.h"
+#include "common/report/phrases.h"
 #include "common/report/words.h"
 
 namespace ls::report {
@@ -20,10 +21,7 @@ std::string unreached(const Json& report) {
 }
 
 std::string one_seed(const Json& report) {
-  if (!flag(member(report, "reference"), "same_seed", false)) return "";
-  return "The reference shares this job&#39;s seed: its noise is the same noise, and the true figures say "
-         "nothing. "
-         "Render it with another --seed.";
+  return flag(member(report, "reference"), "same_seed", false) ? escape_html(phrase("sameSeed")) : "";
 }
 
 }  // namespace
@@ -32,6 +30,8 @@ bool doubtful(const Json& report) {
   const std::string kind = text(report, "verdict_kind");
   return !flag(report, "trusted", true) || kind == "heavy_tail" || kind == "bias_floor";
 }
+
+bool denoised_target(const Json& report) { return text(report, "target_layer") == "denoised"; }
 
 std::string verdict_words(const Json& report) {
   if (doubtful(report)) return "";
@@ -47,7 +47,7 @@ std::string verdict(const Json& report) {
   if (doubtful(report)) {
     const std::string words = text(report, "verdict");
     out += fmt::format("<p class=\"verdict\" role=\"note\">{}</p>",
-                       words.empty() ? "This error estimate can&#39;t be trusted yet." : escape_html(words));
+                       escape_html(words.empty() ? phrase("estimateInDoubt") : words));
   } else if (objects(report, "convergence").empty()) {  // otherwise it is shown below the curves
     out += paragraph("note", verdict_words(report));
   }
@@ -59,7 +59,7 @@ std::string failure(const Json& report) {
   const std::string why = text(report, "error");
   if (why.empty()) return "";
   return fmt::format("<div class=\"failure\" role=\"note\"><b>{}</b><pre>{}</pre></div>\n",
-                     text(report, "state") == "failed" ? "The job failed" : "Something is wrong",
+                     text(report, "state") == "failed" ? phrase("failed") : phrase("unwell"),
                      escape_html(why));
 }
 

@@ -11,12 +11,12 @@
 namespace ls::report {
 namespace {
 
-constexpr double kMargin = 0.06;  // share of the range added on either side
-constexpr double kShort = 2.2;    // decades; on a shorter axis 2 and 5 are labelled too
-constexpr double kFine = 4.5;     // decades; on a shorter axis 2 to 9 have lines
+constexpr double kMargin = 0.06;  // margin on either side, as a share of the range
+constexpr double kShort = 2.2;    // decades: a shorter axis also has labels at 2 and 5
+constexpr double kFine = 4.5;     // decades: a shorter axis has lines at 2 to 9
 constexpr std::size_t kMostLabels = 8;
-constexpr std::size_t kFewTimes = 4;  // labels of time below which those in between are added
-constexpr double kFarthest = 300;     // decades from 1: near the range of double
+constexpr std::size_t kFewTimes = 4;  // with fewer labels of time, intermediate times are added
+constexpr double kFarthest = 300;     // largest distance from 1 in decades: near the range of double
 constexpr double kMinute = 60, kHour = 3600, kDay = 86400;
 
 bool inside(const LogAxis& axis, double value) { return value >= axis.lo && value <= axis.hi; }
@@ -33,7 +33,7 @@ std::string time_label(double seconds) {
   return seconds < kDay ? fmt::format("{:g} h", seconds / kHour) : fmt::format("{:g} d", seconds / kDay);
 }
 
-// Returns the round times on the axis: if `coarse` only the main ones, otherwise also those in between.
+// Returns the round times on the axis: if `coarse` only the main ones, otherwise also the intermediate ones.
 std::vector<double> usual_times(const LogAxis& axis, bool coarse) {
   std::vector<double> all;
   const auto take = [&](double unit, std::initializer_list<double> steps) {
@@ -92,7 +92,8 @@ LogAxis log_axis(double lo, double hi, double from, double to) {
 }
 
 std::vector<Tick> ticks(const LogAxis& axis, AxisUnit unit) {
-  if (!(axis.lo > 0) || !(axis.hi < std::pow(10.0, kFarthest + 1))) return {};  // not made by log_axis()
+  // the axis was not made by log_axis()
+  if (!(axis.lo > 0) || !(axis.hi < std::pow(10.0, kFarthest + 1))) return {};
   return unit == AxisUnit::seconds ? time_ticks(axis) : plain_ticks(axis);
 }
 

@@ -8,6 +8,7 @@
 #include <iterator>
 
 #include "common/report/html.h"
+#include "common/report/phrases.h"
 #include "common/report/words.h"
 
 namespace ls::report {
@@ -15,12 +16,10 @@ namespace {
 
 constexpr double kWidth = 520, kLeft = 60, kRight = 504, kTop = 14;
 constexpr double kPlotHeight = 290, kBelow = 50, kLegendLine = 22;
-// half the width of the widest time label, which must stay within the drawing
+// half the width of the widest time label, which must fit into the drawing
 constexpr double kHalfLabel = 25;
 constexpr double kLetter = 7.4;         // mean width of a letter in the legend
 constexpr double kFarthestAhead = 100;  // multiple of the last x: a forecast beyond it is not drawn
-constexpr std::string_view kNothing =
-    "The first point appears when every tile has finished a round of samples.";
 
 using Out = std::back_insert_iterator<std::string>;
 
@@ -67,7 +66,7 @@ class Drawing {
       draw();
     else
       fmt::format_to(out(), R"(<text class="tick" x="{:g}" y="{:g}" text-anchor="middle">{}</text>)",
-                     kWidth / 2, height / 2, kNothing);
+                     kWidth / 2, height / 2, phrase("noPointYet"));
     return text_ + "</svg>";
   }
 
@@ -220,7 +219,7 @@ class Drawing {
     text_ += "</g>";
   }
 
-  // Draws a mark; the marks of different curves can be distinguished without colour.
+  // Draws a mark. Each curve has its own shape of marks, so that curves can be distinguished without colour.
   static std::string mark(std::size_t index, double x, double y) {
     switch (index % 4) {
       case 1:

@@ -1,4 +1,4 @@
-#include "common/report/report_json.h"
+#include "common/report/job_sections.h"
 
 namespace ls::report {
 

@@ -1,10 +1,12 @@
 #include "common/report/words.h"
 
-#include <fmt/format.h>
+#include <fmt/chrono.h>
 
 #include <array>
 #include <cmath>
 #include <ctime>
+
+#include "common/report/phrases.h"
 
 namespace ls::report {
 
@@ -19,7 +21,8 @@ std::string superscript(int n) {
 std::string figure(double x) {
   if (!std::isfinite(x)) return kAbsent;
   if (x == 0) return "0";
-  const std::string scientific = fmt::format("{:.2e}", x);  // rounded first: 9.996 has the exponent of 10.0
+  // Rounding comes first: 9.996 gets the exponent of 10.0
+  const std::string scientific = fmt::format("{:.2e}", x);
   const std::size_t e = scientific.find('e');
   const int exponent = std::stoi(scientific.substr(e + 1));
   if (exponent >= 5 || exponent < -3) return scientific.substr(0, e) + " × 10" + superscript(exponent);
@@ -28,9 +31,7 @@ std::string figure(double x) {
   return count(std::round(x / unit) * unit);
 }
 
-std::string true_figure(double x, bool below_noise) {
-  return below_noise ? "below the reference's noise" : figure(x);
-}
+std::string true_figure(double x, bool below_noise) { return below_noise ? phrase("belowNoise") : figure(x); }
 
 std::string given(double x) {
   return x != 0 && std::abs(x) < 1e-4 ? figure(x) : std::isfinite(x) ? fmt::format("{:g}", x) : kAbsent;
@@ -88,11 +89,7 @@ std::string percent(double part) {
 
 std::string date_time(double unix_seconds) {
   if (!(unix_seconds > 0 && unix_seconds < 1e11)) return kAbsent;
-  const auto time = static_cast<std::time_t>(unix_seconds);
-  std::tm t{};
-  gmtime_r(&time, &t);
-  return fmt::format("{:04}-{:02}-{:02} {:02}:{:02} UTC", 1900 + t.tm_year, t.tm_mon + 1, t.tm_mday,
-                     t.tm_hour, t.tm_min);
+  return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(static_cast<std::time_t>(unix_seconds)));
 }
 
 }  // namespace ls::report

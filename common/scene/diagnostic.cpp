@@ -28,11 +28,11 @@ std::string_view characters(std::string_view text, std::size_t first, std::size_
   return begin < end ? text.substr(begin, end - begin) : std::string_view{};
 }
 
-// Returns the line with a caret under the place; of a long line only the part around it.
+// Returns the line with a caret under the error's position. Only the relevant part of a long line is shown.
 std::string excerpt(const Diagnostic& d) {
   const std::size_t column = static_cast<std::size_t>(std::max(1, d.place.column)) - 1;
   const std::size_t first = column > scene::kMaxExcerptBytes / 2 ? column - scene::kMaxExcerptBytes / 2 : 0;
-  // plain_text() keeps columns, so the caret fits.
+  // plain_text() does not change columns, so the caret's position is right.
   const std::string line = plain_text(characters(d.source_line, first, first + scene::kMaxExcerptBytes));
   const std::string number = std::to_string(d.place.line);
   const std::size_t room = first + scene::kMaxExcerptBytes - column;

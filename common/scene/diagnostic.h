@@ -1,4 +1,4 @@
-// Errors and warnings about a scene, with their place.
+// Errors and warnings about a scene, with their place in the text.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@ namespace ls {
 
 struct SourcePlace {
   std::string file;
-  int line = 0, column = 0;  // from 1; 0: the file as a whole
+  int line = 0, column = 0;  // counted from 1; 0: the file as a whole
   bool operator==(const SourcePlace&) const = default;
 };
 
@@ -17,8 +17,8 @@ struct Diagnostic {
   Severity severity = Severity::error;
   SourcePlace place;
   std::string text;
-  std::string source_line;  // the line, for showing the caret; empty if there is none
-  int length = 1;           // of the underlined part
+  std::string source_line;  // the line of the error, shown with a caret; empty if there is none
+  int length = 1;           // length of the underlined part, in characters
   bool operator==(const Diagnostic&) const = default;
 };
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cstdlib>
 #include <fstream>
 #include <system_error>
 #include <vector>
@@ -14,9 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxNamesLookedAt = 4096;  // limit of files in a folder examined for a suggestion
+constexpr std::size_t kMaxNamesLookedAt = 4096;  // most files in a folder that are examined for a suggestion
 
-// "; did you mean 'cloud.vol'?" from the files beside the missing one.
+// Returns a suggestion like "; did you mean 'cloud.vol'?" from the files beside the missing one.
 std::string names_like(const fs::path& missing) {
   std::vector<std::string> names;
   std::error_code error;
@@ -32,10 +33,43 @@ std::string names_like(const fs::path& missing) {
 
 }  // namespace
 
+Result<std::shared_ptr<const KeptFolder>> KeptFolder::make() {
+  std::error_code error;
+  std::string path = (fs::temp_directory_path(error) / "lightshaft-scene-XXXXXX").string();
+  if (error || !::mkdtemp(path.data()))
+    return fail(
+        Errc::unavailable,
+        fmt::format("no temporary folder can be made in {}, for the meshes and grids in the scene's text",
+                    fs::path(path).parent_path().string()));
+  return std::shared_ptr<const KeptFolder>(new KeptFolder(path));
+}
+
+KeptFolder::~KeptFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+Result<Asset> FolderAssets::keep(std::string_view name, const std::string& bytes) {
+  if (!kept_) {
+    auto made = KeptFolder::make();
+    if (!made) return tl::unexpected<Error>(made.error());
+    kept_ = std::move(*made);
+  }
+  const fs::path path = kept_->path() / fs::path(name).filename();
+  std::ofstream out(path, std::ios::binary);
+  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  if (!out.flush()) return fail(Errc::unavailable, fmt::format("{} can't be written", path.string()));
+  const Asset asset{std::string(name), sha256(bytes), bytes.size()};
+  found_.insert_or_assign(asset.name, asset);
+  paths_.insert_or_assign(asset.name, path);
+  by_digest_.insert_or_assign(asset.digest, path);
+  return asset;
+}
+
 Result<fs::path> FolderAssets::locate(std::string_view name) const {
   if (name.empty() || name.find('\0') != std::string_view::npos)
     return fail(Errc::invalid_argument, "this is not the name of a file");
-  const fs::path path = folder_ / fs::path(name);  // an absolute name is used as it is
+  const fs::path path = folder_ / fs::path(name);  // an absolute name is used unchanged
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (status.type() == fs::file_type::not_found)

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -12,17 +13,34 @@
 
 namespace ls {
 
+// A temporary folder, which is removed when the last user of its files releases it.
+class KeptFolder {
+ public:
+  static Result<std::shared_ptr<const KeptFolder>> make();
+  ~KeptFolder();
+  KeptFolder(const KeptFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  explicit KeptFolder(std::filesystem::path path) : path_(std::move(path)) {}
+  std::filesystem::path path_;
+};
+
 class FolderAssets final : public AssetSource {
  public:
-  // `folder` is the one of the main scene file; empty: the working directory.
+  // `folder` is the folder of the main scene file; empty: the working directory.
   explicit FolderAssets(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  // Returns name, digest and size of a file; computes each file's digest only once. not_found: the file is
-  // missing; the error suggests similar names. invalid_argument: it exists but is not a regular file, or
-  // cannot be read.
+  // Returns name, digest and size of a file. The digest is computed only once per file. not_found: the file
+  // is missing; the error suggests similar names. invalid_argument: the file exists but is not a regular
+  // file, or cannot be read.
   Result<Asset> find(std::string_view name) override;
   Result<std::string> text(std::string_view name) override;
+  // Writes the file to a temporary folder. It replaces a file of that name in the scene's own folder.
+  Result<Asset> keep(std::string_view name, const std::string& bytes) override;
 
+  // Returns the folder of the files that keep() stored; null if there are none.
+  std::shared_ptr<const KeptFolder> kept() const { return kept_; }
   // Returns the path of a file that find() has found.
   std::optional<std::filesystem::path> path_of(std::string_view name) const;
   std::optional<std::filesystem::path> path_of(const Digest& digest) const;
@@ -31,6 +49,7 @@ class FolderAssets final : public AssetSource {
   Result<std::filesystem::path> locate(std::string_view name) const;
 
   std::filesystem::path folder_;
+  std::shared_ptr<const KeptFolder> kept_;
   std::map<std::string, Asset, std::less<>> found_;
   std::map<std::string, std::filesystem::path, std::less<>> paths_;
   std::map<Digest, std::filesystem::path> by_digest_;

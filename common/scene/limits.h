@@ -8,27 +8,52 @@
 
 namespace ls::scene {
 
-inline constexpr std::size_t kMaxTextBytes = std::size_t{32} << 20;       // one scene file
-inline constexpr std::size_t kMaxTotalTextBytes = std::size_t{64} << 20;  // including all included files
-inline constexpr std::size_t kMaxElements = 500'000;                      // including all included files
+inline constexpr std::size_t kMaxTextBytes = std::size_t{32} << 20;  // bytes of one scene file
+// Bytes of a scene file and all files that it includes
+inline constexpr std::size_t kMaxTotalTextBytes = std::size_t{64} << 20;
+// Elements of a scene file and all files that it includes
+inline constexpr std::size_t kMaxElements = 500'000;
 inline constexpr std::size_t kMaxAttributes = 2'000'000;
-inline constexpr std::size_t kMaxElementAttributes = 32;  // per element; at most 5 are meaningful
+// Attributes of one element; at most 5 are meaningful
+inline constexpr std::size_t kMaxElementAttributes = 32;
 inline constexpr int kMaxNesting = 64;
-inline constexpr int kMaxIncludeDepth = 15;  // as Mitsuba 3
+inline constexpr int kMaxIncludeDepth = 15;  // the same as in Mitsuba 3
 inline constexpr int kMaxIncludes = 256;
-inline constexpr std::size_t kMaxParameters = 4096;  // <default> and -D together
+inline constexpr std::size_t kMaxParameters = 4096;  // parameters by <default> and -D together
 inline constexpr std::size_t kMaxParameterNameBytes = 128;
-inline constexpr std::size_t kMaxValueBytes = std::size_t{64} << 10;  // one attribute after substitution
-inline constexpr std::size_t kMaxSubstitutedBytes = std::size_t{64} << 20;  // all attributes together
-inline constexpr std::size_t kMaxSearchPaths = 64;                          // <path>
-inline constexpr std::size_t kMaxObjectChildren = 4096;                     // per object of a Nori file
-inline constexpr int kMaxReferenceDepth = 64;  // objects within objects, including by reference
-inline constexpr int kMaxBsdfNesting = 8;      // nesting of bsdfs; nested blends may contain 2^7 of them
+// Bytes of one attribute after substitution
+inline constexpr std::size_t kMaxValueBytes = std::size_t{64} << 10;
+// Bytes of all attributes together
+inline constexpr std::size_t kMaxSubstitutedBytes = std::size_t{64} << 20;
+inline constexpr std::size_t kMaxSearchPaths = 64;  // number of <path> elements
+// Children of one object of a Nori file
+inline constexpr std::size_t kMaxObjectChildren = 4096;
+// Parameters of one object of a pbrt file
+inline constexpr std::size_t kMaxPbrtParameters = 64;
+// Quoted values of one parameter of a pbrt file
+inline constexpr std::size_t kMaxPbrtTexts = 256;
+inline constexpr std::size_t kMaxPbrtNesting = 256;       // depth of AttributeBegin in a pbrt file
+inline constexpr std::size_t kMaxGltfValues = 2'000'000;  // values of the JSON of a glTF file
+inline constexpr std::size_t kMaxGltfNodes = 256;         // depth of nodes in a glTF file
+// Elements of accessors of a glTF file without data of their own
+inline constexpr std::size_t kMaxGltfEmptyCount = 1 << 20;
+// Numbers that are read of a glTF file, those of an accessor as often as it is used
+inline constexpr std::size_t kMaxGltfNumbers = std::size_t{1} << 28;
+// Morph targets of a mesh of a glTF file, and numbers that its animations give one node at a time
+inline constexpr std::size_t kMaxGltfTargets = 4096;
+// Sets of joints and weights of a primitive of a glTF file, four joints a corner each
+inline constexpr std::size_t kMaxGltfJointSets = 8;
+// Bytes of all meshes of a glTF file, written as PLY
+inline constexpr std::size_t kMaxGltfMeshBytes = std::size_t{1} << 30;
+// Depth of objects within objects, including by reference
+inline constexpr int kMaxReferenceDepth = 64;
+// Depth of nested bsdfs; blends of this depth may contain 2^7 of them
+inline constexpr int kMaxBsdfNesting = 8;
 inline constexpr std::size_t kMaxDiagnostics = 20;
-inline constexpr std::size_t kMaxExcerptBytes = 160;  // longest part of a source line in a message
+inline constexpr std::size_t kMaxExcerptBytes = 160;  // bytes of a source line that a message shows
 inline constexpr std::size_t kMaxSceneJsonBytes = std::size_t{256} << 20;
 inline constexpr int kMaxJsonNesting = 16;
-// The most pairs of shapes that are compared to find out whether one lets light into the other.
+// Most pairs of shapes that are compared to find whether one lets light into the other.
 inline constexpr std::uint64_t kMaxEntrances = std::uint64_t{1} << 23;
 
 }  // namespace ls::scene

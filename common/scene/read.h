@@ -1,4 +1,4 @@
-// Reads scene text: returns a Scene, or up to kMaxDiagnostics diagnostics, each with a place.
+// Reads scene text. Returns a Scene, or up to kMaxDiagnostics diagnostics, each with its place in the text.
 #pragma once
 
 #include <cstdint>
@@ -15,28 +15,31 @@
 
 namespace ls {
 
-// Gives the reader access to the files that a scene names. Two implementations: a folder on disk (the command
-// line), and the assets of an upload (the coordinator, which never opens a path written in a scene).
+// Provides the files that a scene names. Implementations: a folder on disk (the command line), and the assets
+// of an upload (the coordinator, which never opens a path written in a scene).
 class AssetSource {
  public:
   virtual ~AssetSource() = default;
   // Returns digest and size of the file that the scene calls `name`.
   virtual Result<Asset> find(std::string_view name) = 0;
-  // Returns the text of an included scene file, of limited size.
+  // Returns the text of a scene file that another one includes; its size is limited.
   virtual Result<std::string> text(std::string_view name) = 0;
+  // Keeps a file that the reader has made of numbers in the scene's text; from then on find() returns it. If
+  // a source keeps no files, the sender of the scene must send this file, too, under the same name.
+  virtual Result<Asset> keep(std::string_view name, const std::string& bytes);
 };
 
 struct ReadOptions {
-  std::map<std::string, std::string> defines;  // $name -> value; unused ones cause a warning
+  std::map<std::string, std::string> defines;  // values of $name; unused ones cause a warning
   bool strict = false;                         // true: warnings are errors
   // The frame number, for sequences (jobs with several frames): it replaces each run of # in file names and
   // is the value of $frame.
   std::optional<std::uint32_t> frame = std::nullopt;
-  bool labels = false;  // fill Scene::shape_labels and instance_labels
+  bool labels = false;  // true: fill Scene::shape_labels and instance_labels
 };
 
 struct ReadResult {
-  std::optional<Scene> scene;  // nullopt if there is any error
+  std::optional<Scene> scene;  // nullopt if there are errors
   std::vector<Diagnostic> diagnostics;
 };
 

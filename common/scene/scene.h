@@ -1,7 +1,7 @@
-// The scene as plain data, the result of reading a scene file of any dialect. No pointers, no library types;
-// cross references are typed indices; every file is identified by digest. Semantics are Mitsuba 3's. Lengths
-// are in scene units, angles in degrees (as in the files), colours linear RGB. Equal Scenes have the same
-// canonical serialisation and so the same digest.
+// The scene as plain data, the result of reading a scene file of any format. It has no pointers and no
+// library types; objects refer to each other by typed indices; every file is identified by its digest.
+// Semantics are Mitsuba 3's. Lengths are in scene units, angles in degrees (as in the files), colours linear
+// RGB. Equal Scenes have the same canonical serialisation and so the same digest.
 #pragma once
 
 #include <array>
@@ -20,6 +20,7 @@ namespace ls {
 // Textures.
 enum class TextureFilter { nearest, bilinear };
 enum class Wrap { repeat, mirror, clamp };
+enum class Channel { all, red, green, blue, alpha };
 
 struct ConstantTexture {
   Rgb value{.5, .5, .5};
@@ -30,16 +31,19 @@ struct BitmapTexture {
   AssetIndex file;
   TextureFilter filter = TextureFilter::bilinear;
   Wrap wrap = Wrap::repeat;
-  bool raw = false;  // true: no sRGB decoding of 8- and 16-bit files
+  bool raw = false;  // true: 8- and 16-bit values are not decoded from sRGB
   UvTransform to_uv;
-  // For a texture that is an opacity. If true, the value is the image's alpha channel if that falls below 1/2
-  // somewhere, otherwise the image's colour.
+  // For a texture that is used as an opacity. If true, the value is the image's alpha channel if that falls
+  // below 1/2 somewhere, otherwise the image's colour.
   bool alpha = false;
+  // If it is one channel, the value is that number, without sRGB decoding; a channel that the image lacks
+  // is 1.
+  Channel channel = Channel::all;
   bool operator==(const BitmapTexture&) const = default;
 };
-// color0 where floor(2 u') + floor(2 v') is even after to_uv, with u', v' taken modulo 1 (Mitsuba's
-// `checkerboard`). Read as a scalar (roughness, opacity, weight of a blend, all of `principled` but its
-// colour) the two are swapped, as in Mitsuba 3.9.
+// A checkerboard: color0 where floor(2 u') + floor(2 v') is even after to_uv, with u', v' taken modulo 1
+// (Mitsuba's `checkerboard`). If it is read as a scalar (roughness, opacity, weight of a blend, all
+// parameters of `principled` except its colour) the two are swapped, as in Mitsuba 3.9.
 struct CheckerboardTexture {
   TextureIndex color0, color1;
   UvTransform to_uv;
@@ -60,14 +64,21 @@ struct MeshAttributeTexture {
   double scale = 1;
   bool operator==(const MeshAttributeTexture&) const = default;
 };
-using Texture =
-    std::variant<ConstantTexture, BitmapTexture, CheckerboardTexture, PeakTexture, MeshAttributeTexture>;
+// The product of two textures. With a threshold above 0 it is 1 where the product's luminance is at least the
+// threshold, else 0. This is an extension, used to express the factors and cut-outs of glTF.
+struct ProductTexture {
+  TextureIndex first, second;
+  double threshold = 0;
+  bool operator==(const ProductTexture&) const = default;
+};
+using Texture = std::variant<ConstantTexture, BitmapTexture, CheckerboardTexture, PeakTexture,
+                             MeshAttributeTexture, ProductTexture>;
 
 // Surfaces.
 enum class Microfacet { beckmann, ggx };
 // Rough surfaces with multiple_scattering include light that is scattered several times between microfacets,
-// which the plain model omits (docs/design/multiple-scattering.md). The roughness of such a surface must be
-// one constant.
+// which the plain model leaves out (docs/design/multiple-scattering.md). The roughness of such a surface must
+// be one constant.
 
 struct DiffuseBsdf {
   TextureIndex reflectance;
@@ -99,7 +110,8 @@ struct RoughDielectricBsdf {
   bool multiple_scattering = false;
   bool operator==(const RoughDielectricBsdf&) const = default;
 };
-struct ThinDielectricBsdf {  // both sides of a sheet in one surface: light passes without refraction
+// A thin sheet, both sides in one surface: light passes without changing its direction
+struct ThinDielectricBsdf {
   double int_ior = 1.5046, ext_ior = 1.000277;
   TextureIndex specular_reflectance, specular_transmittance;
   bool operator==(const ThinDielectricBsdf&) const = default;
@@ -119,7 +131,7 @@ struct RoughPlasticBsdf {
   bool multiple_scattering = false;
   bool operator==(const RoughPlasticBsdf&) const = default;
 };
-struct NullBsdf {  // index-matched boundary: light passes unchanged
+struct NullBsdf {  // an index-matched boundary: light passes unchanged
   bool operator==(const NullBsdf&) const = default;
 };
 struct TwoSidedBsdf {
@@ -127,19 +139,20 @@ struct TwoSidedBsdf {
   bool operator==(const TwoSidedBsdf&) const = default;
 };
 // Bsdfs that contain others nest at most scene::kMaxBsdfNesting deep.
-struct MaskBsdf {  // a share 1 - opacity of the light passes straight through
+struct MaskBsdf {  // the share 1 - opacity of the light passes straight through
   TextureIndex opacity;
   BsdfIndex bsdf;
   bool operator==(const MaskBsdf&) const = default;
 };
-struct BlendBsdf {  // (1 - weight) first + weight second
+struct BlendBsdf {  // the mixture (1 - weight) first + weight second
   TextureIndex weight;
   BsdfIndex first, second;
   bool operator==(const BlendBsdf&) const = default;
 };
-// Options of both kinds of map: flip_invalid_normals rotates a normal that faces away from the viewer by half
-// a turn about the surface's (Schuessler et al. 2017); use_shadowing_function darkens by the shadowing of
-// facets with the map's slope (Estevez, Lecocq, Stein 2019). With either, the BSDF is not reciprocal.
+// Options of normal and bump maps. flip_invalid_normals rotates a normal that faces away from the viewer by
+// half a turn about the surface's normal (Schuessler et al. 2017). use_shadowing_function darkens by the
+// shadowing of facets with the map's slope (Estevez, Lecocq, Stein 2019). With either, the BSDF is not
+// reciprocal.
 struct NormalMapBsdf {  // normal = 2 colour - 1 in the frame of u, v and the surface's normal
   TextureIndex normalmap;
   BsdfIndex bsdf;
@@ -155,7 +168,7 @@ struct BumpMapBsdf {
   bool flip_invalid_normals = true, use_shadowing_function = true;
   bool operator==(const BumpMapBsdf&) const = default;
 };
-// Burley's model, 2012 and 2015, as in Mitsuba 3.
+// Burley's model of 2012 and 2015, as in Mitsuba 3.
 struct PrincipledBsdf {
   TextureIndex base_color, roughness, anisotropic, metallic;
   std::optional<TextureIndex> spec_trans;  // nullopt: no light crosses the surface
@@ -170,7 +183,7 @@ using Bsdf = std::variant<DiffuseBsdf, ConductorBsdf, RoughConductorBsdf, Dielec
 // Volumes and media.
 //
 // A constant value. As a density it fills the unit cube [0,1]^3 of its local space, transformed by to_world;
-// for any other purpose it extends everywhere.
+// for any other purpose it fills all of space.
 struct ConstVolume {
   Rgb value{1, 1, 1};
   Transform to_world;
@@ -178,20 +191,21 @@ struct ConstVolume {
 };
 enum class VolumeFilter { nearest, trilinear };
 enum class GridOrder { x_fastest, z_fastest };
-// A grid in the unit cube [0,1]^3 of its local space, values at cell centres, transformed by to_world. With
-// use_grid_bbox the cube is first mapped to the file's own bounding box. VDB and NanoVDB grids are placed by
-// their own transform, raw `.bin` grids by their box with the outermost values on its faces (see
-// docs/reference/scene-format.md).
+// A grid with values at cell centres. It fills the unit cube [0,1]^3 of its local space, transformed by
+// to_world. With use_grid_bbox the cube is first mapped to the file's own bounding box. VDB and NanoVDB grids
+// are placed by their own transform, raw `.bin` grids by their box with the outermost values on its faces
+// (see docs/reference/scene-format.md).
 struct GridVolume {
   AssetIndex file;
-  std::string grid_name;  // for files with named grids; empty: the only grid, or "density"
+  std::string grid_name;  // name of the grid in a VDB file; empty: the only grid, or "density"
   VolumeFilter filter = VolumeFilter::trilinear;
   Wrap wrap = Wrap::clamp;
   bool use_grid_bbox = false;
-  bool node_centred = false;  // the outermost values are on the faces of the box (Mitsuba 0.x); not for VDB
+  // true: the outermost values are on the faces of the box (Mitsuba 0.x); not for VDB
+  bool node_centred = false;
   bool raw = true;
   Transform to_world;
-  GridOrder order = GridOrder::x_fastest;  // of the values in a `.bin`
+  GridOrder order = GridOrder::x_fastest;  // order of the values in a `.bin`
   bool operator==(const GridVolume&) const = default;
 };
 using Volume = std::variant<ConstVolume, GridVolume>;
@@ -213,8 +227,8 @@ struct HomogeneousMedium {
   double scale = 1;
   PhaseIndex phase;
   Rgb emission{0, 0, 0};         // radiance per scene unit, independent of extinction
-  Rgb source_radiance{0, 0, 0};  // radiance of an infinite depth of the medium without scattering
-  int priority = 0;              // of overlapping media, all those of the highest priority are in effect
+  Rgb source_radiance{0, 0, 0};  // radiance of an infinitely deep medium without scattering
+  int priority = 0;              // where media overlap, only those of the highest priority are in effect
   bool operator==(const HomogeneousMedium&) const = default;
 };
 // At most one of emission, source_radiance and temperature is set.
@@ -230,22 +244,23 @@ struct HeterogeneousMedium {
   std::optional<VolumeIndex> temperature;
   double emission_scale = 1;  // factor on the emission
   double temperature_scale = 1, temperature_offset = 0;
-  int priority = 0;  // of overlapping media, all those of the highest priority are in effect
+  int priority = 0;  // where media overlap, only those of the highest priority are in effect
   bool operator==(const HeterogeneousMedium&) const = default;
 };
 using Medium = std::variant<HomogeneousMedium, HeterogeneousMedium>;
 
 // Emitters without a shape.
-struct ConstantEmitter {  // radiance from all directions
+struct ConstantEmitter {  // the same radiance from all directions
   Rgb radiance{1, 1, 1};
   bool operator==(const ConstantEmitter&) const = default;
 };
-// Parallel light. `direction` is the direction in which the light travels, in the world; the irradiance is
+// Parallel light. `direction` is the direction in which the light travels, in world space; the irradiance is
 // that on a plane that faces the light.
 struct DirectionalEmitter {
   Vec3 direction{0, 0, 1};
   Rgb irradiance{1, 1, 1};
-  // Degrees: the light is a disk of this radius in the sky, of uniform radiance, with the same irradiance.
+  // In degrees. If it is not 0, the light is a disk of this angular radius in the sky, of uniform radiance,
+  // with the same irradiance.
   double angular_radius = 0;
   bool operator==(const DirectionalEmitter&) const = default;
 };
@@ -254,17 +269,18 @@ struct PointEmitter {
   Rgb intensity{1, 1, 1};  // W/sr
   bool operator==(const PointEmitter&) const = default;
 };
-struct SpotEmitter {  // at the origin of to_world, emitting along its +z
+struct SpotEmitter {  // a spot light at the origin of to_world, which emits along its +z axis
   Transform to_world;
   Rgb intensity{1, 1, 1};
-  double cutoff_angle = 20;             // degrees from the axis; dark beyond
-  double beam_width = 15;               // full intensity within; linear in the angle between the two
+  double cutoff_angle = 20;  // degrees from the axis; no light beyond this
+  // Full intensity within this angle; linear in the angle between the two
+  double beam_width = 15;
   std::optional<TextureIndex> texture;  // image by which the light is multiplied, projected as in Mitsuba
   bool operator==(const SpotEmitter&) const = default;
 };
-// Radiance from all directions: an image in latitude-longitude form. In its own space the top row is +y; on
-// the horizon the left edge is -z, a quarter further +x, the middle +z (Mitsuba 3). The first and last rows
-// are the poles; columns wrap around. to_world rotates and mirrors only.
+// Radiance from all directions, given by an image in latitude-longitude form. In its own space the top row is
+// +y; on the horizon the left edge is -z, a quarter further +x, the middle +z (Mitsuba 3). The first and last
+// rows are the poles; columns wrap around. to_world may only rotate and mirror.
 struct EnvmapEmitter {
   AssetIndex file;
   double scale = 1;
@@ -272,9 +288,9 @@ struct EnvmapEmitter {
   bool operator==(const EnvmapEmitter&) const = default;
 };
 
-// An inverse camera at the origin of to_world, which looks along its +z with +y up: it projects an image as a
-// camera with that field of view and the image's aspect ratio would see it. On the plane one scene unit
-// ahead, the irradiance is pi * scale times the image's value.
+// An inverse camera at the origin of to_world, which looks along its +z axis with +y up. It projects an image
+// in the way in which a camera with that field of view and the image's aspect ratio would see it. On the
+// plane one scene unit ahead, the irradiance is pi * scale times the image's value.
 struct ProjectorEmitter {
   TextureIndex irradiance;
   double scale = 1;
@@ -288,22 +304,31 @@ using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, 
 
 // Integrator.
 struct IntegratorSettings {
-  std::string name = "volpath";  // our name: "volpath", "volpath_distant_mis" or "path"
-  int max_depth = -1;            // longest path in segments; -1: no limit; 1: emission only; 2: direct light
+  // Our name: "volpath", "volpath_distant_mis", "path" or "whitted".
+  std::string name = "volpath";
+  int max_depth = -1;  // longest path in segments; -1: no limit; 1: emission only; 2: direct light
   int rr_depth = 5;
   bool hide_emitters = false;
-  DistanceSampling distance = DistanceSampling::mis;  // these two for "volpath_distant_mis" only
+  // Distance and heuristic are used by "volpath_distant_mis" only
+  DistanceSampling distance = DistanceSampling::mis;
   MisHeuristic heuristic = MisHeuristic::power;
-  // For "volpath" only. Points at which light is looked for on a camera segment through a medium; 0: as many
-  // as pay for the scene, perhaps none; -1: none.
+  // For "volpath" only: number of points on a camera segment through a medium that look for light. 0: a
+  // number that pays for the scene, which may be none; -1: none.
   int camera_points = 0;
-  bool phase_only = false;  // directions are never aimed at lamps
+  bool phase_only = false;  // true: directions are sampled by the phase function only, never towards lamps
+  // Connections of paths to points that a directional emitter lights. 0: only if they pay for the scene; -1:
+  // never; 1: always.
+  int light_vertices = 0;
+  // For "volpath" only: points near lamps on segments (without which nothing is aimed at lamps either), and
+  // flights that end near lamps; 0: if they pay for the scene; -1: never.
+  int equiangular = 0, lamp_flights = 0;
+  int light_tree = 0;  // -1: lights are chosen by their power alone
   bool operator==(const IntegratorSettings&) const = default;
 };
 
-// Names of a shape or an instance, and of its material; for Cryptomatte names only.
+// Names of a shape or an instance, and of its material; used for Cryptomatte only.
 struct Label {
-  std::string name, material;  // material: empty for instances
+  std::string name, material;  // `material` is empty for instances
   bool operator==(const Label&) const = default;
 };
 
@@ -322,7 +347,8 @@ struct Scene {
   std::uint64_t sample_count = 4;
   std::vector<ShapeGroup> groups;
   std::vector<Instance> instances;
-  std::string aovs;  // AOVs that the scene requests: names of common/image/aov/aov.h, separated by commas
+  // Names of the AOVs that the scene requests (common/image/aov/aov.h), separated by commas
+  std::string aovs;
   // The labels of all shapes and of all instances, by index; empty unless requested (ReadOptions::labels).
   std::vector<Label> shape_labels, instance_labels;
   bool operator==(const Scene&) const = default;

@@ -14,7 +14,7 @@ struct RectangleShape {  // [-1,1]^2 in z = 0, normal +z, uv = (x+1)/2, (y+1)/2
 struct CubeShape {  // [-1,1]^3, normals outwards, uv per face
   bool operator==(const CubeShape&) const = default;
 };
-struct SphereShape {  // center and radius apply before to_world
+struct SphereShape {  // center and radius apply before to_world does
   Vec3 center{0, 0, 0};
   double radius = 1;
   bool operator==(const SphereShape&) const = default;
@@ -22,7 +22,8 @@ struct SphereShape {  // center and radius apply before to_world
 struct DiskShape {  // unit disk in z = 0, normal +z
   bool operator==(const DiskShape&) const = default;
 };
-struct CylinderShape {  // without caps: about the line from p0 to p1; normals outwards, also when mirrored
+// A cylinder without caps about the line from p0 to p1; normals point outwards, also if mirrored
+struct CylinderShape {
   Vec3 p0{0, 0, 0}, p1{0, 0, 1};
   double radius = 1;
   bool operator==(const CylinderShape&) const = default;
@@ -32,15 +33,17 @@ struct MeshShape {
   AssetIndex file;
   MeshFormat format = MeshFormat::obj;
   bool face_normals = false;
+  bool flat_without_normals = false;  // false: smooth normals are computed if the file has none
   bool flip_tex_coords = false;
-  int shape_index = 0;  // which mesh of a `serialized` file
+  int shape_index = 0;  // index of the mesh in a `serialized` file
   bool operator==(const MeshShape&) const = default;
 };
 using Geometry = std::variant<RectangleShape, CubeShape, SphereShape, DiskShape, MeshShape, CylinderShape>;
 
-// Light from a shape's surface, emitted on the side of the normal only. At an angle a from the normal, in
-// degrees, the radiance is the full one for a within beam_width, none beyond cutoff_angle, and in between the
-// full one times s^falloff with s = (cos a - cos cutoff_angle) / (cos beam_width - cos cutoff_angle).
+// Light from a shape's surface, emitted on the side of the normal only. It is a beam if beam_width is set. At
+// an angle a from the normal, in degrees, the radiance is then the full one for a within beam_width and zero
+// beyond cutoff_angle; in between it is the full one times s^falloff with s = (cos a - cos cutoff_angle) /
+// (cos beam_width - cos cutoff_angle).
 struct AreaEmitter {
   TextureIndex radiance;
   double cutoff_angle = 90, beam_width = 90, falloff = 1;
@@ -53,18 +56,18 @@ struct Shape {
   bool flip_normals = false;
   BsdfIndex bsdf;
   std::optional<AreaEmitter> emitter;
-  std::optional<MediumIndex> interior, exterior;  // interior: the side the normal points away from
-  bool is_medium_transition = false;              // interior or exterior was given
+  std::optional<MediumIndex> interior, exterior;  // interior: the side that the normal points away from
+  bool is_medium_transition = false;              // true if the file gives an interior or exterior
   // If set, the shape is visible only through instances of this group, and to_world places it within the
   // group. The shapes of a group are contiguous in the scene's list, and groups are in the order of their
   // indices. None of these shapes emits light.
   std::optional<GroupIndex> group;
   bool operator==(const Shape&) const = default;
 };
-struct ShapeGroup {  // its shapes refer to it
+struct ShapeGroup {  // a group of shapes, which refer to it by its index
   bool operator==(const ShapeGroup&) const = default;
 };
-struct Instance {  // another copy of a group's shapes
+struct Instance {  // a copy of a group's shapes, placed in the world
   GroupIndex group;
   Transform to_world;
   bool operator==(const Instance&) const = default;

@@ -11,7 +11,8 @@ namespace ls {
 
 using Rgb = std::array<double, 3>;
 inline bool all_zero(const Rgb& c) { return c == Rgb{0, 0, 0}; }
-// A point or direction. A separate type from colours, as files write the two differently.
+// A point or direction. A type of its own, different from Rgb, because files write points and colours
+// differently.
 struct Vec3 : std::array<double, 3> {};
 
 // A row-major 4 x 4 matrix for column vectors: p' = M p. It is the identity by default.
@@ -38,7 +39,7 @@ using PhaseIndex = Index<struct PhaseTag>;
 using MediumIndex = Index<struct MediumTag>;
 using GroupIndex = Index<struct GroupTag>;
 
-// A file that the scene names. `name` is as written in the scene, for messages; the digest identifies the
+// A file that the scene uses. `name` is as written in the scene, for messages; the digest identifies the
 // bytes.
 struct Asset {
   std::string name;

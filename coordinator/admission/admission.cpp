@@ -6,24 +6,69 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "common/job/limits.h"
 #include "common/job/replay_command.h"
 #include "common/protocol/limits.h"
+#include "common/scene/analysis/needs.h"
+#include "common/scene/analysis/prune.h"
 #include "common/scene/json/serialize.h"
 #include "common/scene/schema/integrators.h"
 #include "common/scene/schema/nori_words.h"
-#include "coordinator/admission/analysis.h"
 #include "coordinator/admission/cryptomatte_manifests.h"
 #include "coordinator/admission/scene_admission.h"
 #include "coordinator/base/limits.h"
+#include "coordinator/store/jobs/job_store.h"
 
 namespace ls::coordinator {
 namespace {
 
+// Most pruned items that are listed: further ones would hardly add information, and records stay small
+constexpr std::size_t kMostListed = 64;
+
+// Returns the total bytes of the files that only this part of the renderer reads.
+std::uint64_t bytes_of_files(const scene::Needs& needs, const std::string& part) {
+  static const std::map<std::string, std::string> kReads = {{"meshes", "mesh"},
+                                                            {"bitmap textures", "texture"},
+                                                            {"environment map", "environment map"},
+                                                            {"volume grids", "grid"}};
+  const auto reads = kReads.find(part);
+  if (reads == kReads.end()) return 0;
+  std::uint64_t sum = 0;
+  for (const scene::FileNeed& f : needs.files) {
+    const auto used_so = [&](const std::string& use) { return use.starts_with(reads->second); };
+    if (std::any_of(f.uses.begin(), f.uses.end(), used_so)) sum += f.bytes;
+  }
+  return sum;
+}
+
+// Sets needs, features and analysis of `job`: what the scene needs, and which of its parts are left out of
+// the rendering, for workers and as text for users. `pruned` is the part of the scene that the job's
+// integrator uses.
+void note_analysis(const scene::Pruned& pruned, const RenderSettings& settings, StoredJob& job) {
+  using nlohmann::json;
+  const scene::Needs needs = scene::needs_of(pruned.scene, scene::sees_media(settings.integrator));
+  job.needs = canonical_json(needs);
+  json parts = json::array(), left_out = json::array();
+  for (const scene::Need& part : in_words(needs)) {
+    (part.used ? job.features_used : job.features_left_out).push_back(part.part);
+    parts.push_back({{"part", part.part},
+                     {"used", part.used},
+                     {"why", part.why},
+                     {"bytes", bytes_of_files(needs, part.part)}});
+  }
+  for (const scene::LeftOut& x : pruned.left_out) {
+    if (left_out.size() == kMostListed) break;
+    left_out.push_back({{"what", x.what}, {"why", x.why}, {"count", x.count}, {"bytes", x.bytes}});
+  }
+  job.analysis = json{{"parts", std::move(parts)}, {"left_out", std::move(left_out)}}.dump(
+      -1, ' ', false, json::error_handler_t::replace);
+}
+
 Error invalid(std::string text) { return {Errc::invalid_argument, std::move(text)}; }
 
-// Sets the integrator. What the job asks for takes precedence over what the scene names.
+// Sets the integrator. The job's choice takes precedence over the scene's.
 Result<void> choose_integrator(const Scene& scene, const JobSpec& spec, RenderSettings& settings,
                                std::vector<std::string>& warnings) {
   const std::string asked = spec.integrator.value_or(scene.integrator.name);
@@ -36,9 +81,10 @@ Result<void> choose_integrator(const Scene& scene, const JobSpec& spec, RenderSe
         invalid(fmt::format("there is no integrator \"{}\"; there are {}", asked, fmt::join(names, ", "))));
   }
   const std::string_view ours = known ? known->ours : nori->ours;
-  if (ours == "path" && !scene.media.empty())
-    warnings.push_back("the integrator `path` renders without media: the scene's " +
-                       std::to_string(scene.media.size()) + " media are left out");
+  if (!scene::sees_media(ours) && !scene.media.empty())
+    warnings.push_back(
+        fmt::format("the integrator `{}` renders without media: the scene's {} media are left out", ours,
+                    scene.media.size()));
   settings.integrator = ours;
   settings.max_depth = (known ? known->max_depth : nori->max_depth).value_or(scene.integrator.max_depth);
   settings.rr_depth = scene.integrator.rr_depth;
@@ -59,6 +105,9 @@ Result<void> check_size(FrameSize size) {
 Result<void> check_spec(const JobSpec& spec) {
   if (spec.target_error && !(std::isfinite(*spec.target_error) && *spec.target_error > 0))
     return tl::unexpected(invalid("target_error must be positive"));
+  if (spec.target_layer == TargetLayer::denoised && !spec.target_error)
+    return tl::unexpected(
+        invalid("target_layer says which error target_error means, and there is no target_error: give one"));
   if (spec.time && !(std::isfinite(*spec.time) && *spec.time > 0 && *spec.time <= limits::kMaxTimeSeconds))
     return tl::unexpected(
         invalid(fmt::format("time must be between 0 and {} seconds", limits::kMaxTimeSeconds)));
@@ -102,7 +151,7 @@ Rejected rejected(Error error, std::vector<Diagnostic> diagnostics = {}) {
   return {std::move(error), std::move(diagnostics)};
 }
 
-// Returns the part of the scene that the job's integrator uses, or an error if a file of that part is not in
+// Returns the part of the scene that the job's integrator uses, or an error if a file of this part is not in
 // the store.
 tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, const BlobStore& blobs,
                                                   std::optional<std::uint32_t> frame,
@@ -111,7 +160,7 @@ tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, 
   scene::Pruned pruned = scene::pruned(read.scene, whom);
   const auto missing = [&](const Asset& a) { return read.not_uploaded.contains(a.digest); };
   if (std::none_of(pruned.scene.assets.begin(), pruned.scene.assets.end(), missing)) return pruned;
-  // A strict second reading gives the places in the scene that name the missing file
+  // Reading a second time, strictly, gives errors with the places in the scene that name the missing file
   const auto again = read_uploaded(request, blobs, frame, true);
   if (!again) return tl::unexpected(again.error());
   return scene::pruned(again->scene, whom);  // the file has arrived since the first reading
@@ -150,7 +199,7 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
     if (!right) return refuse(right.error());
     origin = std::move(right->origin);
   }
-  if (!wants_labels(job.settings)) {  // without labels, names are not part of the scene
+  if (!wants_labels(job.settings)) {  // unless there are cryptomattes, names are not part of the scene
     read->scene.shape_labels.clear();
     read->scene.instance_labels.clear();
   }
@@ -190,8 +239,8 @@ Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const Blob
         Errc::failed_precondition,
         fmt::format("the reference's blob {0} is not here: PUT /api/v1/blobs/{0} first", digest.hex()));
   ExrLimits limits;
-  // Limits the picture to the pixels that a reference of the right size needs, but not below 2^22, so that a
-  // slightly wrong size can be reported as such.
+  // The picture may have as many pixels as a reference of the right size. The limit is at least 2^22, so that
+  // a slightly wrong size is reported as a wrong size and not as too large.
   limits.max_pixels = std::max<std::uint64_t>(
       static_cast<std::uint64_t>(size.width) * static_cast<std::uint64_t>(size.height),
       std::uint64_t{1} << 22);
@@ -210,8 +259,8 @@ std::string replay_of(const StoredJob& job) {
   return replay_command(job.name, job.spec, frame ? std::optional(frame->frame) : std::nullopt);
 }
 
-// A world (the scene as a worker loads it) takes at least as much memory as its files; the user may ask for
-// workers that have more.
+// A world (the scene as loaded by a worker) takes at least as much memory as its files; the user may request
+// workers with more memory.
 std::uint64_t memory_need(const StoredJob& job) {
   std::uint64_t files = 0;
   for (const BlobRef& file : job.assets) files += file.bytes;
@@ -224,6 +273,7 @@ JobPlan plan_of(const StoredJob& job) {
   plan.grid = {job.settings.size, job.settings.tile};
   plan.spp = job.spp;
   plan.target_error = job.spec.target_error;
+  plan.target_denoised = job.spec.target_layer == TargetLayer::denoised;
   plan.time = job.spec.time;
   plan.priority = job.spec.priority;
   plan.tags = job.spec.tags;
@@ -233,6 +283,7 @@ JobPlan plan_of(const StoredJob& job) {
   plan.max_workers = job.spec.max_workers.value_or(0);
   plan.max_units = job.spec.max_units.value_or(0);
   plan.memory_bytes = memory_need(job);
+  plan.focus = job.focus;
   return plan;
 }
 

@@ -9,7 +9,7 @@
 #include "coordinator/domain/farm/farm.h"
 #include "coordinator/store/blobs/blob_store.h"
 #include "coordinator/store/jobs/job_store.h"
-#include "coordinator/views/submit_request.h"
+#include "coordinator/views/job_view.h"
 
 namespace ls::coordinator {
 
@@ -19,7 +19,7 @@ struct Admission {
   std::size_t text_bytes = 0;  // bytes of all scene files that were read
 };
 
-// Reads the scene with the request's assets as its only files, so a scene can never reach a path on this
+// Reads the scene with the request's assets as its only files, so a scene can never read a path on this
 // machine. Only assets that the scene uses become part of the job; each must be in `blobs`. Stores nothing.
 // `frame` is the number of a frame of a sequence (a job with frames). The scene is then read for this frame,
 // and its seed is the job's plus this number: frames have independent noise, and a frame rendered alone has
@@ -31,17 +31,22 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
 tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitRequest& request,
                                                               const BlobStore& blobs);
 
-// Reads the reference image that the job asks for, for an image of this size. Errors: failed_precondition if
-// its blob is missing, invalid_argument if it is not a suitable picture.
+// Returns a job with the scene, settings and files of `before`, without id, owner and time. If `changes` has
+// any of spp, target_error and time, it replaces all three; its seed and priority also apply, and its other
+// members are ignored. failed_precondition: a file of the scene is gone.
+Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, const BlobStore& blobs);
+
+// Reads the job's reference image, for an image of this size. Errors: failed_precondition if its blob is
+// missing, invalid_argument if it is not a suitable picture.
 Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const BlobStore& blobs);
 
 // Returns the command that renders one of the job's samples again: common/job/replay_command.h.
 std::string replay_of(const StoredJob& job);
 
-// Returns how many bytes of memory a worker needs at least for the job.
+// Returns the least memory, in bytes, that a worker needs for the job.
 std::uint64_t memory_need(const StoredJob& job);
 
-// Returns what the farm needs to know of the stored job.
+// Returns the settings of the stored job that the farm uses.
 JobPlan plan_of(const StoredJob& job);
 
 }  // namespace ls::coordinator

@@ -1,15 +1,30 @@
-// A Cryptomatte manifest lists the names of objects that an image's cryptomattes refer to by identifiers.
+// A Cryptomatte manifest maps the identifiers in an image's cryptomattes to the names of objects.
 #pragma once
 
+#include "common/image/aov/cryptomatte.h"
 #include "common/image/exr/aov_layers.h"
 #include "common/job/settings.h"
 #include "common/scene/scene.h"
 
 namespace ls::coordinator {
 
-// True if the settings ask for cryptomattes, so that the scene must be read with labels.
-bool wants_labels(const RenderSettings& settings);
+// True if the settings include cryptomattes, so that the scene must be read with labels.
+inline bool wants_labels(const RenderSettings& settings) {
+  return aovs_of(settings).any_of(aovs_of(AovKind::ids));
+}
 
-CryptomatteManifests manifests_of(const Scene& scene, AovSet aovs);
+inline CryptomatteManifests manifests_of(const Scene& scene, AovSet aovs) {
+  CryptomatteManifests out;
+  std::vector<std::string> shapes, materials;
+  for (std::size_t i = 0; i < scene.shape_labels.size(); ++i) {
+    // A shape that belongs to a group is not listed: in the image it appears as an instance of the group.
+    if (!scene.shapes[i].group) shapes.push_back(scene.shape_labels[i].name);
+    materials.push_back(scene.shape_labels[i].material);
+  }
+  for (const Label& l : scene.instance_labels) shapes.push_back(l.name);
+  if (aovs.has(Aov::shape_id)) out.shapes = cryptomatte_manifest(std::move(shapes));
+  if (aovs.has(Aov::material_id)) out.materials = cryptomatte_manifest(std::move(materials));
+  return out;
+}
 
 }  // namespace ls::coordinator

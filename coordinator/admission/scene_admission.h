@@ -9,7 +9,7 @@
 
 #include "common/scene/read.h"
 #include "coordinator/store/blobs/blob_store.h"
-#include "coordinator/views/submit_request.h"
+#include "coordinator/views/job_view.h"
 
 namespace ls::coordinator {
 

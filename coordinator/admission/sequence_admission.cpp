@@ -13,12 +13,12 @@ namespace {
 
 constexpr std::uint32_t kMostBadFrames = 64;  // reading stops after this many frames with errors
 
-// Checks the limits on all frames together.
+// Checks the limits that apply to all frames together.
 class Budget {
  public:
   explicit Budget(std::uint32_t frames) : frames_(frames) {}
 
-  // scene() is to be called before the scene's text is read, and frame() for every frame.
+  // Call scene() before the scene's text is read, and frame() for every frame.
   Result<void> scene(std::size_t bytes) const {
     if (bytes <= limits::kMaxSequenceText / frames_) return {};
     return too_much("bytes of scene text", limits::kMaxSequenceText);
@@ -50,7 +50,7 @@ tl::unexpected<Rejected> refused(Error error, std::vector<Diagnostic> found = {}
   return tl::unexpected(Rejected{std::move(error), std::move(found)});
 }
 
-// Drops the warnings of each frame that an earlier frame has, too.
+// Drops warnings that an earlier frame has, too.
 void merge_warnings(std::vector<Admission>& frames) {
   std::set<std::string> reported;
   for (Admission& f : frames)

@@ -8,17 +8,64 @@
 #include <cstddef>
 #include <map>
 #include <optional>
+#include <span>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "common/base/clock.h"
 #include "common/image/film/film.h"
-#include "coordinator/assemble/health_table.h"
+#include "common/image/film/health.h"
+#include "common/image/frame/frame.h"
+#include "common/image/frame/rounds.h"
 #include "coordinator/assemble/round_errors.h"
-#include "coordinator/assemble/unit_costs.h"
 #include "coordinator/store/log/partial_log.h"
 
 namespace ls::coordinator {
+
+// Numeric health (counts of invalid values) of a job's folded units; a unit is one round (range of samples)
+// of one tile. It depends only on the units in the film (the image): a unit that was rendered twice counts
+// once, and one that is not folded does not count.
+class HealthTable {
+ public:
+  // Adds the health of a folded unit. The health of a truncated round is kept separately: if the round is
+  // folded again with more samples, its new health replaces the old one, as its pixels do.
+  void folded(TileIndex tile, RoundIndex round, const SampleRange& samples, const Health& health);
+  void discard(TileIndex tile);  // removes the tile's health, since the tile is folded again from round 0
+  Health total() const;
+
+  std::string save() const;
+  std::string save_tile(TileIndex tile) const;  // load() accepts the texts of all tiles one after the other
+  static std::optional<HealthTable> load(std::string_view text);  // nullopt: the text is damaged
+  bool operator==(const HealthTable&) const = default;
+
+ private:
+  // Health of full rounds and of truncated last rounds; only of tiles with problems
+  std::map<TileIndex, Health> full_, tails_;
+};
+
+// The CPU cost of an image's units; a unit is one round (range of samples) of one tile. A checkpoint costs
+// what its units cost, even if some tiles already have later rounds.
+class UnitCosts {
+ public:
+  explicit UnitCosts(TileIndex tiles = 0) : tiles_(tiles) {}
+
+  // Adds the core seconds of an accepted unit. A unit that is rendered again, for example because its round
+  // was truncated, adds its cost each time.
+  void add(TileIndex tile, RoundIndex round, double core_seconds);
+  // Returns the core seconds of the units in the first `rounds[tile]` rounds of each tile. Units that an
+  // earlier call included stay included, so the result never decreases.
+  double until(std::span<const RoundIndex> rounds);
+
+ private:
+  struct Tile {
+    RoundIndex summed = 0;     // number of rounds included in sum_
+    std::vector<float> ahead;  // core seconds of the rounds from `summed` on
+  };
+  std::vector<Tile> tiles_;
+  double sum_ = 0;
+};
 
 // An accepted partial that is not folded yet. If `partial` is empty, its pixels are read from `place` in the
 // log.
@@ -28,7 +75,7 @@ struct WaitingPartial {
   SampleRange samples;
   Digest digest;
   Health health;
-  TimePoint arrived{};  // zero: it arrived before this start of the coordinator
+  TimePoint arrived{};  // zero if it arrived before this start of the coordinator
 };
 
 // Counts the bytes of the pixels of one job's waiting partials. all() is the sum over all jobs of the
@@ -67,7 +114,7 @@ class Assembly {
   std::optional<WaitingPartial> take(TileIndex tile, RoundIndex round, SampleRange samples);
   void forget_round(RoundIndex round);  // drops waiting partials of a truncated round that was reopened
   void forget_waiting();
-  void discard(TileIndex tile);  // drops all of the tile: it is folded again from round 0
+  void discard(TileIndex tile);  // drops everything about the tile, since it is folded again from round 0
   std::size_t waiting() const { return waiting_.size(); }
   bool holds(TileIndex tile, RoundIndex round) const { return waiting_.contains({tile, round}); }
 
@@ -78,8 +125,8 @@ class Assembly {
   const HealthTable& health() const { return health_; }
   UnitCosts& costs() { return costs_; }  // costs of accepted units, folded or not
   void checkpoint_taken(std::span<const RoundIndex> rounds) { errors_.checkpoint_taken(rounds); }
-  // Returns for each tile how many rounds are folded that a job of `spp` samples per pixel can use. A
-  // truncated last round (tail) that was cut for fewer samples does not count.
+  // Returns for each tile how many folded rounds a job of `spp` samples per pixel can use. A truncated last
+  // round (tail) that was cut for fewer samples does not count.
   std::vector<RoundIndex> rounds_for(std::uint64_t spp) const;
   std::uint64_t folds_since_snapshot = 0;
 

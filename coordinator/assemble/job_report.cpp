@@ -16,13 +16,13 @@ json number(double value) { return std::isfinite(value) ? json(value) : json(); 
 json number(const std::optional<double>& value) { return value ? number(*value) : json(); }
 json text_or_null(const std::string& text) { return text.empty() ? json() : json(text); }
 
-// Writes samples per pixel: 64 rather than 64.0 if all pixels have the same number.
+// Writes samples per pixel as an integer if all pixels have the same number: 64 rather than 64.0.
 json spp_value(double spp) {
   if (spp == std::floor(spp) && spp >= 0 && spp < 1e15) return static_cast<std::uint64_t>(spp);
   return number(spp);
 }
 
-// Adds true_rmse, true_relmse, true_flip, and whether the first two are below the reference's noise.
+// Adds true_rmse, true_relmse, true_flip, and whether the first two are below the reference's own noise.
 void put_reference_error(json& object, const ReferenceError& reference_error) {
   object["true_rmse"] = number(reference_error.rmse);
   object["true_relmse"] = number(reference_error.relmse);
@@ -39,8 +39,8 @@ json reference_of(const ReportFacts& facts, const std::optional<ReferenceError>&
           {"relmse", reference_error ? number(reference_error->relmse) : json()},
           {"flip", reference_error && reference_error->flip ? number(*reference_error->flip) : json()},
           {"same_seed", facts.job.reference_same_seed},
-          // True if the difference to the reference is within the reference's own noise: then it cannot show
-          // the image's error.
+          // True if the difference to the reference is within the reference's own noise, so that it does not
+          // show the image's error.
           {"below_noise", reference_error && reference_error->relmse_below_noise()},
           {"rmse_below_noise", reference_error && reference_error->rmse_below_noise()},
           {"mse_stderr", reference_error ? number(reference_error->mse_stderr) : json()},
@@ -49,11 +49,11 @@ json reference_of(const ReportFacts& facts, const std::optional<ReferenceError>&
           {"noise_relmse", noise ? number(noise->relmse) : json()}};
 }
 
-// Adds to the curve what was forecast at each checkpoint for the time to the target, so that the reliability
+// Adds to the curve the forecast of the time to the target made at each checkpoint, so that the reliability
 // of forecasts can be judged afterwards.
 void put_forecasts(json& curve, const std::vector<ConvergencePoint>& points, double target) {
   const std::vector<ErrorPoint> all = error_points(points);
-  // Only checkpoints at which the samples have doubled get a forecast: points in between add little, and each
+  // A forecast is added each time the samples have doubled. Points in between would add little, and each
   // forecast evaluates all points
   double next = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -105,12 +105,26 @@ json denoised_of(const ReportFacts& facts) {
   return j;
 }
 
+// Returns the target error that is meant for the image itself, whose errors make the curve.
+std::optional<double> target_of_image(const JobSpec& spec) {
+  return spec.target_layer == TargetLayer::raw ? spec.target_error : std::nullopt;
+}
+
+json checks_of(const std::vector<DenoisedCheck>& checks) {
+  json all = json::array();
+  for (const DenoisedCheck& c : checks)
+    all.push_back({{"spp", spp_value(c.spp)},
+                   {"relmse", number(std::max(0.0, c.relmse))},
+                   {"at_most", number(c.at_most)}});
+  return all;
+}
+
 // Returns a forecast of the cost of reaching the job's target error. If there is none, or it is reached, the
 // forecast is for half of the present error.
 json forecast(const ReportFacts& facts) {
   if (facts.convergence.empty()) return {};
   const double now = facts.convergence.back().error.relmse;
-  const auto& asked = facts.job.spec.target_error;
+  const auto asked = target_of_image(facts.job.spec);
   const bool goes_on = asked && *asked < now;
   const double target = goes_on ? *asked : now / 2;
   const auto f = forecast_of(error_points(facts.convergence), target);
@@ -124,7 +138,11 @@ json forecast(const ReportFacts& facts) {
 
 }  // namespace
 
-std::string note_on(StopReason stopped) {
+std::string note_on(StopReason stopped, TargetLayer layer) {
+  if (stopped == StopReason::error && layer == TargetLayer::denoised)
+    return "stopped at a target error of the denoised layers: each tile has as many samples as its own error "
+           "asked for, so the image carries a small bias; where it ended was decided by errors that the "
+           "denoiser of this coordinator computed";
   if (stopped == StopReason::error)
     return "stopped at a target error: each tile has as many samples as its own error asked for, so the "
            "image "
@@ -182,7 +200,7 @@ ConvergenceStatus convergence_status_of(const ReportFacts& facts) {
   return judge(error_points(facts.convergence, !facts.job.reference_same_seed), facts.error->verdict);
 }
 
-// 1 / (error x seconds of wall-clock time), and the same with core seconds, for comparisons between farms.
+// Returns the efficiency by wall-clock seconds and, for comparisons between farms, by core seconds.
 Efficiency efficiency_of(const ReportFacts& facts) {
   const auto over = [&](double seconds) -> std::optional<double> {
     const double cost = facts.error ? facts.error->relmse * seconds : 0;
@@ -215,6 +233,8 @@ std::map<std::string, double> header_figures(const ReportFacts& facts) {
 std::map<std::string, std::string> header_notes(const ReportFacts& facts) {
   std::map<std::string, std::string> notes;
   if (facts.job.reference_same_seed) notes["reference_same_seed"] = kSameSeed;
+  if (facts.job.spec.target_error && facts.job.spec.target_layer == TargetLayer::denoised)
+    notes["target_layer"] = to_string(facts.job.spec.target_layer);
   if (facts.job.fake) notes["fake"] = kFakePixels;
   if (facts.denoised && !facts.denoised->by.empty()) {
     const DenoisedError& e = facts.denoised->error;
@@ -236,11 +256,12 @@ std::string report_json(const ReportFacts& facts) {
   const JobTotals& totals = job.totals;
   json curve = json::array();
   for (const auto& p : facts.convergence) curve.push_back(point(p));
-  if (job.spec.target_error) put_forecasts(curve, facts.convergence, *job.spec.target_error);
+  if (const auto target = target_of_image(job.spec)) put_forecasts(curve, facts.convergence, *target);
   json j{{"job", job.id.value},
          {"name", job.name},
          {"submitted_unix", number(job.submitted_unix)},
          {"target_error", job.spec.target_error ? number(*job.spec.target_error) : json()},
+         {"target_layer", job.spec.target_error ? json(to_string(job.spec.target_layer)) : json()},
          {"scene", job.scene.hex()},
          {"state", to_string(job.state)},
          {"size", {job.settings.size.width, job.settings.size.height}},
@@ -271,9 +292,10 @@ std::string report_json(const ReportFacts& facts) {
          {"stopped", job.stopped ? json(to_string(*job.stopped)) : json()},
          {"warnings", job.warnings},
          {"convergence", std::move(curve)}};
-  // Both texts were written by this program; older records have none.
+  // This program has written both texts; older records have none.
   j["needs"] = job.needs.empty() ? json() : json::parse(job.needs, nullptr, false);
   j["analysis"] = job.analysis.empty() ? json() : json::parse(job.analysis, nullptr, false);
+  j["techniques"] = json::parse(techniques_json(job.techniques, job.settings.integrator));
   const bool known = facts.error.has_value();
   const ImageError e = facts.error.value_or(ImageError{});
   j["rmse"] = known ? number(e.rmse) : json();
@@ -301,7 +323,9 @@ std::string report_json(const ReportFacts& facts) {
   j["error"] = text_or_null(job.error);
   j["adaptive"] = job.spec.target_error.has_value();
   if (job.spec.denoise) j["denoised"] = denoised_of(facts);
-  if (const std::string note = job.stopped ? note_on(*job.stopped) : ""; !note.empty()) j["note"] = note;
+  if (job.spec.denoise) j["denoised_checks"] = checks_of(job.denoised_checks);
+  const std::string note = job.stopped ? note_on(*job.stopped, job.spec.target_layer) : "";
+  if (!note.empty()) j["note"] = note;
   return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 

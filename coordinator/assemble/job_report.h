@@ -1,5 +1,5 @@
-// Writes the report of a job, as JSON, and the figures that are derived from its image and its curve of
-// errors.
+// Writes the report of a job, as JSON, and computes values that are derived from its image and its
+// convergence curve.
 #pragma once
 
 #include <map>
@@ -17,13 +17,13 @@
 
 namespace ls::coordinator {
 
-// The denoised image of a job, in figures.
+// Facts about the denoised image of a job.
 struct DenoisedFigures {
   std::string by;       // name and version of the denoiser; empty: the image could not be denoised
-  std::string trouble;  // why not
+  std::string trouble;  // why the image could not be denoised
   DenoisedError error;
-  double seconds = 0;                   // that denoising took
-  std::optional<TrueError> true_error;  // against the job's reference
+  double seconds = 0;                   // duration of denoising
+  std::optional<TrueError> true_error;  // error against the job's reference
 };
 
 struct ReportFacts {
@@ -33,33 +33,33 @@ struct ReportFacts {
   std::optional<ImageError> error;
   std::uint64_t pixels_without_samples = 0;
   Digest pixels;
-  std::uint64_t clamped_values = 0;  // values that the final EXR cannot represent
+  std::uint64_t clamped_values = 0;  // number of values that are out of range for the final EXR
   std::vector<ConvergencePoint> convergence;
   std::string replay;                             // the job's replay_command()
   std::optional<ReferenceNoise> reference_noise;  // nullopt: unknown, or there is no reference
-  std::optional<DenoisedFigures> denoised;        // nullopt: not asked for, or not made yet
+  std::optional<DenoisedFigures> denoised;        // nullopt: not requested, or not made yet
 };
 std::string report_json(const ReportFacts& facts);
-// Sets those facts that the film gives: samples, pixels without samples, and error.
+// Sets the facts that come from the film: samples, pixels without samples, and error.
 void put_film(ReportFacts& facts, const Film& film);
 
-// Says how far the image's error estimates can be trusted.
+// Returns how far the image's error estimates can be trusted.
 ConvergenceStatus convergence_status_of(const ReportFacts& facts);
 struct Efficiency {
   // wall: 1 / (relMSE x wall-clock seconds); per_core: 1 / (relMSE x core seconds)
   std::optional<double> wall, per_core;
 };
 Efficiency efficiency_of(const ReportFacts& facts);
-// Returns numbers for the header of the final EXR besides those of the film: slope, efficiency,
-// efficiency_per_core, target_error, true_rmse, true_relmse, denoised_relmse, denoised_rmse, as far as they
-// are known.
+// Returns further numbers for the header of the final EXR: slope, efficiency, efficiency_per_core,
+// target_error, true_rmse, true_relmse, denoised_relmse, denoised_rmse. Those that are unknown are left out.
 std::map<std::string, double> header_figures(const ReportFacts& facts);
-// Returns texts for the header of the final EXR: true_below_noise, reference_same_seed, fake, denoised_by,
-// denoised_relmse_ci95 and denoised_rmse_ci95, if they apply
+// Returns texts for the header of the final EXR: true_below_noise, reference_same_seed, fake, target_layer
+// (if it is the denoised one), denoised_by, denoised_relmse_ci95 and denoised_rmse_ci95, if they apply
 std::map<std::string, std::string> header_notes(const ReportFacts& facts);
 
 // Returns a note for an image that ended for another reason than having its samples; else an empty text.
-std::string note_on(StopReason stopped);
+// `layer`: whose error a target error means.
+std::string note_on(StopReason stopped, TargetLayer layer);
 TimeSplit split_of(const JobTotals& totals);
 ErrorFigures figures_of(const ImageError& error);
 // Converts the points of a job's curve. Without `with_reference_error` the result lacks the errors against

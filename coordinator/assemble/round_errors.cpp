@@ -39,7 +39,8 @@ void RoundErrors::checkpoint_taken(std::span<const RoundIndex> rounds) {
     auto& kept = tiles_[i].rounds;
     const auto later =
         std::find_if(kept.begin(), kept.end(), [&](const auto& r) { return r.first >= rounds[i]; });
-    if (later - kept.begin() > 1) kept.erase(kept.begin(), later - 1);  // keeps the last one that counts
+    // the error before `later` is the only earlier one that is still needed
+    if (later - kept.begin() > 1) kept.erase(kept.begin(), later - 1);
   }
 }
 
@@ -62,7 +63,7 @@ void put(std::vector<std::byte>& out, const T& value) {
   std::memcpy(&out[at], &value, sizeof value);
 }
 
-// Reads values from `bytes`. It never allocates more than the bytes can hold, whatever counts they claim.
+// Reads values from `bytes`. It never allocates more memory than `bytes` has, whatever counts are in them.
 class Reader {
  public:
   explicit Reader(std::span<const std::byte> bytes) : bytes_(bytes) {}
@@ -82,8 +83,8 @@ class Reader {
 }  // namespace
 
 // Returns the errors of one tile as bytes: u32 count, then {u32 round, TileError} of each kept round; u32
-// count, then the relative error sums as doubles. They are read only by builds with the same layout: the
-// snapshot names its format, and other builds ignore it.
+// count, then the relative error sums as doubles. Only builds with the same layout can read them: the
+// snapshot contains the name of its format, and other builds ignore it.
 std::vector<std::byte> RoundErrors::save_tile(TileIndex tile) const {
   const Tile& t = tiles_[tile];
   std::vector<std::byte> out;
@@ -98,7 +99,7 @@ std::vector<std::byte> RoundErrors::save_tile(TileIndex tile) const {
 }
 
 namespace {
-// Reads the errors of one tile from the front of `in`. What follows them stays in `in`.
+// Reads the errors of one tile from the front of `in`, and removes them from `in`.
 template <class Rounds>
 bool read_tile(Reader& in, Rounds& rounds, std::vector<double>& relative) {
   std::uint32_t count = 0;

@@ -1,7 +1,7 @@
 // Keeps the error sums of every tile after every fold, as long as they are needed. A round is a range of
-// samples; folding adds a tile's next round to the image. A checkpoint says how many rounds of each tile
-// count, and sums the errors of the tiles after these, even if some tiles are ahead already. So the errors of
-// a checkpoint do not depend on the order in which results arrive.
+// samples; folding adds a tile's next round to the image. A checkpoint gives a number of rounds for each
+// tile, and sums the errors of the tiles after these rounds, even if some tiles already have later ones. So
+// the errors of a checkpoint do not depend on the order in which results arrive.
 #pragma once
 
 #include <cstddef>
@@ -17,21 +17,22 @@ namespace ls::coordinator {
 
 class RoundErrors {
  public:
-  // If `keep_relative`, each fold's relative error sum is kept for good, too: the farm's stop rule needs
+  // If `keep_relative`, the relative error sum of every fold is never dropped: the farm's stop rule needs
   // these sums after a restart.
   RoundErrors(TileIndex tiles, bool keep_relative) : tiles_(tiles), keep_relative_(keep_relative) {}
 
-  // Adds the tile's error after this round. The rounds of a tile come in order; if a round is given again (a
-  // truncated one, now in full), the new error replaces the old.
+  // Adds the tile's error after this round. The rounds of a tile come in order. If a truncated round comes
+  // again in full, its new error replaces the old one.
   void folded(TileIndex tile, RoundIndex round, const TileError& error);
   // Returns the sum of all tiles' errors, in tile order, each after `rounds[tile]` rounds. A tile that has
-  // fewer rounds counts with its last. If a tile was ahead at an earlier checkpoint and only later rounds of
-  // it are kept, it counts with the first of these.
+  // fewer rounds counts with its last. If only later rounds of a tile are kept, because it was ahead at an
+  // earlier checkpoint, it counts with the first of these.
   TileError at(std::span<const RoundIndex> rounds) const;
-  // True if at(rounds) is exact: nothing that it needs has been dropped.
+  // True if at(rounds) is exact: all errors that it needs are still there.
   bool knows(std::span<const RoundIndex> rounds) const;
-  void discard(TileIndex tile) { tiles_[tile] = {}; }  // the tile is folded again from round 0
-  // Drops errors that are no longer needed: at() will not be called with fewer rounds of any tile again
+  // Called when the tile is to be folded again from round 0
+  void discard(TileIndex tile) { tiles_[tile] = {}; }
+  // Drops errors that are no longer needed. Later calls of at() must not have fewer rounds for any tile
   void checkpoint_taken(std::span<const RoundIndex> rounds);
 
   // Returns the relative error sums as [round][tile]; empty unless they are kept. The sum is 0 for tiles that
@@ -45,7 +46,7 @@ class RoundErrors {
  private:
   struct Tile {
     std::vector<std::pair<RoundIndex, TileError>> rounds;  // ascending
-    std::vector<double> relative;                          // by round
+    std::vector<double> relative;                          // relative error sum after each round
     bool operator==(const Tile&) const = default;
   };
   std::vector<Tile> tiles_;

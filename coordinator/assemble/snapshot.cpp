@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 
+#include <array>
 #include <bit>
 #include <cstring>
 
@@ -35,7 +36,7 @@ std::vector<std::byte> head_of(const TileGrid& grid, AovSet aovs, std::string_vi
   return out;
 }
 
-// Reads a file from the front and hashes all that it reads.
+// Reads a file from the front and hashes all bytes that it reads.
 class Source {
  public:
   explicit Source(std::filesystem::path path) : path_(std::move(path)) {
@@ -58,7 +59,7 @@ class Source {
     std::memcpy(&v, raw->data(), sizeof v);
     return v;
   }
-  // True if what is left of the file is the seal (SHA-256) of what was read so far.
+  // True if the rest of the file is the seal (SHA-256) of the bytes read so far.
   bool sealed() {
     const Digest read = hash_.finish();
     const auto seal = take(sizeof read.bytes);
@@ -72,8 +73,8 @@ class Source {
   Sha256 hash_;
 };
 
-// Reads one tile into `film` and `errors`, and appends its text to `health`, which HealthTable::load() reads
-// at the end. False: the file is damaged.
+// Reads one tile into `film` and `errors`, and appends the text of its health to `health`, which
+// HealthTable::load() reads at the end. False: the file is damaged.
 bool read_tile(Source& in, TileIndex tile, Film& film, RoundErrors& errors, std::string& health) {
   TileHead head{.tile = tile};
   for (std::uint64_t* length : {&head.film, &head.errors, &head.health}) {
@@ -150,6 +151,45 @@ std::optional<Assembly> load_snapshot(const std::filesystem::path& path, const T
     if (*tile >= grid.count() || !read_tile(in, *tile, film, errors, health)) return std::nullopt;
   }
   return std::nullopt;
+}
+
+std::optional<SnapshotTiles> SnapshotTiles::open(const std::filesystem::path& path, const TileGrid& grid,
+                                                 AovSet aovs, std::string_view format) {
+  SnapshotTiles out;
+  out.path_ = path;
+  out.places_.resize(grid.count());
+  auto file = File::open(path, O_RDONLY);
+  if (!file) return std::nullopt;
+  out.file_ = std::move(*file);
+  const auto expected = head_of(grid, aovs, format);
+  const auto head = read_at(out.file_, 0, expected.size(), path);
+  if (!head || *head != expected) return std::nullopt;
+  constexpr std::size_t kHead = sizeof(std::uint32_t) + 3 * sizeof(std::uint64_t);
+  for (std::uint64_t at = expected.size();;) {
+    std::uint32_t tile = 0;
+    const auto number = read_at(out.file_, at, sizeof tile, path);
+    if (!number) return std::nullopt;
+    std::memcpy(&tile, number->data(), sizeof tile);
+    if (tile == kEnd) return out;
+    const auto raw = read_at(out.file_, at, kHead, path);
+    if (tile >= grid.count() || !raw) return std::nullopt;
+    std::array<std::uint64_t, 3> lengths{};  // lengths of film, errors and health
+    std::memcpy(lengths.data(), raw->data() + sizeof tile, sizeof lengths);
+    at += kHead;
+    out.places_[tile] = {at, lengths[0]};
+    for (const std::uint64_t length : lengths) {
+      if (length > kMostPart) return std::nullopt;
+      at += length;
+    }
+  }
+}
+
+Result<void> SnapshotTiles::load(TileIndex tile, Film& film) const {
+  const Place& place = places_[tile];
+  if (place.length == 0) return {};
+  const auto bytes = read_at(file_, place.at, static_cast<std::size_t>(place.length), path_);
+  if (!bytes) return tl::unexpected(bytes.error());
+  return film.load_tile(tile, *bytes);
 }
 
 }  // namespace ls::coordinator

@@ -1,11 +1,10 @@
 // A snapshot is a file of a job's folded image, tile by tile. Writing or reading it needs memory for one tile
-// besides the film (the image in memory). Each tile is saved as it was when it was added, so folding may
-// continue meanwhile. After a restart, what was folded later is folded again from the partials (the stored
-// results of units).
-// Format:
+// besides the film (the image in memory). Each tile is saved in the state in which it was added, so folding
+// may continue meanwhile. After a restart, rounds that were folded later are folded again from the partials
+// (the stored results of units). Format:
 //    "LSSNAP2\n", u64 length and name of the format, i32 width, height, tile, u32 AOVs; per tile u32 tile,
 //    u64 lengths of its three parts, and these: film (film_bytes.cpp), error sums, health; u32 2^32 - 1;
-//    SHA-256 of all before it
+//    SHA-256 of all preceding bytes
 #pragma once
 
 #include <filesystem>
@@ -23,7 +22,7 @@ namespace ls::coordinator {
 
 struct TileSnapshot {
   TileIndex tile = 0;
-  std::function<std::vector<std::byte>()> film;  // Film::saver
+  std::function<std::vector<std::byte>()> film;  // the saver of the tile's pixels (Film::saver)
   std::vector<std::byte> errors;
   std::string health;
 };
@@ -46,9 +45,28 @@ class SnapshotFile {
   Sha256 hash_;
 };
 
-// Reads a snapshot. nullopt if the file is missing, damaged or of another grid, AOV set or format: then
-// everything is folded again from the partials (the stored results of units).
+// Reads a snapshot. nullopt if the file is missing, damaged or of another grid, AOV set or format: then the
+// image is folded again from the partials (the stored results of units).
 std::optional<Assembly> load_snapshot(const std::filesystem::path& path, const TileGrid& grid,
                                       bool keep_relative, std::string_view format, AovSet aovs = {});
+
+// Finds the tiles in a snapshot, so that only some of them need to be read. The seal of the file is not
+// checked: each tile has its own checksum.
+class SnapshotTiles {
+ public:
+  // returns nullopt for the same reasons as load_snapshot()
+  static std::optional<SnapshotTiles> open(const std::filesystem::path& path, const TileGrid& grid,
+                                           AovSet aovs, std::string_view format);
+  // Loads the tile's pixels into `film`; leaves `film` unchanged if the tile has no folded rounds.
+  Result<void> load(TileIndex tile, Film& film) const;
+
+ private:
+  struct Place {
+    std::uint64_t at = 0, length = 0;  // position in the file; length 0: the tile has no folded rounds
+  };
+  std::filesystem::path path_;
+  File file_;
+  std::vector<Place> places_;
+};
 
 }  // namespace ls::coordinator

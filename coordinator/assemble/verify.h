@@ -9,13 +9,13 @@
 
 namespace ls::coordinator {
 
-// The partial is honest and of the right round, but of another sample range than is needed now: the job was
-// extended meanwhile.
+// The partial is valid and of the right round, but its sample range is no longer the one that is needed: the
+// job was extended meanwhile.
 struct OtherRange {
   SampleRange samples;
 };
-// The result is wrong: its size, windows, scene, settings, numeric class, tile or digest differ from what is
-// expected, or it has values that are not finite. The error says which.
+// The result is wrong: its size, windows, scene, settings, numeric class, tile or digest differ from the
+// expected ones, or it has values that are not finite. The error says which.
 struct BadResult {
   Error error;
 };

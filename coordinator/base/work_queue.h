@@ -1,4 +1,4 @@
-// Queues between the service's threads.
+// Queues between the service's threads, and periodic work on a thread.
 #pragma once
 
 #include <condition_variable>
@@ -11,9 +11,11 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/clock.h"
+
 namespace ls::coordinator {
 
-// FIFO queue. It has no bound of its own: callers bound it with a ByteBudget or wait_for_room().
+// FIFO queue. It is unbounded: callers limit it with a ByteBudget or wait_for_room().
 template <class T>
 class WorkQueue {
  public:
@@ -22,7 +24,7 @@ class WorkQueue {
       const std::lock_guard lock(mutex_);
       items_.push_back(std::move(item));
     }
-    filled_.notify_one();  // one item, one waiting thread: others would wake to an empty queue
+    filled_.notify_one();  // one item serves one waiting thread: others would wake up in vain
   }
   std::size_t size() const {
     const std::lock_guard lock(mutex_);
@@ -56,15 +58,15 @@ class WorkQueue {
   int held_back_ = 0;  // threads blocked in wait_for_room()
 };
 
-// Limits how many bytes are in use at the same time. ask() requests bytes, release() gives them back;
-// requests that do not fit wait in line.
+// Limits how many bytes are in use at the same time. ask() requests bytes, release() returns them; requests
+// that do not fit wait in line.
 class ByteBudget {
  public:
   explicit ByteBudget(std::size_t bytes) : room_(bytes) {}
-  // Calls `granted` once the bytes fit, in the order of requests. If they fit now, it is called on this
-  // thread before ask() returns; else later on a thread that calls release(). It is never called after
-  // close(). A single item larger than the whole budget is granted when nothing else is in use. Every waiting
-  // request is kept, so callers must limit their number.
+  // Calls `granted` once the bytes fit, in the order of requests. If they fit now, the call is made on this
+  // thread before ask() returns; else later on a thread that calls release(). It is never made after close().
+  // A single item larger than the whole budget is granted when nothing else is in use. Every waiting request
+  // is kept, so callers must limit their number.
   void ask(std::size_t bytes, std::function<void()> granted) {
     {
       const std::lock_guard lock(mutex_);
@@ -113,5 +115,17 @@ class ByteBudget {
   std::size_t room_, used_ = 0;
   bool closed_ = false;
 };
+
+// Calls act() once per `pause` until a stop is requested through `token`. The first call comes after one
+// pause. Blocks the calling thread.
+template <class Act>
+void every(Duration pause, const std::stop_token& token, Act&& act) {
+  std::mutex mutex;
+  std::condition_variable_any woken;
+  std::unique_lock lock(mutex);
+  while (!woken.wait_for(lock, token, pause, [&] { return token.stop_requested(); }) &&
+         !token.stop_requested())
+    act();
+}
 
 }  // namespace ls::coordinator

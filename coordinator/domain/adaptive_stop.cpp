@@ -2,12 +2,53 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "common/base/check.h"
 #include "coordinator/domain/limits.h"
-#include "coordinator/domain/stop_groups.h"
 
 namespace ls::coordinator {
+namespace {
+
+std::int64_t divided_up(std::int64_t a, std::int64_t b) { return (a + b - 1) / b; }
+
+// One side of the frame: its number of tiles, and how they are grouped into blocks of `block` tiles. `whole`
+// is the number of tiles that the frame's edge does not cut, at least 1. Only these form blocks; the
+// remaining tile joins the last block.
+struct Side {
+  int tiles, whole, block;
+  int blocks() const { return std::max(1, whole / block); }
+  int block_of(int tile) const { return std::min(tile / block, blocks() - 1); }
+};
+
+// Divides a side of `frame` pixels into blocks. A block has as many tiles (of `tile` pixels) along this side
+// as it needs to contain kMinStopPixels pixels, given its extent `across` along the other side, in pixels.
+Side side_of(int frame, int tile, int across) {
+  const int whole = std::max(1, frame / tile);
+  const auto wanted = divided_up(kMinStopPixels, std::int64_t{across} * std::min(tile, frame));
+  return {(frame + tile - 1) / tile, whole, static_cast<int>(std::min<std::int64_t>(wanted, whole))};
+}
+
+}  // namespace
+
+std::vector<std::vector<TileIndex>> stop_groups(const TileGrid& grid) {
+  const int width = grid.frame.width, height = grid.frame.height;
+  int square = grid.tile;
+  while (std::int64_t{square} * square < kMinStopPixels) square += grid.tile;
+  // A square block may be higher than the frame; blocks are then wider instead. The same holds for the width.
+  const Side x = side_of(width, grid.tile, std::min(square, height));
+  const Side y = side_of(height, grid.tile, std::min(width, x.block * grid.tile));
+  std::vector<std::vector<TileIndex>> groups(static_cast<std::size_t>(x.blocks()) *
+                                             static_cast<std::size_t>(y.blocks()));
+  for (TileIndex t = 0; t < grid.count(); ++t) {
+    const int column = static_cast<int>(t) % x.tiles, row = static_cast<int>(t) / x.tiles;
+    const auto group = static_cast<std::size_t>(y.block_of(row)) * static_cast<std::size_t>(x.blocks()) +
+                       static_cast<std::size_t>(x.block_of(column));
+    groups[group].push_back(t);
+  }
+  return groups;
+}
+
 namespace {
 
 // The first round that may be a tile's last: the one with which every pixel has kMinSppBeforeStop samples.
@@ -26,7 +67,7 @@ double pixels_of(const TileGrid& grid, TileIndex tile) {
 double level_below(double gain) {
   if (!(gain > 0)) return 0;
   if (std::isinf(gain)) return std::numeric_limits<double>::max();
-  // 2^-1/4, 2^-1/2, 2^-3/4 as constants: the grid must not depend on a machine's exp2.
+  // 2^-1/4, 2^-1/2 and 2^-3/4 are constants, since exp2 may differ in its last bits between machines.
   constexpr double kSteps[] = {0.84089641525371454303, 0.70710678118654752440, 0.59460355750136053336, .5};
   int exponent = 0;
   const double mantissa = std::frexp(gain, &exponent);  // in [1/2, 1)

@@ -1,7 +1,7 @@
 // Adaptive sampling decides when the tiles of a job with a target error stop getting samples. It reads
 // nothing but the tiles' own error estimates. A round is a fixed range of sample indices
 // (common/image/frame/rounds.h); folding adds the pixel sums of a tile's round to the image. Tiles stop in
-// groups (stop_groups.h).
+// groups (stop_groups()).
 //
 // The image's relMSE is the mean over its pixels. Take a group of p pixels whose relative variance per
 // sample, averaged over pixels and channels, is a. After n samples per pixel it adds p a / n to the sum over
@@ -40,6 +40,13 @@
 
 namespace ls::coordinator {
 
+// Returns the groups of tiles that stop getting samples together: the tiles of each ascending, the groups in
+// the order of their first tiles. Every tile is in exactly one group. A decision to stop that rests on few
+// pixels biases the image, so at least kMinStopPixels pixels decide together: small tiles form blocks, and
+// the remainder at the right and bottom edges joins the neighbouring block. Only an image of fewer pixels
+// forms one smaller group. The groups depend on the tiling alone.
+std::vector<std::vector<TileIndex>> stop_groups(const TileGrid& grid);
+
 // Returns the next level below `gain`: the largest number of the grid {2^(-j/4)}, j any integer, that is less
 // than `gain`. Returns 0 for 0.
 double level_below(double gain);
@@ -49,9 +56,9 @@ class AdaptiveStop {
   // `spp` is the sample limit: the most samples per pixel that any tile gets.
   AdaptiveStop(const TileGrid& grid, std::uint64_t spp);
 
-  // Tells the rule that rounds 0..round of the tile are folded. `rel_error_sum` is the sum over the tile's
-  // pixels and channels of the relative squared error after these rounds (TileError::relative.squares). The
-  // rounds of one tile must come in order; tiles may come in any order.
+  // Adds the error of the tile after rounds 0..round, which are now folded. `rel_error_sum` is the sum of the
+  // relative squared error over the tile's pixels and channels (TileError::relative.squares). The rounds of
+  // one tile must come in order; tiles may come in any order.
   void folded(TileIndex tile, RoundIndex round, double rel_error_sum);
 
   // Returns the last round of the tile that is certain to be needed: rounds up to this one may be folded.
@@ -70,7 +77,7 @@ class AdaptiveStop {
   // Returns the relMSE of the image at this level, predicted from the rounds before each tile's last.
   // Requires settled().
   double predicted() const;
-  // True if every group has reached the sample limit: nothing can continue.
+  // True if every group has reached the sample limit, so that no group can continue.
   bool exhausted() const;
   // Goes to the next level. Requires settled() and not exhausted(). If no group's gain is known to be
   // positive, all groups continue to the sample limit.
@@ -81,14 +88,14 @@ class AdaptiveStop {
   std::vector<RoundIndex> ends() const;
   double mean_spp() const;  // samples per pixel at this level, mean over all pixels
 
-  // True if some group has reached the sample limit.
+  // True if at least one group has reached the sample limit.
   bool bound() const;
   // Raises the sample limit to `spp` samples per pixel. Requires !bound(): a group that reached the old limit
   // might have continued under a higher one.
   void extend(std::uint64_t spp);
 
-  // Speculation: the functions below predict which rounds will probably be needed, so that workers render
-  // them in time. They affect no pixel.
+  // Speculation: the functions below predict which rounds will probably be needed, so that workers can render
+  // them ahead. They affect no pixel.
   //
   // foresee() predicts the level at which the image will meet `target`. It does nothing until every group has
   // kFirstForecast rounds.
@@ -96,8 +103,7 @@ class AdaptiveStop {
   // Returns how many rounds of the tile will probably be needed; never fewer than are certain to be needed.
   RoundIndex predicted_last(TileIndex tile) const;
   // Returns the variance per sample of the tile's group, estimated from its last known round; NaN if unknown.
-  // The queue of units (unit_queue.h) derives from it in which order the tiles' next rounds are worth
-  // rendering, in whole rounds.
+  // The queue of units (unit_queue.h) orders speculative rounds by it.
   double variance(TileIndex tile) const;
   // Returns how many pixel samples are still to be taken up to the predicted ends of all groups; nullopt
   // before foresee() has predicted them.
@@ -114,7 +120,7 @@ class AdaptiveStop {
     std::vector<double> sums;  // sums[k]: error sum of the group's tiles after round k, added in tile order
     RoundIndex stop = 0;       // the earliest round that may be the group's last
     RoundIndex predicted_last = 0;  // the round that will probably be its last
-    bool settled = false;           // `stop` is its last round at this level
+    bool settled = false;           // true if `stop` is the group's last round at this level
   };
   // Variance per sample, estimated from rounds 0..round
   double variance(const Group& g, RoundIndex round) const;

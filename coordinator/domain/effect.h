@@ -12,7 +12,7 @@
 #include "common/base/digest.h"
 #include "common/base/id.h"
 #include "common/protocol/messages.h"
-#include "coordinator/domain/freed_cause.h"
+#include "coordinator/domain/farm_figures.h"
 #include "coordinator/domain/job_state.h"
 
 namespace ls::coordinator {
@@ -24,17 +24,20 @@ struct Send {
   ToWorker message;
 };
 
-// These units have left this lease (the list of units that the worker was told to render). Those that are
-// still needed wait for another worker, unless another lease holds them too.
+// These units are no longer part of this lease (the list of units that the worker was told to render). If
+// they are still needed and no other lease holds them, they wait for another worker. Under an audit's lease
+// the unit has an accepted result already.
 struct UnitsFreed {
   JobId job;
   LeaseId lease;
   WorkerId worker;
   std::vector<UnitKey> units;
   FreedCause cause = FreedCause::worker_lost;
+  bool audit = false;
 };
 
-// The farm accepts this result for the unit: store which worker delivered it and its digest.
+// The farm has accepted this result of the unit. The service stores its digest and the worker that delivered
+// it.
 struct RecordUnit {
   UnitKey unit;
   SampleRange samples;
@@ -89,6 +92,14 @@ struct Checkpoint {
   std::vector<RoundIndex> rounds;  // for each tile, how many of its rounds the checkpoint includes
   double spp = 0;                  // samples per pixel, mean over all pixels
 };
+// The target error of this job is that of its denoised layers, and must now be compared with theirs. The film
+// is exactly that of the level with `spp` samples per pixel, mean over all pixels, and stays so until the
+// event DenoisedChecked is raised. If the layers cannot be made, the service pauses the job; the effect comes
+// again when the job is resumed.
+struct CheckDenoised {
+  JobId job;
+  double spp = 0;
+};
 // A job is extended whose last round `round` was truncated by its old sample count. The round is rendered
 // again in full: the service replaces the part that is folded (the tail), and the round's partials are void.
 struct ReopenRound {
@@ -101,8 +112,8 @@ struct JobFinished {
   StopReason stopped = StopReason::spp;
   std::uint64_t unaudited = 0;  // results chosen for an audit when no other worker of the class was connected
 };
-// The job has failed. `error` is a text for a person: what failed, where, what the workers reported and how
-// to replay it. This follows the JobStateChanged to `failed`.
+// The job has failed. `error` is the message for the user: what failed, where, what the workers reported and
+// how to replay it. This effect follows the JobStateChanged to `failed`.
 struct JobFailed {
   JobId job;
   std::string error;
@@ -114,22 +125,22 @@ struct WorkerStateChanged {
   WorkerState to = WorkerState::connected;
   std::string why;
 };
-// The worker has failed too often at units of this job: it gets no more of them for a while.
+// The worker has failed too often on units of this job, so it gets no more of them for a while.
 struct WorkerBlocked {
   WorkerId worker;
   JobId job;
   std::string why;
 };
-// This worker rendered wrong pixels, according to two others. It gets no more work of any job, and its
-// messages are ignored. Store this before carrying out the effects that follow; after a restart none of its
-// results may be accepted.
+// Two other workers agree that this worker rendered wrong pixels. It gets no more work of any job, and its
+// messages are ignored. The service must store this before it carries out the effects that follow; after a
+// restart none of the worker's results may be accepted.
 struct WorkerFoundFaulty {
   WorkerId worker;
-  UnitKey unit;  // the unit of which two results revealed it
+  UnitKey unit;  // the unit whose differing results revealed it
   std::string evidence;
 };
-// The film of this tile is void, since a quarantined worker rendered part of it: the tile is folded again
-// from round 0. None of its results accepted so far count.
+// The film of this tile is void, since a quarantined worker rendered part of it. The tile is folded again
+// from round 0, and none of its earlier results count.
 struct TileDiscarded {
   JobId job;
   TileIndex tile = 0;
@@ -141,7 +152,7 @@ struct WorkerForgotten {
 
 using Effect =
     std::variant<Send, UnitsFreed, RecordUnit, Fold, DropDuplicate, DropUnwanted, DigestMismatch, JobPinned,
-                 JobStateChanged, Checkpoint, ReopenRound, JobFinished, JobFailed, WorkerStateChanged,
-                 WorkerBlocked, WorkerFoundFaulty, TileDiscarded, WorkerForgotten>;
+                 JobStateChanged, Checkpoint, CheckDenoised, ReopenRound, JobFinished, JobFailed,
+                 WorkerStateChanged, WorkerBlocked, WorkerFoundFaulty, TileDiscarded, WorkerForgotten>;
 
 }  // namespace ls::coordinator

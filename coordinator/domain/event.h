@@ -17,30 +17,36 @@
 #include "common/image/frame/frame.h"
 #include "common/image/frame/rounds.h"
 #include "common/protocol/messages.h"
+#include "coordinator/domain/denoised_target.h"
 #include "coordinator/domain/job_state.h"
 
 namespace ls::coordinator {
 
-// What a job asks for. The scene's defaults are already filled in.
+// The settings of a job, with the scene's defaults filled in.
 struct JobPlan {
   JobBrief brief;
   TileGrid grid;
   std::optional<std::uint64_t> spp;    // samples per pixel; nullopt: limits.h kMaxSppWithoutLimit
   std::optional<double> target_error;  // the job ends when the image has this relMSE
+  bool target_denoised = false;        // target_error is that of the denoised layers instead
   std::optional<double> time;          // the job ends this many seconds after the first ray
   int priority = 0;                    // higher first
   std::vector<std::string> tags;       // a worker must have all of them
-  // Command that renders a sample again, without pixel and sample: common/job/replay_command.h
+  // Command that renders one sample again, to which the pixel and the sample are appended:
+  // common/job/replay_command.h
   std::string replay = "lightshaft render SCENE";
-  // Fair shares and limits (fair_share.h, docs/design/scheduling.md)
+  // Limits and fair shares (fair_share.h, docs/design/scheduling.md)
   std::string owner;  // the user (JobView::owner); empty: the administrator, to whom no user limits apply
-  // The sequence that the job is a frame of. Jobs of one owner and group share their turns and run in order.
-  // Empty: the job is alone
+  // The sequence whose frame this job is; empty: the job is alone. Jobs of one owner and group count as one
+  // job for fair shares, and run in order.
   std::string group;
   // Limits of the job, or of all jobs of its group together
   std::uint32_t max_workers = 0;   // most workers that hold units at the same time; 0: no limit
   std::uint32_t max_units = 0;     // most units leased at the same time; 0: no limit
   std::uint64_t memory_bytes = 0;  // the least a worker needs for this job; 0: unknown
+  // Pixels of the frame whose tiles are leased before all other tiles; nullopt: all tiles are treated alike.
+  // It changes the order in which units are leased, and nothing about the image.
+  std::optional<PixelRect> focus;
 };
 
 // Jobs
@@ -53,7 +59,8 @@ struct JobRestored {
   struct Unit {
     TileIndex tile = 0;
     RoundIndex round = 0;
-    // A unit whose range is no longer needed is ignored (a truncated round that was extended since)
+    // The unit's sample range. If the job no longer needs this range (a truncated round that was extended
+    // since), the unit is ignored.
     SampleRange samples;
     Digest digest;
     WorkerId worker;
@@ -62,7 +69,7 @@ struct JobRestored {
   JobState state = JobState::queued;
   std::optional<StopReason> stopped;    // set for a job that is done
   std::optional<Digest> numeric_class;  // the class that the job is pinned to
-  std::vector<Unit> accepted;  // accepted results that are still there after the restart, in any order
+  std::vector<Unit> accepted;           // accepted results that still exist after the restart, in any order
   // For each tile, how many rounds the restored film has folded, a truncated last round included. Empty: no
   // film was restored. Required for a job that is done.
   std::vector<RoundIndex> folded;
@@ -79,6 +86,8 @@ struct JobRestored {
     bool operator==(const Audit&) const = default;
   };
   std::vector<Audit> audits;
+  // What is known of the error of the denoised layers, if the target error is theirs
+  std::vector<DenoisedCheck> denoised_checks;
 };
 
 struct JobCancelled {
@@ -90,7 +99,8 @@ struct JobPaused {
 struct JobResumed {
   JobId job;
 };
-// Only units that are leased already are still rendered. Then the job ends as `done`, stopped by the user.
+// The user has stopped the job. Units that are leased already are still rendered; then the job ends as
+// `done`.
 struct JobStopped {
   JobId job;
 };
@@ -98,16 +108,21 @@ struct JobPriority {
   JobId job;
   int priority = 0;
 };
+// Changes JobPlan::focus. A focus must lie in the frame; otherwise the event is ignored.
+struct JobFocused {
+  JobId job;
+  std::optional<PixelRect> focus;
+};
 // Changes the target error of a job. The job must have one, and it must not have stopped for another reason
 // (Farm::may_retarget). A smaller target also resumes a job that reached the larger one. The image then has
-// the same bits as that of a job that had the smaller target from the start: an image that missed the larger
+// the same bits as if the job had had the smaller target from the start: an image that missed the larger
 // target misses the smaller one, too. A larger target applies from the job's current state on.
 struct JobRetargeted {
   JobId job;
   double target_error = 0;  // relMSE
 };
-// Raises the job's total of samples per pixel; the job may be running, paused or done. If its end is already
-// decided, a target error or time limit no longer applies: all its tiles get the new total.
+// Raises the job's total of samples per pixel; the job may be running, paused or done. If a target error or
+// time limit has already decided the job's end, it no longer applies: all tiles get the new total.
 struct JobExtended {
   JobId job;
   std::uint64_t spp = 0;
@@ -130,9 +145,12 @@ struct WorkerJoined {
   // Memory that the worker's renderer may use; 0: unknown, and then any job may go to it
   std::uint64_t memory_bytes = 0;
   std::vector<Digest> blobs_held;  // blobs in its cache, most recently used first
+  // False: it gets units only of jobs that are pinned to its numeric class already, as a worker of another
+  // version than the coordinator's does
+  bool may_begin = true;
 };
-// The worker rendered wrong pixels, as was found before a restart or by another coordinator. It gets no work,
-// and its results for jobs of this farm are void.
+// The worker rendered wrong pixels; this was found before a restart or by another coordinator. It gets no
+// work, and its results for jobs of this farm are void.
 struct WorkerQuarantined {
   WorkerId worker;
   std::string why;
@@ -161,6 +179,12 @@ struct LeaseCameBack {
 
 // Units
 
+// A verified result of this numeric class is about to be made durable. If the job is pinned to no class yet,
+// it is pinned to this one, so that its log never holds results of two classes.
+struct ClassChosen {
+  JobId job;
+  Digest numeric_class;
+};
 // A verified and durable result has arrived. The event is raised once per arrival; the farm finds out which
 // results are duplicates.
 struct UnitAccepted {
@@ -169,17 +193,23 @@ struct UnitAccepted {
   Digest digest;
   WorkerId worker;
   double cpu_seconds = 0;
-  // Seconds that the rendering thread waited for a core or for memory meanwhile: core_share.h
+  // Seconds that the rendering thread waited for a core or for memory while it rendered the unit: CoreShare
   double wait_seconds = 0;
 };
 // The result of a unit (one tile, one range of its samples) has been added to the image, as the farm asked
 // with a Fold (effect.h).
 struct UnitFolded {
   UnitKey unit;
-  SampleRange samples;  // as in the Fold
+  SampleRange samples;  // the same as in the Fold
   // Sum over pixels and channels of the tile's relative squared error after all rounds up to this one:
   // TileError::relative.squares of common/image/error/error_estimate.h.
   double rel_error_sum = 0;
+};
+// The error of the denoised layers at a level of the stop rule, which the farm asked for with a CheckDenoised
+// (effect.h). It is stored already.
+struct DenoisedChecked {
+  JobId job;
+  DenoisedCheck check;
 };
 // A worker has failed to render a unit. The worker reports it, or the service does for a result that fails
 // verification.
@@ -188,12 +218,13 @@ struct UnitFailed {
   UnitFailure failure;
 };
 
-// Raised about once a second, for deadlines, speculation, forgiveness and time limits.
+// Raised about once a second. Deadlines, speculation, forgiveness of failures and time limits depend on it.
 struct Tick {};
 
-using Event = std::variant<JobSubmitted, JobRestored, JobCancelled, JobPaused, JobResumed, JobStopped,
-                           JobPriority, JobRetargeted, JobExtended, JobForgotten, WorkerJoined,
-                           WorkerQuarantined, WorkerLost, WorkerDrains, LeaseProgress, ResultsWait,
-                           LeaseCameBack, UnitAccepted, UnitFolded, UnitFailed, Tick>;
+using Event =
+    std::variant<JobSubmitted, JobRestored, JobCancelled, JobPaused, JobResumed, JobStopped, JobPriority,
+                 JobFocused, JobRetargeted, JobExtended, JobForgotten, WorkerJoined, WorkerQuarantined,
+                 WorkerLost, WorkerDrains, LeaseProgress, ResultsWait, LeaseCameBack, ClassChosen,
+                 UnitAccepted, UnitFolded, DenoisedChecked, UnitFailed, Tick>;
 
 }  // namespace ls::coordinator

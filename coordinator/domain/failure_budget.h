@@ -1,6 +1,6 @@
 // Counts failed attempts to render a unit (one round of one tile). Decides when a unit has failed often
-// enough for its job to fail, and when a worker gets no more units of a job. If a worker is lost, misses a
-// deadline or returns a lease, the infrastructure has failed: this is not counted.
+// enough to fail its job, and when a worker gets no more units of a job. A lost worker, a missed deadline or
+// a returned lease is a failure of the infrastructure and is not counted.
 #pragma once
 
 #include <algorithm>
@@ -39,7 +39,7 @@ class UnitFailures {
   }
 
  private:
-  // Few attempts each: a job fails when a unit is exhausted()
+  // A list has few entries, since the job fails as soon as a unit is exhausted()
   std::map<UnitCode, std::vector<FailedAttempt>> units_;
 };
 

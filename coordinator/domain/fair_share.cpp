@@ -25,8 +25,8 @@ void FairShare::change(Job& job, Change&& change) {
   const auto user_before = turn_of(at.user);
   const auto group_before = turn_of(at.group);
   change(at);
-  // A job is at work while it has units to lease or units are leased. If it is the first such job of its user
-  // or group, that one's share is raised to the clock, the share of the one served last.
+  // A job is at work while it has units to lease or leased units. If it is the first such job of its user or
+  // group, the share of that user or group is raised to the clock, which is the share of the one served last.
   const bool works = job.offered || job.charge_out > 0;
   if (works && at_work_.insert(job.seq).second) {
     if (at.user.share.at_work++ == 0) at.user.share.spent = std::max(at.user.share.spent, at.level.clock);
@@ -143,7 +143,7 @@ void FairShare::tidy() {
 
 bool FairShare::in_turn(const Visit& visit) const {
   const double kFar = std::numeric_limits<double>::infinity();
-  bool top = true;  // true while `level` is the highest priority that has jobs with units to lease
+  bool top = true;  // true while the loop is at the highest priority that has jobs with units to lease
   for (const auto& [priority, level] : levels_) {
     for (auto user = level.turns.begin(); user != level.turns.end(); ++user) {
       const double behind = user->had - level.turns.begin()->had;

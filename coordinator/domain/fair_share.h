@@ -5,8 +5,9 @@
 // 1996, with measured instead of declared lengths).
 //
 // A user or job that arrives, or returns after a pause, starts at the share of the one that got the last
-// lease. So waiting saves up no turns, and having used the farm alone costs none. If two users both have work
-// for all workers all the time, their shares differ by at most one lease each, plus errors of prediction.
+// lease. So a user gains no turns by waiting, and loses none for having used the farm alone. If two users
+// both have work for all workers all the time, their shares differ by at most one lease each, plus errors of
+// prediction.
 //
 // Every operation costs O(log jobs).
 #pragma once
@@ -26,7 +27,7 @@ namespace ls::coordinator {
 
 class FairShare {
  public:
-  // offer() says that the job has units to lease, and returns true if it had none before. withdraw() says
+  // offer() notes that the job has units to lease, and returns true if it had none before. withdraw() notes
   // that it has none.
   bool offer(Job& job);
   void withdraw(Job& job);
@@ -36,8 +37,8 @@ class FairShare {
   // spend() adds core seconds that a result reported.
   void charge(Job& job, double seconds);
   void spend(Job& job, double seconds);
-  // Forgets users and groups that have no work and whose share is not greater than the clock, the share of
-  // the one served last: if they come back, they start at the clock anyway.
+  // Forgets users and groups that have no work and whose share is not greater than the clock (the share of
+  // the one served last). If they come back, they start at the clock anyway.
   void tidy();
   // leave() must be called before the job's priority changes, and enter() afterwards, which adds the core
   // seconds of its leases at the new priority. The caller then offers the job again.
@@ -50,8 +51,8 @@ class FairShare {
   // that user. It is infinite below the highest priority that has jobs.
   using Visit = std::function<bool(Job&, double lag)>;
   bool in_turn(const Visit& visit) const;
-  // The job gets a lease: users and groups that arrive later start at the share that its user and its group
-  // have now.
+  // Notes that the job gets a lease: users and groups that arrive later start at the share that its user and
+  // its group have now.
   void served(const Job& job);
 
   struct Figure {
@@ -72,7 +73,8 @@ class FairShare {
   template <class T>
   struct Turn {
     double had;
-    JobSeq first;  // first of its jobs that wait: equal shares are served in order of submission
+    JobSeq first;  // its earliest submitted job with units to lease: equal shares are served in order of
+                   // submission
     T* who;
     bool operator<(const Turn& o) const { return std::tie(had, first) < std::tie(o.had, o.first); }
   };
@@ -108,7 +110,7 @@ class FairShare {
   static void place(std::set<Turn<T>>& turns, const std::optional<Turn<T>>& before,
                     const std::optional<Turn<T>>& after);
 
-  std::map<std::int64_t, Level> levels_;  // by -priority
+  std::map<std::int64_t, Level> levels_;  // key: minus the priority
   std::size_t ready_ = 0;
   std::set<JobSeq> at_work_;
 };

@@ -1,15 +1,48 @@
-// Counters of the farm's work that only the service can keep, not the farm itself. /metrics shows them.
+// Counters of the farm's work, which /metrics shows, and limits that other layers pass to the farm unchanged.
 #pragma once
 
 #include <cstdint>
 #include <map>
-
-#include "coordinator/domain/freed_cause.h"
+#include <string_view>
+#include <utility>
 
 namespace ls::coordinator {
 
-// All counters start at 0 when the coordinator starts; members whose names end in _now are current values. A
-// unit is one round (range of samples) of one tile.
+// Why a unit (one round of one tile) left a worker's lease without a result.
+enum class FreedCause {
+  worker_lost,
+  newer_stream,  // the worker has connected again
+  deadline_passed,
+  returned,        // the worker returned it, since it is draining or could not load the job
+  failed,          // the worker failed to render it
+  moved,           // the unit waited behind other work of its worker and is given to an idle worker
+  paused,          // the job was paused
+  round_reopened,  // the job was extended, and the round is rendered again with more samples
+  worker_quarantined,
+  not_wanted,  // the tile has ended with an earlier round, so the unit is not rendered again
+  job_ended    // the job failed or was cancelled, so the unit is not rendered again
+};
+inline constexpr std::pair<FreedCause, std::string_view> kFreedCauses[] = {
+    {FreedCause::worker_lost, "worker lost"},
+    {FreedCause::newer_stream, "replaced by a newer stream"},
+    {FreedCause::deadline_passed, "deadline passed"},
+    {FreedCause::returned, "returned"},
+    {FreedCause::failed, "failed"},
+    {FreedCause::moved, "moved to an idle worker"},
+    {FreedCause::paused, "job paused"},
+    {FreedCause::round_reopened, "round reopened"},
+    {FreedCause::worker_quarantined, "worker quarantined"},
+    {FreedCause::not_wanted, "not wanted"},
+    {FreedCause::job_ended, "job ended"}};
+
+constexpr std::string_view to_string(FreedCause cause) {
+  for (const auto& [one, word] : kFreedCauses)
+    if (one == cause) return word;
+  return "";
+}
+
+// Counters that the service keeps, since the farm itself cannot. All start at 0 when the coordinator starts;
+// members whose names end in _now are current values. A unit is one round (range of samples) of one tile.
 struct FarmFigures {
   // Leases
   std::uint64_t leases_granted = 0, units_leased = 0;
@@ -28,12 +61,33 @@ struct FarmFigures {
   std::uint64_t folded = 0;                 // units whose result was added to the image
   double fold_lag_seconds = 0;              // from a result's arrival to its fold, summed over `folded`
   std::uint64_t arrived_now = 0;            // results that are being verified and stored
-  std::uint64_t arrived_bytes = 0;          // bytes that these results take
+  std::uint64_t arrived_bytes = 0;          // bytes of memory that these results occupy
   std::uint64_t waiting_now = 0;            // accepted results that wait for an earlier round of their tile
   std::uint64_t background_writes_now = 0;  // writes that wait for the disk
   // Bytes
   std::uint64_t result_bytes = 0;  // bytes received in results from workers
   std::uint64_t blob_bytes = 0;    // bytes sent to workers in blobs (files of scenes)
+};
+
+// Limits on how many workers may hold units, and on how many units may be leased, at the same time; 0: no
+// limit. A user's limits hold for all its jobs together.
+struct ShareLimits {
+  std::uint32_t workers_per_job = 0, units_per_job = 0;
+  std::uint32_t workers_per_user = 0, units_per_user = 0;
+  bool operator==(const ShareLimits&) const = default;
+};
+
+// Counts of audits since the start of the coordinator. In an audit another worker renders the unit of an
+// accepted result again, and the two results are compared.
+struct AuditFigures {
+  std::uint64_t asked = 0;  // audits begun
+  std::uint64_t equal = 0;  // audits whose second result had the same bits
+  // Audits whose second result had other bits: a third worker was asked, or the job failed
+  std::uint64_t differ = 0;
+  std::uint64_t dropped = 0;  // audits given up: no other worker could render the unit, or the job ended
+  // Results chosen for an audit that did not begin: no other worker of the class was connected
+  std::uint64_t missed = 0;
+  std::uint64_t workers_quarantined = 0, tiles_discarded = 0;
 };
 
 }  // namespace ls::coordinator

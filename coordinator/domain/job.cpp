@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "common/image/frame/tiles_over.h"
+
 namespace ls::coordinator {
 
 Job::Job(JobSeq number, JobPlan asked)
@@ -12,7 +14,12 @@ Job::Job(JobSeq number, JobPlan asked)
       queue(plan.grid.count(), round_count(spp)),
       cost(plan.grid.count()) {
   std::sort(plan.tags.begin(), plan.tags.end());
+  look_at_focus();
   steer();
+}
+
+void Job::look_at_focus() {
+  queue.set_focus(plan.focus ? tiles_over(plan.grid, *plan.focus) : std::vector<TileIndex>());
 }
 
 void Job::steer() {
@@ -22,13 +29,18 @@ void Job::steer() {
   queue.want_all();
   marks.clear();
   marked_spp = 0;
-  if (plan.target_error) adaptive.emplace(plan.grid, spp);
+  denoised.reset();
+  checking_spp = predicted_error = 0;
+  if (!plan.target_error) return;
+  adaptive.emplace(plan.grid, spp);
+  if (plan.target_denoised) denoised.emplace();
 }
 
 void Job::move_windows(int farm_threads) {
-  if (adaptive_running() &&
+  const auto target = predicted_target();
+  if (adaptive_running() && target &&
       adaptive->rounds_seen() >= predicted_at + std::max<std::uint64_t>(1, adaptive->groups() / 2)) {
-    adaptive->foresee(*plan.target_error);
+    adaptive->foresee(*target);
     predicted_at = adaptive->rounds_seen();
   }
   for (TileIndex t = 0; t < units.tiles(); ++t) move_window(t, farm_threads);
@@ -36,8 +48,8 @@ void Job::move_windows(int farm_threads) {
 
 void Job::move_window(TileIndex tile, int farm_threads) {
   if (!adaptive_running()) return queue.set_window(tile, units.rounds_complete() + kRoundsAhead);
-  // `busy`: rounds that each tile needs ahead so that all threads of the farm have work. A small image has
-  // few tiles, so it needs more of them.
+  // `busy`: number of rounds that each tile needs ahead so that all threads of the farm have work. A small
+  // image has few tiles, so each needs more rounds.
   const RoundIndex busy = kUnitsAThread * static_cast<RoundIndex>(std::max(farm_threads, 0)) / units.tiles();
   queue.set_window(tile, std::min(units.folded(tile) + kRoundsAhead, adaptive->predicted_last(tile) + busy));
   queue.set_wanted(tile, adaptive->wanted(tile) + 1, adaptive->variance(tile));

@@ -4,20 +4,82 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <limits>
 #include <map>
+#include <set>
 #include <unordered_map>
+#include <utility>
+#include <vector>
 
+#include "common/image/frame/frame.h"
 #include "coordinator/domain/adaptive_stop.h"
-#include "coordinator/domain/cost_model.h"
+#include "coordinator/domain/denoised_target.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/domain/failure_budget.h"
+#include "coordinator/domain/limits.h"
 #include "coordinator/domain/unit_queue.h"
 #include "coordinator/domain/unit_table.h"
-#include "coordinator/domain/voter_table.h"
 
 namespace ls::coordinator {
+
+// The CPU seconds that one pixel sample costs, as results report them: for each tile, and as a
+// running mean over the job for tiles that have no result yet. The cost affects the size of leases and their
+// deadlines, never a pixel.
+class CostModel {
+ public:
+  explicit CostModel(TileIndex tiles) : tile_cost_(tiles, 0.0f) {}
+
+  // Adds the cost of one result of this tile. An implausible cost (negative, not finite, more than a day) is
+  // ignored.
+  void measured(TileIndex tile, std::uint64_t pixel_samples, double cpu_seconds) {
+    if (!(cpu_seconds >= 0 && cpu_seconds <= kMostUnitSeconds) || pixel_samples == 0) return;
+    const double n = static_cast<double>(pixel_samples);
+    seconds_ = seconds_ * kMemory + cpu_seconds;
+    samples_ = samples_ * kMemory + n;
+    tile_cost_[tile] = static_cast<float>(cpu_seconds / n);
+  }
+  bool known() const { return samples_ > 0; }
+  double per_sample() const { return known() ? seconds_ / samples_ : 0; }
+  // Predicts the CPU seconds of a unit of this tile with this many pixel samples; 0 if nothing has been
+  // measured.
+  double predict(TileIndex tile, std::uint64_t pixel_samples) const {
+    if (!known()) return 0;
+    const double cost = tile_cost_[tile] > 0 ? tile_cost_[tile] : per_sample();
+    return std::max(kLeastSeconds, cost * static_cast<double>(pixel_samples));
+  }
+
+ private:
+  // CPU seconds that any unit costs at least, however few its samples
+  static constexpr double kLeastSeconds = 1e-4;
+  // Weight of the past per result: an exponential mean over the last few hundred results
+  static constexpr double kMemory = 1 - 1.0 / 256;
+  double seconds_ = 0, samples_ = 0;
+  std::vector<float> tile_cost_;
+};
+
+// Remembers workers that once held a lease on a unit (one round of one tile) but did not deliver its accepted
+// result. If results of a unit differ, only these workers may vote on it (farm_trust.cpp). The table is
+// bounded: beyond kMaxVoters the entries of the earliest rounds are dropped, and later results of those units
+// are mere claims, not votes.
+class VoterTable {
+ public:
+  void note(UnitCode unit, WorkerIndex worker) {
+    held_.emplace(unit, worker);
+    if (held_.size() > kMaxVoters) held_.erase(held_.begin());
+  }
+  bool has(UnitCode unit, WorkerIndex worker) const { return held_.contains({unit, worker}); }
+  void clear() { held_.clear(); }
+  std::size_t size() const { return held_.size(); }
+  void mark_workers(std::vector<bool>& used) const {
+    for (const auto& [unit, worker] : held_) used[worker] = true;
+  }
+
+ private:
+  std::set<std::pair<UnitCode, WorkerIndex>> held_;
+};
 
 using JobSeq = std::uint64_t;    // order of submission
 using LeaseSeq = std::uint64_t;  // order of leasing; 0: no lease
@@ -46,8 +108,8 @@ struct Audit {
   WorkerIndex first = kNoWorker;  // worker of the accepted result
   // The second result, if it differs from the accepted one
   std::optional<std::pair<WorkerIndex, Digest>> second;
-  // A differing result that nobody asked this worker for. It counts as no vote, but an audit is made because
-  // of it
+  // A differing result from a worker that was not asked for it. It does not count as a vote, but it causes an
+  // audit
   std::optional<std::pair<WorkerIndex, Digest>> claim;
   std::vector<WorkerIndex> tried;  // workers that tried to render it for the audit and failed
   TimePoint since{};               // time of the second result, or of the restart
@@ -61,12 +123,12 @@ struct Audit {
   }
 };
 
-// A level of the adaptive stop rule (adaptive_stop.h). A checkpoint is taken of its image as soon as all of
-// it is folded.
+// A level of the adaptive stop rule (adaptive_stop.h). A checkpoint of the level's image is taken as soon as
+// all its rounds are folded.
 struct LevelMark {
   std::vector<RoundIndex> rounds;  // for each tile, how many rounds it has at this level
   double spp = 0;                  // samples per pixel, mean over all pixels
-  TileIndex missing = 0;           // number of tiles that are not folded that far yet
+  TileIndex missing = 0;           // number of tiles whose rounds of this level are not all folded yet
 };
 
 struct Job {
@@ -76,12 +138,12 @@ struct Job {
   JobPlan plan;
   std::uint64_t spp;  // samples per pixel: the plan's, or kMaxSppWithoutLimit; always even
   JobState state = JobState::queued;
-  // Why the job ends. It is set once the last rounds of all tiles are decided, though units of them may still
-  // be leased or not folded. It is final once the job is done
+  // Why the job ends. It is set once the last rounds of all tiles are decided, although some of their units
+  // may still be leased or not folded. It is final once the job is done
   std::optional<StopReason> stopping;
   bool frozen = false;  // stopped by time or user: only results of units leased before are still accepted
   std::optional<Digest> numeric_class;
-  // Start of the job's clock, moved on by the times for which the clock was stopped
+  // Time of the first ray, shifted by the periods during which the job's clock was stopped
   std::optional<TimePoint> first_ray;
   std::optional<TimePoint> still_since;  // set while the job is paused or done: its time budget does not run
 
@@ -104,7 +166,11 @@ struct Job {
   std::optional<AdaptiveStop> adaptive;  // only for a job with a target error
   double level_seen = 0;                 // the last level at which the image was judged; 0: none
   std::deque<LevelMark> marks;  // levels whose checkpoints are still to be taken, by rising number of samples
-  double marked_spp = 0;        // LevelMark::spp of the last mark made
+  // Only for a job whose target error is that of its denoised layers
+  std::optional<DenoisedTarget> denoised;
+  double checking_spp = 0;     // the level whose denoised error the service was asked for; 0: none
+  double predicted_error = 0;  // relMSE of the image itself at which that job will probably end; 0: unknown
+  double marked_spp = 0;       // LevelMark::spp of the last mark made
   std::uint64_t predicted_at = 0;  // rounds_seen() at the last call of foresee()
 
   bool ended() const { return is_terminal(state); }
@@ -127,6 +193,11 @@ struct Job {
   // Starts the stop rule if the plan has a target error, drops it if the plan has none any more, and has the
   // image judged again.
   void steer();
+  // The relMSE of the image itself at which the job will probably end; nullopt: unknown
+  std::optional<double> predicted_target() const {
+    if (!denoised) return plan.target_error;
+    return predicted_error > 0 ? std::optional(predicted_error) : std::nullopt;
+  }
   // Returns the last round of the tile that may be folded now.
   RoundIndex last_foldable(TileIndex tile) const {
     return adaptive_running() ? adaptive->wanted(tile) : std::numeric_limits<RoundIndex>::max();
@@ -135,14 +206,15 @@ struct Job {
   // many threads in total.
   void move_windows(int farm_threads);
   void move_window(TileIndex tile, int farm_threads);
-  // Sets the end of each tile to ends[tile] rounds, unless it ends earlier already, and forgets results that
-  // were accepted of later rounds. `reason` is why the job ends. Does nothing if no tile ends earlier than
-  // before.
+  // Sets the end of each tile to ends[tile] rounds, unless it ends earlier already, and forgets accepted
+  // results of later rounds. `reason` is why the job ends. Does nothing if no tile ends earlier than before.
   void cut_off(const std::vector<RoundIndex>& ends, StopReason reason);
-  void plan_all();  // sets every tile's end to the requested samples
-  // Returns the time at which the job's time budget is used up; nullopt: it has none, or no ray yet.
+  void look_at_focus();  // applies JobPlan::focus to the order of the units
+  void plan_all();       // sets every tile's end to the requested samples
+  // Returns the time at which the job's time budget is used up; nullopt: the job has no time budget, or no
+  // ray was traced yet.
   std::optional<TimePoint> time_limit(TimePoint now) const;
-  // Call both around a change of state that may stop or start the job's clock.
+  // Call stand_still() before and go_on() after a change of state that may stop or start the job's clock.
   void stand_still(TimePoint now);
   void go_on(TimePoint now);
 };

@@ -6,7 +6,7 @@
 
 namespace ls::coordinator {
 
-// `queued`: nothing has been leased yet. The last three are final; only `done` can be extended.
+// `queued`: no unit has been leased yet. The last three are final, except that a `done` job can be extended.
 enum class JobState { queued, running, paused, done, failed, cancelled };
 constexpr std::string_view to_string(JobState state) {
   constexpr std::string_view kWords[] = {"queued", "running", "paused", "done", "failed", "cancelled"};
@@ -14,17 +14,18 @@ constexpr std::string_view to_string(JobState state) {
 }
 // True for states that a job never leaves.
 constexpr bool is_closed(JobState state) { return state == JobState::failed || state == JobState::cancelled; }
-// True for final states. A job leaves one only if it is done and then extended.
+// True for final states. Of these, a job can leave only `done`, by an extension.
 constexpr bool is_terminal(JobState state) { return state == JobState::done || is_closed(state); }
 
-// Why a done job ended: it has its samples per pixel, has reached its target error, has used up its time, or
-// its user stopped it.
+// Why a job is done: it has its samples per pixel, has reached its target error, has used up its time, or its
+// user stopped it.
 enum class StopReason { spp, error, time, user };
 constexpr std::string_view to_string(StopReason reason) {
   constexpr std::string_view kWords[] = {"spp", "error", "time", "user"};
   return kWords[static_cast<std::size_t>(reason)];
 }
 
+// A worker is unhealthy if it failed in two jobs, or is quarantined. In the HTTP API this state is "sick".
 enum class WorkerState { connected, draining, lost, unhealthy };
 constexpr std::string_view to_string(WorkerState state) {
   constexpr std::string_view kWords[] = {"connected", "draining", "lost", "sick"};

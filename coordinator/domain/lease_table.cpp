@@ -1,6 +1,6 @@
 #include "coordinator/domain/lease_table.h"
 
-#include <charconv>
+#include "common/base/parse_number.h"
 
 namespace ls::coordinator {
 
@@ -19,9 +19,8 @@ LeaseRecord* LeaseTable::find(const LeaseId& id) {
   const std::string_view text = id.value;
   const std::size_t head = prefix_.size() + 1;
   if (text.size() <= head || !text.starts_with(prefix_) || text[head - 1] != '-') return nullptr;
-  LeaseSeq seq = 0;
-  const auto [end, error] = std::from_chars(text.data() + head, text.data() + text.size(), seq);
-  return error == std::errc{} && end == text.data() + text.size() ? find(seq) : nullptr;
+  const auto seq = parse_number<LeaseSeq>(text.substr(head));
+  return seq ? find(*seq) : nullptr;
 }
 
 void LeaseTable::erase(LeaseSeq seq) {

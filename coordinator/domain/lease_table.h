@@ -15,17 +15,20 @@ struct LeaseRecord {
   LeaseSeq seq = 0;
   Job* job = nullptr;
   Worker* worker = nullptr;
-  // All units of the lease, finished ones included. A unit is still leased if this lease is among its Holders
-  // (job.h)
+  // All units of the lease, finished ones included. A unit is still leased if its Holders (job.h) name this
+  // lease
   std::vector<UnitCode> units;
   std::uint32_t remaining = 0;  // number of units still leased
   std::uint32_t reported = 0;   // number of units done, as the worker's progress reports say
   double seconds_per_unit = 0;  // predicted CPU seconds of a unit, mean over all units of the lease
-  // Core seconds charged to the owner's share: as above, or kAssumedUnitSeconds if nothing is measured
+  // Core seconds per unit charged to the owner's share: seconds_per_unit, or kAssumedUnitSeconds if nothing
+  // is measured
   double charge_per_unit = 0;
-  bool audit = false;  // true if it holds one unit that is accepted already and is rendered again to compare
+  bool audit = false;  // true for an audit: a lease of one unit that has an accepted result, rendered again
+                       // for comparison
   TimePoint issued{};
-  // Predicted time from `issued` until its last unit is done, after the worker's earlier leases
+  // Predicted time from `issued` until its last unit is done, including the wait for the worker's earlier
+  // leases
   Duration predicted{};
   TimePoint deadline{};
 };

@@ -19,57 +19,60 @@ using namespace std::chrono_literals;
 inline constexpr std::uint64_t kMaxSppWithoutLimit = 65536;
 
 // Leases
-inline constexpr double kLeaseSeconds = 2.0;  // a lease should keep all threads of a worker busy this long
+inline constexpr double kLeaseSeconds = 2.0;  // work that a lease should give to all threads of a worker
 // Lower bound for the share of a core that a worker's thread gets
 inline constexpr double kLeastCoreShare = 1.0 / 64;
-// Units in one lease: keeps the message that assigns it well below 1 MiB
+// Most units in one lease. It keeps the message that assigns the lease well below 1 MiB
 inline constexpr std::uint32_t kMaxLeaseUnits = 1024;
-// Leases that a worker holds: one being rendered, two ahead
+// Leases that a worker holds: one that it renders, and two that wait
 inline constexpr std::uint32_t kQueuedLeases = 3;
-// Units per thread that a worker holds: one being rendered, one ahead, even if units take long
+// Units per thread that a worker holds, even if units take long: one that it renders, and one that waits
 inline constexpr std::uint32_t kUnitsAThread = 2;
 // Speculative units (units that may turn out not to be needed) go only to workers whose queued work takes
-// less than this many seconds. With 0 a worker would wait for a message between two small units.
+// less than this many seconds. With 0 a worker would idle between two small units until the next message.
 inline constexpr double kSpeculativeSeconds = .05;
-inline constexpr std::uint32_t kMaxLeasesPerWorker = 64;  // near the end of a job a lease is a single unit
-// A lease's deadline is this many times its predicted duration away, plus the slacks below
+inline constexpr std::uint32_t kMaxLeasesPerWorker = 64;  // applies near the end of a job, when a lease is a
+                                                          // single unit
+// A lease's deadline is this many times its predicted duration after its grant, plus the slacks below
 inline constexpr double kDeadlineFactor = 3.0;
 inline constexpr Duration kDeadlineSlack = 10s;  // added to every lease's deadline
-// Added, too, until the worker has finished a unit of the job: it may have to load the world
+// Also added until the worker has finished a unit of the job: it may have to load the world
 inline constexpr Duration kLoadSlack = 120s;
 // If a worker finishes no unit for this long, its progress reports no longer renew its leases
 inline constexpr Duration kNoGrowthLimit = 600s;
-// A lease that will wait at least this long behind other work of its worker is moved to an idle worker. The
-// time is far longer than it takes to send a lease.
+// A lease that will wait at least this long behind other work of its worker is moved to an idle worker. This
+// is far longer than it takes to send a lease.
 inline constexpr Duration kTakeBackAfter = 20ms;
 // Idle workers may copy the units of a lease after kSpeculateAfter times its predicted duration plus
 // kSpeculateSlack
 inline constexpr double kSpeculateAfter = 1.5;
 inline constexpr Duration kSpeculateSlack = 1s;
-// Leases that are checked when an idle worker looks for units to copy or take over
+// Most leases that are checked when an idle worker looks for units to copy or take over
 inline constexpr std::uint32_t kSpeculationScan = 64;
 
 // Fair shares
-inline constexpr double kMostUnitSeconds = 86400;  // a time that a result reports is ignored if it is longer
+inline constexpr double kMostUnitSeconds = 86400;  // longer times reported by results are ignored
 inline double plausible_seconds(double reported) {
   return reported >= 0 && reported <= kMostUnitSeconds ? reported : 0;
 }
-// Core seconds charged for a unit while nothing of its job is measured
+// Core seconds charged for a unit until a cost is measured for its job
 inline constexpr double kAssumedUnitSeconds = 1.0;
-// A worker may go on with a job whose world it holds instead of loading another, as long as that job's lag
-// (fair_share.h) is at most this many seconds times the farm's threads greater than that of the job in turn.
+// A worker may continue a job whose world it has loaded instead of loading the world of the job in turn, as
+// long as the lag (fair_share.h) of the former exceeds that of the latter by at most this many seconds times
+// the farm's threads.
 inline constexpr double kLocalitySeconds = 5.0;
-inline constexpr std::uint32_t kJobsLookedAt = 64;  // jobs checked to find one whose world the worker holds
-// Blobs remembered of those that a worker reports to hold
+inline constexpr std::uint32_t kJobsLookedAt = 64;  // most jobs checked to find one whose world the worker
+                                                    // has loaded
+// Most blobs remembered per worker, of those that it reports to hold
 inline constexpr std::size_t kBlobsRemembered = 1024;
 
 // Audits
 
-// audits open at the same time per job; at this number no further one begins
+// most audits open at the same time per job; no further one begins then
 inline constexpr std::size_t kMaxAuditsOpen = 64;
 // Time for workers to reconnect before a restored audit is dropped
 inline constexpr Duration kAuditAfterRestart = 60s;
-// Pairs of unit and worker remembered per job: voter_table.h
+// Most pairs of unit and worker remembered per job: VoterTable
 inline constexpr std::size_t kMaxVoters = 65'536;
 
 // Rounds that may be leased ahead of the folded ones
@@ -81,27 +84,30 @@ inline constexpr RoundIndex kRoundsAhead = 64;  // bounds how many results wait 
 // kUnitFailureAttempts attempts. Fewer workers are enough if fewer are connected
 inline constexpr std::uint32_t kUnitFailureWorkers = 3;
 inline constexpr std::uint32_t kUnitFailureAttempts = 2;
-// After so many failures a worker gets no more units of the job
+// After this many failures a worker gets no more units of the job
 inline constexpr std::uint32_t kWorkerFailuresPerJob = 3;
-// A worker that is blocked from so many jobs is unhealthy: it gets no work at all
+// A worker that is blocked from this many jobs is unhealthy: it gets no work at all
 inline constexpr std::uint32_t kUnhealthyJobs = 2;
 // A worker's failures are forgiven this long after the last one
 inline constexpr Duration kForgiveAfter = 1800s;
 inline constexpr Duration kForgetWorkerAfter = 3600s;  // a worker is forgotten this long after it was lost
-// How many names of workers that are gone may be kept before unused ones are dropped
+// Number of names of departed workers that are kept before unused ones are dropped
 // (WorkerTable::has_many_names)
 inline constexpr std::size_t kNamesKept = 256;
-inline constexpr std::uint32_t kMaxNamedWorkers = 8;  // workers that one message names
+inline constexpr std::uint32_t kMaxNamedWorkers = 8;  // most workers that one message names
 
 // Stopping
 
-// samples per pixel that every tile gets before it may stop for its error
+// samples per pixel that every tile gets before its error may stop it
 inline constexpr std::uint64_t kMinSppBeforeStop = 64;
 inline constexpr int kMinStopPixels = 1024;  // fewest pixels in a group of tiles that stop together
-// Seconds of work that a worker's leases hold. At twice this before its time limit a job's end is planned.
+// Seconds of work that the leases of a worker hold. The end of a job is planned when its time limit is less
+// than twice this away.
 inline constexpr double kTimePlanned = kQueuedLeases * kLeaseSeconds;
-// Of two levels of the stop rule that make checkpoints one after the other, the later has at least this many
-// times the samples of the earlier
+// Smallest ratio of the samples of two consecutive levels of the stop rule that make checkpoints
 inline constexpr double kCheckpointGrowth = 1.15;
+// The same of two levels at which the error of the denoised layers is checked: denoising takes as long as a
+// few samples per pixel
+inline constexpr double kDenoisedCheckGrowth = 1.4;
 
 }  // namespace ls::coordinator

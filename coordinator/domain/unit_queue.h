@@ -5,11 +5,16 @@
 // early. In an adaptive job some rounds are speculative: they may turn out not to be needed. They go behind
 // all that are certain, in the order in which the stop rule would come to need them (adaptive_stop.h).
 //
-// Every operation costs O(log tiles) at most, amortised; memory is 20 bytes per tile, 60 if there are
-// speculative units.
+// A focus is a set of tiles whose certain units go before those of all other tiles. It changes the order of
+// units and nothing else: which units belong to the job, and which of them are certain, do not depend on it.
+// Speculative units keep their order, since those that go early are the ones most likely to be needed.
+//
+// Every operation but set_focus() costs O(log tiles) at most, amortised; memory is 20 bytes per tile, 60 if
+// there are speculative units.
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -34,7 +39,7 @@ class UnitQueue {
   }
 
   TileIndex tiles() const { return static_cast<TileIndex>(next_.size()); }
-  // Returns how many rounds of the tile belong to the job
+  // Returns the number of rounds of the tile that belong to the job
   RoundIndex end(TileIndex tile) const { return end_[tile]; }
   RoundIndex longest() const { return *std::max_element(end_.begin(), end_.end()); }
   // True if the unit belongs to the job: its round is before its tile's end.
@@ -54,9 +59,10 @@ class UnitQueue {
     counting(tile, [&] { window_[tile] = window; });
     if (!was_open) offer(tile);
   }
-  // Says that the tile's rounds before `before` are certain to be needed. Later ones are speculative and
+  // Declares the tile's rounds before `before` as certain to be needed. Later ones are speculative and
   // ordered by the error that each removes per sample: `variance` divided by the product of the sample counts
-  // without and with that round. `variance` is the variance per sample of the tile's group; NaN: unknown.
+  // without and with that round. `variance` is the variance per sample of the group of tiles that stop
+  // together with this one; NaN: unknown.
   void set_wanted(TileIndex tile, RoundIndex before, double variance) {
     if (wanted_.empty()) wanted_.assign(next_.size(), {});
     const float weight =
@@ -67,27 +73,41 @@ class UnitQueue {
     counting(tile, [&] { wanted_[tile] = {before, weight}; });
     if (!was_wanted || !wanted(unit_code(next_[tile], tile))) offer(tile);
   }
-  // Says that all rounds of all tiles are certain to be needed.
+  // Declares all rounds of all tiles as certain to be needed.
   void want_all() {
     if (wanted_.empty()) return;
     wanted_.clear();
     perhaps_ = {};
-    returned_.merge(returned_perhaps_);
+    for (const UnitCode code : returned_perhaps_) line_of(tile_of(code)).returned.insert(code);
+    returned_perhaps_.clear();
     surely_ = 0;
     for (TileIndex t = 0; t < tiles(); ++t) {
       surely_ += surely(t);
       offer(t);
     }
   }
+  // Sets the focus to these tiles; empty: there is no focus. Costs O(tiles).
+  void set_focus(const std::vector<TileIndex>& focus) {
+    std::vector<bool> chosen(focus.empty() ? 0 : next_.size());
+    for (const TileIndex t : focus) chosen[t] = true;
+    if (chosen == focus_) return;
+    focus_ = std::move(chosen);
+    Line all;
+    for (Line& line : lines_) all.returned.merge(line.returned);
+    lines_ = {};
+    for (const UnitCode code : all.returned) line_of(tile_of(code)).returned.insert(code);
+    for (TileIndex t = 0; t < tiles(); ++t)
+      if (wanted(unit_code(next_[t], t))) offer(t);
+  }
   bool wanted(UnitCode code) const { return round_of(code) < wanted_before(tile_of(code)); }
-  // Returns how many waiting units are certain to be needed. May count units that have an accepted result
-  // already, because it arrived before their turn.
-  std::uint64_t surely_waiting() const { return surely_ + returned_.size(); }
+  // Returns how many waiting units are certain to be needed. Units whose result arrived before their turn may
+  // be counted, too.
+  std::uint64_t surely_waiting() const { return surely_ + surely_returned(); }
 
-  // Returns the number of the tile's round that is next in order: every earlier round of the tile has been
-  // leased at least once, or accepted.
+  // Returns the tile's next round in order: every earlier round of the tile has been leased at least once, or
+  // accepted.
   RoundIndex next(TileIndex tile) const { return next_[tile]; }
-  // Makes the tile's rounds from `round` on wait again.
+  // Puts the tile's rounds from `round` on back into the queue.
   void rewind(TileIndex tile, RoundIndex round) {
     forget_from(tile, round);
     if (round >= next_[tile]) return;
@@ -95,54 +115,69 @@ class UnitQueue {
     offer(tile);
   }
 
-  // Returns the first waiting unit that may be leased; nullopt if there is none. Certain units go before
-  // speculative ones, and within each of the two those that came back go first. Of the units that came back,
-  // those are skipped for which `excluded` is true; other units are not asked.
+  // Returns the first waiting unit that may be leased; nullopt if there is none. Certain units of the focus
+  // go first, then the other certain ones, then speculative ones; within each of the three those that came
+  // back go first. `excluded` is asked only about units that came back, and those for which it is true are
+  // skipped.
   template <class Excluded>
   std::optional<UnitCode> front(const UnitTable& units, Excluded&& excluded) {
     const auto first_of = [&](const std::set<UnitCode>& returned) {
       const auto it = std::find_if_not(returned.begin(), returned.end(), excluded);
       return it == returned.end() ? std::nullopt : std::optional(*it);
     };
-    if (const auto code = first_of(returned_)) return code;
-    std::optional<UnitCode> next = head();
-    for (; next && units.accepted(*next); next = head()) advance(tile_of(*next));
-    if (next && wanted(*next)) return next;
-    const auto perhaps = first_of(returned_perhaps_);
-    return perhaps ? perhaps : next;
+    for (Line& line : lines_) {
+      if (const auto code = first_of(line.returned)) return code;
+      while (const auto next = head(line)) {
+        if (!units.accepted(*next)) return next;
+        advance(tile_of(*next));
+      }
+    }
+    if (const auto code = first_of(returned_perhaps_)) return code;
+    while (const auto next = perhaps_head()) {
+      if (!units.accepted(*next)) return next;
+      advance(tile_of(*next));
+    }
+    return std::nullopt;
   }
   bool empty(const UnitTable& units) {
     return !front(units, [](UnitCode) { return false; });
   }
   // Removes the unit that front() returned.
   void pop(UnitCode code) {
-    if (head() == code)
+    if (waits(code))
       advance(tile_of(code));
     else
       forget(code);
   }
-  // Says that a leased unit came back without a result: it waits again.
+  // Puts a leased unit that came back without a result into the queue again.
   void put_back(UnitCode code) {
     if (plans(code) && round_of(code) < next_[tile_of(code)])
-      (wanted(code) ? returned_ : returned_perhaps_).insert(code);
+      (wanted(code) ? line_of(tile_of(code)).returned : returned_perhaps_).insert(code);
   }
-  // Says that a late result arrived for this unit, which may be waiting: it no longer waits.
+  // Removes a unit from the queue, if it is there, because a late result of it arrived.
   void forget(UnitCode code) {
-    returned_.erase(code);
+    line_of(tile_of(code)).returned.erase(code);
     returned_perhaps_.erase(code);
   }
-  bool returned(UnitCode code) const { return returned_.contains(code) || returned_perhaps_.contains(code); }
-  std::size_t returned_count() const { return returned_.size() + returned_perhaps_.size(); }
-  // Number of entries in the two heaps, to measure memory use
-  std::size_t entries() const { return heads_.size() + perhaps_.size(); }
+  bool returned(UnitCode code) const {
+    return line_of(tile_of(code)).returned.contains(code) || returned_perhaps_.contains(code);
+  }
+  std::size_t returned_count() const { return surely_returned() + returned_perhaps_.size(); }
+  // Number of entries in the heaps, for measurements of memory use
+  std::size_t entries() const { return lines_[0].heads.size() + lines_[1].heads.size() + perhaps_.size(); }
 
  private:
   static constexpr RoundIndex kNoWindow = std::numeric_limits<RoundIndex>::max();
 
-  // Per tile, the round set by set_wanted(). Not used while no tile has speculative units.
+  // The round set by set_wanted(), per tile. Not used while no tile has speculative units.
   struct Wanted {
     RoundIndex before = kNoWindow;
     float weight = 0;
+  };
+  // Certain units, in the order in which they go; those in `returned` go before those in `heads`
+  struct Line {
+    std::priority_queue<UnitCode, std::vector<UnitCode>, std::greater<>> heads;
+    std::set<UnitCode> returned;
   };
   // A speculative unit, with the error that it removes per sample.
   struct Perhaps {
@@ -171,16 +206,19 @@ class UnitQueue {
     change();
     surely_ += surely(t);
   }
-  // heads_ and perhaps_ together hold the next unit of every open tile, and outdated entries, which head()
-  // drops.
+  Line& line_of(TileIndex t) { return lines_[focus_.empty() || focus_[t] ? 0 : 1]; }
+  const Line& line_of(TileIndex t) const { return lines_[focus_.empty() || focus_[t] ? 0 : 1]; }
+  std::size_t surely_returned() const { return lines_[0].returned.size() + lines_[1].returned.size(); }
+  // The heads of the two lines and perhaps_ together hold the next unit of every open tile, and outdated
+  // entries, which head() and perhaps_head() drop.
   void offer(TileIndex tile) {
     if (!open(tile)) return;
     const UnitCode code = unit_code(next_[tile], tile);
-    if (wanted(code)) return heads_.push(code);
+    if (wanted(code)) return line_of(tile).heads.push(code);
     if (perhaps_.size() > 2 * next_.size()) return offer_all_perhaps();
     perhaps_.push({gain(code), code});
   }
-  // Rebuilds perhaps_ without outdated entries, so that these never outnumber the others by much.
+  // Rebuilds perhaps_ without outdated entries, so that outdated entries never outnumber the others by much.
   void offer_all_perhaps() {
     std::vector<Perhaps> all;
     for (TileIndex t = 0; t < tiles(); ++t) {
@@ -189,9 +227,12 @@ class UnitQueue {
     }
     perhaps_ = std::priority_queue<Perhaps>({}, std::move(all));
   }
-  std::optional<UnitCode> head() {
-    while (!heads_.empty() && !(waits(heads_.top()) && wanted(heads_.top()))) heads_.pop();
-    if (!heads_.empty()) return heads_.top();
+  std::optional<UnitCode> head(Line& line) {
+    auto& heads = line.heads;
+    while (!heads.empty() && !(waits(heads.top()) && wanted(heads.top()))) heads.pop();
+    return heads.empty() ? std::nullopt : std::optional(heads.top());
+  }
+  std::optional<UnitCode> perhaps_head() {
     const auto alive = [&](const Perhaps& p) {
       return waits(p.code) && !wanted(p.code) && p.gain == gain(p.code);
     };
@@ -210,18 +251,20 @@ class UnitQueue {
   // `from` to `to`.
   void sort_returned(TileIndex tile, RoundIndex from, RoundIndex to) {
     if (returned_count() == 0) return;
-    auto& there = from < to ? returned_perhaps_ : returned_;
-    auto& here = from < to ? returned_ : returned_perhaps_;
+    auto& surely = line_of(tile).returned;
+    auto& there = from < to ? returned_perhaps_ : surely;
+    auto& here = from < to ? surely : returned_perhaps_;
     for (RoundIndex k = std::min(from, to); k < std::min(std::max(from, to), next_[tile]); ++k)
       if (there.erase(unit_code(k, tile)) > 0) here.insert(unit_code(k, tile));
   }
 
   std::vector<RoundIndex> next_, end_, window_;
   std::uint64_t planned_, surely_;
-  std::priority_queue<UnitCode, std::vector<UnitCode>, std::greater<>> heads_;
+  std::vector<bool> focus_;    // by tile; empty: there is no focus
+  std::array<Line, 2> lines_;  // the tiles of the focus (all tiles if there is no focus), and the others
   std::priority_queue<Perhaps> perhaps_;
   std::vector<Wanted> wanted_;  // by tile; empty: all units are certain
-  std::set<UnitCode> returned_, returned_perhaps_;
+  std::set<UnitCode> returned_perhaps_;
 };
 
 }  // namespace ls::coordinator

@@ -1,6 +1,6 @@
-// The state of one job's units; a unit is one round (range of samples) of one tile. For each unit the
-// accepted result is kept (digest and worker, 36 bytes per unit, allocated round by round as rounds begin),
-// and for each tile how many rounds are folded, that is, added to the image.
+// The state of one job's units; a unit is one round (range of samples) of one tile. For each unit the table
+// keeps the accepted result (digest and worker, 36 bytes per unit, allocated when a round begins), and for
+// each tile the number of rounds that are folded, that is, added to the image.
 #pragma once
 
 #include <cstdint>
@@ -37,13 +37,13 @@ class UnitTable {
   // Accepted results
   const Result* find(UnitCode code) const;  // null: the unit has no accepted result
   bool accepted(UnitCode code) const { return find(code) != nullptr; }
-  void accept(UnitCode code, const Result& result);  // the unit must not have an accepted result yet
+  void accept(UnitCode code, const Result& result);  // requires that the unit has no accepted result yet
   std::uint64_t accepted_count() const { return accepted_count_; }
   // One past the tile's last round that has an accepted result
   RoundIndex end_of_accepted(TileIndex tile) const;
   // Forgets the tile's accepted results of rounds from `end` on; none of these may be folded
   void truncate(TileIndex tile, RoundIndex end);
-  // Forgets round `round` of all tiles, accepted or folded; nothing of later rounds may be known
+  // Forgets round `round` of all tiles, accepted or folded. Requires that no later round has results
   void reopen(RoundIndex round);
   // Forgets all results and folds of the tile. Returns the units that had an accepted result, ascending.
   std::vector<UnitCode> void_tile(TileIndex tile);
@@ -54,12 +54,13 @@ class UnitTable {
 
   // Folding
 
-  // Returns the next round of the tile to be folded if its result is accepted and it is below `end` and at
-  // most `limit`; from then on it counts as issued. Otherwise returns nullopt.
+  // If the tile's next round to be folded has an accepted result and is below `end` and at most `limit`,
+  // returns this round and counts it as issued. Otherwise returns nullopt.
   std::optional<RoundIndex> issue_fold(TileIndex tile, RoundIndex limit, RoundIndex end);
   // Number of rounds whose fold was requested
   RoundIndex issued(TileIndex tile) const { return issued_[tile]; }
-  // Notes that the tile's round is folded. False, and nothing changes, if it is not the next issued round.
+  // Notes that the tile's round is folded. If it is not the next issued round, returns false and changes
+  // nothing.
   bool fold(TileIndex tile, RoundIndex round, double rel_error_sum);
   void restore_folded(TileIndex tile, RoundIndex rounds);
   void restore_error(RoundIndex round, TileIndex tile, double rel_error_sum);

@@ -103,7 +103,7 @@ bool holds(const Job& job, const Worker& worker) {
 bool fits(const Job& job, const Worker& worker) {
   if (worker.quarantined) return false;
   if (worker.memory_bytes != 0 && job.plan.memory_bytes > worker.memory_bytes) return false;
-  if (job.numeric_class && *job.numeric_class != worker.numeric_class) return false;
+  if (job.numeric_class ? *job.numeric_class != worker.numeric_class : !worker.may_begin) return false;
   return std::includes(worker.tags.begin(), worker.tags.end(), job.plan.tags.begin(), job.plan.tags.end());
 }
 

@@ -2,25 +2,51 @@
 // tile; a lease is a list of units that one worker was told to render.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <set>
 #include <unordered_map>
 #include <vector>
 
-#include "coordinator/domain/core_share.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/domain/failure_budget.h"
 #include "coordinator/domain/job.h"
+#include "coordinator/domain/limits.h"
 
 namespace ls::coordinator {
 
-// Why a connected worker gets no work at the moment
+// The share of a core that each thread of a worker gets: CPU seconds used / (CPU seconds used + seconds
+// waited). Both are measured from the reports that come with the worker's results. The seconds waited are
+// those that the thread waited for a core (because of other programs, a nice value, or more threads than
+// cores) or for memory from the disk. Costs are CPU seconds (CostModel); this share converts them to
+// wall-clock seconds. It affects the size of leases, their deadlines and predictions, never a pixel.
+class CoreShare {
+ public:
+  // Adds the times of one result. A pair with an implausible value (negative, not finite, more than a day) is
+  // ignored.
+  void measured(double cpu_seconds, double wait_seconds) {
+    const auto sane = [](double s) { return s >= 0 && s <= kMostUnitSeconds; };
+    if (!sane(cpu_seconds) || !sane(wait_seconds)) return;
+    cpu_ = cpu_ * kMemory + cpu_seconds;
+    wall_ = wall_ * kMemory + cpu_seconds + wait_seconds;
+  }
+  // Returns the share, which is 1 until something has been measured. It is never less than kLeastCoreShare,
+  // whatever the worker reports.
+  double get() const { return wall_ > 0 ? std::max(kLeastCoreShare, cpu_ / wall_) : 1; }
+
+ private:
+  // Weight of the past per result: an exponential mean over about the last hundred results
+  static constexpr double kMemory = 1 - 1.0 / 64;
+  double cpu_ = 0, wall_ = 0;
+};
+
+// Why a connected worker gets no work for a while
 enum class Pause {
   none,
-  silent,   // the deadline of a lease passed without a message; until the worker reports
-  stuck,    // the worker reports but finishes nothing; until it finishes a unit or is idle
-  returned  // the worker returned a lease; until the next tick
+  silent,   // the deadline of a lease passed without a message; ends when the worker reports
+  stuck,    // the worker reports but finishes nothing; ends when it finishes a unit or is idle
+  returned  // the worker returned a lease; ends at the next tick
 };
 
 struct Worker {
@@ -32,15 +58,16 @@ struct Worker {
   int threads = 1;
   std::vector<std::string> tags;   // sorted
   std::uint64_t memory_bytes = 0;  // 0: unknown
-  // head_of() the digests of the blobs that the worker reports to hold, sorted
+  // head_of() of the digests of the blobs that the worker reports to hold, sorted
   std::vector<std::uint64_t> blobs;
   bool quarantined = false;  // it rendered wrong pixels
+  bool may_begin = true;     // false: it gets no units of jobs without a numeric class
   bool connected = false;
   bool draining = false;
   Pause pause = Pause::none;
   std::optional<TimePoint> unhealthy_since;
   TimePoint lost_at{};
-  TimePoint progress_at{};  // when it last finished a unit, or got its first unit after being idle
+  TimePoint progress_at{};  // when it last finished a unit, or when it got its first unit after being idle
 
   std::set<LeaseSeq> leases;
   std::uint32_t units_out = 0;  // units leased to it
@@ -48,7 +75,7 @@ struct Worker {
   std::uint64_t units_done = 0;
   CoreShare core_share;
   std::set<JobSeq> briefed;  // jobs whose settings (JobBrief) were sent on this stream
-  // Jobs of which it has finished a unit on this stream: it has loaded their world
+  // Jobs whose world it has loaded: it has finished a unit of them on this stream
   std::set<JobSeq> warmed_up;
   std::map<JobSeq, WorkerFailures> failures;
 
@@ -63,8 +90,8 @@ struct Worker {
     return it != failures.end() && it->second.blocked_at(now);
   }
   // True if the worker should get another lease. It should while it holds fewer than kUnitsAThread units per
-  // thread; beyond that, while it holds fewer than kQueuedLeases leases and its work lasts less than as many
-  // full leases. It never holds more than kMaxLeasesPerWorker leases.
+  // thread. Beyond that, it should while it holds fewer than kQueuedLeases leases and its work takes less
+  // time than that many full leases. It never holds more than kMaxLeasesPerWorker leases.
   bool wants_more() const {
     if (leases.size() >= kMaxLeasesPerWorker) return false;
     if (units_out < kUnitsAThread * static_cast<std::uint32_t>(threads)) return true;
@@ -88,10 +115,10 @@ class WorkerTable {
   Worker* find(const WorkerId& id);
   const Worker* find(const WorkerId& id) const;
   const WorkerId& name_of(WorkerIndex index) const { return ids_[index]; }
-  // Also for workers of which only the id is known, from a stored record
+  // Accepts also ids from stored records of workers that never connected to this farm
   WorkerIndex index_of(const WorkerId& id);
   void forget(Worker& worker);
-  // True if it is time for keep_names(). Names outlive their workers, since results refer to them, and
+  // True if it is time for keep_names(). A name outlives its worker, since results refer to it, and
   // preemptible workers bring new names every hour.
   bool has_many_names() const { return index_.size() > 2 * kept_ + kNamesKept; }
   std::size_t names() const { return index_.size(); }
@@ -100,7 +127,8 @@ class WorkerTable {
   void keep_names(std::vector<bool> used);
   std::vector<bool> no_index() const { return std::vector<bool>(ids_.size()); }
 
-  // Puts the worker into wanting_work() or takes it out; call it after any change to a worker.
+  // Adds the worker to wanting_work() or removes it, as its state demands; call it after any change to a
+  // worker.
   void settle(Worker& worker);
   const std::set<WorkerIndex>& wanting_work() const { return wanting_work_; }
   Worker& at(WorkerIndex index) { return *workers_.at(index); }
@@ -111,7 +139,7 @@ class WorkerTable {
   double cores() const { return cores_; }
   int connected() const { return connected_; }
   void connected(Worker& worker, bool yes);
-  // Adds a measurement to the worker's core share (core_share.h)
+  // Adds a measurement to the worker's core share
   void measured(Worker& worker, double cpu_seconds, double wait_seconds);
   void quarantine(Worker& worker);
   // Returns the number of connected workers of this numeric class that are not quarantined
@@ -121,7 +149,7 @@ class WorkerTable {
   std::vector<WorkerId> ids_;
   std::unordered_map<WorkerId, WorkerIndex> index_;
   std::vector<WorkerIndex> free_;
-  std::size_t kept_ = 0;  // number of names that the last keep_names() left
+  std::size_t kept_ = 0;  // number of names that remained after the last keep_names()
   std::map<WorkerIndex, std::unique_ptr<Worker>> workers_;
   std::set<WorkerIndex> wanting_work_;
   int threads_ = 0, connected_ = 0;
@@ -134,8 +162,8 @@ std::uint64_t head_of(const Digest& digest);
 // True if the worker has loaded the job's world, or at least reports to hold its scene file.
 bool holds(const Job& job, const Worker& worker);
 
-// True if the worker has the job's numeric class and tags, enough memory, and is not quarantined. Ignores
-// what the worker is doing.
+// True if the worker has the job's numeric class (or may begin the job, if it has none yet) and tags, has
+// enough memory, and is not quarantined. Whether the worker is busy does not matter.
 bool fits(const Job& job, const Worker& worker);
 // True if the worker fits the job and may also take units of it now.
 bool may_serve(const Job& job, const Worker& worker, TimePoint now);

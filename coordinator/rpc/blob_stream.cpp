@@ -19,7 +19,8 @@ BlobStream::BlobStream(Coordinator& coordinator, const lightshaft::farm::v1::Fet
       run_(std::move(run)),
       on_gone_(std::move(on_gone)) {}
 
-// After a write or Finish has been started, no member is used: OnDone may run at once.
+// No member may be used after a write or Finish has been started: OnDone, which deletes this object, may run
+// immediately.
 void BlobStream::begin(const JoinGuard& guard, const std::string& address) {
   if (const int wait = guard.wait(address, request_.join_token()); wait > 0)
     return Finish({grpc::StatusCode::RESOURCE_EXHAUSTED, too_many_wrong_tokens(wait)});
@@ -59,8 +60,8 @@ void BlobStream::next() {
   StartWrite(&chunk_);
 }
 
-// Ends the call with an error. The coordinator is told of a missing blob before Finish, so that the jobs that
-// need the blob are paused before the worker gives its units of them back.
+// Ends the call with an error. A missing blob is reported to the coordinator before Finish, so that the jobs
+// that need the blob are paused before the worker returns their units.
 void BlobStream::refuse(const Error& why) {
   if (why.code == Errc::not_found || why.code == Errc::failed_precondition)
     coordinator_.blob_missing(digest_, why);

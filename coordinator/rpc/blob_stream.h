@@ -1,5 +1,5 @@
 // One FetchBlob call: sends a blob to a worker in chunks, as fast as the worker takes them. The blob is read
-// on separate threads (read_pool.h): the coordinator may first have to fetch it from another machine, which
+// on separate threads: the coordinator may first have to fetch it from another machine, which
 // can take minutes, and gRPC's few threads must stay free for the messages of workers.
 #pragma once
 
@@ -12,7 +12,7 @@
 
 namespace ls::coordinator::rpc {
 
-using RunOn = std::function<void(std::function<void()>)>;  // runs the function soon, on another thread
+using RunOn = std::function<void(std::function<void()>)>;  // runs the function on another thread
 
 class BlobStream final : public grpc::ServerWriteReactor<lightshaft::farm::v1::BlobChunk> {
  public:
@@ -31,7 +31,7 @@ class BlobStream final : public grpc::ServerWriteReactor<lightshaft::farm::v1::B
 
   Coordinator& coordinator_;
   BlobStore& blobs_;
-  const lightshaft::farm::v1::FetchBlobRequest& request_;  // lives as long as the call
+  const lightshaft::farm::v1::FetchBlobRequest& request_;  // exists as long as the call
   const JoinCheck& may_join_;
   const RunOn run_;
   const std::function<void()> on_gone_;

@@ -1,7 +1,9 @@
 // Protects join tokens (with which workers prove that they belong to the farm) against guessing: after too
-// many wrong tokens an address has to wait. The gRPC server calls the two functions; the default ones allow
-// everything.
+// many wrong tokens an address has to wait. The gRPC server calls the two functions; the default functions
+// allow everything.
 #pragma once
+
+#include <fmt/format.h>
 
 #include <functional>
 #include <string>
@@ -20,9 +22,30 @@ struct JoinGuard {
 };
 
 // Returns the address without port from a gRPC peer name ("ipv4:10.0.0.7:4711", "ipv6:%5Bfd00::7%5D:4711",
-// "unix:..."); for any other form the whole name.
-std::string address_of_peer(std::string_view peer);
+// "unix:..."); a name of any other form is returned unchanged.
+inline std::string address_of_peer(std::string_view peer) {
+  constexpr std::string_view kFour = "ipv4:", kSix = "ipv6:";
+  std::string_view rest = peer;
+  if (rest.starts_with(kFour)) {
+    rest.remove_prefix(kFour.size());
+    return std::string(rest.substr(0, rest.rfind(':')));
+  }
+  if (!rest.starts_with(kSix)) return std::string(peer);
+  rest.remove_prefix(kSix.size());
+  for (const std::string_view open : {"[", "%5B", "%5b"})
+    if (rest.starts_with(open)) rest.remove_prefix(open.size());
+  for (const std::string_view close : {"]", "%5D", "%5d"})
+    if (const auto end = rest.find(close); end != std::string_view::npos)
+      return std::string(rest.substr(0, end));
+  return std::string(rest.substr(0, rest.rfind(':')));
+}
 
-std::string too_many_wrong_tokens(int seconds);  // message for the worker that has to wait
+// Returns the message for a worker that has to wait.
+inline std::string too_many_wrong_tokens(int seconds) {
+  return fmt::format(
+      "too many wrong join tokens came from this address; try again in {} s, with the one that the "
+      "coordinator keeps in the file `join-token` of its data folder",
+      seconds);
+}
 
 }  // namespace ls::coordinator

@@ -10,9 +10,8 @@
 
 #include "common/base/log.h"
 #include "common/protocol/limits.h"
+#include "coordinator/base/work_queue.h"
 #include "coordinator/rpc/blob_stream.h"
-#include "coordinator/rpc/limits.h"
-#include "coordinator/rpc/read_pool.h"
 #include "coordinator/rpc/work_stream.h"
 
 namespace ls::coordinator {
@@ -22,7 +21,26 @@ using rpc::WorkStream;
 namespace pb = ::lightshaft::farm::v1;
 
 namespace {
-// A reactor that only rejects the call.
+
+// Most workers connected at the same time; the same as kMaxWorkers
+constexpr int kWorkStreams = 16'384;
+// Most blob transfers in progress; further ones are refused, and workers retry them
+constexpr int kFetches = 512;
+// Number of threads that read blobs for these transfers. There are many, because most of them may be waiting
+// for blobs that the coordinator must first fetch from another machine
+constexpr int kReadThreads = 64;
+// Most bytes that a worker may send before the coordinator reads them.
+constexpr int kUnreadBytes = 64 << 10;
+constexpr int kHelloSeconds = 20;  // seconds after opening its stream in which a worker must send its hello
+constexpr int kHandshakeMs = 10'000;
+// Keepalive, with the same values as in worker/client/channel.cpp: a peer that has vanished is noticed within
+// 30 s.
+constexpr int kKeepaliveMs = 20'000;
+constexpr int kKeepaliveTimeoutMs = 10'000;
+// Clients that ping at shorter intervals are disconnected (GOAWAY too_many_pings).
+constexpr int kPingsNotOftenerMs = 5'000;
+
+// A reactor whose only purpose is to reject the call.
 template <class Reactor>
 class Refusal final : public Reactor {
  public:
@@ -45,11 +63,11 @@ struct GrpcServer::Impl final : pb::Farm::CallbackService {
 
   grpc::ServerBidiReactor<pb::FromWorker, pb::ToWorker>* Work(grpc::CallbackServerContext* context) override {
     const std::lock_guard lock(mutex);
-    if (stopping || streams.size() >= rpc::kWorkStreams)
+    if (stopping || streams.size() >= kWorkStreams)
       return new Refusal<grpc::ServerBidiReactor<pb::FromWorker, pb::ToWorker>>(
           stopping ? grpc::Status(grpc::StatusCode::UNAVAILABLE, "the coordinator is going down")
                    : grpc::Status(grpc::StatusCode::RESOURCE_EXHAUSTED, "too many workers are connected"));
-    const TimePoint deadline = clock.now() + std::chrono::seconds(rpc::kHelloSeconds);
+    const TimePoint deadline = clock.now() + std::chrono::seconds(kHelloSeconds);
     auto* stream = new WorkStream(coordinator, context, guard, deadline, [this](WorkStream* gone) {
       const std::lock_guard inner(mutex);
       streams.erase(gone);
@@ -61,13 +79,13 @@ struct GrpcServer::Impl final : pb::Farm::CallbackService {
 
   grpc::ServerWriteReactor<pb::BlobChunk>* FetchBlob(grpc::CallbackServerContext* context,
                                                      const pb::FetchBlobRequest* request) override {
-    if (++fetches > rpc::kFetches) {
+    if (++fetches > kFetches) {
       --fetches;
       return new Refusal<grpc::ServerWriteReactor<pb::BlobChunk>>(
           grpc::Status(grpc::StatusCode::UNAVAILABLE, "too many transfers at once; try again"));
     }
     auto* stream = new BlobStream(
-        coordinator, *request, may_join, [this](std::function<void()> read) { reads.run(std::move(read)); },
+        coordinator, *request, may_join, [this](std::function<void()> read) { reads.push(std::move(read)); },
         [this] { --fetches; });
     stream->begin(guard, address_of_peer(context->peer()));
     return stream;
@@ -93,7 +111,10 @@ struct GrpcServer::Impl final : pb::Farm::CallbackService {
   std::set<WorkStream*> streams;  // guarded by mutex
   bool stopping = false;          // guarded by mutex
   std::atomic<int> fetches{0};
-  rpc::ReadPool reads;  // stopped after the last stream
+  // Reads of blobs that wait for a thread. A read may depend on another machine, so it must not block one of
+  // gRPC's few threads, which must stay free for the messages of workers.
+  WorkQueue<std::function<void()>> reads;
+  std::vector<std::jthread> readers;  // stopped after the last stream
   std::jthread sweeper;
 };
 
@@ -110,17 +131,17 @@ Result<int> GrpcServer::start(const std::string& address, const std::optional<Tl
   builder.SetMaxReceiveMessageSize(static_cast<int>(limits::kMessageBytes));
   builder.SetMaxSendMessageSize(static_cast<int>(limits::kMessageBytes));
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, rpc::kHandshakeMs);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, rpc::kKeepaliveMs);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, rpc::kKeepaliveTimeoutMs);
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, rpc::kPingsNotOftenerMs);
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kPingsNotOftenerMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, 16 << 10);
-  // Limits the bytes that gRPC receives on a stream before the coordinator reads them; by default gRPC lets
-  // them grow to megabytes per worker.
+  // Limits the bytes that gRPC receives on a stream before the coordinator reads them. By default gRPC raises
+  // this limit to megabytes per worker.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
-  builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, rpc::kUnreadBytes);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kUnreadBytes);
   impl_->server = builder.BuildAndStart();
   if (!impl_->server || port == 0) {
     impl_->server.reset();
@@ -131,7 +152,11 @@ Result<int> GrpcServer::start(const std::string& address, const std::optional<Tl
             "not this machine's; choose another with --grpc",
             address));
   }
-  impl_->reads.start(rpc::kReadThreads);
+  for (int i = 0; i < kReadThreads; ++i)
+    impl_->readers.emplace_back([&reads = impl_->reads](const std::stop_token& token) {
+      while (!token.stop_requested())
+        for (auto& read : reads.pop(1, token)) read();
+    });
   impl_->sweeper = std::jthread([this](std::stop_token token) { impl_->sweep(token); });
   return port;
 }
@@ -146,10 +171,11 @@ void GrpcServer::stop() {
   }
   impl_->sweeper.request_stop();
   impl_->changed.notify_all();
-  // Streams that do not end by themselves within this time are cut off.
+  // Streams that do not end within this time are cut off.
   impl_->server->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(2));
   impl_->server->Wait();
-  impl_->reads.stop();
+  for (auto& reader : impl_->readers) reader.request_stop();
+  impl_->readers.clear();
   impl_->server.reset();
 }
 

@@ -1,5 +1,5 @@
-// Serves the protocol between coordinator and workers (proto/farm.proto) on a port and passes what arrives to
-// a Coordinator.
+// Serves the protocol between coordinator and workers (proto/farm.proto) on a port and passes the messages of
+// workers to a Coordinator.
 #pragma once
 
 #include <memory>
@@ -14,21 +14,22 @@ namespace ls::coordinator {
 
 class GrpcServer {
  public:
-  struct Tls {       // PEM
+  struct Tls {       // texts in PEM format
     std::string ca;  // CA that must have signed the workers' certificates
     std::string cert, key;
   };
   // `may_join` checks the join token that a worker sends with a FetchBlob call; the token in a worker's hello
   // is checked by the Coordinator. `guard` limits how many wrong tokens an address may try.
   explicit GrpcServer(Coordinator& coordinator, JoinCheck may_join = join_check({}), JoinGuard guard = {});
-  ~GrpcServer();  // stops
+  ~GrpcServer();  // calls stop()
 
   // Listens on `address`, "host:port", and returns the port; with port 0 the system chooses one. With `tls`
   // workers must present a certificate signed by Tls::ca. unavailable: the address is in use (also by another
   // coordinator, because ports are never shared) or does not belong to this machine. Starts threads, which
   // inherit the signal mask: block SIGTERM before the call.
   Result<int> start(const std::string& address, const std::optional<Tls>& tls = {});
-  // Ends all streams with UNAVAILABLE, so that the workers try to reconnect. Returns when no stream is left.
+  // Ends all streams with UNAVAILABLE, so that the workers try to reconnect. Returns when all streams have
+  // ended.
   void stop();
 
  private:

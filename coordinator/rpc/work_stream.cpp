@@ -4,30 +4,48 @@
 
 #include "common/base/log.h"
 #include "coordinator/rpc/grpc_status.h"
-#include "coordinator/rpc/limits.h"
 #include "proto/convert.h"
 
 namespace ls::coordinator::rpc {
+namespace {
+// Most messages that may wait for a worker that does not read them; the worker is disconnected if there are
+// more
+constexpr std::size_t kQueuedMessages = 8192;
+}  // namespace
 
 void Outlet::send(ToWorker message) {
   pb::ToWorker wire = wire::to_wire(message);
-  const std::lock_guard lock(mutex_);
-  if (!stream_ || closing_ || finished_) return;
-  if (queue_.size() >= kQueuedMessages) {
-    closing_ = true;
-    stream_->context_->TryCancel();
+  const auto state = state_.lock();
+  if (!state->stream || state->closing || state->finished) return;
+  if (state->queue.size() >= kQueuedMessages) {
+    state->closing = true;
+    state->stream->context_->TryCancel();
     return;
   }
-  queue_.push_back(std::move(wire));
-  stream_->pump_locked();
+  state->queue.push_back(std::move(wire));
+  state->pump();
 }
 
 void Outlet::close() {
-  const std::lock_guard lock(mutex_);
-  if (!stream_ || closing_ || finished_) return;
-  closing_ = true;
-  status_ = grpc::Status(grpc::StatusCode::UNAVAILABLE, "the coordinator closed this stream");
-  stream_->pump_locked();
+  state_.lock()->end(grpc::Status(grpc::StatusCode::UNAVAILABLE, "the coordinator closed this stream"));
+}
+
+void Outlet::State::end(const grpc::Status& with) {
+  if (!stream || closing || finished) return;
+  closing = true;
+  status = with;
+  pump();
+}
+
+void Outlet::State::pump() {
+  if (writing || finished) return;
+  if (!queue.empty()) {
+    writing = true;
+    stream->StartWrite(&queue.front());
+  } else if (closing) {
+    finished = true;
+    stream->Finish(status);
+  }
 }
 
 WorkStream::WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context, const JoinGuard& guard,
@@ -44,29 +62,11 @@ void WorkStream::refuse(const Error& error, bool retry) {
   end(to_status(error));
 }
 
-void WorkStream::end(const grpc::Status& status) {
-  const std::lock_guard lock(outlet_->mutex_);
-  if (outlet_->closing_ || outlet_->finished_) return;
-  outlet_->closing_ = true;
-  outlet_->status_ = status;
-  pump_locked();
-}
+void WorkStream::end(const grpc::Status& status) { outlet_->state_.lock()->end(status); }
 
 void WorkStream::cut() {
-  const std::lock_guard lock(outlet_->mutex_);
-  if (!outlet_->finished_) context_->TryCancel();
-}
-
-void WorkStream::pump_locked() {
-  Outlet& out = *outlet_;
-  if (out.writing_ || out.finished_) return;
-  if (!out.queue_.empty()) {
-    out.writing_ = true;
-    StartWrite(&out.queue_.front());
-  } else if (out.closing_) {
-    out.finished_ = true;
-    Finish(out.status_);
-  }
+  const auto out = outlet_->state_.lock();
+  if (!out->finished) context_->TryCancel();
 }
 
 void WorkStream::OnReadDone(bool ok) {
@@ -74,7 +74,8 @@ void WorkStream::OnReadDone(bool ok) {
     end(grpc::Status::OK);
     return;
   }
-  if (greeted_ && !wire::known(incoming_)) {  // a newer worker's message: newer workers must not depend on it
+  // A message type from a newer version: ignored, since newer workers must not rely on it
+  if (greeted_ && !wire::known(incoming_)) {
     StartRead(&incoming_);
     return;
   }
@@ -89,15 +90,15 @@ void WorkStream::OnReadDone(bool ok) {
     if (session_) StartRead(&incoming_);
     return;
   }
-  // The outlet outlives this stream, which may be gone when there is room again.
+  // The outlet outlives this stream, which may be gone by the time there is room for the next message.
   session_->receive(std::move(*message), [outlet = outlet_] { outlet->read_on(); });
 }
 
 // Starts to read the worker's next message; no thread waits for it. The stream cannot be deleted before
 // Finish was called, so it may be used here until then.
 void Outlet::read_on() {
-  const std::lock_guard lock(mutex_);
-  if (stream_ && !finished_) stream_->StartRead(&stream_->incoming_);
+  const auto state = state_.lock();
+  if (state->stream && !state->finished) state->stream->StartRead(&state->stream->incoming_);
 }
 
 void WorkStream::greet(FromWorker message) {
@@ -135,28 +136,28 @@ void WorkStream::greet(FromWorker message) {
 }
 
 void WorkStream::OnWriteDone(bool ok) {
-  const std::lock_guard lock(outlet_->mutex_);
-  outlet_->writing_ = false;
-  outlet_->queue_.pop_front();
+  const auto out = outlet_->state_.lock();
+  out->writing = false;
+  out->queue.pop_front();
   if (!ok) {
-    outlet_->queue_.clear();
-    outlet_->closing_ = true;
+    out->queue.clear();
+    out->closing = true;
   }
-  pump_locked();
+  out->pump();
 }
 
 void WorkStream::OnCancel() {
-  const std::lock_guard lock(outlet_->mutex_);
-  outlet_->closing_ = true;
-  while (outlet_->queue_.size() > (outlet_->writing_ ? 1U : 0U)) outlet_->queue_.pop_back();
-  pump_locked();
+  const auto out = outlet_->state_.lock();
+  out->closing = true;
+  while (out->queue.size() > (out->writing ? 1U : 0U)) out->queue.pop_back();
+  out->pump();
 }
 
 void WorkStream::OnDone() {
   {
-    const std::lock_guard lock(outlet_->mutex_);
-    outlet_->stream_ = nullptr;
-    outlet_->queue_.clear();
+    const auto out = outlet_->state_.lock();
+    out->stream = nullptr;
+    out->queue.clear();
   }
   if (session_) session_->disconnected();
   session_.reset();

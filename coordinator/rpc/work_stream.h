@@ -1,18 +1,18 @@
 // One worker's gRPC stream. It passes the worker's messages to the worker's WorkerSession, and messages to
 // the worker through a queue of at most kQueuedMessages.
 //
-// A stream has two objects. The Outlet is the WorkerSink through which the coordinator sends; the coordinator
-// may keep it as long as it likes. The WorkStream is gRPC's reactor and deletes itself in OnDone. The
-// outlet's mutex guards both objects and is never held while the coordinator is called, so the coordinator
-// may call the sink with its own locks held.
+// A stream consists of two objects. The Outlet is the WorkerSink through which the coordinator sends; the
+// coordinator may keep it as long as it likes. The WorkStream is gRPC's reactor and deletes itself in OnDone.
+// The outlet's lock is never held during calls to the coordinator, so the coordinator may call the sink with
+// its own locks held.
 #pragma once
 
 #include <atomic>
 #include <deque>
 #include <memory>
-#include <mutex>
 
 #include "common/base/clock.h"
+#include "common/base/guarded.h"
 #include "coordinator/rpc/join_guard.h"
 #include "coordinator/service/coordinator.h"
 #include "proto/farm.grpc.pb.h"
@@ -26,34 +26,40 @@ class WorkStream;
 
 class Outlet final : public WorkerSink {
  public:
-  explicit Outlet(WorkStream* stream) : stream_(stream) {}
+  explicit Outlet(WorkStream* stream) : state_(stream) {}
   void send(ToWorker message) override;
   void close() override;
   void read_on();  // starts to read the worker's next message; may be called from any thread
 
  private:
   friend class WorkStream;
-  std::mutex mutex_;
-  WorkStream* stream_;  // null after OnDone
-  std::deque<pb::ToWorker> queue_;
-  bool writing_ = false;   // a write of queue_.front() is in progress
-  bool closing_ = false;   // finish with status_ once the queue is empty
-  bool finished_ = false;  // Finish was called
-  grpc::Status status_;
+  struct State {
+    explicit State(WorkStream* s) : stream(s) {}
+    void end(const grpc::Status& with);  // ends the stream with this status once the queue is empty
+    void pump();                         // starts the next write, or ends the stream
+
+    WorkStream* stream;  // null after OnDone
+    std::deque<pb::ToWorker> queue;
+    bool writing = false;   // a write of queue.front() is in progress
+    bool closing = false;   // end the stream with `status` once the queue is empty
+    bool finished = false;  // Finish was called
+    grpc::Status status;
+  };
+  Guarded<State> state_;
 };
 
 class WorkStream final : public grpc::ServerBidiReactor<pb::FromWorker, pb::ToWorker> {
  public:
-  // The stream calls `on_gone` last before it deletes itself. `guard` must outlive the stream. A worker that
-  // has not sent its hello by `hello_deadline` is disconnected by the server.
+  // The last call of the stream, before it deletes itself, is `on_gone`. `guard` must outlive the stream. The
+  // server disconnects a worker that has not sent its hello by `hello_deadline`.
   WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context, const JoinGuard& guard,
              TimePoint hello_deadline, std::function<void(WorkStream*)> on_gone);
 
   void begin() { StartRead(&incoming_); }
   // Sends the error to the worker, then ends the stream. `retry` tells the worker whether to try again later.
   void refuse(const Error& error, bool retry);
-  void end(const grpc::Status& status);  // ends the stream after the queued messages
-  void cut();                            // ends the stream now, without sending the queued messages
+  void end(const grpc::Status& status);  // ends the stream after the queued messages are sent
+  void cut();                            // ends the stream immediately, without sending the queued messages
   bool hello_overdue(TimePoint now) const { return !greeted_ && now >= hello_deadline_; }
 
   void OnReadDone(bool ok) override;
@@ -64,7 +70,6 @@ class WorkStream final : public grpc::ServerBidiReactor<pb::FromWorker, pb::ToWo
  private:
   friend class Outlet;
   void greet(FromWorker message);
-  void pump_locked();  // starts the next write, or finishes
 
   Coordinator& coordinator_;
   grpc::CallbackServerContext* context_;
@@ -72,7 +77,8 @@ class WorkStream final : public grpc::ServerBidiReactor<pb::FromWorker, pb::ToWo
   const TimePoint hello_deadline_;
   const std::function<void(WorkStream*)> on_gone_;
   std::shared_ptr<Outlet> outlet_;
-  std::unique_ptr<WorkerSession> session_;  // used by read reactions and OnDone, which never overlap
+  // Used in the callbacks for reads and in OnDone, which never overlap
+  std::unique_ptr<WorkerSession> session_;
   std::atomic<bool> greeted_{false};
   pb::FromWorker incoming_;
 };

@@ -6,15 +6,17 @@
 
 #include "common/base/log.h"
 #include "coordinator/base/limits.h"
-#include "coordinator/base/periodic.h"
+#include "coordinator/base/work_queue.h"
 #include "coordinator/service/core.h"
 
 namespace ls::coordinator {
 namespace {
 
 constexpr Duration kLongestPause = std::chrono::hours(1);
-constexpr int kSweepsPerTime = 4;  // sweeps per keep_unused: so no blob stays longer than 1.25 times that
-constexpr std::size_t kJobsAtOnce = 256;  // jobs whose blobs are collected under one lock
+// Sweeps per keep_unused, so that an unused blob stays for at most 1.25 times keep_unused
+constexpr int kSweepsPerTime = 4;
+// Number of jobs whose needed blobs are collected before the lock is released and taken again
+constexpr std::size_t kJobsAtOnce = 256;
 
 std::optional<BlobRef> file_of(const StoredJob& job, const Digest& digest) {
   if (job.scene == digest) return BlobRef{digest, 0, job.name};
@@ -66,7 +68,7 @@ void BlobWatch::missing(const Digest& digest, const Error& why) {
       waiting.push_back(entry);
   }
   if (waiting.empty()) return;
-  (void)core->records.put_together([&] {  // what cannot be stored is found again at the next start
+  (void)core->records.put_together([&] {  // changes that cannot be stored are found again at the next start
     for (const EntryPtr& entry : waiting) {
       core->records.log(entry->stored.id, why.message);
       await_blob(*core, *entry, *file_of(entry->stored, digest), why.code == Errc::failed_precondition);
@@ -96,7 +98,7 @@ void BlobWatch::look_for(const std::set<Digest>& digests) {
   std::set<Digest> here;
   for (const Digest& digest : digests) {
     const auto found = blobs_.find(digest);
-    if (!found) break;  // the store is unavailable: this is tried again at the next lookup
+    if (!found) break;  // the store is unavailable: the lookup is repeated at its next time
     if (*found) here.insert(digest);
   }
   if (here.empty()) return;

@@ -1,6 +1,6 @@
-// Watches over blobs (files of scenes). Jobs that wait for a missing or damaged blob are paused; this does
-// not count against units or workers. They resume automatically when the blob is available again, whichever
-// way it arrived. Blobs that no job needs are removed.
+// Watches over blobs (files of scenes). Jobs whose blobs are missing or damaged are paused; this does not
+// count against units or workers. They resume automatically when the blob is available again, from whatever
+// source. Blobs that no job needs are removed.
 #pragma once
 
 #include <optional>
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/base/guarded.h"
+#include "common/base/guarded.h"
 #include "coordinator/base/work_queue.h"
 #include "coordinator/service/job_commands.h"
 #include "coordinator/store/blobs/collected_blobs.h"
@@ -18,29 +18,28 @@ namespace ls::coordinator {
 
 // Returns the blobs that the job needs and the store lacks. May need the network: call it without the lock.
 Result<std::vector<BlobRef>> missing_blobs_of(const StoredJob& job, const BlobStore& blobs);
-// Has the job wait for a blob.
+// Pauses the job until the blob is available.
 void await_blob(Core& core, JobEntry& entry, const BlobRef& file, bool damaged);
 
 class BlobWatch {
  public:
-  // `keep_unused`: how long blobs are kept that no job needs; nullopt: for good
+  // `keep_unused`: how long blobs that no job needs are kept; nullopt: forever
   BlobWatch(Guarded<Core>& core, CollectedBlobs& blobs, const JobCommands& commands,
             std::optional<Duration> keep_unused, const Clock& clock)
       : core_(core), blobs_(blobs), commands_(commands), keep_unused_(keep_unused), clock_(clock) {}
 
-  // A worker requested a blob that is missing or damaged here.
+  // Handles a worker's request for a blob that is missing or damaged here.
   void missing(const Digest& digest, const Error& why);
-  // Has missing blobs looked up if it is time to. They are looked up on a thread of its own, since that may
-  // need the network.
+  // Starts a lookup of missing blobs if one is due. It runs on a separate thread, since it may need the
+  // network.
   void look_if_due(Core& core);
   void look_loop(const std::stop_token& token);
 
-  // Checks whether the blob store is available. It may be that nobody requests a blob for hours, so requests
-  // alone would not tell.
+  // Checks whether the blob store is available. Requests of workers do not suffice to notice an outage, since
+  // hours may pass between two.
   void check_store();
-  const std::string& trouble(Core&) const {
-    return trouble_;
-  }  // why it is unavailable; empty: it is available
+  // Returns why the store is unavailable; empty: it is available.
+  const std::string& trouble(Core&) const { return trouble_; }
 
   void collect();
   void collect_loop(const std::stop_token& token);
@@ -55,7 +54,7 @@ class BlobWatch {
   const std::optional<Duration> keep_unused_;
   const Clock& clock_;
   WorkQueue<std::set<Digest>> looks_;
-  TimePoint last_look_{};  // this and trouble_ are guarded by the lock
+  TimePoint last_look_{};  // last_look_ and trouble_ are guarded by the lock
   std::string trouble_;
 };
 

@@ -7,12 +7,14 @@
 #include <thread>
 
 #include "common/base/secret.h"
-#include "coordinator/base/periodic.h"
+#include "coordinator/base/work_queue.h"
 #include "coordinator/service/blob_watch.h"
 #include "coordinator/service/core.h"
 #include "coordinator/service/pictures.h"
+#include "coordinator/service/state/job_list.h"
 #include "coordinator/service/submission.h"
 #include "coordinator/service/takeover.h"
+#include "coordinator/service/videos.h"
 #include "coordinator/service/worker_sessions.h"
 #include "coordinator/store/blobs/memory_blobs.h"
 #include "coordinator/store/blobs/open_blobs.h"
@@ -36,7 +38,7 @@ JoinCheck join_check(std::string token) {
 }
 
 namespace {
-// Time between two checks whether the blob store answers
+// Time between two checks whether the blob store is available
 constexpr Duration kBlobsLookedAt = std::chrono::seconds(5);
 
 Result<std::unique_ptr<JobStore>> open_store(const Coordinator::Options& options, const std::string& node) {
@@ -48,14 +50,12 @@ Result<std::unique_ptr<JobStore>> open_store(const Coordinator::Options& options
   return open_redis_job_store(std::move(*local), std::move(redis));
 }
 
-// Returns a random number, used as the seed that decides which results are rendered again: workers must not
+// Returns a random number: the seed that decides which results are audited (rendered again). Workers must not
 // be able to predict it.
 std::uint64_t random_number() {
   std::random_device device;
   return std::uint64_t{device()} << 32 | device();
 }
-
-std::string lease_prefix(std::uint64_t start) { return "l" + std::to_string(start); }
 
 }  // namespace
 
@@ -67,14 +67,16 @@ struct Coordinator::Parts {
         lock(std::move(l)),
         start(n),
         blobs(std::move(inner), options.clock, options.keep_unused) {}
-  ~Parts();
   void start_threads();
+  void stop();  // returns when no thread runs any more
   void tick();
 
   const Options options;
   const std::shared_ptr<JobStore> store;
   const File lock;
-  const std::uint64_t start;  // number of this start of the coordinator
+  const std::uint64_t start;  // number of this start of the coordinator, counted over all its restarts
+  const std::string lease_prefix = fmt::format("l{}", start);
+  const Tracing tracing{options.tracer, lease_prefix};
   const Clock& clock = *options.clock;
   CollectedBlobs blobs;
   const JobFiles files{options.data, options.shared};
@@ -84,7 +86,7 @@ struct Coordinator::Parts {
   BackgroundWrites writes;
   std::atomic<std::uint64_t> blob_bytes{0};
 
-  Guarded<Core> core{Farm::Options{lease_prefix(start), options.limits, options.audit_rate, random_number()},
+  Guarded<Core> core{Farm::Options{lease_prefix, options.limits, options.audit_rate, random_number()},
                      options.shared,
                      clock,
                      *store,
@@ -92,10 +94,12 @@ struct Coordinator::Parts {
                      hub,
                      writes,
                      images,
-                     comparer};
+                     comparer,
+                     tracing};
   ReferenceComparer comparer{core, blobs};
   ImageWriter images{core, files, blobs, denoising, comparer, writes, clock};
   Pictures pictures{core, *store, files, blobs, denoising, clock};
+  Videos videos{core, files, pictures, clock};
   Submission submission{core, *store, files, blobs, denoising, clock};
   const Restore restore{*store, files, blobs, clock};
   JobCommands commands{core, *store, files, restore, images, writes, clock};
@@ -103,10 +107,8 @@ struct Coordinator::Parts {
   Takeover takeover{core, *store, files, blobs, restore, writes, clock};
   ResultPipeline results{core, writes, clock};
   WorkerSessions sessions{
-      core, results, {options.may_join, options.allow_fake, start, lease_prefix(start)}, clock};
-  // Destroyed before the core, since those who listen may ask for jobs
+      core, results, {options.may_join, options.allow_fake, options.version, start, lease_prefix}, clock};
   EventHub hub{[this](std::uint64_t count) { return store->reserve("events", count); }};
-  // This is the last member, so the threads are joined before anything that they use is destroyed
   std::vector<std::jthread> threads;
 };
 
@@ -120,6 +122,7 @@ void Coordinator::Parts::start_threads() {
       for (auto& write : writes.pop(1, stop)) write();
   });
   run([this](Stop stop) { comparer.loop(stop); });
+  if (files.on_disk()) run([this](Stop stop) { videos.loop(stop); });
   run([this](Stop stop) { blob_watch.look_loop(stop); });
   if (!options.tick) return;
   if (files.on_disk()) run([this](Stop stop) { blob_watch.collect_loop(stop); });
@@ -128,14 +131,15 @@ void Coordinator::Parts::start_threads() {
   run([this](Stop stop) { every(*options.tick, stop, [&] { tick(); }); });
 }
 
-// Accepted results are durable already, and workers send those again that were not acknowledged. So nothing
-// is flushed here, and after a clean shutdown the state is the same as after a crash.
-Coordinator::Parts::~Parts() {
+// Nothing is flushed here: accepted results are durable already, and workers send results again that were not
+// acknowledged. After a clean shutdown the state is the same as after a crash.
+void Coordinator::Parts::stop() {
   sessions.abandon();
   results.close();
   for (auto& thread : threads) thread.request_stop();
   threads.clear();
   sessions.close();
+  hub.close();
 }
 
 void Coordinator::Parts::tick() {
@@ -185,12 +189,23 @@ Result<std::unique_ptr<Coordinator>> Coordinator::open(Options options) {
 }
 
 Coordinator::Coordinator(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
-Coordinator::~Coordinator() = default;
+// The parts exist until all threads have ended, because listeners may ask this object for jobs until then.
+Coordinator::~Coordinator() { parts_->stop(); }
 
 // Jobs
 
 tl::expected<JobId, Rejected> Coordinator::submit(SubmitRequest request) {
   return parts_->submission.submit(request);
+}
+
+Result<JobId> Coordinator::submit_again(const JobId& before, const JobSpec& changes, const std::string& owner,
+                                        const std::string& traceparent) {
+  return parts_->submission.submit_again(before, changes, owner, traceparent);
+}
+
+JobsPage Coordinator::list(const JobsAsked& asked) const {
+  const auto core = parts_->core.lock();
+  return list_jobs(core->jobs, core->views, asked);
 }
 
 std::vector<JobView> Coordinator::jobs() const {
@@ -228,10 +243,18 @@ Result<void> Coordinator::wait(const JobId& id) const {
   if (!jobs) return tl::unexpected(jobs.error());
   core.wait(core->ended, [&] {
     return std::all_of(jobs->begin(), jobs->end(), [&](const EntryPtr& entry) {
-      return entry->removed || is_terminal(entry->stored.state);
+      const bool in_trouble = entry->stored.state == JobState::paused && !entry->trouble.empty();
+      return entry->removed || is_terminal(entry->stored.state) || in_trouble;
     });
   });
   return {};
+}
+
+std::optional<trace::SpanContext> Coordinator::trace_of(const JobId& id) const {
+  if (!parts_->tracing.tracer) return std::nullopt;
+  const auto core = parts_->core.lock();
+  const auto entry = core->jobs.find(id);
+  return entry ? JobTrace::context_of(parts_->tracing, entry->stored) : std::nullopt;
 }
 
 // Images and reports
@@ -242,6 +265,20 @@ Result<std::vector<std::byte>> Coordinator::image_exr(const JobId& id) const {
 
 Result<std::vector<std::byte>> Coordinator::image_png(const JobId& id, double exposure, bool denoised) const {
   return parts_->pictures.image_png(id, exposure, denoised);
+}
+
+Result<std::vector<std::byte>> Coordinator::thumbnail_png(const JobId& id) const {
+  return parts_->pictures.thumbnail_png(id);
+}
+
+Result<VideoView> Coordinator::make_video(const JobId& id, const VideoAsked& asked) {
+  return parts_->videos.make(id, asked);
+}
+
+Result<VideoView> Coordinator::video(const JobId& id) const { return parts_->videos.view(id); }
+
+Result<std::filesystem::path> Coordinator::video_file(const JobId& id) const {
+  return parts_->videos.file(id);
 }
 
 Result<std::vector<std::byte>> Coordinator::error_png(const JobId& id) const {
@@ -261,6 +298,14 @@ Result<std::vector<ConvergencePoint>> Coordinator::convergence(const JobId& id) 
   const auto entry = core->jobs.job(id);
   if (!entry) return tl::unexpected(entry.error());
   return (*entry)->points;
+}
+
+Result<std::string> Coordinator::layers_json(const JobId& id) const {
+  return parts_->pictures.layers_json(id);
+}
+
+Result<std::vector<std::byte>> Coordinator::pixels(const JobId& id, const PixelsAsked& asked) const {
+  return parts_->pictures.pixels(id, asked);
 }
 
 std::filesystem::path Coordinator::final_file(const JobId& id, const std::string& name) const {

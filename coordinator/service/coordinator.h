@@ -13,12 +13,12 @@
 
 #include "common/base/clock.h"
 #include "common/base/error.h"
+#include "common/trace/tracer.h"
 #include "coordinator/domain/farm_figures.h"
-#include "coordinator/domain/figures.h"
 #include "coordinator/store/blobs/blob_store.h"
 #include "coordinator/store/jobs/job_store.h"
+#include "coordinator/views/job_list.h"
 #include "coordinator/views/job_view.h"
-#include "coordinator/views/submit_request.h"
 #include "coordinator/views/worker_session.h"
 
 namespace ls::coordinator {
@@ -26,28 +26,34 @@ namespace ls::coordinator {
 class Coordinator {
  public:
   struct Options {
-    std::filesystem::path data;  // empty: everything is in memory and nothing survives (`lightshaft render`)
+    // empty: everything is in memory and is lost at the end (`lightshaft render`)
+    std::filesystem::path data;
     // Where jobs are stored: sqlite, or a redis:// address (store/redis/redis_link.h)
     std::string store = "sqlite";
     std::shared_ptr<JobStore> jobs;    // set by tests; null: opened as `store` says
     std::shared_ptr<BlobStore> blobs;  // set for in-memory use; null: opened as `blobs_at` says
-    // Where blobs are: empty for a folder under `data`; else a folder, or an s3:// address
+    // Where blobs are stored: a folder or an s3:// address; empty: a folder under `data`
     std::string blobs_at;
-    // How long a blob (file of a scene) is kept that no job needs and nobody requests, and an interrupted
-    // upload that does not grow. nullopt: blobs are kept for good, interrupted uploads for a day.
+    // How long a blob (file of a scene) is kept that no job needs and nobody requests, or an interrupted
+    // upload that does not continue. nullopt: blobs are kept forever, interrupted uploads for a day.
     std::optional<Duration> keep_unused = std::chrono::hours(24);
     bool shared = false;      // other coordinators use the same store and blobs
     std::string join_token;   // empty: any worker may join
     JoinCheck may_join;       // if set, decides which workers may join, instead of join_token
-    bool allow_fake = false;  // true: workers that make up their pixels may join (for tests)
+    bool allow_fake = false;  // true: fake workers, which invent their pixels, may join (for tests)
+    // Version of this program. Workers of another one finish the jobs of their numeric class and begin none,
+    // so that jobs that come during an upgrade are not left to workers that are about to go. Empty: any
+    // worker begins jobs.
+    std::string version;
     ShareLimits limits;
-    double audit_rate = 0.01;  // fraction of the results that another worker renders again
+    double audit_rate = 0.01;  // fraction of the results that are audited: another worker renders them again
     std::shared_ptr<const Clock> clock;
     int denoise_threads = 0;  // 0: one per core that this process may use
-    std::string denoiser;     // library of Open Image Denoise; empty: it is looked for
-    // Time between two Tick events, which a thread of the coordinator raises. nullopt: there is no such
-    // thread, and the caller calls tick()
+    std::string denoiser;     // file of the library Open Image Denoise; empty: it is searched for
+    // Time between two Tick events, which a thread of the coordinator raises. nullopt: no such thread; the
+    // caller calls tick()
     std::optional<Duration> tick;
+    std::shared_ptr<trace::Tracer> tracer;  // records the spans of jobs; null: nothing is traced
   };
   static Result<std::unique_ptr<Coordinator>> open(Options options);
   ~Coordinator();
@@ -58,25 +64,45 @@ class Coordinator {
   // Functions that change or show a job also accept a sequence's id; functions on a single image need the id
   // of a frame, which frame_job() gives.
   tl::expected<JobId, Rejected> submit(SubmitRequest request);
-  std::vector<JobView> jobs() const;  // a sequence counts as one job; its frames are not listed
+  // Submits the scene of job `before` once more, with changed settings (admission/admission.h: admit_again).
+  // `traceparent`: as in SubmitRequest.
+  Result<JobId> submit_again(const JobId& before, const JobSpec& changes, const std::string& owner,
+                             const std::string& traceparent = {});
+  JobsPage list(const JobsAsked& asked) const;  // a page of jobs(), filtered and ordered
+  std::vector<JobView> jobs() const;            // a sequence counts as one job; its frames are not listed
   Result<JobView> job(const JobId& id) const;
-  Result<std::string> owner(const JobId& id) const;  // JobView::owner, at less cost than job()
+  Result<std::string> owner(const JobId& id) const;  // JobView::owner, cheaper than by job()
   Result<void> change(const JobId& id, const JobChange& change);
   Result<void> cancel(const JobId& id);
   // Removes an ended job with all its results; a job that has not ended is cancelled and kept.
   Result<void> remove(const JobId& id);
-  Result<void> wait(const JobId& id) const;  // returns when the job is done, failed or cancelled
+  // Returns when the job is done, failed or cancelled, or is paused because something went wrong
+  // (JobView::error).
+  Result<void> wait(const JobId& id) const;
+
+  // The job's span, for spans that others record below it; nullopt: the job is not traced or not known
+  std::optional<trace::SpanContext> trace_of(const JobId& id) const;
 
   // Images and reports
 
-  // The current image, or the final one
+  // The final image if there is one, else the current image
   Result<std::vector<std::byte>> image_exr(const JobId& id) const;
-  // As an 8-bit picture; with `denoised`, of a job with JobSpec::denoise, the denoised image, also of a job
-  // that still renders. One image is denoised at a time, which takes seconds.
+  // The image as an 8-bit PNG. With `denoised`, returns the denoised image of a job with JobSpec::denoise,
+  // even if it still renders. One image is denoised at a time, which takes seconds.
   Result<std::vector<std::byte>> image_png(const JobId& id, double exposure, bool denoised = false) const;
+  // A small picture of the final or the current image, for lists
+  Result<std::vector<std::byte>> thumbnail_png(const JobId& id) const;
+  // Videos of sequences (service/videos.h)
+  Result<VideoView> make_video(const JobId& id, const VideoAsked& asked);
+  Result<VideoView> video(const JobId& id) const;
+  Result<std::filesystem::path> video_file(const JobId& id) const;
   // False-colour maps of the error and of the samples (common/image/exr/maps.h).
   Result<std::vector<std::byte>> error_png(const JobId& id) const;
   Result<std::vector<std::byte>> samples_png(const JobId& id) const;
+  // layers_json() lists the layers of the image (final or current). The other function returns a rectangle of
+  // one layer at one mip level as numbers (common/image/exr/pixel_layers.h).
+  Result<std::string> layers_json(const JobId& id) const;
+  Result<std::vector<std::byte>> pixels(const JobId& id, const PixelsAsked& asked) const;
   Result<std::string> report_json(const JobId& id) const;
   Result<std::vector<ConvergencePoint>> convergence(const JobId& id) const;
   // Returns the path of the file `name` (image.exr or report.json) of a done job. Empty if there is no such
@@ -93,16 +119,16 @@ class Coordinator {
   // Events
 
   // Calls `on_event` (on any thread, in order) for every event after `after_id` that is still kept, then for
-  // new ones. The subscription ends when the returned handle is destroyed. A reader that cannot keep up must
-  // itself drop events.
+  // new ones. The subscription ends when the returned handle is destroyed. The callback must not block: a
+  // slow reader must drop events itself.
   std::shared_ptr<void> subscribe(std::uint64_t after_id, std::function<void(const StreamEvent&)> on_event);
   std::uint64_t last_event_id() const;
 
   // Blobs
 
   BlobStore& blobs();
-  // Says that a worker requested a blob that is missing or damaged here. The jobs that need it are paused
-  // until it is available again.
+  // Notes that a worker requested a blob that is missing or damaged here. The jobs that need the blob are
+  // paused until it is available again.
   void blob_missing(const Digest& digest, const Error& why);
   void blob_sent(std::uint64_t bytes);  // counts bytes sent to a worker
   // Removes blobs that no job needs, and interrupted uploads, after Options::keep_unused. With Options::tick
@@ -111,10 +137,11 @@ class Coordinator {
 
   // Other coordinators (Options::shared)
 
-  // Tells the other coordinators, workers and clients where they reach this one: http://HOST:PORT and
-  // HOST:PORT (gRPC).
+  // Publishes the addresses of this coordinator for other coordinators, workers and clients: http://HOST:PORT
+  // and HOST:PORT (gRPC).
   void announce(const std::string& http, const std::string& grpc);
-  // Finds the coordinator of a job that this one does not have; may block for a second. nullopt: none has it.
+  // Finds the coordinator that owns a job unknown to this one; may block for a second. nullopt: no
+  // coordinator has it.
   Result<std::optional<JobLocation>> locate_job(const JobId& id);
 
   bool ready(std::string* why_not) const;

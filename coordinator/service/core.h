@@ -1,7 +1,7 @@
 // The state of the coordinator's jobs and workers. One mutex guards all of it: it can be reached only through
-// Guarded<Core>::lock(), so a function that takes a Core& runs under the lock, and one that takes none does
-// not need it. What never changes in a JobEntry (id, scene, settings, grid) is also read without the lock.
-// Slow work has its own threads, which lock the core for short:
+// Guarded<Core>::lock(). So a function that takes a Core& runs under the lock, and a function without a Core&
+// does not need the lock. The constant members of a JobEntry (id, scene, settings, grid) may also be read
+// without the lock. Slow work has its own threads, which take the lock briefly:
 //
 //   receive() -> [verify threads: decode, digest] -> [commit thread: append, one fdatasync for all]
 //     -> farm -> acknowledge
@@ -10,7 +10,7 @@
 
 #include <condition_variable>
 
-#include "coordinator/base/guarded.h"
+#include "common/base/guarded.h"
 #include "coordinator/domain/farm_figures.h"
 #include "coordinator/service/farm_driver.h"
 #include "coordinator/service/state/publisher.h"
@@ -19,13 +19,16 @@ namespace ls::coordinator {
 
 struct Core {
   Core(Farm::Options farm, bool shared, const Clock& clock, JobStore& store, const JobFiles& files,
-       EventHub& hub, BackgroundWrites& writes, ImageWriter& images, ReferenceComparer& comparer)
-      : driver(*this, std::move(farm), clock, files, images, comparer),
+       EventHub& hub, BackgroundWrites& writes, ImageWriter& images, ReferenceComparer& comparer,
+       const Tracing& tracing)
+      : tracing(tracing),
+        driver(*this, std::move(farm), clock, files, images, comparer),
         jobs(shared),
         views(driver.farm(), clock),
         records(store, jobs, writes),
         publisher(hub, views, jobs, workers, records, clock) {}
 
+  const Tracing& tracing;
   FarmDriver driver;
   JobTable jobs;
   WorkerTable workers;
@@ -33,7 +36,7 @@ struct Core {
   Records records;
   Publisher publisher;
   FarmFigures figures;            // counters; Coordinator::figures() fills in the current values (..._now)
-  std::condition_variable ended;  // notified when a job ends or leaves
+  std::condition_variable ended;  // notified when a job ends or is removed
 };
 
 }  // namespace ls::coordinator

@@ -26,12 +26,13 @@ std::shared_ptr<const Denoised> Denoising::of(const Film& film) {
   const Digest pixels = pixels_sha256(film);
   const std::lock_guard lock(mutex_);
   if (last_ && last_pixels_ == pixels) return last_;
-  last_.reset();  // frees its memory first
+  last_.reset();  // frees the memory of the previous image first
   auto made = denoise(film);
   if (!made) {
     Denoised none;
     none.figures.trouble = made.error().message;
-    return std::make_shared<const Denoised>(std::move(none));  // not kept: a later attempt may succeed
+    // A failure is not cached: a later attempt may succeed
+    return std::make_shared<const Denoised>(std::move(none));
   }
   last_ = std::make_shared<const Denoised>(std::move(*made));
   last_pixels_ = pixels;

@@ -1,5 +1,6 @@
 // Denoised images of jobs. Denoising takes seconds, gigabytes and all cores, so one image is denoised at a
-// time, and the last one is kept: report, image and preview of one state of a job share it. Thread-safe.
+// time. The last result is cached, since report, image and preview of one state of a job need the same one.
+// Thread-safe.
 #pragma once
 
 #include <memory>
@@ -16,24 +17,24 @@
 namespace ls::coordinator {
 
 struct Denoised {
-  DenoisedImage image;  // without pixels if figures.trouble says why there are none
+  DenoisedImage image;  // without pixels if denoising failed; figures.trouble then says why
   DenoisedFigures figures;
 };
 
 class Denoising {
  public:
-  // `library` is the file of Open Image Denoise; empty: it is looked for (common/denoise/denoiser.h).
+  // `library` is the file of Open Image Denoise; empty: it is searched for (common/denoise/denoiser.h).
   Denoising(int threads, std::string library, const Clock& clock, const BlobStore& blobs)
       : threads_(threads), library_(std::move(library)), clock_(clock), blobs_(blobs) {}
 
-  // Fails as Denoiser::find() does if this machine cannot denoise.
+  // Returns the error of Denoiser::find() if this machine cannot denoise.
   Result<void> available() const;
 
-  // Denoises the film, which has the AOVs for it. Figures are without the true error, which depends on a
-  // job's reference.
+  // Denoises the film, which must have the AOVs that the denoiser needs. The figures lack the true error,
+  // since this depends on the job's reference.
   std::shared_ptr<const Denoised> of(const Film& film);
-  // Returns the denoised image of a job that asks for one, and puts its figures into the facts. `made` is
-  // that image if it has been made already. Null if the job asks for none or has no samples.
+  // Returns the denoised image of a job with JobSpec::denoise, and puts its figures into the facts. `made` is
+  // the image if it exists already. Null if the job has no denoising or no samples.
   std::shared_ptr<const Denoised> of_job(const Film& film, ReportFacts& facts,
                                          std::shared_ptr<const Denoised> made = nullptr);
 

@@ -29,7 +29,7 @@ void FarmDriver::run(Event first) {
     for (const Effect& effect : farm_.handle(event, clock_.now()))
       std::visit([&](const auto& e) { on(e); }, effect);
   }
-  // Snapshots are taken only when all events are handled. A snapshot includes convergence points, and these
+  // Snapshots are taken only after all events are handled: a snapshot includes convergence points, and these
   // must precede it in the writer's queue.
   for (const EntryPtr& entry : std::exchange(folded_, {})) images_.snapshot_if_due(core_, entry);
   for (const JobId& id : farm_.take_changed_audits())
@@ -51,6 +51,7 @@ void FarmDriver::unload(JobEntry& entry) {
   const auto figures = farm_.job(entry.stored.id);
   if (!files_.on_disk() || !figures || entry.unloaded || !is_terminal(figures->state)) return;
   entry.free_image();
+  entry.trace.reset();
   run(JobForgotten{entry.stored.id});
 }
 
@@ -66,6 +67,13 @@ void FarmDriver::on(const Send& e) {
     connection.note_lease(assign->lease.id);
     found->second.last_job = assign->lease.job;
     note_leased(assign->lease, e.worker);
+    if (const auto entry = core_.jobs.find(assign->lease.job); entry && entry->trace) {
+      AssignLease traced = *assign;
+      traced.trace =
+          entry->trace->lease_begins(assign->lease, e.worker, found->second.hello.name, clock_.now());
+      connection.sink->send(std::move(traced));
+      return failpoint("lease-sent");
+    }
   }
   connection.sink->send(e.message);
   if (std::holds_alternative<AssignLease>(e.message)) failpoint("lease-sent");
@@ -84,11 +92,13 @@ void FarmDriver::note_leased(const Lease& lease, const WorkerId& worker) {
 void FarmDriver::on(const UnitsFreed& e) {
   const auto entry = core_.jobs.find(e.job);
   if (!entry) return;
-  core_.figures.units_freed[e.cause] += e.units.size();
+  if (entry->trace) entry->trace->units_freed(e, clock_.now());
+  if (!e.audit) core_.figures.units_freed[e.cause] += e.units.size();
   for (const UnitKey& unit : e.units) {
     const auto held = entry->leased.find({unit.tile, unit.round});
     if (held != entry->leased.end() && std::erase(held->second, e.worker) > 0 && held->second.empty())
       entry->leased.erase(held);
+    if (e.audit) continue;  // the unit has a result
     core_.publisher.tile(*entry, unit.tile, entry->grid.rect(unit.tile), "free", round_range(unit.round).s0,
                          e.worker);
   }
@@ -96,7 +106,7 @@ void FarmDriver::on(const UnitsFreed& e) {
 
 // Results
 
-// The result is in the job's log already, so nothing is written here: this only starts the job's clock.
+// The result is in the job's log already, so this writes nothing and only starts the job's clock.
 void FarmDriver::on(const RecordUnit& e) {
   const auto entry = core_.jobs.find(e.unit.job);
   if (!entry) return;
@@ -108,8 +118,8 @@ void FarmDriver::on(const RecordUnit& e) {
     entry->stored.totals.began_unix = unix_now() - entry->elapsed(clock_.now());
 }
 
-// Returns the accepted partial (the encoded pixel sums of one unit) that is to be folded. It is read from the
-// log if it is no longer in memory: it arrived before a restart, or too many partials are waiting.
+// Returns the accepted partial (the encoded pixel sums of one unit) that is to be folded. Reads it from the
+// log if it is not in memory, because it arrived before a restart or because too many partials wait.
 Result<WaitingPartial> FarmDriver::partial_for(JobEntry& entry, const Fold& e) const {
   auto waiting = entry.assembly->take(e.unit.tile, e.unit.round, e.samples);
   if (!waiting) return fail(Errc::internal, "an accepted partial is not at hand");
@@ -134,7 +144,7 @@ void FarmDriver::on(const Fold& e) {
   const auto error =
       waiting ? entry->assembly->fold(e.unit.tile, e.unit.round, *waiting) : tl::unexpected(waiting.error());
   if (!error) {
-    // A wrong pixel must never be folded: the tile stops and the job waits.
+    // If the partial cannot be read, the tile stops and the job waits: a wrong pixel must never be folded.
     entry->trouble =
         fmt::format("tile {} round {} cannot be folded: {}; restart the coordinator to render it again",
                     e.unit.tile, e.unit.round, error.error().message);
@@ -151,9 +161,14 @@ void FarmDriver::on(const Fold& e) {
   else
     entry->fold_seconds = entry->elapsed(clock_.now());
   todo_.push_back(UnitFolded{e.unit, e.samples, error->relative.squares});
-  entry->stored.totals.time.merge += seconds(clock_.now() - begin);
-  if (core_.publisher.quiet()) return;  // it was folded before already
+  const TimePoint end = clock_.now();
+  entry->stored.totals.time.merge += seconds(end - begin);
+  if (core_.publisher.quiet()) return;  // a fold that repeats an earlier one publishes nothing
   failpoint("result-folded");
+  if (entry->trace)
+    entry->trace->step(
+        "fold", begin, end,
+        {{"lightshaft.tile", std::int64_t{e.unit.tile}}, {"lightshaft.round", std::int64_t{e.unit.round}}});
   ++core_.figures.folded;
   if (waiting->arrived != TimePoint{})
     core_.figures.fold_lag_seconds += seconds(clock_.now() - waiting->arrived);
@@ -185,7 +200,7 @@ void FarmDriver::on(const TileDiscarded& e) {
   if (!entry || !entry->assembly) return;
   entry->assembly->discard(e.tile);
   if (entry->reference_tiles) entry->reference_tiles->discard(e.tile);
-  core_.records.forget_curve(*entry);
+  core_.records.forget_wrong_pixels(*entry);
   core_.records.log(e.job, fmt::format("tile {} is rendered again from its first round", e.tile));
   if (!core_.publisher.quiet()) core_.publisher.tile(*entry, e.tile, entry->grid.rect(e.tile), "free", 0);
 }
@@ -210,15 +225,19 @@ void FarmDriver::on(const JobPinned& e) {
   if (!core_.records.put_pin(entry)) todo_.push_back(JobPaused{e.job});
 }
 
-// The state `done` is published and stored only when the final image is written: see ImageWriter.
+// The state `done` is published and stored only after the final image is written: see ImageWriter.
 void FarmDriver::on(const JobStateChanged& e) {
   const auto entry = core_.jobs.find(e.job);
-  // A job that is removed here continues at another coordinator or not at all.
+  // A removed job continues at another coordinator or not at all.
   if (!entry || entry->removed || e.to == JobState::done) return;
   entry->stored.state = e.to;
   entry->stored.stopped.reset();
   if (e.to != JobState::paused) entry->stored.missing_blobs.clear();
   log_info(fmt::format("job={} state={}", e.job.value, to_string(e.to)), entry->stored.name);
+  if (entry->trace) {
+    if (is_terminal(e.from)) entry->trace->begin_again(entry->stored, clock_.now());
+    entry->trace->event(std::string(to_string(e.to)), clock_.now());
+  }
   core_.records.log(e.job, fmt::format("{}", to_string(e.to)));
   if (e.to == JobState::running && !entry->pin_unsaved) entry->trouble.clear();
   if (e.to == JobState::paused) entry->still_since = clock_.now();
@@ -228,6 +247,8 @@ void FarmDriver::on(const JobStateChanged& e) {
   }
   if (is_terminal(e.to)) {
     end_image(entry);
+    entry->stored.totals.ended_unix = entry->ended_unix;
+    if (entry->trace) entry->trace->end(entry->stored, clock_.now());
     images_.retire(core_, entry);
   }
   core_.records.put(entry);
@@ -240,6 +261,7 @@ void FarmDriver::on(const JobFinished& e) {
   if (!entry) return;
   entry->stored.stopped = e.stopped;
   end_image(entry);
+  if (entry->trace) entry->trace->leases_end(clock_.now());
   if (e.unaudited > 0)
     core_.records.log(
         e.job, fmt::format("{} results were to be rendered again by another worker, but nobody else of their "
@@ -248,11 +270,11 @@ void FarmDriver::on(const JobFinished& e) {
   images_.finish(core_, entry);
 }
 
-// Takes down what the image of a job that has ended has cost, and ends its curve.
+// Stores the cost of the final image of a job that has ended, and ends its convergence curve.
 void FarmDriver::end_image(const EntryPtr& entry) {
   JobTotals& totals = entry->stored.totals;
   totals.render_seconds = entry->fold_seconds;
-  totals.ended_unix = unix_now();
+  entry->ended_unix = unix_now();
   entry->clock_zero.reset();
   entry->leased.clear();
   if (!entry->assembly) return;
@@ -272,7 +294,7 @@ void FarmDriver::on(const JobFailed& e) {
   core_.publisher.job(*entry);
 }
 
-// Curves
+// Convergence curves
 
 void FarmDriver::on(const Checkpoint& e) {
   const auto entry = core_.jobs.find(e.job);
@@ -282,23 +304,29 @@ void FarmDriver::on(const Checkpoint& e) {
   entry->assembly->checkpoint_taken(e.rounds);
   entry->stored.totals.doubt = error.verdict;
   entry->stored.totals.few_hits = error.few_hits;
-  if (!entry->points.empty() && entry->points.back().spp >= error.spp) {  // known from before the restart
+  // The checkpoint is known from before the restart
+  if (!entry->points.empty() && entry->points.back().spp >= error.spp) {
     const bool compared = std::none_of(entry->points.begin(), entry->points.end(), [&](const auto& p) {
       return p.spp == error.spp && !p.reference_error;
     });
     if (!compared) comparer_.compare(core_, entry, e.rounds, error.spp);
     return;
   }
-  // If the errors are not exact, some tile is being rendered again, and earlier errors of the other tiles are
-  // no longer kept: this checkpoint gets no point.
+  // If the errors are not exact, some tile is being rendered again and earlier errors of the other tiles are
+  // lost: this checkpoint gets no point.
   if (!exact) return;
   core_.records.add_point(
       entry, {entry->fold_seconds, entry->assembly->costs().until(e.rounds), error.spp, figures_of(error)});
   comparer_.compare(core_, entry, e.rounds, error.spp);
 }
 
+void FarmDriver::on(const CheckDenoised& e) {
+  const auto entry = core_.jobs.find(e.job);
+  if (entry && entry->assembly) images_.check_denoised(core_, entry, e.spp);
+}
+
 // If a job ends by time or is cancelled, its final image may have more samples than its last checkpoint. The
-// curve then gets a last point for that image, so that all views agree.
+// curve then gets a last point for the final image, so that the curve agrees with the report.
 void FarmDriver::end_curve(const EntryPtr& entry) {
   if (entry->assembly->film().pixels_without_samples() > 0) return;
   const ImageError error = image_error(entry->assembly->film().error());
@@ -313,7 +341,8 @@ void FarmDriver::end_curve(const EntryPtr& entry) {
 
 void FarmDriver::on(const WorkerStateChanged& e) {
   log_info(fmt::format("worker={} state={}", e.worker.value, to_string(e.to)), e.why);
-  if (e.to == WorkerState::unhealthy) log_error(fmt::format("worker={}", e.worker.value), "sick: " + e.why);
+  if (e.to == WorkerState::unhealthy)
+    log_error(fmt::format("worker={}", e.worker.value), "unhealthy: " + e.why);
   if (const auto w = core_.workers.find(e.worker); w != core_.workers.end())
     w->second.trouble = e.to == WorkerState::unhealthy ? e.why : "";
   core_.publisher.worker(e.worker, true);
@@ -325,9 +354,9 @@ void FarmDriver::on(const WorkerBlocked& e) {
   core_.records.log(e.job, fmt::format("worker {} gets no more of it: {}", e.worker.value, e.why));
 }
 
-// A faulty worker is stored apart from the jobs, and for longer: none of its results is accepted after a
-// restart, or in jobs that are extended then. Until it is stored every job waits, since a restart would
-// accept the worker's results that are in the log.
+// A faulty worker is stored separately from the jobs, and for longer, so that none of its results is accepted
+// after a restart or in jobs that are extended later. Until it is stored every job waits, since a restart
+// would accept the worker's results from the log.
 void FarmDriver::on(const WorkerFoundFaulty& e) {
   log_error(fmt::format("worker={} job={} tile={} round={}", e.worker.value, e.unit.job.value, e.unit.tile,
                         e.unit.round),

@@ -1,5 +1,5 @@
-// Drives the farm: hands it events, and carries out its effects (domain/effect.h), in order. Part of the core
-// (core.h), so all of it runs under the lock.
+// Drives the farm: passes events to it, and carries out its effects (domain/effect.h), in order. Part of the
+// core (core.h), so all of it runs under the lock.
 #pragma once
 
 #include <deque>
@@ -23,11 +23,11 @@ class FarmDriver {
 
   const Farm& farm() const { return farm_; }
   void run(Event first);
-  // Gives a stored job to the farm. Of folds that are repeated for it, no events are published.
+  // Gives a stored job to the farm. Folds that this repeats publish no events.
   void replay(JobEntry& entry, JobRestored event);
-  void quarantine(const std::vector<QuarantinedWorker>& workers);  // these are stored already
-  // Unloads a job if it has ended and is on disk: what the farm knows of it and its image in memory are
-  // freed; only its files and its record remain. Results that still arrive for it are dropped.
+  void quarantine(const std::vector<QuarantinedWorker>& workers);  // `workers` are stored already
+  // Unloads an ended job whose files are complete on disk: frees its image in memory and the farm's state of
+  // it; only its files and its record remain. Results that still arrive for it are dropped.
   void unload(JobEntry& entry);
 
  private:
@@ -41,6 +41,7 @@ class FarmDriver {
   void on(const JobPinned& e);
   void on(const JobStateChanged& e);
   void on(const Checkpoint& e);
+  void on(const CheckDenoised& e);
   void on(const ReopenRound& e);
   void on(const JobFinished& e);
   void on(const JobFailed& e);
@@ -60,8 +61,8 @@ class FarmDriver {
   const JobFiles& files_;
   ImageWriter& images_;
   ReferenceComparer& comparer_;
-  std::deque<Event> todo_;        // events that effects have raised
-  std::vector<EntryPtr> folded_;  // jobs of which units were folded by the events that are being handled
+  std::deque<Event> todo_;        // events raised by effects, to be handled next
+  std::vector<EntryPtr> folded_;  // jobs whose units were folded by the events that are being handled
 };
 
 }  // namespace ls::coordinator

@@ -7,15 +7,17 @@
 #include "common/base/failpoint.h"
 #include "common/base/log.h"
 #include "common/image/exr/final_image.h"
+#include "common/scene/json/serialize.h"
+#include "coordinator/admission/cryptomatte_manifests.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/service/core.h"
-#include "coordinator/service/provenance.h"
 #include "coordinator/store/log/audit_file.h"
 
 namespace ls::coordinator {
 namespace {
 
-constexpr TileIndex kTilesAtOnce = 64;  // tiles of a snapshot that are copied under one lock
+// Number of tiles of a snapshot that are copied before the lock is released and taken again
+constexpr TileIndex kTilesAtOnce = 64;
 
 std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
 
@@ -30,7 +32,7 @@ class ImageFile final : public ByteSink {
   AtomicFile& file_;
 };
 
-// Writes the final image. Returns how many values it cannot represent.
+// Writes the final image. Returns how many values are out of range for the file.
 Result<std::uint64_t> write_image(const std::filesystem::path& path, const Film& film,
                                   const ReportFacts& facts, const BlobStore& blobs,
                                   const Denoised* denoised) {
@@ -80,9 +82,9 @@ void ImageWriter::snapshot_if_due(Core&, const EntryPtr& entry) {
   writes_.push([this, entry] { take_snapshot(entry); });
 }
 
-// Takes a snapshot while folding continues. What is folded into a tile after it was copied is folded again
-// after a restart. The convergence points that the snapshot includes must be stored before it; they are in
-// the writer's queue already, so the snapshot is queued behind them.
+// Takes a snapshot while folding continues. Rounds that are folded into a tile after the tile was copied are
+// folded again after a restart. The convergence points that the snapshot includes must be stored before it;
+// they are in the writer's queue already, so the snapshot is queued behind them.
 void ImageWriter::take_snapshot(const EntryPtr& entry) {
   const auto done = [this, entry](const Result<void>& written) {
     if (!written) log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
@@ -139,6 +141,36 @@ Result<void> ImageWriter::write_snapshot(const EntryPtr& entry, const Folded& fo
   return written;
 }
 
+void ImageWriter::check_denoised(Core&, const EntryPtr& entry, double spp) {
+  comparer_.run_afterwards([this, entry, spp, curve = entry->curve, film = entry->assembly->film()] {
+    note_check(entry, curve, spp, *denoising_.of(film));
+  });
+}
+
+void ImageWriter::note_check(const EntryPtr& entry, std::uint64_t curve, double spp, const Denoised& made) {
+  const auto core = core_.lock();
+  StoredJob& job = entry->stored;
+  if (entry->removed || entry->unloaded || entry->curve != curve) return;
+  if (made.image.rgb.empty()) {
+    // A job that has ended, or whose target was dropped meanwhile, needs no check
+    if (job.state != JobState::running || job.spec.target_layer != TargetLayer::denoised) return;
+    entry->trouble = fmt::format(
+        "its target is the error of the denoised layers, which cannot be made: {}; then resume the job",
+        made.figures.trouble);
+    log_error(fmt::format("job={}", job.id.value), entry->trouble);
+    core->records.log(job.id, entry->trouble);
+    core->driver.run(JobPaused{job.id});
+    return;
+  }
+  const DenoisedCheck check{spp, made.figures.error.relmse, made.figures.error.relmse_at_most()};
+  const bool known = std::any_of(job.denoised_checks.begin(), job.denoised_checks.end(),
+                                 [&](const DenoisedCheck& c) { return c.spp == spp; });
+  if (!known) job.denoised_checks.push_back(check);
+  core->records.put(entry);
+  core->driver.run(DenoisedChecked{job.id, check});
+  core->publisher.job(*entry);
+}
+
 void ImageWriter::finish(Core&, const EntryPtr& entry) {
   const std::uint64_t number = entry->finishing = ++last_final_;
   const auto write = [this, entry, number] { write_final(entry, number); };
@@ -153,15 +185,18 @@ void ImageWriter::finish_again(Core&, const EntryPtr& entry) {
   writes_.push([this, entry, number = last_final_] { write_final(entry, number); });
 }
 
-// Denoises the final image of a job before it is written, on another thread than that of the writes.
+// Denoises the final image of a job before it is written. Runs on the comparing thread, not the writer
+// thread.
 void ImageWriter::denoise(const EntryPtr& entry, std::uint64_t number) {
   auto core = core_.lock();
   if (entry->finishing != number || !entry->assembly) return;
   const Film film = entry->assembly->film();
   if (film.samples() == 0) return;
   core.unlock();
+  const TimePoint begin = clock_.now();
   auto made = denoising_.of(film);
   core.lock();
+  if (entry->trace) entry->trace->step("denoise", begin, clock_.now(), {}, made->image.rgb.empty());
   if (entry->finishing == number) entry->denoised = std::move(made);
 }
 
@@ -175,11 +210,13 @@ void ImageWriter::write_final(const EntryPtr& entry, std::uint64_t number) {
   auto denoised = std::exchange(entry->denoised, nullptr);
   core.unlock();
 
+  const TimePoint begin = clock_.now();
   const auto written =
       files_.on_disk() ? write_files(entry, folded, facts, std::move(denoised)) : Result<void>();
 
   core.lock();
-  if (entry->finishing != number) return;  // extended or removed meanwhile
+  if (entry->trace) entry->trace->step("write image", begin, clock_.now(), {}, !written);
+  if (entry->finishing != number) return;  // the job was extended or removed meanwhile
   if (!written) {
     entry->trouble =
         "the final image cannot be written: " + written.error().message + "; then resume the job";
@@ -190,11 +227,16 @@ void ImageWriter::write_final(const EntryPtr& entry, std::uint64_t number) {
   entry->finishing = 0;
   entry->trouble.clear();
   entry->stored.state = JobState::done;
+  entry->stored.totals.ended_unix = entry->ended_unix;
   entry->stored.totals.spp_done = facts.job.totals.spp_done;
   entry->stored.totals.units = facts.job.totals.units;
   entry->stored.totals.units_planned = facts.job.totals.units_planned;
   core->records.put(entry);
   failpoint("job-done");
+  if (entry->trace) {
+    entry->trace->event("done", clock_.now());
+    entry->trace->end(entry->stored, clock_.now());
+  }
   core->driver.unload(*entry);
   log_info(fmt::format("job={} state=done stopped={}", facts.job.id.value, to_string(*facts.job.stopped)),
            facts.job.name);
@@ -213,7 +255,7 @@ Result<void> ImageWriter::write_files(const EntryPtr& entry, const Folded& folde
   facts.clamped_values = *clamped;
   facts.pixels = pixels_sha256(folded.film);
   if (auto done = write_atomically(where / "report.json", bytes_of(report_json(facts))); !done) return done;
-  // The snapshot comes last and must succeed: an extension continues from it.
+  // The snapshot comes last and must succeed, since an extension of the job continues from it.
   return write_snapshot(entry, folded);
 }
 
@@ -229,7 +271,7 @@ void ImageWriter::write_retired(const EntryPtr& entry) {
   const auto written = write_snapshot(entry, folded);
   core.lock();
   if (!entry->assembly || entry->removed) return;
-  if (!written) {  // its image stays in memory
+  if (!written) {  // the image stays in memory, so that writing can be repeated
     log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
     return;
   }
@@ -237,6 +279,39 @@ void ImageWriter::write_retired(const EntryPtr& entry) {
   count_units(entry->stored.totals, core->driver.farm(), entry->stored.id);
   core->records.put(entry);
   core->driver.unload(*entry);
+}
+
+CryptomatteManifests cryptomatte_manifests_of(const StoredJob& job, const BlobStore& blobs) {
+  if (!wants_labels(job.settings)) return {};
+  const auto size = blobs.size(job.scene);
+  const auto json = size ? blobs.read(job.scene, 0, *size)
+                         : Result<std::vector<std::byte>>(fail(Errc::not_found, "its scene is not stored"));
+  const auto scene = json ? deserialize_scene({reinterpret_cast<const char*>(json->data()), json->size()})
+                          : Result<Scene>(tl::unexpected(json.error()));
+  if (scene) return manifests_of(*scene, aovs_of(job.settings));
+  log_warn(fmt::format("job={}", job.id.value), "mattes without names: " + scene.error().message);
+  return {};
+}
+
+Provenance provenance_of(const ReportFacts& facts, const BlobStore& blobs) {
+  const StoredJob& job = facts.job;
+  const Health& health = job.totals.health;
+  const std::string note = job.stopped ? note_on(*job.stopped, job.spec.target_layer) : "";
+  std::string stopped = job.stopped ? std::string(to_string(*job.stopped)) : "";
+  if (!note.empty()) stopped += "; " + note;
+  return {job.scene,
+          canonical_json(job.settings),
+          job.build,
+          job.numeric_class.value_or(Digest{}),
+          job.settings.seed,
+          job.totals.render_seconds,
+          health.clean() ? "clean" : canonical_json(health),
+          cryptomatte_manifests_of(job, blobs),
+          job.totals.core_seconds,
+          std::move(stopped),
+          convergence_status_of(facts),
+          header_figures(facts),
+          header_notes(facts)};
 }
 
 }  // namespace ls::coordinator

@@ -1,13 +1,16 @@
-// Writes the files of a job that renders, on the writer thread: open audits, now and then a snapshot, and at
+// Writes the files of a running job, on the writer thread: open audits, snapshots from time to time, and at
 // the end the final image and the report.
 #pragma once
 
-#include "coordinator/base/guarded.h"
+#include "common/base/guarded.h"
+#include "common/image/exr/final_image.h"
+#include "coordinator/assemble/job_report.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/service/denoising.h"
 #include "coordinator/service/reference_comparer.h"
 #include "coordinator/service/state/job_files.h"
 #include "coordinator/service/state/records.h"
+#include "coordinator/store/blobs/blob_store.h"
 
 namespace ls::coordinator {
 
@@ -25,23 +28,27 @@ class ImageWriter {
 
   void keep_audits(Core&, const EntryPtr& entry, const std::vector<JobRestored::Audit>& audits);
   void snapshot_if_due(Core&, const EntryPtr& entry);
+  // Has the job's film denoised as it is now, at `spp` samples per pixel; then the error of its denoised
+  // layers is stored and the farm is told. If that fails, the job is paused and says why.
+  void check_denoised(Core&, const EntryPtr& entry, double spp);
   // Has the final image of a job written that the farm has finished. The job is done when that has succeeded.
   void finish(Core&, const EntryPtr& entry);
-  void finish_again(Core&, const EntryPtr& entry);  // after it could not be written
-  // Has the image of a failed or cancelled job written, as it is, and its memory freed.
+  void finish_again(Core&, const EntryPtr& entry);  // repeats finish() after it failed
+  // Starts writing the current image of a failed or cancelled job, and frees the job's memory afterwards.
   void retire(Core&, const EntryPtr& entry);
 
  private:
-  struct Folded {  // a copy of the folded image, cheap to make, to use outside the lock
+  struct Folded {  // a cheap copy of the folded image, for use outside the lock
     Film film;
     RoundErrors errors;
     HealthTable health;
   };
-  // All of these run on the writer thread, denoise() on the comparing thread
+  // All of these run on the writer thread, denoise() and note_check() on the comparing thread
   void take_snapshot(const EntryPtr& entry);
   Result<SnapshotFile> copy_folded(const EntryPtr& entry);
   Result<void> write_snapshot(const EntryPtr& entry, const Folded& folded);
   void denoise(const EntryPtr& entry, std::uint64_t number);
+  void note_check(const EntryPtr& entry, std::uint64_t curve, double spp, const Denoised& made);
   void write_final(const EntryPtr& entry, std::uint64_t number);
   Result<void> write_files(const EntryPtr& entry, const Folded& folded, ReportFacts& facts,
                            std::shared_ptr<const Denoised> denoised);
@@ -54,7 +61,14 @@ class ImageWriter {
   ReferenceComparer& comparer_;
   BackgroundWrites& writes_;
   const Clock& clock_;
-  std::uint64_t last_final_ = 0;  // number of the last final image that was asked for; guarded by the lock
+  std::uint64_t last_final_ = 0;  // number of the latest request for a final image; guarded by the lock
 };
+
+// Makes the header of a final image, which describes the job. If the image has cryptomattes, reads the scene
+// for the names in them.
+Provenance provenance_of(const ReportFacts& facts, const BlobStore& blobs);
+// Returns the names for the identifiers of the cryptomattes. Reads the scene if the job has any; empty if
+// reading fails.
+CryptomatteManifests cryptomatte_manifests_of(const StoredJob& job, const BlobStore& blobs);
 
 }  // namespace ls::coordinator

@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "common/base/log.h"
+#include "common/image/frame/tiles_over.h"
 #include "common/job/limits.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/service/core.h"
@@ -13,7 +14,7 @@
 namespace ls::coordinator {
 namespace {
 
-// Checks what holds for jobs and sequences alike.
+// Checks the rules that jobs and sequences share.
 Result<void> check(const JobChange& change) {
   if (change.priority && std::abs(std::int64_t{*change.priority}) > kMaxPriority)
     return fail(Errc::invalid_argument, fmt::format("priority must be within +-{}", kMaxPriority));
@@ -21,6 +22,19 @@ Result<void> check(const JobChange& change) {
     return fail(Errc::invalid_argument,
                 "samples (spp) and target_error cannot be changed at once: one decides "
                 "how far the job goes; change one, then the other");
+  return {};
+}
+
+// Checks that the focus lies in the image of each of the jobs.
+Result<void> check_focus(const JobChange& change, const std::vector<EntryPtr>& jobs) {
+  if (!change.focus || !*change.focus) return {};
+  for (const EntryPtr& job : jobs) {
+    const FrameSize size = job->stored.settings.size;
+    if (!lies_in(size, **change.focus))
+      return fail(Errc::invalid_argument,
+                  fmt::format("focus {} does not lie in the image of job {}, which has {} x {} pixels",
+                              show(**change.focus), job->stored.id.value, size.width, size.height));
+  }
   return {};
 }
 
@@ -51,7 +65,7 @@ double pixels_of(const StoredJob& job) {
   return static_cast<double>(job.settings.size.width) * job.settings.size.height;
 }
 
-// Checks that done frames with this many pixels in total may be resumed together.
+// Checks whether done frames with this many pixels in total may be loaded and resumed together.
 Result<void> may_wake(double pixels) {
   if (pixels <= static_cast<double>(limits::kMaxWokenPixels)) return {};
   return fail(Errc::failed_precondition,
@@ -60,7 +74,7 @@ Result<void> may_wake(double pixels) {
                           pixels, limits::kMaxWokenPixels));
 }
 
-// Returns the frames that a new target error concerns: those whose end is not decided yet, and those that
+// Returns the frames to which a new target error applies: those whose end is not decided yet, and those that
 // ended because they reached a larger target.
 Result<std::vector<EntryPtr>> may_retarget(const Farm& farm, const JobId& id,
                                            const std::vector<EntryPtr>& sound, double target_error) {
@@ -87,7 +101,8 @@ Result<std::vector<EntryPtr>> may_retarget(const Farm& farm, const JobId& id,
   return chosen;
 }
 
-// Returns all frames except those that have `spp` samples already, as after a change that was interrupted.
+// Returns all frames that have fewer than `spp` samples. Some may have them already, after a change that was
+// interrupted.
 Result<std::vector<EntryPtr>> may_extend(const Farm& farm, const Sequence& sequence, std::uint64_t spp) {
   std::vector<EntryPtr> chosen;
   double woken = 0;
@@ -147,13 +162,16 @@ Result<void> JobCommands::change_job(Core& core, const EntryPtr& entry, const Jo
   if (auto ok = check(change); !ok) return ok;
   if (change.state)
     if (auto ok = may_become(*entry, *change.state, change.spp || change.target_error); !ok) return ok;
-  // These functions check first; if one fails, nothing has been changed.
+  if (auto ok = check_focus(change, {entry}); !ok) return ok;
+  // All checks come first, so that a failed check leaves the job unchanged.
   if (change.spp)
     if (auto done = extend(core, *entry, *change.spp); !done) return done;
   if (change.target_error)
     if (auto done = set_target(core, *entry, *change.target_error); !done) return done;
   if (change.priority)
     if (auto done = set_priority(core, *entry, *change.priority); !done) return done;
+  if (change.focus)
+    if (auto done = set_focus(core, {entry}, *change.focus); !done) return done;
   return change.state ? become(core, entry, *change.state) : Result<void>{};
 }
 
@@ -163,12 +181,12 @@ Result<void> JobCommands::become(Core& core, const EntryPtr& entry, JobState ask
   if (asked == JobState::cancelled) {
     if (state != asked) core.driver.run(JobCancelled{id});
   } else if (asked == JobState::paused) {
-    entry->stored.missing_blobs.clear();  // from now on the job is paused by its user
+    entry->stored.missing_blobs.clear();  // from here on the job is paused by its user, not for missing blobs
     if (state != asked)
       core.driver.run(JobPaused{id});
     else
       core.records.put(entry);
-  } else if (entry->finishing) {  // its final image could not be written: this is tried again
+  } else if (entry->finishing) {  // its final image could not be written: try this again
     entry->trouble.clear();
     images_.finish_again(core, entry);
   } else if (state == JobState::paused) {
@@ -189,6 +207,23 @@ Result<void> JobCommands::set_priority(Core& core, JobEntry& entry, int priority
   }
   if (!entry.unloaded) core.driver.run(JobPriority{entry.stored.id, priority});
   core.publisher.job(entry);
+  return {};
+}
+
+// The focus of all jobs is stored in one transaction: either all are stored or nothing is changed.
+Result<void> JobCommands::set_focus(Core& core, const Entries& jobs,
+                                    const std::optional<PixelRect>& focus) const {
+  std::vector<StoredJob> edited;
+  for (const EntryPtr& job : jobs) {
+    edited.push_back(job->stored);
+    edited.back().focus = focus;
+  }
+  if (auto put = store_.put_jobs(edited); !put) return put;
+  for (const EntryPtr& job : jobs) {
+    job->stored.focus = focus;
+    if (!job->unloaded) core.driver.run(JobFocused{job->stored.id, focus});
+    core.publisher.job(*job);
+  }
   return {};
 }
 
@@ -240,6 +275,7 @@ Result<void> JobCommands::go_on(Core& core, JobEntry& entry, const Result<void>&
   core.driver.run(change);
   const JobPlan plan = core.driver.farm().plan(id).value();
   entry.stored.spec.target_error = plan.target_error;
+  if (!plan.target_error) entry.stored.spec.target_layer = TargetLayer::raw;
   entry.stored.spec.time = plan.time;
   if (plan.spp != spp) entry.stored.spp = entry.stored.spec.spp = plan.spp;
   core.records.log(id, std::move(log_line));
@@ -253,10 +289,16 @@ void JobCommands::drop(Core& core, const EntryPtr& entry) const {
   const JobId id = entry->stored.id;
   entry->removed = true;
   entry->finishing = 0;
+  if (entry->trace) {
+    if (!is_terminal(entry->stored.state)) entry->trace->event("removed", clock_.now());
+    entry->trace->end(entry->stored, clock_.now());
+    entry->trace.reset();
+  }
   if (!entry->unloaded) core.driver.run(JobForgotten{id});
   core.jobs.remove(entry);
   log_info(fmt::format("job={}", id.value), "removed");
-  // Background writes of the job may still be queued; what they leave behind is removed with the folder.
+  // Background writes of the job may still be queued. The folder is removed after them, with the files that
+  // they write.
   writes_.push([this, id] {
     (void)store_.remove_job(id);
     files_.discard_folder(id);
@@ -268,7 +310,7 @@ void JobCommands::drop(Core& core, const EntryPtr& entry) const {
 Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Sequence& sequence,
                                           const JobChange& change) const {
   const Farm& farm = core.driver.farm();
-  Entries sound, open, retargeted, extended;  // `sound`: frames whose record can be read
+  Entries sound, open, retargeted, extended;  // `sound`: frames whose records can be read
   for (const EntryPtr& frame : sequence.frames) {
     if (!frame->broken.empty()) continue;
     sound.push_back(frame);
@@ -285,6 +327,7 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
     if (!chosen) return tl::unexpected(chosen.error());
     extended = std::move(*chosen);
   }
+  if (auto ok = check_focus(change, sound); !ok) return ok;
   if (change.state && open.empty() && !change.spp) {
     const JobState state = core.views.sequence(id, sequence, false).state;
     if (state != *change.state)
@@ -299,6 +342,8 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
       return tl::unexpected(in_frame(frame->stored.id, done.error()));
   if (change.priority)
     if (auto done = set_priority_of_all(core, sound, *change.priority); !done) return done;
+  if (change.focus)
+    if (auto done = set_focus(core, sound, *change.focus); !done) return done;
   if (change.state) {
     open.insert(open.end(), extended.begin(), extended.end());
     if (auto done = become_all(core, open, *change.state); !done) return done;
@@ -321,8 +366,8 @@ Result<void> JobCommands::set_priority_of_all(Core& core, const Entries& frames,
   return {};
 }
 
-// Changes the state of the frames and stores them together. A frame whose image is being written is left to
-// end, unless the writing has failed and is to be repeated.
+// Changes the state of the frames and stores them together. A frame whose image is being written is left
+// alone, unless the writing has failed and is to be repeated.
 Result<void> JobCommands::become_all(Core& core, const Entries& frames, JobState asked) const {
   Result<void> done;
   const auto saved = core.records.put_together([&] {
@@ -335,7 +380,7 @@ Result<void> JobCommands::become_all(Core& core, const Entries& frames, JobState
   return done ? saved : done;
 }
 
-// As for a single job, open frames are cancelled and kept.
+// Open frames are cancelled and kept, as with a single job.
 Result<void> JobCommands::remove_sequence(Core& core, const JobId& id, const Sequence& sequence) const {
   Entries open;
   std::vector<JobId> ids;

@@ -1,12 +1,12 @@
-// Changes and removes jobs and sequences for their users. Every change is checked completely before any
-// part of it is applied.
+// Carries out users' commands: changes and removals of jobs and sequences. Every change is checked completely
+// before any part of it is applied.
 #pragma once
 
 #include <functional>
 #include <string>
 #include <vector>
 
-#include "coordinator/base/guarded.h"
+#include "common/base/guarded.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/service/image_writer.h"
 #include "coordinator/service/restore.h"
@@ -25,19 +25,19 @@ class JobCommands {
         writes_(writes),
         clock_(clock) {}
 
-  // A sequence is changed as its frames are; frames that have ended change only if they are to get more
-  // samples.
+  // Changes a job, or all frames of a sequence. Frames that have ended change only if they get more samples.
   Result<void> change(const JobId& id, const JobChange& change) const;
-  // Removes an ended job with all its results, a sequence with all frames. What has not ended is cancelled
-  // and kept.
+  // Removes an ended job, or the ended frames of a sequence, with all results. Open ones are cancelled and
+  // kept.
   Result<void> remove(const JobId& id) const;
-  // Changes the state of a job, which must be possible.
+  // Changes the state of a job. The caller must have checked that the change is possible.
   Result<void> become(Core& core, const EntryPtr& entry, JobState asked) const;
 
  private:
   using Entries = std::vector<EntryPtr>;
   Result<void> change_job(Core& core, const EntryPtr& entry, const JobChange& change) const;
   Result<void> set_priority(Core& core, JobEntry& entry, int priority) const;
+  Result<void> set_focus(Core& core, const Entries& jobs, const std::optional<PixelRect>& focus) const;
   Result<void> extend(Core& core, JobEntry& entry, std::uint64_t spp) const;
   Result<void> set_target(Core& core, JobEntry& entry, double target_error) const;
   Result<void> go_on(Core& core, JobEntry& entry, const Result<void>& possible, const Event& change,

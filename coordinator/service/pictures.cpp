@@ -10,7 +10,7 @@
 #include "common/image/exr/maps.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/service/core.h"
-#include "coordinator/service/provenance.h"
+#include "coordinator/service/image_writer.h"
 #include "coordinator/views/views.h"
 
 namespace ls::coordinator {
@@ -26,7 +26,7 @@ std::string log_text(const std::vector<LogLine>& lines) {
   return text;
 }
 
-// Sorts the lines by time and keeps the latest ones.
+// Sorts the lines by time and keeps the latest `most`.
 void shorten(std::vector<LogLine>& lines, std::size_t most) {
   std::stable_sort(lines.begin(), lines.end(),
                    [](const LogLine& a, const LogLine& b) { return a.unix_time < b.unix_time; });
@@ -134,14 +134,14 @@ Result<std::string> Pictures::report_json(const JobId& id) const {
   if (!shown) return tl::unexpected(shown.error());
   ReportFacts& facts = shown->facts;
   facts.pixels = pixels_sha256(shown->film);
-  // While a job renders its report is asked for often, and is not to wait for a denoiser.
+  // The report of a running job is requested often and must not wait for the denoiser.
   if (is_terminal(facts.job.state)) denoising_.of_job(shown->film, facts);
   if (!facts.job.spec.float_output) facts.clamped_values = values_above_half(shown->film);
   return coordinator::report_json(facts);
 }
 
-// Returns the lines of a job's log; of a sequence, those of all frames. If there are more than kLogLinesKept,
-// the oldest are left out.
+// Returns the log lines of a job, or of all frames of a sequence. If there are more than kLogLinesKept, the
+// oldest are left out.
 Result<std::string> Pictures::log(const JobId& id) const {
   std::vector<JobId> jobs;
   {
@@ -237,7 +237,7 @@ std::string Pictures::sequence_report(const JobView& view) const {
          {"stopped", view.stopped.empty() ? json() : json(view.stopped)},
          {"warnings", view.warnings},
          {"fake", view.fake},
-         {"convergence", json::array()},  // every frame has its own
+         {"convergence", json::array()},  // every frame has its own curve
          {"frames", std::move(frames)}};
   const auto& e = view.error_now;
   j["rmse"] = e ? number(e->rmse) : json();

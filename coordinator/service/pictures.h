@@ -1,12 +1,15 @@
-// Reads what a job has rendered: images, maps, tiles, the report, the log. Images of jobs under way are
-// copied under the lock; those of jobs that have ended are read from disk.
+// Reads the output of jobs: images, maps, tiles, the report, the log. Images of running jobs are copied under
+// the lock; images of ended jobs are read from disk.
 #pragma once
 
+#include <memory>
+#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "coordinator/base/guarded.h"
+#include "common/base/guarded.h"
+#include "coordinator/assemble/stored_layers.h"
 #include "coordinator/service/denoising.h"
 #include "coordinator/service/state/job_entry.h"
 #include "coordinator/service/state/job_files.h"
@@ -23,8 +26,19 @@ class Pictures {
 
   Result<std::vector<std::byte>> image_exr(const JobId& id) const;
   Result<std::vector<std::byte>> image_png(const JobId& id, double exposure, bool denoised) const;
+  Result<std::vector<std::byte>> thumbnail_png(const JobId& id) const;
+  // The tone-mapped picture at the finest mip level at which it has at most `most_side` pixels on a side:
+  // 8 bits of R, G and B of each pixel, row by row. Pixels without samples are black.
+  struct Shown {
+    FrameSize size;
+    std::vector<std::uint8_t> rgb;
+  };
+  Result<Shown> shown(const JobId& id, const VideoAsked& asked, int most_side) const;
   Result<std::vector<std::byte>> error_png(const JobId& id) const;
   Result<std::vector<std::byte>> samples_png(const JobId& id) const;
+  // The layers of an image, and their pixels as numbers (pictures_pixels.cpp)
+  Result<std::string> layers_json(const JobId& id) const;
+  Result<std::vector<std::byte>> pixels(const JobId& id, const PixelsAsked& asked) const;
   Result<std::vector<TileView>> tiles(const JobId& id) const;
   // The report of a sequence has the values of each frame and those of all frames together.
   Result<std::string> report_json(const JobId& id) const;
@@ -38,7 +52,17 @@ class Pictures {
     Film film;
     ReportFacts facts;
   };
+  // The denoised image of a job as viewers see it. That of a running job is made again only when it is old in
+  // comparison to the time that this takes, so that several requests get the same one.
+  struct DenoisedView {
+    std::string key;  // names the image
+    TimePoint made{};
+    Duration cost{};
+    std::shared_ptr<const Denoised> image;  // null: no samples yet
+  };
   Result<Picture> picture(const JobId& id) const;
+  Result<std::shared_ptr<const Denoised>> denoised_view(const JobId& id) const;
+  Result<LayerMosaic> mosaic_of(const JobId& id, const PixelLayer& layer, int level) const;
   std::string sequence_report(const JobView& view) const;
 
   Guarded<Core>& core_;
@@ -47,6 +71,9 @@ class Pictures {
   const BlobStore& blobs_;
   Denoising& denoising_;
   const Clock& clock_;
+  mutable StoredImages stored_images_;
+  mutable std::mutex denoised_mutex_;  // held while an image is denoised
+  mutable DenoisedView denoised_;
 };
 
 }  // namespace ls::coordinator

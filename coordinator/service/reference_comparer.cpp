@@ -11,7 +11,7 @@
 
 namespace ls::coordinator {
 namespace {
-// Comparisons that may wait, each of which holds a picture. With more, only the last checkpoint of a job is
+// Most comparisons that wait; each holds a picture. Beyond this number, only the last checkpoint of a job is
 // compared
 constexpr std::size_t kMaxComparisons = 64;
 
@@ -50,8 +50,8 @@ void ReferenceComparer::compare_last(Core&, const EntryPtr& entry) {
   });
 }
 
-// Returns the job's reference. Only that of the last comparison is kept in memory: jobs that wait cost
-// nothing.
+// Returns the job's reference. Only the reference of the last comparison is kept in memory, so waiting jobs
+// cost no memory.
 std::shared_ptr<const Reference> ReferenceComparer::reference_of(const StoredJob& job) {
   const Digest& digest = *job.spec.reference;
   if (reference_ && reference_digest_ == digest && reference_->size == job.settings.size) return reference_;

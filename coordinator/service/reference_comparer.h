@@ -1,6 +1,6 @@
-// Compares the pictures of jobs that have a reference image with it. The picture of every checkpoint is
-// compared on a thread of its own, since comparing pictures takes longer than summing errors. A job's final
-// image and report wait for its comparisons.
+// Compares pictures of jobs that have a reference image with this image. The picture of every checkpoint is
+// compared on a separate thread, since a comparison takes longer than a checkpoint. A job's final image and
+// report wait for its comparisons.
 #pragma once
 
 #include <functional>
@@ -9,7 +9,7 @@
 #include <stop_token>
 #include <vector>
 
-#include "coordinator/base/guarded.h"
+#include "common/base/guarded.h"
 #include "coordinator/base/work_queue.h"
 #include "coordinator/service/state/job_entry.h"
 #include "coordinator/store/blobs/blob_store.h"
@@ -22,14 +22,15 @@ class ReferenceComparer {
  public:
   ReferenceComparer(Guarded<Core>& core, const BlobStore& blobs) : core_(core), blobs_(blobs) {}
 
-  // Has a checkpoint compared: the one just taken, or one from before a restart that was not compared then.
+  // Queues the comparison of a checkpoint: the one just taken, or one from before a restart that was not
+  // compared then.
   void compare(Core&, const EntryPtr& entry, std::span<const RoundIndex> rounds, double spp);
-  // Has the final image compared, so that the report is complete.
+  // Queues the comparison of the final image, so that the report is complete.
   void compare_last(Core&, const EntryPtr& entry);
-  // Has `task` run on the comparing thread, when the comparisons asked for before are made.
+  // Runs `task` on the comparing thread, after the comparisons that were queued before.
   void run_afterwards(std::function<void()> task) { tasks_.push(std::move(task)); }
 
-  void loop(const std::stop_token& token);  // the comparing thread
+  void loop(const std::stop_token& token);  // runs on the comparing thread
 
  private:
   void compare_tiles(const EntryPtr& entry, std::uint64_t curve, double spp,
@@ -39,7 +40,8 @@ class ReferenceComparer {
   Guarded<Core>& core_;
   const BlobStore& blobs_;
   WorkQueue<std::function<void()>> tasks_;
-  std::shared_ptr<const Reference> reference_;  // that of the last comparison; used by the thread only
+  // Reference of the last comparison; used by the comparing thread only
+  std::shared_ptr<const Reference> reference_;
   Digest reference_digest_;
 };
 

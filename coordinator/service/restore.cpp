@@ -32,9 +32,11 @@ void set_aside(JobEntry& entry, const Error& why) {
                 "the job could not be taken up: {}; repair this and restart the coordinator, or delete "
                 "the job",
                 why.message);
-  entry.stored.state = JobState::failed;  // this is what is shown; the record in the store stays unchanged
+  // Only the copy in memory, which users see, is changed; the record in the store stays as it is
+  entry.stored.state = JobState::failed;
   entry.stored.error = entry.broken;
   entry.free_image();
+  entry.trace.reset();  // a repair continues it
   log_error(fmt::format("job={}", entry.stored.id.value), entry.broken);
 }
 
@@ -49,25 +51,28 @@ Result<void> Restore::restart(Core& core) const {
   if (!jobs) return tl::unexpected(jobs.error());
   files_.remove_unknown(*jobs);
   for (StoredJob& job : *jobs) {
-    // The files of an ended job are looked up only if it is to be rendered again.
-    const bool needs_files = !job.damaged && (!is_terminal(job.state) || files_.image_is_lost(job));
+    reopen_if_image_is_lost(job);
+    const bool needs_files = !job.damaged && !is_terminal(job.state);
     const auto missing = needs_files ? missing_blobs_of(job, blobs_) : std::vector<BlobRef>();
     add(core, std::move(job), missing);
   }
   return {};
 }
 
+void Restore::reopen_if_image_is_lost(StoredJob& job) const {
+  if (!files_.image_is_lost(job)) return;
+  // Rendering the same samples again gives the same bits, so the loss of the image costs only time.
+  log_warn(fmt::format("job={}", job.id.value), "its image is not in --data any more: it is rendered again");
+  job.state = JobState::queued;
+  job.stopped.reset();
+  job.totals = {};
+}
+
 EntryPtr Restore::add(Core& core, StoredJob job, const Result<std::vector<BlobRef>>& missing) const {
-  if (files_.image_is_lost(job)) {
-    // The same samples give the same bits, so only time is lost.
-    log_warn(fmt::format("job={}", job.id.value),
-             "its image is not in --data any more: it is rendered again");
-    job.state = JobState::queued;
-    job.stopped.reset();
-    job.totals = {};
-  }
   const auto entry = std::make_shared<JobEntry>(std::move(job), clock_.now());
   entry->unloaded = is_terminal(entry->stored.state);
+  if (!entry->unloaded) entry->trace = JobTrace::begin(core.tracing, entry->stored);
+  if (entry->trace) entry->trace->event("restored", clock_.now());
   core.jobs.add(entry);
   if (entry->stored.damaged)
     set_aside(*entry, {Errc::internal, entry->stored.error});
@@ -92,7 +97,11 @@ Result<void> Restore::take_up(Core& core, JobEntry& entry,
   if (auto loaded = load(core, entry); !loaded) return loaded;
   const bool begins_again =
       entry.assembly->film().samples() == 0 && (!entry.log || entry.log->found().empty());
-  if (begins_again || has_quarantined(core.driver.farm(), entry)) core.records.forget_curve(entry);
+  // Pixels that are rendered again are the same as before, unless some were wrong
+  if (has_quarantined(core.driver.farm(), entry))
+    core.records.forget_wrong_pixels(entry);
+  else if (begins_again)
+    core.records.forget_curve(entry);
   const JobState state = entry.stored.state;
   JobRestored event = restored(core, entry, state);
   if (auto sound = check_plan(event.plan); !sound) return sound;
@@ -112,6 +121,9 @@ Result<void> Restore::wake(Core& core, JobEntry& entry) const {
   if (!entry.unloaded) return {};
   if (auto loaded = load(core, entry); !loaded) return loaded;
   entry.unloaded = false;
+  entry.trace = JobTrace::begin(core.tracing, entry.stored);
+  if (entry.trace) entry.trace->begin_again(entry.stored, clock_.now());
+  if (has_quarantined(core.driver.farm(), entry)) core.records.forget_wrong_pixels(entry);
   core.driver.replay(entry, restored(core, entry, JobState::done));
   return {};
 }
@@ -122,8 +134,8 @@ Result<void> Restore::load(Core& core, JobEntry& entry) const {
     if (!log) return tl::unexpected(log.error());
     entry.log = std::move(*log);
   }
-  // The snapshot may be older than the discovery that a worker is faulty. So everything is folded again from
-  // the results of the other workers.
+  // The snapshot may be older than the discovery that a worker is faulty. In this case the image is folded
+  // again from the results of the other workers.
   if (has_quarantined(core.driver.farm(), entry))
     entry.begin_image();
   else
@@ -141,6 +153,7 @@ JobRestored Restore::restored(Core& core, JobEntry& entry, JobState state) const
   const std::uint64_t spp = entry.stored.spp.value_or(kMaxSppWithoutLimit);
   event.folded = entry.assembly->rounds_for(spp);
   if (entry.stored.spec.target_error) event.rel_error = entry.assembly->errors().relative();
+  event.denoised_checks = entry.stored.denoised_checks;
   take_up_records(core, entry, event);
   if (files_.on_disk()) event.audits = read_audits(files_.folder(entry.stored.id));
   entry.audits = audits_text(event.audits);
@@ -152,8 +165,8 @@ void Restore::take_up_records(Core& core, JobEntry& entry, JobRestored& event) c
   const std::uint64_t spp = entry.stored.spp.value_or(kMaxSppWithoutLimit);
   JobTotals& totals = entry.stored.totals;
   totals.core_seconds = 0;
-  // Which units have been seen. Units of full rounds are identified by their code alone, since there may be
-  // millions; those of truncated rounds by code and end of their sample range.
+  // Units that have been seen. A unit of a full round is identified by its code alone, since there may be
+  // millions; a unit of a truncated round by its code and the end of its sample range.
   std::unordered_set<UnitCode> seen;
   std::set<std::pair<UnitCode, std::uint64_t>> seen_cut;
   seen.reserve(entry.log->found().size());
@@ -171,7 +184,8 @@ void Restore::take_up_records(Core& core, JobEntry& entry, JobRestored& event) c
     if (record.tile >= entry.grid.count() || !first_of(record)) continue;
     const bool folded = record.round < event.folded[record.tile];
     if (!folded && record.samples == cut_range(record.round, spp)) {
-      // A result that cannot be read does not count as accepted: it is rendered again, to the same bits.
+      // A result that cannot be read does not count as accepted. Its unit is rendered again and gives the
+      // same bits.
       if (const auto readable = entry.log->read(place); !readable) {
         log_warn(fmt::format("job={} tile={} round={}", entry.stored.id.value, record.tile, record.round),
                  readable.error().message);

@@ -1,5 +1,5 @@
 // Gives stored jobs to the farm again: at a restart, when a job of another coordinator is taken over, and
-// when a job that has ended is to go on. Images come from snapshots. Results that are not in the snapshot are
+// when an ended job is extended. Images come from snapshots. Results that a snapshot does not contain are
 // folded again from the logs of partials (the encoded results of units).
 #pragma once
 
@@ -19,12 +19,14 @@ class Restore {
   Restore(JobStore& store, const JobFiles& files, const BlobStore& blobs, const Clock& clock)
       : store_(store), files_(files), blobs_(blobs), clock_(clock) {}
 
-  // Restores all jobs. One that cannot be restored is reported and left unchanged on disk; the others
+  // Restores all jobs. A job that cannot be restored is reported and left unchanged on disk; the others
   // continue.
   Result<void> restart(Core& core) const;
-  // Adds a stored job. `missing` lists the blobs that it needs and the store lacks: it waits for them.
+  // If the image of a done job is lost, sets the job back so that it is rendered again.
+  void reopen_if_image_is_lost(StoredJob& job) const;
+  // Adds a stored job. `missing` lists the blobs that it needs but the store lacks; the job waits for them.
   EntryPtr add(Core& core, StoredJob job, const Result<std::vector<BlobRef>>& missing) const;
-  // Loads a job that has ended.
+  // Loads a job that has ended, so that it can be extended.
   Result<void> wake(Core& core, JobEntry& entry) const;
 
  private:

@@ -13,26 +13,13 @@
 namespace ls::coordinator {
 namespace {
 
-// Writes that wait for the disk; above this number, results wait, too
+// Background writes that may wait for the disk; above this number, results wait, too
 constexpr std::size_t kMaxBackgroundWrites = 4096;
 
-// How to handle a result. It is decided anew when the result arrives, before it is stored and before it is
-// accepted, since the farm's state may have changed.
-enum class Disposition {
-  drop,         // nobody needs it
-  other_class,  // it is of another numeric class than its job
-  compare,      // its unit has an accepted result, with which the farm compares it
-  accept
-};
-Disposition disposition(const Wanted& wanted, const Connection& from) {
-  if (wanted.verdict == Wanted::Verdict::no) return Disposition::drop;
-  if (wanted.numeric_class.value_or(from.numeric_class) != from.numeric_class)
-    return Disposition::other_class;
-  return wanted.verdict == Wanted::Verdict::yes ? Disposition::accept : Disposition::compare;
-}
+using Verdict = Wanted::Verdict;
 
-// Sets implausible times that the worker reports to 0: their sums go into records that must stay readable.
-// Values that are not numbers are rejected with the result (verify_result).
+// Sets implausible times reported by a worker to 0, since their sums go into records that must stay readable.
+// NaN and infinity are rejected with the result (verify_result).
 void drop_impossible_times(UnitResult& result) {
   if (result.cpu_seconds > kMostUnitSeconds) result.cpu_seconds = 0;
   for (double* part : {&result.times.load, &result.times.build, &result.times.transfer, &result.times.idle,
@@ -56,16 +43,16 @@ void ResultPipeline::receive(const std::shared_ptr<Connection>& from, UnitResult
   {
     const auto core = core_.lock();
     core->figures.result_bytes += arrived.result.exr.size();
-    if (!from->open) return next();  // the worker sends it again over its newer stream
+    // The stream was replaced: the worker sends the result again over the newer one
+    if (!from->open) return next();
     const Farm& farm = core->driver.farm();
     const UnitKey& unit = arrived.result.unit;
-    const Wanted wanted = farm.wanted(unit);
-    const Disposition what = disposition(wanted, *from);
+    const Wanted wanted = farm.wanted(unit, from->numeric_class);
     arrived.job = core->jobs.find(unit.job);
-    if (!arrived.job || what == Disposition::drop ||
-        (!wanted.numeric_class && !farm.may_pin(unit.job, from->worker)))
+    if (!arrived.job || wanted.verdict == Verdict::no ||
+        (!wanted.pinned && !farm.may_pin(unit.job, from->worker)))
       return acknowledge(*core, *from, unit), next();
-    if (what == Disposition::other_class)
+    if (wanted.verdict == Verdict::other_class)
       return acknowledge(*core, *from, unit,
                          Error{Errc::failed_precondition,
                                "the job is pinned to another numeric class than this worker's"}),
@@ -73,8 +60,8 @@ void ResultPipeline::receive(const std::shared_ptr<Connection>& from, UnitResult
     arrived.expected = {arrived.job->stored.scene, arrived.job->settings_digest, from->numeric_class,
                         wanted.rect, wanted.samples};
   }
-  // The bytes of the message and of the floats decoded from it. If there is no room for them, only this
-  // worker's stream is held back; no thread blocks.
+  // Space for the message and for the floats decoded from it. If there is no room, only this worker's stream
+  // waits; no thread blocks.
   arrived.bytes = 2 * arrived.result.exr.size();
   const std::size_t bytes = arrived.bytes;
   from->held_back = true;
@@ -92,7 +79,7 @@ void ResultPipeline::verify_loop(const std::stop_token& token) {
       Verified verified =
           verify_result(a.result, a.expected, a.job->grid.frame, aovs_of(a.job->stored.settings));
       failpoint("result-checked");
-      checked_.push({std::move(a), std::move(verified), seconds(clock_.now() - begin)});
+      checked_.push({std::move(a), std::move(verified), begin, seconds(clock_.now() - begin)});
     }
 }
 
@@ -104,8 +91,8 @@ void ResultPipeline::commit_loop(const std::stop_token& token) {
   }
 }
 
-// Makes a batch of results durable, with one sync for each log file, and has the farm accept them. Under load
-// a batch grows while the disk works on the one before, so a result waits for at most two syncs.
+// Makes a batch of results durable, with one sync for each log file, and passes them to the farm. While the
+// disk syncs one batch, the next one collects, so a result waits for at most two syncs.
 void ResultPipeline::commit(std::vector<Checked> batch) {
   std::vector<Stored> stored = prepare(batch);
   append(batch, stored);
@@ -113,7 +100,8 @@ void ResultPipeline::commit(std::vector<Checked> batch) {
     const auto core = core_.lock();
     for (std::size_t i = 0; i < batch.size(); ++i) conclude(*core, batch[i], stored[i]);
   }
-  // Requests that release() grants may continue on this thread, before it returns: so not under the lock.
+  // release() may run waiting requests on this thread before it returns, so it must not be called under the
+  // lock.
   for (const Checked& item : batch) budget_.release(item.arrived.bytes);
 }
 
@@ -126,16 +114,19 @@ std::vector<ResultPipeline::Stored> ResultPipeline::prepare(const std::vector<Ch
     Stored& stored = all.emplace_back();
     stored.resumes = a.job->resumes;
     stored.at_seconds = a.job->elapsed(clock_.now());
-    // If the unit has an accepted result meanwhile, this further one need not be stored; the farm compares
-    // its digest.
-    const bool accept = disposition(farm.wanted(a.result.unit), *a.from) == Disposition::accept;
-    // Pinning to a fake worker's class marks the job as fake; this does so whatever class the worker names.
+    // The farm is asked again, since its state may have changed while the result was verified.
+    const Wanted wanted = farm.wanted(a.result.unit, a.from->numeric_class);
+    const bool accept = wanted.verdict == Verdict::yes;
+    const bool sound = !farm.quarantined(a.from->worker) && std::holds_alternative<Partial>(item.verified);
+    // The class is stored before the result, so that the log never has results of a class that the record
+    // does not name.
+    if (accept && sound && !wanted.pinned)
+      core->driver.run(ClassChosen{a.result.unit.job, a.from->numeric_class});
+    // A job that is pinned by a fake worker is marked as fake, whatever numeric class the worker claims.
     if (a.from->fake && accept && !std::exchange(a.job->stored.fake, true)) a.job->pin_unsaved = true;
     if (const auto saved = core->records.put_pin(a.job); !saved) stored.error = saved.error();
     if (const auto saved = core->records.put_quarantined(); !saved) stored.error = saved.error();
-    if (accept && !farm.quarantined(a.from->worker) && !stored.error &&
-        std::holds_alternative<Partial>(item.verified))
-      stored.log = a.job->log;
+    if (accept && sound && !stored.error) stored.log = a.job->log;
   }
   return all;
 }
@@ -164,7 +155,11 @@ void ResultPipeline::append(const std::vector<Checked>& batch, std::vector<Store
 
 void ResultPipeline::conclude(Core& core, Checked& item, const Stored& stored) {
   const Arrived& a = item.arrived;
-  if (core.driver.farm().quarantined(a.from->worker))
+  const bool quarantined = core.driver.farm().quarantined(a.from->worker);
+  if (a.job->trace)
+    a.job->trace->result(a.result, a.from->worker, item.began, item.seconds, clock_.now(),
+                         quarantined || stored.error || !std::holds_alternative<Partial>(item.verified));
+  if (quarantined)
     acknowledge(core, *a.from, a.result.unit,
                 Error{Errc::failed_precondition, "this worker is quarantined: it rendered wrong pixels"});
   else if (stored.error)
@@ -182,13 +177,13 @@ void ResultPipeline::accept(Core& core, Checked& item, std::optional<PartialLog:
   const UnitResult& r = a.result;
   JobEntry& entry = *a.job;
   core.records.set_trouble("");
-  const Wanted wanted = core.driver.farm().wanted(r.unit);
-  const Disposition what = disposition(wanted, *a.from);
-  const bool accepted = what == Disposition::accept;
-  const bool lost = entry.log && !place;  // a race has left it unstored
+  const Wanted wanted = core.driver.farm().wanted(r.unit, a.from->numeric_class);
+  const bool accepted = wanted.verdict == Verdict::yes;
+  const bool lost = entry.log && !place;  // the other copy was accepted but not stored, by a race
   if (accepted && wanted.samples == a.expected.samples && !lost) {
     ++core.figures.accepted;
     entry.stored.totals.core_seconds += r.cpu_seconds;
+    entry.stored.techniques.add(r.techniques);
     entry.stored.totals.time.add(
         {r.times.load, r.times.build, 0, r.times.transfer, item.seconds, r.times.idle});
     if (entry.assembly) {
@@ -198,10 +193,11 @@ void ResultPipeline::accept(Core& core, Checked& item, std::optional<PartialLog:
           {std::move(std::get<Partial>(item.verified)), place, a.expected.samples, r.digest, r.health, a.at});
     }
   }
-  // The farm compares duplicates it knows about. Of a copy that is not stored just the lease is returned: the
-  // stored copy stands, and a further copy would be equal or evidence. So of a result of another class: the
-  // farm knows the worker's class of now, which may be the job's if the worker has joined again meanwhile.
-  if ((accepted && lost) || what == Disposition::other_class)
+  // The farm compares duplicates that it knows. Two results are only taken off their lease: a copy that a
+  // race left unstored (the stored copy stands, and further copies are compared with it), and a result of
+  // another numeric class (the farm knows only the worker's present class, which may be the job's if the
+  // worker has joined again meanwhile).
+  if ((accepted && lost) || wanted.verdict == Verdict::other_class)
     core.driver.run(LeaseCameBack{a.from->worker, {r.lease, {r.unit}}});
   else
     core.driver.run(
@@ -209,8 +205,8 @@ void ResultPipeline::accept(Core& core, Checked& item, std::optional<PartialLog:
   acknowledge(core, *a.from, r.unit);
 }
 
-// Handles a result that failed verification. This is presumably the worker's fault: it counts as a failure of
-// the unit and the worker.
+// Handles a result that failed verification. The worker is presumably at fault, so this counts as a failure
+// of the unit and the worker.
 void ResultPipeline::refuse(Core& core, const Arrived& a, const Error& error) {
   const UnitKey& unit = a.result.unit;
   ++core.figures.refused;
@@ -226,10 +222,10 @@ void ResultPipeline::refuse(Core& core, const Arrived& a, const Error& error) {
   acknowledge(core, *a.from, unit, error);
 }
 
-// Handles a result that could not be stored. This is the coordinator's fault: the unit waits again, and the
-// job is paused until a person resumes it. Otherwise workers would render for a full disk. If a person has
-// resumed it since storing began, the error may be of what that person mended: the job is not paused again,
-// and the next result shows whether it is.
+// Handles a result that could not be stored. The coordinator is at fault: the unit waits again, and the job
+// is paused until a user resumes it, so that workers do not render for a full disk. If a user has resumed the
+// job since storing began, the cause may have been removed already: the job is not paused again, and the next
+// result shows whether the error persists.
 void ResultPipeline::cannot_store(Core& core, const Arrived& a, const Error& error, std::uint64_t resumes) {
   const UnitKey& unit = a.result.unit;
   ++core.figures.not_stored;

@@ -1,5 +1,5 @@
-// The path of a result: each is verified by itself, made durable together with others, then reported to the
-// farm and acknowledged to its worker.
+// The path of a result: it is verified alone, made durable together with others, then reported to the farm
+// and acknowledged to its worker.
 #pragma once
 
 #include <functional>
@@ -8,8 +8,8 @@
 #include <stop_token>
 #include <vector>
 
+#include "common/base/guarded.h"
 #include "coordinator/assemble/verify.h"
-#include "coordinator/base/guarded.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/base/work_queue.h"
 #include "coordinator/domain/farm_figures.h"
@@ -25,7 +25,7 @@ class ResultPipeline {
   ResultPipeline(Guarded<Core>& core, BackgroundWrites& writes, const Clock& clock)
       : core_(core), writes_(writes), clock_(clock) {}
 
-  // Takes a result. Calls `next` when the worker's next message may come: when this result was dropped, or
+  // Takes a result. Calls `next` when the worker's next message may be read: when this result was dropped, or
   // when there is room for it.
   void receive(const std::shared_ptr<Connection>& from, UnitResult result, std::function<void()> next);
   void close() { budget_.close(); }  // after this, no `next` is called
@@ -46,13 +46,14 @@ class ResultPipeline {
   struct Checked {
     Arrived arrived;
     Verified verified;
-    double seconds = 0;  // time spent on verification
+    TimePoint began{};   // when verification began
+    double seconds = 0;  // time spent on it
   };
   // The outcome of storing a result
   struct Stored {
-    std::shared_ptr<PartialLog> log;  // where it is to be stored; null: it is not
-    double at_seconds = 0;            // on its job's clock
-    std::uint64_t resumes = 0;        // of its job, when storing began
+    std::shared_ptr<PartialLog> log;  // the log to store it in; null: it is not stored
+    double at_seconds = 0;            // time of storing on the job's clock
+    std::uint64_t resumes = 0;        // the job's JobEntry::resumes when storing began
     std::optional<PartialLog::Place> place;
     std::optional<Error> error;
   };

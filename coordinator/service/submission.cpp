@@ -9,7 +9,7 @@
 namespace ls::coordinator {
 namespace {
 
-// Returns one admission, or for a sequence one for each frame.
+// Returns one admission for a job, or one per frame for a sequence.
 tl::expected<std::vector<Admission>, Rejected> admit_all(const SubmitRequest& request,
                                                          const BlobStore& blobs) {
   if (request.spec.frames) return admit_sequence(request, blobs);
@@ -20,57 +20,100 @@ tl::expected<std::vector<Admission>, Rejected> admit_all(const SubmitRequest& re
   return all;
 }
 
+// Empty if the header is none.
+std::string clean_traceparent(const std::string& header) {
+  const auto parent = trace::parse_traceparent(header);
+  return parent ? to_traceparent(*parent) : "";
+}
+
 }  // namespace
 
 tl::expected<JobId, Rejected> Submission::submit(const SubmitRequest& request) {
   const auto refuse = [](const Error& error) { return tl::unexpected(Rejected{error, {}}); };
+  const double at = unix_now();
+  const TimePoint began = clock_.now();
   if (request.spec.denoise)
     if (const auto possible = denoising_.available(); !possible) return refuse(possible.error());
   const auto in_use = blobs_.in_use();
   auto admitted = admit_all(request, blobs_);
   if (!admitted) return tl::unexpected(std::move(admitted.error()));
   std::vector<StoredJob> jobs;
-  const double at = unix_now();
+  const std::string traceparent = clean_traceparent(request.traceparent);
   for (Admission& admission : *admitted) {
     if (const auto put = blobs_.put(admission.job.scene, std::as_bytes(std::span(admission.scene_json)));
         !put)
       return refuse(put.error());
     admission.job.submitted_unix = at;
+    admission.job.traceparent = traceparent;
     jobs.push_back(std::move(admission.job));
   }
   admitted->clear();
+  const auto taken = take(std::move(jobs), request.spec.frames, began);
+  return taken ? tl::expected<JobId, Rejected>(*taken) : refuse(taken.error());
+}
 
+Result<JobId> Submission::submit_again(const JobId& before, const JobSpec& changes, const std::string& owner,
+                                       const std::string& traceparent) {
+  const double at = unix_now();
+  const TimePoint began = clock_.now();
+  StoredJob model;
+  {
+    const auto core = core_.lock();
+    const auto entry = core->jobs.usable(before);
+    if (!entry) return tl::unexpected(entry.error());
+    model = (*entry)->stored;
+  }
+  if (model.spec.denoise)
+    if (const auto possible = denoising_.available(); !possible) return tl::unexpected(possible.error());
+  const auto in_use = blobs_.in_use();
+  auto job = admit_again(model, changes, blobs_);
+  if (!job) return tl::unexpected(job.error());
+  job->owner = owner;
+  job->submitted_unix = at;
+  job->traceparent = clean_traceparent(traceparent);
+  std::vector<StoredJob> jobs;
+  jobs.push_back(std::move(*job));
+  return take(std::move(jobs), std::nullopt, began);
+}
+
+// Stores the jobs, either all or none, and gives them to the farm.
+Result<JobId> Submission::take(std::vector<StoredJob> jobs, const std::optional<FrameRange>& range,
+                               TimePoint began) {
   const auto core = core_.lock();
-  if (const auto room = core->jobs.room_for(request.owner, jobs.size()); !room) return refuse(room.error());
+  if (const auto room = core->jobs.room_for(jobs.front().owner, jobs.size()); !room)
+    return tl::unexpected(room.error());
   const JobId id = core->jobs.unused_id();
-  const auto frames = request.spec.frames ? request.spec.frames->frames() : std::vector<std::uint32_t>();
+  const auto frames = range ? range->frames() : std::vector<std::uint32_t>();
   std::vector<std::shared_ptr<PartialLog>> logs(jobs.size());
   for (std::size_t i = 0; i < jobs.size(); ++i) {
-    jobs[i].id = request.spec.frames ? frame_job(id, frames[i]) : id;
+    jobs[i].id = range ? frame_job(id, frames[i]) : id;
     if (!files_.on_disk()) continue;
     auto log = PartialLog::open(files_.folder(jobs[i].id));
-    if (!log) return refuse(log.error());
+    if (!log) return tl::unexpected(log.error());
     logs[i] = std::move(*log);
   }
-  if (const auto put = store_.put_jobs(jobs); !put) return refuse(put.error());
+  if (const auto put = store_.put_jobs(jobs); !put) return tl::unexpected(put.error());
   std::vector<EntryPtr> entries;
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     entries.push_back(std::make_shared<JobEntry>(std::move(jobs[i]), clock_.now()));
     entries.back()->log = std::move(logs[i]);
     entries.back()->begin_image();
     entries.back()->begin_comparison();
+    entries.back()->trace = JobTrace::begin(core->tracing, entries.back()->stored);
     core->jobs.add(entries.back());
   }
 
   JobEntry& first = *entries.front();
-  if (request.spec.frames) {
-    log_info(fmt::format("job={} frames={}", id.value, to_string(*request.spec.frames)), "submitted");
+  if (range) {
+    log_info(fmt::format("job={} frames={}", id.value, to_string(*range)), "submitted");
     core->records.log(first.stored.id, fmt::format("submitted with {} frames", entries.size()));
   } else {
     log_info(fmt::format("job={} name={}", id.value, log_value(first.stored.name)), "submitted");
     core->records.log(id, "submitted");
     core->publisher.job(first);
   }
+  for (const EntryPtr& entry : entries)
+    if (entry->trace) entry->trace->step("admit scene", began, clock_.now());
   for (const EntryPtr& entry : entries) core->driver.run(JobSubmitted{plan_of(entry->stored)});
   core->publisher.sequence(id, true);
   return id;

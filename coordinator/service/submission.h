@@ -1,11 +1,11 @@
-// Takes a user's submission: a job, or a sequence of jobs, one for each frame.
+// Accepts a user's submission: a job, or a sequence, which is one job per frame.
 #pragma once
 
-#include "coordinator/base/guarded.h"
+#include "common/base/guarded.h"
 #include "coordinator/service/denoising.h"
 #include "coordinator/service/state/job_files.h"
 #include "coordinator/store/blobs/collected_blobs.h"
-#include "coordinator/views/submit_request.h"
+#include "coordinator/views/job_view.h"
 
 namespace ls::coordinator {
 
@@ -20,7 +20,16 @@ class Submission {
   // Returns the id of the job or sequence. All frames of a sequence are stored, or none.
   tl::expected<JobId, Rejected> submit(const SubmitRequest& request);
 
+  // Submits the scene of job `before`, which must not be a sequence, once more. Returns the id of the new
+  // job.
+  // `traceparent`: as in SubmitRequest.
+  Result<JobId> submit_again(const JobId& before, const JobSpec& changes, const std::string& owner,
+                             const std::string& traceparent = {});
+
  private:
+  // `began`: when the scene's admission began
+  Result<JobId> take(std::vector<StoredJob> jobs, const std::optional<FrameRange>& range, TimePoint began);
+
   Guarded<Core>& core_;
   JobStore& store_;
   const JobFiles& files_;

@@ -8,7 +8,7 @@
 
 namespace ls::coordinator {
 namespace {
-// Time until a job is tried again for which the blob store did not answer
+// Time until the next attempt to take over a job after the blob store did not answer
 constexpr Duration kTakeOverPause = std::chrono::seconds(5);
 }  // namespace
 
@@ -29,8 +29,8 @@ void Takeover::look_for_moved_jobs() {
   for (Inheritance& one : inherited) writes_.push([this, one = std::move(one)] { take_over(one); });
 }
 
-// Drops a job that another coordinator owns now. The job's record in the store belongs to that one and must
-// not be touched.
+// Drops a job that another coordinator owns now. The job's record in the store belongs to the new owner and
+// must not be touched.
 void Takeover::let_go(const JobId& id) {
   {
     const auto core = core_.lock();
@@ -51,7 +51,7 @@ void Takeover::let_go(const JobId& id) {
 
 void Takeover::take_over(Inheritance inheritance) {
   StoredJob job = inheritance.job.job;
-  // This is done without the lock, since the blob store may need the network.
+  // The lock is not held here, since the blob store may need the network.
   const auto missing = missing_blobs_of(job, blobs_);
   const auto core = core_.lock();
   const JobId id = job.id;
@@ -63,7 +63,9 @@ void Takeover::take_over(Inheritance inheritance) {
     return;
   }
   if (core->jobs.find(id)) return;
-  files_.remove_folder(id);  // it is of a time when this coordinator owned the job before: it is outdated
+  // The folder is outdated: it dates from a time when this coordinator owned the job before
+  files_.remove_folder(id);
+  restore_.reopen_if_image_is_lost(job);
   const auto entry = restore_.add(*core, std::move(job), missing);
   core->records.log(
       id, fmt::format("taken over from coordinator {}, which is gone; what it had rendered since and not "

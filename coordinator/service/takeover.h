@@ -1,11 +1,11 @@
-// Several coordinators on one store: jobs taken over from a coordinator that is gone, and jobs lost to
-// another one (store/redis/redis_members.h). Both happen on the writer thread, after earlier writes of these
-// jobs.
+// Several coordinators on one store: takes over jobs from a coordinator that is gone, and drops jobs that
+// another one has taken over (store/redis/redis_members.h). Both happen on the writer thread, after earlier
+// writes of these jobs.
 #pragma once
 
 #include <vector>
 
-#include "coordinator/base/guarded.h"
+#include "common/base/guarded.h"
 #include "coordinator/service/restore.h"
 #include "coordinator/service/state/records.h"
 
@@ -29,7 +29,7 @@ class Takeover {
  private:
   struct Inheritance {
     JobStore::Inherited job;
-    TimePoint again{};  // the job is not tried again before this time
+    TimePoint again{};  // time of the next attempt
   };
   void take_over(Inheritance inheritance);
   void let_go(const JobId& id);
@@ -41,7 +41,7 @@ class Takeover {
   const Restore& restore_;
   BackgroundWrites& writes_;
   const Clock& clock_;
-  std::vector<Inheritance> later_;  // jobs to be taken over later; guarded by the lock
+  std::vector<Inheritance> later_;  // jobs whose takeover is to be repeated later; guarded by the lock
 };
 
 }  // namespace ls::coordinator

@@ -46,8 +46,8 @@ bool well_formed(const WorkerId& id) {
          });
 }
 
-// Makes the id of a new worker. A client that names an id gets the stream of that worker, so that the worker
-// can continue after a broken connection. Therefore ids must not be guessable.
+// Makes the id of a new worker. A worker that names its id continues where a broken connection ended. So
+// whoever knows an id could take over that worker's stream, and ids must not be guessable.
 std::string new_worker_id(std::uint64_t start, std::uint64_t number) {
   std::random_device device;
   const std::uint64_t secret = (std::uint64_t{device()} << 32 | device()) & 0xffff'ffff'ffff;
@@ -62,7 +62,7 @@ class WorkerSessions::Session final : public WorkerSession {
       : sessions_(sessions), alive_(sessions.alive_), connection_(std::move(connection)) {}
   ~Session() override { disconnected(); }
   void receive(FromWorker message) override {
-    // This blocks until there is room or the coordinator ends (then the promise is broken).
+    // This blocks until there is room, or until the coordinator ends, which breaks the promise.
     auto room = std::make_shared<std::promise<void>>();
     const auto granted = room->get_future();
     receive(std::move(message), [room = std::move(room)] { room->set_value(); });
@@ -89,8 +89,8 @@ Result<std::unique_ptr<WorkerSession>> WorkerSessions::connect(const WorkerHello
   WorkerTable& workers = core->workers;
   WorkerId id = hello.previous_id;
   const auto known = workers.find(id);
-  // The worker may have its id from a copied folder. Then the id stays with the worker that uses it already,
-  // and this one gets a new id.
+  // Two workers may have the same id if a folder was copied. The id stays with the worker that uses it
+  // already, and the other one gets a new id.
   const bool taken = known != workers.end() && known->second.hello.name != hello.name;
   if (id.empty() || !well_formed(id) || taken)
     id.value = new_worker_id(options_.start, last_epoch_ & 0xffffffff);
@@ -104,14 +104,15 @@ Result<std::unique_ptr<WorkerSession>> WorkerSessions::connect(const WorkerHello
   if (worker.connection) worker.connection->close();
   worker.hello = hello;
   worker.hello.join_token.clear();
-  worker.hello.blobs_held.clear();  // the farm keeps those that it needs
+  worker.hello.blobs_held.clear();  // freed here; the farm keeps the ones it needs
   worker.connection = connection;
   worker.last_seen = clock_.now();
   connection->sink->send(Welcome{id, connection->epoch});
   log_info(fmt::format("worker={} name={} epoch={}", id.value, log_value(hello.name), connection->epoch),
            "joined");
   core->driver.run(WorkerJoined{id, connection->epoch, hello.name, hello.numeric_class, hello.threads,
-                                hello.tags, hello.memory_bytes, hello.blobs_held});
+                                hello.tags, hello.memory_bytes, hello.blobs_held,
+                                options_.version.empty() || hello.build == options_.version});
   return std::make_unique<Session>(*this, std::move(connection));
 }
 
@@ -143,24 +144,24 @@ void WorkerSessions::handle(Core& core, Connection& from, FromWorker message) {
   const auto found = core.workers.find(from.worker);
   if (!from.open || found == core.workers.end()) return;
   found->second.last_seen = clock_.now();
-  std::visit(overloaded{[](const UnitResult&) {},
-                        [](const WorkerHello&) {},  // handled by connect(); a second one is rejected earlier
-                        [&](const WorkerProgress& m) { note_progress(core, from, found->second, m); },
-                        [&](const UnitFailure& m) {
-                          // The acknowledgement goes first, so that the worker does not take it for the
-                          // answer to its next attempt.
-                          from.sink->send(ResultAck{m.unit, std::nullopt});
-                          if (!core.jobs.find(m.unit.job)) return;  // no log for a job that does not exist
-                          core.records.log(m.unit.job,
-                                           fmt::format("tile {} round {} failed on {}: {}", m.unit.tile,
-                                                       m.unit.round, from.worker.value, m.reason));
-                          core.driver.run(UnitFailed{from.worker, m});
-                        },
-                        [&](const LeaseReturned& m) {
-                          core.driver.run(LeaseCameBack{from.worker, m});
-                        },
-                        [&](const WorkerDraining&) { core.driver.run(WorkerDrains{from.worker}); }},
-             message);
+  std::visit(
+      // Handled by connect(); a second WorkerHello is rejected earlier
+      overloaded{[](const UnitResult&) {}, [](const WorkerHello&) {},
+                 [&](const WorkerProgress& m) { note_progress(core, from, found->second, m); },
+                 [&](const UnitFailure& m) {
+                   // The acknowledgement is sent first: sent later, the worker could mistake it for
+                   // the answer to its next attempt.
+                   from.sink->send(ResultAck{m.unit, std::nullopt});
+                   if (!core.jobs.find(m.unit.job)) return;  // unknown jobs have no log
+                   core.records.log(m.unit.job, fmt::format("tile {} round {} failed on {}: {}", m.unit.tile,
+                                                            m.unit.round, from.worker.value, m.reason));
+                   core.driver.run(UnitFailed{from.worker, m});
+                 },
+                 [&](const LeaseReturned& m) {
+                   core.driver.run(LeaseCameBack{from.worker, m});
+                 },
+                 [&](const WorkerDraining&) { core.driver.run(WorkerDrains{from.worker}); }},
+      message);
 }
 
 void WorkerSessions::note_progress(Core& core, Connection& from, WorkerEntry& worker,
@@ -173,8 +174,8 @@ void WorkerSessions::note_progress(Core& core, Connection& from, WorkerEntry& wo
     totals.peak_rss_bytes = std::max(totals.peak_rss_bytes, m.rss_bytes);
     if (m.load_seconds < 1e9) totals.load_seconds = std::max(totals.load_seconds, m.load_seconds);
   }
-  // The worker may still report leases of an earlier stream; their units went to others when that stream
-  // broke.
+  // The worker may still report leases of an earlier stream. Their units went to others when that stream
+  // broke, so these leases are ignored.
   for (const auto& lease : m.leases)
     if (!from.assigned(lease.lease)) from.sink->send(CancelLease{lease.lease});
   core.driver.run(LeaseProgress{from.worker, m.leases});

@@ -1,4 +1,4 @@
-// The streams of workers: how they join, what messages they send, and how they leave.
+// The streams of workers: how workers join, the messages that they send, and how they leave.
 #pragma once
 
 #include <functional>
@@ -13,8 +13,9 @@ class WorkerSessions {
   struct Options {
     JoinCheck may_join;
     bool allow_fake = false;
+    std::string version;       // of the workers that may begin jobs; empty: any
     std::uint64_t start = 0;   // number of this start of the coordinator
-    std::string lease_prefix;  // that of the farm
+    std::string lease_prefix;  // first part of the farm's lease ids
   };
   WorkerSessions(Guarded<Core>& core, ResultPipeline& results, Options options, const Clock& clock)
       : core_(core),
@@ -24,9 +25,10 @@ class WorkerSessions {
         last_epoch_(options_.start << 32) {}
 
   Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink);
-  // Tells the farm which workers have results that wait for room here: they are not late.
+  // Tells the farm which workers have results that wait here for room, so that they do not count as late.
   void report_held_back(Core& core) const;
-  // Sessions may outlive this object. After abandon() they do nothing; close() closes their streams.
+  // Sessions may outlive this object. After abandon() their functions do nothing; close() closes their
+  // streams.
   void abandon() { *alive_ = false; }
   void close();
 

@@ -1,5 +1,5 @@
-// File operations of the store: complete writes, durable renames, and errors that name the path and what to
-// do.
+// File operations of the store: complete writes, durable renames, and errors that name the path and the
+// remedy.
 #pragma once
 
 #include <cstddef>
@@ -35,9 +35,9 @@ class File {
 // Makes an error from errno: a full disk is resource_exhausted, a missing file not_found.
 Error errno_error(std::string_view what, const std::filesystem::path& path);
 
-Result<void> make_folder(const std::filesystem::path& folder);  // and its parents; mode 0750
+Result<void> make_folder(const std::filesystem::path& folder);  // also creates its parents; mode 0750
 Result<void> write_all(const File& file, std::span<const std::byte> bytes, const std::filesystem::path& path);
-// Reads exactly `length` bytes from `offset` on; if the file has fewer, that is an error.
+// Reads exactly `length` bytes from `offset` on; a shorter file is an error.
 Result<std::vector<std::byte>> read_at(const File& file, std::uint64_t offset, std::size_t length,
                                        const std::filesystem::path& path);
 Result<std::vector<std::byte>> read_file(const std::filesystem::path& path, std::uint64_t max_bytes);
@@ -59,9 +59,9 @@ class AtomicFile {
   Result<void> write(std::span<const std::byte> bytes);  // appends
   Result<void> write_at(std::uint64_t offset, std::span<const std::byte> bytes);
   Result<void> sync();
-  Result<void> commit();  // including sync()
+  Result<void> commit();  // includes sync()
   // Like commit(), but without sync(). After a crash of this process the file has its new content; after a
-  // power failure it may have the old content or none.
+  // power failure it may have the old content or be missing.
   Result<void> commit_unsynced();
 
  private:
@@ -69,7 +69,7 @@ class AtomicFile {
       : path_(std::move(path)), temporary_(std::move(temporary)), file_(std::move(file)) {}
 
   std::filesystem::path path_, temporary_;
-  File file_;  // without a descriptor once the object was moved from or committed
+  File file_;  // has no descriptor after a move or a commit
 };
 
 // Locks `folder` for this process until destroyed. failed_precondition if another process holds it.

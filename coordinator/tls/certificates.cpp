@@ -14,7 +14,7 @@
 namespace ls::tls {
 namespace {
 
-// Certificates are valid from this many seconds before now on, since a worker's clock may be behind
+// Certificates are valid from this many seconds before their issue, since a worker's clock may be behind
 constexpr std::int64_t kClocksDiffer = 3600;
 constexpr int kSerialBits = 127;
 
@@ -73,7 +73,7 @@ bool add_extension(X509* cert, X509* issuer, int nid, const std::string& value) 
   return extension && X509_add_ext(cert, extension.get(), -1) == 1;
 }
 
-// Makes a new key and a certificate for it that still lacks issuer, extensions and signature.
+// Makes a new key and a certificate for it, still without issuer, extensions and signature.
 std::optional<Pair> blank(const std::string& common_name, std::int64_t now, std::int64_t days) {
   Pair pair{Cert(X509_new()), Key(EVP_EC_gen("P-256"))};
   const Number serial(BN_new());

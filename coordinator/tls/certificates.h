@@ -10,13 +10,13 @@
 
 namespace ls::tls {
 
-struct Certificate {  // PEM
+struct Certificate {  // texts in PEM format
   std::string cert, key;
 };
 
 inline constexpr std::int64_t kDay = 86'400;
 inline constexpr std::int64_t kAuthorityDays = 3650;
-inline constexpr std::int64_t kDays = 397;  // validity of issued certificates
+inline constexpr std::int64_t kDays = 397;  // validity of issued certificates, in days
 
 // Makes a new certificate authority, valid for kAuthorityDays from `now` on.
 Result<Certificate> make_authority(const std::string& common_name, std::int64_t now);
@@ -25,7 +25,7 @@ enum class Use { server, client };
 struct Wanted {
   std::string common_name;
   Use use = Use::client;
-  std::vector<std::string> names;  // for a server: its host names and addresses
+  std::vector<std::string> names;  // only for a server: its host names and addresses
 };
 // Makes a key and a certificate for it, signed by `authority` and valid for kDays. invalid_argument: a name
 // is invalid, or `authority` is not a certificate with its key.

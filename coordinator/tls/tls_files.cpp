@@ -56,7 +56,6 @@ Result<std::string> read_pem(const fs::path& file, bool secret) {
   }
 }
 
-// Writes a temporary file and renames it, so that readers see either the old file or the new one.
 Result<void> write_pem(const fs::path& file, const std::string& text, mode_t mode) {
   const std::string aside = file.string() + ".new";
   ::unlink(aside.c_str());
@@ -75,7 +74,7 @@ Result<void> write_pair(const fs::path& folder, const std::string& name, const C
 
 Result<Certificate> authority_of(const fs::path& folder, std::int64_t now) {
   const bool cert = fs::exists(folder / "ca.pem"), key = fs::exists(folder / "ca.key");
-  if (!cert) {  // also if there is a key: the last start may have ended before it wrote the certificate
+  if (!cert) {  // made even if there is a key: the last start may have ended before it wrote the certificate
     auto made = make_authority("Lightshaft farm", now);
     if (!made) return made;
     if (auto done = write_pair(folder, "ca", *made); !done) return tl::unexpected(done.error());

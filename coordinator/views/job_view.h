@@ -3,12 +3,14 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "common/base/digest.h"
+#include "common/base/error.h"
 #include "common/base/frame_range.h"
 #include "common/base/id.h"
 #include "common/image/error/convergence.h"
@@ -17,18 +19,47 @@
 #include "common/image/frame/rounds.h"
 #include "common/image/reference/reference.h"
 #include "common/job/health_notes.h"
+#include "common/job/settings.h"
+#include "common/scene/diagnostic.h"
+#include "coordinator/domain/denoised_target.h"
 #include "coordinator/domain/job_state.h"
-#include "coordinator/domain/time_split.h"
 
 namespace ls::coordinator {
 
-inline constexpr int kMoreWorkers = 8;  // workers that JobView::eta_with_more adds
+// How the time of a job was spent, in core seconds of the workers (`merge`: of the coordinator). If the
+// coordinator is killed, all parts except `render` lose the time since the job was last stored.
+struct TimeSplit {
+  double load = 0;      // fetching files
+  double build = 0;     // parsing files, building worlds
+  double render = 0;    // CPU time of units (rounds of tiles): JobView::core_seconds
+  double transfer = 0;  // packing results
+  double merge = 0;     // coordinator: verifying results and adding them to the image
+  double idle = 0;      // worker threads between two units of the job
+  void add(const TimeSplit& o);
+  bool operator==(const TimeSplit&) const = default;
+};
 
-struct ErrorFigures {  // estimated errors of the image that was folded up to one complete round in all tiles
+// The name in JSON of each part, for writing and reading
+struct TimePart {
+  const char* name;
+  double TimeSplit::*seconds;
+};
+inline constexpr TimePart kTimeParts[] = {{"load", &TimeSplit::load},     {"build", &TimeSplit::build},
+                                          {"render", &TimeSplit::render}, {"transfer", &TimeSplit::transfer},
+                                          {"merge", &TimeSplit::merge},   {"idle", &TimeSplit::idle}};
+
+inline void TimeSplit::add(const TimeSplit& o) {
+  for (const TimePart& part : kTimeParts) this->*part.seconds += o.*part.seconds;
+}
+
+inline constexpr int kMoreWorkers = 8;  // number of workers that JobView::eta_with_more assumes in addition
+
+struct ErrorFigures {  // Estimated errors of the image up to the last round that was complete in all tiles
   double rmse = 0;
   double relmse = 0;
   double relmse_lo = 0, relmse_hi = 0;  // 95 % intervals for the realised error
-  double rmse_lo = 0, rmse_hi = 0;      // both are 0 if unknown: a version without them stored the error
+  // Both 0: unknown, since an earlier version stored the error without them
+  double rmse_lo = 0, rmse_hi = 0;
 };
 // Error against a reference image, from which the reference's own noise is subtracted
 // (common/image/reference/reference.h)
@@ -48,18 +79,18 @@ struct ConvergencePoint {
   double core_seconds = 0;  // CPU seconds of workers for these samples
   double spp = 0;
   ErrorFigures error;
-  // nullopt: the job has no reference, the comparison is not finished, or the coordinator was restarted
-  // during the checkpoint
+  // nullopt: the job has no reference, the comparison is not finished, or a restart of the coordinator
+  // interrupted it
   std::optional<ReferenceError> reference_error = {};
 };
 
-// A sequence is a job with frames. Every frame is a job, too; its id is made of the sequence's id and the
+// A sequence is a job with frames. Every frame is also a job; its id consists of the sequence's id and the
 // frame's number.
 struct FrameId {
   JobId sequence;
   std::uint32_t frame = 0;
 };
-JobId frame_job(const JobId& sequence, std::uint32_t frame);  // "j-7f3a91c2-frame12"
+JobId frame_job(const JobId& sequence, std::uint32_t frame);  // returns, for example, "j-7f3a91c2-frame12"
 std::optional<FrameId> frame_of(const JobId& job);            // nullopt: the job is not a frame
 
 struct FrameView {
@@ -74,34 +105,37 @@ struct FrameView {
 struct FramesView {
   FrameRange range;
   std::uint32_t total = 0, done = 0, running = 0, failed = 0, cancelled = 0;
-  std::uint32_t current = 0;   // the frame to show: the first that is being rendered, or has been
+  // The frame to show: the first one that is being rendered, else the last one with samples
+  std::uint32_t current = 0;
   std::vector<FrameView> all;  // all frames, ascending; filled in by Coordinator::job() only
 };
 
 struct JobView {
   JobId id;
   std::string name;  // name of the scene file, for display
-  // The user whose token submitted it. Empty: the administrator, or it was submitted before there were users
+  // The user whose token submitted it. Empty: the administrator, or a record from before users existed
   std::string owner;
   JobState state = JobState::queued;
-  std::string stopped;    // "spp", "error", "time", "user" once done
+  std::string stopped;    // once done: "spp", "error", "time" or "user"
   double progress = 0;    // 0..1
   std::uint64_t spp = 0;  // samples per pixel: requested, or the limit
   bool spp_asked = true;  // false: no number of samples was requested; its target error or its time ends it
-  std::optional<double> target_error;  // relMSE at which the job is to end, if requested
-  bool denoise = false;                // its image also gets denoised layers
-  double spp_done = 0;                 // samples per pixel so far, mean over all pixels
+  std::optional<double> target_error;           // relMSE at which the job is to end, if requested
+  TargetLayer target_layer = TargetLayer::raw;  // whose relMSE that is
+  std::optional<DenoisedCheck> denoised_check;  // the last one, if it is that of the denoised layers
+  bool denoise = false;                         // its image also gets denoised layers
+  double spp_done = 0;                          // samples per pixel so far, mean over all pixels
   std::optional<ErrorFigures> error_now;
-  // At the last checkpoint that was compared with the reference
+  // Error against the reference, at the last checkpoint that was compared
   std::optional<ReferenceError> reference_error;
-  // True if the reference and the image share scene and seed. Then they share their noise as well, and
-  // reference_error means nothing (see same_noise() there)
+  // True if the reference and the image share scene and seed. They then share their noise as well, so
+  // reference_error is meaningless (common/image/reference/reference.h: same_noise())
   bool reference_same_seed = false;
   std::optional<ConvergenceStatus> convergence_status;  // nullopt: no samples yet
   std::optional<std::uint64_t> few_hits;                // pixels with few hits in the current image
   std::optional<Trend> trend;                           // nullopt: too few checkpoints
   std::optional<double> efficiency;                     // 1 / (relMSE x core seconds) at the last checkpoint
-  std::optional<std::uint64_t> pixels_without_samples;  // in the current image; nullopt: unknown
+  std::optional<std::uint64_t> pixels_without_samples;  // number in the current image; nullopt: unknown
   std::optional<double> eta_seconds;
   // 95 % interval of eta_seconds, if an error target ends the job
   std::optional<std::pair<double, double>> eta_ci95;
@@ -114,23 +148,24 @@ struct JobView {
   FrameSize size;
   int tile = 32;
   int priority = 0;
-  std::optional<std::uint32_t> max_workers, max_units;  // requested
+  std::optional<PixelRect> focus;                       // pixels whose tiles are rendered before the others
+  std::optional<std::uint32_t> max_workers, max_units;  // limits that the user requested
   std::uint64_t memory_bytes = 0;                       // the least memory that a worker needs for it
   std::uint64_t units_done = 0, units_total = 0;
-  // Predicted CPU seconds of units that wait for a worker; 0: nothing measured yet
+  // Predicted CPU seconds of the units that wait for a worker; 0: no cost is known yet
   double queued_core_seconds = 0;
   double elapsed_seconds = 0, core_seconds = 0;
   TimeSplit time;
   double submitted_unix = 0;  // time of submission by the wall clock, for display
   Health health;  // numeric health of its folded units (rounds of tiles); for a sequence only the totals
-  std::vector<HealthNote> notes;  // the same as sentences for people; empty: no problems
-  bool fake = false;  // true if fake workers made up its pixels; of a sequence: those of any frame
-  // Set only for a sequence. Its other values combine all frames: they are sums or means over pixels, and
-  // elapsed_seconds counts from the first ray of any frame to the last fold.
+  std::vector<HealthNote> notes;  // the numeric health as sentences for users; empty: no problems
+  bool fake = false;  // true if fake workers invented its pixels; for a sequence: the pixels of any frame
+  // Set only for a sequence. The other values of its view combine all frames: they are sums or means over
+  // pixels, and elapsed_seconds counts from the first ray of any frame to the last fold.
   std::optional<FramesView> frames;
 };
 
-// Changes that a user requests of a job. Either all are applied or, if any is rejected, none.
+// A user's request to change a job. Either all changes are applied or, if one is rejected, none.
 struct JobChange {
   std::optional<JobState> state;  // the new state: paused, running or cancelled
   std::optional<int> priority;
@@ -138,6 +173,8 @@ struct JobChange {
   // The new target error; only for a job that has one and was not stopped for another reason. A smaller
   // target resumes a job that reached the larger one
   std::optional<double> target_error;
+  // Pixels whose tiles are rendered before the others from now on; the inner nullopt ends that
+  std::optional<std::optional<PixelRect>> focus = {};
 };
 
 struct TileView {
@@ -149,12 +186,34 @@ struct TileView {
   std::vector<std::string> workers;  // names of the workers rendering it now
 };
 
+// A request for a rectangle of one layer at one mip level (common/image/exr/pixel_layers.h).
+struct PixelsAsked {
+  std::string layer;
+  int level = 0;
+  PixelRect rect;
+};
+
+// A request for a video of a sequence.
+struct VideoAsked {
+  double fps = 24;        // pictures per second
+  double exposure = 0;    // stops
+  bool denoised = false;  // the denoised images, of a job with JobSpec::denoise
+};
+enum class VideoState { none, waiting, making, ready, failed };
+struct VideoView {
+  VideoState state = VideoState::none;
+  VideoAsked asked;
+  std::size_t frames = 0, frames_done = 0;  // that the video has, and that are in it
+  std::uint64_t bytes = 0;                  // of a video that is ready
+  std::string error;                        // why it failed
+};
+
 struct WorkerView {
   WorkerId id;
   std::string name;
   std::string build;
   Digest numeric_class;
-  bool fake = false;  // a fake worker (for tests) renders nothing and makes up its pixels
+  bool fake = false;  // true for a fake worker (for tests), which invents its pixels instead of rendering
   int threads = 1;
   std::vector<std::string> tags;
   std::string state;     // "connected", "draining", "lost", "sick"
@@ -163,7 +222,7 @@ struct WorkerView {
   std::uint64_t units_done = 0;
   double cpu_seconds = 0;
   std::uint64_t rss_bytes = 0;
-  std::uint64_t memory_bytes = 0;  // memory that it may use; 0: unknown
+  std::uint64_t memory_bytes = 0;  // memory that its renderer may use; 0: unknown
   double last_seen_seconds = 0;    // seconds since its last message
 };
 
@@ -172,10 +231,25 @@ struct StreamEvent {
   std::uint64_t id = 0;
   std::string type;  // "job", "tile", "worker"
   std::string data;
-  // The job that a `job` or `tile` event is about. Empty: the event is about no single job and is sent to
+  // The job that a `job` or `tile` event is about. Empty: the event is not about a single job and is sent to
   // every reader
   std::string job;
-  std::string owner = {};  // owner of that job; for a `worker` event: of the job that the worker works on
+  // Owner of that job; for a `worker` event: the owner of the job that the worker works on
+  std::string owner = {};
+};
+
+struct SubmitRequest {
+  std::string scene_name;  // name of the main file, for diagnostics
+  std::string scene_text;  // Mitsuba or Nori XML
+  // The files that the scene may name; their blobs must be in the store
+  std::map<std::string, Digest> assets;
+  JobSpec spec;
+  std::string owner = {};        // the user who submits it: JobView::owner
+  std::string traceparent = {};  // header of the request (common/trace/context.h); anything else is ignored
+};
+struct Rejected {
+  Error error;
+  std::vector<Diagnostic> diagnostics;
 };
 
 }  // namespace ls::coordinator

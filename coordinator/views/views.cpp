@@ -2,8 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+
+#include "common/base/parse_number.h"
+#include "coordinator/views/job_view.h"
 
 namespace ls::coordinator {
 namespace {
@@ -41,6 +45,12 @@ json to_value(const TimeSplit& t) {
   return j;
 }
 
+json to_value(const DenoisedCheck& c) {
+  return {{"spp", number(c.spp)},
+          {"relmse", number(std::max(0.0, c.relmse))},
+          {"at_most", c.at_most ? number(*c.at_most) : json()}};
+}
+
 json to_value(const JobView& v) {
   json j{{"id", v.id.value},
          {"name", v.name},
@@ -52,6 +62,8 @@ json to_value(const JobView& v) {
          {"spp_asked", v.spp_asked ? json(v.spp) : json()},
          {"spp_done", number(v.spp_done)},
          {"target_error", v.target_error ? number(*v.target_error) : json()},
+         {"target_layer", v.target_error ? json(to_string(v.target_layer)) : json()},
+         {"denoised_check", v.denoised_check ? to_value(*v.denoised_check) : json()},
          {"denoise", v.denoise},
          {"eta_seconds", v.eta_seconds ? number(*v.eta_seconds) : json()},
          {"eta_ci95", pair_or_null(v.eta_ci95)},
@@ -59,7 +71,7 @@ json to_value(const JobView& v) {
                                                   {"seconds", number(*v.eta_with_more)},
                                                   {"ci95", pair_or_null(v.eta_with_more_ci95)}}
                                            : json()},
-         // Older names of the same; they go with the next version.
+         // Older names of the same values, for clients of earlier versions.
          {"eta_with_8_more", v.eta_with_more ? number(*v.eta_with_more) : json()},
          {"eta_with_8_more_ci95", pair_or_null(v.eta_with_more_ci95)},
          {"error", text_or_null(v.error)},
@@ -72,9 +84,11 @@ json to_value(const JobView& v) {
          {"units_total", v.units_total},
          {"elapsed_seconds", number(v.elapsed_seconds)},
          {"core_seconds", number(v.core_seconds)},
+         {"queued_core_seconds", number(v.queued_core_seconds)},
          {"time", to_value(v.time)},
          {"submitted_unix", number(v.submitted_unix)},
          {"health", json::parse(health_json(v.health, v.notes))}};
+  j["focus"] = v.focus ? json{v.focus->x0, v.focus->y0, v.focus->x1, v.focus->y1} : json();
   j["max_workers"] = v.max_workers ? json(*v.max_workers) : json();
   j["max_units"] = v.max_units ? json(*v.max_units) : json();
   j["memory_bytes"] = v.memory_bytes;
@@ -138,9 +152,32 @@ std::string listed(const char* key, const std::vector<View>& views) {
 
 std::string time_json(const TimeSplit& time) { return dump(to_value(time)); }
 std::string job_json(const JobView& job) { return dump(to_value(job)); }
-std::string jobs_json(const std::vector<JobView>& jobs) { return listed("jobs", jobs); }
+std::string jobs_json(const JobsPage& page) {
+  json jobs = json::array(), states = json::object();
+  for (const JobView& job : page.jobs) jobs.push_back(to_value(job));
+  for (std::size_t i = 0; i < page.states.size(); ++i)
+    states[std::string(to_string(static_cast<JobState>(i)))] = page.states[i];
+  return dump(json{{"jobs", std::move(jobs)},
+                   {"total", page.total},
+                   {"states", std::move(states)},
+                   {"owners", page.owners}});
+}
 std::string worker_json(const WorkerView& worker) { return dump(to_value(worker)); }
 std::string workers_json(const std::vector<WorkerView>& workers) { return listed("workers", workers); }
+
+std::string video_json(const VideoView& v) {
+  static constexpr const char* kStates[] = {"none", "waiting", "making", "ready", "failed"};
+  const bool asked = v.state != VideoState::none;
+  return json{{"state", kStates[static_cast<int>(v.state)]},
+              {"fps", asked ? number(v.asked.fps) : json()},
+              {"exposure", asked ? number(v.asked.exposure) : json()},
+              {"layer", asked ? json(v.asked.denoised ? "denoised" : "rgb") : json()},
+              {"frames", v.frames},
+              {"frames_done", v.frames_done},
+              {"bytes", v.state == VideoState::ready ? json(v.bytes) : json()},
+              {"error", text_or_null(v.error)}}
+      .dump(-1, ' ', false, json::error_handler_t::replace);
+}
 
 std::string tiles_json(const std::vector<TileView>& tiles) {
   json all = json::array();
@@ -189,5 +226,26 @@ std::string worker_gone_json(const WorkerId& worker) {
 
 std::string job_moved_json(const JobId& job) { return dump(json{{"id", job.value}, {"state", "moved"}}); }
 std::string job_removed_json(const JobId& job) { return dump(json{{"id", job.value}, {"state", "removed"}}); }
+
+namespace {
+
+// No other id can contain this: ids consist of "j-" and hexadecimal digits
+constexpr std::string_view kMark = "-frame";
+
+}  // namespace
+
+JobId frame_job(const JobId& sequence, std::uint32_t frame) {
+  return {fmt::format("{}{}{}", sequence.value, kMark, frame)};
+}
+
+std::optional<FrameId> frame_of(const JobId& job) {
+  const std::size_t at = job.value.rfind(kMark);
+  if (at == 0 || at == std::string::npos) return std::nullopt;
+  const auto number = parse_number<std::uint32_t>(std::string_view(job.value).substr(at + kMark.size()));
+  if (!number || *number > kMaxFrameNumber) return std::nullopt;
+  const FrameId id{{job.value.substr(0, at)}, *number};
+  // Only the exact form that frame_job() makes is accepted: "-frame07" is not a frame.
+  return frame_job(id.sequence, id.frame) == job ? std::optional(id) : std::nullopt;
+}
 
 }  // namespace ls::coordinator

@@ -1,5 +1,5 @@
-// A worker's stream as the coordinator sees it: the end that it sends to (WorkerSink) and the end that it
-// receives from (WorkerSession). Also the check whether a worker may join.
+// The two ends of a worker's stream, as the coordinator uses them: WorkerSink for sending and WorkerSession
+// for receiving. Also the check whether a worker may join.
 #pragma once
 
 #include <functional>
@@ -11,7 +11,7 @@
 
 namespace ls::coordinator {
 
-// Sends messages to one worker. The functions are called from any thread; they must not block and must not
+// Sends messages to one worker. Its functions may be called from any thread; they must not block and must not
 // call back into the coordinator.
 class WorkerSink {
  public:
@@ -20,7 +20,8 @@ class WorkerSink {
   virtual void close() = 0;
 };
 
-// The stream of one worker that has joined. After disconnected() nothing more is sent to its sink.
+// The stream of one worker that has joined. After disconnected() the coordinator sends nothing more to the
+// worker's sink.
 class WorkerSession {
  public:
   virtual ~WorkerSession() = default;

@@ -10,6 +10,7 @@
 //   Lightshaft-Delivery: j-1f/done/4711      the same when it is sent again
 //   Lightshaft-Signature: t=UNIX,v1=HEX      HEX = HMAC-SHA-256(secret, "UNIX." + body),
 //                                            UNIX = time of sending
+//   traceparent: 00-...                      only of a traced job: the span of this delivery
 //   {"event": "job.done", "id": "j-1f/done/4711", "job": {as in the API}}
 //
 // A receiver accepts a notification by a 2xx answer. After any other answer, or none within 15 s, the
@@ -26,8 +27,9 @@
 
 #include "common/base/clock.h"
 #include "common/base/error.h"
+#include "common/http/post.h"
+#include "common/trace/tracer.h"
 #include "coordinator/service/coordinator.h"
-#include "coordinator/webhooks/post.h"
 
 namespace ls::coordinator {
 
@@ -36,10 +38,13 @@ class Webhooks {
   struct Options {
     std::vector<std::string> urls;
     std::string secret;
-    std::filesystem::path folder;  // of pending notifications
+    std::filesystem::path folder;  // folder of pending notifications
     std::shared_ptr<const Clock> clock;
-    std::function<double()> unix_time;                            // wall clock, seconds
-    std::function<Result<int>(const webhooks::Post&)> send = {};  // webhooks::send by default
+    std::function<double()> unix_time;  // seconds since 1970
+    // Sends the request; ls::post by default
+    std::function<Result<HttpAnswer>(const HttpPost&)> send = {};
+    // Records a span for each attempt to deliver a notification of a traced job; null: none
+    std::shared_ptr<trace::Tracer> tracer = nullptr;
   };
   struct Figures {
     std::uint64_t delivered = 0, failed_attempts = 0, given_up = 0, waiting = 0;
@@ -50,7 +55,7 @@ class Webhooks {
   virtual Figures figures() const = 0;
 };
 
-// The value of the Lightshaft-Signature header.
+// Returns the value of the header Lightshaft-Signature.
 std::string webhook_signature(const std::string& secret, std::int64_t unix_seconds, const std::string& body);
 
 }  // namespace ls::coordinator

@@ -1,5 +1,6 @@
 #!/bin/bash
-# Whether the coordinator in this container is ready: GET /readyz, without a program for it in the image. Says why not.
+# Checks whether the coordinator in this container is ready, by GET /readyz. It needs no HTTP client in the
+# image, and prints the reason if it is not ready.
 set -eu
 port=${LIGHTSHAFT_HTTP_PORT:-8080}
 request='GET /readyz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n'

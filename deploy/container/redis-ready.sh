@@ -1,3 +1,3 @@
 #!/bin/sh
-# Whether Redis answers (and has read its files: it says LOADING until then).
+# Checks whether Redis answers. While it reads its files, it answers LOADING.
 REDISCLI_AUTH=$(cat /secrets/password) redis-cli ping 2>&1 | grep -qx PONG

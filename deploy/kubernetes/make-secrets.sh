@@ -7,23 +7,44 @@ set -eu
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 random_hex() { od -An -v -tx1 -N32 /dev/urandom | tr -d ' \n'; }
-block() { sed 's/^/    /' "$folder/$1"; }   # a file as a block of YAML
+block() { sed 's/^/    /' "$folder/$1"; }   # prints a file as a block of YAML
 join=$(random_hex) password=$(random_hex)
 names=coordinator,coordinator.lightshaft,coordinator.lightshaft.svc,coordinator.lightshaft.svc.cluster.local,localhost,127.0.0.1
+for name in coordinator-0.coordinators coordinator-1.coordinators; do   # of several, by components/shared
+  names=$names,$name,$name.lightshaft,$name.lightshaft.svc,$name.lightshaft.svc.cluster.local
+done
 "$(dirname "$0")/../make-certificates.sh" "$folder" "$names${1:+,$1}" 1 >&2
 cat <<END
 apiVersion: v1
 kind: Secret
-metadata: {name: lightshaft-worker}
+metadata: {name: lightshaft-join-token}
 type: Opaque
 stringData:
   join-token: "$join"
+---
+apiVersion: v1
+kind: Secret
+metadata: {name: lightshaft-worker-tls}
+type: Opaque
+stringData:
   ca.pem: |
 $(block ca.pem)
   worker.pem: |
 $(block worker-1.pem)
   worker.key: |
 $(block worker-1.key)
+---
+apiVersion: v1
+kind: Secret
+metadata: {name: lightshaft-coordinator-tls}
+type: Opaque
+stringData:
+  ca.pem: |
+$(block ca.pem)
+  server.pem: |
+$(block server.pem)
+  server.key: |
+$(block server.key)
 ---
 apiVersion: v1
 kind: Secret
@@ -41,24 +62,6 @@ stringData:
     save ""
     maxmemory-policy noeviction
     requirepass $password
----
-apiVersion: v1
-kind: Secret
-metadata: {name: lightshaft-coordinator}
-type: Opaque
-stringData:
-  join-token: "$join"
-  ca.pem: |
-$(block ca.pem)
-  server.pem: |
-$(block server.pem)
-  server.key: |
-$(block server.key)
   coordinator.conf: |
-    http = "0.0.0.0:8080"
-    grpc = "0.0.0.0:50051"
     store = "redis://:$password@redis:6379/0"
-    tls-ca = "/secrets/ca.pem"
-    tls-cert = "/secrets/server.pem"
-    tls-key = "/secrets/server.key"
 END

@@ -204,9 +204,7 @@ def page(table):
         lines += [f"| {c['name']} | {number(c['expected'])} | {number(c['got'])} | {c['stderr']:.1e} | {c['z']:.2f} | {band(c)} | "
                   f"{c['nonfinite']} | {c['seconds']:.1f} | {c['verdict']} |" for c in members]
         lines.append("")
-    lines += ["### Rows that tests answer without a picture", "", "| row | test | file |", "|---|---|---|"]
-    lines += [f"| {e['row']} | {e['test']} | `{e['file']}` |" for e in table["elsewhere"]]
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines[:-1]) + "\n"
 
 
 # What a constant of docs/reference/constants.md does where it does most, by the case that asks for it.

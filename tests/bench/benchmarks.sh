@@ -5,7 +5,7 @@
 # SCENES is a folder with NAME.xml and, for the races, refs/NAME.0.exr and refs/NAME.1.exr: two independent references. Without it
 # the scenes and references are those of scenes/bench.
 # Entrants of the races are Mitsuba 3 and Cycles, as far as `python3` has the packages mitsuba (and there is an LLVM library for it)
-# and bpy; what is missing is said, and the races of docs/measurements/benchmarks are then not made: they would lose its columns.
+# and bpy (race.py); what is missing is said, and the races of docs/measurements/benchmarks are then not made: they would lose its columns.
 # The curves are those of SCENES and, on a page of its own, of the bath, made here if it is not there; they are counted by CPU
 # seconds, and so may be made while others use the machine. The races want a quiet one, or --clock cpu. Races in docs/measurements/benchmarks
 # give README.md its table of figures (measured.py).
@@ -46,7 +46,7 @@ if [ "$only" != curves ]; then
   fi
   if /usr/bin/python3 "$ADAPTERS/llvm_library.py"; then add_programs mitsuba mitsuba3_volpath mitsuba3_volpathmis; fi
   add_programs bpy cycles
-  "$BIN/lightshaft" compare "$scenes"/*.xml --references "$references" --integrators volpath "${programs[@]}" \
+  /usr/bin/python3 tests/bench/race.py "$scenes"/*.xml --references "$references" --integrators volpath "${programs[@]}" \
     --time "$time" --seeds "$seeds" --seed "$seed" --clock "$clock" --report "$out/races" || status=$?
   # The commit that last touched what the build's name is made of: it stays the renderer's, whatever pages are committed after it.
   commit=$(git log -1 --format=%h -- common worker/render worker/CMakeLists.txt CMakeLists.txt cmake)

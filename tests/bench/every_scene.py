@@ -2,7 +2,7 @@
 """Every scene file below a folder: does it load and render to a healthy picture, and what is said if not?
 
 usage: every_scene.py DIR [--size WxH] [--spp N] [--threads N] [--only TEXT] [--markdown]
-Each XML is rendered small. Healthy is a picture that is finite, not black, and whose report counts no non-finite sample and no
+Each XML, .pbrt, .gltf and .glb is rendered small. Healthy is a picture that is finite, not black, and whose report counts no non-finite sample and no
 majorant violation. Scenes whose root is a test (Nori's `ttest`, `chi2test`) are run by `lightshaft validate`. Files that others
 include, and those without a sensor, are fragments: listed as such. What is refused is printed with the first error.
 Exit status: 0 unless a render failed or was not healthy. Needs numpy and the OpenEXR package of PyPI. A bench, not a test.
@@ -31,7 +31,9 @@ def first_error(text, scene):
 
 
 def is_fragment(scene, text, included):
-    return scene.name in included or not re.search(r"<(sensor|camera|test|include)\b", text)
+    if scene.suffix in (".gltf", ".glb"):
+        return False
+    return scene.name in included or not re.search(r"^\s*Camera\b" if scene.suffix == ".pbrt" else r"<(sensor|camera|test|include)\b", text, re.M)
 
 
 def validated(scene):
@@ -68,9 +70,9 @@ def main():
     parser.add_argument("--only", default="")
     parser.add_argument("--markdown", action="store_true")
     options = parser.parse_args()
-    files = sorted(options.folder.rglob("*.xml"))
+    files = sorted(f for ending in ("xml", "pbrt", "gltf", "glb") for f in options.folder.rglob(f"*.{ending}"))
     texts = {f: f.read_text(errors="replace") for f in files}
-    included = {pathlib.PurePath(name).name for text in texts.values() for name in re.findall(r'<include[^>]*filename="([^"]+)"', text)}
+    included = {pathlib.PurePath(name).name for text in texts.values() for name in re.findall(r'(?:<include[^>]*filename=|^\s*(?:Include|Import)\s+)"([^"]+)"', text, re.M)}
     if options.markdown:
         print("| scene | outcome | |\n|---|---|---|")
     bad = 0

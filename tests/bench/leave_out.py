@@ -1,22 +1,19 @@
 #!/usr/bin/env python3
 """What a scene does not need, measured: writes docs/measurements/leave-out.md.
 
-usage: leave_out.py [--out FILE.md] [--jobs N] [--only NAME,...] [--skip grey,unguarded,counting] [--bytes-alone] [--bits SCENE...]
+usage: leave_out.py [--out FILE.md] [--jobs N] [--only NAME,...] [--bytes-alone] [--bits SCENE...]
 N = 0: with what was built before, which must be of these sources.
 
 For a vacuum, a homogeneous, a grid and a textured scene, and one of whose lights none has an extent:
-- instructions per path (callgrind, within render_tile, one thread) of the release build, against a build of the same sources
-  without the parts that the scene does not use (cmake -DLIGHTSHAFT_WITHOUT=...), against one without extinction that differs
-  between channels alone, and against one without the guards of health;
-- the same of every instantiation of the integrator that covers the scene;
+- instructions per path (callgrind, within render_tile, one thread), and of every instantiation of the integrator that covers the
+  scene: what the parts that its own leaves out would cost;
 - counters of work (a build with -DLIGHTSHAFT_COUNT=ON, through `lightshaft inspect --work`);
 - what a worker on a farm keeps resident and which libraries it has mapped, with larger files;
 - bytes uploaded, sent and loaded with 100 MiB of assets that nothing needed names, and without.
 --bits asks further scenes whether every instantiation that covers them gives the same bits (same_bits.py).
---bytes-alone measures the last two of the list, which need no other build. Builds land in build/leave-out-*, eight of them, of which only the
-renderer differs: with ccache each compiles a few dozen files; build/release must be configured. Needs valgrind. Instruction counts
-do not depend on what else runs. Ends with 1 if a scene pays more than LIMIT for what it leaves out, or a counter of unused work is
-not 0.
+--bytes-alone measures the last two of the list, which need no other build. The build that counts lands in build/leave-out-counting;
+build/release must be configured. Needs valgrind. Instruction counts do not depend on what else runs. Ends with 1 if a scene's
+instantiation takes more than LIMIT beyond the cheapest that covers it, or a counter of unused work is not 0.
 """
 import argparse
 import array
@@ -41,8 +38,6 @@ SIZE, SPP = (48, 36), 2
 LIMIT = 0.005
 UNUSED = 100 << 20
 VOL = struct.Struct("<4s5i6f")  # the header of Mitsuba's grids
-ALL = ["media", "grids", "chromatic", "emission", "overlaps", "boundaries", "veils", "textures", "user_geometries", "instances", "environment_maps",
-       "equiangular", "light_trees", "lenses", "found_lights"]
 GRID = re.compile(r'  <shape type="cube">.*?</shape>\n', re.S)
 BOX = '<shape type="cube"><transform name="to_world"><scale value="0.6"/></transform><bsdf type="diffuse">{}</bsdf></shape>\n'
 HOMOGENEOUS = """  <shape type="cube"><bsdf type="null"/><medium name="interior" type="homogeneous"><float name="sigma_t" value="1.5"/>
@@ -55,14 +50,13 @@ TEXTURE = '<texture type="bitmap" name="reflectance"><string name="filename" val
 LIT = FOG.replace('<emitter type="constant"><rgb name="radiance" value="0.1"/></emitter>', ROOM)
 UNLIT = re.sub(r'  <shape type="rectangle">.*?</shape>\n', POINT, LIT, flags=re.S)
 INSIDE = BOX.format("").replace("0.6", "0.3")
-SCENES = {  # text, the parts that it needs
-    "vacuum": (GRID.sub(BOX.format(""), LIT, count=1), ["found_lights"]),
-    "homogeneous": (GRID.sub(HOMOGENEOUS + INSIDE, LIT, count=1), ["media", "boundaries", "equiangular", "found_lights"]),
-    "grid": (LIT.replace("</scene>", INSIDE + "</scene>"), ["media", "grids", "boundaries", "found_lights"]),
-    "textured": (GRID.sub(BOX.format(TEXTURE), LIT, count=1), ["textures", "found_lights"]),
-    "delta": (GRID.sub(HOMOGENEOUS + INSIDE, UNLIT, count=1), ["media", "boundaries", "equiangular"]),
+SCENES = {
+    "vacuum": GRID.sub(BOX.format(""), LIT, count=1),
+    "homogeneous": GRID.sub(HOMOGENEOUS + INSIDE, LIT, count=1),
+    "grid": LIT.replace("</scene>", INSIDE + "</scene>"),
+    "textured": GRID.sub(BOX.format(TEXTURE), LIT, count=1),
+    "delta": GRID.sub(HOMOGENEOUS + INSIDE, UNLIT, count=1),
 }
-GREY = ["homogeneous", "grid", "delta"]  # scenes with media whose channels fade alike
 # Counters of work that a scene must leave at 0: all but these.
 WORKS = {"vacuum": {"shadow_rays"}, "textured": {"shadow_rays", "texels"},
          "homogeneous": {"shadow_rays", "phase", "transmittance", "equiangular", "boundary_rays"},
@@ -73,7 +67,7 @@ TAKEN_OUT = "What is left out, and how: [design/leave-out.md](../design/leave-ou
 
 
 def scene_text(name):
-    text = SCENES[name][0]
+    text = SCENES[name]
     return text if "$density" in text else text.replace('<default name="density" value="2"/>', "")
 
 
@@ -102,37 +96,26 @@ def build(folder, *targets, jobs):
     return folder / "bin" / "lightshaft"
 
 
-def build_without(name, *options, jobs):
-    folder = ROOT / "build" / f"leave-out-{name}"
+def build_counting(jobs):
+    folder = ROOT / "build" / "leave-out-counting"
     if jobs > 0:
-        subprocess.run(["cmake", "--preset", "release", "-B", folder, "-DLIGHTSHAFT_TESTS=OFF", *options], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+        subprocess.run(["cmake", "--preset", "release", "-B", folder, "-DLIGHTSHAFT_TESTS=OFF", "-DLIGHTSHAFT_COUNT=ON"], cwd=ROOT, check=True,
+                       stdout=subprocess.DEVNULL)
     return build(folder, "lightshaft", jobs=jobs)
 
 
-def without(name):
-    return [part for part in ALL if part not in SCENES[name][1]]
-
-
-# Names of build folders, and what cmake is told. The last two do without instantiations that none of the scenes is rendered with,
-# which take the compiler longest.
-OTHERS = "chromatic,overlaps"
-BUILDS = {**{name: ["-DLIGHTSHAFT_WITHOUT=" + ",".join(without(name))] for name in SCENES}, "grey": ["-DLIGHTSHAFT_WITHOUT=chromatic"],
-          "unguarded": [f"-DLIGHTSHAFT_WITHOUT=health,{OTHERS}"], "counting": ["-DLIGHTSHAFT_COUNT=ON", f"-DLIGHTSHAFT_WITHOUT={OTHERS}"]}
-
-
 def instructions(binary, scene, folder):
-    """Per path, and the image's digest."""
+    """Per path."""
     size = f"{SIZE[0]}x{SIZE[1]}"
     command = ["valgrind", "--tool=callgrind", "--toggle-collect=ls::render::render_tile(*", f"--callgrind-out-file={folder}/callgrind.out",
                binary, "render", scene, "--threads", "1", "--size", size, "--spp", str(SPP), "-o", folder / "out.exr"]
     run = subprocess.run(command, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr[-2000:]
     collected = int(re.search(r"Collected : (\d+)", run.stderr)[1])
-    return collected / (SIZE[0] * SIZE[1] * SPP), re.search(r"pixels_sha256 (\w+)", run.stdout)[1]
+    return collected / (SIZE[0] * SIZE[1] * SPP)
 
 
-# By name: the flags of worker/render/base/features.h but for the last five, in their order, without those that are not set at
-# the end.
+# By name: the flags of worker/render/base/features.h in their order, without those that are not set at the end.
 INSTANTIATIONS = {"surfaces": (), "surfaces that light passes": (0, 0, 0, 0, 0, 1), "homogeneous grey media": (1, 0, 0, 0, 0, 1),
                   "homogeneous chromatic media": (1, 0, 1, 0, 0, 1), "grey grids": (1, 1, 0, 0, 0, 1), "chromatic grids": (1, 1, 1, 0, 0, 1),
                   "everything": (1, 1, 1, 1, 1, 1), "everything, and light in parts": (1, 1, 1, 1, 1, 1, 1),
@@ -167,7 +150,7 @@ def by_instantiation(binary, scene, folder):
     costs = {}
     for function, cost in inclusive(out).items():
         if (m := re.search(r"sample_with<ls::render::Features\{([^}]*)\}", function)):
-            flags = [int(flag == "true") for flag in m[1].split(", ")][:-5] if m[1] else []
+            flags = [int(flag == "true") for flag in m[1].split(", ")] if m[1] else []
             while flags and not flags[-1]:
                 flags.pop()
             flags = tuple(flags)
@@ -214,29 +197,17 @@ def work(binary, scene):
     return json.loads(done.stdout)["work"]
 
 
-def compute(name, binaries, scene, folder):
-    row = {"full": None, "bare": None}
-    row |= {what: None for what in ("unguarded", "grey") if what in binaries and (what != "grey" or name in GREY)}
-    pixels = {}
-    for what in row:
-        binary = binaries[{"full": "release", "bare": name}.get(what, what)]
-        row[what], pixels[what] = instructions(binary, scene, folder)
-        print(f"{name}: {row[what]:.0f} instructions a path, {what}, {percent(row['full'], row[what])}", flush=True)
-    assert len(set(pixels.values())) == 1, f"{name}: the builds do not agree on the image: {pixels}"
-    if "counting" in binaries:
-        row["work"] = work(binaries["counting"], scene)
-    return row | {"variants": by_instantiation(binaries["release"], scene, folder)}
+def compute(binary, counting, scene, folder):
+    return {"full": instructions(binary, scene, folder), "work": work(counting, scene), "variants": by_instantiation(binary, scene, folder)}
 
 
-def measure(names, jobs, folder, bytes_alone, skipped=()):
+def measure(names, jobs, folder, bytes_alone):
     release = ROOT / "build" / "release"
-    binaries = {"release": build(release, "lightshaft", "lightshaft-coordinator", "lightshaft-worker", jobs=jobs)}
+    binary = build(release, "lightshaft", "lightshaft-coordinator", "lightshaft-worker", jobs=jobs)
     small, large = folder / "small", folder / "large"
     write(small, 32, 256)
     write(large, 128, 1024)
-    for name in [] if bytes_alone else [*names, "grey", "unguarded", "counting"]:
-        if name not in skipped:
-            binaries[name] = build_without(name, *BUILDS[name], jobs=jobs)
+    counting = None if bytes_alone else build_counting(jobs)
     rows = {}
     for name in names:
         scene = large / f"{name}.xml"
@@ -244,18 +215,16 @@ def measure(names, jobs, folder, bytes_alone, skipped=()):
         rows[name] = {"variant": told["variant"], "needed": sum(s["bytes"] for s in told["structures"]),
                       "farm": on_a_farm(scene, folder / f"farm-{name}"), "fat": on_a_farm(with_unused(scene, large), folder / f"farm-{name}-fat")}
         if not bytes_alone:
-            rows[name] |= compute(name, binaries, small / f"{name}.xml", folder)
+            rows[name] |= compute(binary, counting, small / f"{name}.xml", folder)
     return rows
 
 
 def faults(rows):
     """What is not as it should be."""
     for name, r in rows.items():
-        if "full" in r and r["full"] > r["bare"] * (1 + LIMIT):
-            yield f"{name}: {percent(r['full'], r['bare'])} instructions for what it leaves out"
-        if "grey" in r and r["full"] > r["grey"] * (1 + LIMIT):
-            yield f"{name}: {percent(r['full'], r['grey'])} instructions for media of three channels, of which it has none"
         if "work" in r:
+            (own, price), *others = r["variants"]
+            yield from (f"{name}: {own} takes {percent(price, n)} of the instructions of {v}" for v, n in others if price > n * (1 + LIMIT))
             yield from (f"{name}: {n} of {key}, which it does not need" for key, n in r["work"].items() if n and key not in WORKS[name])
         if any(r["farm"][key] != r["fat"][key] for key in ("stored", "cached", "pixels")):
             yield f"{name}: unused files change what is stored, fetched or rendered"
@@ -267,19 +236,9 @@ def percent(n, of):
 
 def computed(rows):
     out = ["## Instructions per path", "", f"Images of {SIZE[0]} x {SIZE[1]} pixels with {SPP} samples, one thread.", "",
-           "Callgrind, within `render_tile`: what the presence of parts that the scene does not use costs it. *without*: the same sources "
-           "with these parts compiled out (`cmake -DLIGHTSHAFT_WITHOUT=...`); both give the same pixels, bit for bit.", "",
-           "| scene | instantiation | instructions | without the unused parts | difference | within 0.5 % |", "|---|---|---|---|---|---|"]
-    for name, r in rows.items():
-        out.append(f"| {name} | {r['variant']} | {r['full']:.0f} | {r['bare']:.0f} | {percent(r['full'], r['bare'])} | "
-                   f"{'yes' if r['full'] <= r['bare'] * (1 + LIMIT) else 'NO'} |")
-    out += ["", "Compiled out were: " + "; ".join(f"for *{n}* {', '.join(without(n))}" for n in rows) + ".", ""]
-    out += ["What is left is asked at hits: whether one is on a triangle of the world's own, whether a boundary thins light; and, at flights, whether "
-            "points are sampled about a light.", ""]
-    out += chromatic(rows)
-    out += compared(rows, "unguarded", "### The guards of numeric health",
-                    "Against a build without them (`-DLIGHTSHAFT_WITHOUT=health`, and without instantiations that none of these scenes is rendered "
-                    "with): each sample's test, the bounds of densities, directions that are none.")
+           "Callgrind, within `render_tile`, by the instantiation that the scene is rendered with.", "",
+           "| scene | instantiation | instructions |", "|---|---|---|",
+           *(f"| {name} | {r['variant']} | {r['full']:.0f} |" for name, r in rows.items()), ""]
     out += ["### By instantiation", "",
             "The same bits at another price, in a small image (`lightshaft inspect SCENE --variants`, which names the prices itself where the machine has a "
             "counter of instructions; here again callgrind): the first is the one that the scene is rendered with. What it saves over the general one is "
@@ -287,39 +246,10 @@ def computed(rows):
     for name, r in rows.items():
         cheapest = r["variants"][0][1]
         out.append(f"- {name}: " + "; ".join(f"{v} {n:.0f}" + ("" if n == cheapest else f" ({percent(n, cheapest)})") for v, n in r["variants"]) + ".")
-    return out + [""] + worked({name: r["work"] for name, r in rows.items() if "work" in r})
-
-
-def chromatic(rows):
-    """What media of three channels cost grey ones: by being there, and if they were rendered by their code."""
-    rows = {name: r for name, r in rows.items() if "grey" in r}
-    if not rows:
-        return []
-    out = ["### Grey or chromatic", "",
-           "What extinction that differs between channels, and grids of three channels, cost grey media: by their presence in the renderer (against "
-           "`-DLIGHTSHAFT_WITHOUT=chromatic`), which is what grey scenes pay; and what they would pay if there were no instantiation for grey media "
-           "(the next one that covers the scene and knows channels, in the small image of the list below).", "",
-           "| scene | grey / chromatic | instructions | without | difference | within 0.5 % | as chromatic |", "|---|---|---|---|---|---|---|"]
-    for name, r in rows.items():
-        by = dict(r["variants"])
-        other = {"homogeneous grey media": "homogeneous chromatic media", "grey grids": "chromatic grids"}[r["variant"]]
-        out.append(f"| {name} | {r['variant']} / {other} | {r['full']:.0f} | {r['grey']:.0f} | {percent(r['full'], r['grey'])} | "
-                   f"{'yes' if r['full'] <= r['grey'] * (1 + LIMIT) else 'NO'} | {percent(by[other], by[r['variant']])} |")
-    return out + [""]
-
-
-def compared(rows, what, title, words):
-    """The release build against another one, for the scenes that were measured with it."""
-    rows = {name: r for name, r in rows.items() if what in r}
-    if not rows:
-        return []
-    return [title, "", words, "", "| scene | instructions | without | difference |", "|---|---|---|---|",
-            *(f"| {name} | {r['full']:.0f} | {r[what]:.0f} | {percent(r['full'], r[what])} |" for name, r in rows.items()), ""]
+    return out + [""] + worked({name: r["work"] for name, r in rows.items()})
 
 
 def worked(works):
-    if not works:
-        return []
     return ["## Work that is not done", "",
             "Counted in a build with `-DLIGHTSHAFT_COUNT=ON` (`lightshaft inspect SCENE --work`), in a small image; the script fails where a counter of "
             "what a scene does not need is not 0.", "", "| work | " + " | ".join(works) + " |", "|---|" + "---|" * len(works),
@@ -331,8 +261,7 @@ def page(rows, bytes_alone, bits):
     commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
     out = ["# What a scene does not need is left out", "", f"Made by `{command}` of commit {commit} (release build, GCC 12, `-march=x86-64-v3`).", "", TAKEN_OUT]
     if bytes_alone:
-        out += ["Without `--bytes-alone` it also builds the renderer without the parts that each scene does not use and compares instructions per path, "
-                "and tabulates the counters of work.", ""]
+        out += ["Without `--bytes-alone` it also compares instructions per path of all instantiations, and tabulates the counters of work.", ""]
     else:
         out += computed(rows)
     out += same_bits(bits) if bits else []
@@ -363,12 +292,11 @@ def main():
     options.add_argument("--out", type=pathlib.Path, default=ROOT / "docs" / "measurements" / "leave-out.md")
     options.add_argument("--jobs", type=int, default=2)
     options.add_argument("--only", default=",".join(SCENES))
-    options.add_argument("--skip", default="")
     options.add_argument("--bytes-alone", action="store_true")
     options.add_argument("--bits", nargs="+", type=pathlib.Path, default=[])
     chosen = options.parse_args()
     with tempfile.TemporaryDirectory(prefix="lightshaft-leave-out-") as folder:
-        rows = measure(chosen.only.split(","), chosen.jobs, pathlib.Path(folder), chosen.bytes_alone, chosen.skip.split(","))
+        rows = measure(chosen.only.split(","), chosen.jobs, pathlib.Path(folder), chosen.bytes_alone)
     chosen.out.write_text(page(rows, chosen.bytes_alone, chosen.bits))
     found = list(faults(rows))
     print("\n".join(found), file=sys.stderr)

@@ -64,7 +64,7 @@ def read(races):
 
 def cell(figure):
     middle, low, high = figure
-    return f"{middle:.3g} ({low:.3g} to {high:.3g})"
+    return f"{middle:.3g} ({low:.3g}–{high:.3g})"
 
 
 def against(lanes, program):

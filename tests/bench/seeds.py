@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""The error of many seeds, with the techniques of docs/decisions/0027-light-along-camera-segments.md and without.
+"""The error of many seeds, with the techniques of decisions 27 and 31 (docs/decisions) and without.
 
 usage: seeds.py SCENE.xml[@WxH]... [--seeds N] [--first SEED] [--spp N] [--reference-spp N] [--out PAGE.md]
-Renders each scene with N seeds as by default, and with `camera_points` -1 and `phase_only` in its integrator; the two take turns.
+Renders each scene with N seeds as by default, and with `camera_points` -1, `phase_only` and `light_vertices` -1 in its integrator; the two take turns.
 The true relMSE is (x - ref0)(x - ref1) / (ref^2 + 0.01) against two references by default settings and seeds of their own: free of
 the references' noise in the mean. Core seconds are CPU time of the units: only their ratio means something. Efficiency is 1 / (mean
 relMSE x core seconds). Needs numpy and the OpenEXR package of PyPI.
@@ -18,7 +18,8 @@ import tempfile
 
 from efficiency import BIN, ROOT, load, relmse
 
-PLAIN = '<integer name="camera_points" value="-1"/><boolean name="phase_only" value="true"/>'
+PLAIN = ('<integer name="camera_points" value="-1"/><boolean name="phase_only" value="true"/>'
+         '<integer name="light_vertices" value="-1"/>')
 
 
 def plain(scene):
@@ -80,7 +81,7 @@ def main():
         given = [re.sub(r".*/", "", a) if ".xml" in a else a for a in sys.argv[1:]]
         given[given.index("--out"):given.index("--out") + 2] = []
         asked.out.write_text("# The error of many seeds\n\nEach scene by default, and without what [decision 27](../decisions/0027-light-along-camera-segments.md) "
-                             f"adds. Made by `tests/bench/seeds.py {' '.join(given)}`, commit {commit}; what the columns are: see the script.\n\n" + "\n".join(lines) + "\n")
+                             f"and [decision 31](../decisions/0031-connections-to-light-vertices.md) add. Made by `tests/bench/seeds.py {' '.join(given)}`, commit {commit}; what the columns are: see the script.\n\n" + "\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string_view>
 
 namespace ls::test {
 namespace {
@@ -33,7 +34,10 @@ class ShortCoverage : public ::testing::TestWithParam<const char*> {};
 TEST_P(ShortCoverage, TheIntervalHoldsTheTrueErrorAndTheEstimateIsRightInTheMean) {
   Tests tests("coverage/short");
   const double level = tests.level(7);
-  const CoverageScene scene = scene_of(GetParam(), 32);
+  // All pixels share light vertices. With fewer samples the interval of relMSE is too narrow for such images
+  // (docs/decisions/0031-connections-to-light-vertices.md).
+  const bool connected = std::string_view(GetParam()).ends_with("connected");
+  const CoverageScene scene = scene_of(GetParam(), connected ? 64 : 32);
   const Coverage c = measure_coverage(scene, kJobs, 2, 1, kPaired);
   fmt::print("{}\n", coverage_line(scene, c));
 
@@ -54,7 +58,8 @@ TEST_P(ShortCoverage, TheIntervalHoldsTheTrueErrorAndTheEstimateIsRightInTheMean
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, ShortCoverage,
-                         ::testing::Values("surfaces, noisy", "media, noisy", "surfaces, smooth"),
+                         ::testing::Values("surfaces, noisy", "media, noisy", "surfaces, smooth",
+                                           "media, connected"),
                          [](const auto& info) {
                            std::string name = info.param;
                            std::erase_if(name, [](char c) { return c == ',' || c == ' '; });

@@ -70,6 +70,16 @@ std::string caustic() {
                 R"(<emitter type="area"><rgb name="radiance" value="300, 300, 300"/></emitter>)");
 }
 
+// A closed room into which the sun shines through a slit: its paths are connected to light vertices, which
+// all pixels share.
+std::string slit() {
+  return cube(1.1, .05, 1.1, 0, -1.05, 0, ref("white")) + cube(1.1, .05, 1.1, 0, 1.05, 0, ref("white")) +
+         cube(1, 1, .05, 0, 0, -1.05, ref("white")) + cube(1, 1, .05, 0, 0, 4.5, ref("white")) +
+         cube(.05, 1, 2.8, -1.05, 0, 1.7, ref("red")) + cube(.05, .55, 2.8, 1.05, -.45, 1.7, ref("green")) +
+         cube(.05, .3, 2.8, 1.05, .7, 1.7, ref("green")) +
+         R"(<emitter type="directional"><vector name="direction" x="-1" y="-0.6" z="-0.2"/><rgb name="irradiance" value="40, 36, 30"/></emitter>)";
+}
+
 }  // namespace
 
 const std::vector<CoverageScene>& coverage_scenes() {
@@ -82,6 +92,8 @@ const std::vector<CoverageScene>& coverage_scenes() {
       {"media, smooth", scene(fog(.5, .9, .9) + sky(.7))},
       {"media, noisy", scene(room(lamp(60)) + fog(.6, .9, .995))},
       {"media, dark", scene(fog(2, .95, .9) + lamp(2))},
+      {"surfaces, connected", scene(slit())},
+      {"media, connected", scene(slit() + fog(.3, .9, .99))},
       {"surfaces, to a target", scene(room(lamp(400, .1))), 4096, false, 1.5e-3},
       {"media, to a target", scene(fog(1, .9, .9) + lamp(60, .1)), 4096, false, 1e-4},
       {"fireflies", scene(caustic()), 64, true},

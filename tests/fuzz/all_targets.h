@@ -7,9 +7,13 @@ namespace ls::fuzz {
 
 using Seeds = std::vector<std::string>;
 
-// scene.cpp: Mitsuba and Nori XML; the canonical scene of workers
+// scene.cpp: Mitsuba and Nori XML; pbrt; glTF; the canonical scene of workers
 void scene_xml(Bytes input);
 Seeds scene_xml_seeds();
+void scene_pbrt(Bytes input);
+Seeds scene_pbrt_seeds();
+void scene_gltf(Bytes input);
+Seeds scene_gltf_seeds();
 void scene_json(Bytes input);
 Seeds scene_json_seeds();
 // small_json.cpp: settings, specs, stored jobs, health, unit headers, jobs for a render child

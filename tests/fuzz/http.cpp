@@ -1,6 +1,6 @@
 // Requests to a coordinator in memory, as text: "METHOD target", header lines, an empty line, the body. What
 // the HTTP library makes of bytes is not ours; what we make of its requests is.
-#include "coordinator/http/message/uri.h"
+#include "coordinator/http/message/message.h"
 #include "tests/fuzz/all_targets.h"
 #include "tests/fuzz/http_door.h"
 

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "coordinator/http/net/head_text.h"
+#include "coordinator/http/message/message.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace ls::fuzz {

@@ -2,9 +2,9 @@
 #include "common/image/film/partial.h"
 #include "common/image/exr/exr_file.h"
 #include "common/image/exr/final_image.h"
-#include "common/image/film/fake_pixels.h"
 #include "common/image/film/merge.h"
 #include "tests/fuzz/all_targets.h"
+#include "worker/fake/fake_pixels.h"
 
 namespace ls::fuzz {
 namespace {

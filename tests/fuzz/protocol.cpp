@@ -6,10 +6,10 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
-#include "common/image/film/fake_pixels.h"
 #include "coordinator/service/coordinator.h"
 #include "proto/convert.h"
 #include "tests/fuzz/all_targets.h"
+#include "worker/fake/fake_pixels.h"
 
 namespace ls::fuzz {
 namespace {

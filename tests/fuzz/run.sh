@@ -11,7 +11,7 @@
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 here=tests/fuzz out=build/fuzz turns=build/fuzz/turns.tsv
-all=(scene_xml partial http wire protocol bundle image mesh volume scene_json small_json)
+all=(scene_xml scene_pbrt scene_gltf partial http wire protocol bundle image mesh volume scene_json small_json)
 slice=180 goal=60 most=1000000 build=yes errand=fuzz
 while [ $# -gt 0 ]; do
   case "$1" in

@@ -2,7 +2,7 @@
 #include "common/image/film/health.h"
 #include "common/image/film/partial.h"
 #include "common/job/settings.h"
-#include "coordinator/assemble/health_table.h"
+#include "coordinator/assemble/assembly.h"
 #include "coordinator/store/jobs/job_store.h"
 #include "tests/fuzz/all_targets.h"
 #include "worker/child/job_text.h"

@@ -1,6 +1,11 @@
 // Bytes of a client's connection to the coordinator: what Beast makes of them, what we make of that, and
 // bodies of a length and in chunks, until the connection would be closed. The first byte of each part of the
 // input says how many bytes arrive at once.
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/error.hpp>
+#include <boost/beast/core/buffers_to_string.hpp>
+#include <boost/beast/http/read.hpp>
+
 #include "coordinator/http/net/request_head.h"
 #include "tests/fuzz/all_targets.h"
 #include "tests/fuzz/http_door.h"
@@ -10,47 +15,41 @@ namespace {
 
 using namespace ls::http;
 
-// What arrives, some bytes at a time, as the connection's buffer takes it.
+namespace bhttp = beast::http;
+using boost::system::error_code;
+
+// What arrives, some bytes at a time, as a stream that Beast reads.
 class Arriving {
  public:
   Arriving(std::string_view bytes, std::size_t at_once) : rest_(bytes), at_once_(at_once) {}
 
-  beast::flat_buffer& buffer() { return buffer_; }
-  bool more() {
-    const std::size_t n = std::min({at_once_, rest_.size(), kReadBuffer - buffer_.size()});
-    const auto room = buffer_.prepare(n);
-    std::copy_n(rest_.data(), n, static_cast<char*>(room.data()));
-    buffer_.commit(n);
+  template <class Buffers>
+  std::size_t read_some(const Buffers& into, error_code& ec) {
+    const boost::asio::const_buffer next(rest_.data(), std::min(at_once_, rest_.size()));
+    const std::size_t n = boost::asio::buffer_copy(into, next);
     rest_.remove_prefix(n);
-    return n > 0;
+    ec = n > 0 ? error_code() : boost::asio::error::eof;
+    return n;
   }
+  template <class Buffers>
+  std::size_t read_some(const Buffers& into) {
+    error_code ignored;
+    return read_some(into, ignored);
+  }
+  beast::flat_buffer buffer{kReadBuffer};
 
  private:
   std::string_view rest_;
   std::size_t at_once_;
-  beast::flat_buffer buffer_{kReadBuffer};
 };
-
-bool read_header(Parser& parser, Arriving& from) {
-  while (true) {
-    const Parsed parsed = take_header(parser, from.buffer());
-    if (parsed == Parsed::done) return true;
-    if (parsed != Parsed::more || !from.more()) return false;
-  }
-}
 
 bool read_body(Parser& parser, Arriving& from, std::string& body) {
   while (!parser.is_done()) {
-    if (from.buffer().size() > 0) {
-      const std::size_t before = body.size();
-      const Portion portion = take_body(parser, from.buffer(), body);
-      if (portion.malformed) return false;
-      must(body.size() == before + portion.got && portion.got <= portion.consumed,
-           "a body is no longer than its bytes");
-      if (portion.consumed > 0) continue;
-    }
-    if (!from.more()) return false;
+    error_code ec;
+    bhttp::read_some(from, from.buffer, parser, ec);
+    if (read_result(ec, false) != Read::ok) return false;
   }
+  body = beast::buffers_to_string(parser.get().body().data());
   return true;
 }
 
@@ -58,7 +57,9 @@ bool read_body(Parser& parser, Arriving& from, std::string& body) {
 bool serve_one(HttpDoor& door, Arriving& from) {
   Parser parser;
   prepare(parser, door.api().limits());
-  if (!read_header(parser, from)) return false;
+  error_code ec;
+  bhttp::read_header(from, from.buffer, parser, ec);
+  if (read_result(ec, false) != Read::ok) return false;
   auto parsed = to_request(parser);
   if (const auto* refused = std::get_if<Response>(&parsed)) {
     door.check(*refused, Method::get);

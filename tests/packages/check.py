@@ -166,6 +166,24 @@ def install(box):
     so(not re.search("embree|openvdb", linked), "the coordinator links neither Embree nor OpenVDB")
 
 
+PAGES = {"lightshaft": "lightshaft", "lightshaft-coordinator": "lightshaft-coordinator", "lightshaft-worker": "lightshaft-worker"}
+COMPLETIONS = {"bash": "bash-completion/completions/lightshaft", "zsh": "zsh/vendor-completions/_lightshaft",
+               "fish": "fish/vendor_completions.d/lightshaft.fish"}
+
+
+def check_help(box):
+    """Manual pages are read from the packages: a slim image has dpkg leave them out."""
+    for package, program in PAGES.items():
+        page = f"./usr/share/man/man1/{program}.1.gz"
+        read = box.must("sh", "-c", f"dpkg-deb --fsys-tarfile /packages/{package}_*.deb | tar -xO {page} | gzip -d")
+        options = re.findall(r"--[a-z][a-z-]+", box.must(program, "--help", user="nobody"))
+        so(read.startswith(".TH") and options and all(o.replace("-", r"\-") in read or o in read for o in options),
+           f"{package} has the manual page {program}(1) with the {len(set(options))} options of --help")
+    for shell, path in COMPLETIONS.items():
+        so(box.read(f"/usr/share/{path}") == box.must("lightshaft", "completion", shell, user="nobody"),
+           f"the package has the completion of {shell}")
+
+
 def pixels(box, report):
     return json.loads(box.read(report))["pixels_sha256"]
 
@@ -236,6 +254,7 @@ def main():
             make = [sys.executable, "-B", ROOT / "scenes" / "bath" / "make_bath.py", f"{folder}/bath", "--setting", "sketch"]
             subprocess.run(make, check=True, capture_output=True)
             box.put(f"{folder}/bath", "/scene")
+        check_help(box)
         alone, farm = render(box), render_on_farm(box, services)
         so(alone == farm, f"the farm's pixels are those of `lightshaft render`: {farm[:16]}")
         check_units(box)

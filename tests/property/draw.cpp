@@ -71,7 +71,8 @@ BsdfIndex Draw::bsdf(int depth) {
   }
   if (auto* mask = std::get_if<MaskBsdf>(&b)) {
     // Of an image its alpha channel may be meant: no other use of it is.
-    if (auto* image = std::get_if<BitmapTexture>(&scene_.textures[mask->opacity.value])) image->alpha = true;
+    auto* image = std::get_if<BitmapTexture>(&scene_.textures[mask->opacity.value]);
+    if (image && image->channel == Channel::all) image->alpha = true;
   }
   if (auto* p = std::get_if<PrincipledBsdf>(&b); p && p->spec_trans) {
     // A share of nothing is not given.

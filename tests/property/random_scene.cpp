@@ -203,9 +203,15 @@ class Composer {
     if (out_.choice.calm) {
       i.max_depth = 2 + static_cast<int>(dice_.below(3));
       i.rr_depth = 5;
+      // Light vertices are shared by all pixels: their means have errors that pixels alone do not tell
+      // (connections_test.cpp)
+      i.light_vertices = -1;
     }
     i.camera_points = std::min(i.camera_points, 8);  // more only cost time
-    if (i.name != kNames[0]) i.camera_points = 0, i.phase_only = false;
+    if (i.name != kNames[0]) {
+      i.camera_points = i.light_vertices = i.equiangular = i.lamp_flights = 0;
+      i.phase_only = false;
+    }
     if (i.name == kNames[1]) return;
     i.distance = DistanceSampling::mis;
     i.heuristic = MisHeuristic::power;

@@ -50,8 +50,7 @@ SceneBuilder coloured_fog() {
 SceneBuilder milk_in_glass() {
   SceneBuilder builder = lit_room();
   builder.container(SphereShape{}, {}, builder.glass(1.5), builder.homogeneous({2, 3, 4}, {.95, .9, .8}));
-  builder.shape(RectangleShape{}, translate({0, 0, 3}) * rotate_x(180), builder.diffuse(0)).emitter =
-      AreaEmitter{builder.texture({4, 3, 2})};
+  builder.lamp(RectangleShape{}, translate({0, 0, 3}) * rotate_x(180), {4, 3, 2});
   return builder;
 }
 SceneBuilder surfaces() {
@@ -64,8 +63,7 @@ SceneBuilder surfaces() {
   builder.shape(
       CubeShape{}, translate({1.25, 0, -.5}) * scale(.5),
       builder.bsdf(PlasticBsdf{1.5, 1, false, builder.texture({.5, .25, .125}), builder.texture({1, 1, 1})}));
-  builder.shape(DiskShape{}, translate({0, 0, 3}) * rotate_x(180), builder.diffuse(0)).emitter =
-      AreaEmitter{builder.texture({4, 3, 2})};
+  builder.lamp(DiskShape{}, translate({0, 0, 3}) * rotate_x(180), {4, 3, 2});
   builder.scene.emitters.push_back(DirectionalEmitter{{.25, .5, -1}, {1, .5, .25}, .5});
   builder.environment(.125);
   builder.scene.sensor.aperture_radius = .0625;

@@ -22,7 +22,7 @@ def check(root):
 @pytest.fixture
 def copy(tmp_path):
     """The documents and the package, in a folder of the test."""
-    for name in ("coordinator/http/openapi.json", "docs/reference/scene-format.md"):
+    for name in ("coordinator/http/openapi.json", "docs/reference/mitsuba.md"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
     shutil.copytree(ROOT / "python", tmp_path / "python", ignore=shutil.ignore_patterns("__pycache__"))
@@ -46,8 +46,8 @@ def test_a_field_that_changes_its_type_is_found(copy):
 
 
 def test_a_new_plugin_and_a_method_that_only_waits_are_found(copy):
-    page = copy / "docs/reference/scene-format.md"
-    page.write_text(page.read_text().replace("### shape `cube`", "### shape `cube`, `cone`"))
+    page = copy / "docs/reference/mitsuba.md"
+    page.write_text(page.read_text().replace("| shape | `cube` |", "| shape | `cone` | 3 | read |  |\n| shape | `cube` |"))
     farm = copy / "python/src/lightshaft/farm.py"
     farm.write_text(farm.read_text().replace("def workers(", "def helpers("))
 

@@ -18,7 +18,7 @@ def test_the_wheel_is_built_as_the_page_says():
     command = re.search(r"pip (wheel --no-deps) -w \S+ (\./python)", shell)
     script = (ROOT / "tests/python/venv.sh").read_text()
     assert command and all(part in script for part in command.groups())
-    assert "./python[notebook]" in shell and "[notebook]" in script
+    assert "./python[notebook]" in shell and "[notebook,usd]" in script
 
 
 def test_the_blocks_run_as_they_stand(local_farm, tmp_path, monkeypatch, capsys):

@@ -120,3 +120,9 @@ def test_what_is_wrong_is_told_with_its_keys(objects, path, words):
 def test_the_outermost_must_be_a_scene():
     with pytest.raises(SceneDictError, match="'type': 'scene'"):
         scene_of_dict({"type": "sphere"})
+
+
+def test_the_flag_of_flat_faces_is_no_attribute_of_a_mesh():
+    mesh = {"type": "ply", "filename": "a.ply", "face_normals": True}
+    text = scene_of_dict({"type": "scene", "mesh": mesh})
+    assert '<boolean name="face_normals" value="true"/>' in text.xml and not text.files

@@ -12,7 +12,7 @@ mkdir -p "$out"
   # A compiler that is not there: the wheel needs none.
   CC=/nonexistent CXX=/nonexistent "$out/venv/bin/pip" wheel --no-deps -w "$out/dist" ./python
   wheel=$(echo "$out"/dist/lightshaft-*-py3-none-any.whl)
-  "$out/venv/bin/pip" install "$wheel[notebook]" -r tests/python/requirements.txt
+  "$out/venv/bin/pip" install "$wheel[notebook,usd]" -r tests/python/requirements.txt
   "$out/venv/bin/pip" install --force-reinstall --no-deps "$wheel"
 } >&2
 echo "$out/venv/bin/python"

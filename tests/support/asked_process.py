@@ -6,7 +6,8 @@ import os
 import struct
 
 ATTACH, DETACH, PEEK, POKE, STEP, GETREGS, SETREGS = 16, 17, 2, 5, 9, 12, 13
-ORIG_RAX, RAX, RDI, RSI, RDX, RIP, RSP = 15, 10, 14, 13, 12, 16, 19  # places in user_regs_struct
+# indices of registers in user_regs_struct
+ORIG_RAX, RAX, RDI, RSI, RDX, RIP, RSP = 15, 10, 14, 13, 12, 16, 19
 SYSCALL = b"\x0f\x05"
 ANY_THREAD = 0x40000000  # __WALL
 WORD = 8
@@ -45,7 +46,7 @@ class AskedProcess:
         """0, or the errno. A text is passed by its address."""
         instruction = self.before[RIP] - len(SYSCALL)
         assert struct.pack("<q", _ptrace(PEEK, self.pid, instruction))[:2] == SYSCALL, "it waits in no system call"
-        place = (self.before[RSP] - 4096) & ~15  # of its stack, below all that is in use
+        place = (self.before[RSP] - 4096) & ~15  # on its stack, below all that is in use
         regs = (ctypes.c_ulong * 27)(*self.before)
         regs[ORIG_RAX], regs[RIP], regs[RAX] = 2 ** 64 - 1, instruction, number
         for register, value in zip((RDI, RSI, RDX), arguments):

@@ -12,7 +12,7 @@ class BreakingProxy:
 
     def __init__(self, port, breaks=()):
         self.target, self.breaks = port, list(breaks)
-        self.sent = []  # bytes from the client, of each connection
+        self.sent = []  # bytes received from the client, for each connection
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.port = self.listener.getsockname()[1]
         threading.Thread(target=self._accept, daemon=True).start()
@@ -52,7 +52,7 @@ class BreakingProxy:
         except OSError:
             pass
         try:
-            server.shutdown(socket.SHUT_WR)  # it gets what was under way, and then no more
+            server.shutdown(socket.SHUT_WR)  # the server receives the bytes that were on the way, and no more
         except OSError:
             pass
         client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET_ON_CLOSE)

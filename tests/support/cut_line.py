@@ -44,7 +44,7 @@ class CutLine:
             except OSError:
                 if self.listener.fileno() < 0:
                     return
-                near.close()  # the other end is away
+                near.close()  # the other end is unreachable
                 continue
             self.ends |= {near, far}
             for source, sink in ((near, far), (far, near)):

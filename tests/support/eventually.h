@@ -1,4 +1,4 @@
-// Waits for a condition that another thread brings about.
+// Waits for a condition that another thread will make true.
 #pragma once
 
 #include <chrono>
@@ -6,7 +6,7 @@
 
 namespace ls::test {
 
-// Returns true once `condition()` holds, and false if it does not within 20 s: a test hangs no longer.
+// Returns true once `condition()` holds, or false if it does not within 20 s, so that a test cannot hang.
 template <class Condition>
 bool eventually(Condition condition) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);

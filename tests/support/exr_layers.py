@@ -5,7 +5,7 @@ import struct
 import zlib
 
 TYPES = {0: "I", 1: "e", 2: "f"}
-LINES = 16  # of a ZIP block
+LINES = 16  # rows of a ZIP block
 
 
 def _text(data, at):
@@ -79,7 +79,7 @@ def write(path, header, rows):
     x0, y0, x1, y1 = struct.unpack("<4i", header["dataWindow"][1])
     width, height = x1 - x0 + 1, y1 - y0 + 1
     stored = {**header, "compression": ("compression", b"\0")}
-    # Names of 32 characters and more need a flag of the version.
+    # Names of 32 characters and more need a flag in the version field.
     version = 2 | (1024 if any(len(name) > 31 for name in [*header, *kinds]) else 0)
     head = struct.pack("<2i", 20000630, version) + b"".join(_attribute(name, *a) for name, a in stored.items()) + b"\0"
     lines = [b"".join(struct.pack(f"<{width}{kinds[name]}", *rows[name][y]) for name in sorted(rows)) for y in range(height)]

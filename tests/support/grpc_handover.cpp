@@ -30,7 +30,7 @@
 #include <thread>
 #include <utility>
 
-// Code that must not be a synchronisation itself: locks and atomics that ThreadSanitizer saw would order
+// Code that must not synchronise by itself: locks and atomics visible to ThreadSanitizer would order
 // everything that passes through here, and hide races.
 #define UNSEEN __attribute__((no_sanitize("thread")))
 
@@ -51,8 +51,8 @@ Function library(const char* name) {
   return reinterpret_cast<Function>(found);
 }
 
-// A completion is a functor of gRPC's headers; there are a handful of kinds. Each kind's function is replaced
-// by a trampoline of its own, so that no table by object is needed.
+// A completion is a functor of gRPC's headers, of which there are a few kinds. The function of each kind is
+// replaced by a separate trampoline, so that no table of objects is needed.
 constexpr std::size_t kKinds = 16;
 Completion kinds[kKinds];
 bool kinds_locked = false;
@@ -81,9 +81,9 @@ UNSEEN Completion trampoline_of(Completion run) {
   return kTrampolines[kind];
 }
 
-// The tag of an operation is a functor, which begins with the address of a function, if its completion queue
-// is one of callbacks. Otherwise it is an object with a vtable, which begins with an address of data.
-// Returns 2 for an address of code, 1 for one of data, 0 for one outside of all modules.
+// The tag of an operation is either a functor, which begins with the address of a function (if its completion
+// queue uses callbacks), or an object with a vtable, which begins with an address of data. Returns 2 for an
+// address of code, 1 for one of data, 0 for one outside of all modules.
 UNSEEN int find_code(dl_phdr_info* module, std::size_t, void* address) {
   for (int i = 0; i < module->dlpi_phnum; ++i) {
     const auto& part = module->dlpi_phdr[i];
@@ -102,8 +102,8 @@ UNSEEN void started(void* tag) {
   __tsan_release(tag);
 }
 
-// Runs reactions in order on a thread of its own, whose queue ThreadSanitizer sees. The library has an
-// executor for them, which it does not see.
+// Runs reactions in order on a separate thread, whose queue ThreadSanitizer sees. It does not see the
+// library's own executor for them.
 class Reactions {
  public:
   void run(std::function<void()> reaction) {
@@ -130,11 +130,12 @@ class Reactions {
   std::jthread thread_{[this](const std::stop_token& stop) { work(stop); }};
 };
 Reactions& reactions() {
-  static auto* one = new Reactions;  // never destroyed: reactions may come while the process ends
+  static auto* one = new Reactions;  // never destroyed, since reactions may come while the process ends
   return *one;
 }
 
-// The library's own use of its mutexes stays unseen: it is no promise, and would order too much.
+// The library's use of its own mutexes stays invisible: it is not part of gRPC's promises, and would order
+// too much.
 UNSEEN bool is_in_this_program(const void* address) {
   return address >= &__executable_start && address < &etext;
 }
@@ -178,9 +179,9 @@ void grpc_server_destroy(grpc_server* server) {
 
 namespace grpc::internal {
 
-// The count of outstanding reactions is an atomic that the library decrements unseen. Two references more and
-// one less than it is read here by an instrumented operation, so that what the other reactions did before
-// they decremented it happens before OnDone. The reference that is left over is never counted again.
+// The number of outstanding reactions is an atomic that the library decrements invisibly. Here an
+// instrumented operation adds two references and removes one. So everything that the other reactions did
+// before they decremented the number happens before OnDone. The remaining reference is never counted again.
 void ServerCallbackCall::ScheduleOnDone(bool) {
   static const auto next =
       library<void (*)(ServerCallbackCall*, bool)>("_ZN4grpc8internal18ServerCallbackCall14ScheduleOnDoneEb");

@@ -1,5 +1,5 @@
-// How much a map from the unit square stretches areas, by finite differences: one over the density of what it
-// maps uniform numbers to.
+// Measures by finite differences how much a map from the unit square stretches areas. This is one over the
+// density of the mapped uniform numbers.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -14,18 +14,18 @@
 
 namespace ls::test {
 
-// The map and the density that it claims there; nothing where it fails.
+// The image of a point, and the density that the map claims there; nullopt where the map fails.
 struct Mapped {
-  render::V3d to;  // a unit direction, or a point; its coordinates good to `rounding`
-  double pdf = 0;  // per area, or per steradian
+  render::V3d to;  // a unit direction or a point, with coordinates accurate to `rounding`
+  double pdf = 0;  // density per area, or per steradian
 };
 using SquareMap = std::function<std::optional<Mapped>(const render::V2&)>;
 
-// Densities are float32, of some tens of operations, at places that are moved by as much.
+// Densities are float32 results of some tens of operations, at positions with as many rounding errors.
 inline constexpr double kFloats = 2e-4;
 
 struct Stretch2 {
-  double area = 0, error = 0;  // error: of the differences, and of rounding, relative
+  double area = 0, error = 0;  // error: relative, of the differences and of rounding
 };
 inline std::optional<Stretch2> optical_depth_of(const SquareMap& map, const render::V2& u, double rounding) {
   const auto area = [&](float h, double& noise) -> std::optional<double> {
@@ -34,20 +34,22 @@ inline std::optional<Stretch2> optical_depth_of(const SquareMap& map, const rend
     if (!a || !b || !c || !d) return std::nullopt;
     const render::V3d du = (a->to - b->to) / (2. * h), dv = (c->to - d->to) / (2. * h);
     const double cross = du.cross(dv).length();
-    // Each difference is off by two roundings; their product by the area relative to what it spans.
+    // Each difference has two rounding errors. The error of the product is relative to the area that it
+    // spans.
     noise = cross > 0 ? 2 * rounding / h * (du.length() + dv.length()) / cross : 1;
     return cross;
   };
   double coarse_noise = 0, noise = 0;
   const auto coarse = area(0x1p-6f, coarse_noise), fine = area(0x1p-7f, noise);
   if (!coarse || !fine || !(*fine > 0)) return std::nullopt;
-  // Central differences are off by c h^2: three quarters of what halving the step changed is gone, and the
-  // rest is a third of that change; all of it is allowed, for the next order.
+  // The error of central differences is c h^2. Extrapolation removes the three quarters of it by which
+  // halving the step changed the result, and the remaining third of that change. The whole change is allowed
+  // as error, for the next order.
   return Stretch2{(4 * *fine - *coarse) / 3, std::abs(*fine - *coarse) / *fine + 2 * noise};
 }
 
-// At random places of the square. Where halving the step changes much (a kink, an edge) it says nothing; that
-// may be a fifth of all.
+// Tests random points of the square. A point where halving the step changes much (a kink, an edge) is
+// skipped; up to a fifth of all points may be.
 inline void expect_jacobian(const std::string& name, const SquareMap& map, double rounding = 0x1p-23,
                             int places = 400) {
   render::RandomStream r(23);
@@ -66,7 +68,7 @@ inline void expect_jacobian(const std::string& name, const SquareMap& map, doubl
   EXPECT_GT(met, places / 20) << name;
 }
 
-// The same along a line: x(u) grows with the density 1 / (dx / du).
+// The same along a line: x(u) increases with the density 1 / (dx / du).
 inline void expect_slope(const std::string& name, const std::function<double(double)>& x,
                          const std::function<double(double)>& pdf, double rounding) {
   render::RandomStream r(29);

@@ -1,6 +1,5 @@
 """JSON schemas of the Kubernetes objects that deploy/kubernetes uses, down to the fields that it uses: a name that is misspelt or
-in the wrong place, a missing one, or a wrong type is found. They say less than Kubernetes' own schemas, which need a download
-(docs/guide/operations.md says how to check against those)."""
+in the wrong place, a missing one, or a wrong type is found. tests/kubernetes/run.sh asks Kubernetes itself."""
 
 TEXT, WHOLE, FLAG = {"type": "string"}, {"type": "integer"}, {"type": "boolean"}
 NAME = {"type": "string", "pattern": "^[a-z0-9]([-a-z0-9]*[a-z0-9])?$"}
@@ -19,7 +18,7 @@ def many(of):
     return {"type": "array", "items": of}
 
 
-METADATA = thing(["name"], name=NAME, labels=LABELS)
+METADATA = thing(["name"], name=NAME, labels=LABELS, namespace={"const": "lightshaft"})
 SELECTOR = thing(["matchLabels"], matchLabels=LABELS)
 RESOURCES = thing(["requests", "limits"],
                   requests=thing(["cpu", "memory"], cpu=AMOUNT, memory=AMOUNT, **{"ephemeral-storage": AMOUNT}),
@@ -29,12 +28,18 @@ PROBE = {"oneOf": [{"required": [way]} for way in ("exec", "httpGet", "tcpSocket
                  tcpSocket=thing(["port"], port=NAME), periodSeconds=WHOLE, timeoutSeconds=WHOLE, failureThreshold=WHOLE)}
 CONFINED = thing(["readOnlyRootFilesystem", "allowPrivilegeEscalation", "capabilities"], readOnlyRootFilesystem={"const": True},
                  allowPrivilegeEscalation={"const": False}, capabilities={"const": {"drop": ["ALL"]}})
-CONTAINER = thing(["name", "image", "securityContext", "resources"], name=NAME, image=NAME, command=many(TEXT), args=many(TEXT),
+FROM = {"oneOf": [{"required": [way]} for way in ("secretKeyRef", "fieldRef")],
+        **thing(secretKeyRef=thing(["name", "key"], name=NAME, key=TEXT), fieldRef=thing(["fieldPath"], fieldPath={"const": "metadata.name"}))}
+IMAGE = {"type": "string", "pattern": "^[a-z-]+:[a-z0-9.]+$"}
+CONTAINER = thing(["name", "image", "securityContext", "resources"], name=NAME, image=IMAGE, command=many(TEXT), args=many(TEXT),
+                  env=many(thing(["name", "valueFrom"], name=TEXT, valueFrom=FROM)),
                   ports=many(thing(["name", "containerPort"], name=NAME, containerPort=PORT)), securityContext=CONFINED,
                   resources=RESOURCES, startupProbe=PROBE, readinessProbe=PROBE, livenessProbe=PROBE,
                   volumeMounts=many(thing(["name", "mountPath"], name=NAME, mountPath=TEXT, readOnly=FLAG)))
 VOLUME = {"maxProperties": 2, "minProperties": 2,
-          **thing(["name"], name=NAME, secret=thing(["secretName", "defaultMode"], secretName=NAME, defaultMode={"enum": [0o440, 0o400]}),
+          **thing(["name"], name=NAME, secret=thing(["secretName", "defaultMode"], secretName=NAME, defaultMode={"enum": [0o440, 0o400]},
+                                                    items=many(thing(["key", "path"], key=TEXT, path=TEXT))),
+                  persistentVolumeClaim=thing(["claimName"], claimName=NAME),
                   emptyDir=thing(["sizeLimit"], sizeLimit=AMOUNT, medium={"const": "Memory"}))}
 POD_SECURITY = thing(["runAsNonRoot", "runAsUser", "fsGroup", "seccompProfile"], runAsNonRoot={"const": True}, runAsUser={"const": 10001},
                      runAsGroup={"const": 10001}, fsGroup={"const": 10001}, seccompProfile={"const": {"type": "RuntimeDefault"}})
@@ -58,9 +63,11 @@ SPECS = {
     ("v1", "Service"): thing(["selector", "ports"], clusterIP={"const": "None"}, publishNotReadyAddresses=FLAG, selector=LABELS,
                              ports=many(thing(["name", "port", "targetPort"], name=NAME, port=PORT, targetPort=NAME))),
     ("apps/v1", "StatefulSet"): thing(["serviceName", "replicas", "selector", "template", "volumeClaimTemplates"], serviceName=NAME,
-                                      replicas={"const": 1}, selector=SELECTOR, template=TEMPLATE, volumeClaimTemplates=many(CLAIM)),
-    ("apps/v1", "Deployment"): thing(["selector", "template"], selector=SELECTOR, template=TEMPLATE, strategy=thing(
+                                      replicas={"enum": [1, 2]}, selector=SELECTOR, template=TEMPLATE, volumeClaimTemplates=many(CLAIM)),
+    ("apps/v1", "Deployment"): thing(["selector", "template"], replicas={"const": 0}, selector=SELECTOR, template=TEMPLATE, strategy=thing(
         ["type"], type={"const": "RollingUpdate"}, rollingUpdate=thing(maxUnavailable=SHARE, maxSurge=SHARE))),
+    ("v1", "PersistentVolumeClaim"): thing(["accessModes", "resources"], accessModes={"const": ["ReadWriteMany"]},
+                                           resources=thing(["requests"], requests=thing(["storage"], storage=AMOUNT))),
     ("networking.k8s.io/v1", "NetworkPolicy"): thing(
         ["podSelector", "policyTypes"], podSelector=SELECTOR, policyTypes=many({"enum": ["Ingress", "Egress"]}),
         ingress=many({"anyOf": [thing(["ports"], **{"from": PEERS, "ports": PEER_PORTS})]}),
@@ -79,14 +86,11 @@ SPECS = {
         triggers=many(thing(["type", "metadata"], type={"const": "prometheus"}, metricType={"enum": ["AverageValue", "Value"]},
                             metadata=thing(["serverAddress", "query", "threshold"], serverAddress=TEXT, query=TEXT, threshold=TEXT)))),
 }
-WHOLES = {  # those without a spec
+WHOLES = {  # objects without a spec
     ("v1", "Secret"): thing(["apiVersion", "kind", "metadata", "type", "stringData"], apiVersion=TEXT, kind=TEXT, metadata=METADATA,
                             type={"const": "Opaque"}, stringData={"type": "object", "additionalProperties": TEXT}),
     ("scheduling.k8s.io/v1", "PriorityClass"): thing(["apiVersion", "kind", "metadata", "value"], apiVersion=TEXT, kind=TEXT, metadata=METADATA, value=WHOLE,
                                                      preemptionPolicy={"enum": ["Never", "PreemptLowerPriority"]}, globalDefault=FLAG, description=TEXT),
-    ("kustomize.config.k8s.io/v1beta1", "Kustomization"): thing(
-        ["apiVersion", "kind", "resources"], apiVersion=TEXT, kind=TEXT, namespace=NAME, resources=many(TEXT),
-        images=many(thing(["name", "newName", "newTag"], name=NAME, newName=TEXT, newTag=TEXT))),
 }
 
 

@@ -7,7 +7,6 @@ import http.client
 import json
 import os
 import pathlib
-import random
 import signal
 import ssl
 import subprocess
@@ -17,7 +16,7 @@ import urllib.error
 import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PATIENCE = 120.0  # seconds until a condition that should come true counts as failed
+PATIENCE = 120.0  # seconds after which a condition that should become true counts as failed
 
 
 def bin_dir():
@@ -88,18 +87,28 @@ class Process:
         return pathlib.Path(self.log).read_text(errors="replace")
 
 
+def refused_coordinator(folder, *flags, code=(1, 2), env=None):
+    """What a coordinator prints that does not start with these flags; `code`: the exit code, or those that it may have."""
+    args = [bin_dir() / "lightshaft-coordinator", "--http", "127.0.0.1:0", "--grpc", "127.0.0.1:0", "--data", folder / "data", *flags]
+    coordinator = Process("refused", args, folder / "refused.log", env)
+    assert coordinator.wait() in (code if isinstance(code, tuple) else (code,)), coordinator.output()
+    return coordinator.output()
+
+
 class LocalFarm:
     def __init__(self, folder=None, bin=None, flags=(), tls=False, host="127.0.0.1", environment=None, secrets=None, allow_fake=True):
-        self.host = host  # that workers connect to
-        self.environment = dict(environment or {})  # of the coordinator, besides this process's; read at every start
+        self.host = host  # the host that workers connect to
+        # variables for the coordinator in addition to this process's; read at every start
+        self.environment = dict(environment or {})
         self.tls = tls
-        self.flags = list(flags) + (["--tls"] if tls else []) + (["--allow-fake"] if allow_fake else [])  # of the coordinator, besides its ports and folder
+        # options of the coordinator besides its ports and folder
+        self.flags = list(flags) + (["--tls"] if tls else []) + (["--allow-fake"] if allow_fake else [])
         self.bin = pathlib.Path(bin) if bin else bin_dir()
         self._temporary = tempfile.TemporaryDirectory(prefix="lightshaft-farm-") if folder is None else None
         self.folder = pathlib.Path(folder or self._temporary.name)
         self.folder.mkdir(parents=True, exist_ok=True)
         self.data = self.folder / "data"
-        self.secrets = pathlib.Path(secrets) if secrets else self.data  # of tokens and certificates
+        self.secrets = pathlib.Path(secrets) if secrets else self.data  # folder of tokens and certificates
         self.flags += ["--secrets", self.secrets] if secrets else []
         self.workers = []
         self.coordinator = None

@@ -1,6 +1,6 @@
-// Preloaded into a program, this makes it run as on another machine. LIGHTSHAFT_TEST_ISA: Embree is asked for
-// these instructions instead of those that the program names. LIGHTSHAFT_TEST_OFF: this function's results
-// are off by one unit in the last place ("expf"), or one triangle is taken for the one beside it
+// Preloaded into a program, this makes it behave as on another machine. LIGHTSHAFT_TEST_ISA: Embree is
+// configured for these instructions instead of those that the program names. LIGHTSHAFT_TEST_OFF: results of
+// this function are off by one unit in the last place ("expf"), or one triangle is replaced by its neighbour
 // ("rtcIntersect1").
 #include <dlfcn.h>
 
@@ -35,10 +35,10 @@ extern "C" void* rtcNewDevice(const char* config) {
   const std::string_view isa = setting("LIGHTSHAFT_TEST_ISA");
   std::string text = config ? config : "";
   if (!isa.empty()) text += "," + std::string("isa=").append(isa) + "," + std::string("max_isa=").append(isa);
-  return real(text.c_str());  // of two settings the later one counts
+  return real(text.c_str());  // of two equal settings the later one is used
 }
 
-// RTCRayHit up to the primitive's number, after 12 numbers of the ray and 5 of the hit.
+// The layout of RTCRayHit up to the primitive's number, after 12 numbers of the ray and 5 of the hit.
 extern "C" void rtcIntersect1(void* scene, void* context, void* ray) {
   static const auto real = library<void(void*, void*, void*)>("rtcIntersect1");
   static const bool off = setting("LIGHTSHAFT_TEST_OFF") == "rtcIntersect1";

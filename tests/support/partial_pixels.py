@@ -18,7 +18,7 @@ def green(folder, width, height):
         columns, lines = x1 - x0 + 1, y1 - y0 + 1
         for offset in struct.unpack_from(f"<{lines}Q", data, at):
             y, _ = struct.unpack_from("<2i", data, offset)
-            planes = struct.unpack_from(f"<{6 * columns}f", data, offset + 8)  # A.B A.G A.R B.B B.G B.R
+            planes = struct.unpack_from(f"<{6 * columns}f", data, offset + 8)  # planes A.B A.G A.R B.B B.G B.R
             for x in range(columns):
                 sums[y][x0 + x] += planes[columns + x] + planes[4 * columns + x]
                 samples[y][x0 + x] += unit["s1"] - unit["s0"]

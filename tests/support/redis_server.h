@@ -1,5 +1,5 @@
-// A real Redis server of a test's own: on a port of the loopback that the system chose, keeping nothing on
-// disk.
+// A real Redis server for one test: on a port of the loopback interface that the system chose, without any
+// files on disk.
 #pragma once
 
 #include <arpa/inet.h>
@@ -28,7 +28,8 @@ class RedisServer {
 
   int port() const { return port_; }
 
-  // On the same port, knowing nothing. Returns when it takes connections, which it says itself.
+  // Starts the server on the same port, without data. Returns when it accepts connections, which it reports
+  // itself.
   void start() {
     int pipe[2];
     ASSERT_EQ(::pipe2(pipe, O_CLOEXEC), 0);
@@ -62,11 +63,11 @@ class RedisServer {
     while (said.find("Ready to accept connections") == std::string::npos &&
            (got = ::read(pipe[0], buffer, sizeof buffer)) > 0)
       said.append(buffer, static_cast<std::size_t>(got));
-    output_ = pipe[0];  // stays open: a server that cannot write its log would end
+    output_ = pipe[0];  // kept open: the server would end if it could not write its log
     ASSERT_NE(said.find("Ready to accept connections"), std::string::npos) << said;
   }
 
-  // kill -9; what it knew is lost.
+  // Kills the server by SIGKILL; its data are lost.
   void kill() {
     if (pid_ <= 0) return;
     ::kill(pid_, SIGKILL);

@@ -1,6 +1,6 @@
-// Renders a scene to the mean of its pixels, with a standard error that the low-discrepancy sequences don't
-// fool: the two halves of every pixel and all pixels are independent, so (A - B)^2 / 4 estimates each pixel's
-// squared error without bias.
+// Renders a scene to the mean of its pixels, with a standard error that is valid for low-discrepancy
+// sequences, too: the two halves of every pixel and all pixels are independent, so (A - B)^2 / 4 estimates
+// each pixel's squared error without bias.
 #pragma once
 
 #include <array>
@@ -27,15 +27,16 @@ inline RenderSettings settings_of(const Scene& s, std::uint64_t seed = 0) {
 
 struct Estimate {
   std::array<double, 3> mean{}, standard_error{};
-  // Of the standard error (Satterthwaite, from the fourth powers of the differences): small where a few
-  // pixels rule.
+  // Degrees of freedom of the standard error (Satterthwaite, from the fourth powers of the differences): few
+  // if a few pixels dominate.
   std::array<double, 3> freedom{};
   Health health;
   std::string variant;
   double seconds = 0;
 };
 
-// Throws std::runtime_error with the renderer's message if the world can't be built: a test's own mistake.
+// Throws std::runtime_error with the renderer's message if the world cannot be built: this is a mistake in
+// the test.
 inline std::shared_ptr<const render::World> world_of(const SceneBuilder& builder, std::uint64_t seed = 0,
                                                      int threads = 1) {
   auto w = render::build_world(builder.scene, settings_of(builder.scene, seed), builder.files, threads);

@@ -54,17 +54,18 @@ def signature_problem(method, target, headers):
 
 
 class S3Server:
-    PAGE = 2  # keys in one list, so that lists have pages
-    LEAST_PART = 5 << 20  # bytes of all parts but the last
+    PAGE = 2  # keys in one list, few, so that lists have several pages
+    LEAST_PART = 5 << 20  # least bytes of all parts but the last
 
     def __init__(self, bucket="farm"):
         self.bucket, self.objects = bucket, {}  # key -> bytes
-        self.requests = []  # (method, key)
-        self.refuse = []  # statuses for the next requests
-        self.gate = None  # a threading.Event: objects are given when it is set
-        self.cut = 0  # so many of the next objects are cut off in their middle
-        self.uploads = {}  # id -> (key, {number: part}), of those in parts that have not ended
-        self.forget_ends = 0  # so many ends of uploads in parts are done, and answered with an error
+        self.requests = []  # (method, key) of each request
+        self.refuse = []  # status codes of the next requests
+        self.gate = None  # a threading.Event: objects are sent only while it is set
+        self.cut = 0  # number of the next objects whose transfer is cut off in the middle
+        self.uploads = {}  # id -> (key, {number: part}) of unfinished uploads in parts
+        # number of ends of uploads in parts that are carried out but answered with an error
+        self.forget_ends = 0
         self.lock = threading.Lock()
         owner = self
 
@@ -155,7 +156,7 @@ class Request(http.server.BaseHTTPRequestHandler):
 
     def s3_post(self, state, key, query, body):
         if "uploads" in query:
-            upload = f"of/{key}+{len(state.requests)}="  # as no address could have it unescaped
+            upload = f"of/{key}+{len(state.requests)}="  # contains characters that an address must escape
             state.uploads[upload] = (key, {})
             return self.answer(200, f"<InitiateMultipartUploadResult><UploadId>{upload}</UploadId></InitiateMultipartUploadResult>".encode())
         if query["uploadId"] not in state.uploads:

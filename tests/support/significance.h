@@ -1,11 +1,11 @@
-// ONE rate of false alarms for the whole suite: a right program fails any statistical test of it with the
-// probability kSuiteFalsePositives at most. The rate is split among families of tests (by Bonferroni, since
+// ONE rate of false alarms for the whole suite: the probability that a correct program fails any statistical
+// test of it is at most kSuiteFalsePositives. The rate is split among families of tests (by Bonferroni, since
 // families may use the same numbers), and a family's part evenly among its tests (by Sidak). Seeds are fixed,
-// so that a program's tests in fact always or never fail; the rate says how often a harmless change of random
-// numbers will be taken for a fault.
+// so a program either always fails a test or never does. The rate is the probability that a harmless change
+// of random numbers looks like a fault.
 //
-// Each family reads its level from here. Files of the families that list their tests in kShares announce how
-// many these are, and prove at their end that they ran no more.
+// Each family reads its level from here. Test files of the families in kShares declare the number of their
+// tests, and check at their end that they ran no more.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -28,14 +28,14 @@ enum class Family {
   chi_square,     // samples against densities: unit tests of sampling, bsdf and render
   scenes,         // the same image by other means: tests/property
   coverage,       // estimated errors against true ones: tests/coverage
-  single_figures  // a mean within kStandardErrors of its answer, or more: other unit tests
+  single_figures  // a mean within kStandardErrors of the expected value, or more: other unit tests
 };
 struct Rate {
   Family family;
   double rate;
 };
-// Those of table and closed_forms are the product's own (validation/significance_level.h). Files of tests
-// that `lightshaft validate` is given have the level that they state, .01 if none: they are no part of this.
+// The rates of table and closed_forms are the product's own (validation/significance_level.h). Test files
+// passed to `lightshaft validate` have the level that they state, .01 by default: they are not included here.
 inline constexpr std::array kRates = {Rate{Family::table, 2e-4},      Rate{Family::closed_forms, 2e-4},
                                       Rate{Family::chi_square, 1e-4}, Rate{Family::scenes, 1e-4},
                                       Rate{Family::coverage, 1e-4},   Rate{Family::single_figures, 2e-4}};
@@ -50,11 +50,11 @@ constexpr double sum_of_rates() {
   for (const Rate& r : kRates) sum += r.rate;
   return sum;
 }
-// But for the last place of the sum.
+// up to rounding of the sum
 static_assert(sum_of_rates() <= kSuiteFalsePositives * (1 + 1e-12));
 
-// Single figures stand this many of their standard errors off by chance once in 1.7 million times. They are
-// not counted: 300 of them would use up 1.7e-4.
+// A single mean deviates by this many of its standard errors by chance once in 1.7 million times. These tests
+// are not counted: 300 of them would use up 1.7e-4.
 inline constexpr double kStandardErrors = 5;
 
 struct Share {
@@ -72,12 +72,14 @@ inline constexpr std::array kShares = {Share{Family::chi_square, "bsdf/sampling"
                                        Share{Family::chi_square, "render/envmap", 6},
                                        Share{Family::chi_square, "render/trackers", 1},
                                        Share{Family::chi_square, "render/cylinder", 1},
-                                       Share{Family::coverage, "coverage/short", 3 * 7},
+                                       Share{Family::coverage, "coverage/short", 4 * 7},
                                        Share{Family::coverage, "coverage/target", 3},
                                        Share{Family::coverage, "coverage/fireflies", 1},
                                        Share{Family::coverage, "coverage/denominators", 24},
                                        Share{Family::scenes, "property/agreement", 180},
                                        Share{Family::scenes, "property/lamps", 6},
+                                       Share{Family::scenes, "property/connections", 18},
+                                       Share{Family::scenes, "property/lit_disk", 1},
                                        Share{Family::scenes, "property/pruned", 720},
                                        Share{Family::scenes, "property/twins", 120},
                                        Share{Family::scenes, "property/shared_faces", 24},
@@ -101,7 +103,7 @@ constexpr std::size_t tests_of(Family family) {
 }
 inline double level_of_one(Family family) { return cli::sidak(rate_of(family), tests_of(family)); }
 
-// The tests of one line of kShares, counted as they ask for their level.
+// The tests of one line of kShares, counted when they request their level.
 class Tests {
  public:
   explicit Tests(std::string_view file) : file_(file) {
@@ -112,14 +114,14 @@ class Tests {
   Tests(const Tests&) = delete;
   Tests& operator=(const Tests&) = delete;
 
-  // The probability with which each of `count` more tests may fail a right program.
+  // Returns the probability with which each of `count` more tests may fail for a correct program.
   double level(int count = 1) {
     done_ += count;
     return level_of_one(share_.family);
   }
   int done() const { return done_; }
   int announced() const { return share_.tests; }
-  // To be called when all are done.
+  // Call when all tests are done.
   void close() const {
     EXPECT_LE(done_, share_.tests) << "tests of " << file_ << ": put the number into kShares";
     std::printf("[  level   ] %s: %d tests at %.3g\n", std::string(file_).c_str(), done_,

@@ -1,4 +1,5 @@
-// Cells of directions, or of a square, the mass of a density in them, and the samples that fall into them.
+// Cells of directions, or of a square; the integral of a density over each cell, and the samples that fall
+// into it.
 #pragma once
 
 #include <algorithm>
@@ -10,8 +11,9 @@
 
 namespace ls::test {
 
-// About an axis: `rows` by 1 - cos of the angle to it, from 0 to `reach` (2: all directions), of equal solid
-// angle; `columns` in azimuth. What lies outside counts in a last cell of its own, as do samples that fail.
+// Cells about an axis: `rows` of equal solid angle, by 1 - cos of the angle to the axis, from 0 to `reach`
+// (2: all directions); `columns` in azimuth. Directions outside of these count in an additional last cell, as
+// do samples that fail.
 class SphereCells {
  public:
   SphereCells(const render::V3& axis, double reach, int rows, int columns)
@@ -22,16 +24,16 @@ class SphereCells {
   }
   std::size_t size() const { return static_cast<std::size_t>(rows_) * columns_ + 1; }
 
-  // By the chord to the axis, |w - n|^2 = 2 (1 - cos): of narrow cones, too.
+  // Uses the chord to the axis, |w - n|^2 = 2 (1 - cos), which is accurate for narrow cones, too.
   std::size_t of(const render::V3& w) const {
     const render::V3d v(w), chord = v - n_;
     const double x = .5 * chord.dot(chord) / reach_;
     if (!(x < 1)) return reach_ >= 2 && x < 1.001 ? cell(rows_ - 1, azimuth(v)) : size() - 1;
     return cell(std::min(rows_ - 1, static_cast<int>(x * rows_)), azimuth(v));
   }
-  // Probabilities of the cells, and of none of them last. `grid` points a side in each cell; from one column
-  // of them to the next they move along by the golden ratio of a step, so that an edge of the density that
-  // runs along a row is not hit or missed as a whole.
+  // Returns the probabilities of the cells, and last that of no cell. Each cell has `grid` points on a side.
+  // From one column of points to the next they are shifted by the golden ratio of a step, so that an edge of
+  // the density along a row does not hit or miss a whole row of points.
   std::vector<double> masses(const std::function<double(const render::V3&)>& pdf, int grid) const {
     std::vector<double> p(size(), 0);
     const double steps = double{1} * rows_ * grid, turns = double{1} * columns_ * grid;
@@ -51,7 +53,7 @@ class SphereCells {
     total_ = all;
     return p;
   }
-  // Of the masses last asked for: the integral of the density.
+  // Integral of the density over the cells of the last call of masses().
   double total() const { return total_; }
 
  private:

@@ -1,7 +1,7 @@
-// Images whose truth is known, sampled without a renderer: a pixel's samples are gamma distributed about its
-// mean, and now and then a firefly falls on it. The sum of a round's samples is drawn at once (sums of gamma
-// variables are gamma variables, counts of fireflies binomial), so that a thousand jobs take seconds. Tiles
-// stop by the farm's own rule, from the error estimate that the farm uses.
+// Images whose true values are known, sampled without a renderer. A pixel's samples have a gamma distribution
+// about its mean, and occasionally one is a firefly. The sum of a round's samples is drawn at once (sums of
+// gamma variables are gamma variables, counts of fireflies binomial), so that a thousand jobs take seconds.
+// Tiles stop by the farm's own rule and error estimate.
 #pragma once
 
 #include <array>
@@ -21,16 +21,16 @@ namespace ls::test {
 
 struct SyntheticPixel {
   double mean = 1;     // without fireflies
-  double spread = 1;   // standard deviation of a sample over `mean`
-  double chance = 0;   // of a sample to carry a firefly
-  double firefly = 0;  // its value
+  double spread = 1;   // standard deviation of a sample divided by `mean`
+  double chance = 0;   // probability that a sample is a firefly
+  double firefly = 0;  // value of a firefly
   double truth() const { return mean + chance * firefly; }
   double variance() const {
     return spread * spread * mean * mean + chance * (1 - chance) * firefly * firefly;
   }
 };
 
-// Channels are grey, with these weights.
+// Channels are grey, with these factors.
 inline constexpr double kGrey[3] = {1, .8, .6};
 
 class SyntheticFilm {
@@ -51,7 +51,8 @@ class SyntheticFilm {
   }
   std::size_t pixels() const { return pixels_.size(); }
 
-  // relMSE x samples, of the tile or the image: by uniform sampling n samples give it over n.
+  // relMSE times the number of samples, of the tile or the image: n samples, evenly distributed, give this
+  // value divided by n.
   double relative_variance(TileIndex t) const {
     double sum = 0;
     for (const SyntheticPixel& p : tile(t)) sum += relative(p, p.variance());
@@ -63,7 +64,7 @@ class SyntheticFilm {
       sum += relative_variance(t) * static_cast<double>(tile(t).size());
     return sum / static_cast<double>(pixels());
   }
-  // Mean over the channels of square / (truth^2 + 0.01), `square` being that of a difference of grey 1.
+  // The mean over channels of square / (truth^2 + 0.01), where `square` is that of a difference of grey 1.
   static double relative(const SyntheticPixel& p, double square) {
     double sum = 0;
     for (const double w : kGrey) sum += w * w * square / (w * w * p.truth() * p.truth() + .01);
@@ -76,7 +77,7 @@ class SyntheticFilm {
   std::vector<std::size_t> first_;  // one past each tile's last pixel
 };
 
-// One job: sums of both halves of every pixel, round by round, from a seed.
+// One job: sums of both halves of every pixel, round by round, with random numbers from a seed.
 class SyntheticJob {
  public:
   SyntheticJob(const SyntheticFilm& film, std::uint64_t seed)
@@ -86,7 +87,7 @@ class SyntheticJob {
         before_(film.grid().count()),
         rounds_(film.grid().count()) {}
 
-  // Folds the tile's next round; its relative error sum with it.
+  // Folds the tile's next round and returns its relative error sum.
   double fold(TileIndex t) {
     const auto pixels = film_.tile(t);
     auto& sums = sums_[t];
@@ -116,7 +117,7 @@ class SyntheticJob {
     return estimate_error(halves, round_range(last).s1, &earlier);
   }
 
-  // The image's value less the truth, of every pixel in the order of tiles.
+  // Returns the image's value minus the true value of every pixel, in the order of tiles.
   std::vector<double> errors() const {
     std::vector<double> out;
     for (TileIndex t = 0; t < film_.grid().count(); ++t) {
@@ -129,7 +130,7 @@ class SyntheticJob {
   }
 
  private:
-  // Planes of three channels of both halves.
+  // Returns the means of both halves: planes of three channels each.
   static std::array<std::vector<double>, 2> means(const std::vector<double>& sums, std::uint64_t spp) {
     const std::size_t n = sums.size() / 2;
     std::array<std::vector<double>, 2> out;
@@ -142,8 +143,8 @@ class SyntheticJob {
 
   const SyntheticFilm& film_;
   std::uint64_t seed_;
-  std::vector<std::vector<double>> sums_;    // of each tile: half A, then half B
-  std::vector<std::vector<double>> before_;  // likewise, before its last round
+  std::vector<std::vector<double>> sums_;    // for each tile: half A, followed by half B
+  std::vector<std::vector<double>> before_;  // the same, before the tile's last round
   std::vector<RoundIndex> rounds_;
 };
 
@@ -182,7 +183,7 @@ struct SyntheticScene {
   std::function<SyntheticPixel(int x, int y)> pixel;
 };
 
-// For frames of tiles of 32 pixels; what changes from tile to tile is its noise.
+// For frames with tiles of 32 pixels. The tiles differ in their noise.
 inline std::vector<SyntheticScene> synthetic_scenes() {
   const auto tile_number = [](int x, int y) { return (x / 32) * 7 + (y / 32) * 13; };
   const auto smooth = [](int x, int y) { return .6 + .5 * std::sin(x * .021) * std::cos(y * .033); };

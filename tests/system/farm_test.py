@@ -5,18 +5,10 @@ swapped or folded out of order changes the digest."""
 import random
 
 import pytest
-from local_farm import SCENE, LocalFarm, wait_until
+from local_farm import SCENE, wait_until
 
 SPEC = dict(spp=24, seed=5)
 DELAY = ("--fake-delay", 15)  # milliseconds a unit: slow enough to be hit in flight
-
-
-@pytest.fixture(scope="module")
-def expected(tmp_path_factory):
-    """The digest from one undisturbed worker with one thread."""
-    with LocalFarm(tmp_path_factory.mktemp("alone")) as farm:
-        farm.add_worker()
-        return farm.pixels(farm.submit(SCENE, **SPEC))
 
 
 @pytest.mark.parametrize("workers, threads", [(1, 2), (2, 1), (5, 1)])

@@ -2,6 +2,7 @@
 
 import json
 import threading
+import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 
@@ -12,6 +13,7 @@ class StubCoordinator:
     def __init__(self):
         self.answers = {}
         self.requests = []
+        self.clock_lead = 0  # seconds by which the header Date is ahead of this machine's clock
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), _handler(self))
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
         self.url = f"http://127.0.0.1:{self._server.server_address[1]}"
@@ -39,6 +41,9 @@ class StubCoordinator:
 def _handler(stub):
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
+
+        def date_time_string(self, timestamp=None):
+            return super().date_time_string((time.time() if timestamp is None else timestamp) + stub.clock_lead)
 
         def log_message(self, *args):
             pass

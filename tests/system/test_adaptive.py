@@ -4,18 +4,12 @@ import os
 import random
 
 import pytest
-from cli_kit import digest, lightshaft, load, write_fog
+from cli_kit import digest, lightshaft, load
 from exr_layers import read
-from local_farm import LocalFarm
 
 SIZE = "136x104"  # 4 x 3 whole tiles, and cut ones that stop with their neighbours
 TARGET = 0.004
 OPTIONS = ("--size", SIZE, "--target-error", TARGET)
-
-
-@pytest.fixture(scope="module")
-def fog(tmp_path_factory):
-    return write_fog(tmp_path_factory.mktemp("fog"))
 
 
 @pytest.fixture(scope="module")

@@ -81,10 +81,16 @@ class Door:
             body = b'{"priority": -3}'  # which also a user may choose
         if operation == "post /api/v1/jobs":
             path, body, kind = path + "?spp=2", SCENE.encode(), "application/xml"
+        if operation == "post /api/v1/jobs/{id}/again":
+            body = b'{"spp": 2}'
+        if operation == "post /api/v1/jobs/{id}/video":
+            body, kind = b"{}", "application/json"
         if operation == "post /api/v1/session":
             body = json.dumps({"token": self.tokens[caller]} if self.tokens[caller] else {}).encode()
         if operation == "post /api/v1/tokens":
             body = b'{"role": "read"}'
+        if operation == "get /api/v1/jobs/{id}/pixels":
+            path += "?rect=0,0,1,1"
         if "{token}" in path:
             made = json.loads(self.ask("post", "/api/v1/tokens", "admin", b'{"role": "read"}')[2])
             path = path.replace("{token}", made["id"])
@@ -142,6 +148,8 @@ def test_a_submit_token_lists_its_own_jobs_alone(door):
     jobs = {c: json.loads(door.ask("get", "/api/v1/jobs", c)[2])["jobs"] for c in ("owner", "other", "read", "admin")}
     assert mine in {j["id"] for j in jobs["other"]} and {j["owner"] for j in jobs["other"]} == {"bert"}
     assert {j["owner"] for j in jobs["owner"]} == {"anna"}
+    seen = json.loads(door.ask("get", "/api/v1/jobs", "other")[2])
+    assert seen["owners"] == ["bert"] and sum(seen["states"].values()) == seen["total"] == len(jobs["other"])
     for caller in ("read", "admin"):
         assert {door.done, mine} <= {j["id"] for j in jobs[caller]}
 

@@ -60,6 +60,18 @@ def test_xml_that_is_cut_off_is_told_with_its_place(fog):
     assert re.search(r"fog\.xml:\d+:\d+: error: ", refused(fog))
 
 
+@pytest.mark.parametrize("command", ("render", "inspect", "submit", "convert"))
+def test_a_stage_of_usd_is_told_the_command_that_reads_it(tmp_path, command):
+    stage = tmp_path / "shot.usda"
+    stage.write_text("#usda 1.0\n")
+    out = [tmp_path / "out.xml"] if command == "convert" else []
+
+    told = lightshaft(command, stage, *out, *(["--to", "http://localhost:1"] if command == "submit" else []), code=2).stderr
+
+    assert told.startswith(f"{stage}: error: a stage of USD is read by the Python package: ")
+    assert f"python3 -m lightshaft.usd {stage} -o shot-scene" in told and "shot-scene/scene.xml" in told
+
+
 def test_a_scene_that_is_not_there_is_named(tmp_path):
     assert "nowhere.xml: error: " in refused(tmp_path / "nowhere.xml")
     assert "error: " in refused(tmp_path)

@@ -1,14 +1,11 @@
-"""lightshaft compare: integrators of ours race, and a program that is none of ours, well-behaved or not."""
+"""lightshaft compare: integrators race."""
 
 import csv
-import json
 import math
 import os
-import pathlib
 import re
 import shutil
 import subprocess
-import sys
 
 import pytest
 
@@ -16,34 +13,10 @@ from cli_kit import bin_dir, lightshaft, write_fog
 from exr_layers import read, write_rgb
 from local_farm import PATIENCE
 
-ADAPTERS = pathlib.Path(__file__).resolve().parents[1] / "bench" / "adapters"
-
-# A program that "renders" by running ours: what an adapter calls.
-OTHER = """import json, subprocess, sys
-ours, scene, image, times, spp, seed, size = sys.argv[1:8]
-report = times + ".report"
-subprocess.run([ours, "render", scene, "-o", image, "--float", "--quiet", "--spp", spp, "--seed", str(1000 + int(seed)), "--threads", "1",
-                "--size", size, "--report", report], check=True)
-told = json.load(open(report))
-json.dump({"seconds": told["render_seconds"], "cpu_seconds": told["core_seconds"]}, open(times, "w"))
-"""
-
 
 def rows(path):
     with open(path, newline="") as file:
         return list(csv.DictReader(file))
-
-
-def adapter(folder, command, **more):
-    path = folder / "adapter.json"
-    path.write_text(json.dumps({"name": "Other", "command": command, **more}))
-    return path
-
-
-def other(folder):
-    (folder / "other.py").write_text(OTHER)
-    return adapter(folder, [sys.executable, "{adapter}/other.py", str(bin_dir() / "lightshaft"), "{scene}", "{image}", "{times}", "{spp}",
-                            "{seed}", "{size}"], first_spp=2)
 
 
 def compare(folder, *arguments, code=0, quiet=True):
@@ -93,69 +66,6 @@ def test_the_pictures_are_those_of_render(tmp_path):
     assert float(last["relmse"]) == 0
 
 
-def test_another_program_races(tmp_path):
-    compare(tmp_path, "--program", other(tmp_path), "--time", "0.5", "--seeds", "2")
-    points = rows(tmp_path / "out" / "points.csv")
-
-    theirs = [p for p in points if p["entrant"] == "Other" and p["seed"] == "1"]
-    assert [p["last"] for p in theirs] == ["0"] * (len(theirs) - 1) + ["1"]
-    assert [float(p["spp"]) for p in theirs] == sorted(float(p["spp"]) for p in theirs) and theirs[0]["spp"] == "2"
-    summary = {row["entrant"]: row for row in rows(tmp_path / "out" / "summary.csv")}
-    # It is ours behind a wrapper: as efficient, as far as two seeds tell.
-    assert .2 < float(summary["Other"]["ratio"]) < 5
-
-
-BAD = {
-    "exits": (["sh", "-c", "echo no licence; exit 7", "{scene}", "{spp}", "{image}"], "exit code 7; its last words: no licence"),
-    "dies": (["sh", "-c", "kill -ABRT $$", "{scene}", "{spp}", "{image}"], "signal 6"),
-    "hangs": (["sh", "-c", "tail -f /dev/null", "{scene}", "{spp}", "{image}"], "ran for more than"),
-    "writes nothing": (["true", "{scene}", "{spp}", "{image}"], "exr"),
-    "writes nonsense": (["sh", "-c", "echo hello > $0", "{image}", "{scene}", "{spp}"], "exr"),
-    "has no program": (["no-such-program-here", "{scene}", "{spp}", "{image}"], "cannot be started"),
-    "lists nothing": (["true", "{scene}", "{time}", "{folder}"], "has not written pictures.jsonl"),
-    "lists what is elsewhere": (["sh", "{adapter}/lists.sh", "{folder}", "{scene}", "{time}"], "line 1: 'image' must be"),
-}
-
-
-@pytest.mark.parametrize("kind", BAD)
-def test_a_faulty_program_is_out_and_the_race_goes_on(tmp_path, kind):
-    command, said = BAD[kind]
-    (tmp_path / "lists.sh").write_text("echo '{\"image\": \"../x.exr\", \"spp\": 1, \"seconds\": 0.1}' > $1/pictures.jsonl\n")
-    done = compare(tmp_path, "--program", adapter(tmp_path, command, most_seconds=1), "--time", "0.1", "--seeds", "2", code=1)
-
-    assert said in done.stderr and "Other" in done.stderr
-    assert [row["entrant"] for row in rows(tmp_path / "out" / "summary.csv")] == ["Lightshaft volpath"]
-    assert "Other failed:" in (tmp_path / "out" / "report.md").read_text()
-
-
-def test_mitsuba_gets_an_llvm_library_that_it_can_work_with(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(ADAPTERS)
-    import llvm_library
-
-    def newest_of(*names):
-        folder = tmp_path / "_".join(names)
-        folder.mkdir()
-        for name in names:
-            (folder / name).touch()
-        path = llvm_library.newest([str(folder)])
-        return path and path.removeprefix(f"{folder}/")
-
-    debian = ["libLLVM-14.0.6.so.1", "libLLVM-14.so.1", "libLLVM-15.so", "libLLVM-15.so.1"]
-    assert newest_of(*debian) is None
-    assert newest_of(*debian, "libLLVM.so.19.1") == "libLLVM.so.19.1"
-    assert newest_of("libLLVM-9.so.1", "libLLVM-17.so.1") == "libLLVM-17.so.1"
-    assert newest_of("libLLVM.so.22.1", "libLLVM.so.19.1", "libLLVMSPIRVLib.so.99") == "libLLVM.so.22.1"
-    assert newest_of("libLLVM.so") is None
-
-
-def test_a_picture_of_another_size_is_refused(tmp_path):
-    lightshaft("render", write_fog(tmp_path), "-o", tmp_path / "small.exr", "--quiet", "--spp", "2", "--size", "40x32")
-    path = adapter(tmp_path, ["sh", "-c", f"cp {tmp_path}/small.exr $0", "{image}", "{scene}", "{spp}"])
-    done = compare(tmp_path, "--program", path, "--time", "0.1", "--seeds", "2", code=1)
-
-    assert "is 40 x 32 pixels, and the race is one of 48 x 32" in done.stderr, done.stderr
-
-
 def test_a_reference_with_the_noise_of_a_racer_is_refused(tmp_path):
     lightshaft("render", write_fog(tmp_path), "-o", tmp_path / "ref.exr", "--quiet", "--spp", "8", "--size", "48x32", "--seed", "8")
     race = ("--reference", tmp_path / "ref.exr", "--time", "60", "--spp", "4", "--seeds", "2")
@@ -185,8 +95,7 @@ def test_wrong_use_is_told_before_anything_is_rendered(tmp_path):
     start = ["compare", scene, "--time", "1", "--report", tmp_path / "out"]
     for arguments, said in ((["--integrators", "volpth"], "volpth"), (["--seeds", "1"], "--seeds 1 needs a --reference"),
                             (["--reference", tmp_path / "none.exr"], "none.exr"), (["--clock", "sun"], "--clock"),
-                            (["--program", tmp_path / "none.json"], "there is no such file"), (["--threads", "9999"], "--threads"),
-                            (["--program", adapter(tmp_path, ["x", "{scene}"])], "either {spp}")):
+                            (["--threads", "9999"], "--threads")):
         done = lightshaft(*start, *arguments, code=2)
         assert said in done.stderr, done.stderr
     assert not (tmp_path / "out" / "points.csv").exists()

@@ -5,17 +5,12 @@ import os
 import shutil
 
 import pytest
-from cli_kit import digest, lightshaft, write_fog
+from cli_kit import digest, lightshaft
 from exr_layers import read, read_header, write
 from local_farm import SCENE, HttpError, LocalFarm, bin_dir
 
 LIBRARY = bin_dir().parent / "fake_oidn" / "blurs.so"
 WITH = {"LIGHTSHAFT_OIDN": str(LIBRARY)}
-
-
-@pytest.fixture(scope="module")
-def fog(tmp_path_factory):
-    return write_fog(tmp_path_factory.mktemp("fog"))
 
 
 def render(scene, out, *flags, env=WITH, code=0):
@@ -95,3 +90,47 @@ def test_on_a_farm_image_picture_and_report_have_it(fog, tmp_path):
         with pytest.raises(HttpError) as refused:
             farm.submit(SCENE, spp=16, denoise="true")
         assert refused.value.status == 409 and "deploy/install-denoiser.sh" in str(refused.value)
+
+
+def test_a_target_error_of_the_denoised_layers_is_one_image_wherever_it_is_rendered(fog, tmp_path):
+    target = ("--size", "96x64", "--target-error", 0.03, "--target-layer", "denoised")
+
+    def rendered(name, *flags):
+        done = lightshaft("render", fog, "-o", tmp_path / f"{name}.exr", *target, *flags, "--report", tmp_path / f"{name}.json",
+                          env={**os.environ, **WITH})
+        return done, json.loads((tmp_path / f"{name}.json").read_text())
+
+    done, report = rendered("a", "--threads", 1, "--html", tmp_path / "a.html")
+    checks = report["denoised_checks"]
+    assert report["stopped"] == "error" and report["target_layer"] == "denoised" and report["denoised"]["relmse"] == checks[-1]["relmse"]
+    assert all(c["at_most"] <= 0.03 for c in checks[-2:]) and len(checks) >= 2
+    assert "target 0.03 for the denoised layers" in done.stderr
+    assert "of the denoised layers" in (tmp_path / "a.html").read_text()
+    assert rendered("b", "--threads", 2, "--isolate")[1]["pixels_sha256"] == report["pixels_sha256"]
+
+    with LocalFarm(tmp_path / "farm", environment={"LIGHTSHAFT_OIDN": str(LIBRARY)}) as farm:
+        farm.add_workers(2, fake=False)
+        to = ("--to", f"http://127.0.0.1:{farm.http}", "--token-file", farm.data / "token")
+        job = lightshaft("submit", fog, *to, *target, "--wait").stdout.split()[0]
+        assert farm.report(job)["pixels_sha256"] == report["pixels_sha256"] and farm.report(job)["denoised_checks"] == checks
+        assert farm.job(job)["target_layer"] == "denoised" and farm.job(job)["denoised_check"] == checks[-1]
+        assert "target relMSE, denoised" in lightshaft("show", job, *to).stdout
+        lightshaft("extend", job, "--target-error", 0.02, *to)
+        farm.wait_for_job(job)
+        smaller = lightshaft("render", fog, "-o", tmp_path / "c.exr", "--size", "96x64", "--target-error", 0.02, "--target-layer", "denoised",
+                             env={**os.environ, **WITH})
+        assert farm.report(job)["pixels_sha256"] == digest(smaller)
+
+
+@pytest.mark.parametrize(("flags", "words"), [
+    (("--target-layer", "denoised"), "give that, too"),
+    (("--target-error", 0.1, "--target-layer", "clean"), "raw or denoised")])
+def test_a_target_layer_that_means_nothing_is_refused(fog, tmp_path, flags, words):
+    assert words in lightshaft("render", fog, "-o", tmp_path / "out.exr", *flags, code=2).stderr
+
+
+def test_a_target_of_the_denoised_layers_is_refused_where_there_is_no_library(fog, tmp_path):
+    done = lightshaft("render", fog, "-o", tmp_path / "out.exr", "--target-error", 0.1, "--target-layer", "denoised",
+                      env={**os.environ, "LIGHTSHAFT_OIDN": "/no/such/folder"}, code=1)
+
+    assert "deploy/install-denoiser.sh" in done.stderr and not (tmp_path / "out.exr").exists()

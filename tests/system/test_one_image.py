@@ -4,15 +4,10 @@ import os
 import random
 
 import pytest
-from cli_kit import digest, lightshaft, write_fog
+from cli_kit import digest, lightshaft
 from local_farm import LocalFarm
 
 SPP = 300  # rounds 2, 2, 4, 8, 16, 32, 64, 64, 64 and a cut one of 44
-
-
-@pytest.fixture(scope="module")
-def fog(tmp_path_factory):
-    return write_fog(tmp_path_factory.mktemp("fog"))
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import sys
 import threading
 
 import pytest
-from local_farm import ROOT, SCENE, HttpError, LocalFarm, Process, wait_until
+from local_farm import ROOT, SCENE, HttpError, LocalFarm, refused_coordinator, wait_until
 from redis_server import RedisServer
 
 SPEC = dict(spp=24, seed=5)
@@ -21,13 +21,6 @@ SPEC = dict(spp=24, seed=5)
 def metrics(farm):
     text = farm.request("GET", "/metrics").decode()
     return {line.rsplit(" ", 1)[0]: float(line.rsplit(" ", 1)[1]) for line in text.splitlines() if not line.startswith("#")}
-
-
-@pytest.fixture(scope="module")
-def expected(tmp_path_factory):
-    with LocalFarm(tmp_path_factory.mktemp("undisturbed")) as farm:
-        farm.add_worker()
-        return farm.pixels(farm.submit(SCENE, **SPEC))
 
 
 # ---- metrics ----
@@ -103,7 +96,7 @@ def test_prometheus_is_told_how_to_reach_each_kind_of_farm(tmp_path):
     assert f",{host['lightshaft-tls']}," in (ROOT / "deploy" / "container" / "make-secrets.sh").read_text(), "a name in the certificate"
     assert f",{host['lightshaft-kubernetes']}," in (ROOT / "deploy" / "kubernetes" / "make-secrets.sh").read_text()
     labels = jobs["lightshaft-kubernetes"]["static_configs"][0]["labels"]
-    asked = re.findall(r'(\w+)="(\w+)"', (ROOT / "deploy" / "kubernetes" / "autoscaling-keda.yaml").read_text())
+    asked = re.findall(r'(\w+)="(\w+)"', (ROOT / "deploy" / "kubernetes" / "components" / "keda" / "worker.yaml").read_text())
     assert asked and set(asked) == set(labels.items()), "what KEDA's query selects by"
 
 
@@ -285,11 +278,7 @@ def test_a_webhook_is_told_after_kill_9_of_the_coordinator(tmp_path):
 
 
 def test_a_webhook_that_is_no_address_is_refused_at_the_start(tmp_path):
-    with LocalFarm(tmp_path / "farm") as farm:
-        other = Process("refused", [farm.bin / "lightshaft-coordinator", "--http", "127.0.0.1:0", "--grpc", "127.0.0.1:0", "--data", tmp_path / "data",
-                                    "--webhook", "file:///etc/passwd"], tmp_path / "refused.log")
-        assert other.wait() == 2
-        assert "http://HOST" in other.output()
+    assert "http://HOST" in refused_coordinator(tmp_path, "--webhook", "file:///etc/passwd", code=2)
 
 
 # ---- backup and restore ----

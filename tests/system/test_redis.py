@@ -3,28 +3,15 @@
 import shutil
 
 import pytest
-from local_farm import SCENE, LocalFarm, Process, bin_dir, wait_until
-from redis_server import RedisServer
+from local_farm import SCENE, LocalFarm, refused_coordinator, wait_until
 
-
-@pytest.fixture
-def redis(tmp_path):
-    with RedisServer(tmp_path) as server:
-        yield server
+SPEC = dict(spp=64, seed=3)
 
 
 @pytest.fixture
 def redis_farm(redis, tmp_path):
     with LocalFarm(tmp_path, flags=["--store", redis.url]) as farm:
         yield farm
-
-
-@pytest.fixture(scope="module")
-def expected(tmp_path_factory):
-    """The pixels of an undisturbed farm."""
-    with LocalFarm(tmp_path_factory.mktemp("undisturbed")) as farm:
-        farm.add_worker()
-        return farm.pixels(farm.submit(SCENE, spp=64, seed=3))
 
 
 def metric(farm, name):
@@ -45,7 +32,7 @@ def forget_database(farm):
 
 def test_a_job_survives_redis_and_coordinator_killed_together(redis, redis_farm, expected):
     redis_farm.add_worker("--fake-delay", 10)
-    job = redis_farm.submit(SCENE, spp=64, seed=3)
+    job = redis_farm.submit(SCENE, **SPEC)
     redis_farm.wait_for_progress(job, 5)
 
     redis_farm.coordinator.kill()
@@ -62,7 +49,7 @@ def test_a_job_goes_on_while_redis_is_away(redis, redis_farm, expected):
     redis.kill()
     redis_farm.add_worker()
 
-    job = redis_farm.submit(SCENE, spp=64, seed=3)
+    job = redis_farm.submit(SCENE, **SPEC)
 
     assert redis_farm.pixels(job) == expected
     wait_until(lambda: metric(redis_farm, "lightshaft_redis_up") == 0, "it is noticed")
@@ -73,7 +60,7 @@ def test_a_job_goes_on_while_redis_is_away(redis, redis_farm, expected):
 
 def test_a_lost_database_comes_back_from_redis_and_goes_on_with_the_partials(redis, redis_farm, expected):
     redis_farm.add_worker("--fake-delay", 10)
-    job = redis_farm.submit(SCENE, spp=64, seed=3)
+    job = redis_farm.submit(SCENE, **SPEC)
     redis_farm.wait_for_progress(job, 5)
     told(redis_farm)
 
@@ -87,7 +74,7 @@ def test_a_lost_database_comes_back_from_redis_and_goes_on_with_the_partials(red
 
 def test_a_lost_image_is_rendered_again_to_the_same_bits(redis, redis_farm, expected):
     redis_farm.add_worker()
-    job = redis_farm.submit(SCENE, spp=64, seed=3)
+    job = redis_farm.submit(SCENE, **SPEC)
     assert redis_farm.pixels(job) == expected
     told(redis_farm)
 
@@ -101,7 +88,7 @@ def test_a_lost_image_is_rendered_again_to_the_same_bits(redis, redis_farm, expe
 
 
 def test_a_job_whose_files_are_lost_says_which_and_goes_on_when_they_are_sent_again(redis, redis_farm, expected):
-    job = redis_farm.submit(SCENE, spp=64, seed=3)
+    job = redis_farm.submit(SCENE, **SPEC)
     told(redis_farm)
 
     redis_farm.coordinator.kill()
@@ -140,8 +127,4 @@ def test_a_removed_job_stays_removed(redis, redis_farm):
     ("postgres://db", "unknown"),
 ])
 def test_a_store_that_cannot_be_used_is_refused_with_a_reason(tmp_path, store, said):
-    coordinator = Process("refused", [bin_dir() / "lightshaft-coordinator", "--http", "127.0.0.1:0", "--grpc", "127.0.0.1:0",
-                                      "--data", tmp_path / "data", "--store", store], tmp_path / "refused.log")
-
-    assert coordinator.wait() in (1, 2)
-    assert said in coordinator.output()
+    assert said in refused_coordinator(tmp_path, "--store", store)

@@ -7,7 +7,7 @@ import signal
 import subprocess
 
 import pytest
-from cli_kit import digest, lightshaft, load, write_fog
+from cli_kit import digest, lightshaft, load
 from local_farm import bin_dir, wait_until
 
 CONTRACT = {"spp", "samples", "load_seconds", "render_seconds", "core_seconds", "peak_rss_bytes", "rmse", "relmse",
@@ -15,11 +15,6 @@ CONTRACT = {"spp", "samples", "load_seconds", "render_seconds", "core_seconds", 
             "stopped", "convergence"}
 POINT = {"seconds", "core_seconds", "spp", "rmse", "relmse", "relmse_ci95"}
 SPP = 12  # rounds of 2, 2, 4 and a cut one of 4
-
-
-@pytest.fixture(scope="module")
-def fog(tmp_path_factory):
-    return write_fog(tmp_path_factory.mktemp("fog"))
 
 
 def render(scene, folder, *flags, spp=SPP, **options):

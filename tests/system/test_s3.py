@@ -9,8 +9,10 @@ import threading
 
 import farm_rpc
 import pytest
-from local_farm import SCENE, HttpError, LocalFarm, Process, bin_dir, wait_until
+from local_farm import SCENE, HttpError, LocalFarm, refused_coordinator, wait_until
 from s3_server import ENVIRONMENT, S3Server
+
+SPEC = dict(spp=8, seed=3)
 
 
 @pytest.fixture
@@ -27,13 +29,6 @@ def s3_farm(s3, tmp_path):
         yield farm
 
 
-@pytest.fixture(scope="module")
-def expected(tmp_path_factory):
-    with LocalFarm(tmp_path_factory.mktemp("disk")) as farm:
-        farm.add_worker()
-        return farm.pixels(farm.submit(SCENE, spp=8, seed=3))
-
-
 def put(farm, data):
     digest = hashlib.sha256(data).hexdigest()
     farm.request("PUT", f"/api/v1/blobs/{digest}", data, "application/octet-stream")
@@ -45,7 +40,7 @@ def missing(farm, digest):
 
 
 def test_a_job_has_the_pixels_of_a_store_on_disk_also_after_the_local_copies_are_lost(s3, s3_farm, expected):
-    job = s3_farm.submit(SCENE, spp=8, seed=3)
+    job = s3_farm.submit(SCENE, **SPEC)
     assert len(s3.objects) == 1 and all(key.startswith("scenes/") for key in s3.objects)
 
     s3_farm.coordinator.kill()
@@ -109,7 +104,7 @@ def test_a_store_that_stays_away_is_named_and_the_upload_can_be_tried_again(s3, 
 
 
 def test_an_object_that_breaks_off_comes_again_and_one_that_is_damaged_is_not_believed(s3, s3_farm, expected):
-    job = s3_farm.submit(SCENE, spp=8, seed=3)
+    job = s3_farm.submit(SCENE, **SPEC)
     s3_farm.coordinator.kill()
     shutil.rmtree(s3_farm.data / "blobs")
     (key, good), = s3.objects.items()
@@ -136,7 +131,7 @@ def readiness(farm):
 @pytest.mark.slow
 def test_a_coordinator_whose_store_does_not_answer_says_that_it_is_not_ready_and_goes_on(s3, s3_farm, expected):
     s3_farm.add_worker("--fake-delay", 20)
-    job = s3_farm.submit(SCENE, spp=8, seed=3)
+    job = s3_farm.submit(SCENE, **SPEC)
     s3_farm.wait_for_progress(job, 1)
     assert readiness(s3_farm) == (200, "ready\n")
 
@@ -217,8 +212,5 @@ def test_so_many_copies_as_there_is_room_for_stay_on_this_machine(s3, tmp_path):
 def test_what_cannot_work_is_told_at_the_start(s3, tmp_path, change, said):
     where = s3.url(change.get("prefix", "scenes"), change.get("bucket"))
     env = dict(os.environ, **{k: v for k, v in change.items() if k.startswith("AWS")})
-    coordinator = Process("refused", [bin_dir() / "lightshaft-coordinator", "--http", "127.0.0.1:0", "--grpc", "127.0.0.1:0",
-                                      "--data", tmp_path / "data", "--blobs", where], tmp_path / "refused.log", env)
-
-    assert coordinator.wait() in (1, 2)
-    assert re.search(said, coordinator.output()), coordinator.output()
+    printed = refused_coordinator(tmp_path, "--blobs", where, env=env)
+    assert re.search(said, printed), printed

@@ -10,25 +10,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import s3_server
-from local_farm import SCENE, HttpError, LocalFarm, Process, bin_dir, wait_until
-from redis_server import RedisServer
+from local_farm import SCENE, HttpError, LocalFarm, bin_dir, refused_coordinator, wait_until
 
 pytestmark = pytest.mark.slow
 
 SPEC = dict(spp=64, seed=3)
-
-
-@pytest.fixture
-def redis(tmp_path):
-    with RedisServer(tmp_path) as server:
-        yield server
-
-
-@pytest.fixture(scope="module")
-def expected(tmp_path_factory):
-    with LocalFarm(tmp_path_factory.mktemp("undisturbed")) as farm:
-        farm.add_worker()
-        return farm.pixels(farm.submit(SCENE, **SPEC))
 
 
 @pytest.fixture
@@ -241,11 +227,7 @@ def test_tokens_made_at_two_coordinators_at_once_are_all_kept(redis, tmp_path):
 
 
 def test_a_coordinator_that_knows_of_no_others_does_not_take_their_jobs(pair, redis, tmp_path):
-    alone = Process("alone", [bin_dir() / "lightshaft-coordinator", "--http", "127.0.0.1:0", "--grpc", "127.0.0.1:0",
-                              "--data", tmp_path / "alone", "--store", redis.url], tmp_path / "alone.log")
-
-    assert alone.wait() == 1
-    assert "start with --shared" in alone.output()
+    assert "start with --shared" in refused_coordinator(tmp_path, "--store", redis.url, code=1)
 
 
 @pytest.mark.parametrize("flags, said", [
@@ -255,9 +237,4 @@ def test_a_coordinator_that_knows_of_no_others_does_not_take_their_jobs(pair, re
     (["--shared", "--store", "redis://127.0.0.1:1", "--blobs", "there", "--tls"], "the same --secrets FOLDER"),
 ])
 def test_what_cannot_be_shared_is_refused_with_a_reason(tmp_path, flags, said):
-    flags = [str(tmp_path / f) if f == "there" else f for f in flags]
-    coordinator = Process("refused", [bin_dir() / "lightshaft-coordinator", "--http", "127.0.0.1:0", "--grpc", "127.0.0.1:0",
-                                      "--data", tmp_path / "data"] + flags, tmp_path / "refused.log")
-
-    assert coordinator.wait() in (1, 2)
-    assert said in coordinator.output()
+    assert said in refused_coordinator(tmp_path, *[str(tmp_path / f) if f == "there" else f for f in flags])

@@ -9,7 +9,7 @@ import subprocess
 import pytest
 import steam
 from breaking_proxy import BreakingProxy
-from local_farm import LocalFarm, bin_dir, wait_until
+from local_farm import bin_dir, wait_until
 
 SCENE = steam.scene(samples=2)
 SIDE = 112  # 5.4 MiB of grid

@@ -94,6 +94,42 @@ def test_bsdfs_reflect_what_they_should(tmp_path):
     assert failed == ["bsdf 2 at 40 degrees"]
 
 
+# A closed room that shines 1 and reflects half: 1 + .5 where lamps alone light it, and 1 / (1 - .5) by all light.
+FURNACE = """<test type="ttest">
+  <string name="references" value="{references}"/>
+  {scenes}
+</test>
+"""
+ROOM = """<scene>
+    <integrator type="{integrator}"/>
+    <sampler type="independent"><integer name="sampleCount" value="256"/></sampler>
+    <camera type="perspective"><float name="fov" value="60"/><integer name="width" value="4"/><integer name="height" value="4"/></camera>
+    <mesh type="obj"><string name="filename" value="room.obj"/>
+      <emitter type="area"><color name="radiance" value="1, 1, 1"/></emitter>
+      <bsdf type="diffuse"><color name="albedo" value="0.5, 0.5, 0.5"/></bsdf></mesh>
+  </scene>"""
+# The cube [-2, 2]^3: its corners, and its sides with their normals, which point inwards.
+CORNERS = [(x, y, z) for x in (-2, 2) for y in (-2, 2) for z in (-2, 2)]
+SIDES = {(1, 0, 0): (3, 4, 2, 1), (-1, 0, 0): (6, 8, 7, 5), (0, 1, 0): (2, 6, 5, 1), (0, -1, 0): (7, 8, 4, 3),
+         (0, 0, 1): (5, 7, 3, 1), (0, 0, -1): (4, 8, 6, 2)}
+OBJ = "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS) + "".join(f"vn {x} {y} {z}\n" for x, y, z in SIDES)
+OBJ += "".join(f"f {a}//{n} {b}//{n} {c}//{n} {d}//{n}\n" for n, (a, b, c, d) in enumerate(SIDES.values(), 1))
+
+
+def test_a_furnace_tells_the_integrators_of_nori_apart(tmp_path):
+    expected = {"whitted": 1.5, "direct_mis": 1.5, "path_mis": 2}
+    (tmp_path / "room.obj").write_text(OBJ)
+    file = tmp_path / "furnace.xml"
+    file.write_text(FURNACE.format(references=", ".join(map(str, expected.values())),
+                                   scenes="".join(ROOM.format(integrator=name) for name in expected)))
+
+    table = cases_of(file, tmp_path)
+
+    assert table["passed"] == len(table["cases"]) and len(table["cases"]) >= len(expected)
+    for case in table["cases"]:
+        assert abs(case["got"] - case["expected"]) <= .02 * case["expected"], "the test has no power"
+
+
 def test_bsdfs_draw_directions_with_their_density(tmp_path):
     file = tmp_path / "chi2.xml"
     file.write_text(CHI2)

@@ -15,7 +15,7 @@ def main(folder, wanted):
         for name in names:
             for kind, size in {"desk": {"width": 1280, "height": 860}, "phone": {"width": 390, "height": 800, "phone": True}}.items():
                 page = browser.open(f"{farm.url}/demo.html?view={name}", **size)
-                page.wait("!document.querySelector('live-image') || document.querySelector('live-image').dataset.painted || document.querySelector('.stage-text')")
+                page.wait("!document.querySelector('.stage live-image') || document.querySelector('.stage live-image').dataset.painted || document.querySelector('.stage-text')")
                 page.screenshot(folder / f"{name}-{kind}.png")
                 page.close()
 

@@ -8,6 +8,7 @@ import pathlib
 import queue
 import struct
 import threading
+import urllib.parse
 import zlib
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
@@ -21,7 +22,7 @@ TOKEN = "let-there-be-light"
 def job(id="j-1", name="steam.xml", state="running", **more):
     return {"id": id, "name": name, "state": state, "stopped": "", "progress": 0.25, "spp": 64, "spp_done": 16, "rmse": 0.05, "relmse": 0.01,
             "relmse_ci95": [0.009, 0.011], "target_error": None, "denoise": False, "eta_seconds": 42, "error": "", "warnings": [], "size": [64, 48], "tile": 32,
-            "priority": 0, "owner": "", "units_done": 6, "units_total": 24, "elapsed_seconds": 14, "core_seconds": 28, "submitted_unix": 1765000000,
+            "priority": 0, "focus": None, "owner": "", "units_done": 6, "units_total": 24, "elapsed_seconds": 14, "core_seconds": 28, "submitted_unix": 1765000000,
             "health": {"clean": True, "nonfinite": 0, "negative": 0, "majorant_violations": 0, "causes": []}, **more}
 
 
@@ -39,6 +40,24 @@ def png(width, height, rgb):
             + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
 
 
+class Layer:
+    """A layer of a picture: value(x, y) gives its channels. Levels above 0 have the value of each block's first pixel."""
+
+    def __init__(self, channels, value, format="half", blocks="mean", names=None):
+        self.row = {"channels": channels, "format": format, "blocks": blocks, **({"names": names} if names else {})}
+        self.value = value
+
+    def bytes(self, level, rect):
+        x0, y0, x1, y1 = rect
+        numbers = [v for y in range(y0, y1) for x in range(x0, x1) for v in self.value(x << level, y << level)]
+        return struct.pack(f"<{len(numbers)}{'e' if self.row['format'] == 'half' else 'f'}", *numbers)
+
+
+def gradient(x, y):
+    """Red grows to the right, green downwards; an eighth of it is a power of two, which halves hold exactly."""
+    return x / 64, y / 64, 0.5
+
+
 class StubFarm:
     """State that requests read and change; `with StubFarm() as farm: ... farm.url`."""
 
@@ -49,8 +68,15 @@ class StubFarm:
         self.tiles = []
         self.report = {"convergence": []}
         self.image = png(64, 48, (200, 120, 40))
+        self.thumbnail = png(16, 12, (40, 160, 90))
         self.images = {}  # by job, before `image`
         self.maps = {"error": png(64, 48, (150, 30, 110)), "samples": png(64, 48, (20, 10, 60))}
+        self.size = [96, 64]  # of pictures in numbers
+        self.layers = {"rgb": Layer(["R", "G", "B"], gradient), "stderr": Layer(["R", "G", "B"], lambda x, y: (0.25, 0.125, 0.0625)),
+                       "error": Layer(["Y"], lambda x, y: (0.03,)), "spp": Layer(["Y"], lambda x, y: (64,))}
+        self.layers_of = {}  # by job, before `layers`
+        self.video = {"state": "none", "fps": None, "exposure": None, "layer": None, "frames": 0, "frames_done": 0, "bytes": None, "error": None}
+        self.no_video = None  # why none is made
         self.blobs = {}
         self.submitted = []
         self.refusal = None  # problem details for the next POST /jobs
@@ -174,9 +200,31 @@ def _handler(farm):
             farm.signed_in = True
             return self._send(204, headers=[("Set-Cookie", "session=1; HttpOnly; SameSite=Strict; Path=/")])
 
+        def _list(self):
+            asked = dict(urllib.parse.parse_qsl(self.path.partition("?")[2], keep_blank_values=True))
+            everything = list(farm.jobs.values())
+            states = asked["state"].split(",") if "state" in asked else None
+            found = [job for job in everything
+                     if (states is None or job["state"] in states) and asked.get("owner", job["owner"]) == job["owner"]
+                     and job["submitted_unix"] >= float(asked.get("since", 0)) and asked.get("search", "").lower() in f"{job['name']} {job['id']}".lower()]
+            rank = {"running": 0, "paused": 1, "queued": 2}
+            keys = {"active": lambda job: (rank.get(job["state"], 3), -job["submitted_unix"]), "name": lambda job: job["name"].lower(),
+                    "submitted": lambda job: job["submitted_unix"], "relmse": lambda job: job["relmse"]}
+            sort = asked.get("sort", "active")
+            found.sort(key=keys[sort.lstrip("-")], reverse=sort.startswith("-"))
+            first = int(asked.get("offset", 0))
+            return {"jobs": found[first:first + int(asked.get("limit", len(found)))], "total": len(found), "owners": sorted({job["owner"] for job in everything}),
+                    "states": {state: sum(job["state"] == state for job in everything) for state in {job["state"] for job in everything}}}
+
+        def _delete_jobs(self, parts, body):
+            if farm.jobs[parts[0]]["state"] == "running":
+                return self._problem(409, "A job that renders is cancelled first.")
+            farm.remove(parts[0])
+            return self._send(204)
+
         def _get_jobs(self, parts, body):
             if not parts:
-                return self._send(200, {"jobs": list(farm.jobs.values())})
+                return self._send(200, self._list())
             if parts[0] not in farm.jobs:
                 return self._problem(404, f"There is no job \"{parts[0]}\".")
             what = parts[1] if len(parts) > 1 else None
@@ -186,6 +234,18 @@ def _handler(farm):
                 return self._send(200, {"tiles": farm.tiles})
             if what == "report":
                 return self._send(200, farm.report)
+            layers = farm.layers_of.get(parts[0], farm.layers)
+            if what == "layers":
+                rows = [{"name": name, **layer.row} for name, layer in layers.items()]
+                return self._send(200, {"size": farm.size, "max_level": 10, "max_side": 512, "max_pixels": 1 << 20, "layers": rows})
+            if what == "pixels":
+                asked = dict(urllib.parse.parse_qsl(self.path.split("?")[1]))
+                rect = [int(v) for v in asked["rect"].split(",")]
+                return self._send(200, layers[asked["layer"]].bytes(int(asked["level"]), rect), "application/octet-stream")
+            if what == "video":
+                return self._send(200, farm.video)
+            if what == "thumbnail.png":
+                return self._send(200, farm.thumbnail, "image/png")
             if what == "image.png":
                 return self._send(200, farm.images.get(parts[0], farm.image), "image/png")
             if what.removesuffix(".png") in farm.maps:
@@ -193,11 +253,20 @@ def _handler(farm):
             return self._problem(404, "nothing here")
 
         def _patch_jobs(self, parts, body):
-            wanted = json.loads(body)["state"]
-            farm.change(parts[0], state=wanted)
+            farm.change(parts[0], **json.loads(body))
             return self._send(200, farm.jobs[parts[0]])
 
         def _post_jobs(self, parts, body):
+            if parts[1:] == ["again"]:
+                farm.submitted.append((parts[0], json.loads(body)))
+                farm.jobs["j-again"] = {**farm.jobs[parts[0]], "id": "j-again", "state": "queued", "progress": 0, "units_done": 0}
+                return self._send(201, {"id": "j-again", "url": "/api/v1/jobs/j-again", "warnings": []})
+            if parts[1:] == ["video"]:
+                farm.submitted.append((parts[0], json.loads(body)))
+                if farm.no_video:
+                    return self._problem(409, farm.no_video)
+                farm.video = {**farm.video, "state": "waiting", "frames": 3, **json.loads(body)}
+                return self._send(202, farm.video)
             if farm.refusal:
                 refusal, farm.refusal = farm.refusal, None
                 return self._send(400, refusal, "application/problem+json")

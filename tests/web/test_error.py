@@ -92,21 +92,6 @@ def test_what_a_reference_cannot_tell_is_neither_drawn_nor_nought(dashboard, far
     assert "true error below the reference's noise" in page.text(".plot-reading")
 
 
-@pytest.mark.parametrize("lo, hi, shown", [
-    (1e-5, 2, ["10⁻⁵", "10⁻⁴", "0.001", "0.01", "0.1", "1"]), (0.009, 0.3, ["0.01", "0.02", "0.05", "0.1", "0.2"]), (9e-6, 6e-5, ["10⁻⁵", "2·10⁻⁵", "5·10⁻⁵"])])
-def test_ticks_of_error_are_those_of_the_reports(open_page, farm, lo, hi, shown):
-    """The same cases as tests/unit/report/log_axis_test.cpp."""
-    page = open_page(f"{farm.url}/demo.html")
-    assert page.evaluate(f"import('/js/plot_scale.js').then(({{ errorTicks }}) => errorTicks({{ lo: {lo}, hi: {hi} }}).map(t => t.label).filter(Boolean))") == shown
-
-
-@pytest.mark.parametrize("lo, hi, shown", [
-    (0.7, 300, ["1 s", "2 s", "5 s", "10 s", "20 s", "1 min", "2 min", "5 min"]), (0.5, 90000, ["1 s", "10 s", "1 min", "10 min", "1 h", "10 h", "1 d"])])
-def test_ticks_of_time_are_those_of_the_reports(open_page, farm, lo, hi, shown):
-    page = open_page(f"{farm.url}/demo.html")
-    assert page.evaluate(f"import('/js/plot_scale.js').then(({{ timeTicks }}) => timeTicks({{ lo: {lo}, hi: {hi} }}).map(t => t.label).filter(Boolean))") == shown
-
-
 @pytest.mark.parametrize("points", [
     "null", "'x'", "[null, 1, {}]", "[{seconds: -1, core_seconds: 1, relmse: 1}]", "[{seconds: 1, core_seconds: 1, relmse: NaN}]"])
 def test_what_has_no_logarithm_is_left_out(open_page, farm, points):
@@ -216,22 +201,22 @@ def test_samples_that_nobody_asked_for_are_no_goal(farm, dashboard, fields, show
 # ---- maps ----
 
 def middle_pixel(page):
-    return page.evaluate("(() => { const c = document.querySelector('live-image canvas'); return [...c.getContext('2d').getImageData(c.width / 2, c.height / 2, 1, 1).data.slice(0, 3)]; })()")
+    return page.evaluate("(() => { const c = document.querySelector('.stage live-image canvas'); return [...c.getContext('2d').getImageData(c.width / 2, c.height / 2, 1, 1).data.slice(0, 3)]; })()")
 
 
 def test_the_maps_are_shown_over_the_image_and_follow_what_is_folded(farm, dashboard):
     farm.jobs["j-1"] = job()
     page = dashboard("#/jobs/j-1")
-    page.wait("document.querySelector('live-image')?.dataset.painted")
+    page.wait("document.querySelector('.stage live-image')?.dataset.painted")
     assert middle_pixel(page) == [200, 120, 40]
 
     page.click(".image-tools [value=error]")
-    page.wait("document.querySelector('live-image').dataset.painted === '2'")
+    page.wait("document.querySelector('.stage live-image').dataset.painted === '2'")
 
     assert middle_pixel(page) == [150, 30, 110]
-    assert "100 %" in page.text(".legend") and page.evaluate("document.querySelector('live-image').getAttribute('aria-label')") == "steam.xml, error of each pixel"
+    assert "100 %" in page.text(".legend") and page.evaluate("document.querySelector('.stage live-image').getAttribute('aria-label')") == "steam.xml, error of each pixel"
     farm.emit("tile", {"job": "j-1", "tile": 0, "rect": [0, 0, 32, 32], "state": "folded", "spp": 8, "worker": "w-1"})
-    page.wait("Number(document.querySelector('live-image').dataset.painted) >= 3")
+    page.wait("Number(document.querySelector('.stage live-image').dataset.painted) >= 3")
     assert farm.asked("GET", "/api/v1/jobs/j-1/error.png") >= 2
 
     page.click(".image-tools [value=samples]")
@@ -339,7 +324,7 @@ CONTRAST = """(() => {
 
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
-@pytest.mark.parametrize("view", ["job-reference", "job-unhealthy", "job-failed", "jobs", "workers", "submit-refused", "signin-refused"])
+@pytest.mark.parametrize("view", ["job-reference", "job-unhealthy", "job-failed", "jobs", "jobs-page", "viewer", "viewer-compare", "viewer-objects", "workers", "submit-refused", "signin-refused"])
 def test_every_text_has_the_contrast_that_wcag_asks_for(open_page, farm, view, theme):
     """Level AA: at least 4.5 to 1, by day and by night."""
     page = open_page("about:blank")

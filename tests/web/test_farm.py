@@ -1,5 +1,6 @@
 """The dashboard on a real farm: coordinator and fake workers as processes, Chromium in front."""
 import json
+import struct
 import urllib.parse
 
 import pytest
@@ -57,14 +58,14 @@ def test_from_dropped_files_to_a_finished_image(real_farm, page, tmp_path):
     page.wait("document.querySelector('.job h1')?.innerText === 'bath.xml'")
     page.wait("document.querySelector('.mark-tile')", timeout=60)
     page.wait("document.querySelector('.flash')", timeout=60)
-    page.wait("document.querySelector('live-image').dataset.painted", timeout=60)
+    page.wait("document.querySelector('.stage live-image').dataset.painted", timeout=60)
     page.wait("document.querySelector('.job .pill').innerText === 'done'", timeout=120)
 
     page.wait("document.querySelectorAll('.plot-point').length >= 3", timeout=60)
     assert "64 of 64" in page.text(".figures")
     assert page.count(".mark-tile") == 0
     assert page.wait("""(() => {
-      const canvas = document.querySelector('live-image canvas');
+      const canvas = document.querySelector('.stage live-image canvas');
       const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
       return canvas.width === 96 && canvas.height === 64 && new Set(data).size > 16;
     })()""")
@@ -169,18 +170,18 @@ def test_the_maps_come_from_the_farm(real_farm, page):
     job = real_farm.submit(SCENE, spp=16)
     real_farm.wait_for_job(job)
     page.evaluate(f"void (location.hash = '#/jobs/{job}')")
-    page.wait("document.querySelector('live-image')?.dataset.painted")
+    page.wait("document.querySelector('.stage live-image')?.dataset.painted")
     colours = """(() => {
-      const canvas = document.querySelector('live-image canvas');
+      const canvas = document.querySelector('.stage live-image canvas');
       const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
       return [canvas.width, new Set(Array.from({ length: data.length / 4 }, (_, i) => data.slice(4 * i, 4 * i + 3).join())).size];
     })()"""
 
     found = {}
     for kind in ("error", "samples"):
-        painted = int(page.evaluate("document.querySelector('live-image').dataset.painted"))
+        painted = int(page.evaluate("document.querySelector('.stage live-image').dataset.painted"))
         page.click(f".image-tools [value={kind}]")
-        page.wait(f"Number(document.querySelector('live-image').dataset.painted) > {painted}")
+        page.wait(f"Number(document.querySelector('.stage live-image').dataset.painted) > {painted}")
         found[kind] = page.evaluate(colours)
 
     assert found["error"][0] == 96 and found["error"][1] > 16, "noise differs from pixel to pixel"
@@ -192,9 +193,9 @@ def test_the_denoised_picture_is_offered_where_there_is_one(real_farm, page):
     jobs = {asked: real_farm.submit(SCENE, spp=16, denoise=asked) for asked in ("true", "false")}
     for job in jobs.values():
         real_farm.wait_for_job(job)
-    picture = "document.querySelector('live-image canvas').toDataURL()"
+    picture = "document.querySelector('.stage live-image canvas').toDataURL()"
     page.evaluate(f"void (location.hash = '#/jobs/{jobs['true']}')")
-    page.wait("document.querySelector('live-image')?.dataset.painted")
+    page.wait("document.querySelector('.stage live-image')?.dataset.painted")
     plain = page.evaluate(picture)
 
     page.click(".image-tools [value=denoised]")
@@ -236,15 +237,37 @@ def test_a_sequence_shows_its_frames_and_each_ones_image(real_farm, page):
 
     real_farm.add_workers(2, *SLOW)
 
-    page.wait("document.querySelector('live-image')?.dataset.painted", timeout=60)
+    page.wait("document.querySelector('.stage live-image')?.dataset.painted", timeout=60)
     page.wait("document.querySelectorAll('.frame.is-done').length === 4", timeout=120)
     page.wait("document.querySelector('.job .pill').innerText === 'done'", timeout=30)
     page.click("[data-frame='6']")
     page.wait("document.querySelector('.frame[aria-current]').dataset.frame === '6'")
     page.wait("""(() => {
-      const canvas = document.querySelector('live-image canvas');
+      const canvas = document.querySelector('.stage live-image canvas');
       const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
       return canvas.width === 96 && new Set(data).size > 16;
     })()""")
     page.wait("document.querySelectorAll('.plot-point').length >= 3", timeout=60)
     assert "16 of 16" in page.text(".figures")
+
+
+def test_the_viewer_reads_the_pixels_of_the_image_file(real_farm, page):
+    """While the job is in memory, and once it is on the disk only."""
+    real_farm.add_worker()
+    job = real_farm.submit(SCENE, spp=16, aov="depth,shape_id")
+    real_farm.wait_for_job(job)
+    red, green, blue = struct.unpack("<3e", real_farm.request("GET", f"/api/v1/jobs/{job}/pixels?rect=48,32,49,33"))
+    for _ in range(2):
+        page.evaluate(f"void (location.hash = '#/view/{job}?zoom=1&x=48&y=32')")
+        page.wait("document.querySelector('float-view')?.dataset.painted === 'rgb a'", timeout=60)
+        page.evaluate("document.querySelector('float-view').focus()")
+        page.call("Input.dispatchKeyEvent", {"type": "keyDown", "key": "ArrowRight", "code": "ArrowRight", "modifiers": 8})
+        page.call("Input.dispatchKeyEvent", {"type": "keyDown", "key": "ArrowLeft", "code": "ArrowLeft", "modifiers": 8})
+        page.wait("document.querySelector('.viewer-reading').innerText.startsWith('Pixel 48, 32') && document.querySelectorAll('.viewer-value b').length === 3")
+        shown = page.evaluate("[...document.querySelectorAll('.viewer-value b')].map(b => Number(b.innerText.replace(' × 10', 'e').replace('⁻', '-')))")
+        assert shown == pytest.approx([red, green, blue], rel=1e-3), "four digits are shown"
+        assert page.evaluate("[...document.getElementById('view-layer').options].map(o => o.value)") == ["rgb", "stderr", "error", "spp", "depth", "crypto_object"]
+        page.evaluate("void (location.hash = '#/jobs')")
+        page.wait("document.querySelector('[data-job] live-image')?.dataset.painted", timeout=60)
+        real_farm.restart_coordinator()
+        page.wait("document.querySelector('.link.live')", timeout=60)

@@ -35,7 +35,7 @@ def advance(farm, states, current, changed):
 
 
 def pixel(page):
-    return page.evaluate("[...document.querySelector('live-image canvas').getContext('2d').getImageData(5, 5, 1, 1).data]")[:3]
+    return page.evaluate("[...document.querySelector('.stage live-image canvas').getContext('2d').getImageData(5, 5, 1, 1).data]")[:3]
 
 
 def shown(page):
@@ -61,15 +61,15 @@ def test_frames_are_chosen_and_each_has_its_own_image(farm, dashboard):
     farm.images = {frame_id(1): png(64, 48, (200, 10, 10)), frame_id(2): png(64, 48, (10, 200, 10))}
     sequence(farm, {1: "done", 2: "running", 3: "queued", 4: "queued"}, current=2)
     page = dashboard(f"#/jobs/{SEQUENCE}")
-    page.wait("document.querySelector('live-image')?.dataset.painted")
+    page.wait("document.querySelector('.stage live-image')?.dataset.painted")
     assert shown(page) == "2" and pixel(page) == [10, 200, 10]
     assert [page.evaluate(f"document.querySelector('[data-frame=\"{n}\"]').className") for n in (1, 3)] == ["frame is-done", "frame is-queued"]
 
     page.click("[data-frame='1']")
 
     page.wait("document.querySelector('.frame[aria-current]').dataset.frame === '1'")
-    page.wait("document.querySelector('live-image').dataset.painted")
-    page.wait("document.querySelector('live-image canvas').getContext('2d').getImageData(5, 5, 1, 1).data[0] === 200")
+    page.wait("document.querySelector('.stage live-image').dataset.painted")
+    page.wait("document.querySelector('.stage live-image canvas').getContext('2d').getImageData(5, 5, 1, 1).data[0] === 200")
     assert page.evaluate("location.hash") == f"#/jobs/{SEQUENCE}/1"
     assert page.evaluate("document.querySelector('.downloads a').getAttribute('href')").endswith(f"/jobs/{frame_id(1)}/image.exr")
     page.click("[aria-label='The next frame']")
@@ -102,6 +102,123 @@ def test_a_frame_has_a_page_of_its_own_address(farm, dashboard):
     page = dashboard(f"#/jobs/{SEQUENCE}/1")
 
     page.wait("document.querySelector('.frame[aria-current]')?.dataset.frame === '1'")
+
+
+def film(farm, dashboard):
+    """A sequence of three done frames in colours of their own, and one that is rendered; its page shows frame 1."""
+    farm.images = {frame_id(n): png(64, 48, (50 * n, 10, 10)) for n in range(1, 5)}
+    sequence(farm, {1: "done", 2: "done", 3: "running", 4: "done"}, current=3)
+    page = dashboard(f"#/jobs/{SEQUENCE}/1")
+    page.wait("document.querySelector('.stage live-image')?.dataset.painted")
+    return page
+
+
+def film_red(page):
+    """Red of the picture that the film shows over the image; null if it shows none."""
+    return page.evaluate("(() => { const f = document.querySelector('.films frame-film'); return f && !f.hidden && f.dataset.whole === 'yes' ? f.firstChild.getContext('2d').getImageData(5, 5, 1, 1).data[0] : null; })()")
+
+
+def wait_film(page, red):
+    page.wait(f"(() => {{ const f = document.querySelector('.films frame-film'); return f && !f.hidden && f.dataset.whole === 'yes' && f.firstChild.getContext('2d').getImageData(5, 5, 1, 1).data[0] === {red}; }})()")
+
+
+def scrub_to(page, index):
+    page.evaluate(f"(() => {{ const s = document.getElementById('scrub'); s.value = '{index}'; s.dispatchEvent(new Event('input')); }})()")
+
+
+def test_the_strip_has_small_pictures_of_frames_that_have_samples(farm, dashboard):
+    page = film(farm, dashboard)
+    page.wait("[...document.querySelectorAll('.frame img')].length === 4 && [...document.querySelectorAll('.frame img')].every((i) => i.complete && i.naturalWidth === 16)")
+
+
+def test_the_slider_scrubs_through_the_frames_that_are_done(farm, dashboard):
+    page = film(farm, dashboard)
+    assert page.evaluate("document.getElementById('scrub').max") == "2"
+
+    scrub_to(page, 2)
+
+    wait_film(page, 200)
+    assert shown(page) == "4"
+    assert page.evaluate("document.getElementById('scrub').getAttribute('aria-valuetext')") == "Frame 4"
+    assert page.evaluate("location.hash") == f"#/jobs/{SEQUENCE}/1", "the page stays at its frame until the slider is let go"
+    page.evaluate("document.getElementById('scrub').dispatchEvent(new Event('change'))")
+    page.wait(f"location.hash === '#/jobs/{SEQUENCE}/4'")
+    page.wait("document.querySelector('.stage live-image').dataset.painted && !document.querySelector('.films')")
+    assert pixel(page)[0] == 200
+
+
+def test_the_keyboard_scrubs_plays_and_steps(farm, dashboard):
+    page = film(farm, dashboard)
+    page.evaluate("document.getElementById('scrub').focus()")
+    page.key("ArrowRight", virtual=39)
+    page.wait(f"location.hash === '#/jobs/{SEQUENCE}/2'")
+    page.key("End", virtual=35)
+    page.wait(f"location.hash === '#/jobs/{SEQUENCE}/4'")
+    assert page.evaluate("document.activeElement.id") == "scrub"
+
+    page.key(" ", "Space", 32)
+    page.wait("document.querySelector('.play').innerText === 'Pause'")
+    for red in (50, 100, 200):  # it goes round
+        wait_film(page, red)
+    page.key(" ", "Space", 32)
+    page.wait("document.querySelector('.play').innerText === 'Play' && !document.querySelector('.films')")
+    at = page.evaluate("location.hash").split("/")[-1]
+    assert at in ("1", "2", "4") and shown(page) == at
+
+    page.evaluate("document.querySelector('[data-frame=\"2\"]').focus()")
+    page.evaluate(f"void (location.hash = '#/jobs/{SEQUENCE}/2')")
+    page.wait("document.querySelector('.frame[aria-current]').dataset.frame === '2'")
+    page.key("ArrowRight", virtual=39)  # the strip has all frames
+    page.wait(f"location.hash === '#/jobs/{SEQUENCE}/3'")
+
+
+def test_playing_waits_for_pictures_and_never_skips_one(farm, dashboard):
+    page = film(farm, dashboard)
+    page.evaluate("""(() => {
+      window.seen = [];
+      new MutationObserver(() => window.seen.push(document.querySelector('frame-film').dataset.shown)).observe(document.querySelector('frame-film'), { attributeFilter: ['data-shown'] });
+    })()""")
+    page.evaluate("(() => { const s = document.querySelector('.player select'); s.value = '60'; s.dispatchEvent(new Event('change')); })()")
+    page.click(".play")
+    page.wait("window.seen.length > 8")
+    page.click(".play")
+    seen = [int(one.rsplit("frame", 1)[1]) for one in page.evaluate("window.seen")]
+    order = [frame for i, frame in enumerate(seen) if i == 0 or frame != seen[i - 1]]  # the small picture and the whole one
+    following = {1: 2, 2: 4, 4: 1}
+    assert all(b == following[a] for a, b in zip(order, order[1:])), order
+
+
+def test_a_video_is_made_on_request_and_says_how_far_it_is(farm, dashboard):
+    page = film(farm, dashboard)
+    page.evaluate("(() => { const s = document.querySelector('.player select'); s.value = '30'; s.dispatchEvent(new Event('change')); })()")
+    page.click(".video button")
+    page.wait("document.querySelector('.video').innerText.includes('waits')")
+    assert farm.submitted == [(SEQUENCE, {"exposure": 0, "fps": 30})]
+    assert page.evaluate("document.querySelector('.video button').disabled")
+
+    farm.video = {**farm.video, "state": "making", "frames_done": 2}
+    page.wait("document.querySelector('.video').innerText.includes('2 of 3 frames')")
+    farm.video = {**farm.video, "state": "ready", "frames_done": 3, "bytes": 3 << 20}
+    page.wait("document.querySelector('.video a')")
+
+    assert page.text(".video a") == "Video, 3.0 MiB"
+    assert page.evaluate("document.querySelector('.video a').getAttribute('href')") == f"/api/v1/jobs/{SEQUENCE}/video.mp4"
+    assert "30 per second" in page.text(".video")
+
+
+def test_a_farm_without_ffmpeg_says_so(farm, dashboard):
+    farm.no_video = "the coordinator's machine has no ffmpeg, which makes videos: install it there (apt-get install ffmpeg), then ask again"
+    page = film(farm, dashboard)
+    page.click(".video button")
+    page.wait("document.querySelector('.video').innerText.includes('apt-get install ffmpeg')")
+
+
+def test_who_may_only_read_sees_a_video_but_makes_none(farm, dashboard):
+    farm.role = "read"
+    farm.video = {**farm.video, "state": "ready", "frames": 3, "fps": 24, "bytes": 1000}
+    page = film(farm, dashboard)
+    page.wait("document.querySelector('.video a')")
+    assert page.count(".video button") == 0
 
 
 def test_the_files_of_all_frames_are_taken_along_and_the_range_is_sent(farm, dashboard, tmp_path):

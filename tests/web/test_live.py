@@ -107,7 +107,7 @@ def test_a_slow_list_does_not_undo_what_an_event_said_meanwhile(farm, dashboard)
       window.released = new Promise((resolve) => { window.release = resolve; });
       window.fetch = async (...request) => {
         const response = await real(...request);
-        if (request[0].endsWith("/jobs")) { window.held = true; await window.released; }
+        if (request[0].includes("/jobs?")) { window.held = true; await window.released; }
         return response;
       };
     })()""")
@@ -131,7 +131,7 @@ def test_of_two_lists_the_one_asked_for_later_holds(farm, dashboard):
       let lists = 0;
       window.released = new Promise((resolve) => { window.release = resolve; });
       window.fetch = async (...request) => {
-        const list = request[0].endsWith("/jobs") && ++lists;
+        const list = request[0].includes("/jobs?") && ++lists;
         const response = await real(...request);
         if (list === 1) { window.held = true; await window.released; }
         return response;
@@ -202,8 +202,8 @@ def test_tiles_in_flight_are_marked_until_they_are_folded_and_the_image_follows(
     farm.tiles = [TILE]
     farm.workers = {"w-1": worker("w-1", "lab-01"), "w-2": worker("w-2", "lab-02")}
     page = dashboard("#/jobs/j-1")
-    page.wait("document.querySelector('[data-tile=\"1\"]') && document.querySelector('live-image').dataset.painted")
-    pixel = "[...document.querySelector('live-image canvas').getContext('2d').getImageData(5, 5, 1, 1).data]"
+    page.wait("document.querySelector('[data-tile=\"1\"]') && document.querySelector('.stage live-image').dataset.painted")
+    pixel = "[...document.querySelector('.stage live-image canvas').getContext('2d').getImageData(5, 5, 1, 1).data]"
     assert page.evaluate(pixel)[:3] == [200, 120, 40]
 
     farm.image = png(64, 48, (20, 40, 240))
@@ -221,7 +221,7 @@ def test_the_image_is_not_asked_for_with_every_tile(farm, dashboard):
     """At most one request in 0.4 s (live_image.js), however many tiles come."""
     farm.jobs["j-1"] = job()
     page = dashboard("#/jobs/j-1")
-    page.wait("document.querySelector('live-image').dataset.painted")
+    page.wait("document.querySelector('.stage live-image').dataset.painted")
     before = farm.asked("GET", "/api/v1/jobs/j-1/image.png")
     began = page.evaluate("performance.now()")
 
@@ -229,7 +229,7 @@ def test_the_image_is_not_asked_for_with_every_tile(farm, dashboard):
         farm.emit("tile", {"job": "j-1", "tile": tile, "rect": [0, 0, 32, 32], "state": "folded", "spp": 8, "worker": "lab-01"})
         page.wait(f"document.querySelectorAll('.flash').length > {tile}")
 
-    page.wait("Number(document.querySelector('live-image').dataset.painted) >= 2")
+    page.wait("Number(document.querySelector('.stage live-image').dataset.painted) >= 2")
     elapsed_s = (page.evaluate("performance.now()") - began) / 1000
     assert 1 <= farm.asked("GET", "/api/v1/jobs/j-1/image.png") - before <= 2 + elapsed_s / 0.4
 

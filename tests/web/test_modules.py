@@ -1,10 +1,13 @@
 """The dashboard's pure functions, called in the browser that runs them."""
 import hashlib
 import json
+import pathlib
 
 import pytest
 
 from stub_farm import StubFarm
+
+SHOWN = pathlib.Path(__file__).resolve().parents[1] / "support/shown.json"
 
 
 @pytest.fixture(scope="module")
@@ -28,13 +31,14 @@ def test_own_sha256_agrees_with_a_known_one(modules, size):
     assert text == hashlib.sha256(data[:size]).hexdigest()
 
 
-@pytest.mark.parametrize("call, shown", [
-    ("figure(0)", "0"), ("figure(null)", "–"), ("figure(0.0021)", "0.00210"), ("figure(7.2e-5)", "7.20 × 10⁻⁵"), ("figure(1234)", "1,230"),
-    ("duration(0.42)", "0.4 s"), ("duration(59)", "59 s"), ("duration(252)", "4.2 min"), ("duration(4310)", "1 h 12 min"), ("duration(273600)", "3 d 4 h"), ("duration(null)", "–"),
-    ("bytes(1536)", "1.5 KiB"), ("bytes(0)", "0 B"), ("percent(1)", "100 %"), ("percent(0.9999)", "> 99 %"), ("percent(0.9949)", "99 %"), ("percent(0.0051)", "1 %"), ("percent(1e-6)", "< 1 %"), ("percent(0)", "0 %"),
-])
-def test_figures_are_written_for_people(modules, call, shown):
-    assert modules.evaluate(f"import('/js/format.js').then(({{ figure, duration, bytes, percent }}) => {call})") == shown
+@pytest.mark.parametrize("what, module, function", [
+    ("figure", "format", "figure"), ("given", "format", "given"), ("duration", "format", "duration"), ("count", "format", "count"), ("samples", "format", "spp"),
+    ("bytes", "format", "bytes"), ("percent", "format", "percent"), ("error_ticks", "plot_scale", "errorTicks"), ("time_ticks", "plot_scale", "timeTicks")])
+def test_figures_and_ticks_are_shown_as_in_reports(modules, what, module, function):
+    """The report's own are held to the same table by words_test.cpp and log_axis_test.cpp."""
+    for value, shown in json.loads(SHOWN.read_text())[what]:
+        call = f"f({json.dumps(value)})" if not what.endswith("ticks") else f"f({{ lo: {value[0]}, hi: {value[1]} }}).map((t) => t.label).filter(Boolean)"
+        assert modules.evaluate(f"import('/js/{module}.js').then(({{ {function}: f }}) => {call})") == shown, value
 
 
 @pytest.mark.parametrize("path, main, name", [

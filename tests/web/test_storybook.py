@@ -8,6 +8,7 @@ FACTS = {
     "jobs": ["7 jobs", "steam-bath.xml", "43 %", "215 / 512", "0.00418", "4.2 min", "1 h 12 min", "7.20 × 10⁻⁵", "failed",
              "don't trust yet", "at least 1 h 12 min", "36 until the target"],
     "jobs-confirm": ["Really cancel", "Keep"],
+    "jobs-page": ["3,214 jobs · 12 rendering · 80 waiting", "2 jobs picked", "Pick none", "101 – 107 of 3,214", "everybody", "done 3,080"],
     "jobs-lost": ["connection lost", "The coordinator does not answer."],
     "job": ["steam-bath.xml", "0.00390 – 0.00448", "4.2 min left", "Error against time", "target 0.001", "clean", "tile 104", "lab-03", "EXR",
             "3.1 min to 5.5 min", "with 8 more: 66 s", "slope −0.98 (−1.06 to −0.90)", "converging as expected", "target 0.001 at 7.3 min (6.2 min to 8.6 min)",
@@ -24,10 +25,14 @@ FACTS = {
     "job-failed": ["The job failed", "SIGSEGV on 3 workers", "lightshaft render forge-v12.xml --pixel 412,96 --sample 11"],
     "job-unhealthy": ["The numbers of this image are not clean", "3 samples were not a number (NaN); they count as zero; first at pixel 412,96, sample 11.", "lightshaft render steam-bath.xml --size 640x360 -D density=2.5 --pixel 412,96 --sample 11", "1,204 times a medium was denser", "37 negative values of volumes of the scene were made 0.", "2 warnings about the scene", "Don't trust this estimate yet"],
     "job-unknown": ["There is no job \"nope\"."],
+    "viewer": ["fogbox.xml", "640 × 360", "Exposure", "Pixel 233, 120", "R 0.7341 ± 0.018", "512 samples", "Region 300, 250 to 420, 330: mean R 0.2113 ± 4.0"],
+    "viewer-compare": ["Compare with", "Wipe", "Difference", "relMSE", "FLIP"],
+    "viewer-error": ["relative standard error of a pixel, from 0.1 % to 100 % or more", "Relative error", "Point at a pixel"],
+    "viewer-objects": ["Picked: lamp"],
     "workers": ["5 workers", "36 threads", "lab-01", "fetching steam.vdb", "2 numeric classes", "lost", "6.2 min ago"],
     "workers-empty": ["No worker is connected", "lightshaft-worker --coordinator"],
     "submit": ["Drop a scene here", "Choose a folder"],
-    "submit-ready": ["bath.xml", "meshes/tub.obj", "61 MiB", "not named by the scene", "Render"],
+    "submit-ready": ["bath.xml", "meshes/tub.obj", "61.4 MiB", "not named by the scene", "Render"],
     "submit-missing": ["textures/tiles.png", "missing: add this file"],
     "submit-sending": ["Sending steam.vdb"],
     "submit-refused": ["bath.xml:14:16 error medium \"grid\" has no parameter 'sigmat'; did you mean 'sigma_t'?", "^~~~~~~~~~~~~"],
@@ -71,11 +76,11 @@ def test_markup_in_names_and_messages_is_shown_as_text(open_page, farm, view, pl
 
 def test_live_image_is_painted_and_tiles_in_flight_are_marked_in_their_workers_colour(open_page, farm):
     page = open_page(f"{farm.url}/demo.html?view=job")
-    page.wait("document.querySelector('live-image').dataset.painted")
+    page.wait("document.querySelector('.stage live-image').dataset.painted")
 
     colours = page.evaluate("[...document.querySelectorAll('.mark-tile')].map(mark => getComputedStyle(mark).stroke)")
     bright = page.evaluate("""(() => {
-      const canvas = document.querySelector('live-image canvas');
+      const canvas = document.querySelector('.stage live-image canvas');
       const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
       return data.filter((value, i) => i % 4 < 3 && value > 120).length;
     })()""")
@@ -87,13 +92,13 @@ def test_live_image_is_painted_and_tiles_in_flight_are_marked_in_their_workers_c
 
 def test_exposure_repaints_the_image_brighter(open_page, farm):
     page = open_page(f"{farm.url}/demo.html?view=job")
-    page.wait("document.querySelector('live-image').dataset.painted === '1'")
-    mean = "(() => { const c = document.querySelector('live-image canvas'); return c.getContext('2d').getImageData(0, 0, c.width, c.height).data.reduce((a, b) => a + b, 0); })()"
+    page.wait("document.querySelector('.stage live-image').dataset.painted === '1'")
+    mean = "(() => { const c = document.querySelector('.stage live-image canvas'); return c.getContext('2d').getImageData(0, 0, c.width, c.height).data.reduce((a, b) => a + b, 0); })()"
     before = page.evaluate(mean)
 
     page.evaluate("document.getElementById('exposure').focus()")
     page.key("PageUp", virtual=33)
-    page.wait("document.querySelector('live-image').dataset.painted === '2'")
+    page.wait("document.querySelector('.stage live-image').dataset.painted === '2'")
 
     assert page.evaluate(mean) > before
     assert page.text("output").startswith("+")

@@ -46,6 +46,10 @@ Table all_cases() {
   add_microfacets(t);
   add_places(t);
   add_bodies(t);
+  add_skies(t);
+  add_coatings(t);
+  add_overlaps(t);
+  add_slopes(t);
   add_bugs(t);
   return t;
 }

@@ -9,55 +9,35 @@
 namespace ls::cases {
 namespace {
 
-constexpr double kGreyReflectance = .5;
-
-// A floor seen from the side, at the point at the origin; its radiance = reflectance / pi x irradiance.
-SceneBuilder floor() {
-  SceneBuilder builder;
-  const BsdfIndex white = builder.diffuse(kGreyReflectance);
-  builder.shape(RectangleShape{}, scale(3), white);
-  builder.scene.integrator.max_depth = 2;
-  builder.look({-2, 1, .6}, {0, 0, 0}, 1e-3);
-  return builder;
-}
-
 void direct(Table& t) {
   // BSDF sampling hits the smallest of these lights once in 40,000 paths, and finds a correspondingly small
   // share of its light.
   const auto add = [&](const char* name, SceneBuilder builder, double irradiance) {
     t.mean(std::string("7.6g-") + name, "7.6g N26", "Direct light on a floor, by the light's closed form.",
-           std::move(builder), grey(irradiance * kGreyReflectance / kPi), {.slack = 5e-5});
-  };
-  const auto area = [](SceneBuilder& builder, const Geometry& g, const Transform& t) {
-    const TextureIndex one = builder.texture(rgb(1));
-    const BsdfIndex black = builder.diffuse(0);
-    builder.shape(g, t, black).emitter = AreaEmitter{one};
+           std::move(builder), reflected(irradiance), {.slack = 5e-5});
   };
   {
-    // A square of half side a at height h above its centre: four corners, each by Lambert's formula with x =
-    // a/h, E = x / sqrt(1 + x^2) atan(x / sqrt(1 + x^2)).
-    SceneBuilder builder = floor();
-    area(builder, RectangleShape{}, translate({0, 0, 1.25}) * rotate_x(180) * scale(.8));
-    const double x = .8 / 1.25, s = std::sqrt(1 + x * x);
-    add("direct-square", builder, 4 * x / s * std::atan(x / s));
+    SceneBuilder builder = floor_point();
+    builder.lamp(RectangleShape{}, translate({0, 0, 1.25}) * rotate_x(180) * scale(.8));
+    add("direct-square", builder, below_a_square(.8 / 1.25));
   }
   {
-    SceneBuilder builder = floor();
-    area(builder, DiskShape{}, translate({0, 0, 1.5}) * rotate_x(180) * scale(.7));
+    SceneBuilder builder = floor_point();
+    builder.lamp(DiskShape{}, translate({0, 0, 1.5}) * rotate_x(180) * scale(.7));
     add("direct-disk", builder, kPi * .49 / (.49 + 2.25));
   }
   {
-    SceneBuilder builder = floor();
-    area(builder, SphereShape{}, translate({0, 0, 2}) * scale(.5));
+    SceneBuilder builder = floor_point();
+    builder.lamp(SphereShape{}, translate({0, 0, 2}) * scale(.5));
     add("direct-sphere", builder, kPi * .25 / 4);
   }
   {
-    SceneBuilder builder = floor();  // solid angle 8e-5 sr
-    area(builder, SphereShape{}, translate({0, 0, 1000}) * scale(5));
+    SceneBuilder builder = floor_point();  // solid angle 8e-5 sr
+    builder.lamp(SphereShape{}, translate({0, 0, 1000}) * scale(5));
     add("direct-distant-sphere", builder, kPi * 25 / 1e6);
   }
   {
-    SceneBuilder builder = floor();
+    SceneBuilder builder = floor_point();
     builder.scene.emitters.push_back(PointEmitter{{.5, 0, 1}, rgb(3)});
     add("direct-point", builder, 3 / std::pow(1.25, 1.5));
   }
@@ -65,15 +45,23 @@ void direct(Table& t) {
     // The direction to the floor's point is 20 degrees off the light's axis, halfway between beam (10
     // degrees) and cutoff (30), so the intensity is a half. The light is aimed along -z.
     const double tangent = std::tan(20 * kPi / 180), cosine = std::cos(20 * kPi / 180);
-    SceneBuilder builder = floor();
+    SceneBuilder builder = floor_point();
     builder.scene.emitters.push_back(
         SpotEmitter{translate({tangent, 0, 1}) * rotate_x(180), rgb(2), 30, 10, {}});
     add("direct-spot-falloff", builder, .5 * 2 * cosine * cosine * cosine);
   }
   {
+    // In quarters of two colours: from below as much is seen of one as of the other.
+    SceneBuilder builder = floor_point();
+    const TextureIndex dark = builder.texture(rgb(.25)), bright = builder.texture(rgb(1.5));
+    builder.lamp(SphereShape{}, translate({0, 0, 2}) * scale(.5)).emitter = AreaEmitter{
+        SceneBuilder::push<TextureTag>(builder.scene.textures, CheckerboardTexture{dark, bright, {}})};
+    add("direct-checkered-sphere", builder, kPi * .25 / 4 * (.25 + 1.5) / 2);
+  }
+  {
     // Lights of all kinds in one scene, to test the choice among lights.
-    SceneBuilder builder = floor();
-    area(builder, SphereShape{}, translate({0, 0, 2}) * scale(.5));
+    SceneBuilder builder = floor_point();
+    builder.lamp(SphereShape{}, translate({0, 0, 2}) * scale(.5));
     builder.scene.emitters.push_back(PointEmitter{{.5, 0, 1}, rgb(.3)});
     builder.scene.emitters.push_back(DirectionalEmitter{{1, 0, -1}, rgb(.2)});
     add("direct-three-lights", builder, kPi * .25 / 4 + .3 / std::pow(1.25, 1.5) + .2 / std::sqrt(2.));
@@ -107,7 +95,7 @@ void add_direct_light(Table& t) {
     // A closed room that emits 1 and reflects half: 1 / (1 - .5).
     SceneBuilder builder;
     const TextureIndex one = builder.texture(rgb(1));
-    const BsdfIndex white = builder.diffuse(kGreyReflectance);
+    const BsdfIndex white = builder.diffuse(.5);
     Shape& s = sphere ? builder.shape(SphereShape{}, {}, white) : builder.shape(CubeShape{}, {}, white);
     s.flip_normals = true;
     s.emitter = AreaEmitter{one};

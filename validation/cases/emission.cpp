@@ -12,18 +12,6 @@ namespace {
 
 constexpr Rgb kSigma{0, 1, 16}, kEmission{1, 2.5, 4};
 
-// Sets the emission of homogeneous media or constant volumes in either of the two ways: per length, or
-// (`per_absorption`) as source radiance.
-void set_emission(SceneBuilder& builder, MediumIndex m, const Rgb& emission, bool per_absorption) {
-  if (auto* h = std::get_if<HomogeneousMedium>(&builder.scene.media[m.value])) {
-    (per_absorption ? h->source_radiance : h->emission) = emission;
-    return;
-  }
-  const VolumeIndex v = builder.constant(emission);
-  auto& h = std::get<HeterogeneousMedium>(builder.scene.media[m.value]);
-  (per_absorption ? h.source_radiance : h.emission) = v;
-}
-
 std::vector<float> hills(std::size_t n) {
   std::vector<float> v(n);
   for (std::size_t i = 0; i < n; ++i) v[i] = static_cast<float>((i * 7919) % 13) / 6;
@@ -37,7 +25,7 @@ void absorbing(Table& t) {
     SceneBuilder builder;
     const MediumIndex m =
         grid ? builder.heterogeneous(builder.constant(sigma), rgb(0)) : builder.homogeneous(sigma, rgb(0));
-    set_emission(builder, m, kEmission, per_absorption);
+    builder.set_emission(m, kEmission, per_absorption);
     builder.container(CubeShape{}, translate({.5, .5, .5}) * scale(.5), builder.null(), m);
     builder.look({-3, .5, .5}, {.5, .5, .5});
     Channels expected;
@@ -69,7 +57,7 @@ void enclosures(Table& t) {
       const auto* h = std::get_if<HomogeneousMedium>(&builder.scene.media[m.value]);
       emission[k] = kEmission[k] * (per_absorption ? 1 : h->sigma_t[k] * (1 - h->albedo[k]));
     }
-    set_emission(builder, m, emission, per_absorption);
+    builder.set_emission(m, emission, per_absorption);
     const BsdfIndex walls = mirrors ? builder.mirror() : builder.diffuse(0);
     const TextureIndex light = builder.texture(kEmission);
     Shape& s = builder.shape(CubeShape{}, {}, walls);
@@ -103,18 +91,9 @@ void enclosures(Table& t) {
 // at the sides make it infinite.
 void emitting_slabs(Table& t) {
   const auto add = [&](const char* name, double albedo, double g, double tau, double expected) {
-    SceneBuilder builder;
-    const MediumIndex m = builder.homogeneous(rgb(1), rgb(albedo), g);
-    set_emission(builder, m, rgb(1), true);
-    const BsdfIndex mirror = builder.mirror(), null = builder.null();
-    const double top = tau + 3, bottom = -2, half = (top - bottom) / 2, middle = (top + bottom) / 2;
-    for (const double x : {-.5, .5}) {
-      builder.shape(RectangleShape{}, translate({x, 0, middle}) * rotate_y(90) * scale(half, .6, 1), mirror);
-      builder.shape(RectangleShape{}, translate({0, x, middle}) * rotate_x(90) * scale(.6, half, 1), mirror);
-    }
-    builder.container(RectangleShape{}, translate({0, 0, tau}) * scale(.6), null, m);
-    builder.container(RectangleShape{}, rotate_x(180) * scale(.6), null, m);
-    builder.look({.1, .15, tau + 1}, {.1, .15, 0}, 1e-3, {0, 1, 0});
+    SceneBuilder builder = column({}, {.albedo = albedo, .g = g, .tau = tau, .wall = .5}, false);
+    builder.set_emission(MediumIndex{0}, rgb(1), true);
+    builder.scene.emitters.clear();
     t.mean(std::string("7.6b-") + name, "7.6b 7.2",
            "A scattering slab of source 1 before the dark: 1 - R - T.", builder, grey(expected),
            {.slack = 5e-6, .slow = true});

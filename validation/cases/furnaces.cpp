@@ -1,23 +1,15 @@
 // Furnace tests: uniform light from all directions and no absorption make everything as bright as the light.
 #include <fmt/format.h>
 
-#include <random>
-
 #include "validation/fixtures/case.h"
 #include "validation/fixtures/fixtures.h"
+#include "validation/fixtures/sky_builder.h"
 
 namespace ls::cases {
 namespace {
 
 constexpr Rgb kColours{1, 2.5, 4};
-
-std::vector<float> random_densities(std::size_t n, unsigned seed) {
-  std::mt19937 rng(seed);
-  std::vector<float> v(n);
-  // Many empty voxels, some dense ones.
-  for (float& x : v) x = rng() % 3 == 0 ? static_cast<float>(rng() % 1000) / 250.f : 0.f;
-  return v;
-}
+const Transform kBox = box({-1, -1, -1}, {1, 1, 1});
 
 void white_sky(Table& t) {
   const auto add = [&](const char* name, SceneBuilder builder) {
@@ -43,18 +35,35 @@ void white_sky(Table& t) {
   }
   {
     SceneBuilder builder;
-    const Transform box = translate({-1, -1, -1}) * scale(2);
-    const VolumeIndex v = builder.grid({12, 9, 7}, random_densities(12 * 9 * 7, 5), box);
+    const VolumeIndex v = builder.grid({12, 9, 7}, patchy(12 * 9 * 7, 5), kBox);
     builder.container(CubeShape{}, {}, builder.null(), builder.heterogeneous(v, rgb(1), 2, -.5));
     add("grid-backward", builder);
   }
   {
     SceneBuilder builder;
     const Transform box = rotate_x(20) * translate({-.5, -.5, -.5});
-    const MediumIndex m =
-        builder.heterogeneous(builder.grid({6, 5, 4}, random_densities(120, 9), box), rgb(1), 3, .6);
+    const MediumIndex m = builder.heterogeneous(builder.grid({6, 5, 4}, patchy(120, 9), box), rgb(1), 3, .6);
     builder.container(SphereShape{}, {}, builder.null(), m);
     add("rotated-grid-in-sphere", builder);
+  }
+  {
+    // Three channels with a density each, and the same in balance with its surroundings: a medium of their
+    // radiance is not seen, whatever its albedo.
+    for (const bool warm : {false, true}) {
+      SceneBuilder builder;
+      const VolumeIndex v = builder.grid({12, 9, 7}, patchy(12 * 9 * 7 * 3, 5), kBox, 3);
+      const MediumIndex m = builder.heterogeneous(v, warm ? Rgb{.8, .3, .5} : rgb(1), 2, -.5);
+      if (warm) builder.set_emission(m, rgb(1), true);
+      builder.container(CubeShape{}, {}, builder.null(), m);
+      add(warm ? "three-channel-grid-in-balance" : "three-channel-grid", builder);
+    }
+  }
+  {
+    // Cells so dense that their voxels are followed one by one, and others that are tracked.
+    SceneBuilder builder;
+    const VolumeIndex v = builder.grid({12, 9, 7}, patchy(12 * 9 * 7, 6), kBox);
+    builder.container(CubeShape{}, {}, builder.null(), builder.heterogeneous(v, rgb(1), 30, .8));
+    add("dense-grid", builder);
   }
   {
     SceneBuilder builder;
@@ -79,11 +88,7 @@ void shining_walls(Table& t) {
   const auto add = [&](const char* name, const Geometry& walls, const Transform& to_world, auto medium) {
     SceneBuilder builder;
     const MediumIndex m = medium(builder);
-    const BsdfIndex black = builder.diffuse(0);
-    const TextureIndex light = builder.texture(rgb(1));
-    Shape& s = builder.shape(walls, to_world, black);
-    s.flip_normals = true;
-    s.emitter = AreaEmitter{light};
+    builder.lamp(walls, to_world).flip_normals = true;
     builder.scene.sensor.medium = m;
     builder.look({.2, -.3, .1}, {.5, .9, 0}, 60);
     for (const bool distant : {false, true}) {
@@ -98,8 +103,8 @@ void shining_walls(Table& t) {
   const auto forward = [](SceneBuilder& k) { return k.homogeneous(rgb(1), rgb(1), .7); };
   const auto chromatic = [](SceneBuilder& k) { return k.homogeneous(kColours, rgb(1), .3); };
   const auto grid = [](SceneBuilder& k) {
-    return k.heterogeneous(k.grid({8, 8, 8}, random_densities(512, 3), translate({-2, -2, -2}) * scale(4)),
-                           rgb(1), 1, .4);
+    return k.heterogeneous(k.grid({8, 8, 8}, patchy(512, 3), translate({-2, -2, -2}) * scale(4)), rgb(1), 1,
+                           .4);
   };
   add("shining-sphere-isotropic", SphereShape{}, {}, thin);
   add("shining-sphere-chromatic", SphereShape{}, {}, chromatic);
@@ -110,8 +115,7 @@ void shining_walls(Table& t) {
     // sampled.
     SceneBuilder builder;
     const MediumIndex m = builder.homogeneous(rgb(.8), rgb(1), .2);
-    const BsdfIndex black = builder.diffuse(0), open = builder.null();
-    const TextureIndex light = builder.texture(rgb(1));
+    const BsdfIndex open = builder.null();
     const Transform sides[] = {Transform{},  rotate_x(90),  rotate_x(-90),
                                rotate_y(90), rotate_y(-90), rotate_x(180)};
     for (int i = 0; i < 6; ++i) {  // each at distance 1, facing the origin
@@ -122,7 +126,7 @@ void shining_walls(Table& t) {
         window.exterior = m;
         window.is_medium_transition = true;
       } else {
-        builder.shape(RectangleShape{}, to_world, black).emitter = AreaEmitter{light};
+        builder.lamp(RectangleShape{}, to_world);
       }
     }
     builder.environment();
@@ -133,11 +137,51 @@ void shining_walls(Table& t) {
   }
 }
 
+// A furnace by maps and by walls, with every setting that looks for light along segments.
+void surrounded(Table& t) {
+  constexpr Configuration kVolpath{}, kMis{false, true}, kPoint{.camera_points = 1},
+      kPoints{.camera_points = 5}, kEquiangular{false, true, DistanceSampling::equiangular},
+      kExponential{false, true, DistanceSampling::exponential};
+  struct Surroundings {
+    const char* name;
+    void (*add)(SceneBuilder&);
+    std::vector<Configuration> configurations;
+  };
+  const Surroundings all[] = {
+      {"a-constant", [](SceneBuilder& builder) { builder.environment(); }, {kMis, kPoint, kPoints}},
+      {"a-map",
+       [](SceneBuilder& builder) { add_sky(builder, SkyImage(16, 9, 1), rotate_x(30) * rotate_y(20)); },
+       {kVolpath, kEquiangular, kMis, kPoint, kPoints}},
+      {"walls",
+       [](SceneBuilder& builder) { builder.lamp(CubeShape{}, scale(4)).flip_normals = true; },
+       {kExponential, kEquiangular, kMis, kPoint, kPoints}}};
+  const auto add = [&](const Surroundings& s, const char* name, SceneBuilder builder,
+                       const Configuration& configuration) {
+    s.add(builder);
+    builder.look({.4, -3, .7}, {0, 0, 0}, 30);
+    configuration.choose(builder);
+    t.mean(fmt::format("7.6c-{}-in-{}/{}", name, s.name, configuration.integrator_name()), "7.6c N27",
+           "White media in light from everywhere: as bright as that.", builder, grey(1), {.channels = true});
+  };
+  SceneBuilder ball, grid, glass;
+  ball.container(SphereShape{}, {}, ball.null(), ball.homogeneous(kColours, rgb(1), .6));
+  grid.container(CubeShape{}, {}, grid.null(),
+                 grid.heterogeneous(grid.grid({12, 9, 7}, patchy(12 * 9 * 7, 5), kBox), rgb(1), 2, -.5));
+  glass.container(SphereShape{}, {}, glass.glass(1.4), glass.homogeneous(rgb(2), rgb(1), .5));
+  for (const Surroundings& s : all)
+    for (const Configuration& configuration : s.configurations) {
+      add(s, "chromatic-ball", ball, configuration);
+      add(s, "grid", grid, configuration);
+    }
+  add(all[1], "filled-glass", glass, kVolpath);
+}
+
 }  // namespace
 
 void add_furnaces(Table& t) {
   white_sky(t);
   shining_walls(t);
+  surrounded(t);
 }
 
 }  // namespace ls::cases

@@ -187,9 +187,7 @@ void along_faces(Table& t) {
     Vec3 from, to;
   };
   const std::array<int, 3> n{8, 8, 8};
-  std::vector<float> values(512);
-  std::mt19937 rng(12);
-  for (float& v : values) v = rng() % 3 == 0 ? static_cast<float>(rng() % 1000) / 250.f : 0.f;
+  const std::vector<float> values = patchy(512, 12);
   const Line lines[] = {{"axis-through-centres", {0, .5625, .4375}, {1, .5625, .4375}},
                         {"axis-along-edges", {.5, .5, 0}, {.5, .5, 1}},
                         {"axis-backwards", {.25, 1, .5}, {.25, 0, .5}},

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 
-#include "common/image/exr/exr_file.h"
 #include "validation/fixtures/case.h"
 #include "validation/fixtures/checks.h"
 #include "validation/fixtures/fixtures.h"
+#include "validation/fixtures/sky_builder.h"
 
 namespace ls::cases {
 namespace {
@@ -20,8 +20,7 @@ SceneBuilder plates(int m) {
     builder.shape(RectangleShape{}, translate({0, 0, 2. * i + 1}) * scale(4 * m + 10), glass);
     builder.shape(RectangleShape{}, translate({0, 0, 2. * i}) * rotate_x(180) * scale(4 * m + 10), glass);
   }
-  builder.shape(RectangleShape{}, translate({0, 0, -2}) * scale(4 * m + 10), builder.diffuse(0)).emitter =
-      AreaEmitter{builder.texture(rgb(1))};
+  builder.lamp(RectangleShape{}, translate({0, 0, -2}) * scale(4 * m + 10));
   builder.look({0, 0, 2. * m + 5}, {0, 0, 0}, 1e-4, {0, 1, 0});
   return builder;
 }
@@ -63,8 +62,8 @@ void stacks(Table& t) {
 SceneBuilder mesh(const std::string& more) {
   SceneBuilder builder;
   MeshShape m;
-  m.file = text_file(builder, "mesh.obj",
-                     "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3\n" + more + "f 1 3 4\n");
+  m.file =
+      builder.asset("mesh.obj", "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3\n" + more + "f 1 3 4\n");
   builder.shape(m, scale(2), builder.diffuse(.5));
   builder.environment();
   builder.look({0, -4, 3}, {0, 0, 0}, 40);
@@ -128,15 +127,8 @@ void shapes(Table& t) {
 // Textures.
 SceneBuilder painted(float texel, const UvTransform& to_uv = {}, int side = 1) {
   SceneBuilder builder;
-  ExrPicture picture;
-  picture.size = {side, side};
-  for (const char* c : {"R", "G", "B"})
-    picture.channels[c] = ExrFloat{std::vector<float>(static_cast<std::size_t>(side * side), texel)};
-  const auto bytes = write_exr(picture);
   BitmapTexture image;
-  if (bytes)
-    image.file =
-        text_file(builder, "paint.exr", {reinterpret_cast<const char*>(bytes->data()), bytes->size()});
+  image.file = add_image(builder, SkyImage(side, side, texel), "paint.exr");
   image.to_uv = to_uv;
   builder.shape(RectangleShape{}, scale(50),
                 builder.bsdf(DiffuseBsdf{SceneBuilder::push<TextureTag>(builder.scene.textures, image)}));

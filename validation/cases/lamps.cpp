@@ -119,9 +119,8 @@ void from_afar(Table& t) {
            [=] {
              SceneBuilder builder = lit_cube(configuration, rgb(.01), rgb(1));
              builder.scene.emitters.clear();
-             const TextureIndex light = builder.texture(rgb(1 / (2 * kPi * (1 - std::sqrt(.99)))));
-             builder.shape(SphereShape{}, translate({0, 1e3, 0}) * scale(1e2), builder.diffuse(0)).emitter =
-                 AreaEmitter{light};
+             builder.lamp(SphereShape{}, translate({0, 1e3, 0}) * scale(1e2),
+                          rgb(1 / (2 * kPi * (1 - std::sqrt(.99)))));
              return builder;
            },
            // The lamp's rim is 0.1 rad off the vertical, so the way down through the cube is longer by at
@@ -161,10 +160,8 @@ void enormous(Table& t) {
              [=] {
                SceneBuilder builder = lit_cube(configuration, rgb(1), rgb(1));
                builder.scene.emitters.clear();
-               builder
-                   .shape(light.shape, translate({0, kFar, 0}) * rotate_x(90) * scale(kSize),
-                          builder.diffuse(0))
-                   .emitter = AreaEmitter{builder.texture(rgb(1 / light.solid_angle))};
+               builder.lamp(light.shape, translate({0, kFar, 0}) * rotate_x(90) * scale(kSize),
+                            rgb(1 / light.solid_angle));
                return builder;
              },
              // The light's rim is 0.01 rad off the vertical, 0.014 in the corners: ways down are longer by at

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <fstream>
 
 #include "validation/fixtures/case.h"
 #include "validation/fixtures/checks.h"
@@ -12,50 +11,31 @@
 namespace ls::cases {
 namespace {
 
-constexpr double kReflectance = .5;
-
-// A floor seen from the side, at the point at the origin; its radiance = reflectance / pi x irradiance.
-SceneBuilder floor_point(double size = 3) {
-  SceneBuilder builder;
-  builder.shape(RectangleShape{}, scale(size), builder.diffuse(kReflectance));
-  builder.scene.integrator.max_depth = kOnce;
-  builder.look({-2, 1, .6}, {0, 0, 0}, 1e-3);
-  return builder;
-}
-void add_light(SceneBuilder& builder, const Geometry& g, const Transform& t, double radiance = 1) {
-  const TextureIndex light = builder.texture(rgb(radiance));
-  const BsdfIndex black = builder.diffuse(0);
-  builder.shape(g, t, black).emitter = AreaEmitter{light};
-}
-Channels reflected(double irradiance) { return grey(irradiance * kReflectance / kPi); }
-
 void tiny(Table& t) {
   for (const double ratio : {1e-1, 1e-3, 1e-5}) {
     const double r = 1000 * ratio, slack = 1e-6;
     t.mean(fmt::format("N26-sphere-r/d-{:g}", ratio), "N26 7.6g", "A shining sphere: pi r^2 / d^2.",
            [=] {
              SceneBuilder builder = floor_point();
-             add_light(builder, SphereShape{}, translate({0, 0, 1000}) * scale(r));
+             builder.lamp(SphereShape{}, translate({0, 0, 1000}) * scale(r));
              return builder;
            },
            reflected(kPi * ratio * ratio), {.slack = slack});
     t.mean(fmt::format("N26-disk-r/d-{:g}", ratio), "N26 7.6g", "A shining disk: pi sin^2 of its half angle.",
            [=] {
              SceneBuilder builder = floor_point();
-             add_light(builder, DiskShape{}, translate({0, 0, 1000}) * rotate_x(180) * scale(r));
+             builder.lamp(DiskShape{}, translate({0, 0, 1000}) * rotate_x(180) * scale(r));
              return builder;
            },
            reflected(kPi * ratio * ratio / (1 + ratio * ratio)), {.slack = slack});
-    t.mean(
-        fmt::format("N26-square-a/d-{:g}", ratio), "N26 7.6g",
-        "A shining square: Lambert's formula at its corners.",
-        [=] {
-          SceneBuilder builder = floor_point();
-          add_light(builder, RectangleShape{}, translate({0, 0, 1000}) * rotate_x(180) * scale(r));
-          return builder;
-        },
-        reflected(4 * ratio / std::sqrt(1 + ratio * ratio) * std::atan(ratio / std::sqrt(1 + ratio * ratio))),
-        {.slack = slack});
+    t.mean(fmt::format("N26-square-a/d-{:g}", ratio), "N26 7.6g",
+           "A shining square: Lambert's formula at its corners.",
+           [=] {
+             SceneBuilder builder = floor_point();
+             builder.lamp(RectangleShape{}, translate({0, 0, 1000}) * rotate_x(180) * scale(r));
+             return builder;
+           },
+           reflected(below_a_square(ratio)), {.slack = slack});
   }
 }
 
@@ -64,11 +44,8 @@ void huge(Table& t) {
       "N27-inside-a-shining-sphere", "N27", "A disk inside a shining sphere: irradiance pi.",
       [] {
         SceneBuilder builder;
-        builder.shape(DiskShape{}, scale(.1), builder.diffuse(kReflectance));
-        const TextureIndex light = builder.texture(rgb(1));
-        Shape& s = builder.shape(SphereShape{}, {}, builder.diffuse(0));
-        s.flip_normals = true;
-        s.emitter = AreaEmitter{light};
+        builder.shape(DiskShape{}, scale(.1), builder.diffuse(.5));
+        builder.lamp(SphereShape{}, {}).flip_normals = true;
         builder.scene.integrator.max_depth = kOnce;
         builder.look({-.2, .1, .1}, {0, 0, 0}, 1e-3);
         return builder;
@@ -76,17 +53,16 @@ void huge(Table& t) {
       reflected(kPi));
   for (const double height : {1e-3, .1, 1.}) {
     // The light is a square of half side 1 at this height.
-    const double x = 1 / height, s = std::sqrt(1 + x * x);
     t.mean(fmt::format("N27-square-at-{:g}", height), "N27 7.6g",
            "A floor this close below a shining square: up to pi, where the square is all it sees.",
            [=] {
              SceneBuilder builder = floor_point(1);
-             add_light(builder, RectangleShape{}, translate({0, 0, height}) * rotate_x(180));
+             builder.lamp(RectangleShape{}, translate({0, 0, height}) * rotate_x(180));
              builder.look({-.9, .1, height / 2}, {0, 0, 0}, 1e-4);
              builder.scene.sensor.near_clip = 1e-9;
              return builder;
            },
-           reflected(4 * x / s * std::atan(x / s)), {.slack = 1e-5});
+           reflected(below_a_square(1 / height)), {.slack = 1e-5});
   }
   // The floor at the foot of an emitting wall that is 20 wide and 10 high: the answer is atan(b / c) - c / r
   // atan(b / r), r^2 = c^2 + h^2.
@@ -94,8 +70,8 @@ void huge(Table& t) {
   t.mean("N27-at-the-foot-of-a-wall", "N27 7.6g", "A floor up to the very edge of a shining wall.",
          [] {
            SceneBuilder builder;
-           builder.shape(RectangleShape{}, translate({1, 0, 0}), builder.diffuse(kReflectance));
-           add_light(builder, RectangleShape{}, rotate_y(90) * scale(kSide));
+           builder.shape(RectangleShape{}, translate({1, 0, 0}), builder.diffuse(.5));
+           builder.lamp(RectangleShape{}, rotate_y(90) * scale(kSide));
            builder.scene.integrator.max_depth = kOnce;
            builder.look({1, 0, 2}, {kFar, 0, 0}, 1e-4);
            return builder;
@@ -110,7 +86,7 @@ AssetIndex obj(SceneBuilder& builder, const std::vector<std::array<Vec3, 3>>& tr
     for (const Vec3& p : triangle) text += fmt::format("v {} {} {}\n", p[0], p[1], p[2]);
   for (std::size_t i = 0; i < triangles.size(); ++i)
     text += fmt::format("f {} {} {}\n", 3 * i + 1, 3 * i + 2, 3 * i + 3);
-  return text_file(builder, "lamp.obj", text);
+  return builder.asset("lamp.obj", text);
 }
 
 void of_nothing(Table& t) {
@@ -129,14 +105,13 @@ void of_nothing(Table& t) {
     if (proper) triangles.push_back({a, d, c});
     MeshShape mesh;
     mesh.file = obj(builder, triangles);
-    add_light(builder, mesh, {});
+    builder.lamp(mesh, {});
     return builder;
   };
-  const double x = .8 / 1.25, s = std::sqrt(1 + x * x);
   t.mean(
       "N28-triangles-without-area-among-others", "N28 N40",
       "They are left out, and the light is what it was.", [=] { return lamp(true, true); },
-      reflected(4 * x / s * std::atan(x / s)));
+      reflected(below_a_square(.8 / 1.25)));
   t.exact("N28-no-area-at-all", "N28", "A light of triangles without area: black, and nothing goes wrong.",
           [=](const Bench& b) { return every_value(b, lamp(true, false), 16, grey(0), 0); });
   t.exact("N29-light-of-no-power", "N29", "A black light is left out: the same bits as without it.",
@@ -151,7 +126,7 @@ void of_nothing(Table& t) {
   t.exact("N29-only-black-lights", "N29", "Lights of no power alone: black.", [](const Bench& b) {
     SceneBuilder builder = floor_point();
     builder.scene.emitters.push_back(PointEmitter{{0, .5, 1}, rgb(0)});
-    add_light(builder, SphereShape{}, translate({0, 0, 2}) * scale(.5), 0);
+    builder.lamp(SphereShape{}, translate({0, 0, 2}) * scale(.5), rgb(0));
     return every_value(b, builder, 16, grey(0), 0);
   });
 }

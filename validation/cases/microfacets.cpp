@@ -68,9 +68,9 @@ constexpr double kLean = 80 * kPi / 180;
 SceneBuilder leaning() {
   SceneBuilder builder;
   MeshShape m;
-  m.file = text_file(builder, "floor.obj",
-                     "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn .984807753 0 .173648178\n"
-                     "f 1//1 2//1 3//1\nf 1//1 3//1 4//1\n");
+  m.file = builder.asset("floor.obj",
+                         "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn .984807753 0 .173648178\n"
+                         "f 1//1 2//1 3//1\nf 1//1 3//1 4//1\n");
   builder.shape(m, scale(4), builder.diffuse(1));
   builder.look({1, -3, 2}, {0, 0, 0}, 10);
   return builder;
@@ -82,8 +82,7 @@ void normals(Table& t) {
           [](const Bench& b) {
             SceneBuilder builder = leaning();
             builder.scene.emitters.push_back(PointEmitter{{5, 0, -.5}, rgb(100)});
-            builder.shape(SphereShape{}, translate({6, 0, -1.5}), builder.diffuse(0)).emitter =
-                AreaEmitter{builder.texture(rgb(10))};
+            builder.lamp(SphereShape{}, translate({6, 0, -1.5}), rgb(10));
             return every_value(b, builder, 64, grey(0), 0);
           });
   // A white floor whose shading normals lean by b from the geometric one receives light from the wedge above

@@ -168,8 +168,7 @@ void out_of_focus(Table& t) {
         "A disk that is not in focus: spread over a circle of 2 R |z - f| / z.",
         [=] {
           SceneBuilder builder;
-          builder.shape(DiskShape{}, translate({0, 0, z}) * rotate_x(180) * scale(kDisk), builder.diffuse(0))
-              .emitter = AreaEmitter{builder.texture(rgb(1))};
+          builder.lamp(DiskShape{}, translate({0, 0, z}) * rotate_x(180) * scale(kDisk));
           builder.look({0, 0, 0}, {0, 0, 1}, 1e-4, {0, 1, 0});
           builder.scene.sensor.aperture_radius = kAperture;
           builder.scene.sensor.focus_distance = kFocus;

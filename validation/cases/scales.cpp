@@ -18,9 +18,7 @@ SceneBuilder miniature(const Configuration& configuration, double s) {
   const MediumIndex m = configuration.medium(builder, rgb(2 / s), rgb(.8), .5, box({-s, -s, -s}, {s, s, s}));
   builder.container(SphereShape{}, scale(s), builder.glass(1.3), m);
   builder.shape(RectangleShape{}, translate({0, 0, -1.5 * s}) * scale(4 * s), builder.diffuse(.5));
-  const TextureIndex light = builder.texture(rgb(3));
-  builder.shape(DiskShape{}, translate({0, 0, 3 * s}) * rotate_x(180) * scale(s), builder.diffuse(0))
-      .emitter = AreaEmitter{light};
+  builder.lamp(DiskShape{}, translate({0, 0, 3 * s}) * rotate_x(180) * scale(s), rgb(3));
   builder.scene.emitters.push_back(PointEmitter{{2 * s, 1.5 * s, 1 * s}, rgb(s * s)});
   builder.scene.emitters.push_back(DirectionalEmitter{{.5, .25, -1}, rgb(1)});
   builder.look({-5 * s, -2 * s, 2 * s}, {0, 0, 0}, 35);

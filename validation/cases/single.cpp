@@ -48,11 +48,6 @@ SceneBuilder passing_lit(const Setting& s, const Rgb& sigma, const Rgb& albedo) 
   builder.scene.integrator.heuristic = s.heuristic;
   return builder;
 }
-void shine(SceneBuilder& builder, const Geometry& g, const Transform& t) {
-  const TextureIndex light = builder.texture(rgb(1));
-  const BsdfIndex black = builder.diffuse(0);
-  builder.shape(g, t, black).emitter = AreaEmitter{light};
-}
 
 // Returns the integral of sigma e^(-sigma (t + 3)) / (4 pi) arriving(t) dt along the ray.
 template <class F>
@@ -118,7 +113,7 @@ void lights(Table& t) {
           "7.6f-square-light" + s.name, "7.6f N26", "A ray past a shining square.",
           [=] {
             SceneBuilder builder = passing_lit(s, rgb(.7), rgb(1));
-            shine(builder, RectangleShape{}, translate({.3, 0, 0}) * rotate_y(-90) * scale(.5));
+            builder.lamp(RectangleShape{}, translate({.3, 0, 0}) * rotate_y(-90) * scale(.5));
             return builder;
           },
           grey(square), of_square);
@@ -126,7 +121,7 @@ void lights(Table& t) {
           "7.6f-sphere-light" + s.name, "7.6f N26", "A ray past a shining sphere.",
           [=] {
             SceneBuilder builder = passing_lit(s, rgb(.7), rgb(1));
-            shine(builder, SphereShape{}, translate({.5, 0, 0}) * scale(.3));
+            builder.lamp(SphereShape{}, translate({.5, 0, 0}) * scale(.3));
             return builder;
           },
           grey(sphere), options);

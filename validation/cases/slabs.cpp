@@ -131,7 +131,7 @@ void isotropic(Table& t) {
 SceneBuilder plate_above(const Configuration& configuration, Slab slab) {
   slab.wall = .5;
   SceneBuilder builder = column(configuration, slab, true);
-  Shape& end = builder.scene.shapes.back();  // black, behind what is seen from above
+  Shape& end = builder.scene.shapes[4];  // black, behind what is seen from above
   end.bsdf = builder.diffuse(.5);
   end.to_world = translate({0, 0, slab.tau + 2}) * rotate_x(180) * scale(slab.reach());
   builder.look({.1, .15, slab.tau + 1}, {.1, .15, slab.tau + 2}, 1e-3, {0, 1, 0});

@@ -80,12 +80,7 @@ void bodies_all_but_white(Table& t) {
              configuration.choose(builder);
              const MediumIndex m = configuration.medium(builder, rgb(kDepth), rgb(1 - kAbsorbed), 0,
                                                         box({-1, -1, -1}, {1, 1, 1}));
-             if (auto* h = std::get_if<HomogeneousMedium>(&builder.scene.media[m.value])) {
-               h->source_radiance = rgb(kSource);
-             } else {
-               const VolumeIndex v = builder.constant(rgb(kSource));
-               std::get<HeterogeneousMedium>(builder.scene.media[m.value]).source_radiance = v;
-             }
+             builder.set_emission(m, rgb(kSource), true);
              builder.container(SphereShape{}, {}, builder.null(), m);
              builder.look({0, -5, 0}, {0, 0, 0});
              builder.scene.sensor.projection = Projection::orthographic;

@@ -1,10 +1,13 @@
 #include "validation/measure/hypothesis_tests.h"
 
 #include <algorithm>
+#include <array>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/complement.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <numeric>
+#include <vector>
 
 namespace ls::cli {
 namespace {
@@ -38,6 +41,33 @@ double student_quantile(double p, double freedom) {
 
 double chi2_tail(double x, double freedom) {
   return or_nothing(math::cdf(math::complement(ChiSquared(freedom), std::max(x, 0.))));
+}
+
+ChiSquare chi_square(std::span<const double> expected, std::span<const double> observed, double least) {
+  std::vector<std::size_t> order(expected.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](auto a, auto b) { return expected[a] < expected[b]; });
+  std::vector<std::array<double, 2>> cells;  // expected, observed
+  double e = 0, o = 0;
+  for (const std::size_t i : order) {
+    e += std::max(0., expected[i]);
+    o += observed[i];
+    if (e < least) continue;
+    cells.push_back({e, o});
+    e = o = 0;
+  }
+  if (cells.empty() && e > 0) cells.push_back({0, 0});
+  ChiSquare r;
+  if (cells.empty())
+    r.impossible = o;
+  else  // too few for a cell of their own
+    cells.back()[0] += e, cells.back()[1] += o;
+  for (const auto& [want, got] : cells) r.statistic += (got - want) * (got - want) / want;
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    if (expected[i] <= 0 && observed[i] > least) r.impossible = observed[i];
+  r.freedom = std::max(1, static_cast<int>(cells.size()) - 1);
+  r.p = chi2_tail(r.statistic, r.freedom);
+  return r;
 }
 
 }  // namespace ls::cli

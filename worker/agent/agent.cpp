@@ -1,5 +1,5 @@
-// The agent's control thread: it keeps the connection, handles messages and timers, and ends the work in a
-// drain.
+// The agent's control thread: it keeps the connection, handles messages and timers, and ends the work when
+// the worker drains.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,7 +12,8 @@
 
 namespace ls::worker {
 namespace {
-constexpr Duration kWelcomeLimit = std::chrono::seconds(30);  // how long after connecting Welcome must arrive
+// Time after connecting within which Welcome must arrive
+constexpr Duration kWelcomeLimit = std::chrono::seconds(30);
 // A connection that lasted this long resets the back-off.
 constexpr Duration kGoodConnection = std::chrono::seconds(5);
 constexpr Duration kLongestWait = std::chrono::seconds(1);
@@ -30,7 +31,7 @@ Agent::Impl::Impl(AgentOptions o, CoordinatorLink& l, RenderBackend& b, BlobFile
       trouble_backoff(options.trouble_first, options.backoff_most, options.backoff_seed) {}
 
 Result<void> Agent::Impl::run() {
-  connection_timer = clock.now();
+  connection_timer = last_busy = clock.now();
   threads.emplace_back([this](std::stop_token token) { load_loop(token); });
   for (int i = 0; i < options.threads; ++i) slots.push_back(std::make_unique<RenderSlot>());
   for (auto& slot : slots)
@@ -40,6 +41,7 @@ Result<void> Agent::Impl::run() {
     for (Arrival& arrival : arrivals) handle(arrival);
     if (stop_requested) break;
     look_at_backend();
+    look_at_idleness();
     if (drain_requested) begin_drain();
     if (connection == Connection::opening && clock.now() >= connection_timer) {
       link.close();
@@ -47,7 +49,8 @@ Result<void> Agent::Impl::run() {
     }
     if (connection == Connection::down && clock.now() >= connection_timer && !ended) open_connection();
     for (FromWorker& message : due_messages()) {
-      const bool result = std::holds_alternative<UnitResult>(message);
+      const auto* result = std::get_if<UnitResult>(&message);
+      if (result && options.tracer) trace_sent(result->unit);
       link.send(std::move(message));
       if (result) failpoint("result-sent");
     }
@@ -151,10 +154,11 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
   const JobId& id = assign.lease.job;
   if (assign.brief) {
     const auto it = jobs.find(id);
-    // A job with a known id but another brief is another job: it comes from other data of a coordinator.
+    // A job with a known id but another brief is a different job: the coordinator's data were replaced.
     if (it != jobs.end() && it->second.brief != *assign.brief) {
       table.drop_job(id);
       outbox.drop_job(id);
+      std::erase_if(unsent, [&](const auto& one) { return one.first.job == id; });
       stop_dropped_units();
       jobs.erase(it);
       backend.forget(id);
@@ -172,8 +176,11 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
     return;
   }
   job->second.cancelled = false;
-  table.add(assign.lease, [this](const UnitKey& key) { return outbox.has_result(key); });
-  // Forget jobs that were not used for long: each takes little memory, but a worker may run for years.
+  const bool traced = options.tracer && assign.trace && assign.trace->sampled;
+  table.add(
+      assign.lease, [this](const UnitKey& key) { return outbox.has_result(key); },
+      traced ? assign.trace : std::nullopt, traced ? options.tracer->unix_ns(clock.now()) : 0);
+  // Jobs that were not used for long are forgotten: each takes little memory, but a worker may run for years.
   while (jobs.size() > kJobsRemembered) {
     auto oldest = jobs.end();
     for (auto it = jobs.begin(); it != jobs.end(); ++it)
@@ -189,6 +196,7 @@ void Agent::Impl::cancel(const JobId& job) {
   const std::lock_guard lock(mutex);
   table.drop_job(job);
   outbox.drop_job(job);
+  std::erase_if(unsent, [&](const auto& one) { return one.first.job == job; });
   stop_dropped_units();
   if (const auto it = jobs.find(job); it != jobs.end()) {
     it->second.cancelled = true;
@@ -206,6 +214,21 @@ void Agent::Impl::look_at_backend() {
   const std::lock_guard lock(mutex);
   if (!error || broken) return;
   broken = error;
+  drain_requested = true;
+}
+
+void Agent::Impl::look_at_idleness() {
+  if (options.idle_limit == Duration::zero()) return;
+  const TimePoint now = clock.now();
+  const std::lock_guard lock(mutex);
+  if (table.lease_count() > 0 || !outbox.empty()) last_busy = now;
+  if (draining || drain_requested || now - last_busy < options.idle_limit) return;
+  const double limit = seconds(options.idle_limit);
+  if (id.value.empty()) {
+    ended = fail(Errc::unavailable, fmt::format("did not join the coordinator within {:.0f} s", limit));
+    return;
+  }
+  log_info(fmt::format("worker={}", id.value), fmt::format("no work for {:.0f} s", limit));
   drain_requested = true;
 }
 

@@ -1,5 +1,5 @@
-// The agent's state and its threads (see agent.h). agent.cpp has the control thread, agent_loader.cpp the
-// loader thread, agent_render.cpp the render threads.
+// The agent's state and its threads (see agent.h). agent.cpp contains the control thread, agent_loader.cpp
+// the loader thread, agent_render.cpp the render threads.
 #pragma once
 
 #include <atomic>
@@ -29,12 +29,12 @@ struct Agent::Impl {
     JobBrief brief;
     enum class State { idle, loading, ready } state = State::idle;
     std::shared_ptr<const LocalJob> local;
-    std::vector<std::shared_ptr<const BlobFile>> files;  // holding these keeps the job's files in the cache
-    std::uint64_t last_use = 0;  // value of `uses` at the last use; orders the jobs by it
+    std::vector<std::shared_ptr<const BlobFile>> files;  // these objects keep the job's files in the cache
+    std::uint64_t last_use = 0;  // value of the counter `uses` at the last use; orders the jobs by it
     bool cancelled = false;
-    TimePoint retry_at{};  // when to load again after an interrupted transfer or a problem of this machine
-    std::string trouble;   // the problem of this machine because of which loading was last given up
-    UnitTimes unreported;  // time spent on loading the job that no result has reported to the coordinator yet
+    TimePoint retry_at{};  // time to load again after an interrupted transfer or a problem of this machine
+    std::string trouble;   // the problem of this machine that made the last attempt to load fail
+    UnitTimes unreported;  // time spent on loading the job that the coordinator does not know yet
   };
   struct RenderSlot {
     std::atomic<bool> stop{false};
@@ -43,6 +43,7 @@ struct Agent::Impl {
     JobId last_job;
     TimePoint last_end{};
     double last_transfer = 0;  // seconds spent packing the last result
+    TimePoint began{};         // when its present unit began; set only if this worker is traced
   };
   enum class Connection { down, opening, up };
 
@@ -56,9 +57,10 @@ struct Agent::Impl {
   void cancel(const JobId& job);
   void stop_dropped_units();  // sets the stop flag of each running unit that is no longer in `table`
   void begin_drain();
-  void look_at_backend();  // starts draining if the backend is broken, to end with its error
+  void look_at_backend();   // starts draining if the backend is broken, so that run() ends with its error
+  void look_at_idleness();  // ends the work if there has been none for options.idle_limit
   std::vector<FromWorker> due_messages();
-  std::optional<Result<void>> verdict();  // set once run() should return
+  std::optional<Result<void>> verdict();  // the result of run() if it should end now; nullopt: it continues
   Duration until_next_timer() const;
   WorkerProgress progress() const;
   void end_threads();
@@ -66,27 +68,45 @@ struct Agent::Impl {
   // Loader thread.
   void load_loop(std::stop_token token);
   std::optional<JobId> next_to_load();
-  bool make_room();  // forgets an unused world if too many are kept
+  bool make_room();  // forgets an unused world if too many are kept; false: all are in use
   void load(const JobBrief& brief);
   void try_to_load(const JobBrief& brief);
   void loading_failed(const JobId& id, UnitFailure failure);
   void postpone(const JobId& id, const Error& why);
   void hold_off(const JobId& id, const std::string& trouble);
-  // Describes the problems because of which this machine recently could not load jobs. Call with the mutex
-  // held.
+  // Describes the problems of this machine that recently kept it from loading jobs. Call with the mutex held.
   std::string trouble() const;
 
   // Render threads.
   void render_loop(RenderSlot& slot, std::stop_token token);
   std::optional<HeldLeases::Held> next_unit(RenderSlot& slot, std::stop_token token,
                                             std::shared_ptr<const LocalJob>& job);
-  // Records and returns how many seconds the slot idled between the end of its last unit and the first sample
-  // of the unit that it has just rendered in `wall_seconds`. 0 if the last unit was not of this job.
+  // Records and returns for how many seconds the slot idled between the end of its last unit and the first
+  // sample of the unit that it has just rendered in `wall_seconds`. 0 if the last unit was not of this job.
   double note_gap(RenderSlot& slot, const JobId& job, double wall_seconds);
   tl::expected<UnitResult, UnitFailure> rendered_unit(RenderSlot& slot, const LocalJob& job,
                                                       const HeldLeases::Held& held);
   tl::expected<UnitResult, UnitFailure> render(RenderSlot& slot, const LocalJob& job,
                                                const HeldLeases::Held& held);
+  // Record spans below the lease's span `parent`; only with a tracer (agent_trace.cpp).
+  void record(const char* name, const trace::SpanContext& parent, TimePoint begin, TimePoint end,
+              trace::Attributes attributes, bool failed = false) const;
+  void trace_unit(const RenderSlot& slot, const HeldLeases::Held& held,
+                  tl::expected<UnitResult, UnitFailure>& outcome);
+  void trace_sent(const UnitKey& unit);
+  // Returns the span of the lease of the job's first waiting unit; nullopt: nothing is traced.
+  std::optional<trace::SpanContext> trace_of(const JobId& job) const;
+  // Records at its end that a scene was loaded, unless `parent` (the span of a lease) is nullopt.
+  struct LoadSpan {
+    LoadSpan(const Impl& agent, const JobId& job, TimePoint begin);
+    ~LoadSpan();
+    const Impl& agent;
+    const JobId job;
+    const TimePoint begin;
+    const std::optional<trace::SpanContext> parent;
+    const trace::SpanContext own;
+    std::optional<TimePoint> loaded_at;  // nullopt: it was not loaded
+  };
   void finished(RenderSlot& slot, const UnitKey& key, tl::expected<UnitResult, UnitFailure> outcome);
 
   const AgentOptions options;
@@ -99,33 +119,42 @@ struct Agent::Impl {
   // Used by the control thread only.
   std::uint64_t connection_count = 0;
   Backoff backoff;
-  // While the connection is down: when to retry; while opening: when to give up.
+  // Time of the next attempt to connect while the connection is down; time to give up while it is being
+  // opened.
   TimePoint connection_timer{};
   TimePoint up_since{};
   TimePoint next_progress{};
   TimePoint drain_deadline{};
+  TimePoint last_busy{};  // the last time when this worker was seen to hold units or results
   std::optional<Result<void>> ended;
   WorkerId id;
 
   std::atomic<bool> drain_requested{false}, stop_requested{false};
 
   mutable std::mutex mutex;
-  std::condition_variable_any work;  // wakes loader and render threads: leases, worlds, room in the outbox
+  // Wakes the loader and render threads when leases, worlds or the room in the outbox change
+  std::condition_variable_any work;
   // Guarded by mutex.
   HeldLeases table;
   Outbox outbox;
   std::map<JobId, Job> jobs;
-  std::deque<FromWorker> outgoing;  // messages that give leases back, to be sent when the stream is up
+  // With a tracer: results that were not sent yet, with the spans of their leases and the times of packing
+  struct Unsent {
+    trace::SpanContext lease;
+    TimePoint since{};
+  };
+  std::map<UnitKey, Unsent> unsent;
+  std::deque<FromWorker> outgoing;  // messages that return leases, to be sent when the stream is open
   std::vector<std::unique_ptr<RenderSlot>> slots;
   Connection connection = Connection::down;
   bool draining = false;
-  std::optional<Error> broken;  // the backend's error, with which run() ends
+  std::optional<Error> broken;  // the backend's error, which run() will return
   std::uint64_t uses = 0;
   double cpu_seconds = 0;
   double load_seconds = 0;
   GapMeter gaps;
   Backoff trouble_backoff;
-  // Name of the file that the loader fetched last for the job that it is loading; else empty.
+  // Name of the file that the loader fetched last, while it loads a job; otherwise empty.
   std::string loading;
 
   std::vector<std::jthread> threads;

@@ -10,16 +10,17 @@
 
 namespace ls::worker {
 namespace {
-// How many worlds are kept: the one being rendered and the next one, so that render threads need not wait
+// Number of worlds kept in memory: the one being rendered and the next one. So render threads need not wait
 // between two jobs, and memory stays bounded.
 constexpr std::size_t kWorldsKept = 2;
+constexpr std::size_t kBlobsTraced = 64;  // blobs of one scene that get a span each
 constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
-// If a job's loading failed and it was not tried again for this long after the retry was due, the worker has
-// no units of the job any more, and the problem is no longer reported.
+// A problem with loading a job is no longer reported if the job was not loaded again for this long after its
+// retry was due: the worker then has no units of the job any more.
 constexpr Duration kTroubleShown = std::chrono::seconds(30);
 
-// True if the error is a problem of this machine, such as a full disk, for which no unit may be counted as
-// failed.
+// True if the error is a problem of this machine, such as a full disk, that must not count as a failure of
+// units.
 bool of_this_machine(const Error& error) {
   return error.code == Errc::resource_exhausted || error.code == Errc::internal;
 }
@@ -37,7 +38,8 @@ void Agent::Impl::load_loop(std::stop_token token) {
       try_to_load(brief);
       lock.lock();
     } else {
-      // Interrupted transfers are retried after a pause; all else sends a notification.
+      // The timeout is for interrupted transfers, which are retried after a pause; all other changes notify
+      // this thread.
       work.wait_for(lock, token, kTransferRetry, [&] { return next_to_load().has_value() && make_room(); });
     }
   }
@@ -85,6 +87,7 @@ void Agent::Impl::load(const JobBrief& brief) {
   auto local = std::make_shared<LocalJob>();
   std::vector<std::shared_ptr<const BlobFile>> pins;
   const TimePoint begin = clock.now();
+  LoadSpan span(*this, id, begin);
   std::vector<BlobRef> blobs = {{brief.scene, 0, "the scene"}};
   blobs.insert(blobs.end(), brief.assets.begin(), brief.assets.end());
   for (const BlobRef& blob : blobs) {
@@ -92,7 +95,13 @@ void Agent::Impl::load(const JobBrief& brief) {
       const std::lock_guard lock(mutex);
       loading = blob.name;
     }
+    const TimePoint asked = span.parent ? clock.now() : TimePoint{};
     auto file = files.acquire(blob);
+    if (span.parent && pins.size() < kBlobsTraced)
+      record("fetch blob", span.own, asked, clock.now(),
+             {{"lightshaft.blob", blob.digest.hex()},
+              {"lightshaft.bytes", static_cast<std::int64_t>(blob.bytes)}},
+             !file);
     if (!file && file.error().code == Errc::unavailable) return postpone(id, file.error());
     if (!file && of_this_machine(file.error()))
       return hold_off(id, fmt::format("cannot get '{}': {}", blob.name, file.error().message));
@@ -106,13 +115,19 @@ void Agent::Impl::load(const JobBrief& brief) {
   local->brief = brief;
   const TimePoint start = clock.now();
   auto prepared = backend.prepare(*local);
+  if (span.parent) {
+    const TimePoint end = clock.now();
+    record("build world", span.own, start, end, {{"lightshaft.job", id.value}}, !prepared);
+    if (prepared) span.loaded_at = end;
+  }
   if (!prepared && backend.broken()) return hold_off(id, prepared.error().reason);
   if (!prepared) return loading_failed(id, std::move(prepared.error()));
   const std::lock_guard lock(mutex);
   loading.clear();
   load_seconds = seconds(clock.now() - start);
   const auto it = jobs.find(id);
-  if (it == jobs.end() || it->second.state != Job::State::loading) return;  // the job was replaced meanwhile
+  // The job was replaced by another one meanwhile
+  if (it == jobs.end() || it->second.state != Job::State::loading) return;
   it->second.state = Job::State::ready;
   it->second.local = std::move(local);
   it->second.files = std::move(pins);
@@ -124,8 +139,8 @@ void Agent::Impl::load(const JobBrief& brief) {
   work.notify_all();
 }
 
-// Reports one unit of the job as failed and gives its other units back to the coordinator, so that a job that
-// this worker cannot load costs one failed attempt instead of hundreds.
+// Reports one unit of the job as failed and returns its other units to the coordinator. So a job that this
+// worker cannot load costs one failed attempt instead of hundreds.
 void Agent::Impl::loading_failed(const JobId& id, UnitFailure failure) {
   const std::lock_guard lock(mutex);
   loading.clear();
@@ -152,8 +167,8 @@ void Agent::Impl::postpone(const JobId& id, const Error& why) {
   log_warn(fmt::format("job={}", id.value), "a transfer was cut, trying again: " + why.message);
 }
 
-// Gives the job's units back to the coordinator, so that other workers can render them. If units of the job
-// are assigned to this worker again, they wait until the next attempt to load the job.
+// Returns the job's units to the coordinator, so that other workers can render them. If units of the job are
+// assigned to this worker again, they wait until the next attempt to load the job.
 void Agent::Impl::hold_off(const JobId& id, const std::string& trouble) {
   const std::lock_guard lock(mutex);
   loading.clear();

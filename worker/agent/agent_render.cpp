@@ -1,4 +1,4 @@
-// The agent's render threads: each takes one unit at a time, the first one that waits in the table of leases.
+// The agent's render threads. Each takes one unit at a time, the first one that waits in the table of leases.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,10 +13,10 @@
 namespace ls::worker {
 namespace {
 
-constexpr std::int64_t kExrOverhead = 16 << 10;  // bytes for an EXR's header and line offsets
+constexpr std::int64_t kExrOverhead = 16 << 10;  // allowance for an EXR's header and line offsets, in bytes
 
-// Returns a failure if the result of this unit would not fit into a message, so that the unit need not be
-// rendered.
+// Returns a failure if the result of this unit would not fit into a message, so that the unit is not rendered
+// in vain.
 std::optional<UnitFailure> too_large(const LocalJob& job, const LeaseUnit& unit) {
   const auto per_pixel = static_cast<std::int64_t>(partial_bytes_per_pixel(aovs_of(job.brief.settings)));
   const std::int64_t bytes = unit.rect.pixels() * per_pixel + kExrOverhead;
@@ -32,6 +32,7 @@ std::optional<UnitFailure> too_large(const LocalJob& job, const LeaseUnit& unit)
 
 tl::expected<UnitResult, UnitFailure> Agent::Impl::rendered_unit(RenderSlot& slot, const LocalJob& job,
                                                                  const HeldLeases::Held& held) {
+  if (options.tracer) slot.began = clock.now();
   if (auto failure = too_large(job, held.unit)) return tl::unexpected<UnitFailure>(std::move(*failure));
   auto rendered = backend.render(job, held.unit, slot.stop);
   if (!rendered) {
@@ -50,14 +51,15 @@ tl::expected<UnitResult, UnitFailure> Agent::Impl::rendered_unit(RenderSlot& slo
   result.digest = unit_digest(rendered->partial);
   result.cpu_seconds = rendered->cpu_seconds;
   result.health = rendered->health;
+  result.techniques = rendered->techniques;
   result.times.idle = std::max(0., gap - std::exchange(slot.last_transfer, 0));
   result.times.wait = std::max(0., rendered->wall_seconds - rendered->cpu_seconds);
   result.times.transfer = slot.last_transfer = seconds(clock.now() - packing);
   return result;
 }
 
-// Lets the backend render the unit. A backend in this process may run out of memory; then the unit fails and
-// the process goes on.
+// Lets the backend render the unit. If a backend in this process runs out of memory, the unit fails and the
+// process continues.
 tl::expected<UnitResult, UnitFailure> Agent::Impl::render(RenderSlot& slot, const LocalJob& job,
                                                           const HeldLeases::Held& held) {
   UnitFailure failure;
@@ -94,7 +96,7 @@ void Agent::Impl::render_loop(RenderSlot& slot, std::stop_token token) {
   }
 }
 
-// Waits until there is a unit to render and takes it; `job` becomes its job. nullopt: the thread should end.
+// Waits until there is a unit to render and takes it; sets `job` to its job. nullopt: the thread should end.
 std::optional<HeldLeases::Held> Agent::Impl::next_unit(RenderSlot& slot, std::stop_token token,
                                                        std::shared_ptr<const LocalJob>& job) {
   std::unique_lock lock(mutex);
@@ -124,6 +126,8 @@ void Agent::Impl::finished(RenderSlot& slot, const UnitKey& key,
     const std::lock_guard lock(mutex);
     slot.unit.reset();
     if (outcome) cpu_seconds += outcome->cpu_seconds;
+    if (options.tracer && !slot.stop)
+      if (const auto* held = table.find(key); held && held->trace) trace_unit(slot, *held, outcome);
     // A unit that was stopped no longer belongs to this worker, so its outcome is dropped.
     const auto lease = slot.stop ? std::nullopt : table.finish(key);
     if (lease && outcome) {

@@ -1,5 +1,5 @@
-// The interface through which the agent has units rendered (a unit is one tile and one range of samples). It
-// is implemented by the renderer in this process, the renderer in a child process, and the fake renderer.
+// The interface through which the agent renders units (a unit is one tile and one range of samples). Its
+// implementations are the renderer in this process, the renderer in a child process, and the fake renderer.
 #pragma once
 
 #include <atomic>
@@ -17,15 +17,15 @@
 
 namespace ls::worker {
 
-// A job all of whose blobs (scene and assets) are files on this machine.
+// A job whose blobs (scene and assets) are all files on this machine.
 struct LocalJob {
   JobBrief brief;
   std::filesystem::path scene;                     // file of the canonical scene
   std::map<Digest, std::filesystem::path> assets;  // files by digest
 };
 
-// Identifies the world in which a job is rendered. The job's id is not enough: a coordinator whose data were
-// replaced may reuse it for another job.
+// Identifies the world of a job. The job's id is not enough: a coordinator whose data were replaced may reuse
+// it for another job.
 struct WorldKey {
   JobId job;
   Digest scene, settings;
@@ -36,36 +36,38 @@ inline WorldKey key_of(const JobBrief& brief) { return {brief.job, brief.scene, 
 struct RenderedUnit {
   Partial partial;  // the unit's pixel sums
   double cpu_seconds = 0;
-  double wall_seconds = 0;  // from the first sample to the last
+  double wall_seconds = 0;  // wall-clock time from the first sample to the last
   Health health;
+  TechniqueSet techniques;  // of the world that it was rendered in
 };
 
-// All calls block, and the agent makes them from several threads concurrently. If the caller sets `stop`,
-// render() should return early; its result is then ignored. A UnitFailure says whether the scene is at fault.
+// Renders units. All calls block, and the agent makes them from several threads concurrently. If the caller
+// sets `stop`, render() should return early; its result is then ignored. A UnitFailure says whether the scene
+// is at fault.
 class RenderBackend {
  public:
   virtual ~RenderBackend() = default;
   virtual Digest numeric_class() const = 0;
-  // Builds the job's world (its scene, ready to render), or returns why it cannot. Does nothing if the world
-  // is already built.
+  // Builds the job's world (its scene, ready to render). Does nothing if the world is already built. Returns
+  // the reason if it cannot be built.
   virtual tl::expected<void, UnitFailure> prepare(const LocalJob& job) = 0;
   virtual tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
                                                          const std::atomic<bool>& stop) = 0;
   virtual void forget(const JobId& job) = 0;  // frees all worlds of jobs with this id
   virtual std::uint64_t rss_bytes() const = 0;
-  // Returns an error once the backend can no longer render anything; the worker then ends with this error,
-  // and units that failed because of it are not blamed.
+  // Returns an error once the backend can no longer render anything. The worker then ends with this error,
+  // and the units that failed because of it are not reported as failed.
   virtual std::optional<Error> broken() const { return std::nullopt; }
-  // Tells the backend that no further calls will come; calls that are still blocked should return soon. May
-  // be called more than once.
+  // Tells the backend that no further calls will come; calls that still block should return soon. May be
+  // called more than once.
   virtual void shutdown() {}
 };
 
-// A backend that renders in this process and can report which sample it is rendering.
+// A backend that renders in this process and can show which sample it is rendering.
 class LocalBackend : public RenderBackend {
  public:
-  // Like render(), and writes the sample being rendered to `where`, unless that is null. It is written with
-  // relaxed stores and may be read by another process.
+  // The same as render(), but also writes the sample being rendered to `where`, unless that is null. It is
+  // written with relaxed stores and may be read by another process.
   virtual tl::expected<RenderedUnit, UnitFailure> render_marked(const LocalJob& job, const LeaseUnit& unit,
                                                                 const std::atomic<bool>& stop,
                                                                 render::Breadcrumb* where) = 0;

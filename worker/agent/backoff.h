@@ -1,6 +1,6 @@
-// Exponential back-off with jitter: the n-th wait is between half and all of first * 2^n, and at most `most`.
-// The jitter keeps a thousand workers from reconnecting at the same instant; it is seeded, so that tests can
-// predict it.
+// Exponential back-off with jitter: the n-th wait is between 50 % and 100 % of first * 2^n, and at most
+// `most`. The jitter keeps a thousand workers from reconnecting at the same instant; it is seeded, so that
+// tests can predict it.
 #pragma once
 
 #include <algorithm>

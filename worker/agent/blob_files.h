@@ -1,5 +1,5 @@
-// Provides the files of a job's blobs (its scene and assets). BlobFiles is implemented by a cache that
-// fetches missing blobs from the coordinator (worker/cache), and by files that are already local (`lightshaft
+// Provides the files of a job's blobs (its scene and assets). BlobFiles has two implementations: a cache that
+// fetches missing blobs from the coordinator (worker/cache), and files that are already local (`lightshaft
 // render`).
 #pragma once
 
@@ -13,7 +13,7 @@
 
 namespace ls::worker {
 
-// A complete, verified blob on this machine. The file is kept while the object lives.
+// A complete, verified blob on this machine. The file is not removed while the object lives.
 class BlobFile {
  public:
   virtual ~BlobFile() = default;
@@ -26,11 +26,11 @@ class BlobFiles {
   // Returns the blob's file, and blocks while it is fetched. unavailable: the transfer was interrupted; the
   // bytes received are kept, and the caller should try again later. resource_exhausted, internal: this
   // machine or its coordinator has a problem (a full disk, the cache limit, a blob missing at the
-  // coordinator) that is not the job's fault and may pass. Other errors are final: not_found, for example, if
-  // the blob cannot be had from anywhere.
+  // coordinator) that is not the job's fault and may pass. Other errors are final: for example not_found, if
+  // no source has the blob.
   virtual Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob) = 0;
-  // Returns the blobs that are here, at most `limit`, most recently used first. The worker's hello tells them
-  // to the coordinator.
+  // Returns the blobs that are here, at most `limit`, most recently used first. The worker's hello sends this
+  // list to the coordinator.
   virtual std::vector<Digest> held(std::size_t limit) const = 0;
 };
 

@@ -12,7 +12,7 @@ constexpr double kStepsPerOctave = 8;
 }  // namespace
 
 void GapMeter::add(double seconds) {
-  // The gap is a difference of times from two clocks and may come out slightly negative.
+  // The gap is a difference of times from two clocks and may be slightly negative.
   seconds = std::max(seconds, 0.);
   const double step = seconds > kFirst ? kStepsPerOctave * std::log2(seconds / kFirst) : 0;
   ++counts_[static_cast<std::size_t>(std::min(step, kSteps - 1.))];

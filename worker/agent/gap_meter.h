@@ -1,6 +1,6 @@
-// Collects how long render threads idle between two units of one job, from the last sample of one unit to the
-// first sample of the next. The gaps are kept in a histogram with eight steps per octave, beginning at a
-// microsecond, so that quantiles are accurate to 10 %.
+// Measures how long render threads idle between two units of the same job, from the last sample of one unit
+// to the first sample of the next. The gaps are kept in a histogram with eight steps per octave, beginning at
+// a microsecond, so that quantiles are accurate to 10 %.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ class GapMeter {
   double longest() const { return longest_; }  // seconds
   // Returns the quantile q (0 to 1) of the gaps in seconds; 0 if there were none.
   double quantile(double q) const;
-  std::string text() const;  // for the log
+  std::string text() const;  // a summary for the log
 
  private:
   static constexpr int kSteps = 8 * 32;

@@ -4,7 +4,8 @@
 
 namespace ls::worker {
 
-void HeldLeases::add(const Lease& lease, const std::function<bool(const UnitKey&)>& handed_in) {
+void HeldLeases::add(const Lease& lease, const std::function<bool(const UnitKey&)>& handed_in,
+                     const std::optional<trace::SpanContext>& trace, std::int64_t unix_ns) {
   for (const LeaseUnit& unit : lease.units) {
     const UnitKey key{lease.job, unit.tile, unit.round};
     auto [it, is_new] = units_.try_emplace(key);
@@ -12,9 +13,11 @@ void HeldLeases::add(const Lease& lease, const std::function<bool(const UnitKey&
     if (!is_new) leave(entry.held.lease, false);
     ++leases_[lease.id].open;
     entry.held.lease = lease.id;
+    entry.held.trace = trace;
     if (!is_new) continue;
     entry.held.key = key;
     entry.held.unit = unit;
+    entry.held.since_unix_ns = unix_ns;
     entry.held.state = handed_in(key) ? State::handed_in : State::waiting;
     if (entry.held.state == State::waiting) enqueue(entry);
   }
@@ -86,6 +89,11 @@ std::optional<HeldLeases::Held> HeldLeases::first_waiting(const JobId& job) cons
   for (const auto& [order, key] : queue_)
     if (key.job == job) return units_.at(key).held;
   return std::nullopt;
+}
+
+const HeldLeases::Held* HeldLeases::find(const UnitKey& key) const {
+  const auto it = units_.find(key);
+  return it == units_.end() ? nullptr : &it->second.held;
 }
 
 bool HeldLeases::is_running(const UnitKey& key) const {

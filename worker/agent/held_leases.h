@@ -1,6 +1,6 @@
-// The units that this worker holds, each one tile and one range of samples to render, and the leases by which
-// the coordinator assigned them, in order of arrival. It has no locks and no clock. A unit is held only once:
-// if a later lease contains it again, it belongs to that lease from then on.
+// The units that this worker holds (each is one tile and one range of samples to render), and the leases by
+// which the coordinator assigned them, in order of arrival. It has no locks and no clock. A unit is held only
+// once: if a later lease contains it again, it belongs to that lease from then on.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,8 @@ class HeldLeases {
   enum class State {
     waiting,
     running,
-    // Its result waits to be acknowledged; the unit is rendered again only if the result is rejected.
+    // The result of the unit waits to be acknowledged. The unit is rendered again only if the result is
+    // rejected.
     handed_in,
   };
   struct Held {
@@ -27,28 +28,33 @@ class HeldLeases {
     LeaseId lease;
     LeaseUnit unit;
     State state = State::waiting;
+    // The span of its present lease; nullopt: the lease is not traced
+    std::optional<trace::SpanContext> trace = std::nullopt;
+    std::int64_t since_unix_ns = 0;  // when the unit came to this worker; 0: not noted
   };
 
-  // Adds the units of a lease. `handed_in(key)` must say whether the outbox has a result of that unit
-  // already.
-  void add(const Lease& lease, const std::function<bool(const UnitKey&)>& handed_in);
-  // Takes the first waiting unit of a job in `ready` and marks it running.
+  // Adds the units of a lease. `handed_in(key)` must return whether the outbox has a result of that unit
+  // already. `trace`: the lease's span, if it is traced; `unix_ns`: the time now.
+  void add(const Lease& lease, const std::function<bool(const UnitKey&)>& handed_in,
+           const std::optional<trace::SpanContext>& trace = std::nullopt, std::int64_t unix_ns = 0);
+  // Returns the first waiting unit whose job is in `ready`, and marks it as running.
   std::optional<Held> take(const std::function<bool(const JobId&)>& ready);
-  // Removes a unit that was running and has been rendered. Returns the lease to which it belongs now;
-  // nullopt: it was dropped meanwhile.
+  // Removes a unit that was running and has been rendered. Returns its present lease; nullopt: the unit was
+  // dropped meanwhile.
   std::optional<LeaseId> finish(const UnitKey& key);
   // Removes a unit whose result the coordinator has acknowledged. If the coordinator rejected the result
   // (`refused`), the unit waits to be rendered again.
   void acknowledged(const UnitKey& key, bool refused);
 
-  // Remove all units of a job or a lease, also those that are running.
+  // Remove all units of a job or a lease, including running ones.
   void drop_job(const JobId& job);
   void drop_lease(const LeaseId& lease);
-  // Removes the units that have not been started (only those of *job, if given). Returns the messages by
-  // which the agent gives their leases back to the coordinator.
+  // Removes the units that have not been started (if `job` is given, only units of that job). Returns the
+  // messages that return their leases to the coordinator.
   std::vector<LeaseReturned> return_waiting(const JobId* job = nullptr);
 
   std::optional<Held> first_waiting(const JobId& job) const;
+  const Held* find(const UnitKey& key) const;  // null: the unit is not held
   bool is_running(const UnitKey& key) const;
   bool holds(const JobId& job) const;
   std::size_t lease_count() const { return leases_.size(); }
@@ -70,9 +76,9 @@ class HeldLeases {
   void drop_if(const std::function<bool(const Held&)>& goes);
 
   std::map<UnitKey, Entry> units_;
-  // The waiting units by Entry::order, the first to be rendered first.
+  // The waiting units in the order of rendering (Entry::order).
   std::map<std::uint64_t, UnitKey> queue_;
-  std::map<LeaseId, LeaseState> leases_;  // leases with units that are not finished
+  std::map<LeaseId, LeaseState> leases_;  // leases with units that are not finished yet
   std::uint64_t next_order_ = 0;
   std::size_t running_ = 0;
 };

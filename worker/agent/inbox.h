@@ -1,6 +1,6 @@
 // The queue of events that wake the agent's control thread: messages from the coordinator, the loss of the
-// connection, or a nudge from another thread (a call without content). The link's observer shares ownership
-// of it, so that a callback that comes late cannot reach a destroyed agent.
+// connection, or a nudge (a wake-up without content) from another thread. The link's observer shares
+// ownership of the queue, so that a late callback cannot reach a destroyed agent.
 #pragma once
 
 #include <condition_variable>
@@ -19,7 +19,8 @@ struct ConnectionLost {
   Error why;
 };
 struct Arrival {
-  std::uint64_t connection = 0;  // numbered by the agent; events of older connections are stale
+  // Number of the connection, given by the agent; events of older connections are ignored
+  std::uint64_t connection = 0;
   std::variant<ToWorker, ConnectionLost> what;
 };
 
@@ -35,7 +36,7 @@ class Inbox {
     nudged_ = true;
     changed_.notify_one();
   }
-  // Waits for an event or a nudge, for at most this long, and returns all events that are in the queue.
+  // Waits for an event or a nudge, at most this long, and returns all events in the queue.
   std::deque<Arrival> wait(Duration at_most) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, at_most, [this] { return nudged_ || !arrivals_.empty(); });

@@ -5,8 +5,8 @@
 
 namespace ls::worker {
 
-// Stands between a stream and the agent's observer. It looks at the messages that it passes on, and reports
-// the end of the stream only once.
+// An observer between a stream and the agent's observer. It notes facts from the messages that it passes on,
+// and reports the end of the stream only once.
 class LinkRing::Watch final : public LinkObserver {
  public:
   Watch(std::shared_ptr<State> state, std::shared_ptr<LinkObserver> agent)
@@ -45,7 +45,7 @@ Result<void> LinkRing::connect(const WorkerHello& hello, std::shared_ptr<LinkObs
   {
     const std::lock_guard lock(mutex_);
     const std::lock_guard state_lock(state_->mutex);
-    // A coordinator that has welcomed us is tried again first: it may only have restarted.
+    // A coordinator that has accepted this worker before is tried again first: it may only have restarted.
     if (go_on_ || (tried_ && !state_->welcomed)) current_ = (current_ + 1) % links_.size();
     tried_ = true;
     go_on_ = state_->welcomed = false;

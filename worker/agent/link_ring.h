@@ -1,7 +1,7 @@
-// Makes several coordinators look like one link, for farms in which coordinators with jobs of their own share
-// the workers. The worker has a stream to one coordinator at a time. It moves to the next coordinator when
-// the current one does not welcome it or has had no work for it for a while. So idle workers find a
-// coordinator that has work, also one that has taken over the jobs of another.
+// Combines links to several coordinators into one, for farms in which coordinators with jobs of their own
+// share the workers. The worker has a stream to one coordinator at a time. It moves to the next coordinator
+// if the current one does not accept it or has had no work for it for a while. So idle workers find a
+// coordinator that has work, including one that has taken over the jobs of another.
 #pragma once
 
 #include <cstddef>
@@ -13,14 +13,14 @@
 
 namespace ls::worker {
 
-// A worker tries the next coordinator after this many progress reports in which it had no lease. An idle
-// worker sends one every few seconds.
+// A worker moves to the next coordinator after this many progress reports without a lease. An idle worker
+// sends one every few seconds.
 inline constexpr int kIdleReports = 3;
 
 class LinkRing final : public CoordinatorLink {
  public:
-  // `first` decides which coordinator is tried first and may be any number; with a different number in each
-  // worker the workers spread over the coordinators.
+  // `first`, which may be any number, decides which coordinator is tried first. With a different number in
+  // each worker the workers spread over the coordinators.
   LinkRing(std::vector<std::unique_ptr<CoordinatorLink>> links, std::size_t first);
   ~LinkRing() override;
 
@@ -36,7 +36,7 @@ class LinkRing final : public CoordinatorLink {
     std::mutex mutex;
     bool welcomed = false;
     int idle_reports = 0;
-    int unacknowledged = 0;  // number of results
+    int unacknowledged = 0;  // number of results that are not acknowledged
   };
   CoordinatorLink& current();
   bool idle_for_long(const FromWorker& message);

@@ -10,7 +10,7 @@
 
 namespace ls::worker {
 
-// Resident bytes of the process; 0 if it has ended.
+// Returns the resident bytes of the process; 0 if it has ended.
 inline std::uint64_t resident_bytes(pid_t process) {
   std::uint64_t total = 0, resident = 0;
   std::ifstream statm("/proc/" + std::to_string(process) + "/statm");

@@ -5,7 +5,7 @@
 
 namespace ls::worker {
 namespace {
-constexpr std::size_t kEntryOverhead = 256;  // approximate cost of an entry beside its bytes
+constexpr std::size_t kEntryOverhead = 256;  // approximate memory of an entry besides its bytes
 }
 
 void Outbox::add(UnitResult result) {

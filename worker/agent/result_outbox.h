@@ -13,7 +13,7 @@ class Outbox {
  public:
   void add(UnitResult result);
   void add(UnitFailure failure);
-  // Removes the oldest entry of this unit that was sent. False: there is none.
+  // Removes the oldest entry of this unit that was sent. False: there is no such entry.
   bool acknowledge(const UnitKey& unit);
   void drop_job(const JobId& job);
 

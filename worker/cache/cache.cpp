@@ -17,7 +17,8 @@ namespace ls::worker {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kAttempts = 3;  // how often a blob is fetched if it arrives complete but with a wrong digest
+// Number of attempts to fetch a blob that arrives complete but with a wrong digest
+constexpr int kAttempts = 3;
 
 // A blob's file with a shared lock, which the object holds while it lives.
 class LockedFile final : public BlobFile {
@@ -33,8 +34,8 @@ class LockedFile final : public BlobFile {
   int fd_;
 };
 
-// Turns an error of the coordinator that may pass (a blob that is missing, damaged or denied there) into one
-// of a kind that the agent tries again later.
+// Turns a temporary error of the coordinator (a blob that is missing, damaged or denied there) into one of a
+// kind that the agent tries again later.
 Error passing(Error error) {
   const bool temporary = error.code == Errc::unavailable || error.code == Errc::resource_exhausted;
   if (!temporary) error.code = Errc::internal;
@@ -99,7 +100,7 @@ Result<std::shared_ptr<const BlobFile>> BlobCache::open_verified(const Digest& d
     }
     verified_.insert(digest);
   }
-  ::futimens(fd, nullptr);  // update the time of last use
+  ::futimens(fd, nullptr);  // sets the time of last use
   return file;
 }
 
@@ -125,7 +126,7 @@ Result<void> BlobCache::receive(const BlobRef& blob, bool arrived_wrong, Partial
     if (blob.bytes != 0 && size > blob.bytes)
       return fail(Errc::invalid_argument,
                   fmt::format("'{}' is longer than the {} bytes announced", blob.name, blob.bytes));
-    // The size of a canonical scene (bytes == 0) is not known in advance, so room is made for it as it
+    // The size of a canonical scene is not known in advance (bytes == 0), so room for it is made while it
     // arrives.
     if (blob.bytes == 0)
       if (auto ok = make_room(size, partial.path()); !ok) return ok;
@@ -136,8 +137,7 @@ Result<void> BlobCache::receive(const BlobRef& blob, bool arrived_wrong, Partial
 Result<void> BlobCache::make_room(std::uint64_t bytes, const fs::path& but) {
   if (limit_ == 0) return {};
   std::uint64_t total = bytes;
-  // The files of unfinished transfers are removed before blobs, because the transfers may have been
-  // abandoned.
+  // Files of unfinished transfers, which may be abandoned, are removed before complete blobs.
   std::vector<StoredFile> files = stored_partials(folder_);
   std::erase_if(files, [&](const StoredFile& file) { return file.path == but; });
   for (StoredFile& blob : stored_blobs(folder_)) files.push_back(std::move(blob));

@@ -29,8 +29,8 @@ class PartialFile;
 class BlobCache final : public BlobFiles {
  public:
   using Sink = std::function<Result<void>(std::span<const std::byte>)>;
-  using Fetch =
-      std::function<Result<void>(const BlobRequest&, const Sink& sink)>;  // CoordinatorLink::fetch_blob
+  // Fetches the bytes of a blob; the same as CoordinatorLink::fetch_blob
+  using Fetch = std::function<Result<void>(const BlobRequest&, const Sink& sink)>;
 
   // Creates the folder if it is missing. The cache keeps at most `limit_bytes` bytes; 0: no limit. It gets
   // missing blobs by `fetch`.
@@ -43,17 +43,17 @@ class BlobCache final : public BlobFiles {
  private:
   BlobCache(std::filesystem::path folder, std::uint64_t limit_bytes, Fetch fetch);
   Result<std::shared_ptr<const BlobFile>> open_verified(const Digest& digest);
-  // `arrived_wrong`: an earlier transfer of the blob delivered wrong bytes.
+  // Fetches a blob. `arrived_wrong`: an earlier transfer of the blob delivered wrong bytes.
   Result<void> download(const BlobRef& blob, bool arrived_wrong);
   Result<void> receive(const BlobRef& blob, bool arrived_wrong, PartialFile& partial);
-  // Removes blobs and abandoned transfers, but never the file `but`, until `bytes` more bytes fit within the
-  // limit.
+  // Removes blobs and abandoned transfers until `bytes` more bytes fit within the limit, but never the file
+  // `but`.
   Result<void> make_room(std::uint64_t bytes, const std::filesystem::path& but);
 
   const std::filesystem::path folder_;
   const std::uint64_t limit_;
   const Fetch fetch_;
-  std::mutex mutex_;           // held by acquire(), so that calls of it run one after the other
+  std::mutex mutex_;           // held by acquire(), so that its calls run one after the other
   std::set<Digest> verified_;  // digests verified by this process
 };
 

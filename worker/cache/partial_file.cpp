@@ -33,8 +33,8 @@ Result<PartialFile> PartialFile::open(const std::filesystem::path& path) {
   const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
   if (fd < 0) return io_error("cannot write", path);
   PartialFile file(path, fd);
-  // If another process has the lock, or has moved the file to its final place by now, this one must not write
-  // to it.
+  // This process must not write to the file if another one has locked it, or has meanwhile moved it to its
+  // final place.
   const Lock lock = lock_at(fd, path, LOCK_EX);
   if (lock == Lock::failed) return io_error("cannot lock", path);
   if (lock == Lock::lost) return open_own(path);
@@ -42,8 +42,8 @@ Result<PartialFile> PartialFile::open(const std::filesystem::path& path) {
   return file;
 }
 
-// Creates a file with a random name after `path`. The name cannot contain the process id, because workers in
-// several containers may share the folder and have equal ids.
+// Creates a file whose name is that of `path` with a random suffix. The process id would not do as a suffix,
+// because workers in several containers may share the folder and have equal ids.
 Result<PartialFile> PartialFile::open_own(const std::filesystem::path& path) {
   std::string name = path.string() + ".XXXXXX";
   const int fd = ::mkostemp(name.data(), O_CLOEXEC);
@@ -102,7 +102,7 @@ Result<bool> PartialFile::finish(const Digest& expected, const std::filesystem::
   std::filesystem::create_directories(place.parent_path(), error);
   if (::fdatasync(fd_) != 0) return io_error("cannot store", place);
   if (::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, place.c_str(), RENAME_NOREPLACE) == 0) return true;
-  if (errno == EEXIST) {  // another worker was faster
+  if (errno == EEXIST) {  // another worker has created the file first
     discard();
     return false;
   }

@@ -24,7 +24,7 @@ tl::unexpected<Error> io_error(const std::string& what, const std::filesystem::p
 class PartialFile {
  public:
   // Opens or creates the file at `path` and reads the bytes that are in it already, to compute their digest.
-  // If another process is writing that file, creates another one for this transfer.
+  // If another process is writing that file, creates a different file for this transfer.
   static Result<PartialFile> open(const std::filesystem::path& path);
   PartialFile(PartialFile&&) noexcept;
   PartialFile& operator=(PartialFile&&) = delete;
@@ -33,8 +33,8 @@ class PartialFile {
   const std::filesystem::path& path() const { return path_; }
   std::uint64_t size() const { return size_; }
   Result<void> append(std::span<const std::byte> bytes);
-  // Checks the digest, syncs the file and moves it to `place`. Returns false if `place` has a file already:
-  // that one is kept, as it may be in use. invalid_argument: the digest is not `expected`; the file is
+  // Checks the digest, syncs the file and moves it to `place`. Returns false if `place` already has a file,
+  // which is kept, since it may be in use. invalid_argument: the digest is not `expected`; the file is
   // removed.
   Result<bool> finish(const Digest& expected, const std::filesystem::path& place);
   void discard();

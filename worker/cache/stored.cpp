@@ -61,7 +61,7 @@ std::vector<StoredFile> stored_blobs(const fs::path& folder) {
 std::vector<StoredFile> stored_partials(const fs::path& folder) {
   std::vector<StoredFile> found;
   for_each_in(folder / kPartialFolder, [&](const fs::path& path) {
-    // DIGEST, or DIGEST.XXXXXX for a process that found the first one locked.
+    // The name is DIGEST, or DIGEST.XXXXXX if another process had locked the file DIGEST.
     const std::string name = path.filename().string();
     const auto digest = Digest::parse(std::string_view(name).substr(0, kDigestDigits));
     if (digest && (name.size() == kDigestDigits || name[kDigestDigits] == '.')) look_at(path, *digest, found);

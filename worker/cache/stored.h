@@ -39,11 +39,11 @@ bool remove_unused(const std::filesystem::path& path);
 void remove_orphans(const std::filesystem::path& folder);
 
 // Locks the file `fd`, which was opened at `path`, by flock(2) without waiting; `how` is LOCK_SH or LOCK_EX.
-// `lost`: another process has the lock, or another file has got this path between opening and locking.
-// `failed`: this file system cannot lock; errno says why.
+// `lost`: another process has the lock, or the path belongs to another file since the opening. `failed`: this
+// file system cannot lock; errno says why.
 enum class Lock { taken, lost, failed };
 Lock lock_at(int fd, const std::filesystem::path& path, int how);
 
-void write_cache_tag(const std::filesystem::path& folder);  // bford.info/cachedir
+void write_cache_tag(const std::filesystem::path& folder);  // as specified at bford.info/cachedir
 
 }  // namespace ls::worker

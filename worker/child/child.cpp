@@ -23,19 +23,19 @@ using child::Reply;
 using child::Request;
 using child::Slot;
 
-// If the child dies this many times in a row while it renders a unit, each time because of another unit, this
-// worker gives the unit up. Each such death fails that other unit, and after three failures the farm gives
-// the worker no more units of that unit's job. The limit is high, so that a unit that is not at fault does
-// not reach it before the farm has stopped those that are.
+// Number of times in a row that the child may die while it renders a unit, each time because of another unit,
+// before this worker reports the unit as failed. Each such death fails the other unit, and after three
+// failures the farm gives the worker no more units of that job. So the limit is high enough that an innocent
+// unit does not reach it before the farm has stopped the ones at fault.
 constexpr int kInnocentDeaths = 64;
 
 std::size_t floats_of(const LocalJob& job, const LeaseUnit& unit) {
   return static_cast<std::size_t>(unit.rect.pixels()) *
          (kPartialChannels + planes_of(aovs_of(job.brief.settings)).count());
 }
-// How many children in a row may end by themselves before they are ready; then the backend is broken.
+// Number of children in a row that may exit before they are ready; the backend is broken then.
 constexpr int kUnreadyChildren = 5;
-// How long after the stop flag was set the child must have answered; otherwise it is killed
+// Time after setting the stop flag within which the child must answer; otherwise it is killed
 constexpr Duration kStopLimit = std::chrono::seconds(10);
 
 tl::unexpected<UnitFailure> failed(std::string reason) {
@@ -67,15 +67,15 @@ class ChildBackend final : public RenderBackend {
  private:
   struct Attempt {
     tl::expected<RenderedUnit, UnitFailure> outcome;
-    bool innocent = false;  // the child died, but because of another unit
+    bool innocent = false;  // true if the child died because of another unit
   };
   Result<std::shared_ptr<Process>> living_process();
   Result<std::shared_ptr<Process>> spawn_greeted();
   Result<void> greet(Process& process);
   tl::unexpected<Error> broken_by(std::string why);
   bool send_forgotten(Process& process);
-  // Returns a child that has built the job's world; sets `number` to the job's number in the protocol with
-  // it.
+  // Returns a child that has built the job's world; sets `number` to the job's number in that child's
+  // protocol.
   tl::expected<std::shared_ptr<Process>, UnitFailure> ready_process(const LocalJob& job,
                                                                     std::uint64_t& number);
   tl::expected<void, UnitFailure> prepare_in(Process& process, const LocalJob& job, std::uint64_t number);
@@ -87,11 +87,12 @@ class ChildBackend final : public RenderBackend {
   const ChildOptions options_;
   const SystemClock clock_;
   Digest numeric_class_;
-  std::mutex control_mutex_;  // one request at a time on the control channel; also protects respawning
+  std::mutex control_mutex_;  // allows one request at a time on the control channel; also guards respawning
   mutable std::mutex mutex_;
-  std::shared_ptr<Process> process_;  // guarded by mutex_, like everything below
+  std::shared_ptr<Process> process_;  // guarded by mutex_, as are all members below
   std::map<WorldKey, std::uint64_t> numbers_;
-  std::vector<std::uint64_t> forgotten_;  // to be sent to the child before the next world is built
+  // Numbers of jobs whose worlds the child should free, to be sent before the next world is built
+  std::vector<std::uint64_t> forgotten_;
   std::uint64_t next_number_ = 1;
   std::vector<int> free_slots_;
   bool shut_down_ = false;
@@ -115,8 +116,8 @@ Result<std::shared_ptr<Process>> ChildBackend::living_process() {
   return process;
 }
 
-// Starts a child and waits for its hello. A failed start is tried again, because resources that a new child
-// lacks (address space, descriptors) may be available a little later.
+// Starts a child and waits for its hello. A failed start is repeated, because resources that it lacked
+// (address space, descriptors) may be available a little later.
 Result<std::shared_ptr<Process>> ChildBackend::spawn_greeted() {
   Duration pause = options_.respawn_pause;
   for (int tries = 1;; ++tries, pause *= 2) {
@@ -133,7 +134,7 @@ Result<std::shared_ptr<Process>> ChildBackend::spawn_greeted() {
   }
 }
 
-// Waits for the child's hello. unavailable: the child ended by itself before it, although the first child did
+// Waits for the child's hello. unavailable: the child exited before its hello, although an earlier child did
 // not.
 Result<void> ChildBackend::greet(Process& process) {
   const TimePoint deadline = clock_.now() + options_.start_limit;
@@ -147,8 +148,8 @@ Result<void> ChildBackend::greet(Process& process) {
     if (first) why += "; run the worker with --fake to see whether the renderer is the cause";
     return fail(first || end.signal ? Errc::internal : Errc::unavailable, std::move(why));
   }
-  if (numeric_class_ == Digest{})
-    numeric_class_ = answer->reply.numeric_class;  // of the first child, before any other thread was started
+  // Set by the first child, before any other thread was started
+  if (numeric_class_ == Digest{}) numeric_class_ = answer->reply.numeric_class;
   if (numeric_class_ != answer->reply.numeric_class)
     return broken_by(
         fmt::format("a new render child has the numeric class {}, not {} as this worker began with",
@@ -338,6 +339,7 @@ ChildBackend::Attempt ChildBackend::attempt(Process& process, int index, std::ui
   out.partial.aovs = aovs_of(brief.settings);
   out.cpu_seconds = reply.cpu_seconds;
   out.wall_seconds = reply.wall_seconds;
+  out.techniques = TechniqueSet::of_bits(reply.techniques);
   if (!answer->text.empty()) {
     auto health = parse_health(answer->text);
     if (!health) return {failed("the renderer's answer cannot be read: " + health.error().message), false};

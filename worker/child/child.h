@@ -1,10 +1,10 @@
-// A RenderBackend that runs the renderer in a child process. A scene that crashes the renderer, hangs it or
-// uses up all memory then costs only a unit (one tile and one range of samples) and not the worker. The child
-// is this same executable, started with other arguments by posix_spawn.
+// A RenderBackend that runs the renderer in a child process. If a scene crashes the renderer, hangs it or
+// uses up all memory, this costs only a unit (one tile and one range of samples) and not the worker. The
+// child is this same executable, started with other arguments by posix_spawn.
 //
 // When the child dies, the unit at fault is the one whose thread received the signal or made no progress. The
-// units on other threads are rendered again by the next child, without an error. If it is unknown which unit
-// was at fault (SIGKILL: the system was out of memory), all running units are reported as failed.
+// units on other threads are rendered again by the next child and do not count as failed. If it is unknown
+// which unit was at fault (SIGKILL: the system was out of memory), all running units are reported as failed.
 #pragma once
 
 #include <filesystem>
@@ -21,18 +21,18 @@ namespace ls::worker {
 inline constexpr int kMostChildThreads = 256;
 
 struct ChildOptions {
-  // The child's program. The default is this same program, even if its file has been replaced since it was
-  // started.
+  // The child's program. The default is this same program, even if its file was replaced after the start.
   std::filesystem::path executable = "/proc/self/exe";
   std::vector<std::string> arguments;  // arguments with which the child calls serve(): see worker/main.cpp
-  int slots = 1;                       // units rendered at once; equals the caller's threads
-  Duration hang_limit = std::chrono::minutes(5);      // longest time without finishing a sample
+  // Number of units rendered at the same time: the caller's number of threads
+  int slots = 1;
+  Duration hang_limit = std::chrono::minutes(5);      // longest time that a thread may take for one sample
   Duration prepare_limit = std::chrono::minutes(30);  // longest time to build one world
   Duration forget_limit = std::chrono::minutes(1);    // longest time to free one world
-  // Longest time from the child's start to its hello. It includes the numeric battery: the arithmetic whose
-  // results identify the machine's numeric class
+  // Longest time from the child's start to its hello. This includes the computations whose results identify
+  // the machine's numeric class
   Duration start_limit = std::chrono::minutes(2);
-  // Pause before replacing a child that ended by itself before it was ready; doubles each time.
+  // Pause before the replacement of a child that exited before it was ready; doubles each time.
   Duration respawn_pause = std::chrono::seconds(1);
 };
 

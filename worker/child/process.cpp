@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -15,9 +14,8 @@
 #include <cstring>
 #include <string_view>
 
+#include "common/base/spawn.h"
 #include "worker/agent/resident.h"
-
-extern char** environ;
 
 namespace ls::worker::child {
 namespace {
@@ -29,34 +27,26 @@ tl::unexpected<Error> system_error(const char* what, int error = errno) {
 }
 
 // The descriptors that the child will get, in the order of their numbers in the child, from kSharedMemoryFd
-// on. In this process they get higher numbers than any number in the child, so that no dup2 into place
-// overwrites a descriptor that is still to be moved.
+// on.
 class TheirEnds {
  public:
-  explicit TheirEnds(int slots) : lowest_(kFirstSlotFd + slots + 1) {}
+  TheirEnds() = default;
   ~TheirEnds() {
     for (const int fd : fds_) ::close(fd);
   }
   TheirEnds(const TheirEnds&) = delete;
   TheirEnds& operator=(const TheirEnds&) = delete;
 
-  Result<int> add(int fd) {
-    const int high = ::fcntl(fd, F_DUPFD_CLOEXEC, lowest_);
-    const int error = errno == EINVAL ? EMFILE : errno;  // EINVAL: the limit on descriptors is below lowest_
-    ::close(fd);
-    if (high < 0) return system_error("file descriptors", error);
-    fds_.push_back(high);
-    return high;
-  }
+  void add(int fd) { fds_.push_back(fd); }
   const std::vector<int>& fds() const { return fds_; }
 
  private:
-  const int lowest_;
   std::vector<int> fds_;
 };
 
-// Environment variables passed to the child: only those that its libraries use. The agent's environment may
-// hold secrets (the join token, cloud keys) that a renderer of untrusted files must not see.
+// True for environment variables that are passed to the child: only those that its libraries use. The agent's
+// environment may contain secrets (the join token, cloud keys) that a renderer of untrusted files must not
+// see.
 bool may_see(std::string_view variable) {
   constexpr std::array kNames{"PATH=", "HOME=", "USER=", "TMPDIR=", "TZ=", "LANG=", "LANGUAGE="};
   constexpr std::array kFamilies{"LC_", "LD_", "MALLOC_", "GLIBC_TUNABLES=", "TBB_", "LIGHTSHAFT_LOG="};
@@ -66,70 +56,43 @@ bool may_see(std::string_view variable) {
          std::any_of(kFamilies.begin(), kFamilies.end(), begins) || name.ends_with("SAN_OPTIONS");
 }
 
-std::vector<char*> child_environment() {
-  std::vector<char*> kept;
-  for (char** e = environ; *e; ++e)
-    if (may_see(*e)) kept.push_back(*e);
-  kept.push_back(nullptr);
-  return kept;
-}
-
 }  // namespace
 
 Result<std::shared_ptr<Process>> Process::spawn(const ChildOptions& options) {
   std::shared_ptr<Process> process(new Process);
-  TheirEnds theirs(options.slots);
+  TheirEnds theirs;
   process->memory_bytes_ = sizeof(Slot) * static_cast<std::size_t>(options.slots);
   const int memory_fd = ::memfd_create("lightshaft-render", MFD_CLOEXEC);
   if (memory_fd < 0) return system_error("memfd_create");
-  const auto memory = theirs.add(memory_fd);
-  if (!memory) return tl::unexpected<Error>(memory.error());
-  if (::ftruncate(*memory, static_cast<off_t>(process->memory_bytes_)) != 0)
+  theirs.add(memory_fd);
+  if (::ftruncate(memory_fd, static_cast<off_t>(process->memory_bytes_)) != 0)
     return system_error("shared memory");
-  void* mapped = ::mmap(nullptr, process->memory_bytes_, PROT_READ | PROT_WRITE, MAP_SHARED, *memory, 0);
+  void* mapped = ::mmap(nullptr, process->memory_bytes_, PROT_READ | PROT_WRITE, MAP_SHARED, memory_fd, 0);
   if (mapped == MAP_FAILED) return system_error("mmap");
   process->slots_ = static_cast<Slot*>(mapped);
   for (int i = 0; i <= options.slots; ++i) {
     int pair[2];
     if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) != 0) return system_error("socketpair");
     (i == 0 ? process->control_ : process->slot_fds_.emplace_back()) = pair[0];
-    if (const auto end = theirs.add(pair[1]); !end) return tl::unexpected<Error>(end.error());
+    theirs.add(pair[1]);
   }
   if (const auto ok = process->start(options, theirs.fds()); !ok) return tl::unexpected<Error>(ok.error());
   return process;
 }
 
 Result<void> Process::start(const ChildOptions& options, const std::vector<int>& theirs) {
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  int error = posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
-  for (std::size_t i = 0; i < theirs.size() && error == 0; ++i)
-    error = posix_spawn_file_actions_adddup2(&actions, theirs[i], kSharedMemoryFd + static_cast<int>(i));
-  if (error == 0)
-    error =
-        posix_spawn_file_actions_addclosefrom_np(&actions, kSharedMemoryFd + static_cast<int>(theirs.size()));
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  sigset_t none;
-  sigemptyset(&none);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
-
   std::error_code no_link;  // the process list should show the name behind /proc/self/exe
   const std::filesystem::path behind = std::filesystem::read_symlink(options.executable, no_link);
-  std::vector<std::string> arguments = {no_link ? options.executable.string() : behind.string()};
-  arguments.insert(arguments.end(), options.arguments.begin(), options.arguments.end());
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  argv.push_back(nullptr);
-  if (error == 0)
-    error = ::posix_spawn(&pid_, options.executable.c_str(), &actions, &attributes, argv.data(),
-                          child_environment().data());
-  posix_spawn_file_actions_destroy(&actions);
-  posix_spawnattr_destroy(&attributes);
-  if (error == 0) return {};
-  pid_ = -1;
-  return system_error(options.executable.c_str(), error);
+  Program program{.path = options.executable.string(),
+                  .arguments = {no_link ? options.executable.string() : behind.string()},
+                  .files = {kDevNull, STDOUT_FILENO, STDERR_FILENO},
+                  .inherits = may_see};
+  program.arguments.insert(program.arguments.end(), options.arguments.begin(), options.arguments.end());
+  program.files.insert(program.files.end(), theirs.begin(), theirs.end());
+  const auto pid = ls::spawn(std::move(program));
+  if (!pid) return fail(Errc::internal, "cannot start the render child: " + pid.error().message);
+  pid_ = *pid;
+  return {};
 }
 
 Process::~Process() {
@@ -146,7 +109,7 @@ void Process::kill() {
 }
 
 Process::End Process::end() {
-  // Wait without the lock, which kill() needs. WNOWAIT leaves the ended process unreaped, so its id is not
+  // Waits without the lock, which kill() needs. WNOWAIT leaves the ended process unreaped, so its id is not
   // reused.
   if (alive()) {
     siginfo_t info{};
@@ -192,7 +155,7 @@ std::optional<Process::Answer> Process::ask(int fd, Request request, const std::
                                             const Watch& watch) {
   request.text_bytes = static_cast<std::uint32_t>(text.size());
   auto answer = exchange(fd, request, text, watch);
-  // The child may have closed its end but still run: without the kill, end() would wait forever.
+  // The child may have closed its end but still run. Without the kill, end() would wait forever.
   if (!answer) kill();
   return answer;
 }

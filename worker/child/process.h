@@ -1,4 +1,4 @@
-// One render child process (see child.h), from spawn to exit, as the agent's process sees it.
+// One render child process (see child.h), from spawn to exit, from the point of view of the agent's process.
 #pragma once
 
 #include <sys/types.h>
@@ -21,7 +21,7 @@ namespace ls::worker::child {
 class Process {
  public:
   static Result<std::shared_ptr<Process>> spawn(const ChildOptions& options);
-  ~Process();  // kills it
+  ~Process();  // kills the process
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
@@ -30,8 +30,8 @@ class Process {
     std::string text;
   };
   // Sends a request, followed by `text`, to the child on the channel `fd` and waits for the answer. Meanwhile
-  // it calls `watch` about every 50 ms, which may kill() the child. nullopt: the child died, or it sent a
-  // malformed answer and was killed for it.
+  // it calls `watch` about every 50 ms, which may kill() the child. nullopt: the child died, or was killed
+  // for a malformed answer.
   std::optional<Answer> ask(int fd, Request request, const std::string& text, const Watch& watch);
 
   void kill();
@@ -52,9 +52,10 @@ class Process {
   int slots() const { return static_cast<int>(slot_fds_.size()); }
   bool some_slot_crashed() const;
 
-  std::atomic<int> hung_slot{-1};    // slot (render thread) without progress, for which the child was killed
-  std::atomic<bool> garbled{false};  // the child was killed because of a malformed answer
-  std::atomic<bool> preparing{false};  // a world is being built
+  // Slot (render thread) whose lack of progress made the agent kill the child; -1: none
+  std::atomic<int> hung_slot{-1};
+  std::atomic<bool> garbled{false};    // true if the child was killed for a malformed answer
+  std::atomic<bool> preparing{false};  // true while a world is being built
   std::mutex prepared_mutex;
   // Numbers of the jobs whose scenes the child has built; guarded by prepared_mutex.
   std::set<std::uint64_t> prepared;

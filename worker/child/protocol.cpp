@@ -10,8 +10,8 @@ namespace {
 
 constexpr int kPollMs = 50;
 
-// Transfers all bytes by calls of `move(p, bytes)`, a send or receive that does not block; in between it
-// waits for the event `ready` (of poll(2)).
+// Transfers all bytes by calls of `move(p, bytes)`, a send or receive that does not block. Between the calls
+// it waits for the event `ready` of poll(2).
 template <class Move, class Byte>
 bool move_all(int fd, short ready, Byte* p, std::size_t bytes, const Watch& watch, Move move) {
   while (bytes > 0) {

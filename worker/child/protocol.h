@@ -1,7 +1,7 @@
 // The protocol between agent and render child. Requests and replies are structs of fixed size over a socket
-// pair per channel: one channel for control and one for each slot, i.e. render thread. The pixel sums of
-// rendered units, and for each slot the sample that it is rendering, are in a memory that both share. Agent
-// and child are the same executable, so plain structs suffice.
+// pair per channel: one channel for control and one for each slot, that is, render thread. The pixel sums of
+// rendered units are in shared memory, and so is, for each slot, the sample that it is rendering. Agent and
+// child are the same executable, so plain structs suffice.
 #pragma once
 
 #include <atomic>
@@ -27,13 +27,13 @@ inline constexpr int kControlFd = 4;
 inline constexpr int kFirstSlotFd = 5;
 inline constexpr int kMostSlots = kMostChildThreads;
 
-// Limit for the bytes of one asset in the text of a job (child/job_text.h): its digest, size and name, then
-// the digest again with the path. Escapes may double the bytes of names and paths.
+// Most bytes of one asset in the text of a job (child/job_text.h): its digest, size and name, then the digest
+// again with the path. Escapes may double the bytes of names and paths.
 inline constexpr std::size_t kAssetTextBytes = 2 * 64 + 20 + 2 * limits::kNameBytes + 2 * PATH_MAX + 64;
-// Limit for the bytes of the whole text: the settings as a JSON string, all assets and the scene's file.
+// Most bytes of the whole text: the settings as a JSON string, all assets and the scene's file.
 inline constexpr std::size_t kTextBytes =
     2 * limits::kSettingsBytes + (limits::kAssetsPerJob + 2) * kAssetTextBytes;
-inline constexpr std::size_t kReasonBytes = 64 << 10;  // longest text of a reply
+inline constexpr std::size_t kReasonBytes = 64 << 10;  // most bytes of the text of a reply
 
 // Number of floats in the largest partial (the pixel sums of one unit) that fits into a message: a tile of
 // 202 x 202 pixels without AOVs.
@@ -44,8 +44,8 @@ enum class Kind : std::uint32_t { hello, prepare, forget, render };
 // A request of the agent, followed by `text_bytes` bytes of text.
 struct Request {
   Kind kind{};
-  std::uint32_t text_bytes = 0;  // prepare: the job (child/job_text.h)
-  std::uint64_t job = 0;         // the number that the agent has given to the job
+  std::uint32_t text_bytes = 0;  // for `prepare`: length of the text of the job (child/job_text.h)
+  std::uint64_t job = 0;         // number of the job, assigned by the agent
   std::uint32_t tile = 0, round = 0;
   PixelRect rect;
   SampleRange samples;
@@ -55,25 +55,26 @@ enum class Outcome : std::uint32_t { ok, scene_at_fault, failed, out_of_memory, 
 
 struct Reply {
   Outcome outcome{};
-  // Length of a text that follows: the reason of a failure, or the health of a rendered unit that is not
+  // Length of the text that follows: the reason of a failure, or the health of a rendered unit that is not
   // clean.
   std::uint32_t text_bytes = 0;
-  Digest numeric_class;  // hello
+  Digest numeric_class;  // only in the hello
   double cpu_seconds = 0, wall_seconds = 0;
+  std::uint32_t techniques = 0;  // TechniqueSet::bits() of a rendered unit
 };
 static_assert(std::is_trivially_copyable_v<Request> && std::is_trivially_copyable_v<Reply>);
 
-// What agent and child share of one render thread; an array of these is the shared memory.
+// The data of one render thread that agent and child share. The shared memory is an array of these.
 struct Slot {
   render::Breadcrumb where;
   std::atomic<std::int32_t> tile{-1}, round{-1};
-  std::atomic<bool> stop{false};     // set by the parent
-  std::atomic<bool> crashed{false};  // set by the child's signal handler: this thread crashed
+  std::atomic<bool> stop{false};     // set by the agent
+  std::atomic<bool> crashed{false};  // set by the child's signal handler if this thread crashed
   float sums[kSlotFloats];
 };
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
-// Send or receive all bytes and block until that is done; false: the other side has closed the channel. While
+// Send or receive all bytes and block until this is done; false: the other side has closed the channel. While
 // they wait they call `watch`, if given, about every 50 ms.
 using Watch = std::function<void()>;
 bool send_all(int fd, const void* data, std::size_t bytes, const Watch& watch = {});

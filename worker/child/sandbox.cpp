@@ -57,7 +57,7 @@ constexpr std::uint32_t kDenied[] = {
     SYS_clock_settime,
     SYS_acct,
     SYS_quotactl,
-    // The agent and other processes of its user: signals, scheduling, memory.
+    // Effects on the agent and other processes of its user: signals, scheduling, memory.
     SYS_kill,
     SYS_tkill,
     SYS_rt_sigqueueinfo,
@@ -73,17 +73,17 @@ constexpr std::uint32_t kDenied[] = {
     SYS_move_pages,
     SYS_process_madvise,
     SYS_kcmp,
-    // Objects that outlive the process and evade its memory limit.
+    // Objects that outlive the process and are not counted in its memory limit.
     SYS_shmget,
     SYS_shmat,
     SYS_semget,
     SYS_msgget,
     SYS_mq_open,
 };
-constexpr std::uint32_t kX32 = 0x40000000;  // the x32 numbers of the same calls
+constexpr std::uint32_t kX32 = 0x40000000;  // added to the numbers of the same calls in the x32 ABI
 
 // A system call that is allowed or denied depending on one of its arguments. Only the lower 32 bits of the
-// argument are compared; the kernel uses no others there. Each call is listed once.
+// argument are compared; the kernel ignores the others for these calls. Each call is listed once.
 struct Decided {
   std::uint32_t call;
   unsigned argument;
@@ -91,16 +91,17 @@ struct Decided {
   std::vector<std::uint32_t> values;
 };
 std::vector<Decided> decided() {
-  return {{SYS_tgkill, 0, true, {static_cast<std::uint32_t>(::getpid())}},  // raise and abort
+  // used by raise and abort: only signals to this process itself are allowed
+  return {{SYS_tgkill, 0, true, {static_cast<std::uint32_t>(::getpid())}},
           {SYS_prlimit64, 0, true, {0}},
           {SYS_sched_setaffinity, 0, true, {0}},
-          // The process that the kernel signals when a descriptor becomes ready.
+          // These would choose a process that the kernel signals when a descriptor becomes ready.
           {SYS_fcntl, 1, false, {F_SETOWN, F_SETOWN_EX, F_SETSIG}},
           {SYS_ioctl, 1, false, {FIOSETOWN, SIOCSPGRP}}};
 }
 
-// Appends the test of one call to the filter program. If the number of the system call matches, the test
-// decides by the argument; otherwise the program continues behind the test, with the number still loaded.
+// Appends the test of one call to the filter program. If the number of the system call matches, the argument
+// decides; otherwise the program continues after the test, with the number still loaded.
 void put(const Decided& d, std::vector<sock_filter>& program) {
   const auto n = static_cast<std::uint8_t>(d.values.size());
   program.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, d.call, 0, static_cast<std::uint8_t>(n + 3)));
@@ -136,7 +137,7 @@ bool filter_calls() {
 
 // Files.
 //
-// Access rights that Landlock knows since Linux 5.13 (its ABI 1); later ABIs add more.
+// Access rights known to Landlock since Linux 5.13 (its ABI 1); later ABIs add more.
 constexpr std::uint64_t kRead = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
 constexpr std::uint64_t kWrite = LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_REMOVE_DIR |
                                  LANDLOCK_ACCESS_FS_REMOVE_FILE | LANDLOCK_ACCESS_FS_MAKE_CHAR |
@@ -144,7 +145,7 @@ constexpr std::uint64_t kWrite = LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS
                                  LANDLOCK_ACCESS_FS_MAKE_SOCK | LANDLOCK_ACCESS_FS_MAKE_FIFO |
                                  LANDLOCK_ACCESS_FS_MAKE_BLOCK | LANDLOCK_ACCESS_FS_MAKE_SYM;
 constexpr std::uint64_t kTruncate = std::uint64_t{1} << 14;  // ABI 3, Linux 6.2
-constexpr std::uint64_t kFileRights =  // those that apply to files; the rest apply to folders
+constexpr std::uint64_t kFileRights =  // rights that apply to files; the rest apply to folders
     LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_EXECUTE | kTruncate;
 
 struct Descriptor {
@@ -164,14 +165,14 @@ bool allow(int rules, const std::filesystem::path& path, std::uint64_t rights) {
   return ::syscall(SYS_landlock_add_rule, rules, LANDLOCK_RULE_PATH_BENEATH, &rule, 0) == 0;
 }
 
-// The kernel's landlock_ruleset_attr, including fields that are newer than the headers that we build with.
+// The kernel's landlock_ruleset_attr, including fields that are newer than the kernel headers of the build.
 struct Ruleset {
   std::uint64_t files = 0;    // ABI 1
   std::uint64_t network = 0;  // ABI 4
   std::uint64_t scoped = 0;   // ABI 6
 };
-// Signals of the sandboxed process, also those that the kernel sends for it (fcntl), reach only processes
-// within the sandbox
+// Restricts signals of the sandboxed process, including those that the kernel sends for it (fcntl), to
+// processes within the sandbox
 constexpr std::uint64_t kScopeSignal = 2;
 
 bool bound_files(const std::vector<std::filesystem::path>& readable, long abi) {
@@ -187,10 +188,11 @@ bool bound_files(const std::vector<std::filesystem::path>& readable, long abi) {
   const auto own = std::filesystem::read_symlink("/proc/self/exe", error);
   constexpr std::uint64_t kRun = kRead | LANDLOCK_ACCESS_FS_EXECUTE;
   for (const char* folder : {"/usr", "/lib", "/lib64"}) done &= allow(rules.fd, folder, kRun);
-  // Allow this program and the OpenVDB reader beside it, but not the folder that they are in.
+  // This program and the OpenVDB reader beside it are allowed, but not the folder that contains them.
   done &= allow(rules.fd, own, kRun);
   done &= allow(rules.fd, own.parent_path() / "lightshaft-vdb", kRun);
-  // Files that the dynamic loader and the thread library read. Of /proc other processes are not allowed.
+  // Files that the dynamic loader and the thread library read. The parts of /proc about other processes are
+  // not among them.
   for (const char* path : {"/etc/ld.so.cache", "/etc/ld.so.preload", "/sys", "/proc/self", "/proc/cpuinfo",
                            "/proc/meminfo", "/proc/sys/vm", "/dev/urandom", "/dev/random"})
     done &= allow(rules.fd, path, kRead);
@@ -205,12 +207,14 @@ bool bound_files(const std::vector<std::filesystem::path>& readable, long abi) {
 Sandboxed enter_sandbox(const std::vector<std::filesystem::path>& readable) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   (void)readable;
-  (void)filter_calls;  // sanitizers use ptrace, and write files wherever they are configured to
+  // No sandbox with sanitizers: they use ptrace, and write files wherever they are configured to
+  (void)filter_calls;
   (void)bound_files;
   return {};
 #else
   const long abi = ::syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
-  const bool files = bound_files(readable, abi);  // before filter_calls(), because it makes system calls
+  // Comes before filter_calls(), since it makes system calls that filter_calls() forbids
+  const bool files = bound_files(readable, abi);
   return {filter_calls(), files, files && abi >= 3};
 #endif
 }

@@ -26,7 +26,7 @@ namespace {
 
 constexpr std::size_t kAltStackBytes = 64 << 10;
 
-thread_local Slot* t_slot = nullptr;  // slot of this render thread, for the signal handler
+thread_local Slot* t_slot = nullptr;  // slot of this render thread, used by the signal handler
 
 // Marks the slot of the crashing thread, then dies of the same signal (SA_RESETHAND has restored the default
 // action).
@@ -73,7 +73,7 @@ class Server {
       std::string reason = guarded(reply, [&] { return control(request, text, reply); });
       if (!answer(kControlFd, reply, reason)) break;
     }
-    ::_exit(0);  // the agent is gone; do not wait for render threads in the middle of a sample
+    ::_exit(0);  // the agent is gone: exit without waiting for render threads in the middle of a sample
   }
 
   void render_loop(int index) {
@@ -88,8 +88,7 @@ class Server {
   }
 
  private:
-  // Calls `run` and returns the text for the reply. If `run` throws, the exception becomes the reply's
-  // outcome.
+  // Calls `run` and returns the text for the reply. An exception from `run` becomes the outcome in the reply.
   template <class Run>
   static std::string guarded(Reply& reply, Run run) {
     try {
@@ -156,6 +155,7 @@ class Server {
     std::copy(sums.begin(), sums.end(), slot.sums);
     reply.cpu_seconds = rendered->cpu_seconds;
     reply.wall_seconds = rendered->wall_seconds;
+    reply.techniques = rendered->techniques.bits();
     return rendered->health.clean() ? "" : canonical_json(rendered->health);
   }
 
@@ -169,14 +169,14 @@ class Server {
 
 void confine(std::uint64_t memory_limit) {
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-  // Name the process: started as /proc/self/exe, it would be called "exe".
+  // Names the process: as it was started by /proc/self/exe, its name would be "exe".
   ::prctl(PR_SET_NAME, "ls-render-child");
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
-  // Ctrl-C in a terminal is handled by the agent alone.
+  // Only the agent reacts to Ctrl-C in a terminal.
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) ::signal(signal, SIG_IGN);
 #if !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)  // their shadow memory is larger than any limit
+    !defined(__SANITIZE_THREAD__)  // not with sanitizers: their shadow memory is larger than any limit
   if (memory_limit > 0) {
     const rlimit data{memory_limit, memory_limit};
     ::setrlimit(RLIMIT_DATA, &data);

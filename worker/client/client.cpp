@@ -15,7 +15,8 @@ namespace ls::worker {
 namespace pb = ::lightshaft::farm::v1;
 namespace {
 
-// Keepalive, the same on both sides (coordinator/rpc/limits.h): a vanished peer is detected within 30 s.
+// Keepalive, with the same values as in coordinator/rpc/rpc_server.cpp: a peer that has vanished is detected
+// within 30 s.
 constexpr int kKeepaliveMs = 20'000;
 constexpr int kKeepaliveTimeoutMs = 10'000;
 constexpr Duration kCloseLimit = std::chrono::seconds(2);
@@ -37,7 +38,7 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address, const st
   args.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
   args.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   args.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-  // The agent has its own back-off between attempts to connect; gRPC's must not be longer.
+  // The agent has its own back-off between attempts to connect; the back-off of gRPC must not be longer.
   args.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
   args.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 1000);
   args.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);

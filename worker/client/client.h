@@ -11,8 +11,8 @@ namespace ls::worker {
 
 // Certificates for mutual TLS, in PEM.
 struct LinkTls {
-  std::string ca;         // CA of the coordinator's certificate
-  std::string cert, key;  // our own
+  std::string ca;         // CA that signed the coordinator's certificate
+  std::string cert, key;  // certificate and key of this worker
 };
 
 // Makes a link to the coordinator at `address`, "host:port", without connecting yet. `join_token` is sent

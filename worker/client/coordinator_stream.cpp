@@ -12,7 +12,7 @@ std::shared_ptr<WorkCall> WorkCall::start(pb::Farm::Stub& stub, const WorkerHell
   call->self_ = call;
   call->context_.set_wait_for_ready(false);
   stub.async()->Work(&call->context_, call.get());
-  call->AddHold();  // keeps the call open for writes that are started outside of the On... functions
+  call->AddHold();  // keeps the call open for writes that are started outside of gRPC's callbacks
   call->StartRead(&call->incoming_);
   call->send(hello);
   call->StartCall();
@@ -21,58 +21,58 @@ std::shared_ptr<WorkCall> WorkCall::start(pb::Farm::Stub& stub, const WorkerHell
 
 void WorkCall::send(const FromWorker& message) {
   pb::FromWorker wire = wire::to_wire(message);
-  const std::lock_guard lock(mutex_);
-  if (closing_ || done_) return;
-  queue_.push_back(std::move(wire));
-  pump_locked();
+  const auto state = state_.lock();
+  if (state->closing || state->done) return;
+  state->queue.push_back(std::move(wire));
+  pump(*state);
 }
 
-void WorkCall::pump_locked() {
-  if (writing_ || writes_done_ || !held_) return;
-  if (!queue_.empty()) {
-    writing_ = true;
-    StartWrite(&queue_.front());
-  } else if (closing_) {
-    writes_done_ = true;
+void WorkCall::pump(State& state) {
+  if (state.writing || state.writes_done || !state.held) return;
+  if (!state.queue.empty()) {
+    state.writing = true;
+    StartWrite(&state.queue.front());
+  } else if (state.closing) {
+    state.writes_done = true;
     StartWritesDone();
-    release_hold_locked();
+    release_hold(state);
   }
 }
 
-void WorkCall::release_hold_locked() {
-  if (!held_) return;
-  held_ = false;
+void WorkCall::release_hold(State& state) {
+  if (!state.held) return;
+  state.held = false;
   RemoveHold();
 }
 
 void WorkCall::close(Duration at_most) {
-  std::unique_lock lock(mutex_);
-  closing_ = true;
-  pump_locked();
-  if (done_changed_.wait_for(lock, at_most, [this] { return done_; })) return;
+  auto state = state_.lock();
+  state->closing = true;
+  pump(*state);
+  if (done_changed_.wait_for(state, at_most, [&] { return state->done; })) return;
   context_.TryCancel();
-  release_hold_locked();
+  release_hold(*state);
 }
 
 void WorkCall::OnReadDone(bool ok) {
   if (!ok) {
-    const std::lock_guard lock(mutex_);
-    closing_ = true;
-    if (!writing_) release_hold_locked();
+    const auto state = state_.lock();
+    state->closing = true;
+    if (!state->writing) release_hold(*state);
     return;
   }
-  // A kind of message that only newer versions know: a newer coordinator must not depend on our handling it.
+  // A message type from a newer version: ignored, since newer coordinators must not rely on it.
   if (!wire::known(incoming_)) {
     StartRead(&incoming_);
     return;
   }
   auto message = wire::from_wire(incoming_);
   if (!message) {
-    const std::lock_guard lock(mutex_);
-    broken_ = message.error();
-    closing_ = true;
+    const auto state = state_.lock();
+    state->broken = message.error();
+    state->closing = true;
     context_.TryCancel();
-    if (!writing_) release_hold_locked();
+    if (!state->writing) release_hold(*state);
     return;
   }
   observer_->received(std::move(*message));
@@ -80,25 +80,25 @@ void WorkCall::OnReadDone(bool ok) {
 }
 
 void WorkCall::OnWriteDone(bool ok) {
-  const std::lock_guard lock(mutex_);
-  writing_ = false;
-  queue_.pop_front();
+  const auto state = state_.lock();
+  state->writing = false;
+  state->queue.pop_front();
   if (!ok) {
-    queue_.clear();
-    closing_ = true;
-    release_hold_locked();
+    state->queue.clear();
+    state->closing = true;
+    release_hold(*state);
     return;
   }
-  pump_locked();
+  pump(*state);
 }
 
 void WorkCall::OnDone(const grpc::Status& status) {
   std::shared_ptr<WorkCall> self;
   Error why = status.ok() ? Error{Errc::unavailable, "the coordinator ended the stream"} : to_error(status);
   {
-    const std::lock_guard lock(mutex_);
-    if (broken_) why = *broken_;
-    done_ = true;
+    const auto state = state_.lock();
+    if (state->broken) why = *state->broken;
+    state->done = true;
     self = std::move(self_);
     done_changed_.notify_all();
   }

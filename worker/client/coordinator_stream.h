@@ -1,14 +1,14 @@
-// One gRPC stream to the coordinator. Messages to the coordinator are queued, bounded by the size of the
-// agent's outbox; messages from it are passed to the observer. The object keeps itself alive from StartCall
-// to OnDone, so that the link may drop its pointer at any time.
+// One gRPC stream to the coordinator. Messages to the coordinator are queued; the size of the agent's outbox
+// bounds the queue. Messages from the coordinator are passed to the observer. The object keeps itself alive
+// from StartCall to OnDone, so that the link may drop its pointer at any time.
 #pragma once
 
 #include <condition_variable>
 #include <deque>
 #include <memory>
-#include <mutex>
 
 #include "common/base/clock.h"
+#include "common/base/guarded.h"
 #include "proto/farm.grpc.pb.h"
 #include "worker/agent/link.h"
 
@@ -31,19 +31,21 @@ class WorkCall final
 
  private:
   explicit WorkCall(std::shared_ptr<LinkObserver> observer) : observer_(std::move(observer)) {}
-  void pump_locked();
-  void release_hold_locked();
+  struct State {
+    std::deque<lightshaft::farm::v1::FromWorker> queue;
+    bool writing = false, closing = false, writes_done = false, held = true, done = false;
+    std::optional<Error> broken;  // error of a message that could not be parsed
+  };
+  void pump(State& state);  // starts the next write, or ends the writes
+  void release_hold(State& state);
 
   const std::shared_ptr<LinkObserver> observer_;
-  std::shared_ptr<WorkCall> self_;  // until OnDone
+  std::shared_ptr<WorkCall> self_;  // owns this object until OnDone
   grpc::ClientContext context_;
   lightshaft::farm::v1::ToWorker incoming_;
 
-  std::mutex mutex_;
-  std::condition_variable done_changed_;
-  std::deque<lightshaft::farm::v1::FromWorker> queue_;
-  bool writing_ = false, closing_ = false, writes_done_ = false, held_ = true, done_ = false;
-  std::optional<Error> broken_;  // set by a message that could not be parsed
+  Guarded<State> state_;
+  std::condition_variable_any done_changed_;
 };
 
 }  // namespace ls::worker

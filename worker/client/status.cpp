@@ -19,7 +19,7 @@ Errc code_of(grpc::StatusCode code) {
       return Errc::permission_denied;
     case grpc::StatusCode::UNAUTHENTICATED:
       return Errc::unauthenticated;
-    // The coordinator vanished, was cut off or went down: the caller should try again later.
+    // The coordinator vanished, was unreachable or shut down: the caller should try again later.
     case grpc::StatusCode::UNAVAILABLE:
     case grpc::StatusCode::CANCELLED:
     case grpc::StatusCode::ABORTED:

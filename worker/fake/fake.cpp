@@ -4,14 +4,14 @@
 #include <time.h>
 #include <unistd.h>
 
-#include <charconv>
 #include <chrono>
 #include <condition_variable>
 #include <csignal>
 #include <mutex>
 #include <vector>
 
-#include "common/image/film/fake_pixels.h"
+#include "common/base/parse_number.h"
+#include "worker/fake/fake_pixels.h"
 
 namespace ls::worker {
 namespace {
@@ -95,7 +95,7 @@ class FakeBackend final : public LocalBackend {
     }
   }
 
-  // Sleeps for `delay`. False: `stop` was set meanwhile.
+  // Sleeps for `delay`. Returns false if `stop` was set meanwhile.
   static bool pause(Duration delay, const std::atomic<bool>& stop) {
     const auto end = std::chrono::steady_clock::now() + delay;
     while (!stop && std::chrono::steady_clock::now() < end)
@@ -142,13 +142,11 @@ Result<FakeFault> parse_fake_fault(std::string_view text) {
                           : name == "tile"  ? &fault.tile
                           : name == "round" ? &fault.round
                                             : nullptr;
-    const std::string_view value = eq == std::string_view::npos ? std::string_view() : item.substr(eq + 1);
-    if (!field ||
-        std::from_chars(value.data(), value.data() + value.size(), *field).ptr !=
-            value.data() + value.size() ||
-        value.empty())
+    const auto value = parse_number<std::int64_t>(eq == std::string_view::npos ? "" : item.substr(eq + 1));
+    if (!field || !value)
       return fail(Errc::invalid_argument,
                   fmt::format("'{}' is not seed=, tile= or round= with a number", item));
+    *field = *value;
   }
   return fault;
 }

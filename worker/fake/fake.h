@@ -1,6 +1,6 @@
 // The fake renderer, for tests of everything but rendering, and for load tests of a farm. Its result for a
 // unit (one tile and one range of samples) is a pure function of the job's seed, the pixels and the samples
-// (common/image/film/fake_pixels.h). It opens no scene file.
+// (worker/fake/fake_pixels.h). It opens no scene file.
 #pragma once
 
 #include <memory>
@@ -16,21 +16,21 @@ namespace ls::worker {
 // A fault injected into chosen units, for tests.
 struct FakeFault {
   enum class Kind { none, crash, hang, memory, wrong, unhealthy } kind = Kind::none;
-  // The fault befalls the units with this job's seed, this tile and this round (the number of the unit's
-  // range of samples). A negative value selects any.
+  // Selects the units with this job's seed, this tile and this round (the number of the unit's range of
+  // samples). A negative value matches every unit.
   std::int64_t seed = -1, tile = -1, round = -1;
 };
-// "KIND[,seed=S][,tile=T][,round=R]" with KIND one of crash, hang, memory, wrong, unwell; empty: none.
-// `unwell`: the pixels are right, but two infinite samples are reported at the tile's first pixel.
+// Parses "KIND[,seed=S][,tile=T][,round=R]" with KIND one of crash, hang, memory, wrong, unwell; empty: no
+// fault. `unwell`: the pixels are right, but two infinite samples are reported at the tile's first pixel.
 Result<FakeFault> parse_fake_fault(std::string_view text);
 
-Digest fake_numeric_class();  // SHA-256 of "fake"
+Digest fake_numeric_class();  // returns the SHA-256 of "fake"
 
 struct FakeOptions {
   Duration delay{};           // how long the renderer sleeps for each unit
-  double sample_seconds = 0;  // additional time per sample of a pixel, reported as CPU time
+  double sample_seconds = 0;  // additional time per sample of a pixel, which is reported as CPU time
   FakeFault fault;
-  Digest numeric_class = fake_numeric_class();  // set to another one to simulate another class of machine
+  Digest numeric_class = fake_numeric_class();  // set to another value to simulate another class of machine
 };
 
 std::unique_ptr<LocalBackend> make_fake_backend(FakeOptions options);

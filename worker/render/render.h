@@ -1,4 +1,4 @@
-// The renderer's public interface. It knows scenes, files and pixels, but nothing of jobs or networks.
+// The renderer's public interface. It handles scenes, files and pixels, and does not know jobs or networks.
 #pragma once
 
 #include <atomic>
@@ -15,6 +15,7 @@
 #include "common/image/frame/frame.h"
 #include "common/image/frame/rounds.h"
 #include "common/job/settings.h"
+#include "common/job/techniques.h"
 #include "common/scene/scene.h"
 
 namespace ls::render {
@@ -22,7 +23,7 @@ namespace ls::render {
 class World;
 using ls::Health;
 
-// The local file of each asset of a scene (mesh, image, volume), by the asset's digest.
+// The local file of each asset of a scene (mesh, image, volume). The key is the asset's digest.
 using AssetFiles = std::map<Digest, std::filesystem::path>;
 
 // Prepares the scene for rendering: builds the BVH, grids and light tables. The result does not depend on
@@ -40,16 +41,18 @@ struct Breadcrumb {
 
 struct TileResult {
   std::vector<float> sums;  // planes as in common/image/film/partial.h: six, plus those of the requested AOVs
-  Health health;            // of the samples, by cause and pixel; inputs are not included
-  bool stopped = false;     // `stop` was set: sums are not valid
+  // Health of the samples, by cause and pixel; corrected inputs of the scene are not included
+  Health health;
+  bool stopped = false;  // true if `stop` was set: the sums are then not valid
 };
 
 // Renders the samples `samples` of each pixel of `tile` on the calling thread. The result is a pure function
-// of (world, tile, samples), unless `stop` becomes true. `breadcrumb` receives the sample being rendered.
+// of (world, tile, samples), unless `stop` becomes true. `breadcrumb` receives the sample that is being
+// rendered.
 TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, const std::atomic<bool>* stop,
                        Breadcrumb* breadcrumb);
 
-// The names of the integrator variants that can render this world, cheapest first. A variant is the
+// Returns the names of the integrator variants that can render this world, cheapest first. A variant is the
 // integrator compiled for one set of features (features.h). render_tile_as() renders with one of them; all
 // give the same bits.
 std::vector<std::string> covering_variants(const World& world);
@@ -57,13 +60,16 @@ std::vector<std::string> all_variants(const World& world);  // all variants of t
 TileResult render_tile_as(const World& world, const std::string& variant, PixelRect tile,
                           SampleRange samples);
 
-// The value of one sample of one pixel, so that a single sample can be rendered again.
+// The value of one sample of one pixel, for rendering a single sample again.
 struct SampleValue {
   double rgb[3];
-  bool finite;    // false: the sample is rejected
-  Health health;  // of this sample only
+  bool finite;    // false if the sample is rejected
+  Health health;  // health of this sample only
 };
 SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample);
+
+// The techniques that the world's integrator uses.
+TechniqueSet techniques_of(const World& world);
 
 // A report for people: the names of the features that the scene uses and of those it does not use, and the
 // size of each data structure.
@@ -71,22 +77,23 @@ struct WorldReport {
   struct Structure {
     std::string name;
     std::uint64_t bytes = 0;
-    std::string detail;  // "12 triangles"; if bytes is 0, the reason
+    std::string detail;  // for example "12 triangles"; if bytes is 0, the reason
   };
   std::vector<std::string> used, left_out;
   std::vector<Structure> structures;
-  std::string variant;  // the chosen integrator instantiation, out of `variants` compiled ones
+  std::string variant;  // name of the chosen variant, out of `variants` compiled ones
   std::size_t variants = 0;
   // The number of inputs that were corrected: negative densities and texels set to 0, degenerate triangles
   // dropped, and so on.
   std::uint64_t clamped_inputs = 0;
 };
-// How many inputs of the scene were corrected, by cause.
+// Returns how many inputs of the scene were corrected, by cause.
 const Health& changed_inputs(const World& world);
 WorldReport describe(const World& world);
 
-// The numeric class of this machine and build: the SHA-256 of the build id and of the results of a battery of
-// test computations, run once, at the first call. Machines of the same class produce the same bits.
+// Returns the numeric class of this machine and build: the SHA-256 of the build id and of the results of a
+// battery of test computations. These run once, at the first call. Machines of the same class produce the
+// same bits.
 const Digest& numeric_class();
 
 }  // namespace ls::render

@@ -1,6 +1,6 @@
 // lightshaft-denoise LIBRARY THREADS: denoises the images in the inherited file kHelperFd (exchange.h) with
-// Intel Open Image Denoise 2 and exits. LIBRARY is what dlopen() takes. The library is found at run time and
-// never needed to build: its C API is declared here as its documentation describes it
+// Intel Open Image Denoise 2 and exits. LIBRARY is passed to dlopen(). The library is found at run time and
+// not needed to build: the functions of its C API are declared here according to its documentation
 // (https://www.openimagedenoise.org/documentation.html).
 #include <dlfcn.h>
 #include <sys/mman.h>
@@ -23,8 +23,9 @@ namespace {
 using ls::denoise::Header;
 using ls::denoise::Outcome;
 
-constexpr rlim_t kMostCpuSeconds = 7200;   // an image of 100 megapixels takes minutes
-constexpr int kMaxMemoryMegabytes = 2048;  // of the library itself: larger images are denoised in parts
+constexpr rlim_t kMostCpuSeconds = 7200;  // enough for an image of 100 megapixels, which takes minutes
+// Most memory of the library itself: larger images are denoised in parts
+constexpr int kMaxMemoryMegabytes = 2048;
 
 void confine() {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -35,11 +36,11 @@ void confine() {
 }
 
 void set_error(Header& header, const char* what, const char* why) {
-  if (header.error[0]) return;  // the first error is the cause
+  if (header.error[0]) return;  // the first error is kept, since it is the cause
   std::snprintf(header.error, sizeof header.error, "%s: %s", what, why ? why : "no reason given");
 }
 
-// Open Image Denoise. A function that is missing leaves ok() false.
+// The functions of Open Image Denoise. If one is missing, ok() is false.
 class Library {
  public:
   Library(const char* path, Header& header)
@@ -87,7 +88,7 @@ class Library {
     return function != nullptr;
   }
   Header& header_;
-  void* library_;  // never closed: its threads may still run when main() returns
+  void* library_;  // never closed, since its threads may still run when main() returns
   bool ok_ = false;
 };
 
@@ -110,7 +111,7 @@ class Run {
   Run(const Run&) = delete;
   Run& operator=(const Run&) = delete;
 
-  // Guides are denoised first, each by itself, so that the colour's filter may rely on them.
+  // Guides are denoised first, each separately, so that the colour's filter may rely on them.
   bool denoise(float* color, float* albedo, float* normal) {
     if (!ready_) return false;
     const std::size_t floats = ls::denoise::plane_floats(header_.width, header_.height);
@@ -189,5 +190,5 @@ int main(int argc, char** argv) {
       done = run.denoise(planes, planes + plane, planes + 2 * plane);
   }
   header.outcome = done ? Outcome::done : Outcome::failed;
-  std::_Exit(0);  // without the library's destructors, which may wait for its threads
+  std::_Exit(0);  // skips the library's destructors, which may wait for its threads
 }

@@ -54,7 +54,7 @@ constexpr Alias kAliases[] = {
 // Layers that every image has.
 constexpr std::string_view kAlways[] = {"spp", "stderr", "sample_count", "standard_error"};
 
-constexpr std::size_t kMostShown = 64;  // characters of a wrong name in a message
+constexpr std::size_t kMostShown = 64;  // most characters of a wrong name that a message shows
 
 std::string plain(std::string_view name) {
   std::string out;
@@ -63,7 +63,7 @@ std::string plain(std::string_view name) {
   return out;
 }
 
-// The given text as ASCII, for a message.
+// Returns the text in ASCII, for a message.
 std::string shown(std::string_view name) {
   std::string out(name.substr(0, kMostShown));
   for (char& c : out)

@@ -1,8 +1,9 @@
 // Additional outputs of an image (AOVs): their names, sizes, and planes in a partial (the pixel sums of one
 // tile and range of samples). docs/reference/aovs.md defines each.
 //
-// After its six colour planes a partial has the planes of sums of the requested AOVs, then those of
-// identifiers (id_slots.h); each kind sorted by name, which is also the order in the file.
+// After its six colour planes a partial has the planes of sums of the requested AOVs, then the planes of
+// identifiers (id_slots.h). AOVs of each of the two kinds are sorted by name, which is also the order in the
+// file.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +17,7 @@
 
 namespace ls {
 
-// Planes of colour in a partial: A.R A.G A.B B.R B.G B.B, the sums of the two halves.
+// The colour planes of a partial, A.R A.G A.B B.R B.G B.B: the sums of the two halves of the samples.
 inline constexpr int kPartialChannels = 6;
 
 enum class Aov : std::uint8_t {
@@ -41,23 +42,24 @@ enum class Aov : std::uint8_t {
 };
 inline constexpr std::size_t kAovs = 18;
 
-// The type of an AOV's values, and the divisor of their mean.
+// The type of an AOV's values, and the number of samples by which its sums are divided.
 enum class AovKind {
-  of_hits,  // sums over the samples that hit a surface; the mean is over these
-  of_all,   // sums over the samples that hit a surface; the mean is over all samples: a miss counts as 0
-  light,    // components of the radiance; the mean is over all samples
-  guide,    // for a denoiser: sums over all samples, separately for the two halves of the samples
-  ids       // identifiers, each with its number of samples
+  of_hits,  // sums over the samples that hit a surface, divided by the number of these samples
+  // Sums over the samples that hit a surface, divided by the number of all samples: a miss counts as 0
+  of_all,
+  light,  // components of the radiance, divided by the number of all samples
+  guide,  // for a denoiser: sums over all samples, separately for the two halves of the samples
+  ids     // identifiers, each with the number of samples that hit it
 };
 
 struct AovRow {
   Aov aov;
   std::string_view name;  // name in requests, and of the layer
   AovKind kind;
-  std::string_view components;  // of the layer: one letter per channel
+  std::string_view components;  // channels of the layer, one letter each
   bool half;                    // stored as half floats, unless the image is in floats
 };
-std::span<const AovRow> aov_rows();  // sorted by name
+std::span<const AovRow> aov_rows();  // all AOVs, sorted by name
 const AovRow& row_of(Aov aov);
 
 class AovSet {
@@ -74,34 +76,35 @@ class AovSet {
  private:
   std::uint32_t bits_ = 0;
 };
-AovSet aovs_of(AovKind kind);  // all of a kind
+AovSet aovs_of(AovKind kind);  // returns all AOVs of a kind
 
 // Parses names of AOVs. Names in common use ("normal", "sh_normal", "crypto_object") are accepted; case is
 // ignored, and '-' stands for '_'. "spp" and "stderr", which every image has, are accepted and add nothing.
 // invalid_argument: an unknown name; the message lists the known ones.
 Result<AovSet> parse_aovs(std::span<const std::string> names);
-std::vector<std::string> names_of(AovSet set);  // sorted
-std::string known_aovs();                       // "albedo, coverage, ..."
+std::vector<std::string> names_of(AovSet set);  // returns the names, sorted
+std::string known_aovs();                       // returns "albedo, coverage, ..."
 
 // One plane of sums: a component of an AOV, or the number of samples that hit a surface.
 struct AovPlane {
-  std::string name;      // the partial's channel: "aov.albedo.B", "aov.denoising_albedo.A.B", "aov.hits"
-  Aov aov = Aov::depth;  // unused for hits
-  int component = 0;     // in the row's order
-  int half = 0;          // of a guide: 0 for A, 1 for B; otherwise 0, for both together
+  // Channel in the partial's file: "aov.albedo.B", "aov.denoising_albedo.A.B", "aov.hits"
+  std::string name;
+  Aov aov = Aov::depth;  // not used for hits
+  int component = 0;     // index among the AOV's components
+  int half = 0;          // for a guide: 0 for half A, 1 for half B; otherwise 0, for both together
   bool hits = false;
 };
 struct AovPlanes {
   std::vector<AovPlane> sums;
   std::vector<Aov> ids;            // each has kIdPlanes planes
-  std::vector<std::string> names;  // of all planes, in the order within a partial
+  std::vector<std::string> names;  // names of all planes, in the order within a partial
   std::size_t count() const { return names.size(); }
   std::size_t hits = SIZE_MAX;  // index of the hits plane in sums, if present
 };
 AovPlanes planes_of(AovSet set);
 
-// Bytes per pixel of a partial (and of a tail, the last round of a film if it is cut), and of the film's
-// sums.
+// Bytes per pixel of a partial (and of a tail, the last round of a film if it is truncated), and of the
+// film's sums.
 std::size_t partial_bytes_per_pixel(AovSet set);
 std::size_t film_bytes_per_pixel(AovSet set);
 

@@ -11,11 +11,11 @@
 
 namespace ls {
 
-// MurmurHash3_x86_32 (A. Appleby, public domain) with seed 0.
+// Returns the hash MurmurHash3_x86_32 (A. Appleby, public domain) with seed 0.
 std::uint32_t murmur3_32(std::string_view text);
 
-// Returns the identifier of a name: its hash, taken as the bits of a float. Where not every program would
-// keep that float (0, denormal, infinite or NaN), one exponent bit is flipped.
+// Returns the identifier of a name: its hash, taken as the bits of a float. Some programs would change floats
+// that are 0, denormal, infinite or NaN; for these one exponent bit is flipped.
 float cryptomatte_id(std::string_view name);
 
 // Returns {"name":"8 hexadecimal digits of its id", ...}, sorted by name, without duplicates.

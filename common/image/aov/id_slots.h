@@ -1,7 +1,7 @@
-// Counts which objects a pixel shows and in how many samples: a fixed number of slots (identifier, count),
-// and the number of samples that found no slot. An identifier is a float made from a name as in Cryptomatte:
-// normal, never 0. Slots have one canonical order: by count, largest first, then by the bits of the
-// identifier; unused slots are 0, 0.
+// Counts which objects a pixel shows and in how many samples. It has a fixed number of slots (identifier,
+// count), and the number of samples that found no slot. An identifier is a float made from a name as in
+// Cryptomatte: normal, never 0. Slots have one canonical order: by count, largest first, then by the bits of
+// the identifier; unused slots are 0, 0.
 //
 // Adding two sets keeps the largest slots of both; the others are counted in `more`. While the samples of a
 // pixel show no more than kIdSlots objects in total, every count is exact in any order; beyond that a count
@@ -17,11 +17,11 @@
 namespace ls {
 
 inline constexpr int kIdSlots = 8;
-inline constexpr std::size_t kIdPlanes = 2 * kIdSlots + 1;  // id, n of each slot; more
+inline constexpr std::size_t kIdPlanes = 2 * kIdSlots + 1;  // identifier and count of each slot, and `more`
 
 struct IdSlot {
   float id = 0;
-  float n = 0;  // a whole number, at most 2^24
+  float n = 0;  // number of samples: an integer, at most 2^24
   bool operator==(const IdSlot&) const = default;
 };
 struct IdSlots {

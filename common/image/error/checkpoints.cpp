@@ -21,7 +21,7 @@ void Checkpoints::change(TileIndex index, const std::function<void(Tile&)>& edit
 void Checkpoints::folded(TileIndex index, RoundIndex round, const TileError& error) {
   change(index, [&](Tile& tile) {
     if (round >= complete()) {
-      // Replaces the tile's figures from this round on. Rounds that were skipped while the tile was stopped
+      // Replaces the tile's figures from this round on. Rounds that were skipped because the tile had stopped
       // keep its last figures.
       tile.pending.resize(round - complete(), tile.last);
       tile.pending.push_back(error);
@@ -46,7 +46,7 @@ void Checkpoints::settle() {
       sum.add(tile.pending.empty() ? tile.last : tile.pending.front());
       moved |= !tile.pending.empty();
     }
-    if (!moved) return;  // every tile has stopped
+    if (!moved) return;  // if every tile has stopped, there is no further checkpoint
     done_.push_back(sum);
     for (Tile& tile : tiles_) {
       if (!tile.pending.empty()) tile.pending.erase(tile.pending.begin());

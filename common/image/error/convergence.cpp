@@ -13,11 +13,12 @@ namespace ls {
 namespace {
 
 constexpr double kNormal95 = 1.959964;
-constexpr double kLeastSpp = 8;  // with fewer, halves of one or two samples are too noisy
+constexpr double kLeastSpp = 8;  // with fewer samples, halves of one or two samples are too noisy
 constexpr double kPriorSpread = .15;
-constexpr double kBend = .06;               // for forecasts: variation of the slope, see the header
-constexpr double kSlow = .85, kFast = 1.1;  // slopes in between count as expected
-constexpr std::size_t kMostPoints = 32;     // doublings
+// For forecasts: how much the slope varies, see kBend in the header
+constexpr double kBend = .06;
+constexpr double kSlow = .85, kFast = 1.1;  // the verdict is slow below kSlow and fast above kFast
+constexpr std::size_t kMostPoints = 32;     // most doublings of the sample count that are used
 
 struct Log {
   double time = 0, error = 0, spp = 0;
@@ -50,9 +51,9 @@ double covariance(const Log& a, const Log& b) {
   return a.sigma * b.sigma * std::min(a.spp, b.spp) / std::max(a.spp, b.spp);
 }
 
-// If the slope of the line follows a Brownian motion, the errors deviate from the line. This is the
-// covariance of the deviations at two times u and v, relative to the line's reference point, for a motion of
-// variance 1 per unit of log time; deviations on different sides of that point are independent.
+// Returns the covariance of the deviations of two errors from the line, at times u and v relative to the
+// line's reference point, if the slope of the line follows a Brownian motion. The motion has variance 1 per
+// unit of log time; deviations on different sides of the reference point are independent.
 double bend_covariance(double u, double v) {
   if (u * v <= 0) return 0;
   const double near = std::min(std::abs(u), std::abs(v)), far = std::max(std::abs(u), std::abs(v));
@@ -76,7 +77,7 @@ std::optional<Matrix> factor(const std::vector<Log>& y, double bend) {
   return l;
 }
 
-// Returns L^-1 times the vector given by `value`, which transforms the points to independent ones of variance
+// Returns L^-1 times the vector given by `value`. This transforms the points to independent ones of variance
 // 1.
 template <class Value>
 std::vector<double> whitened(const Matrix& l, const std::vector<Log>& y, const Value& value) {
@@ -95,9 +96,9 @@ double product(const std::vector<double>& a, const std::vector<double>& b) {
   return sum;
 }
 
-// The line error = a - slope * time, fitted to the points with their covariance, whose factor is `l`;
-// optionally with a prior on the slope. Times are relative to the last point, which makes a and slope nearly
-// independent.
+// The line error = a - slope * time, fitted to the points with their covariance, whose Cholesky factor is
+// `l`; optionally with a prior for the slope. Times are relative to the last point, which makes a and slope
+// nearly independent.
 class Line {
  public:
   Line(const std::vector<Log>& points, const Matrix& l, double prior_weight, double bend)
@@ -154,7 +155,8 @@ std::string words(double lo, double hi) {
 
 double excess(const ErrorPoint& p) { return *p.true_relmse - p.relmse; }
 
-// True if the true error of the last point stays above the estimated one; see the header.
+// True if the true error of the last point stays above the estimated one by more than chance; see judge() in
+// the header.
 bool stands_on_a_floor(std::span<const ErrorPoint> points) {
   constexpr double kSigmas = 4;
   if (points.empty() || !usable(points.back()) || !points.back().true_relmse) return false;
@@ -175,7 +177,7 @@ bool stands_on_a_floor(std::span<const ErrorPoint> points) {
 // Returns the earliest time after the last point, as a logarithm, at which `value` falls to `wanted`.
 template <class Curve>
 double when(const Curve& value, double wanted) {
-  constexpr double kMost = 60;  // e^60 times as long counts as never
+  constexpr double kMost = 60;  // reaching the value only after e^60 times as long counts as never
   double lo = 0, hi = 1;
   while (hi < kMost && value(hi) > wanted) lo = hi, hi *= 2;
   for (int i = 0; i < 60; ++i) {
@@ -192,8 +194,9 @@ double end_of_round(double spp) {
   return static_cast<double>(round_range(round_count(samples) - 1).s1);
 }
 
-// Returns by how much the cost of a sample varies between doublings of their number: its standard deviation
-// over the last few doublings, relative to the mean cost of all samples so far. 0: there are too few points.
+// Returns how much the cost of a sample varies between doublings of the number of samples: its standard
+// deviation over the last few doublings, relative to the mean cost of all samples so far. 0: there are too
+// few points.
 double cost_spread(std::span<const ErrorPoint> points) {
   constexpr int kDoublings = 4;
   const ErrorPoint& now = points.back();

@@ -15,22 +15,23 @@ namespace {
 
 constexpr int kReach = 2;                  // radius of the 5 x 5 window
 constexpr double k95 = 1.959963984540054;  // two-sided 95 % point of the normal distribution
-// If fewer pixels than this carry the error, their own scatter (sqrt(4/3/100) = 12 % of the sum) makes the
-// sum unreliable. Small images need fewer: in one of 32 x 32, object edges alone sometimes carry the error.
+// If fewer pixels than this carry the error, the scatter of their values (sqrt(4/3/100) = 12 % of the sum)
+// makes the sum unreliable. In small images fewer pixels suffice: in one of 32 x 32, object edges alone
+// sometimes carry the error.
 constexpr double kFewPixels = 100, kPartOfSmall = 48;
-constexpr double kLargeShare = 0.1;  // of the error in one pixel, for images with many pixels
-// Fourth powers of D in smooth parts of the image are compared with the variance from pairs of neighbours.
-// Their ratio is 1 for Gaussian noise, and up to 6 for low-discrepancy points on a smooth image
-// (tests/coverage); above this limit the estimate is not trusted.
+constexpr double kLargeShare = 0.1;  // largest share of the error in one pixel, for images with many pixels
+// The largest ratio between the fourth powers of D in smooth parts of the image and the variance from pairs
+// of neighbours for which the estimate is trusted. The ratio is 1 for Gaussian noise, and up to 6 for
+// low-discrepancy points on a smooth image (tests/coverage).
 constexpr double kHeavy = 10;
-// ratio of the light in the two halves from which a pixel counts as having few hits
+// a pixel has few hits if one half has at least this many times the light of the other
 constexpr double kOneSided = 19;
-// Least number of samples in the last round for estimating the distribution of the noise: with 8 samples per
-// half, a single sample that finds rare light would dominate.
+// Least number of samples in the last round for estimating the distribution of the noise from it. With 8
+// samples per half, a single sample that finds rare light would dominate.
 constexpr std::uint64_t kTellingSamples = 16;
 
-// The expected amount by which skewed noise lowers the sum of squared relative errors (error_estimate.h
-// derives it). Summed column by column, so that the loop is vectorised.
+// Returns the expected amount by which skewed noise lowers the sum of squared relative errors (derived in
+// error_estimate.h). Summed column by column, so that the loop is vectorised.
 double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earlier,
                const RelativeWeights& w) {
   const double before = static_cast<double>(earlier.spp) / static_cast<double>(spp), last = 1 - before;
@@ -60,8 +61,8 @@ double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earl
   return std::accumulate(columns.begin(), columns.end(), 0.0);
 }
 
-// Sum over pixels of tr(V^2), from fourth powers and, for a trusted image, also from pairs of neighbours;
-// derived in the header.
+// Returns the sum over pixels of tr(V^2), from fourth powers and, for a trusted image, also from pairs of
+// neighbours (derived in the header).
 double trace_of_moments(const NoiseSums& s, bool trusted) {
   const double r2 = s.pair_variance > 0 ? std::clamp(s.pair_covariance / s.pair_variance, 0.0, 1.0) : 1.0;
   const double channel = trusted ? s.edge_channel_fourth : s.channel_fourth,
@@ -70,16 +71,16 @@ double trace_of_moments(const NoiseSums& s, bool trusted) {
   return channel / 3 + cross * r2 / (1 + 2 * r2) + (trusted ? s.flat_pairs : 0);
 }
 
-// Returns the standard deviation of the estimated minus the realised sum of squares, divided by the estimated
-// sum.
+// Returns the standard deviation of the difference between the estimated and the realised sum of squares,
+// divided by the estimated sum.
 double relative_spread(const NoiseSums& s, bool trusted) {
   if (!(s.squares > 0)) return 0;
   return trusted ? 2 * std::sqrt(s.changes.products) / s.changes.squares
                  : 2 * std::sqrt(trace_of_moments(s, false)) / s.squares;
 }
 
-// Returns the sums for the interval. `a` and `b` are the changes of the two halves' means, three planes each;
-// `scale` is a factor on their squares.
+// Returns the sums from which the interval is computed. `a` and `b` are the changes of the two halves' means,
+// three planes each; `scale` is a factor on their squares.
 ChangeSums change_sums(const std::vector<double>& a, const std::vector<double>& b, double scale) {
   const std::size_t n = a.size() / 3;
   ChangeSums out;
@@ -210,8 +211,7 @@ void count_hits(const HalfMeans& h, TileError& out) {
 
 namespace {
 
-// Computes the sums from the changes in the last round, if that round and the part before it have enough
-// samples.
+// Sets the sums of changes from the last round, if that round and the part before it have enough samples.
 void send_changes(const HalfMeans& h, std::uint64_t spp, const EarlierMeans& earlier,
                   const std::vector<double>& roots, TileError& out) {
   if (std::min(earlier.spp, spp - earlier.spp) < kTellingSamples) return;
@@ -248,8 +248,8 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMea
             earlier->spp < spp,
         "{} and {} values of {} samples before {} of {}", earlier->halves.a.size(), earlier->halves.b.size(),
         earlier->spp, 3 * n, spp);
-  // With low-discrepancy points the whole is better than its parts, so a correction estimated from the parts
-  // must be limited.
+  // With low-discrepancy points the error of the whole is smaller than the errors of its parts suggest, so a
+  // correction estimated from the parts must be limited.
   const double all = out.relative.squares;
   out.subtract_skew(std::clamp(skew_of(h, spp, *earlier, w), -all / 2, all / 2));
   send_changes(h, spp, *earlier, w.roots, out);
@@ -258,13 +258,13 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMea
 
 namespace {
 
-// Half width of the 95 % interval of the logarithm of a sum of squares; on a log scale, so that the lower end
-// stays above zero. The spread is itself an estimate. From fourth powers: for n equal Gaussian pixels these
-// have a relative variance of 96 / (9 n), and (sum x)^2 / sum x^2 = n / 3 = e, so they behave like a chi
-// square with e / 2 degrees of freedom. From changes: 4 products / squares^2 has a relative variance of (8 +
-// 4 - 8) / n (from the products, the square and their covariance), hence 3 e / 2 degrees; uneven noise has
-// fewer, but at least e / 2 in the scenes of tests/coverage. The factor is Student's t for these, to first
-// order (Abramowitz and Stegun 26.7.5).
+// Returns half the width of the 95 % interval of the logarithm of a sum of squares. A log scale keeps the
+// lower end above zero. The spread is itself an estimate. From fourth powers: for n equal Gaussian pixels
+// these have a relative variance of 96 / (9 n), and (sum x)^2 / sum x^2 = n / 3 = e, so they behave like a
+// chi square with e / 2 degrees of freedom. From changes: 4 products / squares^2 has a relative variance of
+// (8 + 4 - 8) / n (from the products, the square and their covariance), hence 3 e / 2 degrees; uneven noise
+// has fewer, but at least e / 2 in the scenes of tests/coverage. The factor is Student's t for these degrees,
+// to first order (Abramowitz and Stegun 26.7.5).
 double half_width(const NoiseSums& s, bool trusted) {
   if (!(s.pixel_fourth > 0)) return 0;
   const double freedom = s.squares * s.squares / s.pixel_fourth / 2;

@@ -1,65 +1,68 @@
 // Estimates the error of an image from the image itself.
 //
-// A pixel's two half means A and B are independent and have the same expectation. With a, b their errors, the
-// image (A+B)/2 has the error e = (a+b)/2, and D = (A-B)/2 = (a-b)/2 has the same variance v as e: d = D^2 is
-// an unbiased estimate of E[e^2]. Sums of d over pixels and channels give the mean squared error; sums of w
-// d, with w = 1/(m^2 + 0.01) and m the pixel's true value, the relative one.
+// A pixel's two half means A and B are independent and have the same expectation. Let a and b be their
+// errors. The image (A+B)/2 has the error e = (a+b)/2, and D = (A-B)/2 = (a-b)/2 has the same variance v as
+// e. So d = D^2 is an unbiased estimate of E[e^2]. The mean of d over pixels and channels estimates the mean
+// squared error. The mean of w d estimates the relative one, with w = 1/(m^2 + 0.01) and m the pixel's true
+// value.
 //
-// The estimate of m must not contain the noise being measured: S = (A+B)/2 itself would let a firefly enlarge
-// its own denominator and hide most of its error, and the average W of the neighbours alone is wrong wherever
-// an image has edges (docs/design/error.md has figures for both). So, per channel,
+// The estimate of m must not contain the noise that is being measured. With S = (A+B)/2 itself, a firefly
+// would enlarge its own denominator and hide most of its error. The average W of the neighbours alone is
+// wrong where the image has edges (docs/design/error.md has figures for both). So, per channel,
 //   m = W + g (S - W),   g = T / (T + v),
-// local Wiener filtering (Lee 1980) with
+// which is local Wiener filtering (Lee 1980) with
 //   W   the mean of the 5 x 5 window without the pixel, clipped to the tile;
 //   u   the window's mean of D^2;
 //   v   the noise: u, or D^2 of the pixel where that exceeds T + u (a firefly has D^2 = (S - W)^2);
 //   T   the image's structure: the window's variance of S minus its noise u; or (S - W)^2 where that
 //       exceeds 9 u and 9 D^2, three standard deviations, as for a small bright object.
-// In a flat or dark area g is near 0 and m does not depend on the pixel; where the image's structure exceeds
-// its noise g is near 1. A tile of one pixel uses S. The noise remaining in m, of variance s^2 = g^2 u + (1 -
-// g)^2 u / n (n: the window's pixels), would bias f = 1/(m^2 + c), c = 0.01, by f" s^2 / 2: that is
-// subtracted, within [f/2, 2 f]. What remains is of second order: in the dark 3 s^4 / c^2 of the value.
+// In a flat or dark area g is near 0, and m does not depend on the pixel. Where the image's structure exceeds
+// its noise, g is near 1. A tile of one pixel uses S. The noise that remains in m has the variance s^2 = g^2
+// u + (1 - g)^2 u / n (n: the window's pixels). It would bias f = 1/(m^2 + c), c = 0.01, by f" s^2 / 2; this
+// is subtracted, within [f/2, 2 f]. The remaining bias is of second order: in the dark 3 s^4 / c^2 of the
+// value.
 //
-// Where g is near 1 the pixel's value enters its own weight, and the noise of rendered pixels is skewed: a
-// bright sample raises both D^2 and S, and the sum of f D^2 comes out too low, to first order by f'(m) g
-// cov(D^2, S), a relative error that falls like 1/N (2 % at 64 samples, docs/design/error.md). It is
-// estimated from the samples of the last round, which are independent of earlier ones: with n of N samples in
-// the last round, o before it, and D, S indexed by part,
+// Skew: where g is near 1, the pixel's value enters its own weight, and the noise of rendered pixels is
+// skewed. A bright sample raises both D^2 and S, so the sum of f D^2 is too low, to first order by f'(m) g
+// cov(D^2, S). This relative error falls like 1/N (2 % at 64 samples, docs/design/error.md). It is estimated
+// from the samples of the last round, which are independent of earlier ones. Let n of N samples be in the
+// last round and o before it, and let D and S be indexed by part. Then
 //   E[D_n^2 (S_n - S_o)] = k / n^2  and  E[D_o^2 (S_o - S_n)] = k / o^2,
 // with k the third cumulant of a sample; the pixel's true value cancels in the difference. cov(D^2, S) is k /
-// N^2, so
+// N^2, and
 //   t = ((n D_n / N)^2 (n / N) - (o D_o / N)^2 (o / N)) (S_n - S_o)
-// has it as its expectation, and f'(m) g t is subtracted. (To first order the squared difference of the last
-// samples is weighted by the earlier ones' weight, and vice versa.) Neither weight changes by more than half
+// has this expectation, so f'(m) g t is subtracted. (To first order, the squared difference of the last
+// samples is weighted by the weight from the earlier ones, and vice versa.) A weight changes by at most half
 // of itself. The first round has no earlier one and is not corrected.
 //
 // Interval of the realised error: d - e^2 = -ab, so Var(sum of d - sum of e^2) = sum of 4 v^2 exactly,
-// whatever the distribution of a and b; over channels, 4 tr(V^2) with V the covariance of the channels of D.
-// Divided by the square of the sum of tr V this depends only on how unevenly noise is spread over pixels and
-// channels:
+// whatever the distribution of a and b. Over channels it is 4 tr(V^2), with V the covariance of the channels
+// of D. Divided by the square of the sum of tr V, it depends only on how unevenly noise is spread over pixels
+// and channels:
 //   relative variance = 4 sum tr(V^2) / (sum tr V)^2.
-// It is estimated from the last round. With o samples before it and n in it, alpha = sqrt(o / 2n) (A - A_o)
-// of the one half and beta of the other are independent, since the halves are; each has expectation 0 and
-// covariance V (for independent samples: Var(A - A_o) = Var(A) n / o). So
+// It is estimated from the last round. With o samples before it and n in it, let alpha = sqrt(o / 2n) (A -
+// A_o) for one half, and beta the same for the other. Both have expectation 0 and covariance V (for
+// independent samples: Var(A - A_o) = Var(A) n / o), and they are independent, since the halves are. So
 //   E[(alpha . beta)^2] = tr(V^2)   and   E[(alpha . alpha + beta . beta) / 2] = tr V,
 // for each pixel separately, whatever the tails of its noise and the noise of its neighbours. The
-// alternatives are worse: fourth powers of D depend on the tails, products of neighbours on noise that varies
-// slowly, and choosing between the two by a g that depends on the pixel's own D removes the large ones from
-// its sum. Low-discrepancy points make the whole better than its parts by some factor, which cancels if it is
-// the same for all pixels.
+// alternatives are worse: fourth powers of D depend on the tails; products of neighbours require noise that
+// varies slowly; and a choice between the two by g, which depends on the pixel's own D, would remove large D
+// from a sum. With low-discrepancy points the error of the whole is smaller than its parts suggest, by a
+// factor that cancels if it is the same for all pixels.
 //
-// The first rounds, whose samples are too few to be separated, and a last round cut to a few samples use two
-// other estimates of tr(V^2); each pixel takes a share g^2 of the first and 1 - g^2 of the second:
+// The first rounds have too few samples to be separated, and the last round may be truncated to a few
+// samples. In these cases two other estimates of tr(V^2) are used; each pixel takes a share g^2 of the first
+// and 1 - g^2 of the second:
 //   From its own fourth powers, for Gaussian D: E[D_c^4] = 3 V_cc^2 and E[D_c^2 D_k^2] = V_cc V_kk (1 + 2
-//   r^2), r the correlation of two channels, hence
+//   r^2), where r is the correlation of two channels. Hence
 //     tr V^2 = sum_c E[D_c^4] / 3  +  sum_{c != k} E[D_c^2 D_k^2] r^2 / (1 + 2 r^2).
 //   With grey noise (r = 1) this is E[x^2]/3 for x = sum_c D_c^2. r^2 is taken from products of neighbouring
 //   pixels p, q, E[D_c D_k (p) D_c D_k (q)] / E[D_c^2 (p) D_k^2 (q)], a ratio in which image structure
-//   cancels. Heavier tails than Gaussian make E[D^4] larger than 3 v^2.
+//   cancels. With heavier tails than Gaussian, E[D^4] is larger than 3 v^2.
 //
-//   From pairs of neighbours, for any distribution: E[(D(p) . D(q))^2] = tr V(p) V(q), as their D are
-//   independent. That is tr V^2 where the noise varies slowly, which it does where the image does: where g
-//   is small.
+//   From pairs of neighbours, for any distribution: E[(D(p) . D(q))^2] = tr V(p) V(q), since their D are
+//   independent. This equals tr V^2 where the noise varies slowly. The noise does so where the image does,
+//   that is, where g is small.
 // An untrusted image has an interval from fourth powers alone, which is wider.
 #pragma once
 
@@ -84,45 +87,47 @@ struct ChangeSums {
 
 // Sums over the pixels of one tile (or of several: they are additive).
 struct NoiseSums {
-  double squares = 0;                                     // sum over pixels and channels of D^2
-  double channel_fourth = 0;                              // sum over pixels and channels of D^4
-  double pixel_fourth = 0;                                // sum over pixels of (sum over channels of D^2)^2
-  double pair_covariance = 0, pair_variance = 0;          // numerator and denominator of r^2
-  double edge_channel_fourth = 0, edge_pixel_fourth = 0;  // the fourth powers again, times g^2
+  double squares = 0;                             // sum over pixels and channels of D^2
+  double channel_fourth = 0;                      // sum over pixels and channels of D^4
+  double pixel_fourth = 0;                        // sum over pixels of (sum over channels of D^2)^2
+  double pair_covariance = 0, pair_variance = 0;  // numerator and denominator of r^2
+  // The two fourth powers above, but each pixel times g^2
+  double edge_channel_fourth = 0, edge_pixel_fourth = 0;
   double flat_pairs = 0;  // sum over pixels of 1 - g^2 times the mean of (D(p) . D(q))^2
   double largest = 0;     // largest sum over channels of D^2 of one pixel
-  ChangeSums changes;  // if the last round cannot be used: squares, and tr(V^2) by one of the other estimates
+  // Used unless the last round cannot be used; then one of the estimates above gives tr(V^2)
+  ChangeSums changes;
   void add(const NoiseSums& other);
   bool operator==(const NoiseSums&) const = default;
 };
 
 struct TileError {
   std::uint64_t pixels = 0;
-  std::uint64_t samples = 0;  // spp x pixels
-  // Number of pixels of which at least one half has almost no light although there is some: their light came
-  // from very few samples, and neither their value nor their difference is reliable. A pixel counts if one
-  // half has 19 times as much light as the other, or if both have none and more than half of the neighbours
-  // in its window have some. (k equal hits all fall into one half with probability 2^-(k-1): of pixels with 2
-  // hits half are found, with 5 one in 16, with 10 one in 500.)
+  std::uint64_t samples = 0;  // samples per pixel times pixels
+  // Number of pixels with few hits: at least one half has almost no light although the pixel has some. Its
+  // light came from very few samples, so neither its value nor its difference is reliable. A pixel counts if
+  // one half has 19 times as much light as the other, or if both have none and more than half of the
+  // neighbours in its window have some. (k equal hits all fall into one half with probability 2^-(k-1): of
+  // pixels with 2 hits half are found, with 5 one in 16, with 10 one in 500.)
   std::uint64_t few_hits = 0;
-  std::uint64_t lit = 0;  // pixels in which some sample found light
-  NoiseSums plain;        // of D
-  NoiseSums relative;     // of D / sqrt(window^2 + 0.01)
-  double skew = 0;        // amount subtracted from relative.squares because noise is skewed
+  std::uint64_t lit = 0;  // number of pixels in which some sample found light
+  NoiseSums plain;        // sums of D
+  NoiseSums relative;     // sums of D / sqrt(window^2 + 0.01)
+  double skew = 0;        // amount subtracted from relative.squares because the noise is skewed
   void add(const TileError& other);
   void subtract_skew(double part);
   bool operator==(const TileError&) const = default;
 };
 
-// Half means of a tile, planar: R, G, B planes of rect.pixels() each, row by row.
+// Half means of a tile: R, G, B planes of rect.pixels() values each, row by row.
 struct HalfMeans {
   int width = 0, height = 0;
   std::span<const double> a, b;
 };
-// The half means of the same tile after fewer samples, which are included in the later means.
+// The half means of the same tile after fewer samples, all of which are also part of the later means.
 struct EarlierMeans {
   HalfMeans halves;
-  std::uint64_t spp = 0;  // at least 2, fewer than now
+  std::uint64_t spp = 0;  // samples per pixel: at least 2, and fewer than now
 };
 // Estimates the error of a tile. `spp` is the number of samples per pixel in `halves`, both halves together.
 // Without `earlier`, skewed noise is not corrected and the interval assumes Gaussian noise.
@@ -136,42 +141,42 @@ bool has_few_hits(const HalfMeans& halves, int x, int y);
 struct ImageError {
   double rmse = 0, rmse_lo = 0, rmse_hi = 0;  // 95 % interval for the realised error of this image
   double relmse = 0, relmse_lo = 0, relmse_hi = 0;
-  double spp = 0;  // mean over pixels
-  // With x the relative error of a pixel: (sum of x)^2 / (sum of x^2), the number of pixels that carry the
-  // error.
+  double spp = 0;  // samples per pixel, mean over all pixels
+  // The number of pixels that carry the error: (sum of x)^2 / (sum of x^2), where x is the relative error of
+  // a pixel.
   double effective_pixels = 0;
   double top_share = 0;        // share of the relative error in the worst pixel
-  std::uint64_t few_hits = 0;  // number of pixels
+  std::uint64_t few_hits = 0;  // number of pixels with few hits
   // False if few pixels carry the error, or if there is no light; then the intervals are unreliable.
   bool trusted = false;
-  std::string verdict;  // in words; empty when trusted
+  std::string verdict;  // the reason for distrust in words; empty when trusted
 };
 ImageError image_error(const TileError& sums);
 
 // Collects the error figures of all tiles after each round (range of samples). A checkpoint has the image's
-// figures at one round: the sum over all tiles in tile order, so that it does not depend on the order in
+// figures after one round. It is the sum over all tiles in tile order, so it does not depend on the order in
 // which results arrive. A tile that stopped early counts with its last figures.
 class Checkpoints {
  public:
   explicit Checkpoints(TileIndex tiles) : tiles_(tiles), waiting_(tiles) {}
 
-  // Records a tile's figures; call after each fold (addition of a round). If a round is repeated (a cut round
-  // replaced by the full one, or a restarted tile), the figures replace the tile's figures from that round
-  // on, except in complete checkpoints, which are final.
+  // Records a tile's figures; call after each fold (addition of a round). If a round is repeated (a truncated
+  // round replaced by the full one, or a restarted tile), the figures replace the tile's figures from that
+  // round on. Complete checkpoints are final and do not change.
   void folded(TileIndex tile, RoundIndex round, const TileError& error);
-  // Says that no more rounds will follow for this tile, unless folded() is called for it again.
+  // Declares that no more rounds will follow for this tile, unless folded() is called for it again.
   void stopped(TileIndex tile);
 
-  // complete() is the number of rounds that all tiles have reached; at() has the image's figures at one of
-  // them.
+  // complete() is the number of rounds that all tiles have reached; at() returns the image's figures at one
+  // of them.
   RoundIndex complete() const { return static_cast<RoundIndex>(done_.size()); }
   const TileError& at(RoundIndex round) const { return done_[round]; }
 
  private:
   struct Tile {
-    std::vector<TileError> pending;  // figures of round complete() and later ones
+    std::vector<TileError> pending;  // figures of the rounds from complete() on
     TileError last;
-    RoundIndex reached = 0;  // last folded round + 1
+    RoundIndex reached = 0;  // one more than the last folded round
     bool stopped = false;
   };
   bool ready(const Tile& tile) const;  // true if the tile has its figures for the next checkpoint

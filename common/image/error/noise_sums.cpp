@@ -1,5 +1,5 @@
-// Sums over the pixels of a tile: accumulated per column, row by row, so that they are vectorised, and added
-// up at the end.
+// Sums over the pixels of a tile. They are accumulated per column, row by row, so that the loops are
+// vectorised, and the columns are added up at the end.
 #include <algorithm>
 #include <cstddef>
 #include <numeric>
@@ -11,7 +11,7 @@ namespace {
 
 using Scanline = std::vector<double>;
 
-// A row of three planes of values, with the g^2 of its pixels (`edges`).
+// A row of three planes of values, and the g^2 of its pixels (`edges`).
 struct Values {
   const double *r, *g, *b, *edges;
 };
@@ -59,7 +59,7 @@ struct Columns {
                 edge_pixel_fourth.data());
   }
 
-  // Adds the products of each pixel with the one before it in the row.
+  // Adds the products of each pixel with the previous one in the row.
   void add_pairs(const Values& v) {
     double* __restrict covariance = pair_covariance.data(), * __restrict variance = pair_variance.data();
     const std::size_t width = squares.size();
@@ -71,9 +71,9 @@ struct Columns {
     }
   }
 
-  // Adds, for each pixel, (D(p) . D(q))^2 for its neighbours q. `beside` has these for neighbours in the row
-  // (beside[x]: with the previous pixel, beside[x + 1]: with the next), `above` and `below` for those in the
-  // rows above and below; they are 0 where there is no neighbour.
+  // Adds, for each pixel, (D(p) . D(q))^2 for its neighbours q. `beside` contains these values for neighbours
+  // in the row (beside[x]: with the previous pixel, beside[x + 1]: with the next), `above` and `below` for
+  // the rows above and below. They are 0 where there is no neighbour.
   void add_flat(const double* edges, const Scanline& beside, const Scanline& above, const Scanline& below,
                 bool first, bool last) {
     const std::size_t width = squares.size();
@@ -111,7 +111,7 @@ NoiseSums noise_sums(const std::vector<double>& values, const std::vector<double
     return Values{at, at + n, at + 2 * n, &edges[y * w]};
   };
   Columns columns(w);
-  Scanline beside(w + 1), above(w), below(w);  // beside[x]: pair of pixels x - 1 and x
+  Scanline beside(w + 1), above(w), below(w);  // beside[x] is the pair of the pixels x - 1 and x
   for (std::size_t y = 0; y < h; ++y) {
     const Values v = row(y), right{v.r + 1, v.g + 1, v.b + 1, nullptr};
     columns.add_pixels(v);

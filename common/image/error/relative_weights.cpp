@@ -9,9 +9,10 @@ namespace ls {
 namespace {
 
 constexpr std::size_t kWindowReach = 2;  // radius of the 5 x 5 window
-constexpr double kSignificant = 9;       // three standard deviations, squared
+constexpr double kSignificant = 9;       // square of three standard deviations
 
-// Uninitialised memory: its initial values are never read, and initialising would take as long as the sums.
+// Uninitialised memory. Its initial values are never read, and initialising it would take as long as
+// computing the sums.
 class Room {
  public:
   explicit Room(std::size_t size) : values_(std::make_unique_for_overwrite<double[]>(size)) {}
@@ -22,12 +23,12 @@ class Room {
   std::unique_ptr<double[]> values_;
 };
 
-// These take values, not references, so that they compile to vector instructions.
+// The parameters are values, not references, so that the calls compile to vector instructions.
 inline double larger(double a, double b) { return a < b ? b : a; }
 inline double smaller(double a, double b) { return b < a ? b : a; }
 
-// Sums over 5 x 5 windows, clipped to the tile. First along rows, then along columns, both sequential in
-// memory.
+// Sums over 5 x 5 windows, clipped to the tile. They are computed first along rows, then along columns;
+// memory access is sequential in both.
 class Windows {
  public:
   Windows(std::size_t width, std::size_t height)
@@ -86,7 +87,7 @@ struct Channel {
   }
 };
 
-// Computes the weights of one row of pixels, which starts at `at`; `spans` are the widths of the windows in
+// Computes the weights of one row of pixels, which starts at `at`. `spans` are the widths of the windows in
 // pixels, `rows` is their height.
 void weigh_row(const Channel& c, std::size_t at, const std::vector<double>& spans, double rows,
                double* __restrict roots, double* __restrict leans, double* __restrict edges) {

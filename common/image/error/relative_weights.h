@@ -1,5 +1,6 @@
-// The weights of relMSE in one tile, as derived in error_estimate.h. Branch-free loops over rows, which the
-// compiler vectorises: the estimate is made for every folded unit and must cost much less than rendering it.
+// The weights of relMSE in one tile, as derived in error_estimate.h. The loops over rows have no branches, so
+// that the compiler vectorises them: the estimate is made for every folded unit and must cost much less than
+// rendering it.
 #pragma once
 
 #include <vector>
@@ -11,9 +12,9 @@ namespace ls {
 // relMSE is a squared error divided by the sum of the squared true value and this constant.
 inline constexpr double kRelMseDenominator = 0.01;
 
-// The weights of each pixel of a tile. `roots` has the square root of the weight in each channel, `leans` the
-// derivative of that root by the pixel's own value (both planar), and `edges` the square of the mean of g
-// over the channels, one plane.
+// The weights of each pixel of a tile. `roots` is the square root of the weight in each channel, `leans` the
+// derivative of that root by the pixel's own value (three planes each). `edges` is the square of the mean of
+// g over the channels, one plane.
 struct RelativeWeights {
   std::vector<double> roots, leans, edges;
 };

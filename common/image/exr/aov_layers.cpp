@@ -20,7 +20,7 @@ class Layers {
   explicit Layers(const Film& film)
       : film_(film), frame_(film.grid().frame), planes_(planes_of(film.aovs())) {
     sums_.assign(planes_.sums.size(), {});
-    // The hits and half B of a guide have no layer of their own.
+    // Hits, and half B of a guide, have no separate layer.
     for (std::size_t p = 0; p < sums_.size(); ++p)
       if (p != planes_.hits && planes_.sums[p].half == 0) sums_[p].resize(pixels_of(frame_));
     ids_.assign(planes_.ids.size() * 2 * kCryptomatteRanks, std::vector<float>(pixels_of(frame_)));
@@ -74,7 +74,7 @@ class Layers {
       each_pixel(tile.rect, frame_, [&](std::size_t to, std::size_t from) {
         const double count = by_hits ? hits[from] : static_cast<double>(tile.spp);
         const double sum = tile.sums[p * n + from] + (other ? other[from] : 0);
-        // Maps -0 to +0; everything else is unchanged.
+        // The addition maps -0 to +0; all other values stay the same.
         if (count > 0) sums_[p][to] = static_cast<float>(sum / count) + 0.f;
       });
     }

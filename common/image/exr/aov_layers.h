@@ -9,7 +9,7 @@
 
 namespace ls {
 
-// Cryptomatte manifests of the identifier layers (cryptomatte.h); empty: none.
+// Cryptomatte manifests of the identifier layers (cryptomatte.h); empty: no manifest.
 struct CryptomatteManifests {
   std::string shapes, materials;
 };
@@ -17,7 +17,7 @@ struct CryptomatteManifests {
 inline constexpr int kCryptomatteRanks =
     6;  // identifiers per pixel, largest coverage first: three layers of four channels
 
-// The name of a layer: that of the AOV, or "crypto_object", "crypto_material".
+// Returns the name of a layer: that of the AOV, or "crypto_object", "crypto_material".
 std::string layer_of(Aov aov);
 
 // Adds the film's AOVs to `picture`: channels NAME.R, NAME.X, ... and, for identifiers, NAME00.R to NAME02.A

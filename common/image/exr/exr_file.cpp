@@ -19,13 +19,13 @@ namespace {
 
 struct Source {
   int part = 0;
-  std::vector<const char*> channels;  // one or three
+  std::vector<const char*> channels;  // one channel or three
 };
 
 Result<Source> find_colour(const Imf::MultiPartInputFile& file, const std::string& name) {
   for (int p = 0; p < file.parts(); ++p) {
     const Imf::Header& header = file.header(p);
-    if (header.hasType() && !Imf::isImage(header.type())) continue;  // deep
+    if (header.hasType() && !Imf::isImage(header.type())) continue;  // skips deep parts
     const Imf::ChannelList& list = header.channels();
     const bool rgb = list.findChannel("R") && list.findChannel("G") && list.findChannel("B");
     const bool chroma = list.findChannel("RY") || list.findChannel("BY");
@@ -53,7 +53,7 @@ FrameSize size_of(const Imath::Box2i& window) {
   return {window.max.x - window.min.x + 1, window.max.y - window.min.y + 1};
 }
 
-// Rows are appended in bands as they are read, so that a small file with a large claimed size costs little
+// Rows are appended in bands as they are read, so that a small file that claims a large size costs little
 // memory.
 Result<RgbImage> read_part(Imf::MultiPartInputFile& file, const Source& source) {
   const Imath::Box2i window = file.header(source.part).dataWindow();

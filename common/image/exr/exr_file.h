@@ -1,4 +1,4 @@
-// The interface to OpenEXR: reads external images, writes our own; partials have their own functions
+// The interface to OpenEXR: reads external images and writes our own. Partials have their own functions
 // (partial_exr.cpp, partial_decoder.h). No type of the library appears here, and none of its exceptions
 // escapes.
 #pragma once
@@ -20,13 +20,14 @@
 namespace ls {
 
 struct RgbImage {
-  FrameSize size;          // of the data window
-  std::vector<float> rgb;  // interleaved, row by row from the top; values as stored (may be NaN or infinite)
+  FrameSize size;  // size of the data window
+  // R, G, B of each pixel, row by row from the top; values as stored (may be NaN or infinite)
+  std::vector<float> rgb;
 };
 
 struct ExrLimits {
-  std::uint64_t max_bytes = std::uint64_t{1} << 30;   // of the file
-  std::uint64_t max_pixels = std::uint64_t{1} << 28;  // of the data window
+  std::uint64_t max_bytes = std::uint64_t{1} << 30;   // most bytes of the file
+  std::uint64_t max_pixels = std::uint64_t{1} << 28;  // most pixels of the data window
   int max_side = 65536;
 };
 
@@ -36,7 +37,8 @@ struct ExrLimits {
 // before anything is allocated.
 Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::string& name,
                               const ExrLimits& limits = {});
-// Reads a whole file. Errors: not_found, unavailable; resource_exhausted: more than limits.max_bytes.
+// Reads a whole file. Errors: not_found, unavailable; resource_exhausted if the file has more than
+// limits.max_bytes.
 Result<std::vector<std::byte>> read_exr_bytes(const std::filesystem::path& path,
                                               const ExrLimits& limits = {});
 Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits& limits = {});
@@ -45,7 +47,7 @@ Result<RgbImage> read_exr_rgb(const std::filesystem::path& path, const ExrLimits
 // full resolution; otherwise `error` is empty.
 struct RgbWithError {
   RgbImage image;
-  std::vector<float> error;                    // interleaved like image.rgb
+  std::vector<float> error;                    // in the order of image.rgb
   std::map<std::string, std::string> strings;  // header strings
 };
 Result<RgbWithError> read_exr_with_error(std::span<const std::byte> bytes, const std::string& name,
@@ -56,7 +58,7 @@ inline constexpr float kLargestHalf = 65504;
 // An image of several planes of the same size.
 struct ExrHalf {
   std::vector<float> values;
-};  // converted on writing; the caller must clamp to +-kLargestHalf
+};  // rounded to half when the file is written; the caller must clamp to +-kLargestHalf
 struct ExrFloat {
   std::vector<float> values;
 };
@@ -65,24 +67,25 @@ struct ExrUint {
 };
 struct ExrPicture {
   FrameSize size;
-  std::map<std::string, std::variant<ExrHalf, ExrFloat, ExrUint>> channels;  // "R", "stderr.R", "spp", ...
-  std::map<std::string, std::string> strings;                                // header attributes
+  // By name: "R", "stderr.R", "spp", ...
+  std::map<std::string, std::variant<ExrHalf, ExrFloat, ExrUint>> channels;
+  std::map<std::string, std::string> strings;  // header attributes
 };
 // Encodes an image as a scanline EXR with ZIP compression. The bytes depend only on the image.
 Result<std::vector<std::byte>> write_exr(const ExrPicture& picture);
 
-// Destination for files too large to be held in memory.
+// Destination for files that are too large for memory.
 class ByteSink {
  public:
   virtual ~ByteSink() = default;
   virtual Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) = 0;
 };
-// An image delivered in bands of whole rows, from the top. Each band is an ExrPicture of that many rows; all
+// An image delivered in bands of whole rows, from the top. Each band is an ExrPicture of its rows; all bands
 // have the same channels. The strings of the first band also go into the header.
 struct ExrBands {
   FrameSize size;
   std::map<std::string, std::string> strings;
-  // Returns band 0, 1, 2, ... until all rows are delivered. It is called for each band twice, in two passes.
+  // Returns band 0, 1, 2, ... until all rows are delivered. It is called twice for each band, in two passes.
   std::function<ExrPicture(int band)> band;
 };
 // Writes the whole image to `sink` as one EXR file, with the seal (digests of all layers and headers, seal.h)

@@ -1,4 +1,4 @@
-// Reads a final EXR back.
+// Reads a final EXR that this program has written.
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -20,7 +20,7 @@ namespace {
 
 constexpr const char* kColours[3] = {"R", "G", "B"};
 constexpr const char* kErrors[3] = {"stderr.R", "stderr.G", "stderr.B"};
-constexpr std::size_t kMaxLayers = 128;  // all AOVs together give 74, denoising 3 more
+constexpr std::size_t kMaxLayers = 128;  // all AOVs together have 74 layers, denoising adds 3
 
 tl::unexpected<Error> bad(const std::string& name, const std::string& what) {
   return fail(Errc::invalid_argument, fmt::format("{}: {}", name, what));
@@ -86,7 +86,7 @@ void append(const ExrPicture& band, FinalPicture& image) {
         channel);
 }
 
-// Reads one band of rows at a time, so that a small file with a large claimed size costs little memory.
+// Reads one band of rows at a time, so that a small file that claims a large size costs little memory.
 void read_pixels(Imf::InputFile& file, FinalPicture& image) {
   constexpr int kBand = 64;
   exr::Seal seal;

@@ -12,7 +12,7 @@
 namespace ls {
 namespace {
 
-// Maps -0 to +0 (when rounding to nearest); everything else is unchanged.
+// The addition maps -0 to +0 (when rounding to nearest); all other values stay the same.
 float pixel_value(double mean) { return static_cast<float>(mean) + 0.0f; }
 
 struct Gathered {
@@ -141,7 +141,7 @@ std::map<std::string, std::string> strings_of(const Film& film, const Provenance
                                                 {"lightshaft:class", from.numeric_class.hex()},
                                                 {"lightshaft:tiles", tile_digests(film)}};
   strings.merge(error_strings(film.error(), film.pixels_without_samples()));
-  // The convergence curve may reveal problems that the film cannot.
+  // The convergence curve may show problems that the film alone does not show.
   if (auto verdict = strings.find("lightshaft:verdict");
       verdict != strings.end() && verdict->second == "trusted" && from.convergence_status &&
       !from.convergence_status->trusted)
@@ -193,7 +193,8 @@ Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& from, 
                                       ByteSink& sink, std::span<const float> denoised) {
   std::uint64_t clamped = 0;
   const ExrBands bands{film.grid().frame, strings_of(film, from), [&](int row) {
-                         if (row == 0) clamped = 0;  // the bands are requested twice
+                         // The bands are requested twice, but clamped values are counted once
+                         if (row == 0) clamped = 0;
                          ExrPicture band =
                              final_layers(film.row(row), from.manifests, float_output, &clamped);
                          if (!denoised.empty())

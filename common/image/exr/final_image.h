@@ -19,8 +19,8 @@
 namespace ls {
 
 // Returns the SHA-256 over the pixels as float32((sumA + sumB) / (nA + nB)), where sums and counts are those
-// of the two halves of the samples: divided in double, -0 replaced by +0; R, G, B interleaved per pixel, row
-// by row, little endian. Pixels without samples are zero.
+// of the two halves of the samples. The division is in double, and -0 is replaced by +0. The order is R, G, B
+// of each pixel, row by row, little endian. Pixels without samples are zero.
 Digest pixels_sha256(const Film& film);
 
 // The text of the note (Provenance::notes) called `fake`, for an image that contains results of fake workers.
@@ -29,23 +29,23 @@ inline constexpr const char* kFakePixels = "the pixels are made up by fake worke
 // The source of the header strings `lightshaft:...` of the final EXR, which docs/design/error.md lists. Some
 // strings come from the film instead: `:relmse`, `:relmse_ci95` ("LOW HIGH"), `:rmse`, `:rmse_ci95`,
 // `:few_hits` (pixels), `:verdict` ("trusted", or the reason why not) and `:tiles`. Without samples only
-// `:tiles` of these is written. `:pixels_without_samples` is written if there are any.
-// written if there are any.
+// `:tiles` of these is written. `:pixels_without_samples` is written only if there are such pixels.
 struct Provenance {
   Digest scene;
   std::string settings_json;  // canonical RenderSettings
   std::string build;
   Digest numeric_class;
-  // for this and the following: nullopt means unknown, and is not written
+  // from here on, nullopt means unknown; unknown values are not written
   std::optional<std::uint64_t> seed = {};
   std::optional<double> seconds = {};  // render time
   // "clean", or canonical_json() of the Health; empty: unknown, and not written.
   std::string health;
   CryptomatteManifests manifests = {};
-  double core_seconds = 0;   // CPU time of units; 0: unknown, and not written
-  std::string stopped = {};  // why sampling stopped, and its consequences; empty: not written
+  double core_seconds = 0;  // CPU seconds of all units; 0: unknown, and not written
+  // Why sampling stopped before the requested samples, and the consequences; empty: not written
+  std::string stopped = {};
   std::optional<ConvergenceStatus> convergence_status =
-      {};  // includes the convergence curve, which the film alone does not have
+      {};  // status that takes the convergence curve into account, which the film does not have
   std::map<std::string, double> figures = {};     // further numbers, by the name after "lightshaft:"
   std::map<std::string, std::string> notes = {};  // further texts, by the name after "lightshaft:"
 };
@@ -57,39 +57,39 @@ struct FinalImage {
 // the number of clamped values to `clamped`.
 ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
                         std::uint64_t* clamped = nullptr);
-// Makes the final EXR, also of an unfinished film. Its layers are half (or with `float_output` float) R, G,
+// Makes the final EXR; the film may be unfinished. Its layers are half (or with `float_output` float) R, G,
 // B, FLOAT stderr.R, stderr.G, stderr.B, UINT spp, the film's AOVs, and denoised.R, denoised.G, denoised.B if
-// `denoised` is not empty: the denoised image, interleaved RGB of the whole frame, row by row. All are sealed
-// in `lightshaft:seal` (seal.h).
+// `denoised` is not empty: the denoised image, R, G, B of each pixel of the whole frame, row by row. All are
+// sealed in `lightshaft:seal` (seal.h).
 Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output,
                              std::span<const float> denoised = {});
-// Writes the same bytes to `sink`, one row of tiles at a time, so that a large image is never in memory as a
-// whole. Returns the number of clamped values.
+// Writes the bytes of final_exr() to `sink`, one row of tiles at a time, so that a large image is never in
+// memory as a whole. Returns the number of clamped values.
 Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& provenance, bool float_output,
                                       ByteSink& sink, std::span<const float> denoised = {});
 
 // Returns the header strings about the error, by full name, of an image whose tiles have the sums `sums`;
-// `lightshaft:verdict` is based on the pixels only. There are none without samples.
+// `lightshaft:verdict` is based on the pixels only. Without samples there are no such strings.
 std::map<std::string, std::string> error_strings(const TileError& sums, std::uint64_t pixels_without_samples);
 
-// Number of values of R, G and B that a half image clamps.
+// Returns the number of values of R, G and B that a half image would clamp.
 std::uint64_t values_above_half(const Film& film);
 
-// A final EXR read back from an untrusted file: all layers and header strings; the layers that every final
-// EXR has are required. Sizes are bounded.
+// The content of a final EXR, read from an untrusted file: all layers and header strings. The layers that
+// every final EXR has are required. Sizes are limited.
 inline constexpr std::uint64_t kMaxFinalBytes = std::uint64_t{1} << 32;
 struct FinalPicture : ExrPicture {
-  bool half = false;  // colours are stored as halves
-  // Layers and headers that do not match the seal, by name ("layer depth.Z"); nullopt: no seal.
+  bool half = false;  // true if colours are stored as halves
+  // Names of the layers and headers that do not match the seal ("layer depth.Z"); nullopt: there is no seal.
   std::optional<std::vector<std::string>> changed;
 };
-// Reads a final EXR. invalid_argument: something is missing or wrong; the message names it. `name` is the
+// Reads a final EXR. invalid_argument: something is missing or wrong; the message says what. `name` is the
 // file's name for that message.
 Result<FinalPicture> read_final_exr(std::span<const std::byte> exr, const std::string& name);
-float as_half(float value);  // rounded to half precision
+float as_half(float value);  // returns the value rounded to half precision
 
-// Returns a linear pixel times `scale` in 8-bit sRGB (IEC 61966-2-1, rounded to nearest); magenta if a
-// channel is NaN.
+// Returns a linear pixel times `scale` in 8-bit sRGB (IEC 61966-2-1, rounded to nearest). A pixel with NaN in
+// a channel is magenta.
 std::array<std::uint8_t, 3> srgb8(const double* rgb, double scale);
 
 // Encodes an image as a PNG. `rgb` has 8 bits per channel, row by row.

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstdint>
+#include <iterator>
 #include <optional>
 
 #include "common/base/plain_text.h"
-#include "common/image/exr/attribute.h"
 #include "common/image/exr/byte_cursor.h"
 
 namespace ls::exr {
@@ -13,17 +15,18 @@ namespace {
 
 constexpr std::uint32_t kMagic = 20000630, kTiledFlag = 0x200, kMultiPartFlag = 0x1000;
 constexpr std::size_t kMaxNameBytes = 255;
-// The library allocates a chunk's buffers before it reads any of the chunk. For chunks above this size the
-// file must be long enough to hold them: the best compression in the format is a few thousand to one
-// (deflate: 1032).
+// The library allocates a chunk's buffers before it reads the chunk. For chunks above this size the file must
+// be long enough to contain them: the best compression in the format is a few thousand to one (deflate:
+// 1032).
 constexpr std::uint64_t kFreeChunkBytes = std::uint64_t{64} << 20;
 constexpr double kMostPacking = 4096;
-constexpr std::size_t kLeastChannelBytes = 18;  // a name of one letter, the terminating zero, four int32
+// Smallest entry of a channel list: a name of one letter, the terminating zero, four int32
+constexpr std::size_t kLeastChannelBytes = 18;
 
 struct Part {
   std::optional<std::int64_t> width, height;
   std::int64_t lines_per_chunk = 1;
-  std::size_t channels = 0;  // an upper bound
+  std::size_t channels = 0;  // an upper bound of their number
   std::uint32_t tile_width = 0, tile_height = 0;
   std::int32_t chunk_count = 0;
 };
@@ -50,6 +53,75 @@ void note(std::string_view name, std::span<const std::byte> raw, Part& part) {
   } else if (name == "chunkCount" && raw.size() == 4) {
     part.chunk_count = *in.value<std::int32_t>();
   }
+}
+
+struct Fixed {
+  std::string_view type;
+  std::size_t bytes;
+};
+constexpr Fixed kFixed[] = {{"box2i", 16},
+                            {"box2f", 16},
+                            {"chromaticities", 32},
+                            {"compression", 1},
+                            {"deepImageState", 1},
+                            {"double", 8},
+                            {"envmap", 1},
+                            {"float", 4},
+                            {"int", 4},
+                            {"keycode", 28},
+                            {"lineOrder", 1},
+                            {"m33f", 36},
+                            {"m33d", 72},
+                            {"m44f", 64},
+                            {"m44d", 128},
+                            {"rational", 8},
+                            {"tiledesc", 9},
+                            {"timecode", 8},
+                            {"v2i", 8},
+                            {"v2f", 8},
+                            {"v2d", 16},
+                            {"v3i", 12},
+                            {"v3f", 12},
+                            {"v3d", 24}};
+
+// Checks a list of channels: each a name followed by 16 bytes, and an empty name at the end.
+bool channel_list(ByteCursor in) {
+  while (const auto name = in.name(kMaxNameBytes)) {
+    if (name->empty()) return in.left() == 0;
+    if (!in.take(16)) return false;
+  }
+  return false;
+}
+
+// Checks a list of strings, each preceded by its length.
+bool strings(ByteCursor in) {
+  while (in.left() > 0) {
+    const auto length = in.value<std::int32_t>();
+    if (!length || *length < 0 || !in.take(static_cast<std::size_t>(*length))) return false;
+  }
+  return true;
+}
+
+// Checks a preview: width, height, and four bytes per pixel.
+bool preview(ByteCursor in) {
+  const auto width = in.value<std::uint32_t>(), height = in.value<std::uint32_t>();
+  return width && height && std::uint64_t{*width} * *height <= in.left() / 4 &&
+         std::uint64_t{*width} * *height * 4 == in.left();
+}
+
+// Checks the size of an attribute's value against its type. The library reads most types by their contents
+// instead of the size in the header; if the two disagree it continues reading at a wrong place, where it may
+// take any four bytes for the size of a buffer to allocate. Always true for unknown types, whose bytes the
+// library just keeps.
+bool fills_its_size(std::string_view type, std::span<const std::byte> value) {
+  const auto* fixed =
+      std::find_if(std::begin(kFixed), std::end(kFixed), [&](const Fixed& f) { return f.type == type; });
+  if (fixed != std::end(kFixed)) return value.size() == fixed->bytes;
+  if (type == "chlist") return channel_list(ByteCursor(value));
+  if (type == "stringvector") return strings(ByteCursor(value));
+  if (type == "preview") return preview(ByteCursor(value));
+  if (type == "floatvector") return value.size() % 4 == 0;
+  return true;
 }
 
 class Scan {
@@ -113,7 +185,7 @@ class Scan {
     };
     const std::uint64_t chunks =
         tiles ? up(w, part.tile_width) * up(h, part.tile_height) : up(h, part.lines_per_chunk);
-    // The table has 8 bytes per chunk; further levels make it longer, not shorter.
+    // The table of chunks has 8 bytes per chunk; further mip levels make it longer, not shorter.
     if (chunks > in_.left() / 8 || part.chunk_count < 0 ||
         static_cast<std::uint64_t>(part.chunk_count) > in_.left() / 8)
       return refuse(fmt::format("the file ends too early for {} x {} pixels", w, h));

@@ -13,7 +13,7 @@ namespace ls::exr {
 
 // Checks that every part's size is within `limits`, every attribute lies inside the file and is as long as
 // its type requires, every chunk table is no longer than the file, and the buffer of one chunk is at most
-// kMaxChunkBytes. All else is left to the library.
+// kMaxChunkBytes. Everything else is checked by the library.
 inline constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 30;
 inline constexpr int kMaxParts = 256;
 Result<void> check_headers(std::span<const std::byte> file, const std::string& name, const ExrLimits& limits);

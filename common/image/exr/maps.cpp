@@ -17,7 +17,7 @@ double ramp(double value, double least, double most) {
   return value > least ? std::log(value / least) / std::log(most / least) : 0;
 }
 
-// Draws an image tile by tile: one colour per pixel, row by row.
+// Draws one tile of a map: returns one colour per pixel, row by row.
 using DrawTile = std::function<std::vector<Colour>(TileIndex, const TilePixels&)>;
 Result<std::vector<std::byte>> drawn(const Film& film, const DrawTile& draw) {
   const FrameSize frame = film.grid().frame;
@@ -70,7 +70,7 @@ double averaged(const std::vector<double>& values, const PixelRect& rect, std::s
 }  // namespace
 
 Colour map_colour(double t) {
-  // Dark blue, blue, green, yellow: lightness rises evenly, so the order is visible in grey too.
+  // Dark blue, blue, green, yellow: lightness increases evenly, so the order is visible in grey too.
   constexpr std::array<Colour, 5> kStops = {
       {{13, 8, 70}, {45, 60, 142}, {33, 120, 140}, {70, 180, 105}, {250, 230, 50}}};
   const double at = std::clamp(std::isnan(t) ? 1.0 : t, 0.0, 1.0) * (kStops.size() - 1);

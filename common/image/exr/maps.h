@@ -23,7 +23,8 @@ namespace ls {
 inline constexpr double kMapLeastError = 1e-3, kMapMostError = 1;       // relative standard error
 inline constexpr double kMapLeastSamples = 2, kMapMostSamples = 16384;  // per pixel
 
-// Maps 0..1 to a colour. Lightness is monotonic too, for people who do not see hues.
+// Maps t from 0 to 1 to a colour. Lightness increases with t, so that the map can be read without seeing
+// hues.
 std::array<std::uint8_t, 3> map_colour(double t);
 inline constexpr std::array<std::uint8_t, 3> kFewHitsColour = {255, 0, 255}, kNoSampleColour = {96, 96, 96};
 

@@ -1,4 +1,4 @@
-// OpenEXR streams over memory. For the files of this folder only.
+// OpenEXR streams over memory. Used by the files of this folder only.
 #pragma once
 
 #include <ImfIO.h>
@@ -50,9 +50,8 @@ class MemoryWriter final : public Imf::OStream {
   void write(const char c[], int n) override {
     const auto end = position_ + static_cast<std::uint64_t>(n);
     if (end > bytes_.size()) bytes_.resize(end);
-    if (n > 0)
-      // without bytes the address may be null
-      std::memcpy(bytes_.data() + position_, c, static_cast<std::size_t>(n));
+    // memcpy must not be called for an empty text, whose address may be null
+    if (n > 0) std::memcpy(bytes_.data() + position_, c, static_cast<std::size_t>(n));
     position_ = end;
   }
   std::uint64_t tellp() override { return position_; }
@@ -65,13 +64,14 @@ class MemoryWriter final : public Imf::OStream {
   std::uint64_t position_ = 0;
 };
 
-// Forbids the library threads of its own: the farm assigns threads itself, and small images gain nothing.
+// Keeps the library from starting threads: the farm assigns threads itself, and small images would gain
+// nothing.
 inline void set_up_library() {
   static std::once_flag once;
   std::call_once(once, [] { Imf::setGlobalThreadCount(0); });
 }
 
-// Calls f, which returns a Result<T>; exceptions of the library become an error with this code and the
+// Calls f, which returns a Result<T>. An exception of the library becomes an error with this code and the
 // message `what: reason`.
 template <class F>
 auto guarded(Errc code, const std::string& what, F&& f) -> decltype(f()) {

@@ -1,7 +1,6 @@
 // Decodes partials, which are untrusted input. A partial has exactly one form (uncompressed scanlines of
-// known float channels under a known header), so it is parsed here byte by byte against that form, instead of
-// by a library that understands every EXR. Nothing is allocated before the sizes are known to be those of the
-// tile.
+// known float channels under a known header). So it is parsed byte by byte against that form, instead of by a
+// library that accepts every EXR. Nothing is allocated before the sizes are known to be those of the tile.
 #include "common/image/exr/partial_decoder.h"
 
 #include <fmt/format.h>
@@ -21,8 +20,9 @@ namespace ls {
 namespace {
 
 constexpr std::int32_t kMaxUnitJson = 1024;
-constexpr std::int32_t kMaxChannelList = 8192;  // all AOVs together need about 2700
-constexpr std::size_t kMaxNameBytes = 31;       // the format's limit without the long-names flag
+// Most bytes of the channel list; all AOVs together need about 2700
+constexpr std::int32_t kMaxChannelList = 8192;
+constexpr std::size_t kMaxNameBytes = 31;  // longest name in the format without the long-names flag
 
 tl::unexpected<Error> refuse_partial(std::string what) {
   return fail(Errc::invalid_argument, "partial EXR: " + std::move(what));
@@ -37,7 +37,7 @@ struct Shape {
 
 struct Attribute {
   std::string_view name, type;
-  std::int32_t size;  // 0: any
+  std::int32_t size;  // size of the value; 0: any size
 };
 constexpr Attribute kAttributes[] = {
     {"channels", "chlist", 0},        {"compression", "compression", 1}, {"dataWindow", "box2i", 16},
@@ -66,7 +66,7 @@ std::vector<std::string> file_channels(AovSet aovs) {
   return names;
 }
 
-// Returns the names of all channels; each must be FLOAT and present at every pixel.
+// Returns the names of all channels. Each must be FLOAT and not subsampled.
 Result<std::vector<std::string_view>> channel_names(std::span<const std::byte> raw) {
   ByteCursor in(raw);
   std::vector<std::string_view> names;
@@ -114,7 +114,7 @@ Result<AovSet> check_channels(std::span<const std::byte> raw) {
 }
 
 Result<PixelRect> read_window(std::string_view name, std::span<const std::byte> raw) {
-  std::int32_t v[4];  // inclusive
+  std::int32_t v[4];  // bounds of the window, inclusive
   std::memcpy(v, raw.data(), sizeof v);
   for (const std::int32_t x : v)
     if (x < 0 || x >= kMaxFrameSide)
@@ -215,7 +215,7 @@ Result<std::vector<float>> read_pixels(std::span<const std::byte> exr, const Sha
       return refuse_partial(fmt::format("line {}: wrong number or size", y));
     for (std::size_t c = 0; c < channels; ++c) {
       const std::size_t plane = c < kFileOrder.size() ? static_cast<std::size_t>(kFileOrder[c]) : c;
-      const auto row = lines.take(width * sizeof(float));  // present: the size was checked
+      const auto row = lines.take(width * sizeof(float));  // the bytes are there, since the size was checked
       std::memcpy(sums.data() + (plane * height + y) * width, row->data(), row->size());
     }
   }

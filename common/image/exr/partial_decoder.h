@@ -1,5 +1,5 @@
-// Shared by the encoder and the decoder of partials (files with the pixel sums of one tile and range of
-// samples).
+// Declarations shared by the encoder and the decoder of partials (files with the pixel sums of one tile and
+// range of samples).
 #pragma once
 
 #include <array>
@@ -10,17 +10,17 @@
 namespace ls {
 
 inline constexpr char kUnitAttribute[] = "lightshaft:unit";
-// The names of the colour channels in the order of the planes in memory. A file has its channels sorted by
-// name: kFileOrder[i] is the plane of the file's i-th channel. The AOV channels follow in both, in their own
-// order.
+// The names of the colour channels in the order of the planes in memory. In a file channels are sorted by
+// name: kFileOrder[i] is the plane of the file's i-th channel. The AOV channels follow the colour channels,
+// in the same order in memory and in the file.
 inline constexpr std::array<const char*, kPartialChannels> kPartialChannelNames = {"A.R", "A.G", "A.B",
                                                                                    "B.R", "B.G", "B.B"};
 inline constexpr std::array<int, kPartialChannels> kFileOrder = {2, 1, 0, 5, 4, 3};
-inline constexpr std::int64_t kMaxPartialPixels = 256 * 256;  // the largest tile
+inline constexpr std::int64_t kMaxPartialPixels = 256 * 256;  // pixels of the largest tile
 
-// The error names the first pixel, channel and value that is not finite.
+// Returns an error if a value is not finite; it names the first such pixel, channel and value.
 Result<void> all_finite(const Partial& partial);
-// The error names the first pixel and AOV with impossible counts or identifiers.
+// Returns an error if counts or identifiers are impossible; it names the first such pixel and AOV.
 Result<void> counts_possible(const Partial& partial);
 
 }  // namespace ls

@@ -11,10 +11,11 @@ namespace ls {
 namespace {
 
 constexpr double kMaxStops = 60;
-constexpr int kChecker = 8;  // pixels
+constexpr int kChecker = 8;  // side of a square of the checkerboard, in pixels
 constexpr std::array<png_byte, 3> kEmpty[2] = {{24, 24, 27}, {31, 31, 35}};
 
-// kSteps[i]: the linear value from which the sRGB code is i + 1 (IEC 61966-2-1, rounded to nearest).
+// Returns the thresholds between sRGB codes: the i-th is the linear value from which the code is i + 1 (IEC
+// 61966-2-1, rounded to nearest).
 std::array<double, 255> srgb_steps() {
   std::array<double, 255> out;
   for (std::size_t i = 0; i < out.size(); ++i) {

@@ -16,7 +16,7 @@
 namespace ls::exr {
 namespace {
 
-// Attributes that the seal leaves out: those about the storage of the pixels, and the seal itself.
+// Attributes that the seal does not cover: those about the storage of the pixels, and the seal itself.
 constexpr std::array<std::string_view, 3> kLeftOut = {"compression", "lineOrder", kSealName};
 
 // Returns the lines of a seal, keyed by the layer or header that they cover. A line of unknown form is its
@@ -75,7 +75,7 @@ std::vector<std::string> differences(const std::string& sealed, const std::strin
       if (found == theirs->end() || found->second != digest) names.insert(name);
     }
   std::vector<std::string> out(names.begin(), names.end());
-  // The two texts cover the same and differ in their form only.
+  // The two texts have the same content in different forms.
   if (out.empty() && sealed != now) out.emplace_back(fmt::format("header {}", kSealName));
   return out;
 }

@@ -15,7 +15,8 @@
 namespace ls {
 namespace {
 
-constexpr int kZipLevel = 2;  // noise hardly compresses further, and images may be requested at any moment
+// A fast level: noise hardly compresses better at higher ones, and users wait for images
+constexpr int kZipLevel = 2;
 
 std::vector<half> to_half(const std::vector<float>& values) {
   std::vector<half> out(values.size());
@@ -41,10 +42,10 @@ Result<void> check(const ExrPicture& picture) {
   return {};
 }
 
-// Writes rows from y0 on.
+// Writes rows, the first of which is row y0 of the file.
 void write_rows(Imf::OutputFile& file, const ExrPicture& rows, int y0) {
   Imf::FrameBuffer buffer;
-  // growing moves the vectors without copying, so the slices stay valid
+  // the outer vector may grow: this moves the inner ones without copying, so the slices stay valid
   std::vector<std::vector<half>> halves;
   const auto add = [&](const std::string& name, Imf::PixelType type, const void* data) {
     buffer.insert(name, Imf::Slice::Make(type, data, {0, y0}, rows.size.width, rows.size.height));
@@ -72,7 +73,7 @@ Imf::Header header_of(FrameSize size, const ExrPicture& like,
   return header;
 }
 
-// Calls take(rows, y) for each band, y being its first row in the file.
+// Calls take(rows, y) for each band, where y is its first row in the file.
 template <class Take>
 Result<void> each_band(const ExrBands& bands, Take take) {
   for (int band = 0, y = 0; y < bands.size.height; ++band) {
@@ -86,7 +87,7 @@ Result<void> each_band(const ExrBands& bands, Take take) {
   return {};
 }
 
-// The seal is in the header, before the data that it covers, so the bands are generated twice.
+// The seal is in the header, which precedes the data that it covers, so the bands are generated twice.
 Result<void> write_bands(Imf::OStream& out, const ExrBands& bands) {
   if (bands.size.width < 1 || bands.size.height < 1)
     return fail(Errc::invalid_argument, "writing an EXR: the image is empty");
@@ -105,7 +106,7 @@ Result<void> write_bands(Imf::OStream& out, const ExrBands& bands) {
   return each_band(bands, [&](const ExrPicture& rows, int y) { write_rows(file, rows, y); });
 }
 
-// The library reports errors by exceptions only, so the sink's own error is kept here.
+// The library reports errors as exceptions only, so the sink's own error is kept here.
 class SinkStream final : public Imf::OStream {
  public:
   explicit SinkStream(ByteSink& sink) : OStream("image"), sink_(sink) {}

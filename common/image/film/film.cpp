@@ -117,7 +117,8 @@ std::array<std::vector<double>, 2> Film::halves(const Tile& tile, std::size_t pi
 std::array<std::vector<double>, 2> Film::means(const Tile& tile, std::size_t pixels, bool with_tail) {
   auto out = halves(tile, pixels, with_tail);
   const double samples =
-      static_cast<double>((with_tail ? tile.spp() : tile.full_spp()) / 2);  // of each half: counts are even
+      // Samples of each half; the number of all samples is even
+      static_cast<double>((with_tail ? tile.spp() : tile.full_spp()) / 2);
   for (auto& half : out) {
     double* values = half.data();
     const std::size_t count = half.size();

@@ -32,7 +32,7 @@
 
 namespace ls {
 
-// The current pixels of one tile; interleaved R, G, B, row by row.
+// The current pixels of one tile: R, G, B of each pixel, row by row.
 struct TilePixels {
   PixelRect rect;
   std::uint64_t spp = 0;
@@ -44,7 +44,7 @@ struct TilePixels {
 struct TileAovs {
   PixelRect rect;
   std::uint64_t spp = 0;
-  std::vector<double> sums;  // planes_of(aovs).sums, planar; zero if spp is 0
+  std::vector<double> sums;  // the planes of planes_of(aovs).sums; zero if spp is 0
   std::vector<float> ids;    // kIdPlanes planes for each of planes_of(aovs).ids
 };
 
@@ -56,11 +56,10 @@ class Film {
   AovSet aovs() const { return aovs_; }
 
   // Folds the partial of round `round` of tile `tile`. The rounds of a tile must come in the order 0, 1, 2,
-  // ...; a cut round only as the last.
-  //   invalid_argument: the partial is not of this tile or round;
-  //   failed_precondition: an earlier round is missing (the message names the next one);
-  //   already_exists: this round, or more of it, has been folded.
-  // On error the film is unchanged. `digest` is unit_digest(partial), if already known.
+  // ...; a truncated round only as the last. invalid_argument: the partial is not of this tile or round;
+  // failed_precondition: an earlier round is missing (the message names the next one); already_exists: this
+  // round, or more of it, has been folded. On error the film is unchanged. `digest` is unit_digest(partial),
+  // if already known.
   Result<TileError> fold(TileIndex tile, RoundIndex round, const Partial& partial);
   Result<TileError> fold(TileIndex tile, RoundIndex round, const Partial& partial, const Digest& digest);
 
@@ -68,13 +67,15 @@ class Film {
   void discard(TileIndex tile) { tiles_[tile] = nullptr; }
 
   // Figures of one tile.
-  RoundIndex full_rounds(TileIndex tile) const;  // complete rounds; also the index of the next round to fold
+  // Number of complete rounds, and so the index of the next round to fold
+  RoundIndex full_rounds(TileIndex tile) const;
   RoundIndex rounds_folded(TileIndex tile) const;  // full_rounds(), plus one if there is a tail
   std::optional<SampleRange> tail(TileIndex tile) const;
   std::uint64_t spp(TileIndex tile) const;
-  TileError error(TileIndex tile) const;  // as of the last fold; zeros (and its pixel count) before the first
-  // Returns the hash chain over the unit digests in round order: c = SHA-256(c || unit digest), beginning
-  // with 32 zero bytes.
+  // Error after the last fold; before the first, zeros and the number of pixels
+  TileError error(TileIndex tile) const;
+  // Returns the digest of a chain over the unit digests in round order: c = SHA-256(c || unit digest),
+  // beginning with 32 zero bytes.
   Digest tile_digest(TileIndex tile) const;
   TilePixels pixels(TileIndex tile) const;
   TileAovs aov_pixels(TileIndex tile) const;
@@ -82,7 +83,7 @@ class Film {
   std::array<std::vector<double>, 2> half_means(TileIndex tile) const;
 
   // Figures of the image.
-  std::uint64_t samples() const;       // over all pixels
+  std::uint64_t samples() const;       // number of samples of all pixels together
   std::uint64_t memory_bytes() const;  // memory taken by the sums and identifiers
   // Returns the sum over all tiles with samples, in tile order; the error of other tiles is unknown.
   TileError error() const;
@@ -94,11 +95,11 @@ class Film {
 
   // Saving and loading, for a restart of the coordinator.
   //
-  // The bytes of a tile have a version and end with a SHA-256; no bytes stand for a tile of which nothing is
-  // folded. Loading rejects damaged or foreign bytes.
+  // The bytes of a tile have a version and end with a SHA-256. A tile without folded rounds has no bytes.
+  // Loading rejects damaged or foreign bytes.
   std::vector<std::byte> save_tile(TileIndex tile) const;
-  // Returns a function that does save_tile() of the tile as it is now, for a later call. It keeps only that
-  // tile alive, where a copy of the film would keep all tiles.
+  // Returns a function that later does save_tile() of the tile in its present state. It keeps only that tile
+  // in memory, whereas a copy of the film would keep all tiles.
   std::function<std::vector<std::byte>()> saver(TileIndex tile) const;
   Result<void> load_tile(TileIndex tile, std::span<const std::byte> bytes);
 
@@ -113,12 +114,12 @@ class Film {
   };
   struct Tile {
     RoundIndex full_rounds = 0;
-    Digest chain;              // over the full rounds
-    std::vector<double> sums;  // of the full rounds: planes as in Partial, without identifiers
+    Digest chain;              // digest chain over the full rounds
+    std::vector<double> sums;  // sums of the full rounds: planes as in Partial, without identifiers
     std::vector<float> ids;    // identifiers of the full rounds
     std::optional<Tail> tail;
-    TileError error;                 // including the tail
-    std::uint64_t full_spp() const;  // without the tail
+    TileError error;                 // error of the full rounds and the tail
+    std::uint64_t full_spp() const;  // samples per pixel of the full rounds
     std::uint64_t spp() const;
     bool operator==(const Tile&) const = default;
   };
@@ -141,7 +142,7 @@ class Film {
   TileGrid grid_;
   AovSet aovs_;
   Planes planes_;
-  std::vector<std::shared_ptr<const Tile>> tiles_;  // null: nothing folded yet
+  std::vector<std::shared_ptr<const Tile>> tiles_;  // null: no round of the tile is folded yet
 };
 
 }  // namespace ls

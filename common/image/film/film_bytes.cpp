@@ -44,7 +44,7 @@ tl::unexpected<Error> damaged(std::string_view what) {
 
 class Reader {
  public:
-  // Reads between the magic and the checksum, after checking both.
+  // Checks the magic and the checksum, and returns a reader of the bytes in between.
   static Result<Reader> open(std::span<const std::byte> bytes, std::string_view magic) {
     if (bytes.size() < magic.size() + 32) return damaged("cut off");
     if (std::memcmp(bytes.data(), magic.data(), magic.size()) != 0)
@@ -55,7 +55,7 @@ class Reader {
     return Reader(body.subspan(magic.size()));
   }
   std::size_t left() const { return bytes_.size(); }
-  // Reads a number; returns zero past the end, so callers check ok() or left().
+  // Reads a number. Returns zero past the end, so callers must check ok() or left().
   template <class T>
   T value() {
     T v{};

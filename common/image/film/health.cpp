@@ -16,7 +16,7 @@ struct Row {
   HealthCause cause;
   std::string_view word;
   HealthEffect effect;
-  std::string_view one, many;  // the text after the count
+  std::string_view one, many;  // the text after the count, in singular and plural
 };
 constexpr auto kRejected = HealthEffect::rejected, kKept = HealthEffect::kept, kInput = HealthEffect::input;
 constexpr std::array kRows{
@@ -75,7 +75,8 @@ HealthCause cause_named(std::string_view word) {
   return HealthCause::unnamed;
 }
 
-std::uint64_t sum(std::uint64_t a, std::uint64_t b) {  // saturates, because a peer may send any count
+// saturates, because another process may send any count
+std::uint64_t sum(std::uint64_t a, std::uint64_t b) {
   return a > std::numeric_limits<std::uint64_t>::max() - b ? std::numeric_limits<std::uint64_t>::max()
                                                            : a + b;
 }
@@ -158,7 +159,8 @@ std::string canonical_json(const Health& health) {
 Result<Health> parse_health(std::string_view text) {
   constexpr std::size_t kMostBytes = 64 << 10, kMostCauses = 64;
   if (text.size() > kMostBytes) return tl::unexpected(bad_health("the text is too long"));
-  // Our own texts nest four deep; the callback stops at deeper ones before they cost stack or memory.
+  // Our own texts are nested four levels deep. The callback stops at deeper ones before they cost stack or
+  // memory.
   bool deep = false;
   const auto shallow = [&](int depth, json::parse_event_t, json&) {
     deep = deep || depth > 4;

@@ -1,5 +1,5 @@
-// Numeric health of the rendered samples: which faults occurred, how often, and where first. For a healthy
-// job it is empty and allocates nothing. It depends on the samples only: merging gives the same result in any
+// Numeric health of the rendered samples: which problems occurred, how often, and where first. For a healthy
+// job it is empty and allocates nothing. It depends only on the samples: merging gives the same result in any
 // order.
 #pragma once
 
@@ -16,24 +16,24 @@
 
 namespace ls {
 
-// The causes of bad health. To add one, add it here and a row in health.cpp (the compiler reports a missing
-// one). Causes are stored and sent by the names in these rows, so their order here is free.
+// The causes of bad health. A new cause needs an entry here and a row in health.cpp (the compiler reports a
+// missing one). Causes are stored and sent by the names in these rows, so their order here does not matter.
 enum class HealthCause : std::uint8_t {
-  none,  // for a good sample; never in a Health
-  // Causes of rejected samples. Such a sample is counted, contributes zero to the sums, still counts in their
-  // number of samples N, and is not drawn again.
-  unnamed,  // the sender did not name the cause, or names one that is unknown here
+  none,  // used for a good sample; a Health never contains it
+  // Causes of rejected samples. Such a sample is counted and contributes zero to the sums. It remains one of
+  // the pixel's N samples and is not replaced.
+  unnamed,  // the sender named no cause, or a cause that is unknown here
   not_a_number,
   infinite,
-  too_large,          // exceeds what float sums of 2^31 samples hold
-  too_many_surfaces,  // path cut off
+  too_large,          // larger than float sums of 2^31 samples can represent
+  too_many_surfaces,  // the path was cut off
   no_direction,
-  nested_media,  // inside more media at once than a path can store
+  nested_media,  // the path was inside more media at once than it can store
   // Causes of samples that are counted but kept, because rejecting them would bias the result.
   negative,
-  // a density above the bound (majorant) of its place; each occurrence counts
+  // a density exceeded the bound (majorant) of its cell; each occurrence counts
   majorant_violation,
-  // Values of the scene that were corrected. They are the same for all units of a job, and have no pixel.
+  // Corrected values of the scene. They are the same for all units of a job, and have no pixel.
   negative_density,
   bright_albedo,
   negative_texel,
@@ -44,15 +44,15 @@ enum class HealthCause : std::uint8_t {
 enum class HealthEffect : std::uint8_t { rejected, kept, input };
 
 HealthEffect effect_of(HealthCause cause);
-std::string_view to_string(HealthCause cause);  // "too_large"
-// One sentence without a full stop: "3 samples were not a number (NaN); they count as zero".
+std::string_view to_string(HealthCause cause);  // returns, for example, "too_large"
+// Returns one sentence without a full stop: "3 samples were not a number (NaN); they count as zero".
 std::string sentence(HealthCause cause, std::uint64_t count);
 
 struct HealthLocation {
   int x = 0, y = 0;  // pixel of the image
   std::uint64_t sample = 0;
   bool operator==(const HealthLocation&) const = default;
-  bool operator<(const HealthLocation& o) const {  // row by row, then by sample
+  bool operator<(const HealthLocation& o) const {  // order: row by row, then by sample
     return y != o.y ? y < o.y : x != o.x ? x < o.x : sample < o.sample;
   }
 };
@@ -60,7 +60,7 @@ inline constexpr std::size_t kHealthLocations = 8;  // number of locations that 
 
 struct HealthEntry {
   std::uint64_t count = 0;
-  std::vector<HealthLocation> first;  // the locations that come first, in ascending order; empty for inputs
+  std::vector<HealthLocation> first;  // the first locations in ascending order; empty for inputs
   bool operator==(const HealthEntry&) const = default;
 };
 
@@ -81,12 +81,12 @@ struct Health {
 // Returns {"too_large":{"count":3,"first":[[x,y,sample],...]}} with sorted keys and without spaces; {} if
 // healthy.
 std::string canonical_json(const Health& health);
-// Parses a Health. Anything that canonical_json() does not write is an error; an unknown cause becomes
+// Parses a Health. Any text that canonical_json() does not write is an error; an unknown cause becomes
 // `unnamed`.
 Result<Health> parse_health(std::string_view json);
 
-// Checks the health of a unit with these pixels and samples. invalid_argument: it names pixels or samples
-// outside the unit, or has more rejected samples than the unit has samples.
+// Checks the health of a unit with these pixels and samples. invalid_argument: the health refers to pixels or
+// samples outside the unit, or has more rejected samples than the unit has samples.
 Result<void> check_health(const Health& health, const PixelRect& rect, const SampleRange& samples);
 
 }  // namespace ls

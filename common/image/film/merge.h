@@ -15,21 +15,21 @@
 namespace ls {
 
 struct PartialSource {
-  std::string name;                                      // for the messages
+  std::string name;                                      // name for messages
   std::function<Result<std::vector<std::byte>>()> read;  // reads the file; may be called twice
 };
 
 struct Merged {
   Film film;
   Digest scene, settings, numeric_class;
-  std::uint64_t duplicates = 0;  // equal partials that were dropped
+  std::uint64_t duplicates = 0;  // number of equal partials that were dropped
 };
 
 // Groups the partials by tile and folds each tile's in the order of their first sample (s0). If a tile has
-// both a full round (range of samples) and a cut one, uses the full one. Holds one partial's pixels at a
-// time. Errors name the files: partials of different scenes, settings or numeric classes; frames or AOVs that
-// differ; tiles that do not fit one tiling; gaps and overlaps in a tile's samples; duplicates that differ;
-// tiles of the frame without a partial.
+// both a full round (range of samples) and a truncated one, uses the full one. Keeps the pixels of one
+// partial in memory at a time. Errors name the files: partials of different scenes, settings or numeric
+// classes; frames or AOVs that differ; tiles that do not fit one tiling; gaps and overlaps in a tile's
+// samples; duplicates that differ; tiles of the frame without a partial.
 Result<Merged> merge_partials(const std::vector<PartialSource>& sources);
 
 }  // namespace ls

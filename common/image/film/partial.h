@@ -1,5 +1,5 @@
 // A partial, the result of a unit (one tile and one range of samples): float32 sums of the samples of each
-// pixel, separately for the two halves of the samples, with everything that identifies the unit.
+// pixel, separately for the two halves of the samples, with all data that identify the unit.
 #pragma once
 
 #include <cstddef>
@@ -18,29 +18,30 @@ namespace ls {
 
 // Everything that determines a unit's pixels.
 struct UnitHeader {
-  Digest scene;          // of the canonical scene
-  Digest settings;       // of the canonical RenderSettings (common/job/settings.h)
-  Digest numeric_class;  // of the machine that rendered it
+  Digest scene;          // digest of the canonical scene
+  Digest settings;       // digest of the canonical RenderSettings (common/job/settings.h)
+  Digest numeric_class;  // numeric class of the machine that rendered it
   PixelRect tile;
   SampleRange samples;
   bool operator==(const UnitHeader&) const = default;
 };
 
-// {"class":..,"s0":..,"s1":..,"scene":..,"settings":..,"tile":[x0,y0,x1,y1]}: keys sorted, no spaces.
+// Returns {"class":..,"s0":..,"s1":..,"scene":..,"settings":..,"tile":[x0,y0,x1,y1]}: keys sorted, no spaces.
 std::string canonical_json(const UnitHeader& header);
 Result<UnitHeader> parse_unit_header(std::string_view json);
 
 struct Partial {
   UnitHeader header;
-  // Planar: six planes of tile.pixels() floats each, row by row, then those of planes_of(aovs). Sums, never
-  // averages; the number of samples of each half follows from the range, and AOVs are sums over both halves.
-  // Every value is finite (a non-finite sample is counted and contributes zero).
+  // Six planes of tile.pixels() floats each, row by row, followed by those of planes_of(aovs). Values are
+  // sums, never averages; the number of samples of each half follows from the range, and AOVs are sums over
+  // both halves. Every value is finite (a non-finite sample is counted and contributes zero).
   std::vector<float> sums;
   AovSet aovs;  // as requested in the settings
   bool operator==(const Partial&) const = default;
 };
 
-// SHA-256 over the header's canonical JSON followed by all planes (little endian); not over file bytes.
+// Returns the SHA-256 over the header's canonical JSON followed by all planes (little endian). It does not
+// depend on the bytes of a file.
 Digest unit_digest(const Partial& partial);
 
 // Encodes a partial as an EXR file: scanline, uncompressed, FLOAT; the dataWindow is the tile, the
@@ -55,7 +56,7 @@ Result<std::vector<std::byte>> encode_partial(const Partial& partial, FrameSize 
 Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader& expected, FrameSize frame,
                                AovSet aovs = {});
 
-// A partial whose header and AOVs are taken from its file; for `lightshaft merge`.
+// A partial whose header and AOVs are read from its file; for `lightshaft merge`.
 struct PartialFile {
   Partial partial;
   FrameSize frame;

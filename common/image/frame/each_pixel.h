@@ -1,4 +1,4 @@
-// The pixels of a tile, by their places in the frame and in the tile.
+// Visits the pixels of a tile, with their positions in the frame and in the tile.
 #pragma once
 
 #include <cstddef>

@@ -13,7 +13,7 @@ struct FrameSize {
   bool operator==(const FrameSize&) const = default;
 };
 
-// Half-open pixel rectangle [x0, x1) x [y0, y1); y grows downwards, (0, 0) is the top left pixel.
+// A half-open pixel rectangle [x0, x1) x [y0, y1); y grows downwards, (0, 0) is the top left pixel.
 struct PixelRect {
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
   int width() const { return x1 - x0; }
@@ -21,13 +21,13 @@ struct PixelRect {
   std::int64_t pixels() const { return static_cast<std::int64_t>(width()) * height(); }
   bool operator==(const PixelRect&) const = default;
 };
-// "[x0,y0,x1,y1]", for messages.
+// Returns "[x0,y0,x1,y1]", for messages.
 std::string show(const PixelRect& r);
 
 using TileIndex = std::uint32_t;
 
-// Tiles of `tile` x `tile` pixels (smaller at the right and bottom edges), numbered row by row from the top
-// left.
+// The tiling of a frame: tiles of `tile` x `tile` pixels (smaller at the right and bottom edges), numbered
+// row by row from the top left.
 struct TileGrid {
   FrameSize frame;
   int tile = 32;

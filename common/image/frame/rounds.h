@@ -1,6 +1,6 @@
-// Rounds group a tile's samples: 2, 2, 4, 8, 16, 32, then 64 in each round. The grouping is constant: it does
-// not depend on the number of samples, cost or timing. So any two jobs group the same samples alike, and
-// their double sums are equal bit for bit.
+// Rounds group a tile's samples: 2, 2, 4, 8, 16, 32, then 64 in each round. The grouping is fixed: it does
+// not depend on the number of samples, cost or timing. So any two jobs group the same samples in the same
+// way, and their double sums are equal bit for bit.
 #pragma once
 
 #include <algorithm>
@@ -10,24 +10,24 @@ namespace ls {
 
 using RoundIndex = std::uint32_t;
 
-// Half-open range of sample indices [s0, s1). Both ends are even: even samples are half A, odd ones half B.
+// A half-open range of sample indices [s0, s1). Both ends are even: even samples are half A, odd ones half B.
 struct SampleRange {
   std::uint64_t s0 = 0, s1 = 0;
   std::uint64_t count() const { return s1 - s0; }
   bool operator==(const SampleRange&) const = default;
 };
 
-// The full range of round k.
+// Returns the full range of round k.
 constexpr SampleRange round_range(RoundIndex k) {
   if (k == 0) return {0, 2};
   if (k <= 5) return {std::uint64_t{1} << k, std::uint64_t{2} << k};
   return {64 * static_cast<std::uint64_t>(k - 5), 64 * static_cast<std::uint64_t>(k - 4)};
 }
 
-// Returns the samples per pixel as rendered: odd numbers are rounded up to even, to at least 2.
+// Returns the samples per pixel that are rendered: odd numbers are rounded up to even, to at least 2.
 constexpr std::uint64_t even_spp(std::uint64_t spp) { return std::max<std::uint64_t>(2, spp + (spp & 1)); }
 
-// Returns the number of rounds of an image with `spp` samples; its last round may be cut short.
+// Returns the number of rounds of an image with `spp` samples; its last round may be truncated.
 constexpr RoundIndex round_count(std::uint64_t spp) {
   const std::uint64_t n = even_spp(spp);
   if (n <= 64) {
@@ -38,7 +38,7 @@ constexpr RoundIndex round_count(std::uint64_t spp) {
   return static_cast<RoundIndex>((n + 63) / 64 + 5);
 }
 
-// Returns the samples of round k of an image with `spp` samples: the full range, or what is left of the `spp`
+// Returns the samples of round k of an image with `spp` samples: the full range, or the rest of the `spp`
 // samples.
 constexpr SampleRange cut_range(RoundIndex k, std::uint64_t spp) {
   SampleRange r = round_range(k);

@@ -13,7 +13,7 @@ namespace {
 
 using flip::Planes;
 
-// CIE XYZ of the Rec. 709 primaries with D65 white, and that white.
+// Conversion to CIE XYZ of the Rec. 709 primaries with D65 white, and this white.
 constexpr float kToXyz[3][3] = {{10135552.F / 24577794.F, 8788810.F / 24577794.F, 4435075.F / 24577794.F},
                                 {2613072.F / 12288897.F, 8788810.F / 12288897.F, 887015.F / 12288897.F},
                                 {1425312.F / 73733382.F, 8788810.F / 73733382.F, 70074185.F / 73733382.F}};
@@ -22,7 +22,7 @@ constexpr float kToRgb[3][3] = {{3.241003275F, -1.537398934F, -0.498615861F},
                                 {0.055639423F, -0.204011202F, 1.057148933F}};
 constexpr float kWhite[3] = {0.950428545F, 1.F, 1.088900371F};
 
-// [LDR] section 4.1: exponents, and the knee of the redistribution of colour errors.
+// Constants of [LDR] section 4.1: exponents, and the knee of the redistribution of colour errors.
 constexpr float kQc = .7F, kPc = .4F, kPt = .95F, kQf = .5F;
 
 using Triple = std::array<float, 3>;
@@ -33,7 +33,7 @@ Triple times(const float (&m)[3][3], const Triple& v) {
   return out;
 }
 
-float shown(float v) { return v > 0 ? std::min(v, 1.F) : 0.F; }  // NaN becomes 0 too
+float shown(float v) { return v > 0 ? std::min(v, 1.F) : 0.F; }  // NaN becomes 0, too
 
 // Linearised CIELAB, in which contrast sensitivity is defined ([LDR] equation (2)).
 Triple opponent(const Triple& rgb) {
@@ -57,8 +57,7 @@ Triple lab(const Triple& rgb) {
   return {116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])};
 }
 
-// Adjusts colours as [LDR] equation (6) does: in darker colours differences of hue are less visible (Hunt
-// 1952).
+// Adjusts colours by [LDR] equation (6): in darker colours differences of hue are less visible (Hunt 1952).
 Triple hunt(Triple v) {
   v[1] *= .01F * v[0];
   v[2] *= .01F * v[0];
@@ -85,7 +84,7 @@ Planes opponents(const FlipImage& image) {
   return out;
 }
 
-// Returns the colour of a pixel as seen at this distance, in CIELAB adjusted by hunt().
+// Returns the colour of a pixel as seen at the viewing distance, in CIELAB adjusted by hunt().
 Triple seen(const Planes& filtered, std::size_t i) {
   Triple rgb = rgb_of({filtered[0][i], filtered[1][i], filtered[2][i]});
   for (float& v : rgb) v = shown(v);
@@ -98,7 +97,7 @@ constexpr float kTone[6] = {.6F * .6F * 2.51F, .6F * .03F, 0, .6F * .6F * 2.43F,
 float tone_mapped(float v) {
   if (!(v > 0)) return 0;
   if (!std::isfinite(v)) return 1;
-  // Limits v, as larger values would overflow when squared; there the curve has reached its limit, above 1.
+  // Limits v, since larger values would overflow when squared. The curve is constant there, above 1.
   v = std::min(v, 1e15F);
   return shown((kTone[0] * v * v + kTone[1] * v + kTone[2]) / (kTone[3] * v * v + kTone[4] * v + kTone[5]));
 }
@@ -146,13 +145,13 @@ FlipExposures flip_exposures(std::span<const float> rgb) {
   const auto middle = light.begin() + static_cast<std::ptrdiff_t>(light.size() / 2);
   std::nth_element(light.begin(), middle, light.end());
   const float median = *middle, most = *std::max_element(light.begin(), light.end());
-  // The larger x at which the tone curve is kLevel, from a quadratic equation.
+  // Returns the larger x at which the tone curve is kLevel, from a quadratic equation.
   constexpr float kLevel = .85F;
   const float a = kTone[0] - kLevel * kTone[3], b = kTone[1] - kLevel * kTone[4],
               c = kTone[2] - kLevel * kTone[5];
   const float x = (-b + std::sqrt(b * b - 4 * a * c)) / (2 * a);
   FlipExposures out{std::log2(x / most), std::log2(x / median), 2};
-  constexpr int kMost = 64;  // limit of exposures: a range of 64 stops is no sensible image
+  constexpr int kMost = 64;  // most exposures: an image with a range of 64 stops is not sensible
   out.count = std::clamp(static_cast<int>(std::ceil(out.last - out.first)), 2, kMost);
   return out;
 }

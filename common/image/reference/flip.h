@@ -21,7 +21,8 @@
 
 namespace ls {
 
-// Pixels per degree for a 0.7 m wide monitor of 3,840 pixels seen from 0.7 m: 0.7 * 3840 / 0.7 * pi / 180.
+// The density of pixels per degree on a 0.7 m wide monitor of 3,840 pixels seen from 0.7 m: 0.7 * 3840 / 0.7
+// * pi / 180.
 inline constexpr float kFlipPixelsPerDegree = 67.0206432765823F;
 
 struct FlipImage {
@@ -34,8 +35,8 @@ struct FlipImage {
 std::vector<float> ldr_flip(const FlipImage& reference, const FlipImage& image,
                             float pixels_per_degree = kFlipPixelsPerDegree);
 
-// The exposures of HDR-FLIP in stops ([HDR] section 4): from the one that maps the brightest pixel of the
-// reference to 0.85, to the one that maps the median to 0.85.
+// The exposures of HDR-FLIP in stops ([HDR] section 4): from the exposure that maps the brightest pixel of
+// the reference to 0.85, to the one that maps the median to 0.85.
 struct FlipExposures {
   float first = 0, last = 0;
   int count = 2;
@@ -49,6 +50,7 @@ FlipExposures flip_exposures(std::span<const float> reference_rgb);
 std::vector<float> hdr_flip(const FlipImage& reference, const FlipImage& image,
                             float pixels_per_degree = kFlipPixelsPerDegree);
 
-double mean_of(std::span<const float> values);  // the figure usually quoted: the mean over pixels
+// Returns the mean over pixels, which is usually quoted as the error
+double mean_of(std::span<const float> values);
 
 }  // namespace ls

@@ -8,11 +8,11 @@ namespace ls::flip {
 namespace {
 
 using Plane = std::vector<float>;
-using Kernel = std::vector<float>;  // of odd length; the middle is the pixel
+using Kernel = std::vector<float>;  // of odd length; the middle element is the weight of the pixel itself
 
 constexpr double kPi = std::numbers::pi;
 
-// out[x] = sum over i of kernel[i] in[x + i - radius] along rows, with the ends repeated.
+// Computes out[x] = sum over i of kernel[i] in[x + i - radius] along rows; values at the ends are repeated.
 Plane along_rows(const Plane& in, FrameSize size, const Kernel& kernel) {
   const auto width = static_cast<std::size_t>(size.width), radius = kernel.size() / 2;
   Plane out(in.size()), padded(width + 2 * radius);
@@ -85,10 +85,10 @@ Plane filtered(const Plane& in, FrameSize size, const std::array<Sensitivity, 2>
   return sum;
 }
 
-// A Gaussian of a feature's width and its derivatives ([LDR] section 4.2), each normalised so that its
+// A Gaussian of a feature's width and its derivatives ([LDR] section 4.2). Each is normalised so that its
 // positive weights sum to 1 and its negative ones to -1 over the window.
 struct FeatureKernels {
-  Kernel across;       // the Gaussian, along the other axis; sums to 1
+  Kernel across;       // the Gaussian, for the other axis; sums to 1
   Kernel edge, point;  // first and second derivative
 };
 
@@ -99,7 +99,7 @@ void balance(Kernel& kernel) {
 }
 
 FeatureKernels feature_kernels(double ppd) {
-  constexpr double kWidth = .082;  // degrees
+  constexpr double kWidth = .082;  // width of a feature in degrees
   const double sigma = .5 * kWidth * ppd;
   const int radius = static_cast<int>(std::ceil(3 * sigma));
   FeatureKernels out;

@@ -1,4 +1,4 @@
-// The spatial filters of FLIP (flip.h), all of them sums of separable filters. For flip.cpp.
+// The spatial filters of FLIP (flip.h), all of them sums of separable filters. Used by flip.cpp only.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace ls::flip {
 
-class Planes {  // Y, Cx, Cz
+class Planes {  // three planes: Y, Cx, Cz
  public:
   explicit Planes(FrameSize size) : size_(size) {
     for (auto& plane : planes_) plane.resize(pixels());

@@ -16,7 +16,7 @@ tl::unexpected<Error> refuse(const std::string& name, std::string why) {
 }
 
 // Returns the mean of s^2 (the reference's squared standard error) over the eight neighbours of value i,
-// without i itself.
+// excluding i.
 double noise_around(const Reference& r, std::size_t i) {
   const auto width = static_cast<std::size_t>(r.size.width), height = static_cast<std::size_t>(r.size.height);
   const std::size_t channel = i % 3, x = i / 3 % width, y = i / 3 / width;
@@ -32,7 +32,7 @@ double noise_around(const Reference& r, std::size_t i) {
   return count > 0 ? sum / count : 0;
 }
 
-// Returns the weight h, which reference.h defines.
+// Returns the weight h, which is defined in reference.h.
 double weight(const Reference& r, std::size_t i) {
   const double value = r.rgb[i];
   if (r.error.empty()) return relative_weight(value, 0);
@@ -82,7 +82,7 @@ TrueError true_error(const Reference& reference, std::span<const float> rgb) {
   const bool known = !reference.error.empty();
   double squares = 0, relative = 0, squares_variance = 0, relative_variance = 0;
   for (std::size_t pixel = 0; pixel < rgb.size(); pixel += 3) {
-    double product = 0, weighted = 0;  // of |x - ref| and s
+    double product = 0, weighted = 0;  // sums of products of |x - ref| and s
     for (std::size_t i = pixel; i < pixel + 3; ++i) {
       const double d = double{rgb[i]} - reference.rgb[i], s = known ? reference.error[i] : 0;
       const double h = weight(reference, i);

@@ -4,30 +4,32 @@
 //   relmse = mean of h ((x - ref)^2 - s^2)
 //
 // s is the reference's own standard error, if its file has layers stderr.R, G, B (final_image.h): s = |A - B|
-// / 2, with A and B the two half means of the reference, ref = (A + B) / 2. So A and B are ref + s and ref -
-// s, in unknown order, and with a and b their errors and e that of the image
+// / 2, where A and B are the two half means of the reference, and ref = (A + B) / 2. So A and B are ref + s
+// and ref - s, in unknown order. With a and b their errors and e that of the image,
 //
 //   (x - ref)^2 - s^2 = (x - A) (x - B) = (e - a) (e - b).
 //
-// a and b are independent with mean 0: the expectation is e^2, whatever their distribution, and with r =
-// Var((a + b) / 2) the variance is 4 e^2 r + 4 r^2 (half of the second term because s^2 itself is known from
-// one difference only).
+// a and b are independent with mean 0, so the expectation is e^2, whatever their distribution. With r =
+// Var((a + b) / 2) the variance is 4 e^2 r + 4 r^2 (half of the second term because s^2 itself is estimated
+// from one difference only).
 //
-// The weight h is the mean of f(A) and f(B), f(m) = 1 / (m^2 + 0.01). f(ref) would be biased: it is small
-// where a and b are both large, where (e - a) (e - b) is large too, and that adds up to f" r^2, many times
-// e^2 f in a noisy reference. In (e - a) (e - b) f(A), b stands alone and is 0 in the mean, which leaves (e^2
-// - e a) f(A): -e a averages out over an image whose errors have both signs, and from e^2 f(A) the bias e^2
-// f" r is subtracted within f (relative_weight()), with r from the neighbours' s^2, which are independent of
-// a. What remains is of second order: for bright m 60 r^2 / m^4 of the value.
+// The weight h is the mean of f(A) and f(B), f(m) = 1 / (m^2 + 0.01). The weight f(ref) would be biased:
+// where a and b are both large, f(ref) is small and (e - a) (e - b) is large. This adds up to f" r^2, many
+// times e^2 f in a noisy reference. In (e - a) (e - b) f(A), b is not in the weight and vanishes in the mean,
+// which leaves (e^2 - e a) f(A). The part with -e a averages out over an image whose errors have both signs.
+// The bias e^2 f" r of e^2 f(A) is subtracted within f (relative_weight()), where r comes from the
+// neighbours' s^2, which are independent of a. The remaining bias is of second order: for bright m 60 r^2 /
+// m^4 of the value.
 //
-// The standard error of these figures, from the reference's noise alone: over channels (e - a) . (e - b) has
-// the variance 4 e'Ve + 4 tr V^2 with V the covariance of the reference, and for Gaussian noise 4 ((x - ref)
-// . s)^2 with the signs of s has that mean, because ref and A - B are independent. The signs are not stored;
-// the sum of |x - ref| s is not less. So it is right for grey noise, and a third too wide for independent
-// channels (with r much larger than e^2; there the mean of the square is 3 + 6 (2 / pi)^2 of 3).
+// The standard error of these figures is that from the reference's noise alone. Over channels (e - a) . (e -
+// b) has the variance 4 e'Ve + 4 tr V^2, with V the covariance of the reference. For Gaussian noise, 4 ((x -
+// ref) . s)^2 with the signs of s has this mean, because ref and A - B are independent. The signs are not
+// stored, so the sum of |x - ref| s is used, which is at least as large. It is right for grey noise, and a
+// third too wide for independent channels (with r much larger than e^2; there the mean of the square is 3 + 6
+// (2 / pi)^2 of 3).
 //
 // Without these layers s is 0, and the figures include an unknown amount of the reference's noise. The
-// difference of noisy numbers can fall below zero, and is then set to 0.
+// difference of noisy numbers can be negative, and is then set to 0.
 #pragma once
 
 #include <cstddef>
@@ -45,11 +47,11 @@
 
 namespace ls {
 
-// Header strings lightshaft:scene and lightshaft:seed; empty if missing.
+// The header strings lightshaft:scene and lightshaft:seed of the reference; empty if missing.
 struct ReferenceOrigin {
   std::string scene, seed;
 };
-// True if the reference was rendered from this scene with this seed. Then image and reference share their
+// True if the reference was rendered from this scene with this seed. Image and reference then share their
 // samples and so a part of their noise, which cancels in the difference: no figure shows the image's true
 // error.
 bool same_noise(const ReferenceOrigin& origin, const Digest& scene, std::uint64_t seed);
@@ -58,13 +60,13 @@ inline constexpr const char* kSameSeed =
 
 struct Reference {
   FrameSize size;
-  std::vector<float> rgb;    // interleaved, row by row
+  std::vector<float> rgb;    // R, G, B of each pixel, row by row
   std::vector<float> error;  // standard error of each value; empty: unknown
   ReferenceOrigin origin = {};
 };
 // Reads a reference image. invalid_argument: it is not an image, has another size than `size`, or has values
-// that are not finite. If error layers have values that are not finite and positive, the file is rejected
-// too, rather than partly used. `name` is for messages.
+// that are not finite. A file whose error layers have values that are not finite and positive is also
+// rejected. `name` is for messages.
 Result<Reference> read_reference(std::span<const std::byte> exr, const std::string& name, FrameSize size,
                                  const ExrLimits& limits = {});
 
@@ -76,9 +78,11 @@ ReferenceNoise noise_of(const Reference& reference);
 
 struct TrueError {
   double rmse = 0, relmse = 0;
-  std::optional<double> mse_stderr = {}, relmse_stderr = {};  // of rmse^2 and relmse; nullopt: s is unknown
+  // Standard errors of rmse^2 and relmse; nullopt: s is unknown
+  std::optional<double> mse_stderr = {}, relmse_stderr = {};
 };
-// Returns the errors of the image `rgb` (interleaved, of the reference's size) against the reference.
+// Returns the errors of the image `rgb` (R, G, B of each pixel, of the reference's size) against the
+// reference.
 TrueError true_error(const Reference& reference, std::span<const float> rgb);
 
 // True if an error figure cannot be distinguished from 0, because it is less than three times its standard

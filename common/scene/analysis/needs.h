@@ -1,8 +1,9 @@
-// What a scene needs of the renderer, as plain data: a function of the scene alone. The coordinator computes
-// it once when a job is submitted, stores it with the job and sends it to workers. A worker computes it again
-// from the scene it receives; if the two differ, the program versions differ and the worker renders nothing.
-// The needs determine the integrator variant (the integrator compiled for a subset of its features);
-// `lightshaft inspect` and the report describe them in words.
+// The features that a scene needs of the renderer, as plain data. The needs are a function of the scene
+// alone. The coordinator computes them once when a job is submitted, stores them with the job and sends them
+// to workers. A worker computes them again from the scene that it receives. If the two differ, coordinator
+// and worker are different versions of the program, and the worker renders nothing. The needs determine the
+// integrator variant (the integrator compiled for a subset of its features); `lightshaft inspect` and the
+// report describe them in words.
 #pragma once
 
 #include <cstdint>
@@ -18,29 +19,31 @@ struct FileNeed {
   std::string name;
   Digest digest;
   std::uint64_t bytes = 0;
-  std::vector<std::string> uses;  // sorted: "mesh", "texture", "environment map", "grid", "grid NAME"
+  // The parts that use the file, sorted: "mesh", "texture", "environment map", "grid", "grid NAME"
+  std::vector<std::string> uses;
   bool operator==(const FileNeed&) const = default;
 };
 
 struct Needs {
-  // Whether the scene has any media; media whose density varies in space; whose extinction differs between
-  // channels; which emit; and whose phase function is not isotropic.
+  // True if the scene has media of a kind. media: any; grids: the density varies in space; chromatic: the
+  // extinction differs between channels; emission: they emit light; anisotropic: the phase function is not
+  // isotropic.
   bool media = false, grids = false, chromatic = false, emission = false, anisotropic = false;
   bool camera_in_medium = false;
-  // Whether it has index-matched surfaces, and surfaces through which a part of the light passes straight
-  // (null transmission).
+  // boundaries: it has index-matched surfaces. null_transmission: it has surfaces through which part of the
+  // light passes straight.
   bool boundaries = false, null_transmission = false;
   bool lens = false, crop = false;
-  // Number of objects of each type, by the type's name in describe.h; types without an object are absent.
+  // Number of objects of each type, by the type's name in describe.h. Types without objects are left out.
   std::map<std::string, std::uint32_t> shapes, materials, textures, lights, media_kinds;
   std::uint32_t area_lights = 0, instances = 0;
-  std::uint32_t compensated = 0;  // rough materials with multiple_scattering
-  // True if a heterogeneous medium has its density in a file. If that file has three channels the medium is
-  // chromatic, but only the file tells.
+  std::uint32_t compensated = 0;  // number of rough materials with multiple_scattering
+  // True if the density of a heterogeneous medium is in a file. The file may have three channels, which makes
+  // the medium chromatic; this is known only after reading it.
   bool density_files = false;
   // True if all lights are points, spots, projectors or directions without extent, which no ray can hit.
   bool only_delta_lights = false;
-  std::vector<FileNeed> files;  // in the scene's order
+  std::vector<FileNeed> files;  // files in the scene's order
   bool operator==(const Needs&) const = default;
 
   // Returns the number of lights that next-event estimation samples: all but a constant environment.
@@ -51,15 +54,16 @@ struct Needs {
 // integrator `path`, which ignores media.
 Needs needs_of(const Scene& scene, bool sees_media);
 
-// Returns the needs as JSON with sorted keys and without spaces: equal needs give equal texts. The files are
-// left out, because the scene's digest covers them; so the text has a few hundred bytes for any scene.
+// Returns the needs as JSON with sorted keys and without spaces, so that equal needs give equal texts. The
+// files are left out, because the scene's digest covers them; so the text has a few hundred bytes for any
+// scene.
 std::string canonical_json(const Needs& needs);
 
 // Returns the first difference of two such texts ("lights.point: 2 here, 3 there"), for a message; empty if
-// they are equal. It accepts any text.
+// they are equal. Any text is accepted.
 std::string first_difference(const std::string& here, const std::string& there);
 
-// A part of the renderer ("volume grids"), whether the scene needs it, and why or why not.
+// A part of the renderer ("volume grids"), whether the scene needs it, and the reason.
 struct Need {
   std::string part;
   bool used = false;

@@ -1,4 +1,4 @@
-// Needs as canonical JSON, and in words.
+// Writes needs as canonical JSON, and in words.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -20,14 +20,14 @@ template <class... T>
 std::uint32_t count(const std::map<std::string, std::uint32_t>& of) {
   return (count(of, kInfo<T>.name) + ...);
 }
-// "2 sphere, 1 mesh"
+// Returns, for example, "2 sphere, 1 mesh".
 std::string listed(const std::map<std::string, std::uint32_t>& kinds) {
   std::vector<std::string> parts;
   for (const auto& [kind, n] : kinds) parts.push_back(fmt::format("{} {}", n, kind));
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-// Formats values from the other side for a message: short, and on one line.
+// Formats a value that another process has sent for a message: short, and on one line.
 std::string shown(const json& j) {
   std::string text = j.dump(-1, ' ', true, json::error_handler_t::replace);
   if (text.size() > 80) text = text.substr(0, 77) + "...";
@@ -103,7 +103,8 @@ class Words {
         "no light to sample: paths find what shines");
     say("choice among lights", sampled > 1, fmt::format("{} lights", sampled), "one light at most");
     say("area lights", n_.area_lights, "shining shapes");
-    say("point and spot lights", count<PointEmitter, SpotEmitter, ProjectorEmitter>(n_.lights),
+    say("point and spot lights",
+        sampled - n_.area_lights - count<DirectionalEmitter, EnvmapEmitter>(n_.lights),
         "points, spots, projectors");
     say("directional lights", count<DirectionalEmitter>(n_.lights), "directions");
     const std::uint32_t constant = count<ConstantEmitter>(n_.lights), map = count<EnvmapEmitter>(n_.lights);

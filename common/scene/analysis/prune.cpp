@@ -42,7 +42,7 @@ class Pruner {
   void note(std::string what, std::string why, std::uint32_t count = 1, std::uint64_t bytes = 0) {
     if (count > 0) left_out_.push_back({std::move(what), std::move(why), count, bytes});
   }
-  // Returns the value of a constant texture; nullptr for others.
+  // Returns the value of a constant texture; nullptr for other textures.
   const Rgb* constant(TextureIndex t) const {
     const auto* c = std::get_if<ConstantTexture>(&s_.textures[t.value]);
     return c ? &c->value : nullptr;
@@ -65,14 +65,14 @@ class Pruner {
   void invisible();
   void files(const std::vector<Asset>& after);
 
-  const std::vector<Asset> assets_;  // before pruning
+  const std::vector<Asset> assets_;  // the assets before pruning
   Scene s_;
   const PrunedFor whom_;
   std::vector<LeftOut> left_out_;
   std::uint32_t blends_ = 0, masks_ = 0;
 };
 
-// Removes emission of strength 0, so that the grid it multiplies is not needed.
+// Removes emission of strength 0, so that its grid is not needed.
 void Pruner::drop_dark_sources() {
   std::uint32_t dark = 0;
   for (Medium& medium : s_.media) {
@@ -94,8 +94,8 @@ std::vector<bool> Pruner::named_media() const {
   return named;
 }
 
-// Removes media without effect, except those that keep media of lower priority from acting where they
-// overlap.
+// Removes media without effect. A medium without effect is kept if it displaces media of lower priority where
+// it overlaps them.
 std::uint32_t Pruner::drop_idle_media() {
   const std::vector<bool> named = named_media();
   const auto idle = [&](const Medium& m) {
@@ -122,7 +122,7 @@ std::uint32_t Pruner::drop_idle_media() {
   return count;
 }
 
-// Removes media that only fill bodies that no light enters.
+// Removes media whose volumes no light enters.
 std::uint32_t Pruner::drop_unreachable_media() {
   const std::vector<bool> out_of_reach = unreachable_interiors(s_);
   std::vector<std::optional<MediumIndex>> set_aside(s_.shapes.size());
@@ -140,8 +140,7 @@ std::uint32_t Pruner::drop_unreachable_media() {
   return static_cast<std::uint32_t>(std::count(dropped.begin(), dropped.end(), true));
 }
 
-// Removes media, and repeats that until nothing changes: a removed medium may have been the reason to keep
-// another.
+// Removes media, repeatedly until nothing changes: a removed medium may have been the reason to keep another.
 void Pruner::media() {
   drop_dark_sources();
   std::uint32_t dead = 0, hidden = 0;
@@ -151,12 +150,11 @@ void Pruner::media() {
     hidden += unreachable;
     more = idle + unreachable > 0;
   }
-  // Without any medium no surface is a transition.
+  // Without media no surface is a boundary of media.
   const std::vector<bool> named = named_media();
   if (std::none_of(named.begin(), named.end(), [](bool n) { return n; }))
     for (Shape& s : s_.shapes) s.is_medium_transition = false;
-  note("medium", whom_.media ? "it neither takes light nor gives any" : "the integrator `path` sees none",
-       dead);
+  note("medium", whom_.media ? "it neither takes light nor gives any" : "the integrator sees none", dead);
   note("medium", "no light gets into what it fills", hidden);
 }
 
@@ -178,8 +176,8 @@ void Pruner::phases() {
   note("phase function", "its medium scatters no light", unasked);
 }
 
-// Replaces a bsdf by a simpler one with the same effect, by one step; false if it cannot. A branch (bsdf
-// inside it) that remains keeps its own constants, so that it scatters as before.
+// Replaces a bsdf by a simpler one with the same effect, by one step. Returns false if there is no such step.
+// A nested bsdf that remains keeps its constants, so that it scatters as before.
 bool Pruner::simplify(Bsdf& b) {
   if (const auto* blend = std::get_if<BlendBsdf>(&b)) {
     const bool first = everywhere(blend->weight, 0);
@@ -200,7 +198,7 @@ bool Pruner::simplify(Bsdf& b) {
   return false;
 }
 
-// Each step removes one nesting level, and nesting is bounded.
+// Each step removes one level of nesting, and the depth of nesting is bounded.
 void Pruner::materials() {
   for (Bsdf& b : s_.bsdfs)
     for (int step = 0; step < kMaxBsdfNesting && simplify(b); ++step) {
@@ -228,7 +226,7 @@ void Pruner::lights() {
   note("light", "it is black", dark);
 }
 
-// Erases the elements for which `gone` is true, with their labels if any. Returns their number.
+// Erases the elements for which `gone` is true, and their labels if there are any. Returns their number.
 template <class T, class Gone>
 std::uint32_t erase_labelled(std::vector<T>& all, std::vector<Label>& labels, const Gone& gone) {
   std::size_t kept = 0;
@@ -246,8 +244,8 @@ std::uint32_t erase_labelled(std::vector<T>& all, std::vector<Label>& labels, co
   return erased;
 }
 
-// Removes null surfaces that neither separate media nor emit. A group left without shapes is removed, with
-// its instances.
+// Removes null surfaces that neither bound media nor emit. A group left without shapes is removed, with its
+// instances.
 void Pruner::invisible() {
   const auto unseen = [&](const Shape& s) {
     return !whom_.passing_counts && std::holds_alternative<NullBsdf>(s_.bsdfs[s.bsdf.value]) &&

@@ -10,7 +10,7 @@
 namespace ls::scene {
 namespace {
 
-// Transforms p by the inverse of t (Cramer's rule); t must be invertible.
+// Returns the image of p under the inverse of t (Cramer's rule); t must be invertible.
 Vec3 local_point(const Transform& t, const Vec3& p) {
   const Vec3 q{p[0] - t.m[3], p[1] - t.m[7], p[2] - t.m[11]};
   Vec3 local;

@@ -1,5 +1,5 @@
-// Bounding boxes of shapes from the scene description alone; not for meshes, whose files would have to be
-// read.
+// Bounding boxes of shapes, computed from the scene description alone. Meshes have none, since their files
+// would have to be read.
 #pragma once
 
 #include <optional>
@@ -8,17 +8,17 @@
 
 namespace ls::scene {
 
-struct Box {  // parallel to the scene's axes
+struct Box {  // a box parallel to the scene's axes
   Vec3 lo, hi;
   bool operator==(const Box&) const = default;
 };
-Vec3 corner(const Box& b, int k);  // 0 to 7
-Box grown(Box b, double by);       // to all sides
+Vec3 corner(const Box& b, int k);  // k is from 0 to 7
+Box grown(Box b, double by);       // enlarged to all sides
 bool touch(const Box& a, const Box& b);
 double largest_coordinate(const Box& b);
 
-// Returns a box that encloses the shape, seldom the smallest such box. For a shape in a group, the box is in
-// the group's space. nullopt: the shape is a mesh, or the box is not finite.
+// Returns a box that encloses the shape; it may be larger than necessary. For a shape in a group, the box is
+// in the group's space. nullopt: the shape is a mesh, or the box is not finite.
 std::optional<Box> box_of(const Shape& shape);
 
 // True if the point is inside a sphere or cube, whose to_world must be invertible; false for other shapes.

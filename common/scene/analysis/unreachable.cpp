@@ -12,8 +12,9 @@
 namespace ls::scene {
 namespace {
 
-// A distance, relative to the largest coordinate. If two objects are at least this far apart, rays that are
-// offset from one of them cannot get into the other: it is 16 times the renderer's offset.
+// A distance relative to the largest coordinate. If two objects are at least this far apart, a ray that
+// starts on one of them cannot start inside the other, although its origin is offset: the distance is 16
+// times the renderer's offset.
 constexpr double kApart = 0x1p-16;
 Box with_margin(const Box& b, const Box& beside) {
   return grown(b, kApart * std::max(largest_coordinate(b), largest_coordinate(beside)));
@@ -22,7 +23,7 @@ Box with_margin(const Box& b, const Box& beside) {
 Vec3 place_of(const Transform& t) { return {t.m[3], t.m[7], t.m[11]}; }
 Vec3 column(const Transform& t, std::size_t k) { return {t.m[k], t.m[4 + k], t.m[8 + k]}; }
 
-// True if the camera and all of its near plane, where rays begin, are outside the box.
+// True if the camera and its near plane, where rays begin, are completely outside the box.
 bool camera_is_outside(const Sensor& s, const Box& tight) {
   const Vec3 camera = place_of(s.to_world);
   const Box box = with_margin(tight, {camera, camera});
@@ -58,7 +59,7 @@ class Search {
  private:
   struct Entrance {
     std::size_t shape;
-    std::optional<Box> box;  // nullopt: may be anywhere
+    std::optional<Box> box;  // nullopt: the position is unknown
   };
   bool emits(MediumIndex m) const { return traits_of(s_.media[m.value], s_.volumes).emits; }
   static std::optional<Box> place_in_scene(const Shape& s) { return s.group ? std::nullopt : box_of(s); }
@@ -72,14 +73,14 @@ class Search {
     return traits_[s.bsdf.value].transmits && !nothing;
   }
 
-  // False if the shape is mirrored, or if normals in a mesh's file may swap its sides
-  // (worker/render/geometry/geometry_build.cpp).
+  // True if the interior is behind the shape's normals. False if the shape is mirrored, or if normals in a
+  // mesh's file may swap its sides (worker/render/geometry/geometry_build.cpp).
   static bool has_interior_behind(const Shape& s) {
     const auto* mesh = std::get_if<MeshShape>(&s.geometry);
     return invertible(s.to_world) && determinant3(s.to_world) > 0 && (!mesh || mesh->face_normals);
   }
 
-  // True if the shape is closed, with the interior inside, and no light can be there.
+  // True if the shape is closed, its interior medium is inside, and no light can be there.
   bool sealed(const Shape& s, std::size_t i, const Box& box) {
     const bool closed =
         std::holds_alternative<SphereShape>(s.geometry) || std::holds_alternative<CubeShape>(s.geometry);
@@ -95,7 +96,8 @@ class Search {
                        [&](const Entrance& e) { return e.shape != i && e.box && apart(box, e); });
   }
 
-  // True if the entrance (a surface through which light may come) is beside the shape, or surrounds it.
+  // True if the entrance (a surface through which light may come) is clear of the shape, beside it or around
+  // it.
   bool apart(const Box& tight, const Entrance& e) const {
     const Box box = with_margin(tight, *e.box);
     if (!touch(box, *e.box)) return true;

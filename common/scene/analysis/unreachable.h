@@ -1,5 +1,5 @@
-// Finds media inside shapes that no camera path can enter. The decision uses the scene description alone,
-// without mesh files, so it is conservative for meshes.
+// Finds media inside shapes that no camera path can enter. This uses the scene description alone, without
+// mesh files, so it is conservative for meshes.
 #pragma once
 
 #include <vector>
@@ -8,14 +8,14 @@
 
 namespace ls::scene {
 
-// Returns for each shape whether its interior medium can be removed without changing the image, provided
-// that nothing else refers to that medium. `scene` must be consistent. Paths begin at the camera, in the
-// sensor's medium, and enter another medium when they leave a surface to its side, reflected or not. There
-// are two reasons:
-// - The surface is black behind: no path leaves it to that side, whatever arrives there.
-// - It is a sphere or cube that lets nothing through, with neither the camera, nor an emitter, nor a surface
-//   that light passes inside or on it. Only rounding can put a path inside (around an edge of a cube), and
-//   there it finds no light.
+// Returns for each shape whether its interior medium can be removed without changing the image, provided that
+// nothing else refers to that medium. `scene` must be consistent. Paths begin at the camera, in the sensor's
+// medium. They enter another medium when they leave a surface towards its side, by reflection or
+// transmission. An interior can be removed for either of two reasons:
+// - The surface is black behind: no path leaves it to that side.
+// - The shape is a sphere or cube that no light passes, and inside or on it there is no camera, no emitter
+// and no surface that light passes. Only rounding can put a path inside (around an edge of a cube), and it
+// finds no light there.
 std::vector<bool> unreachable_interiors(const Scene& scene);
 
 }  // namespace ls::scene

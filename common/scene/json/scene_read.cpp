@@ -15,7 +15,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Fills one object from its JSON. Records the first error, with its path, and skips everything after it.
+// Fills one object from its JSON. Records the first error, with its path in the JSON, and ignores everything
+// after it.
 class ObjectReader {
  public:
   ObjectReader(const Json& json, std::string path, std::string& wrong)
@@ -30,7 +31,7 @@ class ObjectReader {
     const auto it = json_.find(std::string(f.name));
     if (it == json_.end()) return f.elided ? void() : fail(f.name, "is missing");
     read(f, *it, value);
-    // Equal scenes have one form only: a default that the writer omits must not be written explicitly.
+    // Equal scenes have only one form: a default that the writer omits must not be present.
     if (f.elided && wrong_.empty() && value == T{}) fail(f.name, "has the value that is left out");
   }
 

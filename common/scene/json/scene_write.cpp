@@ -28,8 +28,8 @@ void write_string(std::string& out, std::string_view text) {
   out += '"';
 }
 
-// The shortest text that reads back to the same bits. -0 is written as 0, so that equal numbers have equal
-// texts.
+// Writes the shortest text that reads back to the same bits. -0 is written as 0, so that equal numbers have
+// equal texts.
 void write_number(std::string& out, double x) {
   CHECK(std::isfinite(x), "a scene with the number {} can't be written", x);
   char text[32];
@@ -37,7 +37,7 @@ void write_number(std::string& out, double x) {
   out.append(text, end);
 }
 
-// One object of canonical JSON: collects members as text and outputs them sorted by name.
+// One object of canonical JSON. Collects members as text and writes them sorted by name.
 class JsonWriter {
  public:
   template <class T>

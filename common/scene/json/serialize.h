@@ -14,7 +14,7 @@ namespace ls {
 
 std::string serialize(const Scene& scene);
 Result<Scene> deserialize_scene(
-    std::string_view json);  // untrusted input: bounds, indices and ranges are checked
+    std::string_view json);  // untrusted input: sizes, indices and ranges are checked
 Digest digest_of(const Scene& scene);
 
 }  // namespace ls

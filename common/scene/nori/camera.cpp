@@ -1,23 +1,24 @@
-// Camera with filter and sampler; integrator.
+// Translates Nori's camera, with filter and sampler, and its integrators.
 #include <fmt/format.h>
 
 #include "common/base/suggest.h"
 #include "common/image/frame/render_limits.h"
 #include "common/scene/nori/parts.h"
+#include "common/scene/schema/integrators.h"
 #include "common/scene/xml/transform_element.h"
 #include "common/scene/xml/values.h"
 
 namespace ls::scene::nori {
 namespace {
 
-// Returns the parameters of an integrator of Nori, according to the integrator that it becomes.
+// Returns the parameters of a Nori integrator, which are those of the integrator that it is translated to.
 std::vector<Parameter> parameters_of(const IntegratorRow& row) {
   std::vector<Parameter> p;
   if (row.ours == "volpath_distant_mis") {
     p.push_back({"distance", kString, "mis", "how distances are chosen: exponential, equiangular or mis"});
     p.push_back({"heuristic", kString, "power", "how the two of mis are weighed: power or balance"});
   }
-  if (row.ours != "path")
+  if (sees_media(row.ours))
     p.push_back({"inmedium", kBoolean, "false", "the camera is in the medium of the mesh around it"});
   if (!row.max_depth)
     p.push_back({"maxDepth",
@@ -75,7 +76,7 @@ void add_lens(Element& out, Object& o) {
   const double radius = o.number("apertureRadius", 0);
   if (radius > 0 && !o.has("focusDistance")) o.missing("focusDistance");
   const double focus = o.number("focusDistance", 1);
-  if (!(radius > 0)) return;  // with a pinhole everything is in focus
+  if (!(radius > 0)) return;  // with a pinhole camera everything is in focus
   for (Attribute& a : out.attributes)
     if (a.name == "type") a.value = "thinlens";
   add(out, "aperture_radius", radius, o.element().at);
@@ -99,7 +100,7 @@ std::optional<Element> camera(const Element& e, const Element* sampler_given, Re
   add(out, "near_clip", near, e.at);
   add(out, "far_clip", far, e.at);
   add_lens(out, o);
-  // Nori's +x is to the right of the image, Mitsuba's to the left.
+  // Nori's +x points to the right of the image, Mitsuba's to the left.
   Element mirror = made("scale", "", e.at);
   set(mirror, "value", "-1 1 1", e.at);
   add_transform(out, o.take("toWorld"), "to_world", {std::move(mirror)});

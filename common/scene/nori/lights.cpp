@@ -1,4 +1,4 @@
-// Emitters.
+// Translates emitters.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -41,7 +41,7 @@ Element parallel(Object& o) {
   return out;
 }
 
-// Makes a disk-shaped light of given radiance and angular radius thetaA.
+// Makes a disk-shaped light at infinity of the given radiance and angular radius thetaA.
 Element disk(Object& o, Report& report) {
   need(o, "radiance");
   need(o, "thetaA");
@@ -59,7 +59,8 @@ Element disk(Object& o, Report& report) {
                              "is light from everywhere",
                              o.title(), angle));
   Element out = light("directional", o), mirror = made("scale", "", o.element().at);
-  set(mirror, "value", "1 1 -1", o.element().at);  // light travels away from the disk
+  // The direction of an emitter is that of its light, away from the disk
+  set(mirror, "value", "1 1 -1", o.element().at);
   add_transform(out, to_world, "to_world", {std::move(mirror)});
   const double sine = std::sin(angle * kDegree);
   add(out, "irradiance", times(radiance, std::numbers::pi * sine * sine), o.element().at);
@@ -72,8 +73,8 @@ Element environment(Object& o) {
   Element out = light("envmap", o);
   add_as(out, o.take("filename"), "filename");
   add_as(out, o.take("strength"), "scale");
-  // Rotates from Mitsuba's convention (+y at the top, -z at the left edge, +x a quarter further) to +z, +x
-  // and +y.
+  // Rotates from Mitsuba's convention (+y at the top, -z at the left edge, +x a quarter further) to Nori's:
+  // +z, +x and +y.
   add_transform(out, o.take("toWorld"), "to_world",
                 {matrix_step({0, 0, -1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1}, o.element().at)});
   return out;
@@ -92,8 +93,8 @@ Element spot(Object& o, Report& report) {
   return out;
 }
 
-// Full intensity within beam_width, dark beyond cutoff; both are always written, as Mitsuba's defaults
-// differ.
+// Adds the two angles of a spot light: full intensity within beam_width, no light beyond cutoff. Both are
+// always written, since Mitsuba's defaults differ from Nori's.
 void add_cone(Element& out, Object& o, Report& report) {
   const double cutoff = o.number("cutoff", 20), beam = o.number("beam_width", cutoff * 3 / 4);
   if (beam > cutoff)

@@ -1,4 +1,4 @@
-// Media with their phase functions and volumes.
+// Translates media with their phase functions and volumes.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,7 +16,8 @@ struct Coefficients {
   Rgb sigma_t, albedo;
 };
 
-// The three notations of coefficients: sigma_a and sigma_s, absorption and scattering, sigma_t and albedo.
+// Reads the three notations of coefficients: sigma_a and sigma_s, absorption and scattering, sigma_t and
+// albedo.
 class Reader {
  public:
   Reader(Object& o, Report& report) : o_(o), report_(report) {}
@@ -69,7 +70,7 @@ std::optional<Rgb> constant_of(const Element& e, Report& report) {
   return value;
 }
 
-// Maps the volume's unit cube to the bounding box of the mesh.
+// Adds a transform that maps the volume's unit cube to the bounding box of the mesh.
 void fit(Element& volume, const Mesh& mesh) {
   std::array<double, 16> m{};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -98,7 +99,7 @@ std::optional<Element> grid(const Element* filename, const Element* order, std::
   return out;
 }
 
-// Makes the <volume> of a heterogeneous medium that is not constant.
+// Makes the <volume> of a heterogeneous medium whose density is not constant.
 std::optional<Element> grid_volume(const Element& e, std::string name, const Mesh& mesh, Report& report) {
   const Plugin* plugin = known_plugin(e, report);
   if (!plugin) return std::nullopt;
@@ -141,7 +142,7 @@ Element homogeneous(const Coefficients& c, double scale, const Span& at) {
   return out;
 }
 
-// A density grid, multiplied by the coefficients.
+// Reads a density grid and multiplies it by the coefficients.
 std::optional<Element> scaled_grid(Object& o, const Mesh& mesh, Report& report) {
   const Element* filename = o.take("filename");
   const auto c = Reader(o, report).coefficients();
@@ -165,7 +166,7 @@ std::optional<Element> scaled_grid(Object& o, const Mesh& mesh, Report& report) 
   return out;
 }
 
-// sigma_t and albedo as volumes.
+// Reads sigma_t and albedo as two volumes.
 std::optional<Element> two_volumes(Object& o, const Mesh& mesh, Report& report) {
   if (!o.has("sigma_t")) o.missing("sigma_t");
   const Span at = o.element().at;

@@ -36,7 +36,7 @@ std::string range_text(const Parameter& p) {
   return fmt::format("{}{}{}", low, p.name, high);
 }
 
-// Returns the values in a property of this tag; nullopt: they are not readable.
+// Returns the values in a property of this tag; nullopt: they cannot be parsed.
 std::optional<std::vector<double>> values_of(const Element& e) {
   const std::string_view text = e.get("value");
   if (e.tag == "float") {
@@ -49,7 +49,8 @@ std::optional<std::vector<double>> values_of(const Element& e) {
   }
   auto numbers = parse_numbers(text, 3);
   if (!numbers) return std::nullopt;
-  const bool pair = (e.tag == "point" || e.tag == "vector") && numbers->size() == 2;  // in u and v
+  // a pair of values for u and v
+  const bool pair = (e.tag == "point" || e.tag == "vector") && numbers->size() == 2;
   if (numbers->size() != 3 && !pair) return std::nullopt;
   return numbers;
 }
@@ -212,7 +213,8 @@ void Object::left_over(const Child& c) {
     if (p.name == name && !p.idle.empty())
       return report_.warning(value_place(*c.e, "name"),
                              fmt::format("'{}' of {} has no effect here: {}", name, title(), p.idle));
-    // Known, but useless in combination with other parameters, which were reported or imply it.
+    // The parameter is known but has no effect with the other parameters. It was reported, or is implied by
+    // them.
     if (p.name == name)
       return report_.error(
           value_place(*c.e, "name"),
@@ -224,67 +226,6 @@ void Object::left_over(const Child& c) {
                                               name.empty() ? "" : fmt::format(" called '{}'", name)));
   report_.error(value_place(*c.e, "name"),
                 fmt::format("{} has no parameter '{}'{}", title(), name, suggestion(name, names)));
-}
-
-Element made(std::string tag, std::string_view type, const Span& at) {
-  Element e;
-  e.tag = std::move(tag);
-  e.at = at;
-  if (!type.empty()) set(e, "type", std::string(type), at);
-  return e;
-}
-
-void set(Element& e, std::string attribute, std::string value, const Span& at) {
-  e.attributes.push_back({std::move(attribute), std::move(value), at, at});
-}
-
-void add(Element& parent, Element child) { parent.children.push_back(std::move(child)); }
-
-void add(Element& parent, std::string tag, std::string name, std::string value, const Span& at) {
-  Element property = made(std::move(tag), "", at);
-  set(property, "name", std::move(name), at);
-  set(property, "value", std::move(value), at);
-  add(parent, std::move(property));
-}
-
-void add(Element& parent, std::string name, double value, const Span& at) {
-  add(parent, "float", std::move(name), fmt::format("{}", value), at);
-}
-
-void add(Element& parent, std::string name, const Rgb& value, const Span& at) {
-  add(parent, "rgb", std::move(name), fmt::format("{} {} {}", value[0], value[1], value[2]), at);
-}
-
-void add_as(Element& parent, const Element* property, std::string name) {
-  if (!property) return;
-  Element e = *property;
-  if (e.tag == "color") e.tag = "rgb";
-  for (Attribute& a : e.attributes)
-    if (a.name == "name") a.value = name;
-  add(parent, std::move(e));
-}
-
-void add_transform(Element& parent, const Element* transform, std::string name, std::vector<Element> before) {
-  if (!transform && before.empty()) return;
-  Element out = made("transform", "", transform ? transform->at : before.front().at);
-  set(out, "name", std::move(name), out.at);
-  out.children = std::move(before);
-  if (transform)
-    for (Element step : transform->children) {
-      if (step.tag == "rotate")
-        for (Attribute& a : step.attributes)
-          if (a.name == "axis") a.name = "value";
-      add(out, std::move(step));
-    }
-  add(parent, std::move(out));
-}
-
-Element matrix_step(const std::array<double, 16>& m, const Span& at) {
-  std::string text;
-  for (const double x : m) text += fmt::format("{}{}", text.empty() ? "" : " ", x);
-  Element step = made("matrix", "", at);
-  set(step, "value", std::move(text), at);
-  return step;
 }
 
 }  // namespace ls::scene::nori

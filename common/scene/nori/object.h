@@ -1,5 +1,5 @@
-// One object of a Nori file during translation to Mitsuba: its parameters are taken by name and checked
-// against the table of parameters; those left over are reported.
+// One object of a Nori file during translation to Mitsuba. Its parameters are taken by name and checked
+// against the table of parameters; parameters that nobody takes are reported.
 #pragma once
 
 #include <optional>
@@ -10,6 +10,7 @@
 #include "common/scene/schema/nori_words.h"
 #include "common/scene/xml/document.h"
 #include "common/scene/xml/error_report.h"
+#include "common/scene/xml/make_element.h"
 
 namespace ls::scene::nori {
 
@@ -18,8 +19,8 @@ Kind object_kind(const Element& e);
 // Checks elements, their attributes and nesting; false if errors were reported.
 bool check_objects(const Element& root, Report& report);
 
-// Returns the table's row for the type of `e`. If the type is unknown or unsupported, reports that, with a
-// suggestion for an unknown one, and returns nullptr.
+// Returns the table's row for the type of `e`. If the type is unknown or unsupported, reports this and
+// returns nullptr; for an unknown type the message has a suggestion.
 const Plugin* known_plugin(const Element& e, Report& report);
 
 class Object {
@@ -27,27 +28,27 @@ class Object {
   Object(const Element& e, const Plugin& plugin, Report& report);
 
   const Element& element() const { return e_; }
-  std::string title() const;  // bsdf "microfacet"
+  std::string title() const;  // for example: bsdf "microfacet"
   std::string_view type() const { return plugin_.type; }
   bool has(std::string_view parameter) const;
 
-  // Returns the element that sets the parameter; nullptr if there is none, or if it is wrong, which is
-  // reported.
+  // Returns the element that sets the parameter. Returns nullptr if there is none; also if it is wrong, which
+  // is reported.
   const Element* take(std::string_view parameter);
   double number(std::string_view parameter, double fallback);
   Rgb color(std::string_view parameter, const Rgb& fallback);
   Vec3 triple(std::string_view parameter, const Vec3& fallback);
   std::string_view text(std::string_view parameter, std::string_view fallback);
   void missing(std::string_view parameter);
-  // True if both parameters are given, which is reported as an error.
+  // True if both parameters are given; this is reported as an error.
   bool both(std::string_view one, std::string_view other);
 
-  // Returns the nested objects with this tag that are not the value of a parameter.
+  // Returns the nested objects with this tag, except those that are values of parameters.
   std::vector<const Element*> nested(std::string_view tag);
-  // the single nested object with this tag; a second one is reported
+  // returns the single nested object with this tag; a second one is reported
   const Element* only(std::string_view tag);
   void finish();
-  // Like finish() for an unsupported object: reports only unknown parameters.
+  // finish() for an unsupported object: reports only unknown parameters.
   void finish_refused();
 
  private:
@@ -65,21 +66,5 @@ class Object {
   Report& report_;
   std::vector<Child> children_;
 };
-
-// These make elements of Mitsuba's dialect. A new element gets the place of the Nori element it is made from.
-Element made(std::string tag, std::string_view type, const Span& at);
-void set(Element& e, std::string attribute, std::string value, const Span& at);
-void add(Element& parent, Element child);
-// Each adds a property; numbers are written in the shortest form that reads back to the same bits.
-void add(Element& parent, std::string tag, std::string name, std::string value, const Span& at);
-void add(Element& parent, std::string name, double value, const Span& at);
-void add(Element& parent, std::string name, const Rgb& value, const Span& at);
-// Adds the same property under another name.
-void add_as(Element& parent, const Element* property, std::string name);
-// Adds a <transform>: the steps `before`, followed by those of `transform`. Adds nothing if there are no
-// steps at all.
-void add_transform(Element& parent, const Element* transform, std::string name,
-                   std::vector<Element> before = {});
-Element matrix_step(const std::array<double, 16>& m, const Span& at);
 
 }  // namespace ls::scene::nori

@@ -31,7 +31,7 @@ std::optional<Element> camera(const Element& e, const Element* sampler, Report& 
 
 struct Integrator {
   Element element;
-  // from Kombu, a descendant of Nori: the camera is inside the medium of the mesh around it
+  // an option of Kombu, a descendant of Nori: the camera is inside the medium of the mesh around it
   bool inmedium = false;
 };
 std::optional<Integrator> integrator(const Element& e, Report& report);

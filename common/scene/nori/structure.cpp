@@ -1,4 +1,4 @@
-// The grammar of Nori's files, checked for a whole file before translation.
+// Checks the grammar of a whole Nori file before it is translated.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -42,7 +42,7 @@ const TagRow* row_of(const Element& e) {
   return nullptr;
 }
 
-// Suggests what to write instead of an element that only Mitsuba has.
+// Returns a suggestion for an element that exists only in Mitsuba's format.
 std::string_view instead(std::string_view tag) {
   static constexpr std::pair<std::string_view, std::string_view> kOthers[] = {
       {"shape", "in Nori it is called <mesh>"},
@@ -61,7 +61,7 @@ class NoriChecker {
  public:
   explicit NoriChecker(Report& report) : report_(report) {}
 
-  // Depth is bounded by kMaxNesting.
+  // The depth of recursion is bounded by kMaxNesting.
   void check(const Element& e, const TagRow* parent) {
     if (report_.full()) return;
     const TagRow* row = row_of(e);

@@ -1,4 +1,4 @@
-// Bsdfs and textures.
+// Translates bsdfs and textures.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace ls::scene::nori {
 namespace {
 
-// Maps (u, v) of a Mitsuba mesh to those of an image: x = au u + cu, y = av v + cv.
+// Maps (u, v) of a Mitsuba mesh to coordinates of an image: x = au u + cu, y = av v + cv.
 struct Placement {
   double au = 1, cu = 0, av = 1, cv = 0;
 };
@@ -21,7 +21,7 @@ void add_placement(Element& texture, const Placement& p) {
                 {matrix_step({p.au, 0, 0, p.cu, 0, p.av, 0, p.cv, 0, 0, 1, 0, 0, 0, 0, 1}, texture.at)});
 }
 
-// Returns a parameter of one or two numbers about u and v; one number stands for both.
+// Returns a parameter of one or two numbers for u and v; a single number applies to both.
 std::array<double, 2> pair(Object& o, std::string_view parameter, double fallback) {
   const Element* e = o.take(parameter);
   const auto v = e ? parse_numbers(e->get("value"), 3) : std::nullopt;
@@ -29,7 +29,8 @@ std::array<double, 2> pair(Object& o, std::string_view parameter, double fallbac
   return {v->front(), v->size() > 1 ? (*v)[1] : v->front()};
 }
 
-// In Nori a mesh's v starts at the bottom, in Mitsuba at the top; on a sphere u is offset by half a turn.
+// Returns the offset of u between the two formats on a sphere: half a turn. (On a mesh, v starts at the
+// bottom in Nori and at the top in Mitsuba.)
 double half_turn(const Mesh& mesh) { return mesh.sphere ? .5 : 0; }
 
 Element checkerboard(Object& o, const Mesh& mesh) {
@@ -37,7 +38,7 @@ Element checkerboard(Object& o, const Mesh& mesh) {
   add(out, "color0", o.color("value1", {0, 0, 0}), o.element().at);
   add(out, "color1", o.color("value2", {1, 1, 1}), o.element().at);
   const auto scale = pair(o, "scale", 1), delta = pair(o, "delta", 0);
-  // Mitsuba's squares are half as wide as its period.
+  // Mitsuba's squares are half as wide as the period of its texture.
   add_placement(out, {1 / (2 * scale[0]), (half_turn(mesh) / scale[0] - delta[0]) / 2, -1 / (2 * scale[1]),
                       (1 / scale[1] - delta[1]) / 2});
   return out;
@@ -87,9 +88,9 @@ Element dielectric(Object& o) {
   return out;
 }
 
-// kd / pi + (1 - max kd) D F G / (4 cos cos): with m = max kd a mixture of (1 - m) times the reflection and m
-// times a diffuse surface of kd / m. F is the Fresnel term of a dielectric from outside, which equals that of
-// a conductor with a real index.
+// Nori's microfacet bsdf is kd / pi + (1 - max kd) D F G / (4 cos cos). With m = max kd this is a mixture of
+// (1 - m) times the reflection and m times a diffuse surface of kd / m. F is the Fresnel term of a dielectric
+// from outside, which equals that of a conductor with a real index.
 std::optional<Element> microfacet(Object& o, const Mesh& mesh, Report& report) {
   const Span at = o.element().at;
   Element gloss = bsdf_of("roughconductor", o.element());
@@ -166,11 +167,12 @@ Element principled(Object& o, const Mesh& mesh, Report& report) {
                            "sheen_tint", "spec_tint", "spec_trans"})
     add_as(out, o.take(name), name);
   const double specular = o.number("specular", .5);
-  add(out, "specular", glass && specular == 0 ? 1e-3 : specular, o.element().at);  // as in Kombu
+  // the same value as in Kombu
+  add(out, "specular", glass && specular == 0 ? 1e-3 : specular, o.element().at);
   return out;
 }
 
-// From Kombu. Its parts have names; its weight may be a texture without a name.
+// Translates Kombu's blend. Its parts have names; its weight may be a texture without a name.
 std::optional<Element> blend(Object& o, const Mesh& mesh, Report& report) {
   Element out = bsdf_of("blendbsdf", o.element());
   const Element* fresnel = o.take("fresnel");
@@ -191,7 +193,7 @@ std::optional<Element> blend(Object& o, const Mesh& mesh, Report& report) {
     const bool given = o.has(name);
     const Element* part = o.take(name);
     if (!given) {
-      add(out, bsdf_of("diffuse", o.element()));  // reflectance 0.5
+      add(out, bsdf_of("diffuse", o.element()));  // diffuse with Mitsuba's default reflectance, 0.5
       continue;
     }
     auto inner = part ? bsdf(*part, mesh, report) : std::nullopt;
@@ -215,7 +217,7 @@ std::optional<Element> bsdf_in_words(Object& o, const Mesh& mesh, Report& report
   if (type == "blendbsdf") return blend(o, mesh, report);
   if (type == "conductor" || type == "roughconductor") return metal(o, mesh, report);
   if (type == "principled") return principled(o, mesh, report);
-  return bsdf_of("null", e);  // transparent, null
+  return bsdf_of("null", e);  // for the types "transparent" and "null"
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 namespace ls::scene::nori {
 namespace {
 
-// The id of the medium outside of all meshes with a medium.
+// The id of the medium outside of all meshes that have a medium.
 constexpr std::string_view kAmbient = "ambient";
 
 class SceneTranslator {
@@ -33,7 +33,7 @@ class SceneTranslator {
 
  private:
   void child(const Element& e) {
-    if (e.tag == "medium") return;  // already read
+    if (e.tag == "medium") return;  // media were read before
     if (e.tag == "mesh") return mesh(e);
     if (e.tag == "emitter") {
       if (auto light = emitter(e, report_)) add(out_, std::move(*light));
@@ -88,6 +88,7 @@ class SceneTranslator {
       const Element* filename = o.take("filename");
       if (!filename) o.missing("filename");
       add_as(out, filename, "filename");
+      add(out, "boolean", "flat_without_normals", "true", e.at);
     }
     add_transform(out, to_world, "to_world");
     const Element* inner = o.only("medium");
@@ -97,8 +98,8 @@ class SceneTranslator {
     add(out_, std::move(out));
   }
 
-  // A mesh that only bounds a medium gets a null bsdf; any other mesh without a bsdf is grey, even if it
-  // emits.
+  // Adds the bsdf. A mesh that only bounds a medium gets a null bsdf; any other mesh without a bsdf is grey,
+  // even if it emits.
   void surface(Object& o, const Mesh& m, bool bounds_medium, Element& out) {
     const Span at = o.element().at;
     if (const Element* given = o.only("bsdf")) {
@@ -147,7 +148,7 @@ class SceneTranslator {
     add(out_, std::move(*sensor));
   }
 
-  // Kombu uses the medium of the mesh whose bounding box contains the camera.
+  // Kombu puts the camera into the medium of the mesh whose bounding box contains it.
   void inside_of_mesh(Element& sensor) {
     const auto placed = std::find_if(sensor.children.begin(), sensor.children.end(),
                                      [](const Element& c) { return c.tag == "transform"; });
@@ -171,7 +172,7 @@ class SceneTranslator {
   const Element* camera_ = nullptr;
   const Element* sampler_ = nullptr;
   const Element* integrator_ = nullptr;
-  std::vector<std::pair<std::string, Mesh>> bounded_;  // media of meshes, by id
+  std::vector<std::pair<std::string, Mesh>> bounded_;  // meshes that bound media, by the medium's id
 };
 
 }  // namespace

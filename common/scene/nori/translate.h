@@ -1,5 +1,5 @@
-// Translates scenes of Nori and its descendants to Mitsuba 3, so that later stages know one dialect. Only
-// names, notations and defaults are Nori's; source places are kept.
+// Translates scenes of Nori and its descendants to Mitsuba 3, so that later stages have to handle only
+// Mitsuba's format. Names, notations and defaults change; places in the source text are kept.
 #pragma once
 
 #include <optional>
@@ -13,7 +13,8 @@ namespace ls::scene::nori {
 // <camera> or a <mesh>.
 bool is_nori(const Element& root);
 
-// Translates the document in place if it is a Nori file. False: it has errors, which were reported.
+// Translates the document in place if it is a Nori file. Returns false if the file has errors, which were
+// reported.
 bool translate(Document& document, Report& report);
 
 // Returns the equivalent <scene> of Mitsuba 3; nullopt: `scene` has errors, which were reported.

@@ -1,4 +1,4 @@
-// Checks of media and camera after everything has been read.
+// Checks media and camera after the whole scene has been read.
 #include <fmt/format.h>
 
 #include "common/scene/analysis/shape_place.h"
@@ -7,7 +7,8 @@
 
 namespace ls::scene {
 
-// As in Mitsuba, only the sensor's `medium` says which medium the camera is in.
+// Warns if the camera is inside a boundary: as in Mitsuba, only the sensor's `medium` decides in which medium
+// it is.
 void Reader::warn_of_media_around_camera() {
   if (!sensor_ || scene_.sensor.medium || report_.has_errors()) return;
   const auto& m = scene_.sensor.to_world.m;

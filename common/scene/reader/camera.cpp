@@ -1,4 +1,4 @@
-// Sensor, film, filter, sampler and integrator.
+// Reads sensors, films, filters, samplers and integrators.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -7,15 +7,15 @@
 #include "common/base/suggest.h"
 #include "common/scene/reader/plugin_error.h"
 #include "common/scene/reader/reader.h"
-#include "common/scene/reader/unsupported.h"
 #include "common/scene/schema/integrators.h"
+#include "common/scene/schema/mitsuba_plugins.h"
 #include "common/scene/xml/transform_element.h"
 #include "common/scene/xml/values.h"
 
 namespace ls::scene {
 
 void Reader::read_sensor(const Element& e) {
-  if (!is_supported_plugin("sensor", e.get("type"))) return unknown_plugin(e, report_);
+  if (!is_read_plugin("sensor", e.get("type"))) return unknown_plugin(e, report_);
   if (sensor_)
     return report_.warning(
         e.at, fmt::format("a second sensor; the first ({}) is used", report_.refer_to(sensor_->at, e.at)));
@@ -32,7 +32,7 @@ void Reader::read_sensor(const Element& e) {
   p.finish();
 }
 
-// Parameters specific to each camera plugin.
+// Reads the parameters that are specific to each camera plugin.
 void Reader::read_projection(const Element& e, Params& p, Sensor& s) {
   Binder binder(p);
   if (e.get("type") == "spherical") {
@@ -65,7 +65,8 @@ void Reader::read_projection(const Element& e, Params& p, Sensor& s) {
   }
 }
 
-// The name is "medium" or absent; any other name is an error, as only shapes have interior and exterior.
+// Reads the sensor's medium. Its name is "medium" or absent; any other name is an error, since only shapes
+// have an interior and an exterior medium.
 void Reader::read_sensor_medium(Params& p, Sensor& s) {
   const Element* use = p.take("medium");
   if (const Element* object = use ? resolve(*use) : nullptr) s.medium = medium(*object, *use);
@@ -76,7 +77,8 @@ void Reader::read_sensor_medium(Params& p, Sensor& s) {
   }
 }
 
-// Without `fov` the angle is that of a focal length on 35 mm film, over the diagonal of 36 mm x 24 mm.
+// Reads the field of view. Without `fov` it follows from a focal length on 35 mm film, over the diagonal of
+// 36 mm x 24 mm.
 void Reader::read_fov(Params& p, Sensor& s) {
   const bool has_fov = p.has("fov");
   const Element* given = p.take("focal_length");
@@ -94,7 +96,7 @@ void Reader::read_fov(Params& p, Sensor& s) {
   }
   s.fov = 2 * std::atan(std::sqrt(36.0 * 36 + 24.0 * 24) / (2 * length)) * (180 / std::numbers::pi);
   s.fov_axis = FovAxis::diagonal;
-  // As in Mitsuba.
+  // As in Mitsuba, fov_axis is only used with `fov`.
   if (const Element* axis = p.take("fov_axis"))
     report_.warning(
         value_place(*axis, "name"),
@@ -105,10 +107,10 @@ void Reader::read_fov(Params& p, Sensor& s) {
 
 void Reader::read_film(const Element& e) {
   used_parts_.insert(&e);
-  if (!is_supported_plugin("film", e.get("type"))) return unknown_plugin(e, report_);
+  if (!is_read_plugin("film", e.get("type"))) return unknown_plugin(e, report_);
   Params p(*this, e);
   FilmSettings& film = scene_.film;
-  if (e.get("type") == "mfilm") film = {{1, 1}, BoxFilter{}};  // the default in Mitsuba 0.x
+  if (e.get("type") == "mfilm") film = {{1, 1}, BoxFilter{}};  // the defaults of Mitsuba 0.x
   if (e.get("type") != "hdrfilm")
     report_.warning(value_place(e, "type"),
                     fmt::format("{} gives the size of the frame and its filter: what is written are linear "
@@ -126,8 +128,8 @@ void Reader::read_film(const Element& e) {
   p.finish();
 }
 
-// A missing side is the frame's. A crop of the whole frame is stored as no crop, so that both scenes are
-// equal.
+// Checks the crop. A missing side is the frame's. A crop of the whole frame is stored as no crop, so that
+// both scenes are equal.
 void Reader::check_crop(const Element& e, Params& p, bool has_width, bool has_height) {
   FilmSettings& f = scene_.film;
   if (!has_width) f.crop_size.width = f.size.width;
@@ -160,20 +162,14 @@ ReconstructionFilter Reader::read_filter(const Element& e) {
   if (type == "box") return read_plain_filter<BoxFilter>(e);
   if (type == "tent") return read_plain_filter<TentFilter>(e);
   if (type == "gaussian") return read_plain_filter<GaussianFilter>(e);
-  if (is_unsupported_plugin("rfilter", type))
-    report_.error(value_place(e, "type"),
-                  fmt::format("the filter \"{}\" has negative lobes, which samples that each belong to one "
-                              "pixel can't follow; use box, tent or gaussian",
-                              type));
-  else
-    unknown_plugin(e, report_);
+  unknown_plugin(e, report_);
   return GaussianFilter{};
 }
 
-// The sampler is this program's own; only the number of samples is taken from the scene.
+// Reads only the number of samples: the sampler itself is always this program's own.
 void Reader::read_sampler(const Element& e) {
   used_parts_.insert(&e);
-  if (!is_supported_plugin("sampler", e.get("type"))) return unknown_plugin(e, report_);
+  if (!is_read_plugin("sampler", e.get("type"))) return unknown_plugin(e, report_);
   Params p(*this, e);
   if (e.get("type") != "independent")
     report_.warning(
@@ -213,13 +209,15 @@ void Reader::read_integrator(const Element& e, int depth) {
                                                         p.title(), row->ours));
   i.name = row->ours;
   if (i.name != kDistantMis) refuse(p, {"distance", "heuristic"}, kDistantMis);
-  if (i.name != "volpath") refuse(p, {"camera_points", "phase_only"}, "volpath");
+  if (i.name != "volpath")
+    refuse(p, {"camera_points", "phase_only", "light_vertices", "equiangular", "lamp_flights"}, "volpath");
+  i.max_depth = row->default_depth;
   bind(p, i);
   if (row->max_depth) i.max_depth = *row->max_depth;
   p.finish();
 }
 
-// Rejects parameters that only the integrator `of` has.
+// Rejects parameters that exist only for the integrator `of`.
 void Reader::refuse(Params& p, std::initializer_list<std::string_view> names, std::string_view of) {
   for (const std::string_view name : names)
     if (const Element* e = p.take(name))

@@ -1,4 +1,4 @@
-// Emitters without a shape.
+// Reads emitters without a shape.
 #include <fmt/format.h>
 
 #include "common/scene/reader/plugin_error.h"
@@ -9,6 +9,13 @@ namespace ls::scene {
 
 void Reader::read_emitter(const Element& e) {
   const std::string_view type = e.get("type");
+  // Reads a kind all of whose parameters have rows in describe().
+  const auto read_plain = [&](auto emitter) {
+    Params p(*this, e);
+    bind(p, emitter);
+    p.finish();
+    scene_.emitters.emplace_back(emitter);
+  };
   if (type == "directional") return read_directional(e);
   if (type == "point") return read_point(e);
   if (type == "spot") return read_spot(e);
@@ -16,12 +23,8 @@ void Reader::read_emitter(const Element& e) {
   if (type == "projector") return read_projector(e);
   if (type == "area") return report_.error(e.at, "an emitter \"area\" stands in the shape that shines");
   if (type != "constant") return unknown_plugin(e, report_);
-  Params p(*this, e);
-  ConstantEmitter emitter;
-  bind(p, emitter);
-  p.finish();
   check_only_environment(e);
-  scene_.emitters.emplace_back(emitter);
+  read_plain(ConstantEmitter{});
 }
 
 void Reader::check_only_environment(const Element& e) {

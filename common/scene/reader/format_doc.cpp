@@ -22,7 +22,7 @@ std::string text_of(const std::array<double, 3>& v) {
   return v[0] == v[1] && v[1] == v[2] ? fmt::format("{}", v[0]) : fmt::format("{}, {}, {}", v[0], v[1], v[2]);
 }
 
-// A parameter's element type in the file, and its default in words.
+// The texts for a parameter's columns: its element type in a file, and its default.
 struct Column {
   std::string_view type;
   std::string value;
@@ -50,7 +50,7 @@ requires std::is_enum_v<E> Column column(const Field&, E x) {
                        value == x ? fmt::format("**{}**", name) : std::string(name));
   return {"string", all};
 }
-// For nested objects and derived fields.
+// Used for nested objects and derived fields.
 template <class T>
 requires(!std::is_enum_v<T>) Column column(const Field&, const T&) { return {"", ""}; }
 
@@ -172,6 +172,10 @@ A whole scene, a ball of fog in a white surrounding:
   beyond its ends. It becomes the linear sRGB that the CIE 1931 2-degree observer sees: of light as it is, of anything else under
   D65. What sRGB or a reflectance can't hold is cut off, with a warning. `<spectrum value="2"/>` of an emitter is light of the same
   power at all wavelengths, which is 2 * (1.2048, 0.9483, 0.9089), as in Mitsuba's RGB modes; elsewhere it is grey.
+- A spectrum may be an object, too: `<spectrum type="irregular">` with `wavelengths` and `values` (a `<string>` of numbers each) and
+  `regular` with `wavelength_min`, `wavelength_max` and `values` are such curves; `d65` is white, `color` times `scale`; `blackbody`
+  with `temperature` is light of a black body, in the units of a medium's ([below](#grids-and-light-given-off-by-media));
+  `rawconstant` has a `value`: a number or a `<vector>`.
 - `<transform name="to_world">` holds `<translate>`, `<rotate>`, `<scale>`, `<lookat>`, `<matrix>` (9 or 16 numbers, row by row),
   each applied after those before it. `<rotate>` turns by `angle` degrees about the direction `x`, `y`, `z`; if that is not of
   length 1 there is a warning, as Mitsuba 3 then shears.
@@ -185,6 +189,7 @@ A whole scene, a ball of fog in a white surrounding:
   value="..."/>` before it. A `-D` that nothing in the scene asks for is a warning over HTTP and an error on the command line.
 - `<include filename="..."/>` puts in the objects of another file, `<path value="folder"/>` adds a folder in which files are
   looked for. Names are relative to the main scene file, those in an included file first to the folder of that file.
+- Which plugins of Mitsuba are read, and why the others are refused: [plugins of Mitsuba](mitsuba.md).
 - Files of version 0.x are read as Mitsuba 0.5 and 0.6 do, files of Nori as Nori does: see their sections.
 
 )";
@@ -283,9 +288,11 @@ std::string integrators_section() {
   std::string out = "Integrators by their names, in all versions:\n\n| name | means |\n|---|---|\n";
   for (const IntegratorRow& row : integrators())
     if (row.name != row.ours || row.max_depth)
-      out += fmt::format("| `{}` | `{}`{}{} |\n", row.name, row.ours,
-                         row.max_depth ? fmt::format(" with max_depth {}", *row.max_depth) : "",
-                         row.other_method ? ", with a warning" : "");
+      out += fmt::format(
+          "| `{}` | `{}`{}{}{} |\n", row.name, row.ours,
+          row.max_depth ? fmt::format(" with max_depth {}", *row.max_depth) : "",
+          row.default_depth >= 0 ? fmt::format(" with max_depth {} unless given", row.default_depth) : "",
+          row.other_method ? ", with a warning" : "");
   for (const WrapperRow& row : integrator_wrappers())
     out += row.name == "aov"
                ? fmt::format(
@@ -306,18 +313,6 @@ std::string meaningless_section() {
     out += fmt::format("| {}{} | `{}` | {} |\n", row.tag,
                        row.plugin.empty() ? "" : fmt::format(" `{}`", row.plugin),
                        fmt::join(row.parameters, "`, `"), row.because);
-  return out + "\n";
-}
-
-std::string unsupported_section() {
-  std::string out =
-      "## Not supported\n\nThese plugins of Mitsuba, older versions too, are refused by name:\n\n| object | "
-      "plugins "
-      "|\n|---|---|\n";
-  for (const char* tag : {"integrator", "sensor", "film", "rfilter", "shape", "bsdf", "texture", "emitter",
-                          "medium", "phase", "volume"})
-    if (const auto& plugins = unsupported_plugins(tag); !plugins.empty())
-      out += fmt::format("| {} | `{}` |\n", tag, fmt::join(plugins, "`, `"));
   return out + "\n";
 }
 
@@ -359,8 +354,7 @@ std::string scene_format_markdown() {
   out +=
       "A sampler, whatever its type, gives `sample_count` (default 4) samples a pixel. The films `ldrfilm`, "
       "`mfilm` and\n`tiledhdrfilm` are read as `hdrfilm`, with a warning.\n\n";
-  out += old_files_section() + nori::markdown() + meaningless_section() + unsupported_section() +
-         names_section();
+  out += old_files_section() + nori::markdown() + meaningless_section() + names_section();
   return out += kCanonical;
 }
 

@@ -1,4 +1,4 @@
-// Names of shapes and materials (for Cryptomatte), and requested AOVs.
+// Reads names of shapes and materials (for Cryptomatte), and the requested AOVs.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kMaxLabelBytes = 256;  // longer names are truncated
 
-// "meshes/Tub.obj" -> "Tub"
+// Returns a file's name without folder and extension: "Tub" for "meshes/Tub.obj".
 std::string stem(std::string_view file) {
   if (const auto slash = file.find_last_of("/\\"); slash != std::string_view::npos)
     file.remove_prefix(slash + 1);
@@ -29,7 +29,8 @@ std::string given_name(const Element& e) {
   return {};
 }
 
-// A material without an id may be a wrapper (twosided, bumpmap) of one that has it.
+// Returns a material's name. A material without an id may be a wrapper (twosided, bumpmap) of one that has an
+// id.
 std::string material_name(const Element& e, std::size_t index) {
   if (const auto id = e.get("id"); !id.empty()) return std::string(id.substr(0, kMaxLabelBytes));
   for (const Element& child : e.children)
@@ -50,7 +51,7 @@ std::string no_channel(std::string_view name, const ChannelRow* row) {
 
 }  // namespace
 
-// Makes a name unique by its index in the list.
+// Makes a name unique by appending its index in the list.
 std::string Reader::fresh_label(std::string name, std::string_view type, std::size_t index) {
   if (name.empty()) name = fmt::format("{}_{}", type, index);
   if (!labels_.insert(name).second) labels_.insert(name = fmt::format("{}_{}", name, index));
@@ -71,7 +72,7 @@ void Reader::label_instance(const Element& e) {
       {fresh_label(given_name(e), e.get("type"), scene_.instance_labels.size()), {}});
 }
 
-// The wrapper's list "label:channel, ...": the AOVs that the scene requests.
+// Reads the integrator's list "label:channel, ...": the AOVs that the scene requests.
 void Reader::read_channels(Params& p) {
   const Element* channels = p.take("aovs");
   if (!channels) return;

@@ -20,8 +20,8 @@ constexpr std::string_view kFrameParameter = "frame";
 
 bool is_name_char(char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; }
 
-// `$name` -> value. Substituted text is not searched again, so there is no recursion and no exponential
-// growth.
+// The values of parameters `$name`. Substituted text is not searched again, so there is no recursion and no
+// exponential growth.
 class Parameters {
  public:
   Parameters(const ReadOptions& options, Report& report)
@@ -30,12 +30,12 @@ class Parameters {
       unused_.insert(name);
       note_length(name);
     }
-    if (!options.frame) return;  // a scene need not use it
+    if (!options.frame) return;  // the scene does not have to use $frame
     values_.insert_or_assign(std::string(kFrameParameter), std::to_string(*options.frame));
     note_length(std::string(kFrameParameter));
   }
 
-  // An unused parameter from outside is probably a typing error, but no reason to stop.
+  // Warns of unused parameters from outside: they are probably misspelt, but no reason to stop.
   void warn_of_unused(const Span& at) const {
     std::vector<std::string> known;
     for (const auto& [name, value] : values_)
@@ -79,7 +79,7 @@ class Parameters {
         return complain(a.value_at, fmt::format("with its parameters put in, this is longer than {} bytes",
                                                 kMaxValueBytes));
     }
-    // The substituted text is untrusted.
+    // The substituted text is untrusted, so it is checked.
     if (find_invalid_utf8(out) != std::string_view::npos || find_control(out) != std::string_view::npos)
       return complain(a.value_at,
                       "with its parameters put in, this has bytes in it that are no UTF-8 text, or control "
@@ -99,8 +99,8 @@ class Parameters {
     longest_ = std::min(std::max(longest_, name.size()), kMaxParameterNameBytes);
   }
 
-  // Returns the parameter with the longest name that the text has at `at`, as in Mitsuba: "$resx" means
-  // `resx` if that exists, otherwise the value of `res` followed by an x.
+  // Returns the parameter with the longest name that the text has at position `at`, as in Mitsuba: "$resx"
+  // means `resx` if that exists, otherwise the value of `res` followed by an x.
   Values::const_iterator longest_at(const std::string& text, std::size_t at) const {
     std::size_t end = at;
     while (end < std::min(text.size(), at + longest_) && is_name_char(text[end])) ++end;
@@ -127,7 +127,7 @@ class Parameters {
   }
 
   Values values_;
-  std::set<std::string> unused_;  // parameters from outside that are not used
+  std::set<std::string> unused_;  // parameters from outside that have not been used so far
   Report& report_;
   std::size_t longest_ = 0;  // length of the longest parameter name
   std::size_t total_ = 0;
@@ -176,8 +176,8 @@ class Loader {
     return false;
   }
 
-  // Substitutes parameters, and replaces the elements that concern the text itself. Depth is bounded by
-  // kMaxNesting and kMaxIncludeDepth.
+  // Substitutes parameters, and replaces <include>, <default> and <path>. The depth of recursion is bounded
+  // by kMaxNesting and kMaxIncludeDepth.
   bool expand(Element& e, bool old) {
     for (Attribute& a : e.attributes)
       if (!parameters_.substitute(a)) return false;

@@ -1,4 +1,4 @@
-// Volumes, phase functions and media.
+// Reads volumes, phase functions and media.
 #include <fmt/format.h>
 
 #include "common/scene/reader/plugin_error.h"
@@ -49,7 +49,8 @@ void need_inverse(const Transform& to_world, const Element& e, Report& report) {
     report.error(e.at, "to_world flattens this volume or leaves the range of numbers: it can't be inverted");
 }
 
-// Parameters that need another one to have an effect; constructed before parameters are taken.
+// The parameters that have an effect only together with another one. Must be constructed before parameters
+// are taken.
 struct Factors {
   explicit Factors(const Params& p)
       : light(p.has("emission_scale")), heat(p.has("temperature_scale") || p.has("temperature_offset")) {}
@@ -161,7 +162,7 @@ std::optional<MediumIndex> Reader::read_any_medium(const Element& e) {
   return MediumIndex{static_cast<std::uint32_t>(scene_.media.size() - 1)};
 }
 
-// In 0.x a constant density extends everywhere, not only over the unit cube.
+// In Mitsuba 0.x a constant density fills all of space, not only the unit cube.
 void Reader::unbound_constant_density(const Element& e) {
   const auto medium = std::get<HeterogeneousMedium>(scene_.media.back());
   const Rgb* density = constant(medium.sigma_t);

@@ -92,7 +92,7 @@ void Params::left_over(const Child& c) {
   if (const auto instead = replacement(object_.tag, c.name); !instead.empty())
     return reader_.report().error(value_place(*c.element, "name"),
                                   fmt::format("{} has no parameter '{}': {}", title(), c.name, instead));
-  // Suggests known parameters first, then those that would only cause a warning.
+  // Suggests a supported parameter first, then one that would only cause a warning.
   std::string hint = suggestion(c.name, known_);
   if (const auto near = nearest_name(c.name, known_); !near)
     if (const auto other = nearest_name(c.name, meaningless_parameters(object_.tag, plugin)))
@@ -244,14 +244,15 @@ void Params::convert(const Field& f, const Element& e, AssetIndex& value) {
 
 void Params::convert(const Field& f, const Element& e, TextureIndex& value) {
   const Element* object = object_at(e);
-  if (object && (object->tag == "texture" || object->tag == "spectrum")) {
+  const bool spectrum = object && Reader::is_spectrum(*object);
+  if (object && !spectrum && (object->tag == "texture" || object->tag == "spectrum")) {
     const auto index = reader_.texture(*object, e);
     if (!index) return;
-    // The values of images are unknown here.
+    // The bounds of images are unknown here.
     if (const auto& b = reader_.bounds(*index); b && !(in_range(f, e, b->low) && in_range(f, e, b->high)))
       return;
     value = *index;
-  } else if (object) {
+  } else if (object && !spectrum) {
     reader_.report().error(e.at, fmt::format("'{}' of {} wants a colour or a texture, not a <{}>", f.name,
                                              title(), object->tag));
   } else if (const auto c = colour(f, e, "a colour or a texture")) {
@@ -270,7 +271,7 @@ void Params::convert(const Field& f, const Element& e, VolumeIndex& value) {
     if (!index) return;
     if (const Rgb* constant = reader_.constant(*index); constant && !in_range(f, e, *constant)) return;
     value = *index;
-  } else if (object) {
+  } else if (object && object->tag != "spectrum" && object->tag != "texture") {
     reader_.report().error(e.at, fmt::format("'{}' of {} wants a colour or a <volume>, not a <{}>", f.name,
                                              title(), object->tag));
   } else if (const auto c = colour(f, e, "a colour or a <volume>")) {

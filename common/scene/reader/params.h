@@ -1,5 +1,4 @@
-// The parameters of one object. Its reader takes those that it knows; finish() reports those that are left
-// over.
+// The parameters of one object. Its reader takes the ones that it knows; finish() reports the others.
 #pragma once
 
 #include <fmt/format.h>
@@ -21,28 +20,28 @@ class Params {
   Params(Reader& reader, const Element& object);
 
   const Element& object() const { return object_; }
-  std::string title() const;  // bsdf "diffuse"
+  std::string title() const;  // for example: bsdf "diffuse"
   bool has(std::string_view name) const;
   // Returns the child of that name (a property, an object or a reference), and marks the name as known.
   const Element* take(std::string_view name);
-  // A nested object that no reader took by name, and the element at its place, which may be a reference to
+  // A nested object that no reader took by name, and the element in its place, which may be a reference to
   // it.
   struct Nested {
     const Element* object;
     const Element* use;
   };
-  enum class Names { any, none };  // none: only those without a name
+  enum class Names { any, none };  // which nested objects: all, or only those without a name
   std::vector<Nested> take_nested(std::string_view tag, Names names = Names::any);
   // Reports the parameters that no reader took.
   void finish();
 
-  // Each returns a plain value; nullopt if it is absent, or of the wrong type, which is reported.
+  // Each returns a plain value. Returns nullopt if it is absent; also if it has the wrong type, which is
+  // reported.
   std::optional<std::string> take_string(std::string_view name);
   std::optional<double> take_number(std::string_view name);
   std::optional<Transform> take_transform(std::string_view name);
 
-  // For Binder: these convert `e` to `value`, in the notation that files use for that type, and report
-  // errors.
+  // Used by Binder: these convert `e` to `value`, in the notation of that type, and report errors.
   void convert(const Field& f, const Element& e, double& value);
   void convert(const Field& f, const Element& e, int& value);
   void convert(const Field& f, const Element& e, bool& value);
@@ -83,7 +82,7 @@ class Params {
  private:
   struct Child {
     const Element* element;
-    const Element* object = nullptr;  // for objects and (resolved) references
+    const Element* object = nullptr;  // for objects, and for references after they were resolved
     std::string_view name;
     bool taken = false;
   };
@@ -94,11 +93,13 @@ class Params {
                   const std::vector<std::string>& names);
   bool in_range(const Field& f, const Element& e, double x);
   bool in_range(const Field& f, const Element& e, const std::array<double, 3>& x);
-  // Returns the object at `e`, nested or referenced; nullptr if `e` is a plain value, or wrong and reported.
+  // Returns the object at `e`, nested or referenced. Returns nullptr if `e` is a plain value, or is wrong,
+  // which is reported.
   const Element* object_at(const Element& e);
   std::optional<std::string> string_value(std::string_view name, const Element& e);
   std::optional<Rgb> colour(const Field& f, const Element& e, std::string_view wanted);
   std::optional<Rgb> spectrum(const Field& f, const Element& e, std::string_view wanted);
+  std::optional<Rgb> colour_of_object(const Field& f, const Element& e, const Element& object);
   Rgb shown(const Field& f, const Element& e, const Rgb& seen);
 
   Reader& reader_;
@@ -107,7 +108,7 @@ class Params {
   std::vector<std::string> known_;
 };
 
-// Reads an object, whose fields describe() lists, from its parameters.
+// Reads an object, whose fields are listed by describe(), from its parameters.
 class Binder {
  public:
   explicit Binder(Params& params) : params_(params) {}

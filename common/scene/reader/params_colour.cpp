@@ -1,4 +1,4 @@
-// The part of Params that reads colours in their various notations.
+// Reads colours in their various notations (part of Params).
 #include <algorithm>
 #include <cmath>
 
@@ -14,6 +14,8 @@ namespace ls::scene {
 std::optional<Rgb> Params::colour(const Field& f, const Element& e, std::string_view wanted) {
   const std::string_view text = e.get("value");
   if (e.tag == "spectrum" && kind_of(e) == TagKind::property) return spectrum(f, e, wanted);
+  if (const Element* object = object_at(e); object && (object->tag == "spectrum" || object->tag == "texture"))
+    return colour_of_object(f, e, *object);
   std::optional<Rgb> c;
   if (e.tag == "rgb" || e.tag == "color") c = parse_rgb(text);
   if (e.tag == "float" || e.tag == "integer")
@@ -25,9 +27,9 @@ std::optional<Rgb> Params::colour(const Field& f, const Element& e, std::string_
   return in_range(f, e, *c) ? c : std::nullopt;
 }
 
-// Converts spectra as the RGB modes of Mitsuba do. Version 3: curves of reflectances are seen under D65,
-// curves of light as they are, so light of equal power at all wavelengths is not white. 0.x: all curves are
-// seen as they are, and a single number is grey.
+// Converts spectra as the RGB modes of Mitsuba do. Version 3: curves of reflectances are multiplied by D65,
+// curves of light are not, so light of equal power at all wavelengths is not white. Version 0.x: no curve is
+// multiplied by an illuminant, and a single number is grey.
 std::optional<Rgb> Params::spectrum(const Field& f, const Element& e, std::string_view wanted) {
   const SpectrumText text = parse_spectrum(e.get("value"));
   const bool emits = object_.tag == "emitter";
@@ -59,9 +61,41 @@ std::optional<Rgb> Params::spectrum(const Field& f, const Element& e, std::strin
   return in_range(f, e, *c) ? c : std::nullopt;
 }
 
+// A spectrum, or a texture that is the same everywhere.
+std::optional<Rgb> Params::colour_of_object(const Field& f, const Element& e, const Element& object) {
+  std::optional<Rgb> c;
+  if (Reader::is_spectrum(object)) {
+    const auto s = reader_.spectrum(object, e);
+    if (!s) return std::nullopt;
+    const bool emits = object_.tag == "emitter";
+    if (const auto* rgb = std::get_if<Rgb>(&*s)) c = *rgb;
+    if (const auto* curve = std::get_if<SpectralCurve>(&*s))
+      c = shown(f, e, linear_srgb(*curve, emits || e.old ? Illuminant::equal_energy : Illuminant::d65));
+    if (const auto* light = std::get_if<Reader::LightColour>(&*s)) {
+      if (!emits) {
+        reader_.report().error(e.at, fmt::format("'{}' of {} is no light: it can't be a \"{}\"", f.name,
+                                                 title(), object.get("type")));
+        return std::nullopt;
+      }
+      c = light->value;
+    }
+  } else if (const auto index = reader_.texture(object, e)) {
+    const Rgb* same = reader_.constant(*index);
+    if (!same) {
+      reader_.report().error(
+          e.at, fmt::format("'{}' of {} is the same everywhere: a texture \"{}\" can't be one", f.name,
+                            title(), object.get("type")));
+      return std::nullopt;
+    }
+    c = *same;
+  }
+  return c && in_range(f, e, *c) ? c : std::nullopt;
+}
+
 // Clamps values outside sRGB, or above 1 for a reflectance, as Mitsuba does.
 Rgb Params::shown(const Field& f, const Element& e, const Rgb& seen) {
-  // Tables and matrix have four digits or more: no warning for the resulting deviation of a white from 1.
+  // The tables and the matrix have at least four digits. A white that deviates from 1 by their rounding
+  // causes no warning.
   constexpr double kSlack = 1e-3;
   Rgb c = seen;
   double most = 0;

@@ -4,7 +4,8 @@
 
 namespace ls::scene {
 
-// Reports that the object's type cannot be read: unsupported, or unknown with a suggestion.
+// Reports that the object's type cannot be read: it is unsupported, or unknown, and then the message has a
+// suggestion.
 void unknown_plugin(const Element& e, Report& report);
 
 }  // namespace ls::scene

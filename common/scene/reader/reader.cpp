@@ -6,8 +6,11 @@
 
 #include "common/base/frame_range.h"
 #include "common/base/suggest.h"
+#include "common/scene/file_names.h"
+#include "common/scene/gltf/load.h"
 #include "common/scene/limits.h"
 #include "common/scene/nori/translate.h"
+#include "common/scene/pbrt/load.h"
 #include "common/scene/read.h"
 #include "common/scene/reader/unsupported.h"
 #include "common/scene/schema/validate.h"
@@ -31,7 +34,7 @@ Scene Reader::read() {
   return std::move(scene_);
 }
 
-// At the top level a reference stands for the object that it refers to, as in any other parent element.
+// A reference at the top level is treated as the object that it refers to, as in any other parent element.
 void Reader::read_child(const Element& child) {
   const TagKind kind = kind_of(child);
   if (kind == TagKind::alias) return;
@@ -45,15 +48,17 @@ void Reader::read_child(const Element& child) {
   if (e->tag == "sensor") return read_sensor(*e);
   if (e->tag == "integrator") return read_integrator(*e, 0);
   if (e->tag == "bsdf") return void(bsdf(*e, child));
+  if (is_spectrum(*e)) return void(spectrum(*e, child));
   if (e->tag == "texture" || e->tag == "spectrum") return void(texture(*e, child));
   if (e->tag == "volume") return void(volume(*e, child));
   if (e->tag == "phase") return void(phase(*e, child));
   if (e->tag == "medium") return void(medium(*e, child));
-  if (e->find("id")) return parts_.push_back(e);  // a film, filter or sampler that a sensor may refer to
+  // A film, filter or sampler with an id is kept for the sensor that refers to it
+  if (e->find("id")) return parts_.push_back(e);
   report_.error(e->at, fmt::format("a <{}> belongs into a <sensor>", e->tag));
 }
 
-// Reads films, filters and samplers that no sensor uses, only to report their errors.
+// Reads films, filters and samplers that no sensor uses, so that their errors are reported.
 void Reader::read_idle_parts() {
   const FilmSettings film = scene_.film;
   const std::uint64_t sample_count = scene_.sample_count;
@@ -78,7 +83,7 @@ const Element* Reader::resolve(const Element& child) {
   return nullptr;
 }
 
-// Returns a suggestion for a reference that leads nowhere.
+// Returns a suggestion for a reference whose target does not exist.
 std::string Reader::hint_for(const Element& reference) const {
   if (ids_.empty()) return "; no object here has one";
   std::vector<std::string> known;
@@ -117,6 +122,9 @@ std::optional<I> Reader::once(Memo<I>& memo, std::string_view kind, const Elemen
 
 std::optional<TextureIndex> Reader::texture(const Element& object, const Element& use) {
   return once(textures_, "texture", object, use, [&](const Element& e) { return read_texture(e); });
+}
+std::optional<Reader::Spectrum> Reader::spectrum(const Element& object, const Element& use) {
+  return once(spectra_, "spectrum", object, use, [&](const Element& e) { return read_spectrum(e); });
 }
 std::optional<BsdfIndex> Reader::bsdf(const Element& object, const Element& use) {
   return once(bsdfs_, "bsdf", object, use, [&](const Element& e) { return read_bsdf(e); });
@@ -160,6 +168,13 @@ const std::optional<Reader::Bounds>& Reader::bounds(TextureIndex texture) {
         include(0, 1);
       else if (inner.value < i && texture_bounds_[inner.value])
         include(texture_bounds_[inner.value]->low, texture_bounds_[inner.value]->high);
+    } else if (const auto* product = std::get_if<ProductTexture>(&scene_.textures[i])) {
+      const auto of = [&](TextureIndex t) { return t.value < i ? texture_bounds_[t.value] : std::nullopt; };
+      const auto x = of(product->first), y = of(product->second);
+      if (product->threshold > 0)
+        include(0, 1);
+      else if (x && y)
+        include(x->low * y->low, x->high * y->high);
     }
     texture_bounds_.push_back(b);
   }
@@ -168,6 +183,10 @@ const std::optional<Reader::Bounds>& Reader::bounds(TextureIndex texture) {
 
 const Rgb* Reader::constant(VolumeIndex volume) const {
   const auto* c = std::get_if<ConstVolume>(&scene_.volumes[volume.value]);
+  return c ? &c->value : nullptr;
+}
+const Rgb* Reader::constant(TextureIndex texture) const {
+  const auto* c = std::get_if<ConstantTexture>(&scene_.textures[texture.value]);
   return c ? &c->value : nullptr;
 }
 
@@ -203,11 +222,36 @@ std::optional<AssetIndex> Reader::asset(const std::string& written, const Span& 
 
 }  // namespace scene
 
+Result<Asset> AssetSource::keep(std::string_view name, const std::string& bytes) {
+  auto asset = find(name);
+  if (!asset)
+    return fail(
+        asset.error().code,
+        fmt::format("the numbers here are a file \"{}\" of their own, which `lightshaft submit` sends "
+                    "along: {}",
+                    name, asset.error().message));
+  if (asset->digest == sha256(bytes)) return asset;
+  return fail(
+      Errc::invalid_argument,
+      fmt::format("the file \"{}\" that was sent along is not the one of the numbers here: leave it to "
+                  "`lightshaft submit`",
+                  name));
+}
+
 ReadResult read_scene(std::string_view file_name, std::string_view text, AssetSource& assets,
                       const ReadOptions& options) {
   scene::Report report(options.strict);
   ReadResult result;
-  auto document = scene::load_document(file_name, text, assets, options, report);
+  if (std::string why = scene::why_no_scene(file_name); !why.empty()) {
+    const std::uint32_t file = report.add_file(scene::SourceText(std::string(file_name), ""));
+    report.error({file, 0, 1}, std::move(why));
+    result.diagnostics = report.take();
+    return result;
+  }
+  const auto load = scene::pbrt::is_pbrt(file_name)   ? scene::pbrt::load_document
+                    : scene::gltf::is_gltf(file_name) ? scene::gltf::load_document
+                                                      : scene::load_document;
+  auto document = load(file_name, text, assets, options, report);
   if (document && scene::nori::translate(*document, report)) {
     const Scene read = scene::Reader(*document, assets, report).read();
     if (!report.has_errors()) result.scene = scene::compacted(read);

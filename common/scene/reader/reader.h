@@ -1,4 +1,5 @@
-// Converts a Document to a Scene: the state shared by the readers of all kinds of objects. One .cpp per kind.
+// Converts a Document to a Scene. This is the state shared by the readers of all kinds of objects, which have
+// one .cpp file per kind.
 #pragma once
 
 #include <initializer_list>
@@ -7,11 +8,13 @@
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
+#include <variant>
 #include <vector>
 
 #include "common/scene/reader/params.h"
 #include "common/scene/schema/bsdf_traits.h"
 #include "common/scene/xml/grammar.h"
+#include "common/scene/xml/spectrum.h"
 
 namespace ls::scene {
 
@@ -21,10 +24,10 @@ class Reader {
   Scene read();  // valid only if the report has no errors afterwards
 
   Report& report() { return report_; }
-  // Returns the object that `child` is or refers to; nullptr: there is none, which has been reported.
+  // Returns the object that `child` is or refers to. nullptr: there is none, which has been reported.
   const Element* resolve(const Element& child);
 
-  // Each returns the index of `object` in the scene, and reads the object only once, however often it is
+  // Each returns the index of `object` in the scene. An object is read only once, however often it is
   // referred to; `use` is the place of the reference. nullopt: an error was reported.
   std::optional<TextureIndex> texture(const Element& object, const Element& use);
   std::optional<BsdfIndex> bsdf(const Element& object, const Element& use);
@@ -32,14 +35,24 @@ class Reader {
   std::optional<PhaseIndex> phase(const Element& object, const Element& use);
   std::optional<MediumIndex> medium(const Element& object, const Element& use);
 
+  // A spectrum of which the use decides the colour: one that is the colour of light in any case, and a curve,
+  // which is seen as it is (light) or under D65 (anything else).
+  struct LightColour {
+    Rgb value;
+  };
+  using Spectrum = std::variant<Rgb, LightColour, SpectralCurve>;
+  static bool is_spectrum(const Element& object);
+  std::optional<Spectrum> spectrum(const Element& object, const Element& use);
+
   TextureIndex add_constant_texture(const Rgb& value);
   VolumeIndex add_constant_volume(const Rgb& value);
-  // Bounds of a texture's values; nullopt if they depend on an image.
+  // Bounds of a texture's values. nullopt if they depend on an image.
   struct Bounds {
     double low, high;
   };
   const std::optional<Bounds>& bounds(TextureIndex texture);
-  const Rgb* constant(VolumeIndex volume) const;  // nullptr: it is a grid
+  const Rgb* constant(VolumeIndex volume) const;    // nullptr: it is a grid
+  const Rgb* constant(TextureIndex texture) const;  // nullptr: it varies
   std::optional<AssetIndex> asset(const std::string& name, const Span& at);
 
  private:
@@ -61,6 +74,8 @@ class Reader {
   void refuse_attributes(const Element& e, TextureIndex t, std::string_view parameter);
   void check_attributes(const Element& e, const Shape& shape);
   std::optional<TextureIndex> read_uniform_texture(const Element& e, std::string_view parameter);
+  std::optional<TextureIndex> read_raw_constant(const Element& e);
+  std::optional<Spectrum> read_spectrum(const Element& e);
   std::optional<BsdfIndex> read_bsdf(const Element& e);
   template <class T>
   std::optional<BsdfIndex> read_plain_bsdf(const Element& e);
@@ -98,6 +113,8 @@ class Reader {
   void warn_of_media_around_camera();
   void read_shape_group(const Element& e);
   void read_instance(const Element& e);
+  void read_merge(const Element& e);
+  void refuse_in_group(const Element& use, std::string_view type);
 
   void read_emitter(const Element& e);
   void read_directional(const Element& e);
@@ -122,7 +139,7 @@ class Reader {
   void read_channels(Params& p);
 
   std::string fresh_label(std::string name, std::string_view type, std::size_t index);
-  void label_shape(const Element& e);  // names the last shape of scene_
+  void label_shape(const Element& e);  // adds the name of the last shape of scene_
   void label_instance(const Element& e);
 
   const Document& document_;
@@ -142,16 +159,19 @@ class Reader {
   std::vector<std::optional<Bounds>> texture_bounds_;
   std::vector<BsdfTraits> bsdf_traits_;  // traits of the first bsdfs of scene_; more are added when needed
 
-  bool reads_attributes_ = false;                     // some texture read so far is a mesh attribute
-  std::map<TextureIndex, TextureIndex> old_numbers_;  // keyed by the textures as they were read
+  bool reads_attributes_ = false;  // true if some texture read so far is a mesh attribute
+  // Results of old_number(), by the texture as it was read
+  std::map<TextureIndex, TextureIndex> old_numbers_;
   Memo<TextureIndex> textures_;
+  Memo<Spectrum> spectra_;
   Memo<BsdfIndex> bsdfs_;
   Memo<VolumeIndex> volumes_;
   Memo<PhaseIndex> phases_;
   Memo<MediumIndex> media_;
-  // The shape groups, read where they are defined; nullopt: the group has no shape, or is wrong.
+  // The index of each shape group that was read; nullopt: the group has no shape, or is wrong.
   std::unordered_map<const Element*, std::optional<GroupIndex>> groups_;
-  std::optional<GroupIndex> group_;  // the group whose shapes are being read
+  std::optional<GroupIndex> group_;            // the group whose shapes are being read
+  std::unordered_set<const Element*> merges_;  // read so far
   std::map<std::string, AssetIndex> assets_by_name_;
   std::unordered_set<const Element*> in_progress_;
   std::unordered_set<const Element*> bad_refs_;  // references whose errors have been reported

@@ -1,4 +1,5 @@
-// Shapes with their nested objects: bsdf, area emitter, media; groups of shapes and their instances.
+// Reads shapes with their nested objects (bsdf, area emitter, media), and groups of shapes with their
+// instances.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include "common/scene/reader/plugin_error.h"
 #include "common/scene/reader/reader.h"
 #include "common/scene/schema/mesh_attributes.h"
+#include "common/scene/schema/mitsuba_plugins.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene {
@@ -23,7 +25,14 @@ void Reader::read_shape(const Element& e) {
   if (type == "cylinder") return read_geometry(e, CylinderShape{});
   if (type == "shapegroup") return read_shape_group(e);
   if (type == "instance") return read_instance(e);
+  if (type == "merge") return read_merge(e);
   unknown_plugin(e, report_);
+}
+
+void Reader::refuse_in_group(const Element& use, std::string_view type) {
+  report_.error(use.at, fmt::format("{} can't stand in a shapegroup: instances within instances are not "
+                                    "supported, by Mitsuba neither; put the shapes themselves here",
+                                    type == "instance" ? "an instance" : "a shapegroup"));
 }
 
 // A group is read at its first use, which may be an instance before its definition.
@@ -36,9 +45,7 @@ void Reader::read_shape_group(const Element& e) {
   for (const auto& [object, use] : p.take_nested("shape")) {
     const std::string_view type = object->get("type");
     if (type == "instance" || type == "shapegroup") {
-      report_.error(use->at, fmt::format("{} can't stand in a shapegroup: instances within instances are not "
-                                         "supported, by Mitsuba neither; put the shapes themselves here",
-                                         type == "instance" ? "an instance" : "a shapegroup"));
+      refuse_in_group(*use, type);
       continue;
     }
     group_ = group;
@@ -53,6 +60,25 @@ void Reader::read_shape_group(const Element& e) {
   }
   scene_.groups.emplace_back();
   index = group;
+}
+
+// Its shapes look the same apart. One use of each, and none within another: references to references could
+// make more shapes than there is memory.
+void Reader::read_merge(const Element& e) {
+  if (!merges_.insert(&e).second)
+    return report_.error(
+        e.at, "this shape \"merge\" is used twice: put it into a shapegroup and use instances of that");
+  Params p(*this, e);
+  for (const auto& [object, use] : p.take_nested("shape")) {
+    const std::string_view type = object->get("type");
+    if (type == "merge")
+      report_.error(use->at, "a merge can't stand in another: put its shapes themselves here");
+    else if (group_ && (type == "instance" || type == "shapegroup"))
+      refuse_in_group(*use, type);
+    else
+      read_shape(*object);
+  }
+  p.finish();
 }
 
 void Reader::read_instance(const Element& e) {
@@ -135,13 +161,13 @@ void Reader::read_shape_parts(Params& p, Shape& shape) {
     if (const auto index = bsdf(*bsdfs[0].object, *bsdfs[0].use)) shape.bsdf = *index;
     return;
   }
-  // 0.x: a shape that only bounds a medium is null.
+  // In Mitsuba 0.x a shape that only bounds a medium has a null bsdf.
   if (p.object().old && emitters.empty() && shape.is_medium_transition) {
     scene_.bsdfs.emplace_back(NullBsdf{});
     shape.bsdf = {static_cast<std::uint32_t>(scene_.bsdfs.size() - 1)};
     return;
   }
-  // Mitsuba's defaults: diffuse; black for an emitter.
+  // Mitsuba's default material: diffuse, and black for an emitter.
   const double grey = emitters.empty() ? .5 : 0;
   scene_.bsdfs.emplace_back(DiffuseBsdf{add_constant_texture({grey, grey, grey})});
   shape.bsdf = {static_cast<std::uint32_t>(scene_.bsdfs.size() - 1)};
@@ -152,6 +178,11 @@ void Reader::read_shape_parts(Params& p, Shape& shape) {
 }
 
 std::optional<AreaEmitter> Reader::read_area(const Element& e) {
+  if (const PluginRow* row = plugin_row("emitter", e.get("type"));
+      row && row->standing == Standing::refused) {
+    unknown_plugin(e, report_);
+    return std::nullopt;
+  }
   if (e.get("type") != "area") {
     report_.error(value_place(e, "type"),
                   fmt::format("a shape can only hold an emitter \"area\", not \"{}\"", e.get("type")));
@@ -168,16 +199,16 @@ std::optional<AreaEmitter> Reader::read_area(const Element& e) {
   if (area.beam_width > area.cutoff_angle)
     report_.error(
         e.at, fmt::format("beam_width {} is wider than cutoff_angle {}", area.beam_width, area.cutoff_angle));
-  // Without a range between the two angles falloff has no effect, and is not written.
+  // If the two angles are equal, falloff has no effect, and its default is stored.
   if (area.beam_width == AreaEmitter{}.beam_width) area.falloff = AreaEmitter{}.falloff;
   return area;
 }
 
 namespace {
 
-// True if it stays a circular cylinder: two directions perpendicular to its axis remain perpendicular, to
-// each other and to the axis, and equally long (up to the rounding of composed transforms in single
-// precision).
+// True if the transformed cylinder is still circular: two directions perpendicular to its axis remain
+// perpendicular, to each other and to the axis, and equally long (up to the rounding of composed transforms
+// in single precision).
 bool stays_cylinder(const CylinderShape& c, const Transform& t) {
   const auto dot = [](const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
   const auto cross = [](const Vec3& a, const Vec3& b) {
@@ -202,11 +233,11 @@ bool stays_cylinder(const CylinderShape& c, const Transform& t) {
 
 }  // namespace
 
-// Whether the file has the attributes is checked when the mesh is loaded.
+// Checks the attributes that textures read. Whether the file has them is checked when the mesh is loaded.
 void Reader::check_attributes(const Element& e, const Shape& shape) {
   const auto* mesh = std::get_if<MeshShape>(&shape.geometry);
   if (!reads_attributes_ || (mesh && mesh->format == MeshFormat::ply)) return;
-  if (report_.has_errors()) return;  // its materials may be missing
+  if (report_.has_errors()) return;  // after errors, materials may be missing
   for (const AttributeUse& use : attribute_uses(scene_, shape))
     report_.error(
         e.at,

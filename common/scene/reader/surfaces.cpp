@@ -1,4 +1,4 @@
-// Textures and bsdfs.
+// Reads textures and bsdfs.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,9 +20,11 @@ std::optional<TextureIndex> Reader::read_texture(const Element& e) {
   const std::string_view type = e.get("type");
   if (type == "uniform") return read_uniform_texture(e, "value");
   if (type == "srgb") return read_uniform_texture(e, "color");
+  if (type == "rawconstant") return read_raw_constant(e);
   if (type == "bitmap" && e.tag == "texture") return read_plain_texture<BitmapTexture>(e);
   if (type == "checkerboard" && e.tag == "texture") return read_plain_texture<CheckerboardTexture>(e);
   if (type == "peak" && e.tag == "texture") return read_plain_texture<PeakTexture>(e);
+  if (type == "product" && e.tag == "texture") return read_plain_texture<ProductTexture>(e);
   if (type == "mesh_attribute" && e.tag == "texture") return read_mesh_attribute(e);
   unknown_plugin(e, report_);
   return std::nullopt;
@@ -49,7 +51,7 @@ std::optional<TextureIndex> Reader::read_mesh_attribute(const Element& e) {
   return index;
 }
 
-// Rejects mesh attributes where there is no mesh.
+// Rejects textures of mesh attributes for objects that are not meshes.
 void Reader::refuse_attributes(const Element& e, TextureIndex t, std::string_view parameter) {
   if (!reads_attributes_) return;
   for (const AttributeUse& use : attribute_uses(scene_, t))
@@ -64,6 +66,25 @@ std::optional<TextureIndex> Reader::read_uniform_texture(const Element& e, std::
   Rgb value{1, 1, 1};
   if (const Element* given = p.take(parameter))
     p.convert({.name = parameter, .doc = "", .range = kNonNegative}, *given, value);
+  p.finish();
+  return add_constant_texture(value);
+}
+
+// Its value is one number, or the three of a <vector>.
+std::optional<TextureIndex> Reader::read_raw_constant(const Element& e) {
+  Params p(*this, e);
+  Rgb value{};
+  const Field field{.name = "value", .doc = "", .range = kNonNegative};
+  const Element* given = p.take("value");
+  if (!given) {
+    report_.error(e.at, fmt::format("{} needs 'value'", p.title()));
+  } else if (given->tag == "vector" || given->tag == "point") {
+    Vec3 parts{};
+    p.convert(field, *given, parts);
+    value = parts;
+  } else {
+    p.convert(field, *given, value);
+  }
   p.finish();
   return add_constant_texture(value);
 }
@@ -129,7 +150,7 @@ std::optional<BsdfIndex> Reader::read_plain_bsdf(const Element& e) {
   return add_bsdf(e, b);
 }
 
-// Multiple scattering needs a constant roughness, because its energy table is for a single roughness.
+// Checks that the roughness is constant: the energy table of multiple scattering is for a single roughness.
 void Reader::check_multiple_scattering(const Element& e, TextureIndex alpha_u, TextureIndex alpha_v) {
   const std::size_t n = scene_.textures.size();
   if (alpha_u.value >= n || alpha_v.value >= n) return;  // already reported
@@ -158,7 +179,7 @@ std::optional<BsdfIndex> Reader::read_rough(const Element& e) {
   return add_bsdf(e, b);
 }
 
-// Reads a conductor as the other bsdfs are read, but eta and k may also be given by a metal's name.
+// Reads a conductor; eta and k may also be given by a metal's name.
 template <class T>
 std::optional<BsdfIndex> Reader::read_metal(const Element& e) {
   Params p(*this, e);
@@ -194,7 +215,8 @@ void Reader::read_metal_preset(Params& p, Rgb& eta, Rgb& k) {
   k = metal->k;
 }
 
-// The nested bsdfs in the order of the file; for a blend, as in Mitsuba, ordered by name if both have one.
+// Returns the nested bsdfs in the order of the file. Those of a blend are ordered by name if both have one,
+// as in Mitsuba.
 std::optional<std::vector<BsdfIndex>> Reader::read_inner_bsdfs(Params& p, std::size_t at_least,
                                                                std::size_t at_most) {
   auto nested = p.take_nested("bsdf");
@@ -233,15 +255,15 @@ std::optional<BsdfIndex> Reader::read_twosided(const Element& e) {
   return add_bsdf(e, TwoSidedBsdf{sides->front(), sides->back()});
 }
 
-// In files of version 0.x a checkerboard shows the same squares as a scalar and as a colour (see scene.h): as
-// a scalar it becomes another one with the colours swapped.
+// In files of version 0.x a checkerboard shows the same squares as a scalar and as a colour (see scene.h). So
+// if it is used as a scalar, it is replaced by another one with the colours swapped.
 TextureIndex Reader::old_number(const Element& e, TextureIndex t) {
   if (!e.old || t.value >= scene_.textures.size()) return t;
   const auto* given = std::get_if<CheckerboardTexture>(&scene_.textures[t.value]);
   if (!given) return t;
   if (const auto it = old_numbers_.find(t); it != old_numbers_.end()) return it->second;
   const CheckerboardTexture as_colour = *given;  // a copy, because the list grows
-  // Recursion is bounded, as nested textures were read within kMaxReferenceDepth.
+  // The depth of recursion is bounded, since nested textures were read within kMaxReferenceDepth.
   const CheckerboardTexture swapped{old_number(e, as_colour.color1), old_number(e, as_colour.color0),
                                     as_colour.to_uv};
   scene_.textures.emplace_back(swapped);
@@ -255,7 +277,8 @@ std::optional<BsdfIndex> Reader::read_mask(const Element& e) {
   b.opacity = old_number(e, b.opacity);
   // After an error a mask may have no texture.
   const bool known = b.opacity.value < scene_.textures.size();
-  if (const auto* image = known ? std::get_if<BitmapTexture>(&scene_.textures[b.opacity.value]) : nullptr) {
+  const auto* image = known ? std::get_if<BitmapTexture>(&scene_.textures[b.opacity.value]) : nullptr;
+  if (image && image->channel == Channel::all) {
     BitmapTexture opacity = *image;  // a copy, because others may use its colour
     opacity.alpha = true;
     scene_.textures.emplace_back(opacity);
@@ -299,7 +322,7 @@ std::optional<BsdfIndex> Reader::read_bump_map(const Element& e) {
   return add_bsdf(e, b);
 }
 
-// The nested texture may have any name, or none.
+// Reads the texture of a bump map, which may have any name, or none.
 bool Reader::read_heights(Params& p, BumpMapBsdf& b) {
   const bool named = p.has("texture");
   bind(p, b);

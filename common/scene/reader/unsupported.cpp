@@ -1,81 +1,8 @@
 #include "common/scene/reader/unsupported.h"
 
 #include <algorithm>
-#include <map>
-
-#include "common/scene/schema/describe.h"
-#include "common/scene/schema/integrators.h"
 
 namespace ls::scene {
-namespace {
-
-using Names = std::vector<std::string>;
-
-struct PluginRow {
-  Names supported, unsupported;
-};
-
-Names integrator_names() {
-  Names names;
-  for (const IntegratorRow& row : integrators()) names.emplace_back(row.name);
-  for (const WrapperRow& row : integrator_wrappers()) names.emplace_back(row.name);
-  return names;
-}
-
-// The names of a variant's kinds, and `others`.
-template <class Variant>
-Names kinds_of(Names others = {}) {
-  others.insert(others.end(), kKindsOf<Variant>.begin(), kKindsOf<Variant>.end());
-  std::sort(others.begin(), others.end());
-  return others;
-}
-
-const std::map<std::string_view, PluginRow>& plugins() {
-  static const std::map<std::string_view, PluginRow> table = {
-      {"integrator",
-       {integrator_names(),
-        {"ao", "depth", "direct_projective", "field", "multichannel", "prb_projective", "prb_reparam",
-         "stokes"}}},
-      {"sensor",
-       {{"orthographic", "perspective", "spherical", "thinlens"},
-        {"batch", "distant", "irradiancemeter", "perspective_rdist", "radiancemeter", "fluencemeter",
-         "telecentric"}}},
-      {"film", {{"hdrfilm", "ldrfilm", "mfilm", "tiledhdrfilm"}, {"specfilm"}}},
-      {"sampler",
-       {{"independent", "stratified", "multijitter", "orthogonal", "ldsampler", "halton", "hammersley",
-         "sobol"},
-        {}}},
-      {"rfilter", {{"box", "gaussian", "tent"}, {"catmullrom", "lanczos", "mitchell"}}},
-      {"shape",
-       {{"cube", "cylinder", "disk", "instance", "obj", "ply", "rectangle", "serialized", "shapegroup",
-         "sphere"},
-        {"bsplinecurve", "deformable", "ellipsoids", "ellipsoidsmesh", "hair", "heightfield", "linearcurve",
-         "merge", "sdfgrid"}}},
-      {"bsdf",
-       {kinds_of<Bsdf>(),
-        {"circular", "coating", "difftrans", "hair", "hk", "irawan", "measured", "measured_polarized",
-         "mixturebsdf", "phong", "pplastic", "polarizer", "principledthin", "retarder", "roughcoating",
-         "roughdiffuse", "ward"}}},
-      {"emitter",
-       {kinds_of<Emitter>({"area"}),
-        {"collimated", "directionalarea", "sky", "sun", "sunsky", "timed_sunsky", "avg_sunsky"}}},
-      {"texture",
-       {{"bitmap", "checkerboard", "mesh_attribute", "peak", "srgb", "uniform"},
-        {"scale", "sampledspectrum", "volume", "vertexcolors", "wireframe", "curvature", "gridtexture"}}},
-      {"spectrum", {{"srgb", "uniform"}, {"blackbody", "d65", "irregular", "rawconstant", "regular"}}},
-      {"volume", {kinds_of<Volume>(), {"hgridvolume", "volcache"}}},
-      {"medium", {kinds_of<Medium>(), {}}},
-      {"phase",
-       {kinds_of<Phase>(),
-        {"blendphase", "kkay", "microflake", "mixturephase", "rayleigh", "sggx", "tabphase"}}},
-  };
-  return table;
-}
-
-const Names kNone;
-
-}  // namespace
-
 const std::vector<MeaninglessRow>& meaningless_table() {
   static const std::string_view output = "the output format is chosen by the command line or the job";
   static const std::string_view sampling = "it only steers sampling, which is chosen here";
@@ -102,6 +29,15 @@ const std::vector<MeaninglessRow>& meaningless_table() {
        {"shading_samples", "emitter_samples", "bsdf_samples", "luminaire_samples"},
        sampling},
       {"integrator", "volpath", {"version", "max_null_collisions"}, "all light is followed"},
+      {"integrator", "volpathmis", {"use_spectral_mis"}, sampling},
+      {"integrator",
+       "prb_projective",
+       {"sppc", "sppp", "sppi", "guiding", "guiding_proj", "guiding_rounds", "project_seed"},
+       sampling},
+      {"integrator",
+       "direct_projective",
+       {"sppc", "sppp", "sppi", "guiding", "guiding_proj", "guiding_rounds", "project_seed"},
+       sampling},
       {"integrator", "bdpt", {"light_image", "sample_direct"}, sampling},
       {"integrator",
        "erpt",
@@ -156,6 +92,11 @@ const std::vector<MeaninglessRow>& meaningless_table() {
       {"emitter", "constant", {"to_world"}, "it is the same from everywhere"},
       {"emitter", "envmap", {"mis_compensation"}, sampling},
       {"emitter", "envmap", {"cache"}, "it does not change the values"},
+      {"texture", "srgb", {"unbounded"}, "colours are linear RGB"},
+      {"spectrum", "srgb", {"unbounded"}, "colours are linear RGB"},
+      {"texture", "uniform", {"wavelength_min", "wavelength_max"}, "colours are linear RGB"},
+      {"spectrum", "uniform", {"wavelength_min", "wavelength_max"}, "colours are linear RGB"},
+      {"spectrum", "blackbody", {"wavelength_min", "wavelength_max"}, "colours are linear RGB"},
       {"texture", "bitmap", {"format", "accel", "cache", "max_anisotropy"}, "it does not change the values"},
       {"volume", "gridvolume", {"accel", "max_value", "send_data"}, "it does not change the values"},
       {"medium",
@@ -203,26 +144,6 @@ std::string_view replacement(std::string_view tag, std::string_view parameter) {
   for (const auto& row : rows)
     if (row.tag == tag && row.parameter == parameter) return row.instead;
   return {};
-}
-
-const std::vector<std::string>& supported_plugins(std::string_view tag) {
-  const auto it = plugins().find(tag);
-  return it == plugins().end() ? kNone : it->second.supported;
-}
-
-const std::vector<std::string>& unsupported_plugins(std::string_view tag) {
-  const auto it = plugins().find(tag);
-  return it == plugins().end() ? kNone : it->second.unsupported;
-}
-
-bool is_supported_plugin(std::string_view tag, std::string_view plugin) {
-  const Names& names = supported_plugins(tag);
-  return std::find(names.begin(), names.end(), plugin) != names.end();
-}
-
-bool is_unsupported_plugin(std::string_view tag, std::string_view plugin) {
-  const Names& names = unsupported_plugins(tag);
-  return std::find(names.begin(), names.end(), plugin) != names.end();
 }
 
 }  // namespace ls::scene

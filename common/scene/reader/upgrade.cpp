@@ -17,7 +17,8 @@ constexpr Renamed kRenamed[] = {
     {"medium", "heterogeneous", "density", "sigma_t"},
 };
 
-// Renamed values. The old filters differ in minification, which more samples compensate.
+// Values that have new names. The old filters differ from the new ones in minification, which more samples
+// compensate.
 constexpr struct {
   std::string_view tag, plugin, parameter, before, now;
 } kValues[] = {
@@ -41,8 +42,8 @@ void erase_child(Element& e, std::string_view name) {
   std::erase_if(e.children, [&](const Element& c) { return c.get("name") == name; });
 }
 
-// Makes an element for a default that an old file leaves out. Its place in the text, for messages, is that of
-// the object it belongs to.
+// Makes an element for a default that old files leave out. Messages about it refer to the place of the object
+// that it belongs to.
 Element made(std::string tag, const Span& at) {
   Element e;
   e.tag = std::move(tag);
@@ -74,7 +75,7 @@ void rename_parameters(Element& e) {
         if (Attribute* value = find(*c, "value"); value && value->value == row.before) value->value = row.now;
 }
 
-// Moves a parameter's value to one component of a transform step.
+// Moves the value of a parameter to one component of a transform step.
 void move_part(Element& texture, std::string_view parameter, Element& step, std::string_view axis) {
   Element* c = child(texture, parameter);
   if (!c) return;
@@ -85,7 +86,7 @@ void move_part(Element& texture, std::string_view parameter, Element& step, std:
   erase_child(texture, parameter);
 }
 
-// uscale, vscale, uoffset, voffset: (u, v) * scale + offset.
+// Converts uscale, vscale, uoffset and voffset, which mean (u, v) * scale + offset, to a transform.
 void place_texture(Element& e) {
   Element scale = made("scale", e.at), translate = made("translate", e.at);
   move_part(e, "uscale", scale, "x");
@@ -100,8 +101,8 @@ void place_texture(Element& e) {
   e.children.push_back(std::move(transform));
 }
 
-// Upgrades a bitmap texture. gamma: -1 means as the file says; 1 means linear, which is `raw`. The texture
-// gets one wrap mode for both directions.
+// Upgrades a bitmap texture. A gamma of -1 means the file's own; 1 means linear, which is now `raw`. The
+// texture gets one wrap mode for both directions.
 void upgrade_bitmap(Element& e) {
   if (const Element* gamma = child(e, "gamma")) {
     const auto value = parse_number(gamma->get("value"));
@@ -135,7 +136,7 @@ void upgrade_colour(Element& e) {
   value->value = fmt::format("{} {} {}", (*c)[0], (*c)[1], (*c)[2]);
 }
 
-// In old files the axes are directions.
+// Normalises the axis of a rotation: in old files it may have any length.
 void upgrade_rotation(Element& e) {
   Vec3 axis{0, 0, 0};
   static constexpr std::string_view kAxes[] = {"x", "y", "z"};
@@ -176,12 +177,12 @@ bool is_old_version(std::string_view version) {
 }
 
 void upgrade(Element& e) {
-  if (e.tag == "default") return;  // its name is chosen by the scene
+  if (e.tag == "default") return;  // the name in a <default> is the scene's own and stays unchanged
   e.old = true;
   if (Attribute* name = find(e, "name")) name->value = snake_case(name->value);
   if (e.tag == "lookAt") e.tag = "lookat";
   if (e.tag == "rotate") upgrade_rotation(e);
-  // The intent of a colour matters to spectral renderers only.
+  // `intent` only matters to spectral renderers.
   if (e.tag == "rgb" || e.tag == "spectrum")
     std::erase_if(e.attributes, [](const Attribute& a) { return a.name == "intent"; });
   if (e.tag == "rgb" || e.tag == "srgb") return upgrade_colour(e);

@@ -1,6 +1,6 @@
 // Upgrades files of Mitsuba 0.5 and 0.6, and of other programs with the same format, to Mitsuba 3: camelCase
-// names, renamed parameters, values with other meanings, other defaults. Later stages know one dialect; where
-// that is not enough, they check Element::old.
+// names, renamed parameters, values with other meanings, other defaults. Later stages have to handle only the
+// format of Mitsuba 3; where that is not enough, they check Element::old.
 #pragma once
 
 #include <span>
@@ -11,17 +11,17 @@
 
 namespace ls::scene {
 
-// True if `version` is one of such a file ("0.5.0", but not "3.0.0").
+// True if `version` is that of such a file ("0.5.0", but not "3.0.0").
 bool is_old_version(std::string_view version);
 
-// Rewrites an element, whose children have been rewritten already, and marks it as old. It leaves what it
-// does not understand as it is; the reader of the element reports that.
+// Upgrades an element, whose children have been upgraded already, and marks it as old. Leaves everything
+// unknown unchanged; the reader of the element reports it.
 void upgrade(Element& e);
 
-// Converts names: maxDepth -> max_depth, intIOR -> int_ior.
+// Converts names from camelCase: maxDepth to max_depth, intIOR to int_ior.
 std::string snake_case(std::string_view name);
 
-// Parameters whose new name is not just the old one in snake_case; also used for the documentation.
+// A parameter whose new name is not just the old one in snake_case; also used for the documentation.
 struct Renamed {
   std::string_view tag, plugin, before, now;
 };

@@ -55,7 +55,7 @@ class Uses {
   std::map<VolumeIndex, int> volumes_;
 };
 
-// The shortest text that reads back to the same bits; -0 is 0, as in the digest.
+// Returns the shortest text that reads back to the same bits. -0 is written as 0, as in the digest.
 std::string number(double x) {
   CHECK(std::isfinite(x), "a scene with the number {} can't be written", x);
   char text[32];
@@ -69,7 +69,7 @@ std::string numbers(const List& list) {
   return out;
 }
 
-// Escapes an attribute value; "$" would begin a parameter.
+// Escapes an attribute value. "$" is escaped too, since it would begin a parameter.
 std::string escaped(std::string_view text) {
   std::string out;
   for (const char c : text) {
@@ -89,7 +89,7 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
-// A flag that Mitsuba 3 does not know: written only if set.
+// A flag that Mitsuba 3 does not have: written only if it is set.
 constexpr std::string_view kOurOwn = "node_centred";
 
 // Returns the name of the plugin for a value of this type.
@@ -139,7 +139,7 @@ class Writer {
 
   template <class T>
   void field(const Field& f, const T& value) {
-    if (f.derived && f.given_as.empty()) return;  // derived from something else
+    if (f.derived && f.given_as.empty()) return;  // the field is derived from others
     if constexpr (std::equality_comparable<T>)
       if (f.elided && value == T{}) return;
     const std::string_view name = f.given_as.starts_with('<') ? "" : f.name;
@@ -172,7 +172,7 @@ class Writer {
   }
   void close(std::string_view tag) {
     --depth_;
-    if (out_.size() == opened_) {  // it is empty
+    if (out_.size() == opened_) {  // the object has no members
       out_.replace(out_.size() - 2, 1, "/>");
       return;
     }
@@ -220,7 +220,7 @@ class Writer {
   static std::string id_of(MediumIndex i) { return fmt::format("medium{}", i.value); }
   static std::string id_of(GroupIndex i) { return fmt::format("group{}", i.value); }
 
-  // For a mesh, only fields that its plugin has.
+  // Selects the fields that the plugin of a mesh has.
   struct GeometryFields {
     Writer& writer;
     const Geometry& geometry;
@@ -257,14 +257,15 @@ class Writer {
     close("shape");
   }
 
-  // Omits the parameters of other integrators.
+  // Leaves out the parameters of other integrators.
   struct OwnParameters {
     Writer& writer;
     std::string_view integrator;
     template <class T>
     void field(const Field& f, const T& x) {
       const bool distances = f.name == "distance" || f.name == "heuristic";
-      const bool aims = f.name == "camera_points" || f.name == "phase_only";
+      const bool aims = f.name == "camera_points" || f.name == "phase_only" || f.name == "light_vertices" ||
+                        f.name == "equiangular" || f.name == "lamp_flights";
       if (distances ? integrator == kDistantMis : !aims || integrator == "volpath") writer.field(f, x);
     }
   };
@@ -281,7 +282,7 @@ class Writer {
     if (!scene_.aovs.empty()) close("integrator");
   }
 
-  // For a camera, only fields that its plugin has.
+  // Selects the fields that the plugin of a camera has.
   struct SensorFields {
     Writer& writer;
     const Sensor& sensor;
@@ -307,7 +308,7 @@ class Writer {
     close("sensor");
   }
 
-  // Members of an object, by type.
+  // Writes the members of an object, by type.
   template <class Tag>
   requires(!std::is_same_v<Tag, AssetTag>) void nested(std::string_view name, const Index<Tag>& i) {
     reference(name, id_of(i));
@@ -329,7 +330,7 @@ class Writer {
     if (x != f.unwritten) value("float", f.name, number(x));
   }
   void property(const Field& f, int x) {
-    // Omitted if there is no crop, or for the only mesh of a file.
+    // Left out if there is no crop, or if the mesh is the only one in its file.
     if (x == 0 && (f.name.starts_with("crop_") || f.name == "shape_index")) return;
     if (x == f.unwritten) return;
     value("integer", f.name, std::to_string(x));
@@ -344,7 +345,7 @@ class Writer {
   template <class E>
   requires std::is_enum_v<E>
   void property(const Field& f, E e) { value("string", f.name, name_of(e)); }
-  void property(const Field& f, GridOrder o) {  // not in Mitsuba 3
+  void property(const Field& f, GridOrder o) {  // Mitsuba 3 has no such parameter
     if (o != GridOrder{}) value("string", f.name, name_of(o));
   }
   void property(const Field& f, const Vec3& x) {
@@ -386,10 +387,10 @@ class Writer {
 
   const Scene& scene_;
   Uses uses_;
-  std::vector<std::string> asset_names_;  // as written
+  std::vector<std::string> asset_names_;  // names of assets as written to the file
   std::string out_;
   int depth_ = 1;
-  std::size_t opened_ = 0;  // where the text of the last opened object begins
+  std::size_t opened_ = 0;  // offset at which the text of the last opened object begins
 };
 
 }  // namespace

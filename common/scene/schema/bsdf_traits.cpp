@@ -49,8 +49,8 @@ BsdfTraits traits_of(const Bsdf& bsdf, const std::vector<BsdfTraits>& known) {
   return t;
 }
 
-// Computes the traits by relaxation, so that the list may be in any order: a chain of n nested bsdfs is known
-// after n passes over the list, a cycle never.
+// Computes the traits by repeated passes over the list, which may be in any order. A chain of n nested bsdfs
+// is known after n passes; a cycle would never be.
 std::optional<std::vector<BsdfTraits>> bsdf_traits(const Scene& scene) {
   for (const Bsdf& b : scene.bsdfs)
     for (const auto& inner : nested_bsdfs(b))

@@ -10,19 +10,21 @@
 namespace ls::scene {
 
 struct BsdfTraits {
-  int depth = 1;             // nesting depth: 1 contains none
-  bool transmits = false;    // some light crosses the surface
-  bool passes = false;       // part of the light passes straight through: shadow rays must handle it
-  bool two_sided = false;    // is a `twosided`
-  bool black_behind = true;  // light that reaches its back is absorbed: neither reflected nor transmitted
+  int depth = 1;           // nesting depth: 1 for a bsdf that contains no other
+  bool transmits = false;  // true if some light crosses the surface
+  // True if part of the light passes straight through, so that shadow rays must handle it
+  bool passes = false;
+  bool two_sided = false;  // true for `twosided`
+  // True if light that reaches its back is absorbed: neither reflected nor transmitted
+  bool black_behind = true;
   bool operator==(const BsdfTraits&) const = default;
 };
 
 // Returns the bsdfs that `bsdf` contains directly.
 std::array<std::optional<BsdfIndex>, 2> nested_bsdfs(const Bsdf& bsdf);
 
-// Returns the traits of `bsdf`. `known` has the traits of the scene's bsdfs, at least of those that `bsdf`
-// contains.
+// Returns the traits of `bsdf`. `known` contains the traits of other bsdfs of the scene, at least of those
+// that `bsdf` contains.
 BsdfTraits traits_of(const Bsdf& bsdf, const std::vector<BsdfTraits>& known);
 
 // Returns the traits of every bsdf. nullopt: a bsdf refers to one that does not exist, or bsdfs contain each

@@ -1,11 +1,11 @@
-// The table of the scene language: for every type of scene.h its name, and for every field its name, unit,
-// range, default (the value in a default-constructed struct, or Field::fallback for textures) and meaning.
-// Parameter reading, canonical JSON, hashing, docs/reference/scene-format.md and the random tests all visit
-// it:
+// The table of the scene language. For every type of scene.h it has the name, and for every field the name,
+// unit, range, default (the value in a default-constructed struct, or Field::fallback for textures) and
+// meaning. Parameter reading, canonical JSON, hashing, docs/reference/scene-format.md and the random tests
+// all visit it:
 //
 //   describe(visitor, value)  calls  visitor.field(Field{...}, value.member)  for each member.
 //
-// CONTRIBUTING.md says what else a new type needs.
+// CONTRIBUTING.md lists the further steps for a new type.
 #pragma once
 
 #include <array>
@@ -35,35 +35,34 @@ struct Field {
   std::string_view name;
   std::string_view doc;
   std::string_view unit = "";
-  Range range = kAny;        // of a number, or of each component of a colour
-  Rgb fallback{1, 1, 1};     // colour of a texture or volume that is not given
-  bool derived = false;      // derived from something else in the file; not a parameter of its own
-  bool named_ior = false;    // names of materials ("water") are accepted too
-  bool constvolume = false;  // a colour that may be given as a <volume type="constvolume">
+  Range range = kAny;        // range of a number, or of each component of a colour
+  Rgb fallback{1, 1, 1};     // colour that replaces a missing texture or volume
+  bool derived = false;      // true: derived from other parts of the file; not a parameter
+  bool named_ior = false;    // true: names of materials ("water") are accepted too
+  bool constvolume = false;  // true: a colour that may be given as a <volume type="constvolume">
   bool required = false;
-  // The type as the documentation names it, if the C++ type is not enough: "point", "medium" (a nested one
+  // The type's name in the documentation, if the C++ type does not suffice: "point", "medium" (a nested one
   // with the field's name), "<phase>" (a nested one without a name). Derived fields without such a name are
   // not written in files.
   std::string_view given_as = "";
-  // For a number or colour that the dialect does not have: the value for which the field is not written in
-  // files.
+  // For a number or colour that Mitsuba does not have: the value for which the field is not written in files.
   double unwritten = std::numeric_limits<double>::quiet_NaN();
-  bool number = false;  // a texture that is read as a scalar, not as a colour
-  // True for fields that were added after scenes had digests, or that the dialect does not have. If such a
-  // field has its type's initial value (false, 0, empty), it is written neither in files nor in JSON, where
-  // it may be missing.
+  bool number = false;  // true: a texture that is read as a scalar, not as a colour
+  // True for fields that were added when scenes already had digests, or that Mitsuba does not have. If such a
+  // field has its type's initial value (false, 0, empty), it is written neither in files nor in JSON, so it
+  // may be missing there.
   bool elided = false;
 };
 
 struct TypeInfo {
-  std::string_view kind;     // the element: bsdf, shape, ...
-  std::string_view name;     // the plugin, and "type" in JSON
-  std::string_view plugins;  // the dialect's plugins that become this type, if their names differ
+  std::string_view kind;     // the element's tag: bsdf, shape, ...
+  std::string_view name;     // name of the plugin, and "type" in JSON
+  std::string_view plugins;  // Mitsuba's plugins that are read as this type, if their names differ
   std::string_view doc;
 };
 
 template <class T>
-struct InfoOf;  // no definition: a type without a row in the table does not compile
+struct InfoOf;  // without a definition, so that a type without a row in the table does not compile
 template <class T>
 inline constexpr TypeInfo kInfo = InfoOf<std::remove_const_t<T>>::value;
 
@@ -81,6 +80,9 @@ LS_TYPE(CheckerboardTexture, "texture", "checkerboard", "", "two colours in alte
 LS_TYPE(PeakTexture, "texture", "peak", "",
         "the largest channel of another texture, or its colour divided by that; not in Mitsuba: Nori's "
         "`microfacet_tex` is made of it")
+LS_TYPE(ProductTexture, "texture", "product", "",
+        "the product of two textures, or where that is large enough; not in Mitsuba: factors and cut-outs of "
+        "glTF are made of it")
 LS_TYPE(
     MeshAttributeTexture, "texture", "mesh_attribute", "",
     "what a `ply` mesh carries at its vertices, interpolated over each triangle, or at its faces: one "
@@ -175,8 +177,11 @@ LS_TYPE(Sensor, "sensor", "perspective", "perspective, thinlens, orthographic, s
         "of 2 by 2 height / width, which `to_world` may scale. `spherical`: all directions by latitude and "
         "longitude, +y in the top row; of the horizon the left edge is -z, a quarter of the width further +x")
 LS_TYPE(FilmSettings, "film", "hdrfilm", "", "size of the frame and its reconstruction filter")
-LS_TYPE(IntegratorSettings, "integrator", "volpath", "volpath, volpath_distant_mis, path",
-        "how light is followed")
+LS_TYPE(IntegratorSettings, "integrator", "volpath", "volpath, volpath_distant_mis, path, whitted",
+        "how light is followed. `path` and `whitted` leave media out. `whitted` is Nori's: what mirrors and "
+        "clear glass show, however many, and where they lead to on any other surface the light that comes "
+        "straight from lamps; light that such surfaces send each other, and what mirrors throw on them, is "
+        "left out")
 #undef LS_TYPE
 
 template <class Variant>
@@ -185,14 +190,14 @@ template <class... Kinds>
 struct KindsOf<std::variant<Kinds...>> {
   static constexpr std::array<std::string_view, sizeof...(Kinds)> names{kInfo<Kinds>.name...};
 };
-// Names of the kinds of a variant, such as Medium, in its order.
+// Returns the names of the kinds of a variant, such as Medium, in its order.
 template <class Variant>
 inline constexpr auto& kKindsOf = KindsOf<Variant>::names;
 
 template <class T, class U>
 concept Of = std::same_as<std::remove_const_t<T>, U>;
 
-// The enumerators of an enumeration with their names.
+// Returns the enumerators of an enumeration with their names.
 template <class E>
 struct Named {
   std::string_view name;
@@ -209,6 +214,14 @@ template <>
 struct NamesOf<Wrap> {
   static constexpr Named<Wrap> all[] = {
       {"repeat", Wrap::repeat}, {"mirror", Wrap::mirror}, {"clamp", Wrap::clamp}};
+};
+template <>
+struct NamesOf<Channel> {
+  static constexpr Named<Channel> all[] = {{"all", Channel::all},
+                                           {"red", Channel::red},
+                                           {"green", Channel::green},
+                                           {"blue", Channel::blue},
+                                           {"alpha", Channel::alpha}};
 };
 template <>
 struct NamesOf<Microfacet> {

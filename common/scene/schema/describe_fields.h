@@ -22,6 +22,11 @@ void describe(V& v, T& t) {
            .doc = "moves (u, v) before the look-up: of a 4 x 4 matrix its x and y rows and its translation"},
           t.to_uv);
   v.field({.name = "alpha", .doc = "it is an opacity", .derived = true}, t.alpha);
+  v.field(
+      {.name = "channel",
+       .doc = "one channel as a number, without sRGB decoding; 1 where the image lacks it. Not in Mitsuba",
+       .elided = true},
+      t.channel);
 }
 template <class V, Of<CheckerboardTexture> T>
 void describe(V& v, T& t) {
@@ -39,6 +44,18 @@ void describe(V& v, T& t) {
   v.field({.name = "texture", .doc = "the texture", .range = kNonNegative}, t.texture);
   v.field({.name = "hue", .doc = "the colour divided by its largest channel, white where it is black"},
           t.hue);
+}
+
+template <class V, Of<ProductTexture> T>
+void describe(V& v, T& t) {
+  v.field({.name = "first", .doc = "a colour or texture", .range = kNonNegative}, t.first);
+  v.field({.name = "second", .doc = "a colour or texture", .range = kNonNegative}, t.second);
+  v.field({.name = "threshold",
+           .doc = "above 0: the value is 1 where the product's luminance is at least this, else 0",
+           .range = kNonNegative,
+           .unwritten = 0,
+           .elided = true},
+          t.threshold);
 }
 
 template <class V, Of<MeshAttributeTexture> T>
@@ -270,7 +287,7 @@ void describe(V& v, T& e) {
 template <class V, Of<IntegratorSettings> T>
 void describe(V& v, T& i) {
   v.field({.name = "name",
-           .doc = "\"volpath\", \"volpath_distant_mis\" or \"path\" (leaves media out)",
+           .doc = "\"volpath\", \"volpath_distant_mis\", or \"path\" and \"whitted\", which leave media out",
            .derived = true},
           i.name);
   v.field({.name = "max_depth",
@@ -302,6 +319,34 @@ void describe(V& v, T& i) {
               "the phase function and the material, none is aimed at such a light",
        .elided = true},
       i.phase_only);
+  v.field(
+      {.name = "light_vertices",
+       .doc =
+           "`volpath` alone: whether paths are connected to points that a directional emitter lights; 0: if "
+           "that pays for the scene; -1: never; 1: always, as far as it is possible",
+       .range = {-1, 1},
+       .elided = true},
+      i.light_vertices);
+  v.field(
+      {.name = "equiangular",
+       .doc = "`volpath` alone: whether light near lamps is looked for along whole ways through a medium; 0: "
+              "if that pays for the scene; -1: only where a ray is scattered, and nothing is aimed at lamps",
+       .range = {-1, 0},
+       .elided = true},
+      i.equiangular);
+  v.field({.name = "lamp_flights",
+           .doc = "`volpath` alone: whether a tenth of all flights through homogeneous media end near point, "
+                  "spot and projector lights; 0: if directions are aimed at these; -1: never",
+           .range = {-1, 0},
+           .elided = true},
+          i.lamp_flights);
+  v.field(
+      {.name = "light_tree",
+       .doc = "how one of 32 lights and more is chosen; 0: by distance, direction and power; -1: by power "
+              "alone",
+       .range = {-1, 0},
+       .elided = true},
+      i.light_tree);
 }
 
 template <class V, Of<Asset> T>

@@ -25,6 +25,11 @@ void describe(V& v, T& s) {
   v.field({.name = "format", .doc = "of the file: the plugin's name", .derived = true}, s.format);
   v.field({.name = "face_normals", .doc = "flat shading: the file's vertex normals are left out"},
           s.face_normals);
+  v.field(
+      {.name = "flat_without_normals",
+       .doc = "flat shading if the file has no vertex normals, as in Nori and pbrt; else it is smooth then",
+       .elided = true},
+      s.flat_without_normals);
   v.field({.name = "flip_tex_coords", .doc = "v becomes 1 - v; true unless said otherwise for `obj`"},
           s.flip_tex_coords);
   v.field({.name = "shape_index", .doc = "which mesh of a `serialized` file", .range = {0, 1e6}},
@@ -43,7 +48,7 @@ void describe(V& v, T& s) {
   v.field({.name = "group", .doc = "the group", .derived = true, .given_as = "<shapegroup>"}, s.group);
   v.field({.name = "to_world", .doc = "places the group in the world"}, s.to_world);
 }
-// Common to all shapes; their geometry, emitter, bsdf and media are nested objects.
+// The fields of all shapes. Geometry, emitter, bsdf and media are nested objects.
 template <class V, Of<Shape> T>
 void describe(V& v, T& s) {
   v.field({.name = "geometry", .doc = "the plugin", .derived = true}, s.geometry);

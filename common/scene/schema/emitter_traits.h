@@ -8,9 +8,9 @@
 namespace ls::scene {
 
 struct EmitterTraits {
-  bool dark = false;             // it gives off no light
-  bool delta = false;            // it has no extent: no ray can hit it
-  std::optional<Vec3> position;  // where it stands, in the world; nullopt: infinitely far
+  bool dark = false;             // true if it emits no light
+  bool delta = false;            // true if it has no extent, so that no ray can hit it
+  std::optional<Vec3> position;  // its position in the world; nullopt: infinitely far
 };
 
 EmitterTraits traits_of(const Emitter& emitter, const std::vector<Texture>& textures);

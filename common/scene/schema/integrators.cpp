@@ -9,6 +9,9 @@
 namespace ls::scene {
 namespace {
 
+// The default max_depth of Mitsuba 3's differentiable integrators; that of all others is -1.
+constexpr int kDifferentiated = 6;
+
 constexpr IntegratorRow kIntegrators[] = {
     {"volpath", "volpath", {}},
     {"volpathmis", "volpath", {}},
@@ -16,10 +19,13 @@ constexpr IntegratorRow kIntegrators[] = {
     {"volpath_simple", "volpath", {}},
     {"path", "path", {}},
     {"direct", "path", 2},
+    {kWhitted, kWhitted, {}},
     {"ptracer", "path", {}},
-    {"prb", "path", {}, true},
-    {"prb_basic", "path", {}, true},
-    {"prbvolpath", "volpath", {}, true},
+    {"prb", "path", {}, true, kDifferentiated},
+    {"prb_basic", "path", {}, true, kDifferentiated},
+    {"prb_projective", "path", {}, true, kDifferentiated},
+    {"prbvolpath", "volpath", {}, true, kDifferentiated},
+    {"direct_projective", "path", 2, true},
     {"bdpt", "volpath", {}, true},
     {"erpt", "volpath", {}, true},
     {"mlt", "volpath", {}, true},
@@ -50,9 +56,10 @@ std::span<const IntegratorRow> integrators() { return kIntegrators; }
 const IntegratorRow* integrator_row(std::string_view name) { return row_of(kIntegrators, name); }
 
 bool sees_media(std::string_view name) {
-  if (const IntegratorRow* row = integrator_row(name)) return row->ours != "path";
+  const auto sees = [](std::string_view ours) { return ours != "path" && ours != kWhitted; };
+  if (const IntegratorRow* row = integrator_row(name)) return sees(row->ours);
   const nori::IntegratorRow* row = nori::integrator_row(name);
-  return !row || row->ours != "path";
+  return !row || sees(row->ours);
 }
 
 std::span<const WrapperRow> integrator_wrappers() { return kWrappers; }

@@ -1,5 +1,4 @@
-// The integrators by their names in all versions of the dialect (Mitsuba's scene format), for scenes and for
-// --integrator.
+// The integrators by their names in all versions of Mitsuba's format, for scenes and for --integrator.
 #pragma once
 
 #include <optional>
@@ -8,29 +7,32 @@
 
 namespace ls::scene {
 
-// The only integrator with settings other than depths.
+// The only integrator that has settings other than depths.
 inline constexpr std::string_view kDistantMis = "volpath_distant_mis";
+// Nori's: direct light where mirrors and clear glass lead to, without media.
+inline constexpr std::string_view kWhitted = "whitted";
 
 struct IntegratorRow {
-  std::string_view name;         // the dialect's, or ours
+  std::string_view name;         // Mitsuba's name, or ours
   std::string_view ours;         // IntegratorSettings::name
-  std::optional<int> max_depth;  // implied by the name
-  // True if the name stands for another method with the same result that is not implemented here: scenes that
-  // request it get a warning.
+  std::optional<int> max_depth;  // maximum depth implied by the name
+  // True if the name belongs to another method with the same expected result that is not implemented here:
+  // scenes that request it get a warning.
   bool other_method = false;
+  int default_depth = -1;  // max_depth if the scene gives none
 };
 
 std::span<const IntegratorRow> integrators();
-const IntegratorRow* integrator_row(std::string_view name);  // nullptr: unknown name
+const IntegratorRow* integrator_row(std::string_view name);  // returns nullptr for an unknown name
 
-// True if the integrator renders media, or is unknown; false for `path` and those that are read as `path`.
-// `name` is the dialect's, ours or Nori's.
+// True if the integrator renders media, or is unknown; false for `path`, `whitted` and those that are read as
+// one of them. `name` is the dialect's, ours or Nori's.
 bool sees_media(std::string_view name);
 
 // Integrators that contain another one and add something to its result; here the inner one is used alone.
 struct WrapperRow {
   std::string_view name;
-  std::string_view lost;  // the function that is lost
+  std::string_view lost;  // the function of the wrapper, which is not available here
 };
 std::span<const WrapperRow> integrator_wrappers();
 const WrapperRow* wrapper_row(std::string_view name);

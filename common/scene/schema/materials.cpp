@@ -11,7 +11,7 @@ struct Ior {
   double value;
 };
 
-// Handbook values at 589 nm and 20 C (CRC Handbook of Chemistry and Physics), by the dialect's names.
+// Handbook values at 589 nm and 20 C (CRC Handbook of Chemistry and Physics), by Mitsuba's names.
 constexpr Ior kIors[] = {
     {"vacuum", 1.0},
     {"helium", 1.000036},

@@ -1,4 +1,4 @@
-// Named indices of refraction and metals, as the dialect calls them.
+// Named indices of refraction and metals, by Mitsuba's names.
 #pragma once
 
 #include <optional>

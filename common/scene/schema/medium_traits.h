@@ -5,14 +5,15 @@
 
 namespace ls::scene {
 
-// False is certain; true may turn out to be false, since a grid file may hold nothing but zeros.
+// Properties of a medium. False is certain; true may turn out to be false, since a grid file may contain only
+// zeros.
 struct MediumTraits {
-  bool extinguishes = false;  // extinction is above 0 somewhere
+  bool extinguishes = false;  // the extinction is above 0 somewhere
   bool scatters = false;
   bool emits = false;
-  bool chromatic = false;     // extinction differs between colour channels; false for grid files
-  bool grids = false;         // coefficients are volumes
-  bool density_file = false;  // extinction comes from a grid file
+  bool chromatic = false;     // the extinction differs between colour channels; false for grid files
+  bool grids = false;         // some coefficients are volumes
+  bool density_file = false;  // the extinction comes from a grid file
 };
 
 MediumTraits traits_of(const Medium& medium, const std::vector<Volume>& volumes);

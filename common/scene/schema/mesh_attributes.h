@@ -9,11 +9,11 @@
 namespace ls::scene {
 
 struct AttributeUse {
-  // How many numbers the attribute must have. number: one. colour: three (a normal map). any: either; a
+  // How many numbers the attribute must have. number: one. colour: three (a normal map). any: one or three; a
   // single number is grey.
   enum class As { any, number, colour } as = As::any;
-  TextureIndex texture;  // a MeshAttributeTexture
-  // True if the shape's emitter reads it, so that numbers above 1 make sense.
+  TextureIndex texture;  // index of a MeshAttributeTexture
+  // True if the shape's emitter reads it, so that numbers above 1 are allowed.
   bool in_light = false;
   auto operator<=>(const AttributeUse&) const = default;
 };
@@ -21,7 +21,7 @@ struct AttributeUse {
 // True if any texture of the scene reads an attribute; if not, the shapes need not be examined.
 bool any_attribute(const Scene& scene);
 // Return the attributes that a shape or a texture reads, sorted, without duplicates. They terminate for any
-// scene, including circular ones, and ignore indices out of range.
+// scene, including one with cycles, and ignore indices out of range.
 std::vector<AttributeUse> attribute_uses(const Scene& scene, const Shape& shape);
 std::vector<AttributeUse> attribute_uses(const Scene& scene, TextureIndex texture);
 

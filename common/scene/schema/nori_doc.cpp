@@ -16,6 +16,7 @@ What Nori means otherwise than Mitsuba:
 - The camera's +x is on the right of the picture, so that a bare `<lookat>` shows the world mirrored. `fov` is over the width. The
   filter, if none is given, is `gaussian` with stddev 0.5; one sample a pixel is taken if there is no sampler.
 - v of a mesh runs from the lower edge of an image upwards. On a sphere u begins at -x.
+- A mesh whose file has no normals (`vn`) is flat; in Mitsuba it is smooth.
 - A mesh without a bsdf is diffuse with albedo 0.5, also if it shines; if it bounds a medium it lets light through.
 - A `<medium>` in a mesh is inside of it. One that stands in the scene itself is everywhere where no mesh holds another.
 - Media come in three notations: `sigma_a`, `sigma_s` with `phase_g`, `density_scale` and `emission`; `sigma_t`, `albedo`, `scale`;
@@ -25,6 +26,10 @@ What Nori means otherwise than Mitsuba:
 )";
 
 constexpr std::string_view kIntegratorParameters = R"(
+`direct` and its kin show lamps, and the light that reaches a surface straight from them; mirrors and clear glass show lamps and
+nothing else, also with `direct_ems`. `whitted` follows mirrors and clear glass until they show another surface. Nori ends one in
+twenty such paths and weighs the others up, which changes no mean; here a path ends at random once it carries little light.
+
 Those without a max_depth take `maxDepth` (-1: no limit), those with media `inmedium` (the camera is in the medium of the mesh around
 it), `volpath_distant_mis` its `distance` and `heuristic` as in Mitsuba's language.
 )";

@@ -101,7 +101,7 @@ std::vector<Parameter> parallel_light_parameters() {
            {.min = 0, .max = 90}}};
 }
 
-// Kombu's, which equals Mitsuba's.
+// The parameters of Kombu's `principled`, which equals Mitsuba's.
 std::vector<Parameter> principled_parameters() {
   std::vector<Parameter> p{
       {"base_color", kAnyColor | kTexture, "0.5", "the colour", kUnit},
@@ -261,11 +261,11 @@ constexpr IntegratorRow kIntegrators[] = {
     {"direct_mats", "path", 2},
     {"direct_ems", "path", 2},
     {"direct_mis", "path", 2},
-    {"whitted", "path", {}, "light that diffuse surfaces send each other is seen, too"},
+    {"whitted", "whitted", {}},
     {"photonmapper", "path", {}, "light is followed exactly, without the blur of gathered photons"},
 };
 
-// For integrators that show something other than light.
+// The reason to reject integrators that show something other than light.
 constexpr std::string_view kNoLight =
     "what it draws is not light: choose path_mis, or vol_path_mis if there are media";
 

@@ -1,5 +1,5 @@
-// The vocabulary of Nori's scene files: its objects with their parameters, and its integrators. One table for
-// reading, suggestions and docs/reference/scene-format.md.
+// The vocabulary of Nori's scene files: its objects with their parameters, and its integrators. Reading,
+// suggestions and docs/reference/scene-format.md use this one table.
 #pragma once
 
 #include <optional>
@@ -32,10 +32,10 @@ std::string text_of(unsigned types);
 struct Parameter {
   std::string_view name;
   unsigned types;
-  std::string_view fallback;  // the default in words; "" without further remark: optional
+  std::string_view fallback;  // the default in words; "": the parameter is optional and has no default
   std::string_view meaning;
-  Range range = kAny;          // of a number, or of each component
-  std::string_view idle = "";  // why it has no effect here (causes a warning)
+  Range range = kAny;          // range of a number, or of each component
+  std::string_view idle = "";  // why the parameter has no effect here, for a warning; empty: it has an effect
 };
 
 struct Plugin {
@@ -47,18 +47,19 @@ std::span<const Plugin> plugins();
 const Plugin* find_plugin(std::string_view tag, std::string_view type);
 std::vector<std::string> plugin_names(std::string_view tag);
 
-// Objects of Nori or its descendants that are rejected by name.
+// Objects of Nori or its descendants that are rejected.
 struct Refused {
   std::string_view tag, type, because;
 };
 std::span<const Refused> refused_plugins();
-std::string_view refused_because(std::string_view tag, std::string_view type);  // empty: not rejected
+// returns the reason; empty: the object is not rejected
+std::string_view refused_because(std::string_view tag, std::string_view type);
 
 struct IntegratorRow {
   std::string_view name;
   std::string_view ours;         // IntegratorSettings::name
-  std::optional<int> max_depth;  // implied by the name
-  std::string_view but = "";     // how the image differs from Nori's (causes a warning)
+  std::optional<int> max_depth;  // maximum depth implied by the name
+  std::string_view but = "";     // how the image differs from Nori's, for a warning
 };
 std::span<const IntegratorRow> integrators();
 const IntegratorRow* integrator_row(std::string_view name);

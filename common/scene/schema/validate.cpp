@@ -141,7 +141,8 @@ class ValueChecker {
           wrong_ = "scene.bsdfs: a twosided bsdf holds one that lets light through, or another twosided";
     }
   }
-  // The shapes of a group are contiguous, groups in order; each has shapes, and none of them emits.
+  // Checks that the shapes of a group are contiguous, that groups are in order and have shapes, and that none
+  // of these shapes emits.
   void check_groups() {
     std::size_t seen = 0;
     const std::optional<GroupIndex>* last = nullptr;
@@ -172,8 +173,7 @@ class ValueChecker {
                   outside(f.crop_offset[1], f.crop_size.height, f.size.height)))
       wrong_ = "scene.film: the crop is not within the frame";
   }
-  // Computes the nesting depth of each texture by relaxation: as many passes over the list as textures may
-  // nest.
+  // Checks the nesting depth of textures by repeated passes over the list: as many as textures may nest.
   void check_texture_nesting() {
     std::vector<int> depth(s_.textures.size(), 0);
     for (int round = 0; round <= kMaxReferenceDepth; ++round) {
@@ -184,6 +184,8 @@ class ValueChecker {
           d = 1 + std::max(depth[c->color0.value], depth[c->color1.value]);
         else if (const auto* p = std::get_if<PeakTexture>(&s_.textures[i]))
           d = 1 + depth[p->texture.value];
+        else if (const auto* product = std::get_if<ProductTexture>(&s_.textures[i]))
+          d = 1 + std::max(depth[product->first.value], depth[product->second.value]);
         changed |= std::exchange(depth[i], d) != d;
       }
       if (!changed) return;
@@ -225,7 +227,7 @@ class Compactor {
   }
 
  private:
-  // Recursion is bounded by kMaxReferenceDepth (checked before).
+  // The depth of recursion is bounded by kMaxReferenceDepth (checked before).
   template <class T>
   void move(T& object) {
     IndexWalker walker([&](auto& i) { i = moved(i); });

@@ -1,4 +1,4 @@
-// Consistency between the parts of a Scene, beyond the ranges of single fields.
+// Checks the consistency between the parts of a Scene, beyond the ranges of single fields.
 #pragma once
 
 #include <string>
@@ -7,9 +7,9 @@
 
 namespace ls::scene {
 
-// Returns the first inconsistency: an index out of range, textures or bsdfs that contain themselves, a bsdf
-// that is not allowed within `twosided`, a frame too large, or matrices that are not finite. Empty if the
-// scene is consistent.
+// Returns a description of the first inconsistency: an index out of range, textures or bsdfs that contain
+// themselves, a bsdf that is not allowed within `twosided`, a frame that is too large, or matrices that are
+// not finite. Empty if the scene is consistent.
 std::string find_inconsistency(const Scene& scene);
 
 // Returns the scene with only those objects that shapes, emitters and the sensor reach, directly or through

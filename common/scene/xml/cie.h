@@ -7,11 +7,11 @@
 namespace ls::scene {
 
 struct CieRow {
-  std::array<double, 3> observer;  // x, y, z
-  double d65;                      // relative; 100 at 560 nm
+  std::array<double, 3> observer;  // the values x, y and z of the observer
+  double d65;                      // relative power; 100 at 560 nm
 };
 
-inline constexpr double kCieFirst = 360, kCieLast = 830, kCieStep = 5;  // nm
+inline constexpr double kCieFirst = 360, kCieLast = 830, kCieStep = 5;  // wavelengths in nm
 // clang-format off
 inline constexpr std::array<CieRow, 95> kCieRows{{
     {{0.0001299, 3.917e-06, 0.0006061}, 46.6383},  // 360

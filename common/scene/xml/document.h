@@ -1,4 +1,4 @@
-// A scene file as a tree of elements with their places in the text: includes are inserted, $parameters
+// A scene file as a tree of elements with their places in the text. Includes are inserted and $parameters
 // substituted, but nothing is interpreted yet.
 #pragma once
 
@@ -14,32 +14,32 @@
 namespace ls::scene {
 
 struct Attribute {
-  std::string name, value;  // value: entities decoded, parameters substituted
-  Span name_at, value_at;   // value_at: between the quotes
+  std::string name, value;  // value: with entities decoded and parameters substituted
+  Span name_at, value_at;   // value_at: the place of the text between the quotes
 };
 
 struct Element {
   std::string tag;
-  Span at;  // the tag's name
+  Span at;  // place of the tag's name
   std::vector<Attribute> attributes;
   std::vector<Element> children;
-  bool old = false;  // in a file of Mitsuba 0.x; see upgrade.h
+  bool old = false;  // true for elements of a file of Mitsuba 0.x; see upgrade.h
 
   const Attribute* find(std::string_view attribute) const;
-  // Returns the attribute's value, empty if the element has no such attribute.
+  // Returns the attribute's value; empty if there is no such attribute.
   std::string_view get(std::string_view attribute) const;
 };
 
 struct Document {
   Element root;
-  std::vector<std::string> search_paths;  // from <path>, in the order in which they are tried
+  std::vector<std::string> search_paths;  // folders of <path> elements, in the order in which they are tried
   std::optional<std::uint32_t> frame;     // ReadOptions::frame
   bool labels = false;                    // ReadOptions::labels
 };
 
-// Parses XML text. nullopt: it is malformed, not UTF-8 or beyond the limits, which has been reported. No
-// other function uses pugixml. `elements_left` is the number of elements still allowed; it is reduced by
-// those found.
+// Parses XML text. nullopt: it is malformed, not UTF-8 or beyond the limits, which has been reported. Only
+// this function uses pugixml. `elements_left` is the number of elements still allowed; the number of elements
+// in the text is subtracted from it.
 std::optional<Element> parse_xml(std::uint32_t file, Report& report, std::size_t& elements_left);
 
 // Reads a scene file into a Document: parses it, follows <include>, applies <default> and the defines of
@@ -48,7 +48,7 @@ std::optional<Document> load_document(std::string_view file_name, std::string_vi
                                       const ReadOptions& options, Report& report);
 
 // Returns `name` relative to `folder` (either may be absolute or empty), with "." and ".." resolved where
-// that is possible without looking at the disk.
+// this is possible without looking at the disk.
 std::string join_path(std::string_view folder, std::string_view name);
 
 }  // namespace ls::scene

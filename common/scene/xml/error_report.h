@@ -14,21 +14,23 @@ class Report {
  public:
   explicit Report(bool strict) : strict_(strict) {}
 
-  // Adds a file, which is kept as long as the report. Returns its index, for Span::file.
+  // Adds a file, which is kept as long as the report. Returns its index for Span::file.
   std::uint32_t add_file(SourceText file);
   const SourceText& file(std::uint32_t index) const { return files_[index]; }
 
   void error(const Span& at, std::string text);
-  void warning(const Span& at, std::string text);  // an error under --strict
+  void warning(const Span& at, std::string text);  // becomes an error under --strict
 
   bool has_errors() const { return errors_ > 0; }
-  bool full() const { return errors_ >= kMax; }  // further errors would not be shown: reading may stop
-  // True if a further warning would be shown; check this before a warning is composed at some expense.
+  // True if further errors would not be shown, so that reading may stop
+  bool full() const { return errors_ >= kMax; }
+  // True if a further warning would be shown; check this before composing a warning that costs much time.
   bool takes_warnings() const { return (strict_ ? errors_ : warnings_) < kMax; }
   // Returns text that refers to the place `there` in a message about `here`: "line 9", with the file's name
   // if the two are in different files.
   std::string refer_to(const Span& there, const Span& here) const;
-  std::vector<Diagnostic> take();  // in the order found; with too many, errors are kept before warnings
+  // Returns the diagnostics in the order found; if there are too many, errors are kept before warnings
+  std::vector<Diagnostic> take();
 
  private:
   static const std::size_t kMax;

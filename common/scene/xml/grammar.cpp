@@ -53,7 +53,7 @@ class StructureChecker {
  public:
   explicit StructureChecker(Report& report) : report_(report) {}
 
-  // Depth is bounded by kMaxNesting.
+  // The depth of recursion is bounded by kMaxNesting.
   void check(const Element& e, const Element* parent) {
     if (report_.full()) return;
     const TagRow* row = row_of(e);
@@ -126,7 +126,7 @@ class StructureChecker {
                                     report_.refer_to(it->second->at, at)));
   }
 
-  // As in Mitsuba the original must precede its alias.
+  // Handles an <alias>. As in Mitsuba, the original must precede it.
   void alias(const Element& e) {
     const auto it = ids.find(e.get("id"));
     if (it != ids.end()) return declare(std::string(e.get("as")), it->second, value_place(e, "as"));

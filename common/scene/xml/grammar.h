@@ -1,5 +1,5 @@
-// Checks which elements exist, their attributes and their nesting, for a whole document before anything is
-// interpreted, so that the readers of objects can rely on a correct structure.
+// Checks which elements occur, their attributes and their nesting. This is done for a whole document before
+// anything is interpreted, so that the readers of objects can rely on a correct structure.
 #pragma once
 
 #include <map>
@@ -11,7 +11,7 @@ namespace ls::scene {
 
 enum class TagKind { object, property, transform, step, reference, alias, unknown };
 
-TagKind kind_of(const Element& e);  // a <spectrum type="..."> is an object
+TagKind kind_of(const Element& e);  // for example, a <spectrum type="..."> is an object
 
 using Ids = std::map<std::string, const Element*, std::less<>>;
 // Reports structural errors, duplicate ids and aliases without a target. Returns the objects that have ids,

@@ -42,7 +42,8 @@ std::size_t sequence_length(std::string_view text) {
 
 }  // namespace
 
-SourceText::SourceText(std::string name, std::string text) : name_(std::move(name)), text_(std::move(text)) {
+SourceText::SourceText(std::string name, std::string text, PathOf path_of)
+    : name_(std::move(name)), text_(std::move(text)), path_of_(std::move(path_of)) {
   lines_before_.reserve(text_.size() / kBlock + 1);
   std::uint32_t lines = 0;
   for (std::size_t begin = 0; begin <= text_.size(); begin += kBlock) {
@@ -73,13 +74,16 @@ SourcePlace SourceText::place(std::size_t offset) const {
 Diagnostic SourceText::diagnose(Diagnostic::Severity severity, std::size_t offset, std::size_t length,
                                 std::string message) const {
   offset = std::min(offset, text_.size());
+  if (const std::string path = path_of_ ? path_of_(offset) : ""; !path.empty())
+    message = path + ": " + message;
   Diagnostic d{severity, place(offset), std::move(message), {}, 1};
   const std::size_t start = line_start(offset);
   std::size_t end = std::min(text_.find('\n', start), text_.size());
   if (end > start && text_[end - 1] == '\r') --end;
   const std::size_t shown = std::min(length, end - std::min(offset, end));
   d.length = std::max(1, count_characters(std::string_view(text_).substr(std::min(offset, end), shown)));
-  // Lines of megabytes are not shown; lines that are merely long are, so that columns and carets fit.
+  // A line of megabytes is not shown. A line that is merely long is included as a whole, so that columns and
+  // carets are right.
   const std::string_view line = std::string_view(text_).substr(start, end - start);
   if (line.size() <= 20 * kMaxExcerptBytes && find_invalid_utf8(line) == std::string_view::npos)
     d.source_line = line;

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,14 +23,16 @@ struct Span {
 
 class SourceText {
  public:
-  SourceText(std::string name, std::string text);
+  // `path_of` names what stands at an offset, for the beginning of messages about it; empty: nothing does.
+  using PathOf = std::function<std::string(std::size_t)>;
+  SourceText(std::string name, std::string text, PathOf path_of = {});
 
   const std::string& name() const { return name_; }
   const std::string& text() const { return text_; }
   // Returns line and column of a byte, both from 1. The column counts characters (UTF-8 code points), not
   // bytes, which takes time proportional to the line's length.
   SourcePlace place(std::size_t offset) const;
-  int line(std::size_t offset) const;  // the line only, without scanning it
+  int line(std::size_t offset) const;  // returns the line only, which needs no scan of it
   std::size_t index_bytes() const { return lines_before_.size() * sizeof lines_before_[0]; }
   // Makes a diagnostic about the bytes [offset, offset + length), with their line cut to a readable length.
   Diagnostic diagnose(Diagnostic::Severity severity, std::size_t offset, std::size_t length,
@@ -38,6 +41,7 @@ class SourceText {
  private:
   std::size_t line_start(std::size_t offset) const;
   std::string name_, text_;
+  PathOf path_of_;
   // The number of line ends before each block of the text. (An entry for each line would make this many times
   // the size of a text that consists of empty lines.)
   std::vector<std::uint32_t> lines_before_;

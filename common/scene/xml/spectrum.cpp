@@ -41,7 +41,7 @@ double on_line(const SpectralCurve& c, std::size_t segment, double nm) {
 }
 
 // Between neighbouring samples of the curve or the tables the integrand is a product of three linear
-// functions: Simpson's rule is exact.
+// functions, for which Simpson's rule is exact.
 Xyz integral(const SpectralCurve& c, Illuminant illuminant) {
   Xyz sum{0, 0, 0};
   const double end = std::min(c.nm.back(), kCieLast);

@@ -1,5 +1,5 @@
-// Converts spectral curves to linear sRGB: as seen by the CIE 1931 2-degree standard observer, with the
-// primaries and the white (D65) of ITU-R BT.709.
+// Converts spectral curves to linear sRGB: the colours that the CIE 1931 2-degree standard observer sees,
+// with the primaries and the white (D65) of ITU-R BT.709.
 #pragma once
 
 #include <array>
@@ -9,15 +9,15 @@
 
 namespace ls::scene {
 
-// A curve over the wavelength: linear between the points, 0 beyond the ends. It has at least two points; nm
-// increases.
+// A curve over the wavelength: linear between its points, and 0 beyond the ends. It has at least two points,
+// with increasing wavelengths `nm`.
 struct SpectralCurve {
   std::vector<double> nm, value;
   bool operator==(const SpectralCurve&) const = default;
 };
 
 // The illuminant by which a curve is multiplied: d65 for a reflectance. Spectra of light, and all curves of
-// Mitsuba 0.x, use equal_energy: the same power at all wavelengths.
+// Mitsuba 0.x, use equal_energy, which has the same power at all wavelengths.
 enum class Illuminant { equal_energy, d65 };
 
 // Returns integral(curve * illuminant * observer) / integral(illuminant * y), from 360 to 830 nm, as linear
@@ -31,8 +31,8 @@ Rgb linear_srgb(const std::array<double, 3>& xyz);
 // linear_srgb(): a radiance of 1 at all wavelengths gives X = Y = Z = 1.
 std::array<double, 3> black_body_xyz(double kelvin);
 
-// Returns the linear sRGB of light of the same power at all wavelengths and luminance 1: X = Y = Z = 1, which
-// is not white.
+// Returns the linear sRGB of light with the same power at all wavelengths and luminance 1: X = Y = Z = 1,
+// which is not white.
 Rgb equal_energy_srgb();
 
 }  // namespace ls::scene

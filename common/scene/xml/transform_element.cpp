@@ -31,7 +31,7 @@ bool is_zero(const Vec3& v) { return v[0] == 0 && v[1] == 0 && v[2] == 0; }
 Transform translation(const Vec3& d) { return {{1, 0, 0, d[0], 0, 1, 0, d[1], 0, 0, 1, d[2], 0, 0, 0, 1}}; }
 Transform scaling(const Vec3& s) { return {{s[0], 0, 0, 0, 0, s[1], 0, 0, 0, 0, s[2], 0, 0, 0, 0, 1}}; }
 
-// Rodrigues' formula, right-handed.
+// Returns a rotation by Rodrigues' formula, right-handed.
 Transform rotation(const Vec3& axis, double degrees) {
   const Vec3 a = normalized(axis);
   const double angle = degrees * (std::numbers::pi / 180), s = std::sin(angle), c = std::cos(angle),
@@ -41,8 +41,8 @@ Transform rotation(const Vec3& axis, double degrees) {
            t * a[0] * a[2] - s * a[1], t * a[1] * a[2] + s * a[0], t * a[2] * a[2] + c, 0, 0, 0, 0, 1}};
 }
 
-// A vector perpendicular to the unit vector n (Duff et al. 2017, "Building an Orthonormal Basis, Revisited":
-// the first of the two).
+// Returns a vector perpendicular to the unit vector n (the first of the two of Duff et al. 2017, "Building an
+// Orthonormal Basis, Revisited").
 Vec3 some_up(const Vec3& n) {
   const double sign = std::copysign(1.0, n[2]), a = -1 / (sign + n[2]);
   return {1 + sign * n[0] * n[0] * a, sign * n[0] * n[1] * a, -sign * n[0]};
@@ -109,7 +109,7 @@ std::optional<Transform> read_rotate(const Element& e, Report& report) {
     report.error(e.at, "<rotate> needs an axis: x=\"1\", y=\"1\", z=\"1\" or a mixture");
     return std::nullopt;
   }
-  // Mitsuba 3 uses the numbers unnormalised, so that the step shears; that is never intended.
+  // Mitsuba 3 uses the numbers unnormalised, which makes the step a shear; this is never intended.
   const double length = std::sqrt(dot(*axis, *axis));
   if (std::abs(length - 1) > kUnitSlack)
     report.warning(e.at, fmt::format("this axis has the length {:.4g}: only its direction is used. Mitsuba 3 "
@@ -164,7 +164,7 @@ bool invertible(const Transform& t) {
          std::isnormal(determinant3(t));
 }
 
-// M transpose(M) = 1.
+// Checks M transpose(M) = 1.
 bool is_rigid(const Transform& t) {
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t j = i; j < 3; ++j) {
@@ -178,7 +178,7 @@ bool is_rigid(const Transform& t) {
 bool is_similarity(const Transform& t) {
   const Vec3 columns[3] = {{t.m[0], t.m[4], t.m[8]}, {t.m[1], t.m[5], t.m[9]}, {t.m[2], t.m[6], t.m[10]}};
   const double size = dot(columns[0], columns[0]);
-  // Files often have six digits: squares then differ by a few 1e-6.
+  // Files often have six digits, so that squares differ by a few 1e-6.
   const double slack = 1e-5 * size;
   return std::abs(dot(columns[1], columns[1]) - size) <= slack &&
          std::abs(dot(columns[2], columns[2]) - size) <= slack &&

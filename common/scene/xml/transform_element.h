@@ -10,11 +10,11 @@ double dot(const Vec3& a, const Vec3& b);
 Vec3 cross(const Vec3& a, const Vec3& b);
 
 Transform multiply(const Transform& a, const Transform& b);
-Vec3 transform_point(const Transform& t, const Vec3& p);  // affine part
+Vec3 transform_point(const Transform& t, const Vec3& p);  // uses the affine part only
 Vec3 transform_vector(const Transform& t, const Vec3& v);
-double determinant3(const Transform& t);  // of the linear part
+double determinant3(const Transform& t);  // determinant of the linear part
 
-// True if the matrix is invertible, and it and its inverse are within the range of numbers.
+// True if the matrix is invertible, and it and its inverse have no element that is infinite.
 bool invertible(const Transform& t);
 // True if the matrix consists only of translation, rotation and reflection, up to 1e-3 as Mitsuba 3 requires
 // of sensors.

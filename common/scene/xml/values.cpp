@@ -29,7 +29,8 @@ std::optional<T> parse_whole(std::string_view text) {
   return value;
 }
 
-template <class F>  // F(std::string_view) -> bool: false stops
+// Calls f(std::string_view) -> bool for each part of the text, until it returns false.
+template <class F>
 bool for_each_token(std::string_view text, F f) {
   for (std::size_t at = text.find_first_not_of(kSeparators); at < text.size();) {
     const std::size_t end = std::min(text.find_first_of(kSeparators, at), text.size());
@@ -39,7 +40,7 @@ bool for_each_token(std::string_view text, F f) {
   return true;
 }
 
-// At least two pairs, in increasing order of wavelength.
+// Parses a curve: at least two pairs, with increasing wavelengths.
 std::optional<SpectralCurve> parse_curve(std::string_view text) {
   SpectralCurve curve;
   const bool ok = for_each_token(text, [&](std::string_view token) {

@@ -14,7 +14,7 @@ namespace ls::scene {
 // Parse one finite number, which may have blanks around it.
 std::optional<double> parse_number(std::string_view text);
 std::optional<long long> parse_integer(std::string_view text);
-std::optional<bool> parse_boolean(std::string_view text);  // true or false, in any letter case
+std::optional<bool> parse_boolean(std::string_view text);  // parses true or false, in any letter case
 // Parses numbers separated by commas or blanks. nullopt: one of them is not a number, or there are more than
 // `most`.
 std::optional<std::vector<double>> parse_numbers(std::string_view text, std::size_t most);
@@ -22,9 +22,9 @@ std::optional<std::vector<double>> parse_numbers(std::string_view text, std::siz
 std::optional<Rgb> parse_rgb(std::string_view text);
 // Parses #rrggbb without decoding: 255 becomes 1.
 std::optional<Rgb> parse_hex(std::string_view text);
-double decode_srgb(double x);  // to linear (IEC 61966-2-1)
+double decode_srgb(double x);  // converts to linear (IEC 61966-2-1)
 // The value of a <spectrum>: one number, three numbers of linear sRGB (0.x files), or wavelength:value pairs
-// in nm; std::monostate if it is none of these.
+// in nm; std::monostate if the text is none of these.
 using SpectrumText = std::variant<std::monostate, double, Rgb, SpectralCurve>;
 SpectrumText parse_spectrum(std::string_view text);
 

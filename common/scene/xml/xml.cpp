@@ -11,8 +11,8 @@ namespace {
 
 bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
-// pugixml reports where a tag begins but not the positions of its attributes: finds them in the text. `at` is
-// the offset of the tag's name in well-formed XML.
+// Finds the positions of attributes in the text, which pugixml does not report; it reports only where a tag
+// begins. `at` is the offset of the tag's name in well-formed XML.
 class AttributePlaces {
  public:
   AttributePlaces(std::uint32_t file, std::string_view text, std::size_t at)
@@ -26,7 +26,7 @@ class AttributePlaces {
     while (more() && !is_space(text_[at_]) && text_[at_] != '=' && text_[at_] != '>') ++at_;
     out.name_at = {file_, name, at_ - name};
     skip_space();
-    if (more()) ++at_;  // '='
+    if (more()) ++at_;  // skips '='
     skip_space();
     const char quote = more() ? text_[at_] : '"';
     const std::size_t value = std::min(at_ + 1, text_.size());
@@ -65,7 +65,7 @@ class TreeBuilder {
   TreeBuilder(std::uint32_t file, Report& report)
       : file_(file), report_(report), text_(report.file(file).text()) {}
 
-  // Depth is bounded by kMaxNesting.
+  // The depth of recursion is bounded by kMaxNesting.
   bool build(pugi::xml_node node, Element& out, int depth) {
     out.tag = node.name();
     out.at = {file_, static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, node.offset_debug())),
@@ -92,7 +92,7 @@ class TreeBuilder {
   bool read_attributes(pugi::xml_node node, Element& out) {
     AttributePlaces places(file_, text_, out.at.offset);
     for (const pugi::xml_attribute attribute : node.attributes()) {
-      // Also keeps the search for duplicate names short.
+      // This also keeps the search for duplicate names short.
       if (out.attributes.size() == kMaxElementAttributes) {
         report_.error(out.at,
                       fmt::format("<{}> has more than {} attributes", out.tag, kMaxElementAttributes));
@@ -124,8 +124,8 @@ class TreeBuilder {
   std::string_view text_;
 };
 
-// Returns the offset at which an attribute value begins that runs into the next element, because its closing
-// quote was forgotten (which a parser notices only later); npos if there is none. XML allows no '<' in
+// Returns the offset at which an attribute value begins whose closing quote is missing, so that it extends
+// into the next element (a parser would notice this only later); npos if there is none. XML allows no '<' in
 // values. Quotes in comments, CDATA and instructions are ignored.
 std::size_t find_open_quote(std::string_view text) {
   static constexpr std::string_view kOpaque[][2] = {{"<!--", "-->"}, {"<![CDATA[", "]]>"}, {"<?", "?>"}};
@@ -154,7 +154,7 @@ std::size_t find_open_quote(std::string_view text) {
   return std::string_view::npos;
 }
 
-// Reports a better place than pugixml's, which is where it gave up.
+// Reports a malformed text at a more helpful place than where pugixml stopped.
 void malformed(std::uint32_t file, const pugi::xml_parse_result& result, Report& report) {
   const std::string& text = report.file(file).text();
   if (const std::size_t quote = find_open_quote(text); quote != std::string_view::npos)
@@ -167,7 +167,7 @@ void malformed(std::uint32_t file, const pugi::xml_parse_result& result, Report&
   report.error({file, offset, 1}, fmt::format("malformed XML: {}", result.description()));
 }
 
-// Checks numbers of tags and attributes, which limit what pugixml allocates.
+// Checks the numbers of tags and attributes, which limit pugixml's memory.
 bool small_enough(std::uint32_t file, std::string_view text, Report& report, std::size_t& elements_left) {
   std::size_t tags = 0, attributes = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -208,7 +208,7 @@ std::optional<Element> parse_xml(std::uint32_t file, Report& report, std::size_t
   if (!small_enough(file, text, report, elements_left)) return std::nullopt;
 
   pugi::xml_document xml;
-  // pugixml expands no DTD entities: only XML's five and character numbers.
+  // pugixml expands only XML's five entities and character numbers, no entities of a DTD.
   const pugi::xml_parse_result result =
       xml.load_buffer(text.data(), text.size(), pugi::parse_default, pugi::encoding_utf8);
   if (!result) {

@@ -1,17 +1,17 @@
 // The farm is a state machine. It decides which worker renders which units (a unit is one round, that is
-// range of samples, of one tile), what is folded (added to the job's image) when, and when a job ends. Its
-// effects are a function of events and time: it does no I/O and has no threads, no clock, no log. It is not
-// thread-safe; the service guards it with one mutex.
+// range of samples, of one tile), which results are folded (added to the job's image) and when, and when a
+// job ends. Its effects are a function of events and time: it does no I/O and has no threads, no clock, no
+// log. It is not thread-safe; the service guards it with one mutex.
 //
 // effects = farm.handle(event, now); `now` never goes back.
 //
-// The path of a result: worker -> the service calls wanted(unit), verifies the partial (the encoded pixel
-// sums of the unit) and makes it durable -> UnitAccepted -> {RecordUnit, Fold...} -> the assembler folds ->
-// UnitFolded -> {Checkpoint, JobFinished...}. Several results of one unit may be under way at once: the first
-// UnitAccepted wins.
+// The path of a result: a worker sends it -> the service calls wanted(), verifies the partial (the encoded
+// pixel sums of the unit) and makes it durable -> UnitAccepted -> {RecordUnit, Fold...} -> the assembler
+// folds -> UnitFolded -> {Checkpoint, JobFinished...}. Several results of one unit may be under way at once:
+// the first UnitAccepted wins.
 //
-// The cost of one call of handle() does not grow with the number of tiles or units, except once per round
-// (when it completes: checkpoint) and for what happens once per job.
+// The cost of one call of handle() does not depend on the number of tiles or units. Two things cost more: a
+// round that completes (checkpoint), and what happens once per job.
 #pragma once
 
 #include <cstdint>
@@ -24,28 +24,27 @@
 #include "common/base/error.h"
 #include "coordinator/domain/effect.h"
 #include "coordinator/domain/event.h"
-#include "coordinator/domain/figures.h"
+#include "coordinator/domain/farm_figures.h"
 
 namespace ls::coordinator {
 
-// Returns an error for a plan that limits.h does not allow: too many units, no tile, or a target error or
-// time that is not positive.
+// Returns an error for a plan that exceeds limits.h: too many units, no tile, or a target error or time that
+// is not positive.
 Result<void> check_plan(const JobPlan& plan);
 
-// What the service should do with a result that has arrived
+// How the service should handle a result that has arrived
 struct Wanted {
   enum class Verdict {
-    yes,        // verify it against `samples` and `numeric_class`, make it durable, then raise UnitAccepted
-    duplicate,  // do the same; the farm drops it if its digest is equal, else it is evidence against a worker
-    no          // acknowledge it to the worker and drop it
+    yes,          // verify it against `samples`, make it durable, then raise UnitAccepted
+    duplicate,    // its unit has an accepted result already: verify it and raise UnitAccepted, since the farm
+                  // compares the two, but do not store it
+    other_class,  // its numeric class (machines that compute the same bits) is not that of the job
+    no            // nobody needs it: acknowledge it to the worker and drop it
   };
   Verdict verdict = Verdict::no;
   SampleRange samples;  // the sample range that the job needs of this unit now
   PixelRect rect;
-  // The numeric class (machines that compute the same bits) that the job is pinned to. nullopt: any class
-  // will do, and the first result pins the job to its worker's class
-  std::optional<Digest> numeric_class;
-  std::string why;  // the reason if the verdict is `no`
+  bool pinned = false;  // true if the job is pinned to a numeric class
 };
 
 struct JobFigures {
@@ -103,23 +102,24 @@ class Farm {
 
   std::vector<Effect> handle(const Event& event, TimePoint now);
 
-  // Queries. For an unknown id they return nullopt, an empty container or Verdict::no.
-  Wanted wanted(const UnitKey& unit) const;
+  // Queries. For an unknown id they return nullopt, an empty container or Verdict::no. `numeric_class` is the
+  // class of the worker that rendered the result.
+  Wanted wanted(const UnitKey& unit, const Digest& numeric_class) const;
   std::vector<JobId> jobs() const;  // in order of submission
   std::optional<JobFigures> job(const JobId& id) const;
-  // Returns the job's plan as it is to be stored: with changed priority and samples, and without a target
+  // Returns the job's current plan, for storage: with changed priority and samples, and without a target
   // error or time limit that no longer applies.
   std::optional<JobPlan> plan(const JobId& id) const;
-  // Return an error that says why the event JobRetargeted or JobExtended would change nothing.
+  // Return an error if the event JobRetargeted or JobExtended would change nothing; the error says why.
   Result<void> may_retarget(const JobId& id, double target_error) const;
   Result<void> may_extend(const JobId& id, std::uint64_t spp) const;
   std::vector<WorkerId> workers() const;
   std::optional<WorkerFigures> worker(const WorkerId& id) const;
   std::optional<TileFigures> tile(const JobId& id, TileIndex tile) const;
-  // Workers that render the tile now; scans the leases
+  // Returns the workers that render the tile at the moment. Scans all leases of the job
   std::vector<WorkerId> tile_workers(const JobId& id, TileIndex tile) const;
-  // Says why a job that could run has no worker. Names workers of another class, workers without its tags,
-  // and blocked or unhealthy ones. Empty if some worker may take it.
+  // Returns the reason why a job that could run has no worker, for the user: it names workers of another
+  // class, workers without its tags, and blocked or unhealthy ones. Empty if some worker may take it.
   std::string why_waiting(const JobId& id) const;
   // Returns the core seconds of all users that have jobs at work, as FairShare counts them; for tests and
   // metrics.
@@ -130,23 +130,23 @@ class Farm {
   };
   std::vector<Shares> shares() const;
   AuditFigures audits() const;
-  // Returns the job's open audits, which must be stored: otherwise a restart would clear a faulty worker of
-  // suspicion.
+  // Returns the job's open audits. The service must store them: otherwise a faulty worker would no longer be
+  // suspected after a restart.
   std::vector<JobRestored::Audit> open_audits(const JobId& id) const;
   std::vector<JobId> take_changed_audits();  // jobs whose open audits may have changed since the last call
   bool quarantined(const WorkerId& worker) const;
   // True if a job without a numeric class may be pinned to this worker's class.
   bool may_pin(const JobId& id, const WorkerId& worker) const;
-  double cores_connected() const;  // sum over connected workers: threads times core share (core_share.h)
+  double cores_connected() const;  // sum over connected workers: threads times core share (CoreShare)
   int workers_connected() const;
 
-  // Returns the sizes of all containers, by name; for tests that look for unbounded growth.
+  // Returns the sizes of all containers, by name. Tests use them to detect unbounded growth.
   std::vector<std::pair<std::string, std::size_t>> sizes() const;
 
   // Checks all invariants and describes the first violation; empty if all hold. Invariants: planned = done +
-  // leased + queued; leases, workers and jobs agree with one another; no worker is idle while a unit it may
-  // take is queued. This is slow, for tests and occasional checks in service, and may be called only right
-  // after handle().
+  // leased + queued; leases, workers and jobs agree with one another; no worker is idle while a queued unit
+  // exists that it may take. The check is slow; it is meant for tests and for occasional use in service, and
+  // may be called only right after handle().
   std::string audit() const;
 
  private:

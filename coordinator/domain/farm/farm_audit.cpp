@@ -69,7 +69,7 @@ std::string audit_load(const std::string& whose, const Load& kept, const Load& c
   return "";
 }
 
-// Units and charges of each job, group and user, added up anew from the leases
+// Units and charges of each job, group and user, summed up from the leases to check the running totals
 struct Leased {
   std::map<JobSeq, Load> jobs;
   std::map<std::string, Load> users, groups;
@@ -97,10 +97,10 @@ std::string audit_job_load(const Job& job, Leased& leased, const ShareLimits& li
   const double charge = leases == leased.charges.end() ? 0 : leases->second;
   if (std::abs(job.charge_out - charge) > 1e-6 * (1 + charge))
     return fmt::format("{}: charged with {} s, leased {} s", name, job.charge_out, charge);
-  // Rounding errors of what was added and subtracted must not stay for good.
+  // Without any lease the charge must be exactly 0, so that rounding errors cannot accumulate.
   if (leases == leased.charges.end() && job.charge_out != 0)
     return fmt::format("{}: charged with {} s though nothing is leased", name, job.charge_out);
-  const bool alone = plan.group.empty();  // a job in a group has no limits of its own: they are the group's
+  const bool alone = plan.group.empty();  // The limits of a job in a group apply to the whole group
   return audit_load(name, job.load, leased.jobs[job.seq],
                     alone ? tighter(plan.max_units, limits.units_per_job) : 0,
                     alone ? tighter(plan.max_workers, limits.workers_per_job) : 0);
@@ -176,8 +176,8 @@ std::string Farm::audit() const {
   if (wrong.empty())
     wrong = audit_loads("group", state.groups, leased.groups, limits.units_per_job, limits.workers_per_job);
   if (!wrong.empty()) return wrong;
-  // The table of workers keeps `cores` by adding and subtracting as workers come, go and are measured: each
-  // time it loses about 2^-52 of the farm's threads to rounding.
+  // The worker table updates `cores` by additions and subtractions as workers join, leave and are measured.
+  // Each of them has a rounding error of about 2^-52 of the farm's threads.
   if (std::abs(cores - state.workers.cores()) > 1e-6 * std::max(threads, 1)) return "cores are counted wrong";
   return threads == state.workers.threads() ? "" : "threads are counted wrong";
 }

@@ -41,8 +41,8 @@ Result<void> Farm::State::may_extend(const Job& job, std::uint64_t spp) {
   if (is_closed(job.state))
     return ls::fail(Errc::failed_precondition,
                     fmt::format("job {} is {}: it cannot be extended", id, to_string(job.state)));
-  // now_spp is the job's current total of samples per pixel. If the job's end was decided by something else
-  // than its samples, that is what its longest tile ends with; otherwise it is what was requested.
+  // now_spp is the job's current total of samples per pixel. If the samples decided the job's end, this is
+  // the requested number; otherwise it is the number that the tile with the most rounds ends with.
   const RoundIndex rounds = job.queue.longest();
   const bool cut_short = job.stopping && *job.stopping != StopReason::spp;
   const std::uint64_t now_spp = !cut_short ? job.spp : rounds == 0 ? 0 : cut_range(rounds - 1, job.spp).s1;
@@ -79,6 +79,7 @@ void Farm::State::on(const JobRetargeted& event) {
   job->plan.target_error = event.target_error;
   job->level_seen = 0;
   job->predicted_at = 0;
+  job->predicted_error = 0;
   if (job->stopping) {
     job->stopping.reset();
     job->plan_all();
@@ -123,7 +124,8 @@ void Farm::State::reopen(Job& job, RoundIndex last) {
 
 void Farm::State::take_up_again(Job& job) {
   work_appeared = true;
-  // While the job was ended its image stood, so results of quarantined workers were kept. Now they are void.
+  // While the job had ended, its image was final, so results of quarantined workers were kept. Now they are
+  // void.
   for (const auto& [worker, why] : quarantined)
     if (const WorkerIndex faulty = workers.index_of(worker); !job.units.tiles_of(faulty).empty())
       void_results(job, faulty);

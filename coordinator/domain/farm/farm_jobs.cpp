@@ -1,7 +1,8 @@
-// Jobs, from submission to end.
+// The life of jobs in the farm, from submission to end.
 #include <algorithm>
 #include <set>
 
+#include "common/image/frame/tiles_over.h"
 #include "coordinator/domain/farm/farm_state.h"
 
 namespace ls::coordinator {
@@ -29,7 +30,7 @@ void Farm::State::set_state(Job& job, JobState to) {
 
 void Farm::State::refresh(Job& job) {
   const bool units = job.leasable() && !job.queue.empty(job.units);
-  // The job may be offered already, because of an audit that not every worker can do
+  // The job may have been offered already, because of an audit that only some workers can do
   work_appeared |= units && !job.has_units;
   job.has_units = units;
   if (units || (job.leasable() && job.audit_waits()))
@@ -46,14 +47,15 @@ void Farm::State::on(const JobSubmitted& event) {
 void Farm::State::on(const JobRestored& event) {
   if (find(event.plan.brief.job) != nullptr || !check_plan(event.plan)) return;
   Job& job = add(event.plan);
+  if (job.denoised) job.denoised.emplace(event.denoised_checks);
   job.state = event.state;
   job.numeric_class = event.numeric_class;
   if (event.elapsed_seconds > 0) job.first_ray = now - from_seconds(event.elapsed_seconds);
   if (job.state == JobState::paused || job.state == JobState::done) job.stand_still(now);
   if (is_closed(job.state)) return;
 
-  // A done job that has lost its film (the sums of its samples) no longer knows how many samples each tile
-  // got. The film is summed up again from the job's results.
+  // If a done job has lost its film (the sums of its samples), the number of samples of each tile is lost,
+  // too. The film is summed up again from the job's results.
   const bool with_film = event.folded.size() == job.units.tiles() &&
                          std::any_of(event.folded.begin(), event.folded.end(), [](auto r) { return r > 0; });
   if (job.state == JobState::done && with_film) {
@@ -102,8 +104,8 @@ void Farm::State::on(const JobPaused& event) {
   Job* job = find(event.job);
   if (job == nullptr || !job->leasable()) return;
   set_state(*job, JobState::paused);
-  // Leases that are being rendered are finished; the others are taken back now. The last one goes first:
-  // whether a lease has begun depends on the earlier ones of its worker.
+  // A lease that a worker has begun is finished; the others are taken back now. The newest lease goes first,
+  // since whether a lease has begun is derived from the worker's earlier leases.
   const std::vector<LeaseSeq> out = leases_of(*job);
   for (auto seq = out.rbegin(); seq != out.rend(); ++seq)
     if (untouched(*leases.find(*seq))) free_lease(*seq, FreedCause::paused, true);
@@ -114,6 +116,8 @@ void Farm::State::on(const JobResumed& event) {
   Job* job = find(event.job);
   if (job == nullptr || job->state != JobState::paused) return;
   set_state(*job, job->numeric_class ? JobState::running : JobState::queued);
+  job->checking_spp = 0;  // the check may have failed, which paused the job: it is made again
+  if (job->adaptive) judge(*job);
   refresh(*job);
 }
 
@@ -135,8 +139,15 @@ void Farm::State::on(const JobPriority& event) {
   refresh(*job);
 }
 
-// Forgets the job, but not what workers failed in it; that stays on record until it is forgiven. A worker
-// that fails in two jobs is unhealthy, even if the first job is gone.
+void Farm::State::on(const JobFocused& event) {
+  Job* job = find(event.job);
+  if (job == nullptr || (event.focus && !lies_in(job->plan.grid.frame, *event.focus))) return;
+  job->plan.focus = event.focus;
+  job->look_at_focus();
+}
+
+// Forgets the job, but not which workers failed in it; failures stay on record until they are forgiven. A
+// worker that fails in two jobs is unhealthy, even if the first job is gone.
 void Farm::State::on(const JobForgotten& event) {
   Job* job = find(event.job);
   if (job == nullptr || !job->ended()) return;
@@ -155,7 +166,7 @@ void Farm::State::freeze(Job& job, StopReason reason) {
   for (TileIndex t = 0; t < begun.size(); ++t)
     begun[t] = std::max({job.queue.next(t), job.units.end_of_accepted(t), RoundIndex{1}});
   job.cut_off(begun, reason);
-  // This also folds results that the target error held back
+  // This also folds results that were held back by the target error
   for (TileIndex t = 0; t < begun.size(); ++t) issue_folds(job, t);
   finish_if_complete(job);
   refresh(job);
@@ -174,7 +185,7 @@ void Farm::State::finish_if_complete(Job& job) {
 void Farm::State::fail(Job& job, std::string error, std::optional<UnitFailure> failure) {
   set_state(job, JobState::failed);
   effects.emplace_back(JobFailed{job.plan.brief.job, std::move(error), std::move(failure)});
-  // If a job fails for every worker, this is not held against the workers that tried it.
+  // If a job fails on every worker, the workers are not to blame: their failures are erased.
   for (const auto& [index, worker] : workers.all()) worker->failures.erase(job.seq);
   end(job);
 }

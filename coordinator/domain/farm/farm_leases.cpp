@@ -1,5 +1,5 @@
-// Leases units to workers and takes them back. Only here does it change which leases exist, which of them
-// hold a unit, and what a worker has to do.
+// Leases units to workers and takes them back. No other file changes which leases exist, which units they
+// hold, or the amount of work of each worker.
 #include <algorithm>
 #include <limits>
 

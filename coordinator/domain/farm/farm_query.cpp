@@ -1,12 +1,13 @@
-// Queries of the farm; none of them changes it.
+// The public functions of the farm: handling of events, and queries, which change nothing.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "common/image/frame/tiles_over.h"
 #include "coordinator/domain/farm/farm_state.h"
 
 namespace ls::coordinator {
-
 namespace {
 
 std::string in_words(std::uint64_t bytes) {
@@ -17,6 +18,23 @@ std::string in_words(std::uint64_t bytes) {
 
 }  // namespace
 
+Farm::Farm() : Farm(Options{}) {}
+Farm::Farm(Options options) : state_(std::make_unique<State>(std::move(options))) {}
+Farm::~Farm() = default;
+Farm::Farm(Farm&&) noexcept = default;
+Farm& Farm::operator=(Farm&&) noexcept = default;
+
+std::vector<Effect> Farm::handle(const Event& event, TimePoint now) {
+  State& state = *state_;
+  state.now = std::max(state.now, now);
+  state.work_appeared = false;
+  state.dirty.clear();
+  state.effects.clear();
+  std::visit([&](const auto& e) { state.on(e); }, event);
+  state.dispatch();
+  return std::move(state.effects);
+}
+
 Result<void> check_plan(const JobPlan& plan) {
   const TileGrid& grid = plan.grid;
   if (plan.brief.job.empty()) return fail(Errc::invalid_argument, "a job needs an id");
@@ -26,7 +44,7 @@ Result<void> check_plan(const JobPlan& plan) {
   }
   const std::uint64_t tiles = std::uint64_t(grid.columns()) * std::uint64_t(grid.rows());
   const std::uint64_t spp = plan.spp.value_or(kMaxSppWithoutLimit);
-  // Check the samples first: then the number of rounds fits 32 bits.
+  // The samples are checked first: only then the number of rounds is sure to fit 32 bits.
   if (tiles > kMaxTiles || spp > kMaxUnits * 64 || tiles * round_count(spp) > kMaxUnits) {
     return fail(Errc::invalid_argument,
                 fmt::format("{} tiles at {} spp are more than {} units; use larger tiles or fewer samples",
@@ -38,18 +56,22 @@ Result<void> check_plan(const JobPlan& plan) {
   if (plan.time && !(*plan.time > 0 && *plan.time < 1e9)) {
     return fail(Errc::invalid_argument, "time must be positive, in seconds");
   }
+  if (plan.focus && !lies_in(grid.frame, *plan.focus)) {
+    return fail(Errc::invalid_argument,
+                fmt::format("the focus {} does not lie in the frame of {} x {} pixels", show(*plan.focus),
+                            grid.frame.width, grid.frame.height));
+  }
   return {};
 }
 
-Wanted Farm::wanted(const UnitKey& unit) const {
+Wanted Farm::wanted(const UnitKey& unit, const Digest& numeric_class) const {
   const Job* job = state_->find(unit.job);
-  const auto no = [](std::string why) { return Wanted{.why = std::move(why)}; };
-  if (job == nullptr) return no("no such job");
-  if (is_closed(job->state)) return no("the job has ended");
+  if (job == nullptr || is_closed(job->state)) return {};
   const UnitCode code = unit_code(unit.round, unit.tile);
-  if (unit.tile >= job->units.tiles() || !job->queue.plans(code)) return no("not a unit of this job");
-  const auto verdict = job->units.accepted(code) ? Wanted::Verdict::duplicate : Wanted::Verdict::yes;
-  return {verdict, job->range(code), job->plan.grid.rect(unit.tile), job->numeric_class, ""};
+  if (unit.tile >= job->units.tiles() || !job->queue.plans(code)) return {};
+  Wanted::Verdict verdict = job->units.accepted(code) ? Wanted::Verdict::duplicate : Wanted::Verdict::yes;
+  if (job->numeric_class.value_or(numeric_class) != numeric_class) verdict = Wanted::Verdict::other_class;
+  return {verdict, job->range(code), job->plan.grid.rect(unit.tile), job->numeric_class.has_value()};
 }
 
 std::vector<JobId> Farm::jobs() const {
@@ -78,8 +100,8 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
   f.rounds_complete = job->units.rounds_complete();
   f.priority = job->plan.priority;
   f.seconds_per_sample = job->cost.per_sample();
-  // Samples are counted over all pixels. A round of which some units are missing counts by the share of its
-  // units that are undone, as if all tiles had the same size.
+  // Samples are averaged over all pixels. A round that misses some units counts in proportion to its finished
+  // units, as if all tiles had the same size.
   const RoundIndex rounds = job->queue.longest();
   const double pixels = static_cast<double>(job->plan.grid.frame.width) * job->plan.grid.frame.height;
   const double left = static_cast<double>(job->units.tiles());
@@ -160,6 +182,8 @@ std::string Farm::why_waiting(const JobId& id) const {
     std::string why;
     if (job->numeric_class && *job->numeric_class != worker->numeric_class)
       why = "is of another numeric class";
+    else if (!job->numeric_class && !worker->may_begin)
+      why = "is of another version than the coordinator and begins no job";
     else if (worker->quarantined)
       why = "is quarantined, since it rendered wrong pixels";
     else if (worker->memory_bytes != 0 && job->plan.memory_bytes > worker->memory_bytes)
@@ -168,7 +192,7 @@ std::string Farm::why_waiting(const JobId& id) const {
     else if (!fits(*job, *worker))
       why = "lacks a tag that the job asks for";
     else if (worker->unhealthy_since)
-      why = "is sick";
+      why = "is unhealthy";
     else if (worker->blocked(job->seq, state_->ticked))
       why = "failed too many of its units";
     else if (worker->draining)

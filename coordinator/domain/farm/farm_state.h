@@ -1,4 +1,4 @@
-// The state of the farm, and what it does on each event. The functions are grouped by subject into the files
+// The state of the farm, and its reaction to each event. The functions are grouped by subject into the files
 // farm_jobs, farm_changes, farm_workers, farm_units, farm_leases, schedule, farm_stop and farm_trust. A unit
 // is one round (range of samples) of one tile; a lease is a list of units that one worker was told to render.
 #pragma once
@@ -30,20 +30,21 @@ struct Farm::State {
   std::unordered_map<JobId, Job*> by_id;
   JobSeq last_job = 0;
   FairShare shares;                    // the jobs with units to lease, and their order
-  std::map<std::string, Load> users;   // units leased of each owner; without the administrator
-  std::map<std::string, Load> groups;  // units leased of each sequence (JobPlan::group)
+  std::map<std::string, Load> users;   // leased units of each owner, except the administrator
+  std::map<std::string, Load> groups;  // leased units of each sequence (JobPlan::group)
   std::map<WorkerId, std::string> quarantined;
   AuditFigures audited;
   std::set<JobId> audits_changed;
 
   // State of the event being handled
   TimePoint now{};
-  // Time of the last Tick. Whether a worker is still blocked is decided by this time, since blocks are
-  // forgiven at ticks, when all workers are checked
+  // Time of the last Tick. Whether a worker is still blocked is decided by this time, because blocks are
+  // lifted at ticks, when all workers are checked
   TimePoint ticked{};
   std::vector<Effect> effects;
-  bool work_appeared = false;   // there may be units that any worker could take now
-  std::set<WorkerIndex> dirty;  // workers that may want more work, since something about them has changed
+  bool work_appeared = false;      // there may be units that any worker could take now
+  bool pinned_for_others = false;  // a job was pinned for which workers wait that may not begin jobs
+  std::set<WorkerIndex> dirty;     // workers whose state has changed, so that they may want more work
 
   // farm_jobs.cpp, farm_changes.cpp
   void on(const JobSubmitted& event);
@@ -53,6 +54,7 @@ struct Farm::State {
   void on(const JobResumed& event);
   void on(const JobStopped& event);
   void on(const JobPriority& event);
+  void on(const JobFocused& event);
   void on(const JobRetargeted& event);
   void on(const JobExtended& event);
   void on(const JobForgotten& event);
@@ -63,7 +65,8 @@ struct Farm::State {
   Job* find(const JobId& id) const;
   Job& add(JobPlan plan);
   void set_state(Job& job, JobState to);
-  // Tells FairShare whether the job has units to lease; call after any change of its queue, state or window
+  // Tells FairShare whether the job has units to lease. Must be called after any change of the job's queue,
+  // state or window
   void refresh(Job& job);
   void restore_tile(Job& job, TileIndex tile, const JobRestored& event);
   void freeze(Job& job, StopReason reason);
@@ -88,8 +91,10 @@ struct Farm::State {
   void forget_names();  // forgets names of workers that are gone and that no job refers to
 
   // farm_units.cpp
+  void on(const ClassChosen& event);
   void on(const UnitAccepted& event);
   void on(const UnitFolded& event);
+  void on(const DenoisedChecked& event);
   void on(const UnitFailed& event);
   void charge(Job& job, double cpu_seconds);  // adds these seconds to the share of the job's owner
   void issue_folds(Job& job, TileIndex tile);
@@ -110,25 +115,28 @@ struct Farm::State {
   void disagreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
   void claimed(Job& job, UnitCode code, const UnitAccepted& by);
   void undecided(Job& job, UnitCode code);
-  // Which workers could render the unit of an audit: none; only workers that are connected but get no work
-  // now (away); or one that may begin (there).
+  // The workers that could render the unit of an audit. `none`: no worker; `away`: only workers that are
+  // connected but get no work now; `there`: at least one that may begin.
   enum class Deciders { none, away, there };
   Deciders deciders(const Job& job, const Audit& audit) const;
-  void settle_audits(Job& job);  // drops the open audits that no worker can do, or decides them
+  void settle_audits(Job& job);  // decides or drops the open audits that no worker can do
   void audit_failed(Job& job, UnitCode code, Worker& worker, LeaseRecord& lease);
   void close_audits(Job& job, const std::function<bool(UnitCode, const Audit&)>& which);
   void found_faulty(const UnitKey& unit, WorkerIndex faulty, std::string evidence);
-  void bar(const WorkerId& id, const std::string& why);  // the worker is in `quarantined` already
+  void bar(const WorkerId& id, const std::string& why);  // requires that the worker is in `quarantined`
+                                                         // already
   void void_results(Job& job, WorkerIndex faulty);
   void void_tile(Job& job, TileIndex tile);
   static void steer_anew(Job& job);
 
   // farm_stop.cpp
 
-  // Tells the stop rule the error of the tile after this round, which has just been folded, and acts on its
-  // decision.
+  // Passes the error of the tile after this round, which has just been folded, to the stop rule and acts on
+  // its decision.
   void steer(Job& job, TileIndex tile, RoundIndex round);
-  void judge(Job& job);  // judges the image at every level that all groups have reached
+  void judge(Job& job);                        // judges the image at every level that all groups have reached
+  AdaptiveStop::Verdict verdict_on(Job& job);  // of the image at the level that all groups have reached
+  AdaptiveStop::Verdict denoised_verdict(Job& job);
   void mark_level(Job& job, bool last);
   void take_marks(Job& job);  // emits a Checkpoint for each mark (job.h) that is folded
   void stop_at_level(Job& job);
@@ -143,7 +151,8 @@ struct Farm::State {
   void grant(Job& job, Worker& worker, std::vector<UnitCode> units, bool audit = false);
   void load(Job& job, const Worker& worker, std::uint32_t units);
   void unload(Job& job, std::uint32_t units);
-  void leave_load(Job& job, const Worker& worker);  // counts one lease of the job less for the worker
+  void leave_load(Job& job, const Worker& worker);  // subtracts one of the job's leases from the worker's
+                                                    // count
   // Returns how many more of the job's units the worker may be leased under the limits on workers and units.
   // Audits are exempt: the farm orders them, not the user, and an audit that waited for the user's other work
   // would delay the end of a finished job.
@@ -156,7 +165,7 @@ struct Farm::State {
   // if unknown.
   void settle_unit(Job& job, UnitCode code, const Worker* by);
   // Takes those units of the lease for which `which` is true from the worker and queues them again. A lease
-  // without units ends. `send_worker`: the worker is told so.
+  // without units ends. `send_worker`: the worker gets a message about it.
   template <class Which>
   void free_units(LeaseRecord& lease, FreedCause why, bool send_worker, Which&& which);
   void free_lease(LeaseSeq seq, FreedCause why, bool send_worker);
@@ -168,10 +177,11 @@ struct Farm::State {
   void dispatch();
   void serve(const std::vector<Worker*>& candidates, bool only_uncovered, bool only_holders);
   bool assign(Worker& worker, bool only_held);
-  Job* choose(const Worker& worker);  // the job that this worker gets units of next; null: none
+  Job* choose(const Worker& worker);  // the job whose units this worker gets next; null: none
   enum class Takes { nothing, later, now };
   Takes takes(Job& job, const Worker& worker);
   bool may_pin(const Job& job, const Worker& worker) const;
+  void pin(Job& job, const Digest& numeric_class);  // does nothing if the job is pinned already
   bool lease_from(Job& job, Worker& worker);
   std::optional<UnitCode> next_for(Job& job, const Worker& worker);
   // True if the unit is speculative and the worker should not get it yet, because it still has enough to do.
@@ -191,10 +201,10 @@ struct Farm::State {
 template <class Which>
 void Farm::State::free_units(LeaseRecord& lease, FreedCause why, bool send_worker, Which&& which) {
   Job& job = *lease.job;
-  UnitsFreed freed{job.plan.brief.job, leases.id_of(lease.seq), lease.worker->id, {}, why};
+  UnitsFreed freed{job.plan.brief.job, leases.id_of(lease.seq), lease.worker->id, {}, why, lease.audit};
   for (const UnitCode code : lease.units) {
     if (!has(lease, code) || !which(code)) continue;
-    if (!lease.audit) freed.units.push_back(job.key(code));
+    freed.units.push_back(job.key(code));
     if (!lease.audit) job.voters.note(code, lease.worker->index);
     work_appeared |= lease.audit;
     if (!detach(lease, code)) continue;

@@ -1,5 +1,5 @@
-// How a job ends by its target error or by its time limit. For the error, this file passes errors to the stop
-// rule (adaptive_stop.h), judges its levels and takes their checkpoints.
+// The end of a job by its target error or by its time limit. For the target error, this file passes errors to
+// the stop rule (adaptive_stop.h), judges the image at each level and takes checkpoints of the levels.
 #include <algorithm>
 
 #include "coordinator/domain/farm/farm_state.h"
@@ -26,7 +26,7 @@ void Farm::State::judge(Job& job) {
   AdaptiveStop& rule = *job.adaptive;
   bool lower = false;
   while (job.adaptive_running() && rule.settled() && rule.level() != job.level_seen) {
-    const auto verdict = rule.exhausted() ? AdaptiveStop::Verdict::no : rule.judge(*job.plan.target_error);
+    const auto verdict = verdict_on(job);
     if (verdict == AdaptiveStop::Verdict::unknown) break;
     job.level_seen = rule.level();
     mark_level(job, verdict == AdaptiveStop::Verdict::yes || rule.exhausted());
@@ -38,6 +38,48 @@ void Farm::State::judge(Job& job) {
   if (!lower) return;
   job.move_windows(workers.threads());
   for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
+}
+
+AdaptiveStop::Verdict Farm::State::verdict_on(Job& job) {
+  if (job.adaptive->exhausted()) return AdaptiveStop::Verdict::no;
+  return job.denoised ? denoised_verdict(job) : job.adaptive->judge(*job.plan.target_error);
+}
+
+AdaptiveStop::Verdict Farm::State::denoised_verdict(Job& job) {
+  using Verdict = AdaptiveStop::Verdict;
+  AdaptiveStop& rule = *job.adaptive;
+  const double spp = rule.mean_spp(), target = *job.plan.target_error;
+  const auto answer = job.denoised->judge(spp, target);
+  if (answer == DenoisedTarget::Answer::end) return Verdict::yes;
+  if (answer == DenoisedTarget::Answer::go_on) {
+    if (!(rule.predicted() > 0) && job.denoised->met(target)) return Verdict::yes;
+    if (job.denoised->due(spp)) {
+      job.predicted_error = rule.predicted() * job.denoised->error_left(target);
+      job.predicted_at = 0;
+    }
+    return Verdict::no;
+  }
+  // The film can be denoised only while it is exactly that of this level.
+  const std::vector<RoundIndex> ends = rule.ends();
+  bool missing = false;
+  for (TileIndex t = 0; t < job.units.tiles(); ++t) {
+    if (job.units.issued(t) > ends[t]) return Verdict::no;
+    missing |= job.units.folded(t) < ends[t];
+  }
+  if (!missing && job.checking_spp != spp) {
+    job.checking_spp = spp;
+    effects.emplace_back(CheckDenoised{job.plan.brief.job, spp});
+  }
+  return Verdict::unknown;
+}
+
+void Farm::State::on(const DenoisedChecked& event) {
+  Job* job = find(event.job);
+  if (job == nullptr || job->ended() || !job->denoised) return;
+  job->denoised->add(event.check);
+  judge(*job);
+  finish_if_complete(*job);
+  refresh(*job);
 }
 
 void Farm::State::mark_level(Job& job, bool last) {
@@ -59,8 +101,8 @@ void Farm::State::take_marks(Job& job) {
 }
 
 void Farm::State::stop_at_level(Job& job) {
-  // Folds that were requested cannot be taken back. If the target was raised, they may be more than the level
-  // needs.
+  // Folds that were requested cannot be undone. If the target was raised, more rounds may be folded than the
+  // level needs.
   std::vector<RoundIndex> ends = job.adaptive->ends();
   for (TileIndex t = 0; t < job.units.tiles(); ++t) ends[t] = std::max(ends[t], job.units.issued(t));
   job.cut_off(ends, StopReason::error);
@@ -68,11 +110,11 @@ void Farm::State::stop_at_level(Job& job) {
   for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
 }
 
-// Decides which units are still rendered before the time limit. Queued units are looked at in the order of
-// rounds, and kept as long as there is time for their predicted cost: the time of all cores until the limit,
-// minus what the leased units need. A unit is kept if at least half of it fits, so the job ends as often
-// before the limit as after it. Leased units stay leased, however long they take: dropping slow units would
-// bias the image. This is repeated until the limit, since predictions improve.
+// Decides which units are still rendered before the time limit. Queued units are considered in the order of
+// rounds, and kept as long as their predicted cost fits the remaining time: the time of all cores until the
+// limit, minus the cost of the leased units. A unit is kept if at least half of it fits, so the job ends as
+// often before the limit as after it. Leased units stay leased, however long they take: dropping slow units
+// would bias the image. This function is called again until the limit, since predictions improve.
 void Farm::State::plan_end(Job& job, TimePoint limit) {
   if (job.adaptive_running() || !job.cost.known()) return;
   if (job.stopping == StopReason::time) {

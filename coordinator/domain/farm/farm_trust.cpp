@@ -1,8 +1,8 @@
 // Audits detect faulty workers. A random share of the accepted results is rendered again by another worker,
-// and the two results are compared; so are copies that were leased because a unit was slow. Only workers that
-// held a lease on a unit may vote on it (voter_table.h). If two results of a unit differ, a third worker
-// decides, and the outvoted one is quarantined: every tile that it has contributed to, in any running job, is
-// folded again from round 0.
+// and the two results are compared. Copies of slow units, which two workers render, are compared in the same
+// way. Only workers that held a lease on a unit may vote on it (VoterTable). If two results of a unit differ,
+// a third worker decides, and the outvoted one is quarantined: every tile that it has contributed to, in any
+// running job, is folded again from round 0.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -50,8 +50,8 @@ void Farm::State::consider_audit(Job& job, UnitCode code, WorkerIndex first) {
   work_appeared = true;
 }
 
-// Audits that were open at the restart continue. No worker is connected yet, so workers get some time to come
-// back.
+// Audits that were open at the restart continue. No worker is connected yet; their deadline leaves workers
+// time to come back.
 void Farm::State::restore_audits(Job& job, const JobRestored& event) {
   for (const JobRestored::Audit& open : event.audits) {
     const UnitCode code = unit_code(open.round, open.tile);
@@ -168,7 +168,7 @@ void Farm::State::agreed(Job& job, UnitCode code, const UnitAccepted& with, bool
   const WorkerIndex by = workers.index_of(with.worker);
   if (found == job.audits.end() || by == first.worker) return;
   const Audit audit = found->second;
-  // Has this worker delivered another digest of this unit before? Then it is faulty.
+  // If this worker has delivered a different digest of this unit before, it is faulty.
   for (const auto& before : {audit.second, audit.claim})
     if (before && by == before->first)
       return found_faulty(with.unit, by, contradiction(with, before->second));
@@ -215,9 +215,9 @@ void Farm::State::disagreed(Job& job, UnitCode code, const UnitAccepted& with, b
                outvoted(with.unit, first.digest, workers.name_of(second), with.worker, claimed));
 }
 
-// Handles a differing result that nobody asked this worker for. The worker has chosen the unit itself, so its
-// result is no vote. But the unit is audited, and if the auditor agrees with the accepted result, the worker
-// that made the claim is faulty.
+// Handles a differing result from a worker that was not asked for it. The worker has chosen the unit itself,
+// so its result is no vote. But the unit is audited, and if the auditor agrees with the accepted result, the
+// worker that made the claim is faulty.
 void Farm::State::claimed(Job& job, UnitCode code, const UnitAccepted& by) {
   const std::pair claimed{workers.index_of(by.worker), by.digest};
   if (const auto open = job.audits.find(code); open != job.audits.end()) {
@@ -272,7 +272,7 @@ void Farm::State::bar(const WorkerId& id, const std::string& why) {
 
 void Farm::State::void_results(Job& job, WorkerIndex faulty) {
   std::vector<TileIndex> tiles = job.units.tiles_of(faulty);
-  // In an adaptive job one tile's errors affect where all others end.
+  // In an adaptive job the error of one tile affects where all other tiles end.
   const bool by_error = job.adaptive && (!job.stopping || *job.stopping == StopReason::error);
   if (!tiles.empty() && by_error) {
     tiles.resize(job.units.tiles());
@@ -287,14 +287,14 @@ void Farm::State::void_results(Job& job, WorkerIndex faulty) {
   for (auto& [code, audit] : job.audits)
     if (audit.claim && audit.claim->first == faulty) audit.claim.reset();
   for (const TileIndex tile : tiles) void_tile(job, tile);
-  if (!tiles.empty()) job.checkpoint_spp = 0;  // earlier checkpoints were of an image with wrong pixels
+  if (!tiles.empty()) job.checkpoint_spp = 0;  // earlier checkpoints described an image with wrong pixels
   if (!tiles.empty() && job.adaptive) steer_anew(job);
   if (!tiles.empty()) job.move_windows(workers.threads());
   finish_if_complete(job);
   refresh(job);
 }
 
-// Rebuilds the stop rule from what is still folded.
+// Rebuilds the stop rule from the rounds that are still folded.
 void Farm::State::steer_anew(Job& job) {
   job.adaptive.reset();
   job.steer();

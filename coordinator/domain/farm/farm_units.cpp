@@ -1,4 +1,4 @@
-// What the farm does with results and failures of units (rounds of tiles) and when they are folded, and how a
+// The farm's reaction to results and failures of units (rounds of tiles): when results are folded, and when a
 // job fails.
 #include <fmt/format.h>
 
@@ -7,6 +7,24 @@
 #include "coordinator/domain/farm/farm_state.h"
 
 namespace ls::coordinator {
+
+void Farm::State::pin(Job& job, const Digest& numeric_class) {
+  if (job.numeric_class) return;
+  job.numeric_class = numeric_class;
+  effects.emplace_back(JobPinned{job.plan.brief.job, numeric_class});
+  // Workers that may not begin a job may take units of it from now on.
+  for (const WorkerIndex index : workers.wanting_work()) {
+    const Worker& worker = workers.at(index);
+    if (!worker.may_begin && worker.numeric_class == numeric_class) work_appeared = pinned_for_others = true;
+  }
+}
+
+void Farm::State::on(const ClassChosen& event) {
+  Job* job = find(event.job);
+  if (job == nullptr || job->ended()) return;
+  pin(*job, event.numeric_class);
+  refresh(*job);
+}
 
 void Farm::State::on(const UnitAccepted& event) {
   const auto unwanted = [&](std::string why) {
@@ -28,10 +46,7 @@ void Farm::State::on(const UnitAccepted& event) {
   }
   if (job.units.accepted(code)) return compare(job, code, event);
 
-  if (worker != nullptr && !job.numeric_class) {  // the service has checked may_pin()
-    job.numeric_class = worker->numeric_class;
-    effects.emplace_back(JobPinned{event.unit.job, worker->numeric_class});
-  }
+  if (worker != nullptr) pin(job, worker->numeric_class);
   if (job.state == JobState::queued) set_state(job, JobState::running);
   if (!job.first_ray) job.first_ray = now - from_seconds(std::clamp(event.cpu_seconds, 0.0, 3600.0));
   effects.emplace_back(RecordUnit{event.unit, event.samples, event.digest, event.worker});
@@ -75,11 +90,11 @@ void Farm::State::on(const UnitFolded& event) {
 }
 
 // Takes a checkpoint after a round that is folded in all tiles. In an adaptive job (one with a target error)
-// this holds only for the rounds that all tiles get for certain; later checkpoints are taken at levels of the
-// stop rule.
+// this function handles only the rounds that every tile gets in any case; later checkpoints are taken at
+// levels of the stop rule.
 void Farm::State::checkpoint(Job& job, RoundIndex round) {
   const double spp = static_cast<double>(cut_range(round, job.spp).s1);
-  // A truncated round that was reopened is folded a second time: it makes no further checkpoint.
+  // A truncated round that was reopened is folded a second time, which makes no further checkpoint.
   if ((!job.adaptive || cut_range(round, job.spp).s1 < std::min(job.spp, kMinSppBeforeStop)) &&
       spp > job.checkpoint_spp) {
     job.checkpoint_spp = spp;
@@ -111,8 +126,8 @@ void Farm::State::on(const UnitFailed& event) {
   note_progress(*worker);
   const UnitCode code = unit_code(event.failure.unit.round, event.failure.unit.tile);
   if (event.failure.unit.tile >= job->units.tiles() || !job->queue.plans(code)) return;
-  // Only a worker that holds the unit can fail at it. A unit that was taken back from it is rendered
-  // elsewhere.
+  // Only a worker that holds the unit can fail on it. If the unit was taken back, another worker renders it,
+  // and this report is ignored.
   LeaseRecord* lease = lease_of(*job, code, *worker);
   if (lease == nullptr) return;
   if (lease->audit) return audit_failed(*job, code, *worker, *lease);
@@ -125,7 +140,7 @@ void Farm::State::count_failure(Job& job, UnitCode code, Worker& worker, const U
   WorkerFailures& record = worker.failures[job.seq];
   const bool was_blocked = record.blocked_at(now);
   record.add(now);
-  work_appeared = true;  // the set of workers that may take it has changed
+  work_appeared = true;  // the failure changes which workers may take the unit
   std::size_t known = 0, willing = 0;
   for (const auto& [index, other] : workers.all()) {
     if (!other->connected || !fits(job, *other)) continue;
@@ -137,8 +152,8 @@ void Farm::State::count_failure(Job& job, UnitCode code, Worker& worker, const U
     fail(job, head + describe_failure(rect, job.range(code), job.failures.attempts(code), job.plan.replay),
          failure);
   };
-  // One worker's word that the scene is at fault does not fail the job: its memory may be bad, or it lies. It
-  // counts like any other failure.
+  // A single report that the scene is at fault does not fail the job: the worker may have bad memory or lie.
+  // It counts like any other failure.
   const std::string at_fault = failure.scene_at_fault ? "the scene cannot be rendered: " : "";
   if (job.failures.exhausted(code, known)) return report(at_fault);
   if (known > 0 && willing == 0) {

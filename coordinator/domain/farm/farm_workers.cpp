@@ -1,4 +1,4 @@
-// What the farm does when workers join, report and leave, and as time passes.
+// The farm's reaction to workers that join, report and leave, and to the passing of time.
 #include <algorithm>
 #include <span>
 
@@ -27,6 +27,7 @@ void Farm::State::on(const WorkerJoined& event) {
   worker.tags = event.tags;
   std::sort(worker.tags.begin(), worker.tags.end());
   worker.memory_bytes = event.memory_bytes;
+  worker.may_begin = event.may_begin;
   worker.blobs.clear();
   for (const Digest& blob :
        std::span(event.blobs_held).first(std::min(event.blobs_held.size(), kBlobsRemembered)))
@@ -65,7 +66,7 @@ void Farm::State::lose(Worker& worker, FreedCause why) {
   while (!worker.leases.empty()) free_lease(*worker.leases.begin(), why, false);
   workers.settle(worker);
   effects.emplace_back(WorkerStateChanged{worker.id, worker.state(), std::string(to_string(why))});
-  work_appeared = true;  // units that were kept for this worker
+  work_appeared = true;  // units that were reserved for this worker are free again
 }
 
 void Farm::State::on(const WorkerDrains& event) {
@@ -116,7 +117,7 @@ void Farm::State::on(const LeaseCameBack& event) {
   std::set<UnitCode> back;
   for (const UnitKey& unit : event.returned.unrendered) back.insert(unit_code(unit.round, unit.tile));
   workers.settle(*worker);
-  work_appeared = true;  // including units that were left for this worker
+  work_appeared = true;  // units that were reserved for this worker may go to others
   free_units(*lease, FreedCause::returned, false, [&](UnitCode code) { return back.contains(code); });
 }
 
@@ -131,13 +132,13 @@ void Farm::State::on(const Tick&) {
     if (!job->leasable() || job->frozen) continue;
     const auto limit = job->time_limit(now);
     if (limit && now >= *limit) freeze(*job, StopReason::time);
-    // Early enough that no lease reaches the limit yet
+    // The end is planned before the first lease could extend beyond the limit
     else if (limit && seconds(*limit - now) <= 2 * kTimePlanned)
       plan_end(*job, *limit);
   }
   work_appeared = true;
   for (const WorkerIndex index : workers.wanting_work()) {
-    if (!workers.at(index).saturated()) dirty.insert(index);  // they may copy overdue units
+    if (!workers.at(index).saturated()) dirty.insert(index);  // they may render copies of overdue units
   }
 }
 

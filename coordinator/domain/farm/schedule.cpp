@@ -1,7 +1,7 @@
 // Decides which worker gets which units next; a unit is one round (range of samples) of one tile. Higher
-// priorities go first, jobs of one priority get equal shares (fair_share.h), and within a job lower rounds go
-// first, which give a preview (the order of unit codes). Idle workers go before busy ones, and among them
-// those that hold the job's world. Leases shrink near the end of a job.
+// priorities go first, and jobs of one priority get equal shares (fair_share.h). Within a job lower rounds go
+// first, so that a preview of the whole image is available early. Idle workers go before busy ones, and among
+// them those that have loaded the job's world. Leases shrink near the end of a job.
 #include <algorithm>
 #include <limits>
 
@@ -12,11 +12,11 @@ namespace {
 
 struct LeaseSize {
   std::uint64_t units = 1;
-  double seconds = 0;  // CPU seconds; a lease is complete when its predicted cost reaches them
+  double seconds = 0;  // CPU seconds; units are added to a lease until its predicted cost reaches this
 };
 
-// Returns the seconds until the job's time limit, minus those that the worker needs for the leases it holds.
-// Infinite if no limit applies.
+// Returns the seconds until the job's time limit, minus the seconds that the worker needs for the leases it
+// holds. Infinite if no limit applies.
 double seconds_left(const Job& job, const Worker& worker, TimePoint now) {
   const auto limit = job.time_limit(now);
   if (!limit || job.frozen) return std::numeric_limits<double>::infinity();
@@ -31,7 +31,7 @@ LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, Tim
   const std::uint64_t threads = static_cast<std::uint64_t>(worker.threads);
   const std::uint64_t halves = 2 * static_cast<std::uint64_t>(std::max(farm_threads, 1));
   const std::uint64_t waiting = std::min(job.queued(), job.queue.surely_waiting());
-  // `least`: with leases of single units, a worker with many threads would hold kMaxLeasesPerWorker leases
+  // `least`: with single-unit leases, a worker with many threads would reach kMaxLeasesPerWorker leases
   // before all its threads have work.
   const std::uint64_t least = (kUnitsAThread * threads + kMaxLeasesPerWorker - 1) / kMaxLeasesPerWorker;
   const std::uint64_t share = std::max(least, (waiting * threads + halves - 1) / halves);
@@ -41,8 +41,8 @@ LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, Tim
   return {std::min(share, most), lasts * worker.cores()};
 }
 
-// True if the job's time limit keeps this unit from the worker: nothing is leased after the limit, or when
-// the worker is busy until the limit. Every tile gets its first round all the same.
+// True if the job's time limit forbids leasing this unit to the worker: the limit has passed, or the worker
+// is busy until then. The first round of every tile is exempt.
 bool out_of_time(const Job& job, const Worker& worker, UnitCode code, TimePoint now) {
   const auto limit = job.time_limit(now);
   if (!limit || job.frozen || round_of(code) == 0) return false;
@@ -54,6 +54,7 @@ bool out_of_time(const Job& job, const Worker& worker, UnitCode code, TimePoint 
 
 void Farm::State::dispatch() {
   do {
+    pinned_for_others = false;
     std::vector<Worker*> candidates;
     for (const WorkerIndex index : work_appeared ? workers.wanting_work() : dirty) {
       if (workers.wanting_work().contains(index)) candidates.push_back(&workers.at(index));
@@ -63,7 +64,7 @@ void Farm::State::dispatch() {
       if (choice) serve(candidates, only_uncovered, true);
       serve(candidates, only_uncovered, false);
     }
-  } while (take_back_for_idle());
+  } while (pinned_for_others || take_back_for_idle());
   for (const WorkerIndex index : dirty) {
     if (workers.wanting_work().contains(index)) copy_overdue(workers.at(index));
   }
@@ -82,7 +83,7 @@ bool Farm::State::take_back_for_idle() {
   return false;
 }
 
-// A worker processes its leases in order: it has not begun this one as long as its earlier leases keep all
+// A worker processes its leases in order. It has not begun this one as long as its earlier leases keep all
 // its threads busy.
 bool Farm::State::untouched(const LeaseRecord& lease) const {
   std::uint32_t units = 0;
@@ -100,7 +101,8 @@ double Farm::State::waits_behind_others(const LeaseRecord& lease) const {
   for (const LeaseSeq seq : lease.worker->leases) {
     if (seq >= lease.seq) break;
     const LeaseRecord& earlier = leases.all().at(seq);
-    // The cost is predicted anew: when the first leases were granted, nothing was measured
+    // The cost is predicted again, since the prediction at the time of the grant may precede the first
+    // measurement
     before += earlier.remaining * earlier.job->predict(earlier.units.front());
   }
   return before / lease.worker->cores();
@@ -113,8 +115,8 @@ LeaseRecord* Farm::State::longest_waiting_for(const Worker& idle) {
   for (auto it = leases.all().rbegin(); it != leases.all().rend() && ++looked_at <= kSpeculationScan; ++it) {
     LeaseRecord& lease = it->second;
     const Job& job = *lease.job;
-    // The idle worker must be able to begin immediately: it has loaded the job's world, and no rule keeps the
-    // units from it.
+    // The idle worker must be able to begin immediately: it has loaded the job's world, and every rule allows
+    // it these units.
     if (lease.audit || lease.worker == &idle || !idle.warmed_up.contains(job.seq) ||
         !may_serve(job, idle, ticked) || !job.leasable() || room(job, idle) < lease.remaining)
       continue;
@@ -147,8 +149,8 @@ Farm::State::Takes Farm::State::takes(Job& job, const Worker& worker) {
   return too_early(job, worker, *code, 0, 0) ? Takes::later : Takes::now;
 }
 
-// Nobody can audit a worker that is alone in its numeric class. So, if some class has several workers that
-// fit the job, the job is pinned to such a class. Without audits it does not matter.
+// A worker that is alone in its numeric class cannot be audited. So, if some class has several workers that
+// fit the job, the job may be pinned only to such a class. Without audits any class will do.
 bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
   if (job.numeric_class || options.audit_rate <= 0 || workers.of_class(worker.numeric_class) > 1) return true;
   std::map<Digest, int> others;
@@ -162,10 +164,10 @@ bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
   return true;
 }
 
-// Returns the next job for this worker. This is the first in turn, or one whose world the worker holds
-// (loading a world costs time), unless that one has had much more than its share. But if no worker renders
-// the first job in turn, it is not passed over in this way. Null if there is none. Null also if the worker
-// will get units of the first job, but not yet: leases of another job in between would prevent that.
+// Returns the next job for this worker: the first in turn, or a later one whose world the worker has loaded
+// (loading a world costs time), unless the later one is far ahead of its fair share. A first job that no
+// worker renders is never passed over in this way. Null if there is no job. Null also if the worker will get
+// units of the first job, but not yet: leases of another job would delay those.
 Job* Farm::State::choose(const Worker& worker) {
   Job* fair = nullptr;
   Job* chosen = nullptr;
@@ -221,10 +223,7 @@ bool Farm::State::lease_from(Job& job, Worker& worker) {
     cost += job.predict(*code);
   }
   if (units.empty()) return false;
-  if (!job.numeric_class) {
-    job.numeric_class = worker.numeric_class;
-    effects.emplace_back(JobPinned{job.plan.brief.job, worker.numeric_class});
-  }
+  pin(job, worker.numeric_class);
   if (job.state == JobState::queued) set_state(job, JobState::running);
   shares.served(job);
   grant(job, worker, std::move(units));

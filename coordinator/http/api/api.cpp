@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <exception>
 
 #include "common/base/log.h"
+#include "common/base/parse_number.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/message/problem.h"
 
@@ -59,8 +59,8 @@ std::string target_of(const Request& request) {
   return target;
 }
 
-// Returns a redirect to the coordinator that has the job, or a 503 if that coordinator cannot be found out or
-// does not answer; nullopt: no coordinator has the job.
+// Returns a redirect to the coordinator that has the job, or a 503 if that coordinator is unknown at the
+// moment or does not answer; nullopt: no coordinator has the job.
 std::optional<Response> at_its_owner(coordinator::Coordinator& coordinator, const Request& request,
                                      const Params& params) {
   if (params.empty() || !plausible_id(params[0])) return std::nullopt;
@@ -99,8 +99,8 @@ Api::Api(coordinator::Coordinator& coordinator, TokenRegistry& tokens, Limits li
 
 std::variant<Response, Match> Api::admit(Request& request) {
   auto found = admit_route(request);
-  // A request with a known caller was already counted when its caller was identified; the others are counted
-  // here, by address.
+  // Requests of known callers were counted when the caller was identified. The others are counted here, by
+  // address.
   if (request.caller.token_id.empty())
     if (auto refused = auth_.too_often(request, nullptr)) return *refused;
   return found;
@@ -196,8 +196,8 @@ Response Api::handle(const Match& match, const Request& request) {
   });
 }
 
-// Only jobs unknown here are looked up elsewhere; their owner's coordinator checks access. A local job that
-// the caller may not see stays a 404.
+// Only jobs unknown here are looked up at other coordinators; the job's own coordinator checks access. A
+// local job that the caller may not see stays a 404.
 bool Api::may_be_another_coordinators(const Match& match, const Response& response) const {
   return response.status == 404 && match.route->pattern.starts_with(kOneJob) && !match.params.empty() &&
          !coordinator_.owner(JobId{match.params[0]});
@@ -236,11 +236,10 @@ Result<JobId> job_of(const Request& request, const Params& params) {
   if (!plausible_id(id.value)) return fail(Errc::not_found, "there is no such job");
   const auto text = request.parameter("frame");
   if (!text) return id;
-  std::uint32_t frame = 0;
-  const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), frame);
-  if (error != std::errc{} || end != text->data() + text->size() || frame > kMaxFrameNumber)
+  const auto frame = parse_number<std::uint32_t>(*text);
+  if (!frame || *frame > kMaxFrameNumber)
     return fail(Errc::invalid_argument, "'frame' must be the number of a frame");
-  return coordinator::frame_job(id, frame);
+  return coordinator::frame_job(id, *frame);
 }
 
 }  // namespace ls::http

@@ -20,8 +20,8 @@
 
 namespace ls::http {
 
-// Receives the body of one request in pieces, as they arrive. If the sink is destroyed before finish(), what
-// it has received is thrown away, except in an upload in parts, where a later request can continue.
+// Receives the body of one request in pieces, as they arrive. If the sink is destroyed before finish(), the
+// received bytes are dropped, except in an upload in parts, which a later request can continue.
 class BodySink {
  public:
   virtual ~BodySink() = default;
@@ -41,7 +41,8 @@ class Api {
   // route, or a Response that the server sends without calling handle(): a static file, or an error (unknown
   // address, missing or insufficient token, too many requests, body too long).
   std::variant<Response, Match> admit(Request& request);
-  // Returns how many bytes this request's body may have at most, with or without Content-Length.
+  // Returns the greatest allowed length of this request's body in bytes. It also holds without
+  // Content-Length.
   std::uint64_t body_limit(const Route& route, const Request& request) const;
   // Returns how this request's body is to be read: BodyKind::archive if its media type is in Route::unpacks,
   // else Route::body.
@@ -57,7 +58,7 @@ class Api {
   // Returns the sink for a body that is streamed (BodyKind::blob and archive), or the response that rejects
   // the request.
   std::variant<Response, std::unique_ptr<BodySink>> open_upload(const Match& match, const Request& request);
-  // Makes long work end at its next step, because the coordinator stops.
+  // Requests that long work ends at its next step, because the coordinator stops.
   void ask_to_stop() { stop_.request_stop(); }
   std::stop_token stop_token() const { return stop_.get_token(); }
 
@@ -69,6 +70,9 @@ class Api {
   // Sets the function from which /metrics gets the webhook counters; call this before the first request. If
   // it is never called, /metrics has no webhook counters.
   void webhooks(std::function<WebhookFigures()> figures) { webhooks_ = std::move(figures); }
+  // The same for the counters of spans
+  void traces(std::function<trace::Figures()> figures) { traces_ = std::move(figures); }
+  std::optional<trace::Figures> traces() const { return traces_ ? std::optional(traces_()) : std::nullopt; }
   std::optional<WebhookFigures> webhooks() const {
     return webhooks_ ? std::optional(webhooks_()) : std::nullopt;
   }
@@ -77,7 +81,7 @@ class Api {
   std::variant<Response, Match> admit_route(Request& request);
   std::optional<Response> refuse_caller(Access access, Request& request);
   std::optional<Response> refuse_body(const Route& route, const Request& request) const;
-  // 404 if a submit token asks for another user's job: to it such jobs do not exist.
+  // Returns a 404 if a submit token is used for another user's job, which is invisible to this caller.
   std::optional<Response> refuse_job(const Match& match, const Request& request) const;
 
   coordinator::Coordinator& coordinator_;
@@ -87,13 +91,15 @@ class Api {
   StaticFiles files_;
   Counters counters_;
   std::function<WebhookFigures()> webhooks_;
+  std::function<trace::Figures()> traces_;
   std::stop_source stop_;
 };
 
-// Returns work(), or 503 (out of memory) or 500 if it throws. `what` names the work in the log.
+// Returns work(). If it throws, returns 503 (out of memory) or 500 (anything else). `what` names the work in
+// the log.
 Response guarded(std::string_view what, const std::function<Response()>& work);
 
-// True if the id has the characters and length of ids made here; anything else is no job.
+// True if the text has the characters and length of the ids made here. Any other text is no job's id.
 bool plausible_id(std::string_view id);
 
 // Returns the id of the job in a request's address. With ?frame=N the address names a sequence (a job with

@@ -1,8 +1,12 @@
 #include <fmt/format.h>
 
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "common/base/parse_number.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/api/handlers.h"
-#include "coordinator/http/message/content_range.h"
 #include "coordinator/http/message/json_read.h"
 #include "coordinator/http/message/problem.h"
 
@@ -10,6 +14,44 @@ namespace ls::http {
 namespace {
 
 using coordinator::BlobStore;
+
+// The Content-Range header of one request of an upload in parts: "bytes FIRST-LAST/SIZE" (RFC 9110,
+// 14.4), or "bytes */SIZE" with an empty body if the client has sent all bytes already.
+struct ContentRange {
+  std::uint64_t first = 0;
+  std::uint64_t bytes = 0;  // length of this part, LAST - FIRST + 1; 0: the header was "bytes */SIZE"
+  std::uint64_t size = 0;   // SIZE: bytes of the whole upload
+  bool possible = true;     // false: FIRST-LAST does not lie within SIZE bytes
+  bool is_last() const { return first + bytes == size; }
+};
+
+// Numbers above this are rejected. It is larger than any file, but small enough that sums of two such numbers
+// do not overflow.
+constexpr std::uint64_t kMost = std::uint64_t{1} << 62;
+
+std::optional<std::uint64_t> number(std::string_view text) {
+  const auto value = parse_number<std::uint64_t>(text);
+  return value && *value <= kMost ? value : std::nullopt;
+}
+
+// Returns nullopt if the value has neither of the two forms.
+std::optional<ContentRange> parse_content_range(std::string_view value) {
+  constexpr std::string_view kUnit = "bytes ";
+  if (!value.starts_with(kUnit)) return std::nullopt;
+  value.remove_prefix(kUnit.size());
+  const std::size_t slash = value.find('/');
+  if (slash == std::string_view::npos) return std::nullopt;
+  const auto size = number(value.substr(slash + 1));
+  const std::string_view range = value.substr(0, slash);
+  if (!size) return std::nullopt;
+  if (range == "*") return ContentRange{*size, 0, *size, *size > 0};
+  const std::size_t dash = range.find('-');
+  if (dash == std::string_view::npos) return std::nullopt;
+  const auto first = number(range.substr(0, dash)), last = number(range.substr(dash + 1));
+  if (!first || !last) return std::nullopt;
+  if (*last < *first || *last >= *size) return ContentRange{*first, 0, *size, false};
+  return ContentRange{*first, *last - *first + 1, *size, true};
+}
 
 Response stored(const Digest& digest, int status) {
   Response response;
@@ -76,14 +118,15 @@ void send_offset(Response& response, std::uint64_t offset, bool complete) {
   response.headers.emplace_back("Upload-Complete", complete ? "?1" : "?0");
 }
 
-// Makes the rejection of a part; its answer tells the client the offset from which to continue.
+// Makes the response that rejects a part. It tells the client the offset from which to continue.
 Response refused_part(int status, std::string_view detail, std::uint64_t offset) {
   Response response = problem(status, detail);
   send_offset(response, offset, false);
   return response;
 }
 
-// A part that exists already is read and ignored: answering in the middle would break the connection.
+// Receives a part that exists already and ignores it. An answer before the end of the part would break the
+// connection.
 class IgnoreSink final : public BodySink {
  public:
   IgnoreSink(const Digest& digest, std::uint64_t bytes) : digest_(digest), left_(bytes) {}
@@ -174,7 +217,7 @@ std::variant<Response, std::unique_ptr<BodySink>> open_blob(Api& api, const Requ
   if (!request.header("content-range").empty()) return open_part(api, request, *digest);
   auto& blobs = api.coordinator().blobs();
   if (blobs.prove(*digest)) {
-    // A client that waits for '100 Continue' has sent nothing yet and need not.
+    // A client that waits for '100 Continue' has not sent the body yet and does not have to.
     if (!request.header("expect").empty()) return stored(*digest, 204);
     return std::make_unique<CompareSink>(*digest, api.limits().blob_bytes);
   }
@@ -217,7 +260,7 @@ Response post_blobs_missing(Api& api, const Request& request, const Params&) {
     const auto digest = read_digest(item, fmt::format("digests[{}]", &item - &list->front()));
     if (!digest) return problem(digest.error());
     const auto there = api.coordinator().blobs().find(*digest);
-    if (!there) return problem(there.error());  // the store cannot tell now whether it has the blob
+    if (!there) return problem(there.error());  // it is unknown at the moment whether the store has the blob
     if (!*there) missing.push_back(digest->hex());
   }
   return json_response(200, write_json({{"missing", std::move(missing)}}));

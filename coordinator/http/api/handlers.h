@@ -2,6 +2,8 @@
 // pool that its route names (Route::executor), possibly by several threads concurrently.
 #pragma once
 
+#include "common/job/settings.h"
+#include "coordinator/http/api/api.h"
 #include "coordinator/http/api/routes.h"
 
 namespace ls::http {
@@ -9,6 +11,7 @@ namespace ls::http {
 class BodySink;
 
 // system_handlers.cpp
+Response get_report_page(Api&, const Request&, const Params&);
 Response get_healthz(Api&, const Request&, const Params&);
 Response get_readyz(Api&, const Request&, const Params&);
 Response get_metrics(Api&, const Request&, const Params&);
@@ -16,15 +19,19 @@ Response get_openapi(Api&, const Request&, const Params&);
 Response get_session(Api&, const Request&, const Params&);
 Response post_session(Api&, const Request&, const Params&);
 Response delete_session(Api&, const Request&, const Params&);
-Response get_tokens(Api&, const Request&, const Params&);    // token_handlers.cpp
-Response post_token(Api&, const Request&, const Params&);    // token_handlers.cpp
-Response delete_token(Api&, const Request&, const Params&);  // token_handlers.cpp
+Response get_tokens(Api&, const Request&, const Params&);
+Response post_token(Api&, const Request&, const Params&);
+Response delete_token(Api&, const Request&, const Params&);
 Response get_workers(Api&, const Request&, const Params&);
 Response get_events(Api&, const Request&, const Params&);
 Response get_job_events(Api&, const Request&, const Params&);
 
-// job_handlers.cpp
+// list_handlers.cpp
 Response get_jobs(Api&, const Request&, const Params&);
+Response post_again(Api&, const Request&, const Params&);
+Response get_thumbnail(Api&, const Request&, const Params&);
+
+// job_handlers.cpp
 Response post_job(Api&, const Request&, const Params&);
 Response get_job(Api&, const Request&, const Params&);
 Response patch_job(Api&, const Request&, const Params&);
@@ -38,8 +45,14 @@ Response get_convergence(Api&, const Request&, const Params&);
 Response get_tiles(Api&, const Request&, const Params&);
 Response get_log(Api&, const Request&, const Params&);
 
-// page_handlers.cpp
-Response get_report_page(Api&, const Request&, const Params&);
+// pixel_handlers.cpp
+Response get_layers(Api&, const Request&, const Params&);
+Response get_pixels(Api&, const Request&, const Params&);
+
+// video_handlers.cpp
+Response post_video(Api&, const Request&, const Params&);
+Response get_video(Api&, const Request&, const Params&);
+Response get_video_mp4(Api&, const Request&, const Params&);
 
 // blob_handlers.cpp; PUT is streamed
 Response post_blobs_missing(Api&, const Request&, const Params&);
@@ -48,5 +61,30 @@ std::variant<Response, std::unique_ptr<BodySink>> open_blob(Api&, const Request&
 
 // bundle_handlers.cpp: POST /jobs with an archive
 std::variant<Response, std::unique_ptr<BodySink>> open_bundle(Api&, const Request&);
+
+// The steps that all submissions share, whether the body was a scene, JSON or an archive (job_handlers.cpp)
+
+// Returns the text of a scene file from the blob store; a file of more than kMaxSceneXml bytes is an error.
+Result<std::string> read_scene_blob(Api& api, const Digest& digest);
+
+// Submits the job and answers: 201 {id, url, warnings}, or the error with the scene's diagnostics.
+Response submit_job(Api& api, coordinator::SubmitRequest request, const Caller& caller);
+// Makes the response 201 with the id and the address of an accepted job.
+Response submitted(Api& api, const JobId& id);
+
+// Returns a 403 if a caller with a submit token requests a priority above Limits::user_priority. Jobs of a
+// higher priority are rendered before all jobs of lower ones, including those of other users. nullopt: the
+// priority is allowed.
+std::optional<Response> refuse_priority(const Api& api, const Caller& caller, int priority);
+
+// spec_query.cpp: reads a job's spec (what its submitter asks for: samples, size, seed, ...) from query
+// parameters, as in POST /api/v1/jobs?spp=64&size=320x240&define=NAME=VALUE&aov=a,b with an application/xml
+// body.
+// Keys: spp, target_error, target_layer, time, seed, size, integrator, priority, float, frames, max_workers,
+// max_units, memory, reference, aov and tags (comma lists), define (may be repeated). The key `also` is
+// ignored; any other key, a repeated key, or a wrong value is an error that names the key. Keys that the
+// query lacks keep their values in `base`, the JSON of a spec. The query's definitions are added to those of
+// `base`; for a name in both the query's value holds.
+Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, const std::string& base = "{}");
 
 }  // namespace ls::http

@@ -1,14 +1,14 @@
 #include <fmt/format.h>
 
-#include <charconv>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "common/base/parse_number.h"
 #include "common/job/limits.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/api/handlers.h"
-#include "coordinator/http/api/spec_query.h"
-#include "coordinator/http/api/submission.h"
 #include "coordinator/http/message/json_read.h"
 #include "coordinator/http/message/problem.h"
 #include "coordinator/views/views.h"
@@ -75,13 +75,13 @@ Result<SubmitRequest> from_xml(const Request& request) {
   return submit;
 }
 
-// Reads the changes of a PATCH completely before anything is changed.
+// Reads all changes of a PATCH, so that an error in one of them is found before any is applied.
 Result<coordinator::JobChange> read_change(std::string_view text) {
   using coordinator::JobState;
-  const auto body = read_object(text, {"state", "priority", "spp", "target_error"});
+  const auto body = read_object(text, {"state", "priority", "spp", "target_error", "focus"});
   if (!body) return tl::unexpected(body.error());
   if (body->empty())
-    return bad_argument("the body changes nothing; possible: state, priority, spp, target_error");
+    return bad_argument("the body changes nothing; possible: state, priority, spp, target_error, focus");
   coordinator::JobChange change;
   if (const auto target = body->find("target_error"); target != body->end()) {
     if (!target->is_number() || !(target->get<double>() > 0))
@@ -103,6 +103,17 @@ Result<coordinator::JobChange> read_change(std::string_view text) {
       return bad_argument("'spp' must be a whole number: the new total per pixel");
     change.spp = spp->get<std::uint64_t>();
   }
+  if (const auto focus = body->find("focus"); focus != body->end()) {
+    const auto pixel = [](const json& v) {
+      return v.is_number_unsigned() && v.get<std::uint64_t>() <= std::numeric_limits<int>::max();
+    };
+    const bool rect =
+        focus->is_array() && focus->size() == 4 && std::all_of(focus->begin(), focus->end(), pixel);
+    if (!rect && !focus->is_null())
+      return bad_argument("'focus' must be [x0, y0, x1, y1] in whole pixels, or null to render all alike");
+    change.focus =
+        rect ? std::optional(PixelRect{(*focus)[0], (*focus)[1], (*focus)[2], (*focus)[3]}) : std::nullopt;
+  }
   return change;
 }
 
@@ -117,17 +128,12 @@ Response file_response(std::string content_type, Body bytes, const std::string& 
 
 }  // namespace
 
-Response get_jobs(Api& api, const Request& request, const Params&) {
-  auto jobs = api.coordinator().jobs();
-  std::erase_if(jobs, [&](const auto& job) { return !request.caller.sees(job.owner); });
-  return json_response(200, coordinator::jobs_json(jobs));
-}
-
 Response post_job(Api& api, const Request& request, const Params&) {
   const bool is_json = media_type(request.header("content-type")) == "application/json";
   auto submit = is_json ? from_json(api, request) : from_xml(request);
   if (!submit) return problem(submit.error());
   submit->owner = request.caller.user;
+  submit->traceparent = request.header("traceparent");
   return submit_job(api, std::move(*submit), request.caller);
 }
 
@@ -172,16 +178,13 @@ Response get_image_exr(Api& api, const Request& request, const Params& params) {
 Response get_image_png(Api& api, const Request& request, const Params& params) {
   const auto id = job_of(request, params);
   if (!id) return problem(id.error());
-  double exposure = 0;
-  if (const auto text = request.parameter("exposure")) {
-    const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), exposure);
-    if (error != std::errc{} || end != text->data() + text->size() || !(std::abs(exposure) <= kMaxExposure))
-      return problem(400, fmt::format("'exposure' must be a number of stops from -{0} to {0}", kMaxExposure));
-  }
+  const auto exposure = parse_number<double>(request.parameter("exposure").value_or("0"));
+  if (!exposure || !(std::abs(*exposure) <= kMaxExposure))
+    return problem(400, fmt::format("'exposure' must be a number of stops from -{0} to {0}", kMaxExposure));
   const auto layer = request.parameter("layer");
   if (layer && *layer != "denoised")
     return problem(400, "'layer' must be \"denoised\", or be left out for the image itself");
-  auto image = api.coordinator().image_png(*id, exposure, layer.has_value());
+  auto image = api.coordinator().image_png(*id, *exposure, layer.has_value());
   return image ? file_response("image/png", std::move(*image), id->value + ".png") : problem(image.error());
 }
 
@@ -232,6 +235,46 @@ Response get_log(Api& api, const Request& request, const Params& params) {
   if (!id) return problem(id.error());
   auto log = api.coordinator().job_log(*id);
   return log ? text_response(200, "text/plain; charset=utf-8", std::move(*log)) : problem(log.error());
+}
+
+Result<std::string> read_scene_blob(Api& api, const Digest& digest) {
+  auto& blobs = api.coordinator().blobs();
+  if (!blobs.has(digest))
+    return fail(Errc::failed_precondition,
+                fmt::format("the scene's blob {0} is not here: PUT /api/v1/blobs/{0} first", digest.hex()));
+  const auto size = blobs.size(digest);
+  if (!size) return tl::unexpected(size.error());
+  if (*size > kMaxSceneXml)
+    return fail(Errc::invalid_argument,
+                fmt::format("the scene file has {} bytes; at most {} are accepted", *size, kMaxSceneXml));
+  const auto bytes = blobs.read(digest, 0, *size);
+  if (!bytes) return tl::unexpected(bytes.error());
+  return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+}
+
+std::optional<Response> refuse_priority(const Api& api, const Caller& caller, int priority) {
+  if (caller.role != Role::submit || priority <= api.limits().user_priority) return std::nullopt;
+  return problem(
+      403, fmt::format("priority {} goes before other users' jobs: with a token of the role 'submit' at most "
+                       "{} is possible; ask the administrator (--user-priority)",
+                       priority, api.limits().user_priority));
+}
+
+Response submit_job(Api& api, coordinator::SubmitRequest request, const Caller& caller) {
+  if (auto refused = refuse_priority(api, caller, request.spec.priority)) return std::move(*refused);
+  const auto id = api.coordinator().submit(std::move(request));
+  return id ? submitted(api, *id) : problem(id.error().error, id.error().diagnostics);
+}
+
+Response submitted(Api& api, const JobId& id) {
+  const std::string url = "/api/v1/jobs/" + id.value;
+  const auto job = api.coordinator().job(id);
+  nlohmann::ordered_json body{{"id", id.value}, {"url", url}};
+  body["warnings"] = job ? job->warnings : std::vector<std::string>{};
+  body["reference_same_seed"] = job && job->reference_same_seed;
+  Response response = json_response(201, write_json(body));
+  response.headers.emplace_back("Location", url);
+  return response;
 }
 
 }  // namespace ls::http

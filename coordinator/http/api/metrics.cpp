@@ -1,12 +1,50 @@
 #include "coordinator/http/api/metrics.h"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
+#include <filesystem>
+#include <fstream>
 #include <iterator>
-
-#include "coordinator/http/api/process_figures.h"
+#include <string>
 
 namespace ls::http {
+namespace {
+
+std::uint64_t status_figure(const std::string& name) {
+  std::ifstream in("/proc/self/status");
+  std::string word;
+  std::uint64_t value = 0;
+  while (in >> word)
+    if (word == name) return in >> value ? value : 0;
+  return 0;
+}
+
+std::uint64_t files_in(const char* folder) {
+  std::error_code failed;
+  std::uint64_t count = 0;
+  for (std::filesystem::directory_iterator at(folder, failed), end; !failed && at != end;
+       at.increment(failed))
+    ++count;
+  // The descriptor that this iteration itself opens is not counted
+  return failed || count == 0 ? 0 : count - 1;
+}
+
+}  // namespace
+
+ProcessFigures process_figures() {
+  ProcessFigures p;
+  p.resident_bytes = status_figure("VmRSS:") * 1024;
+  p.threads = status_figure("Threads:");
+  p.open_files = files_in("/proc/self/fd");
+  rusage usage{};
+  if (::getrusage(RUSAGE_SELF, &usage) == 0)
+    for (const timeval& part : {usage.ru_utime, usage.ru_stime})
+      p.cpu_seconds += static_cast<double>(part.tv_sec) + 1e-6 * static_cast<double>(part.tv_usec);
+  return p;
+}
+
 namespace {
 
 using coordinator::JobState;
@@ -84,7 +122,8 @@ void write_leases(std::string& out, const coordinator::FarmFigures& f) {
          f.units_leased);
   head(out, "lightshaft_units_freed_total", "counter",
        "Units that a worker had and did not hand in, by cause; those that are still wanted go to another.");
-  // All causes are listed, even with count 0, so that Prometheus can compute rates from the first event on.
+  // All causes are listed, even with count 0: Prometheus can compute the rate of an event only if its counter
+  // existed before.
   for (const auto& [cause, word] : coordinator::kFreedCauses) {
     const auto count = f.units_freed.find(cause);
     fmt::format_to(std::back_inserter(out), "lightshaft_units_freed_total{{cause=\"{}\"}} {}\n", word,
@@ -147,6 +186,16 @@ void write_webhooks(std::string& out, const WebhookFigures& w) {
   single(out, "lightshaft_webhooks_waiting", "gauge", "Events that receivers have still to take.", w.waiting);
 }
 
+void write_traces(std::string& out, const trace::Figures& f) {
+  head(out, "lightshaft_trace_spans_total", "counter",
+       "Spans that the collector of traces took, those that it refused or did not answer for, and those left "
+       "out since too many waited.");
+  for (const auto& [result, count] :
+       {std::pair("taken", f.sent), std::pair("refused", f.refused), std::pair("left out", f.left_out)})
+    fmt::format_to(std::back_inserter(out), "lightshaft_trace_spans_total{{result=\"{}\"}} {}\n", result,
+                   count);
+}
+
 void write_process(std::string& out) {
   const ProcessFigures p = process_figures();
   single(out, "process_resident_memory_bytes", "gauge", "Memory of the coordinator.", p.resident_bytes);
@@ -171,7 +220,8 @@ std::string metrics_text(std::span<const coordinator::JobView> jobs,
                          std::span<const coordinator::WorkerView> workers, std::uint64_t last_event,
                          const Counters& counters, const coordinator::StoreStatus& store,
                          const coordinator::FarmFigures& farm, const coordinator::AuditFigures& audits,
-                         const std::optional<WebhookFigures>& webhooks) {
+                         const std::optional<WebhookFigures>& webhooks,
+                         const std::optional<trace::Figures>& traces) {
   std::string out;
   write_jobs(out, jobs);
   write_workers(out, workers);
@@ -192,6 +242,7 @@ std::string metrics_text(std::span<const coordinator::JobView> jobs,
   single(out, "lightshaft_http_body_bytes_total", "counter", "Bytes of request bodies.",
          counters.body_bytes.load());
   if (webhooks) write_webhooks(out, *webhooks);
+  if (traces) write_traces(out, *traces);
   if (!store.mirror.empty()) {
     single(out, "lightshaft_redis_up", "gauge", "1 while Redis answers.", store.trouble.empty() ? 1 : 0);
     single(out, "lightshaft_redis_jobs_behind", "gauge", "Jobs of which Redis has not been told all.",

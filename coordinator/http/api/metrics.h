@@ -10,10 +10,20 @@
 #include <string>
 #include <utility>
 
+#include "common/trace/span_queue.h"
 #include "coordinator/http/message/message.h"
 #include "coordinator/service/coordinator.h"
 
 namespace ls::http {
+
+// Resources used by this process, according to Linux.
+struct ProcessFigures {  // a value that could not be read is 0
+  std::uint64_t resident_bytes = 0;
+  std::uint64_t open_files = 0;
+  std::uint64_t threads = 0;
+  double cpu_seconds = 0;
+};
+ProcessFigures process_figures();
 
 // Counters that the HTTP server loop increments and /metrics shows. Thread-safe.
 class Counters {
@@ -21,28 +31,31 @@ class Counters {
   void answered(Method method, int status);
   std::map<std::pair<Method, int>, std::uint64_t> requests() const;
 
-  std::atomic<std::uint64_t> connections{0};     // open now
-  std::atomic<std::uint64_t> event_streams{0};   // open now
-  std::atomic<std::uint64_t> events_dropped{0};  // readers disconnected because they were too slow
-  std::atomic<std::uint64_t> body_bytes{0};      // received
+  std::atomic<std::uint64_t> connections{0};    // connections that are open now
+  std::atomic<std::uint64_t> event_streams{0};  // event streams that are open now
+  // Number of readers that were disconnected because they were too slow
+  std::atomic<std::uint64_t> events_dropped{0};
+  std::atomic<std::uint64_t> body_bytes{0};  // bytes received in request bodies
 
  private:
   mutable std::mutex mutex_;
   std::map<std::pair<Method, int>, std::uint64_t> requests_;
 };
 
-// Numbers of notifications to webhooks (coordinator/webhooks) since the start: accepted by a receiver,
-// attempts that failed, notifications given up; and those that wait to be sent now.
+// Counts of notifications to webhooks (coordinator/webhooks) since the start: notifications accepted by a
+// receiver, attempts that failed, and notifications given up. Also the number that now wait to be sent.
 struct WebhookFigures {
   std::uint64_t delivered = 0, failed_attempts = 0, given_up = 0, waiting = 0;
 };
 
-// Returns the text of /metrics. Without `webhooks` it has no webhook counters.
+// Returns the text of /metrics. Without `webhooks` it has no webhook counters, without `traces` none of
+// spans.
 std::string metrics_text(std::span<const coordinator::JobView> jobs,
                          std::span<const coordinator::WorkerView> workers, std::uint64_t last_event,
                          const Counters& counters, const coordinator::StoreStatus& store = {},
                          const coordinator::FarmFigures& farm = {},
                          const coordinator::AuditFigures& audits = {},
-                         const std::optional<WebhookFigures>& webhooks = std::nullopt);
+                         const std::optional<WebhookFigures>& webhooks = std::nullopt,
+                         const std::optional<trace::Figures>& traces = std::nullopt);
 
 }  // namespace ls::http

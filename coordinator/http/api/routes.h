@@ -1,5 +1,5 @@
-// The route table: for every address who may use it, how large its request's body may be and on which threads
-// its handler runs. openapi.json describes the same routes; a test compares the two.
+// The route table. It says for every address who may use it, how large the request's body may be and on which
+// threads the handler runs. openapi.json describes the same routes; a test compares the two.
 #pragma once
 
 #include <cstdint>
@@ -17,10 +17,11 @@ namespace ls::http {
 
 class Api;
 
-// Who may use a route, by the role of the caller's token (Role in message/caller.h).
+// Who may use a route, by the role of the caller's token (Role in message/message.h).
 enum class Access {
-  open,   // everybody, also without a token
-  token,  // the roles submit, read and admin: any token but a worker's. A submit token sees only its own jobs
+  open,  // everybody, even without a token
+  // The roles submit, read and admin: any token except a worker's. A submit token sees only its own jobs
+  token,
   submit,  // the roles submit and admin
   see,     // the roles read and admin, because the route shows data of all users
   admin,   // the role admin
@@ -33,17 +34,18 @@ enum class Executor {
   here,    // the network thread; the handler must not block
   quick,   // the pool for handlers that answer from memory
   slow,    // the pool for handlers that read scenes or write images
-  remote,  // the pool for handlers that ask other machines, which may not answer for a while
+  remote,  // the pool for handlers that send requests to other machines, whose answers may take a while
 };
 enum class BodyKind {
   none,      // a body is ignored
   buffered,  // the body is read into memory as a whole, at most Route::body_limit bytes
   blob,      // the body is streamed into the sink that Api::open_upload returns
-  archive,   // like blob, but the sink's finish() unpacks an archive, which takes time. Chosen by
-             // Api::body_kind for single requests; no route in the table has it
+  // Like blob, but the sink's finish() unpacks an archive, which takes time. No route has this kind in the
+  // table; Api::body_kind chooses it for single requests
+  archive,
 };
 
-using Params = std::vector<std::string>;  // values of the {..} in the pattern, in order
+using Params = std::vector<std::string>;  // the path segments that match the {..} in the pattern, in order
 using Handler = Response (*)(Api&, const Request&, const Params&);
 
 struct Route {
@@ -54,8 +56,8 @@ struct Route {
   BodyKind body = BodyKind::none;
   std::uint64_t body_limit = 0;
   Handler handler = nullptr;      // null for BodyKind::blob
-  std::string_view accepts = {};  // media types of a buffered body, separated by spaces
-  std::string_view unpacks = {};  // media types whose body is an archive instead
+  std::string_view accepts = {};  // allowed media types of a buffered body, separated by spaces
+  std::string_view unpacks = {};  // media types of bodies that are archives (BodyKind::archive)
 };
 
 std::span<const Route> routes();
@@ -67,7 +69,7 @@ struct Match {
 struct WrongMethod {
   std::string allow;  // value of the Allow header
 };
-// A GET route answers HEAD as well. nullopt: no such address.
+// Finds the route of a request. A GET route answers HEAD as well. nullopt: there is no such address.
 std::optional<std::variant<Match, WrongMethod>> find_route(Method method,
                                                            std::span<const std::string> segments);
 

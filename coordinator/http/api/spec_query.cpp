@@ -1,10 +1,11 @@
-#include "coordinator/http/api/spec_query.h"
+#include "coordinator/http/api/handlers.h"
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <nlohmann/json.hpp>
 #include <set>
+
+#include "common/base/parse_number.h"
 
 namespace ls::http {
 namespace {
@@ -16,18 +17,10 @@ tl::unexpected<Error> wrong(std::string_view key, std::string_view value, std::s
               fmt::format("query parameter '{}' is '{}', expected {}", key, value, expected));
 }
 
-template <class T>
-std::optional<T> number(std::string_view text) {
-  T value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
 Result<Json> parse_size(std::string_view text) {
   const std::size_t x = text.find('x');
   if (x == std::string_view::npos) return wrong("size", text, "WIDTHxHEIGHT");
-  const auto width = number<int>(text.substr(0, x)), height = number<int>(text.substr(x + 1));
+  const auto width = parse_number<int>(text.substr(0, x)), height = parse_number<int>(text.substr(x + 1));
   if (!width || !height) return wrong("size", text, "WIDTHxHEIGHT");
   return Json::array({*width, *height});
 }
@@ -43,8 +36,8 @@ Json parse_list(std::string_view text) {
 }
 
 template <class T>
-Result<Json> parse_number(std::string_view key, std::string_view text, std::string_view expected) {
-  if (const auto value = number<T>(text)) return Json(*value);
+Result<Json> json_number(std::string_view key, std::string_view text, std::string_view expected) {
+  if (const auto value = parse_number<T>(text)) return Json(*value);
   return wrong(key, text, expected);
 }
 
@@ -52,11 +45,11 @@ Result<Json> parse_number(std::string_view key, std::string_view text, std::stri
 // no such key.
 std::optional<Result<Json>> parse_value(std::string_view key, std::string_view text) {
   if (key == "spp" || key == "seed" || key == "max_workers" || key == "max_units" || key == "memory")
-    return parse_number<std::uint64_t>(key, text, "a whole number");
-  if (key == "target_error" || key == "time") return parse_number<double>(key, text, "a number");
-  if (key == "priority") return parse_number<int>(key, text, "a whole number");
+    return json_number<std::uint64_t>(key, text, "a whole number");
+  if (key == "target_error" || key == "time") return json_number<double>(key, text, "a number");
+  if (key == "priority") return json_number<int>(key, text, "a whole number");
   if (key == "size") return parse_size(text);
-  if (key == "integrator" || key == "frames" || key == "reference")
+  if (key == "integrator" || key == "frames" || key == "reference" || key == "target_layer")
     return Result<Json>(Json(std::string(text)));
   if (key == "aov" || key == "tags") return Result<Json>(parse_list(text));
   if (key == "float" || key == "denoise") {
@@ -82,7 +75,7 @@ Result<void> add_define(Json& defines, std::string_view text) {
 Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, const std::string& base) {
   auto whole = parse_spec_object(base);
   if (!whole) return tl::unexpected(whole.error());
-  // Errors in `base` are reported even if the query replaces the value of the wrong key.
+  // Errors in `base` are reported even if the query replaces the wrong value.
   if (const auto alone = job_spec_of(*whole); !alone) return alone;
   Json spec = Json::object();
   Json defines = Json::object();
@@ -98,17 +91,17 @@ Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, cons
     if (!value)
       return fail(
           Errc::invalid_argument,
-          fmt::format(
-              "unknown query parameter '{}'; known: {}{}spp, target_error, time, seed, size, integrator, "
-              "aov, define, priority, float, denoise, tags, frames, max_workers, max_units, memory, "
-              "reference",
-              key, also, also.empty() ? "" : ", "));
+          fmt::format("unknown query parameter '{}'; known: {}{}spp, target_error, target_layer, time, seed, "
+                      "size, integrator, "
+                      "aov, define, priority, float, denoise, tags, frames, max_workers, max_units, memory, "
+                      "reference",
+                      key, also, also.empty() ? "" : ", "));
     if (!*value) return tl::unexpected(value->error());
     spec[key] = std::move(**value);
   }
   if (!defines.empty()) (*whole)["defines"].update(defines);
   whole->update(spec);
-  // Invalid UTF-8 is replaced on the way through text: no valid key or name contains it.
+  // dump() would throw on invalid UTF-8, so this is replaced; no valid key or name contains it.
   return parse_job_spec(whole->dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 

@@ -58,7 +58,7 @@ std::optional<Response> StaticFiles::find(const Request& request) const {
   const Entry& entry = found->second;
   Response response;
   response.headers.emplace_back("ETag", entry.etag);
-  // The browser asks again each time and gets a 304 if the file has not changed.
+  // The browser checks for changes each time, and gets a 304 if the file has not changed.
   response.headers.emplace_back("Cache-Control", "no-cache");
   response.headers.emplace_back("Content-Security-Policy", kPagePolicy);
   if (request.header("if-none-match").find(entry.etag) != std::string_view::npos) {

@@ -1,5 +1,5 @@
-// Serves the dashboard's files, which are built into the executable. A request finds a file only by its exact
-// name in a table in memory, so no request can read other files of the disk.
+// Serves the dashboard's files, which are built into the executable. Files are looked up by their exact names
+// in a table in memory, so no request can read other files of the disk.
 #pragma once
 
 #include <map>
@@ -36,7 +36,7 @@ class StaticFiles {
 
 std::string_view content_type_of(std::string_view file_name);
 
-// Generated at build from web/static and coordinator/http/openapi.json.
+// Generated at build time from web/static and coordinator/http/openapi.json.
 std::span<const StaticFile> embedded_files();
 std::string_view embedded_openapi();
 

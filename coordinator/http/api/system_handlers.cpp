@@ -1,8 +1,10 @@
-#include <charconv>
+#include <fmt/format.h>
 
+#include "common/base/parse_number.h"
+#include "common/report/job_page.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/api/handlers.h"
-#include "coordinator/http/auth/visible.h"
+#include "coordinator/http/auth/auth.h"
 #include "coordinator/http/message/json_read.h"
 #include "coordinator/http/message/problem.h"
 #include "coordinator/views/views.h"
@@ -21,15 +23,12 @@ Response event_stream(const Request& request, std::string job) {
   EventStream stream;
   stream.job = std::move(job);
   stream.reader = request.caller;
-  // Browsers send the header Last-Event-ID when they reconnect; its id is newer than that in the address.
+  // Browsers send the header Last-Event-ID when they reconnect. Its id is later than the id in the address.
   std::string_view text = request.header("last-event-id");
   if (text.empty()) text = request.parameter("last_event_id").value_or("");
   if (!text.empty()) {
-    std::uint64_t id = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
-    if (error != std::errc{} || end != text.data() + text.size())
-      return problem(400, "Last-Event-ID must be the id of an event: a whole number");
-    stream.after_id = id;
+    stream.after_id = parse_number<std::uint64_t>(text);
+    if (!stream.after_id) return problem(400, "Last-Event-ID must be the id of an event: a whole number");
   }
   Response response;
   response.content_type = "text/event-stream";
@@ -44,17 +43,18 @@ Response get_healthz(Api&, const Request&, const Params&) { return text_response
 Response get_readyz(Api& api, const Request&, const Params&) {
   std::string why_not;
   if (!api.coordinator().ready(&why_not)) return problem(503, "not ready: " + why_not);
-  // Jobs continue while Redis is unavailable: report it, but do not divert clients.
+  // While Redis is unavailable jobs continue, so this is reported, but the coordinator stays ready for
+  // clients.
   const std::string trouble = api.coordinator().store_status().trouble;
   return text_response(200, "text/plain", trouble.empty() ? "ready\n" : "ready, but: " + trouble + "\n");
 }
 
 Response get_metrics(Api& api, const Request&, const Params&) {
   auto& coordinator = api.coordinator();
-  return text_response(
-      200, "text/plain; version=0.0.4; charset=utf-8",
-      metrics_text(coordinator.jobs(), coordinator.workers(), coordinator.last_event_id(), api.counters(),
-                   coordinator.store_status(), coordinator.figures(), coordinator.audits(), api.webhooks()));
+  return text_response(200, "text/plain; version=0.0.4; charset=utf-8",
+                       metrics_text(coordinator.jobs(), coordinator.workers(), coordinator.last_event_id(),
+                                    api.counters(), coordinator.store_status(), coordinator.figures(),
+                                    coordinator.audits(), api.webhooks(), api.traces()));
 }
 
 Response get_openapi(Api&, const Request&, const Params&) {
@@ -63,7 +63,9 @@ Response get_openapi(Api&, const Request&, const Params&) {
 
 Response get_session(Api&, const Request& request, const Params&) {
   const Caller& caller = request.caller;
-  return json_response(200, write_json({{"role", to_string(caller.role)}, {"user", caller.user}}));
+  return json_response(
+      200,
+      write_json({{"role", to_string(caller.role)}, {"user", caller.user}, {"version", LIGHTSHAFT_VERSION}}));
 }
 
 Response post_session(Api& api, const Request& request, const Params&) {
@@ -89,8 +91,8 @@ Response get_workers(Api& api, const Request& request, const Params&) {
   auto workers = api.coordinator().workers();
   for (auto& worker : workers) {
     if (request.caller.role != Role::submit) continue;
-    // A worker without a job is hidden, too: its status may reveal what it did for others (why it failed, or
-    // is quarantined).
+    // The status of a worker without a job is hidden, too: it may reveal the worker's earlier jobs for other
+    // users (why it failed or is quarantined).
     const auto owner = api.coordinator().owner(JobId{worker.job});
     if (!owner || !request.caller.sees(*owner)) hide_work(worker);
   }
@@ -104,6 +106,69 @@ Response get_job_events(Api& api, const Request& request, const Params& params) 
   if (!id) return problem(id.error());
   if (const auto job = api.coordinator().job(*id); !job) return problem(job.error());
   return event_stream(request, id->value);
+}
+
+Response get_report_page(Api& api, const Request& request, const Params& params) {
+  const auto id = job_of(request, params);
+  if (!id) return problem(id.error());
+  auto image = api.coordinator().image_png(*id, 0);
+  if (!image) return problem(image.error());
+  auto report = api.coordinator().report_json(*id);
+  if (!report) return problem(report.error());
+  auto page = report::job_page({std::move(*report), std::move(*image),
+                                api.coordinator().error_png(*id).value_or(std::vector<std::byte>{}),
+                                api.coordinator().samples_png(*id).value_or(std::vector<std::byte>{})});
+  if (!page) return problem(page.error());
+  Response response = text_response(200, "text/html; charset=utf-8", std::move(*page));
+  response.headers.emplace_back("Content-Security-Policy",
+                                report::job_page_policy() + "; frame-ancestors 'none'");
+  response.headers.emplace_back("Content-Disposition",
+                                fmt::format("inline; filename=\"{}.html\"", id->value));
+  return response;
+}
+
+namespace {
+
+nlohmann::ordered_json to_value(const TokenInfo& token) {
+  return {
+      {"id", token.id}, {"role", to_string(token.role)}, {"user", token.user}, {"of_file", token.of_file}};
+}
+
+}  // namespace
+
+Response get_tokens(Api& api, const Request&, const Params&) {
+  auto list = nlohmann::ordered_json::array();
+  for (const TokenInfo& token : api.tokens().list()) list.push_back(to_value(token));
+  return json_response(200, write_json({{"tokens", std::move(list)}}));
+}
+
+Response post_token(Api& api, const Request& request, const Params&) {
+  const auto body = read_object(request.body, {"role", "user"});
+  if (!body) return problem(body.error());
+  const auto role = body->find("role");
+  const auto known = role != body->end() && role->is_string()
+                         ? parse_role(role->get_ref<const std::string&>())
+                         : std::nullopt;
+  if (!known) return problem(400, "'role' must be \"admin\", \"submit\", \"read\" or \"join\"");
+  std::string user;
+  if (const auto found = body->find("user"); found != body->end()) {
+    if (!found->is_string()) return problem(400, "'user' must be a text");
+    user = found->get<std::string>();
+  }
+  const auto made = api.tokens().add(*known, std::move(user));
+  if (!made) return problem(made.error());
+  auto value = to_value(made->info);
+  value["token"] = made->token;
+  Response response = json_response(201, write_json(value));
+  response.headers.emplace_back("Location", "/api/v1/tokens/" + made->info.id);
+  return response;
+}
+
+Response delete_token(Api& api, const Request&, const Params& params) {
+  if (const auto done = api.tokens().revoke(params[0]); !done) return problem(done.error());
+  Response response;
+  response.status = 204;
+  return response;
 }
 
 }  // namespace ls::http

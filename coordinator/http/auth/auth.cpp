@@ -8,6 +8,7 @@
 #include <array>
 #include <charconv>
 #include <chrono>
+#include <nlohmann/json.hpp>
 
 #include "common/base/check.h"
 #include "common/base/digest.h"
@@ -134,7 +135,7 @@ bool Auth::cross_site(const Request& request) {
   if (site == "cross-site" || site == "same-site") return true;
   const std::string_view origin = request.header("origin");
   if (origin.empty()) return false;
-  // Compares only host and port: a proxy in front may use TLS where we do not.
+  // Compares host and port but not the scheme, since a proxy may accept TLS and forward plain HTTP.
   const std::size_t scheme = origin.find("://");
   return scheme == std::string_view::npos || origin.substr(scheme + 3) != request.header("host");
 }
@@ -177,6 +178,26 @@ std::string Auth::mac(std::string_view text) const {
              &size) != nullptr,
         "HMAC failed");
   return out.hex();
+}
+
+void hide_work(coordinator::WorkerView& worker) {
+  worker.job.clear();
+  worker.activity.clear();
+}
+
+std::optional<coordinator::StreamEvent> visible(const coordinator::StreamEvent& event, const Caller& caller) {
+  if (caller.role != Role::submit) return event;
+  if (event.type != "worker") return caller.sees(event.owner) ? std::optional(event) : std::nullopt;
+  auto worker = nlohmann::json::parse(event.data, nullptr, false);
+  if (!worker.is_object()) return std::nullopt;
+  const auto job = worker.find("job");
+  if (job == worker.end()) return std::nullopt;
+  if (!job->is_null() && caller.sees(event.owner)) return event;
+  coordinator::StreamEvent hidden = event;
+  *job = nullptr;
+  worker["activity"] = "";
+  hidden.data = worker.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return hidden;
 }
 
 }  // namespace ls::http

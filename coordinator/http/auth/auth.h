@@ -16,9 +16,9 @@
 
 #include "coordinator/http/auth/throttle.h"
 #include "coordinator/http/auth/token_registry.h"
-#include "coordinator/http/message/caller.h"
 #include "coordinator/http/message/limits.h"
 #include "coordinator/http/message/message.h"
+#include "coordinator/views/job_view.h"
 
 namespace ls::http {
 
@@ -30,21 +30,21 @@ class Auth {
   struct Options {
     Pace requests{};      // how many requests each token, or each address without a token, may send
     Pace failures{};      // how many wrong tokens each address may send
-    bool secure = false;  // requests arrive over TLS: the cookie is restricted to TLS
+    bool secure = false;  // requests arrive over TLS, so the cookie may be sent only over TLS
   };
   // `tokens` must outlive this.
   Auth(const TokenRegistry& tokens, Options options, UnixClock now = system_unix_clock());
 
-  // Returns who sends the request, or the response 401, 403 or 429. In a request that may change something
-  // (any method but GET, HEAD and OPTIONS) a cookie counts only if the browser's headers say that the request
-  // comes from a page of this server.
+  // Returns the sender of the request, or the response 401, 403 or 429. In a request that may change
+  // something (any method but GET, HEAD and OPTIONS) a cookie is accepted only if the browser's headers show
+  // that the request comes from a page of this server.
   std::variant<Caller, Response> identify(const Request& request);
 
-  // Counts the request and returns a 429 if its caller sends too many. Without a caller (null) the client's
-  // address is counted instead.
+  // Counts the request and returns a 429 if its caller sends too many. If the caller is null, the requests of
+  // the client's address are counted instead.
   std::optional<Response> too_often(const Request& request, const Caller* caller);
 
-  // True if the token of this caller has not been revoked.
+  // True unless the token of this caller has been revoked.
   bool still_valid(const Caller& caller) const;
 
   // For POST /session: returns the Set-Cookie value of a new session for this token, or the error response.
@@ -66,13 +66,21 @@ class Auth {
 
   const TokenRegistry& tokens_;
   const Options options_;
-  // Contains part of the digest of the session key: browsers share cookies between all ports of a host, and
-  // two coordinators on one host must not overwrite each other's.
+  // Name of the session cookie. It contains part of the digest of the session key: browsers share cookies
+  // between all ports of a host, and two coordinators on one host must not overwrite each other's cookies.
   std::string cookie_name_;
   UnixClock now_;
   Throttle throttle_;
   mutable std::mutex mutex_;
-  std::map<std::string, std::int64_t, std::less<>> revoked_;  // expiry of each closed session, by its text
+  // Closed sessions: the cookie's text and its expiry
+  std::map<std::string, std::int64_t, std::less<>> revoked_;
 };
+
+// Clears the fields of `worker` that show what it does for other users' jobs.
+void hide_work(coordinator::WorkerView& worker);
+
+// Returns the event without the parts that this caller may not see; nullopt: the caller may not see the event
+// at all.
+std::optional<coordinator::StreamEvent> visible(const coordinator::StreamEvent& event, const Caller& caller);
 
 }  // namespace ls::http

@@ -21,12 +21,12 @@ class Throttle {
  public:
   Throttle(Pace requests, Pace failures) : requests_(requests), failures_(failures) {}
 
-  // Counts one request of `who`, a token's id or an address, at the time `now`. Returns after how many
-  // seconds it would be allowed; 0: it is allowed.
+  // Counts one request of `who`, a token's id or an address, at the time `now`. Returns 0 if the request is
+  // allowed, else the number of seconds after which it would be.
   int request(std::string_view who, std::int64_t now);
 
-  // Checks whether a token from this address may be tried. After too many wrong tokens from an address only
-  // tokens that were right from there before may be tried, so that guessing stops without locking out
+  // Checks whether a token from this address may be tried. After too many wrong tokens from an address, only
+  // tokens that were accepted from this address before may be tried. So guessing stops without locking out
   // legitimate users. Returns the seconds to wait; 0: the token may be tried.
   int may_try(const std::string& address, std::string_view token_id, std::int64_t now);
   void failed(const std::string& address, std::int64_t now);
@@ -38,9 +38,9 @@ class Throttle {
 
  private:
   struct Bucket {
-    double level = 0;                // requests, or wrong tokens, that are allowed now
-    std::int64_t at = 0;             // when `level` was computed: seconds since 1970
-    std::vector<std::string> known;  // ids of the last kMaxKnown tokens that were right from this address
+    double level = 0;                // number of requests, or of wrong tokens, that are allowed now
+    std::int64_t at = 0;             // time for which `level` was computed, in seconds since 1970
+    std::vector<std::string> known;  // ids of the last kMaxKnown tokens that were accepted from this address
   };
   using Buckets = std::map<std::string, Bucket, std::less<>>;
   static Bucket& fill(Buckets& buckets, std::string_view who, const Pace& pace, std::int64_t now);

@@ -97,7 +97,6 @@ Result<std::string> read_list(const std::filesystem::path& file) {
   return text;
 }
 
-// Writes a temporary file and renames it, so that a crash never leaves `file` half written.
 Result<void> write_private(const std::filesystem::path& file, std::string_view text) {
   const std::string aside = file.string() + ".new";
   ::unlink(aside.c_str());

@@ -18,13 +18,13 @@ Result<std::string> read_or_make_token(const std::filesystem::path& file);
 // 256 random bits in hexadecimal.
 Result<std::string> random_token();
 
-// Reads a small file that others may read but not write; empty if there is none.
+// Reads a small file. Others may be able to read it but not to write it. Empty if there is no file.
 Result<std::string> read_list(const std::filesystem::path& file);
 
-// Replaces the file in one step, mode 0600: a crash leaves the old one or the new one.
+// Replaces the file in one step, with mode 0600: after a crash there is either the old or the new file.
 Result<void> write_private(const std::filesystem::path& file, std::string_view text);
 
-// Identifies a state of a file: if two of these differ, the file was replaced or written between them. All
+// Identifies a version of a file: if two of these differ, the file was replaced or written in between. All
 // zero: there is no file.
 struct FileState {
   std::uint64_t inode = 0, size = 0;
@@ -34,8 +34,8 @@ struct FileState {
 FileState file_state(const std::filesystem::path& file);
 
 // Holds a lock on a folder while the object lives, so that other processes do not change the folder's secrets
-// meanwhile. The constructor blocks until it has the lock. If no lock file can be created in the folder, it
-// goes on without one: then nothing can be written there either. An empty path locks nothing.
+// meanwhile. The constructor blocks until it has the lock. If the folder is read-only, so that no lock file
+// can be created, there is no lock and no need of one. An empty path locks nothing.
 class FolderLock {
  public:
   explicit FolderLock(const std::filesystem::path& folder);

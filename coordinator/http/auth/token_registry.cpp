@@ -56,8 +56,9 @@ bool plausible_user(std::string_view name) {
 TokenRegistry::TokenRegistry(std::string admin_token, std::string join_token)
     : session_key_("session " + admin_token) {
   CHECK(!admin_token.empty(), "an empty token would let everybody in");
-  put(Role::admin, {}, sha256(admin_token), true);
-  if (!join_token.empty()) put(Role::join, {}, sha256(join_token), true);
+  const auto tokens = tokens_.lock();
+  tokens->put(Role::admin, {}, sha256(admin_token), true);
+  if (!join_token.empty()) tokens->put(Role::join, {}, sha256(join_token), true);
 }
 
 Result<std::unique_ptr<TokenRegistry>> TokenRegistry::open(const std::filesystem::path& folder) {
@@ -70,44 +71,43 @@ Result<std::unique_ptr<TokenRegistry>> TokenRegistry::open(const std::filesystem
                 fmt::format("'token' and 'join-token' in '{}' are the same: whoever has a worker's would be "
                             "admin; delete one to get a new one",
                             folder.string()));
-  auto tokens = std::make_unique<TokenRegistry>(*admin, *join);
-  tokens->file_ = folder / "tokens";
+  auto registry = std::make_unique<TokenRegistry>(*admin, *join);
+  const auto tokens = registry->tokens_.lock();
+  tokens->file = folder / "tokens";
   if (auto read = tokens->read_all(); !read) return tl::unexpected(read.error());
-  return tokens;
+  return registry;
 }
 
-Result<void> TokenRegistry::read_all() const {
-  const FileState now = file_state(file_);
-  auto text = read_list(file_);
+Result<void> TokenRegistry::Tokens::read_all() {
+  const FileState now = file_state(file);
+  auto text = read_list(file);
   if (!text) return tl::unexpected(text.error());
-  std::vector<Entry> before = entries_;
-  std::erase_if(entries_, [](const Entry& e) { return !e.info.of_file; });
+  std::vector<Entry> before = entries;
+  std::erase_if(entries, [](const Entry& e) { return !e.info.of_file; });
   int number = 0;
   for (std::string_view rest = *text; !rest.empty();) {
     const std::size_t end = std::min(rest.find('\n'), rest.size());
     ++number;
     if (const auto done = read_line(rest.substr(0, end)); !done) {
-      entries_ = std::move(before);
+      entries = std::move(before);
       return fail(Errc::failed_precondition,
-                  fmt::format("{}:{}: {}", file_.string(), number, done.error().message));
+                  fmt::format("{}:{}: {}", file.string(), number, done.error().message));
     }
     rest.remove_prefix(std::min(end + 1, rest.size()));
   }
-  seen_ = now;
+  seen = now;
   return {};
 }
 
-// Rereads the file of tokens if it has changed. If it cannot be read, the known tokens stay as they are, and
-// the error is logged once.
-void TokenRegistry::look_again_locked() const {
-  if (file_.empty()) return;
-  const FileState now = file_state(file_);
-  if (now == seen_) return;
+void TokenRegistry::Tokens::look_again() {
+  if (file.empty()) return;
+  const FileState now = file_state(file);
+  if (now == seen) return;
   if (const auto read = read_all(); !read) log_error("", read.error().message);
-  seen_ = now;
+  seen = now;
 }
 
-Result<void> TokenRegistry::read_line(std::string_view line) const {
+Result<void> TokenRegistry::Tokens::read_line(std::string_view line) {
   if (line.size() > kMaxLine) return bad_argument("the line is too long to be a token's");
   std::string_view rest = line.substr(0, line.find('#'));
   const std::string_view role_name = next_word(rest);
@@ -121,31 +121,36 @@ Result<void> TokenRegistry::read_line(std::string_view line) const {
   const auto digest = Digest::parse(next_word(rest));
   if (!digest || !next_word(rest).empty())
     return bad_argument("the third and last word must be the SHA-256 of the token: 64 hexadecimal digits");
-  if (entries_.size() >= kMaxTokens) return bad_argument(fmt::format("more than {} tokens", kMaxTokens));
-  for (const Entry& e : entries_)
+  if (entries.size() >= kMaxTokens) return bad_argument(fmt::format("more than {} tokens", kMaxTokens));
+  for (const Entry& e : entries)
     if (e.info.id == digest->hex().substr(0, kIdDigits)) return bad_argument("this token is listed already");
   put(*role, std::string(user), *digest, false);
   return {};
 }
 
-void TokenRegistry::put(Role role, std::string user, const Digest& digest, bool of_file) const {
-  entries_.push_back({{digest.hex().substr(0, kIdDigits), role, std::move(user), of_file}, digest});
+void TokenRegistry::Tokens::put(Role role, std::string user, const Digest& digest, bool of_file) {
+  entries.push_back({{digest.hex().substr(0, kIdDigits), role, std::move(user), of_file}, digest});
+}
+
+Guarded<TokenRegistry::Tokens>::Lock TokenRegistry::latest() const {
+  auto tokens = tokens_.lock();
+  tokens->look_again();
+  return tokens;
 }
 
 std::optional<Caller> TokenRegistry::find(std::string_view token) const {
   const Digest digest = sha256(token);
-  const std::lock_guard lock(mutex_);
-  look_again_locked();
+  const auto tokens = latest();
   std::optional<Caller> found;
-  for (const Entry& e : entries_)  // compares all, so that the time taken does not show which one matches
+  // All entries are compared, so that the duration does not reveal which one matches.
+  for (const Entry& e : tokens->entries)
     if (equal_secret(digest, e.digest)) found = {e.info.role, e.info.user, e.info.id};
   return found;
 }
 
 std::optional<Caller> TokenRegistry::by_id(std::string_view id) const {
-  const std::lock_guard lock(mutex_);
-  look_again_locked();
-  for (const Entry& e : entries_)
+  const auto tokens = latest();
+  for (const Entry& e : tokens->entries)
     if (e.info.id == id) return Caller{e.info.role, e.info.user, e.info.id};
   return std::nullopt;
 }
@@ -163,57 +168,57 @@ Result<TokenRegistry::Made> TokenRegistry::add(Role role, std::string user) {
         "a user name has 1 to {} of a-z A-Z 0-9 . _ - @ and begins with a letter or digit", kMaxUserName));
   auto token = random_token();
   if (!token) return tl::unexpected(token.error());
-  const std::lock_guard lock(mutex_);
-  const FolderLock others(file_.parent_path());
-  look_again_locked();
-  if (entries_.size() >= kMaxTokens)
-    return fail(Errc::resource_exhausted, fmt::format("there are {} tokens already", entries_.size()));
-  put(role, std::move(user), sha256(*token), false);
-  if (auto saved = save_locked(); !saved) {
-    entries_.pop_back();
+  const auto tokens = tokens_.lock();
+  const FolderLock others(tokens->file.parent_path());
+  tokens->look_again();
+  if (tokens->entries.size() >= kMaxTokens)
+    return fail(Errc::resource_exhausted, fmt::format("there are {} tokens already", tokens->entries.size()));
+  tokens->put(role, std::move(user), sha256(*token), false);
+  if (auto saved = tokens->save(); !saved) {
+    tokens->entries.pop_back();
     return tl::unexpected(saved.error());
   }
-  return Made{entries_.back().info, std::move(*token)};
+  return Made{tokens->entries.back().info, std::move(*token)};
 }
 
 Result<void> TokenRegistry::revoke(std::string_view id) {
-  const std::lock_guard lock(mutex_);
-  const FolderLock others(file_.parent_path());
-  look_again_locked();
+  const auto tokens = tokens_.lock();
+  const FolderLock others(tokens->file.parent_path());
+  tokens->look_again();
+  auto& entries = tokens->entries;
   const auto found =
-      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.info.id == id; });
-  if (found == entries_.end()) return fail(Errc::not_found, "there is no such token");
+      std::find_if(entries.begin(), entries.end(), [&](const Entry& e) { return e.info.id == id; });
+  if (found == entries.end()) return fail(Errc::not_found, "there is no such token");
   if (found->info.of_file)
     return fail(Errc::failed_precondition,
                 "this token is a file of the data folder: delete it there and restart the coordinator");
-  const auto place = found - entries_.begin();
+  const auto place = found - entries.begin();
   const Entry gone = *found;
-  entries_.erase(found);
-  if (auto saved = save_locked(); !saved) {
-    entries_.insert(entries_.begin() + place, gone);
+  entries.erase(found);
+  if (auto saved = tokens->save(); !saved) {
+    entries.insert(entries.begin() + place, gone);
     return saved;
   }
   return {};
 }
 
 std::vector<TokenInfo> TokenRegistry::list() const {
-  const std::lock_guard lock(mutex_);
-  look_again_locked();
+  const auto tokens = latest();
   std::vector<TokenInfo> all;
-  for (const Entry& e : entries_) all.push_back(e.info);
+  for (const Entry& e : tokens->entries) all.push_back(e.info);
   return all;
 }
 
-Result<void> TokenRegistry::save_locked() const {
-  if (file_.empty()) return {};
+Result<void> TokenRegistry::Tokens::save() {
+  if (file.empty()) return {};
   std::string text =
       "# ROLE USER SHA256-OF-THE-TOKEN; written by the coordinator (lightshaft token add | revoke)\n";
-  for (const Entry& e : entries_)
+  for (const Entry& e : entries)
     if (!e.info.of_file)
       text += fmt::format("{} {} {}\n", to_string(e.info.role), e.info.user.empty() ? "-" : e.info.user,
                           e.digest.hex());
-  auto written = write_private(file_, text);
-  seen_ = file_state(file_);
+  auto written = write_private(file, text);
+  seen = file_state(file);
   return written;
 }
 

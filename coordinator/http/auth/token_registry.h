@@ -1,20 +1,20 @@
-// All known tokens. The files DATA/token (the administrator's) and DATA/join-token (the workers') hold their
-// tokens in the clear. Of all other tokens DATA/tokens holds only the SHA-256, one per line: `ROLE USER
-// SHA256`, with USER `-` if there is none. Several coordinators may share one folder (--secrets): each
-// rereads the file, if another one has changed it, before it checks a token.
+// All known tokens. The files DATA/token (the administrator's) and DATA/join-token (the workers') contain
+// their tokens in the clear. For all other tokens DATA/tokens contains only the SHA-256, one per line: `ROLE
+// USER SHA256`, with USER `-` if the token has no user. Several coordinators may share one folder
+// (--secrets): before a coordinator checks a token, it rereads the file if another one has changed it.
 #pragma once
 
 #include <filesystem>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/base/digest.h"
 #include "common/base/error.h"
+#include "common/base/guarded.h"
 #include "coordinator/http/auth/token_file.h"
-#include "coordinator/http/message/caller.h"
+#include "coordinator/http/message/message.h"
 
 namespace ls::http {
 
@@ -28,7 +28,7 @@ struct TokenInfo {
   std::string id;  // the first 16 hex digits of its SHA-256
   Role role = Role::read;
   std::string user;
-  // The token is in DATA/token or DATA/join-token and is revoked only by deleting that file.
+  // True if the token is in DATA/token or DATA/join-token. It is then revoked only by deleting that file.
   bool of_file = false;
 };
 
@@ -36,24 +36,24 @@ class TokenRegistry {
  public:
   // Makes a registry without files. If `join_token` is empty, no token lets a worker join.
   explicit TokenRegistry(std::string admin_token, std::string join_token = {});
-  // Reads the folder's files; creates `token` and `join-token` if they are missing. failed_precondition: a
-  // file that others may write (or, for secrets, read), or an invalid line, named with its number.
+  // Reads the folder's files; creates `token` and `join-token` if they are missing. failed_precondition:
+  // others may write a file (or, for secrets, read it), or a line is invalid; the message has its number.
   static Result<std::unique_ptr<TokenRegistry>> open(const std::filesystem::path& folder);
 
-  // Returns the caller with this token, or nullopt for a wrong token. Takes equally long for both.
+  // Returns the caller with this token; nullopt: the token is wrong. The duration is the same for both.
   std::optional<Caller> find(std::string_view token) const;
   std::optional<Caller> by_id(std::string_view id) const;
   bool may_join(std::string_view token) const;
 
   struct Made {
     TokenInfo info;
-    std::string token;  // shown once, stored nowhere
+    std::string token;  // the token itself; shown once, stored nowhere
   };
   // Makes a token and stores its SHA-256. invalid_argument: the user name is missing or invalid.
   // resource_exhausted: there are kMaxTokens already, or the disk is full.
   Result<Made> add(Role role, std::string user);
-  // Makes the token with this id invalid. not_found: there is none. failed_precondition: the token is that of
-  // DATA/token or DATA/join-token.
+  // Makes the token with this id invalid. not_found: there is no such token. failed_precondition: it is the
+  // token in DATA/token or DATA/join-token.
   Result<void> revoke(std::string_view id);
   std::vector<TokenInfo> list() const;
 
@@ -66,18 +66,24 @@ class TokenRegistry {
     TokenInfo info;
     Digest digest;
   };
-  void put(Role role, std::string user, const Digest& digest, bool of_file) const;
-  Result<void> read_line(std::string_view line) const;
-  Result<void> read_all() const;
-  void look_again_locked() const;  // rereads the file if another coordinator has written it
-  Result<void> save_locked() const;
+  // The tokens, as of the last reading of the file.
+  struct Tokens {
+    void put(Role role, std::string user, const Digest& digest, bool of_file);
+    // Rereads the file if it has changed. If it cannot be read, the known tokens stay as they are, and the
+    // error is logged once.
+    void look_again();
+    Result<void> read_all();
+    Result<void> read_line(std::string_view line);
+    Result<void> save();
+
+    std::filesystem::path file;  // empty: the tokens are in memory only
+    FileState seen;
+    std::vector<Entry> entries;
+  };
+  Guarded<Tokens>::Lock latest() const;
 
   std::string session_key_;
-  std::filesystem::path file_;  // empty: in memory only
-  mutable std::mutex mutex_;
-  // Cached contents of the file; mutable, since rereading it does not change the registry logically.
-  mutable FileState seen_;
-  mutable std::vector<Entry> entries_;
+  mutable Guarded<Tokens> tokens_;  // mutable, since const functions reread the file
 };
 
 }  // namespace ls::http

@@ -42,12 +42,12 @@ class Utf8Names {
 
 enum class Trouble { none, stopped, unreadable, list_too_long };
 
-// Where libarchive's callbacks get the archive's bytes from.
+// The input of libarchive's callbacks: the archive's bytes.
 struct Source {
   int fd = -1;
   std::int64_t size = 0, at = 0;
-  // How many more bytes of a zip's list of entries may be read. libarchive reads the list together with the
-  // first entry and keeps it in memory, so its size must be limited.
+  // How many more bytes of a zip's list of entries may be read. libarchive reads the list before the first
+  // entry and keeps it in memory, so its size must be limited.
   std::int64_t list_bytes_left = static_cast<std::int64_t>(kMaxArchiveList);
   bool reads_list = true;
   std::stop_token stop;
@@ -110,7 +110,7 @@ struct ArchiveReader::State {
   Source source;
   ArchiveKind kind = ArchiveKind::zip;
   std::unique_ptr<archive, FreeArchive> reader;
-  std::int64_t data_end = 0;  // offset in the unpacked tar at which the data of the last entry read end
+  std::int64_t data_end = 0;  // offset in the unpacked tar where the data of the last entry end
 
   Error error(std::string_view doing) const;
   std::int64_t position() const { return archive_filter_bytes(reader.get(), 0); }
@@ -194,7 +194,8 @@ Result<std::optional<ArchiveEntry>> ArchiveReader::next() {
     entry.bytes = static_cast<std::uint64_t>(std::max<la_int64_t>(archive_entry_size(e), 0));
   entry.encrypted = archive_entry_is_encrypted(e) != 0;
   if (s.kind == ArchiveKind::zip) {
-    // "ZIP 2.0 (deflation)": only here does libarchive report the compression method of an entry.
+    // The text is, for example, "ZIP 2.0 (deflation)". libarchive reports the compression method of an entry
+    // nowhere else.
     const std::string_view format = archive_format_name(a);
     entry.packed_oddly = !format.ends_with("(deflation)") && !format.ends_with("(uncompressed)");
   }

@@ -19,27 +19,28 @@ enum class ArchiveKind { zip, tar };
 
 struct ArchiveEntry {
   enum class Kind { file, folder, link, other };
-  std::string name;  // as in the archive; any bytes, possibly not UTF-8
+  std::string name;  // as in the archive: any bytes, which may be invalid UTF-8
   Kind kind = Kind::other;
-  std::optional<std::uint64_t> bytes;  // as announced; differs from the actual size only in damaged archives
+  // Size announced in the header; it differs from the actual size only in damaged archives
+  std::optional<std::uint64_t> bytes;
   bool encrypted = false;
-  bool packed_oddly = false;  // zip: compressed by another method than deflate
+  bool packed_oddly = false;  // true for an entry of a zip with another compression method than deflate
 };
 
 class ArchiveReader {
  public:
-  // Opens the archive in `fd`, a regular file that the caller keeps open. Reads by offset (pread), so that
-  // the file's position does not change. invalid_argument: the file is not an archive of this kind. After a
-  // stop request through `stop` every later call of the reader fails with `unavailable`.
+  // Opens the archive in `fd`, a regular file that the caller keeps open. The file's position does not
+  // change, since it is read by offset (pread). invalid_argument: the file is not an archive of this kind.
+  // After a stop request through `stop` every later call of the reader fails with `unavailable`.
   static Result<ArchiveReader> open(int fd, ArchiveKind kind, std::stop_token stop);
   ~ArchiveReader();
   ArchiveReader(ArchiveReader&&) noexcept;
 
-  // Goes on to the next entry; the previous one must have been read to its end. nullopt: the archive's end
-  // marker has been reached. A file that ends without an end marker is an error.
+  // Moves to the next entry; the previous one must have been read to its end. nullopt: the end marker of the
+  // archive has been reached. A file that ends without an end marker is an error.
   Result<std::optional<ArchiveEntry>> next();
-  // Reads the next bytes of the current entry and returns how many. 0: the entry has ended, and its checksum,
-  // if it has one, was right.
+  // Reads the next bytes of the current entry and returns their number. 0: the entry has ended, and its
+  // checksum, if it has one, is right.
   Result<std::size_t> read(std::span<std::byte> into);
 
  private:

@@ -19,7 +19,7 @@ tl::unexpected<Error> refused(const Error& error) {
   return error.code == Errc::invalid_argument ? bad_bundle(error.message) : tl::unexpected(error);
 }
 
-// Adds the name of the entry in which the error occurred to an error about the archive.
+// Adds the name of the entry to an error about the archive.
 tl::unexpected<Error> within(const Error& error, std::string_view name) {
   if (error.code != Errc::invalid_argument) return tl::unexpected(error);
   return bad_entry(name, error.message);
@@ -107,7 +107,8 @@ class Survey {
       if (auto ok = room_for(entry.name, bytes, total_); !ok) return ok;
       const auto part = std::span<const std::byte>(buffer_).first(*n);
       sha.update(part);
-      if (keep && text.size() <= kMaxBundleJobJson)  // one that is too long is an error only if it is used
+      // A job.json that is too long is an error only if it is used
+      if (keep && text.size() <= kMaxBundleJobJson)
         text.append(reinterpret_cast<const char*>(part.data()), part.size());
     }
     if (folder) return {};
@@ -116,8 +117,8 @@ class Survey {
     return {};
   }
 
-  // True if this file may be the bundle's job.json: it lies at the top, or directly in one of the first
-  // folders that have a job.json (if everything lies in one folder, that folder counts as the top).
+  // True if this file may be the bundle's job.json. The file must be at the top, or directly in one of the
+  // first folders that have a job.json (if all files are in one folder, that folder counts as the top).
   bool may_be_job_file(const std::string& name) const {
     if (name == kBundleJobFile) return true;
     const std::size_t slash = name.find('/');

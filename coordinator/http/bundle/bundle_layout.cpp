@@ -1,5 +1,5 @@
-// Decides which file of a bundle is the scene, reads job.json, and names the other files relative to the
-// scene.
+// Decides which file of a bundle is the scene, reads job.json, and makes the names of the other files
+// relative to the scene.
 #include "coordinator/http/bundle/bundle_layout.h"
 
 #include <fmt/format.h>
@@ -98,7 +98,7 @@ Result<JobFile> read_job_file(const std::string& text) {
     out.scene = scene->get<std::string>();
     job.erase(scene);
   }
-  // The keys of the spec are beside "scene" or, as in a JSON request, in an object "spec" of their own.
+  // The keys of the spec are beside "scene" or, as in a JSON request, in an object "spec".
   if (const auto spec = job.find("spec"); spec != job.end()) {
     if (!spec->is_object() || job.size() != 1)
       return bad_bundle("'spec' in job.json must be an object, and the only key besides 'scene'");
@@ -108,7 +108,8 @@ Result<JobFile> read_job_file(const std::string& text) {
   return out;
 }
 
-// Returns `name` relative to `folder` ("" or "a/b/"), as a scene in that folder would write it.
+// Returns the path of the file `name` relative to `folder` ("" or "a/b/"), as a scene in that folder would
+// contain it.
 std::string seen_from(std::string_view folder, std::string_view name) {
   std::size_t common = 0;
   for (std::size_t i = 0; i < std::min(folder.size(), name.size()) && folder[i] == name[i]; ++i)

@@ -1,5 +1,5 @@
-// Makes a bundle (a scene with its files) from the list of an archive's files. This part of read_bundle()
-// reads no archive itself.
+// Finds the parts of a bundle (a scene with its files) in the list of an archive's files. This part of
+// read_bundle() does not read the archive itself.
 #pragma once
 
 #include <map>

@@ -10,7 +10,7 @@
 
 namespace ls::http {
 
-// Parses the body as a JSON object that may have only the keys in `known`; the error says what is wrong.
+// Parses the body as a JSON object that may have only the keys in `known`. The error explains what is wrong.
 Result<nlohmann::json> read_object(std::string_view body, std::initializer_list<std::string_view> known);
 
 // Parses a SHA-256 in hexadecimal digits (either case); `what` names the value in the error.

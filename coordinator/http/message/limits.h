@@ -17,12 +17,12 @@ inline constexpr std::uint64_t kMaxControlJson = 64u << 10;  // PATCH /jobs/ID
 inline constexpr std::uint64_t kMaxSessionJson = 4u << 10;   // POST /session
 
 // Contents of requests
-inline constexpr int kMaxJsonDepth = 16;             // values are printed recursively
-inline constexpr std::size_t kMaxDigests = 100'000;  // per POST /blobs/missing
+inline constexpr int kMaxJsonDepth = 16;             // bounds the depth of recursion when values are printed
+inline constexpr std::size_t kMaxDigests = 100'000;  // digests in one POST /blobs/missing
 inline constexpr std::size_t kMaxAssetName = 1024;   // characters
 inline constexpr std::size_t kMaxTarget = 8u << 10;  // request target
 inline constexpr std::size_t kMaxQueryParameters = 256;
-inline constexpr std::size_t kMaxIdLength = 64;  // of a job's id
+inline constexpr std::size_t kMaxIdLength = 64;  // characters of a job's id
 inline constexpr double kMaxExposure = 32;       // stops, positive or negative
 
 // Bundles
@@ -30,21 +30,26 @@ inline constexpr std::size_t kMaxBundleEntries = coordinator::limits::kMaxAssets
 inline constexpr std::size_t kMaxBundleNames = 16u << 20;    // bytes of all names together
 inline constexpr std::size_t kMaxBundleJobJson = 1u << 20;   // job.json
 inline constexpr std::uint64_t kMaxArchiveList = 32u << 20;  // a zip's directory, which is read as a whole
-inline constexpr std::uint64_t kMaxBundleRatio = 200;        // unpacked bytes per byte of the archive...
-// ...and this many unpacked bytes more, because a small archive of empty grids may compress even better
+// An archive may unpack to this many bytes per byte of its own size...
+inline constexpr std::uint64_t kMaxBundleRatio = 200;
+// ...plus this many bytes, because a small archive of empty grids may compress even better
 inline constexpr std::uint64_t kBundleSlack = 64u << 20;
 
 // Buffers
-inline constexpr std::size_t kReadBuffer = 64u << 10;   // per connection
-inline constexpr std::size_t kBodyChunk = 256u << 10;   // written to the disk at once
-inline constexpr std::size_t kWriteSlice = 256u << 10;  // written to a client between two checks of the clock
+inline constexpr std::size_t kReadBuffer = 64u << 10;  // per connection
+// Bytes of a request's body written to the disk at once
+inline constexpr std::size_t kBodyChunk = 256u << 10;
+// Bytes written to a client between two checks of its deadline
+inline constexpr std::size_t kWriteSlice = 256u << 10;
 // Bytes of request bodies that all connections together may hold in memory
 inline constexpr std::uint64_t kMaxBuffered = 256u << 20;
 // Bytes of answers that all connections together may hold in memory, not counting bodies in files. A single
-// answer larger than this is sent while no other answer is counted.
+// answer that is larger than this is sent once no other answer is in memory.
 inline constexpr std::uint64_t kMaxAnswers = 256u << 20;
-inline constexpr std::uint64_t kSmallAnswer = 64u << 10;  // an answer up to this size is not counted
-inline constexpr std::uint64_t kLingerBytes = 16u << 20;  // read and discarded after an early rejection
+// Answers up to this size are not counted in kMaxAnswers
+inline constexpr std::uint64_t kSmallAnswer = 64u << 10;
+// Bytes that are read and dropped after an early rejection (see linger_seconds)
+inline constexpr std::uint64_t kLingerBytes = 16u << 20;
 
 inline constexpr std::int64_t kSessionSeconds = 12 * 3600;
 inline constexpr std::size_t kMaxRevokedSessions = 10'000;
@@ -61,23 +66,27 @@ struct Limits {
   std::size_t event_queue = 4096;  // events waiting for one reader
   std::size_t event_queue_bytes = 4u << 20;
   double header_seconds = 10;  // from the first byte of a request to the end of its header
-  double idle_seconds = 60;    // of a kept connection between two requests
-  // A body (in either direction) is cut off when it is slower than this: allowed seconds = grace + bytes so
-  // far / min_rate. So it takes at most grace + length / min_rate, and one that stalls is cut off after
-  // grace, whatever length it announced.
+  double idle_seconds = 60;    // a kept-alive connection is closed after this time without a request
+  // A body (in either direction) is cut off when its transfer takes longer than body_grace_seconds + (bytes
+  // so far) / min_rate. So a transfer of `length` bytes takes at most body_grace_seconds + length / min_rate,
+  // and a stalled one is cut off after the grace time, whatever length it announced.
   double body_grace_seconds = 15;
   double min_rate = 8u << 10;     // bytes per second
-  double heartbeat_seconds = 15;  // between comments on a silent event stream
-  double linger_seconds = 3;      // reading on after an early rejection, so that the answer arrives
+  double heartbeat_seconds = 15;  // interval of the comments that keep a silent event stream alive
+  // After an early rejection the rest of the body is read for this long: closing at once could lose the
+  // answer
+  double linger_seconds = 3;
   // Requests per token, or per address without a token; 0: no limit. The burst is twice as large
   double requests_per_second = 500;
-  double wrong_tokens_per_minute = 20;  // per address, with a burst of the same size; then 429; 0: no limit
-  double stop_seconds = 5;              // how long a stopping coordinator waits for open requests
-  int quick_threads = 2;                // for answers from memory
-  int remote_threads = 8;               // for requests to other machines: blob stores, other coordinators
-  int user_priority = 0;                // highest priority of jobs with a submit token
-  int slow_threads = 4;                 // for reading scenes, writing images and blobs
-  int bundle_threads = 2;               // for unpacking bundles, so that these never occupy all slow threads
+  // Requests with a wrong token, per address, with a burst of the same size. Further ones are answered with
+  // 429. 0: no limit
+  double wrong_tokens_per_minute = 20;
+  double stop_seconds = 5;  // how long a stopping coordinator waits for open requests
+  int quick_threads = 2;    // for answers from memory
+  int remote_threads = 8;   // for requests to other machines: blob stores, other coordinators
+  int user_priority = 0;    // highest priority of jobs with a submit token
+  int slow_threads = 4;     // for reading scenes, writing images and blobs
+  int bundle_threads = 2;   // for unpacking bundles, so that these never occupy all slow threads
   // Folder for bundles while they are read; empty: the system's temporary folder
   std::filesystem::path spool;
 };

@@ -1,9 +1,21 @@
 #include "coordinator/http/message/message.h"
 
+#include <fcntl.h>
+#include <fmt/chrono.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
+#include <boost/beast/http/status.hpp>
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+#include <iterator>
 
 #include "common/base/overloaded.h"
+#include "coordinator/base/percent_decode.h"
+#include "coordinator/http/message/limits.h"
 
 namespace ls::http {
 namespace {
@@ -17,38 +29,6 @@ constexpr std::array kMethods = {
     MethodName{Method::post, "POST"},       MethodName{Method::put, "PUT"},
     MethodName{Method::patch, "PATCH"},     MethodName{Method::del, "DELETE"},
     MethodName{Method::options, "OPTIONS"},
-};
-
-struct StatusName {
-  int status;
-  std::string_view phrase;
-};
-constexpr std::array kPhrases = {
-    StatusName{200, "OK"},
-    StatusName{201, "Created"},
-    StatusName{202, "Accepted"},
-    StatusName{204, "No Content"},
-    StatusName{304, "Not Modified"},
-    StatusName{307, "Temporary Redirect"},
-    StatusName{400, "Bad Request"},
-    StatusName{401, "Unauthorized"},
-    StatusName{403, "Forbidden"},
-    StatusName{404, "Not Found"},
-    StatusName{405, "Method Not Allowed"},
-    StatusName{408, "Request Timeout"},
-    StatusName{409, "Conflict"},
-    StatusName{411, "Length Required"},
-    StatusName{413, "Content Too Large"},
-    StatusName{414, "URI Too Long"},
-    StatusName{415, "Unsupported Media Type"},
-    StatusName{416, "Range Not Satisfiable"},
-    StatusName{429, "Too Many Requests"},
-    StatusName{431, "Request Header Fields Too Large"},
-    StatusName{500, "Internal Server Error"},
-    StatusName{501, "Not Implemented"},
-    StatusName{503, "Service Unavailable"},
-    StatusName{505, "HTTP Version Not Supported"},
-    StatusName{507, "Insufficient Storage"},
 };
 
 }  // namespace
@@ -107,9 +87,8 @@ Response json_response(int status, std::string json) {
 }
 
 std::string_view reason_phrase(int status) {
-  for (const auto& s : kPhrases)
-    if (s.status == status) return s.phrase;
-  return "Unknown";
+  return boost::beast::http::obsolete_reason(
+      boost::beast::http::int_to_status(static_cast<unsigned>(status)));
 }
 
 std::string media_type(std::string_view content_type) {
@@ -118,6 +97,138 @@ std::string media_type(std::string_view content_type) {
   std::transform(type.begin(), type.end(), type.begin(),
                  [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
   return type;
+}
+
+Result<FileBody> open_file_body(const std::filesystem::path& path) {
+  const int opened = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (opened < 0)
+    return fail(errno == ENOENT ? Errc::not_found : Errc::unavailable,
+                fmt::format("cannot open {}: {}", path.string(), std::strerror(errno)));
+  const std::shared_ptr<const int> fd(new int(opened), [](const int* owned) {
+    ::close(*owned);
+    delete owned;
+  });
+  struct stat info {};
+  if (::fstat(*fd, &info) != 0)
+    return fail(Errc::unavailable, fmt::format("cannot look at {}: {}", path.string(), std::strerror(errno)));
+  return FileBody{fd, static_cast<std::uint64_t>(info.st_size)};
+}
+
+std::size_t read_slice(const FileBody& file, std::uint64_t offset, std::span<std::byte> into) {
+  ssize_t n = -1;
+  do n = ::pread(*file.fd, into.data(), into.size(), static_cast<off_t>(offset));
+  while (n < 0 && errno == EINTR);
+  return n < 0 ? 0 : static_cast<std::size_t>(n);
+}
+
+namespace {
+
+bool has(const Response& response, std::string_view name) {
+  for (const auto& field : response.headers)
+    if (field.first == name) return true;
+  return false;
+}
+
+}  // namespace
+
+std::string head_text(const Response& response, const HeadOptions& options, std::int64_t unix_seconds) {
+  std::string out = fmt::format("HTTP/1.1 {} {}\r\n", response.status, reason_phrase(response.status));
+  const auto field = [&out](std::string_view name, std::string_view value) {
+    fmt::format_to(std::back_inserter(out), "{}: {}\r\n", name, value);
+  };
+  field("Date", fmt::format("{:%a, %d %b %Y %H:%M:%S} GMT", fmt::gmtime(std::time_t{unix_seconds})));
+  if (!response.content_type.empty()) field("Content-Type", response.content_type);
+  const bool bodyless = response.status == 204 || response.status == 304;
+  // The answer to HEAD gives the length of the answer to GET. If a handler answers HEAD without a body and
+  // content type, the length is unknown.
+  const bool unknown = options.streamed || (options.method == Method::head && response.content_type.empty());
+  if (!bodyless && !unknown) field("Content-Length", fmt::format("{}", response.length()));
+  for (const auto& [name, value] : response.headers) field(name, value);
+  if (!has(response, "Cache-Control")) field("Cache-Control", "no-store");
+  if (!has(response, "Content-Security-Policy"))
+    field("Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'");
+  field("X-Content-Type-Options", "nosniff");
+  field("Referrer-Policy", "no-referrer");
+  field("Connection", options.keep_alive ? "keep-alive" : "close");
+  out += "\r\n";
+  return out;
+}
+
+namespace {
+
+// In queries '+' is a space.
+Result<std::string> decode(std::string_view text, bool plus_is_space) {
+  std::string coded(text);
+  if (plus_is_space) std::replace(coded.begin(), coded.end(), '+', ' ');
+  auto plain = coordinator::percent_decode(coded);
+  if (!plain) return fail(Errc::invalid_argument, "the request target has a broken percent code");
+  return std::move(*plain);
+}
+
+// Removes and returns the part of `rest` up to `separator`.
+std::string_view take_part(std::string_view& rest, char separator) {
+  const std::size_t end = rest.find(separator);
+  const std::string_view part = rest.substr(0, end);
+  rest = end == std::string_view::npos ? std::string_view{} : rest.substr(end + 1);
+  return part;
+}
+
+Result<std::vector<std::string>> parse_path(std::string_view path) {
+  std::vector<std::string> segments;
+  path.remove_prefix(1);
+  while (!path.empty()) {
+    auto segment = decode(take_part(path, '/'), false);
+    if (!segment) return tl::unexpected(segment.error());
+    if (segment->find('/') != std::string::npos || segment->find('\0') != std::string::npos)
+      return fail(Errc::invalid_argument, "the path hides '/' or NUL in a percent code");
+    segments.push_back(std::move(*segment));
+    if (path.empty()) break;
+  }
+  return segments;
+}
+
+Result<Fields> parse_query(std::string_view query) {
+  Fields fields;
+  while (!query.empty()) {
+    std::string_view value = take_part(query, '&');
+    if (value.empty()) continue;
+    const std::string_view name = take_part(value, '=');
+    if (fields.size() == kMaxQueryParameters)
+      return fail(Errc::invalid_argument,
+                  fmt::format("the query has more than {} parameters", kMaxQueryParameters));
+    auto decoded_name = decode(name, true);
+    if (!decoded_name) return tl::unexpected(decoded_name.error());
+    auto decoded_value = decode(value, true);
+    if (!decoded_value) return tl::unexpected(decoded_value.error());
+    fields.emplace_back(std::move(*decoded_name), std::move(*decoded_value));
+  }
+  return fields;
+}
+
+}  // namespace
+
+Result<Target> parse_target(std::string_view target) {
+  for (const std::string_view scheme : {"http://", "https://"}) {
+    if (!target.starts_with(scheme)) continue;
+    target.remove_prefix(scheme.size());
+    const std::size_t path = target.find_first_of("/?");
+    target = path == std::string_view::npos ? std::string_view("/") : target.substr(path);
+    break;
+  }
+  for (const char c : target)
+    if (static_cast<unsigned char>(c) <= ' ' || c == '\x7f')
+      return fail(Errc::invalid_argument, "the request target has a space or a control character");
+  if (target.empty() || target.front() != '/')
+    return fail(Errc::invalid_argument, "the request target must start with '/'");
+  target = target.substr(0, target.find('#'));
+  std::string_view rest = target;
+  const std::string_view path = take_part(rest, '?');
+
+  auto segments = parse_path(path);
+  if (!segments) return tl::unexpected(segments.error());
+  auto query = parse_query(rest);
+  if (!query) return tl::unexpected(query.error());
+  return Target{std::move(*segments), std::move(*query)};
 }
 
 }  // namespace ls::http

@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -11,38 +13,74 @@
 #include <variant>
 #include <vector>
 
-#include "coordinator/http/message/caller.h"
-#include "coordinator/http/message/file_body.h"
+#include "common/base/error.h"
 
 namespace ls::http {
 
+// The caller of a request and its role. What each role may do: docs/reference/authorisation.md.
+enum class Role {
+  admin,   // everything
+  submit,  // submits jobs; sees and changes only its own
+  read,    // sees everything, changes nothing
+  join,    // a worker: may join the farm over gRPC, but may not use the HTTP API
+};
+std::string_view to_string(Role role);  // returns "admin", ...
+std::optional<Role> parse_role(std::string_view name);
+
+struct Caller {
+  Role role = Role::join;  // worker, the role with the fewest rights, until the caller is identified
+  // Owner of the jobs that the caller submits; empty: the administrator with the token of the file `token`
+  std::string user;
+  std::string token_id;
+  // True if the caller may see the jobs of the user `owner`.
+  bool sees(std::string_view owner) const {
+    return role == Role::admin || role == Role::read || (role == Role::submit && owner == user);
+  }
+};
+
+// A response body that is read from a file. It is sent slice by slice, so that it does not fill memory while
+// a slow client reads it.
+struct FileBody {
+  // The descriptor is closed with the last copy of the FileBody; the file is readable even after its removal.
+  std::shared_ptr<const int> fd;
+  std::uint64_t size = 0;  // bytes
+};
+
+// not_found: there is no such file.
+Result<FileBody> open_file_body(const std::filesystem::path& path);
+
+// Reads bytes from `offset` on and returns their number; 0: the file has become shorter, or cannot be read.
+std::size_t read_slice(const FileBody& file, std::uint64_t offset, std::span<std::byte> into);
+
 enum class Method { get, head, post, put, patch, del, options };
-std::string_view to_string(Method method);                  // "GET", ...
+std::string_view to_string(Method method);                  // returns "GET", ...
 std::optional<Method> parse_method(std::string_view name);  // case-sensitive, as in RFC 9110
 
 using Fields = std::vector<std::pair<std::string, std::string>>;
 
 struct Request {
   Method method = Method::get;
-  std::vector<std::string> segments;  // of the path, percent-decoded; none for "/"
+  std::vector<std::string> segments;  // segments of the path, percent-decoded; none for "/"
   Fields query;                       // decoded, in order
   Fields headers;                     // names in lower case
   std::optional<std::uint64_t> content_length;
-  bool has_body = false;  // Content-Length above zero, or chunked
+  bool has_body = false;  // true for a Content-Length above zero or a chunked body
   std::string body;
   std::string peer;  // the client's address without port; empty: unknown
-  Caller caller;     // set by Api::admit for routes that identify the caller; the least role before
+  Caller caller;     // set by Api::admit for routes that identify the caller; until then the default role
 
-  std::string_view header(std::string_view lower_case_name) const;         // empty if absent
-  std::optional<std::string_view> parameter(std::string_view name) const;  // the first of this name
+  std::string_view header(std::string_view lower_case_name) const;  // empty if absent
+  // Value of the first parameter with this name
+  std::optional<std::string_view> parameter(std::string_view name) const;
 };
 
-// What a stream of Server-Sent Events shall contain. A Response with an EventStream is followed by the
-// events.
+// The events that a stream of Server-Sent Events is to contain. If a Response has an EventStream, the events
+// follow it.
 struct EventStream {
-  std::optional<std::uint64_t> after_id;  // only events with higher ids; nullopt: only those from now on
-  std::string job;                        // only events of this job; empty: of all jobs
-  Caller reader;                          // restricts the events to what the reader may see
+  // Only events with higher ids; nullopt: only events that occur from now on
+  std::optional<std::uint64_t> after_id;
+  std::string job;  // only events of this job; empty: of all jobs
+  Caller reader;    // restricts the events to what the reader may see
 };
 
 struct Response {
@@ -54,7 +92,7 @@ struct Response {
   std::optional<EventStream> events;
 
   std::span<const std::byte> bytes() const;  // empty for a file
-  std::uint64_t length() const;              // of the body
+  std::uint64_t length() const;              // length of the body
   std::uint64_t in_memory() const;           // bytes held in memory while the response is sent
 };
 
@@ -63,7 +101,27 @@ Response json_response(int status, std::string json);
 
 std::string_view reason_phrase(int status);
 
-// Returns "application/json" for "Application/JSON; charset=utf-8".
+// Returns the media type in lower case without parameters: "application/json" for "Application/JSON;
+// charset=utf-8".
 std::string media_type(std::string_view content_type);
+
+struct HeadOptions {
+  bool keep_alive = false;
+  bool streamed = false;  // true: there is no Content-Length, and the body ends with the connection
+  Method method = Method::get;
+};
+
+// Returns the status line, the header fields and the empty line behind them. The fields are those of
+// `response`, and Date (from `unix_seconds`), the length, and the security headers of every response.
+std::string head_text(const Response& response, const HeadOptions& options, std::int64_t unix_seconds);
+
+struct Target {
+  std::vector<std::string> segments;
+  Fields query;
+};
+
+// Parses "/api/v1/jobs?spp=4" or "http://host/path". Invalid percent codes, control characters, '/' or NUL
+// hidden in a percent code, and more than kMaxQueryParameters are errors (400).
+Result<Target> parse_target(std::string_view target);
 
 }  // namespace ls::http

@@ -19,7 +19,7 @@ constexpr std::array kStatus = {
 };
 
 Response from_json(int status, const nlohmann::ordered_json& json) {
-  // Texts may quote a scene's bytes: invalid UTF-8 is replaced and never throws.
+  // Texts may quote bytes of a scene. Invalid UTF-8 is replaced, so that dump() never throws.
   Response response =
       text_response(status, "application/problem+json",
                     json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));

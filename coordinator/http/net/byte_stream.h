@@ -1,52 +1,70 @@
-// Reads and writes a client's socket, plain or with TLS; the only user of libssl in the HTTP server. Without
-// TLS no libssl code runs. Includes Boost.
+// A client's socket, plain or with TLS, as a stream that the algorithms of Asio and Beast read and write; the
+// only user of libssl in the HTTP server. Without TLS no libssl code runs. Includes Boost.
 #pragma once
 
-#include <array>
+#include <boost/asio/async_result.hpp>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/ip/tcp.hpp>
-#include <functional>
+#include <boost/asio/redirect_error.hpp>
+#include <boost/asio/ssl/stream.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <memory>
+#include <optional>
 #include <string>
+#include <type_traits>
+#include <utility>
 
-#include "coordinator/http/net/tls_identity.h"
+#include "coordinator/http/net/http_server.h"
 
 namespace ls::http {
+
+namespace net = boost::asio;
+using Tcp = net::ip::tcp;
+using boost::system::error_code;
+
+// For co_await: the operation reports failure in `ec` and does not throw.
+inline auto awaiting(error_code& ec) { return net::redirect_error(net::use_awaitable, ec); }
 
 // Used by the network thread only. One read and one write may be in progress at a time.
 class Stream {
  public:
-  using Tcp = boost::asio::ip::tcp;
-  using Code = boost::system::error_code;
-  template <class T>
-  using Awaitable = boost::asio::awaitable<T>;
-
   Stream(Tcp::socket socket, std::shared_ptr<const TlsIdentity> identity);  // null: no TLS
-  ~Stream();
 
   enum class Opened { ready, plain_text, failed };
   // Does the TLS handshake; without TLS it has nothing to do and returns `ready`. plain_text: the client
   // speaks no TLS; further writes are sent in plain text, so that an error can be reported to the client.
   // After cancel() it ends early.
-  Awaitable<Opened> open();
+  net::awaitable<Opened> open();
 
-  Awaitable<std::size_t> read_some(boost::asio::mutable_buffer into, Code& ec);
-  Awaitable<std::size_t> write_some(const std::array<boost::asio::const_buffer, 2>& from, Code& ec);
-  void read_in_background(boost::asio::mutable_buffer into, std::function<void()> came);
+  using executor_type = Tcp::socket::executor_type;
+  executor_type get_executor() { return socket_.get_executor(); }
 
-  void cancel();  // pending operations end with an error; the stream stays open
+  // What a read or a write with this completion token returns.
+  template <class Token>
+  using Started = typename net::async_result<std::decay_t<Token>, void(error_code, std::size_t)>::return_type;
+  template <class Buffers, class Token>
+  Started<Token> async_read_some(const Buffers& into, Token&& token) {
+    if (through_tls_) return tls_->async_read_some(into, std::forward<Token>(token));
+    return socket_.async_read_some(into, std::forward<Token>(token));
+  }
+  template <class Buffers, class Token>
+  Started<Token> async_write_some(const Buffers& from, Token&& token) {
+    if (through_tls_) return tls_->async_write_some(from, std::forward<Token>(token));
+    return socket_.async_write_some(from, std::forward<Token>(token));
+  }
+
+  void cancel();  // ends pending operations with an error; the stream stays open
   void close();
-  Awaitable<void> send_goodbye();  // ends writing: closes TLS, then the socket's sending side
+  net::awaitable<void> send_goodbye();  // ends writing: closes TLS, then the socket's sending side
 
   std::string peer() const { return peer_; }  // address without port
 
  private:
-  struct Tls;
-  Tcp::socket& socket();
   std::string peer_;
-  std::unique_ptr<Tcp::socket> plain_;  // exactly one of plain_ and tls_ is set
-  std::shared_ptr<Tls> tls_;            // shared with a background read, which uses it when it ends
-  bool through_tls_ = false;            // between handshake and goodbye
+  Tcp::socket socket_;
+  std::shared_ptr<const TlsIdentity> identity_;
+  std::optional<net::ssl::stream<Tcp::socket&>> tls_;
+  bool through_tls_ = false;  // between handshake and goodbye
 };
 
 }  // namespace ls::http

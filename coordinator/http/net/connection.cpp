@@ -2,19 +2,20 @@
 
 #include <fmt/format.h>
 
-#include <boost/asio/redirect_error.hpp>
-#include <boost/asio/use_awaitable.hpp>
+#include <array>
+#include <boost/asio/buffer.hpp>
+#include <boost/beast/core/buffers_prefix.hpp>
+#include <boost/beast/core/buffers_suffix.hpp>
+#include <boost/beast/core/buffers_to_string.hpp>
+#include <boost/beast/http/read.hpp>
 #include <exception>
 #include <utility>
 
 #include "common/base/log.h"
+#include "coordinator/http/message/message.h"
 #include "coordinator/http/message/problem.h"
-#include "coordinator/http/net/head_text.h"
-#include "coordinator/http/net/run_on.h"
 
 namespace ls::http {
-
-using boost::system::error_code;
 
 Connection::Connection(Tcp::socket socket, std::shared_ptr<const TlsIdentity> tls, Shared& shared)
     : stream_(std::move(socket), std::move(tls)),
@@ -146,6 +147,151 @@ net::awaitable<Response> Connection::handle_on_executor(const Match& match, cons
   co_return co_await run_on(shared_.remote, shared_.io, std::move(ask));
 }
 
+// Sets the deadline of the operations that follow. Asio gives single reads no deadline; so when it passes,
+// all pending operations on the socket are cancelled. The socket stays open, so that a client whose request
+// was too slow still gets an answer.
+void Connection::arm(SteadyClock::time_point deadline) {
+  timed_out_ = false;
+  deadline_ = deadline;
+  watch(deadline);
+}
+
+void Connection::watch(SteadyClock::time_point until) {
+  watchdog_.expires_at(until);
+  watchdog_.async_wait([this, alive = std::weak_ptr(alive_)](error_code ec) {
+    if (ec || alive.expired() || SteadyClock::now() < deadline_) return;
+    timed_out_ = true;
+    stream_.cancel();
+    // Once more: an operation of Beast that has just finished one read may start another.
+    watch(SteadyClock::now() + std::chrono::milliseconds(100));
+  });
+}
+
+void Connection::disarm() {
+  deadline_ = SteadyClock::time_point::max();
+  watchdog_.cancel();
+}
+
+SteadyClock::time_point Connection::pace(SteadyClock::time_point began, std::uint64_t bytes) const {
+  return began + steady_seconds(limits_.body_grace_seconds + static_cast<double>(bytes) / limits_.min_rate);
+}
+
+net::awaitable<Read> Connection::fill() {
+  error_code ec;
+  buffer_.commit(co_await stream_.async_read_some(buffer_.prepare(kReadBuffer), awaiting(ec)));
+  co_return read_result(ec, timed_out_);
+}
+
+net::awaitable<Read> Connection::read_header(Parser& parser) {
+  if (buffer_.size() == 0) {
+    idle_ = true;
+    arm(SteadyClock::now() + steady_seconds(limits_.idle_seconds));
+    if (co_await fill() != Read::ok) co_return Read::closed;  // no request has begun, so nothing is answered
+    idle_ = false;
+  }
+  arm(SteadyClock::now() + steady_seconds(limits_.header_seconds));
+  error_code ec;
+  co_await beast::http::async_read_header(stream_, buffer_, parser, awaiting(ec));
+  co_return read_result(ec, timed_out_);
+}
+
+net::awaitable<Connection::Body> Connection::read_whole(Parser& parser, Request& request,
+                                                        std::uint64_t limit) {
+  if (!co_await send_continue(request)) co_return Body{Read::closed, {}};
+  const auto began = SteadyClock::now();
+  std::uint64_t received = 0;
+  while (!parser.is_done()) {
+    const Read read = co_await read_portion(parser, began, received);
+    if (read != Read::ok) co_return Body{read, {}};
+    if (received > limit)
+      co_return Body{Read::ok,
+                     problem(413, fmt::format("the body has more than the {} bytes accepted here", limit))};
+    if (!charge(received))
+      co_return Body{Read::ok, problem(503, "too many large requests at once; try again")};
+  }
+  beast::flat_buffer body = std::exchange(parser.get().body(), beast::flat_buffer());
+  request.body = beast::buffers_to_string(body.data());
+  co_return Body{};
+}
+
+net::awaitable<Connection::Body> Connection::read_streamed(Parser& parser, const Match& match,
+                                                           const Request& request) {
+  auto open = [this, &match, &request] { return shared_.api.open_upload(match, request); };
+  auto opened = co_await run_on(shared_.slow, shared_.io, std::move(open));
+  if (auto* refused = std::get_if<Response>(&opened)) co_return Body{Read::ok, std::move(*refused)};
+  auto sink = std::move(std::get<std::unique_ptr<BodySink>>(opened));
+  Body body;
+  if (co_await send_continue(request)) {
+    body = co_await read_into(parser, *sink);
+  } else {
+    body.read = Read::closed;
+  }
+  const bool whole = body.read == Read::ok && !body.answer;
+  disarm();
+  auto end = [sink = std::move(sink), whole]() mutable {
+    std::optional<Response> answer;
+    if (whole) answer = sink->finish();
+    sink.reset();  // here, on a thread of the pool, because it may remove a large file, which takes time
+    return answer;
+  };
+  const bool unpacks = whole && shared_.api.body_kind(*match.route, request) == BodyKind::archive;
+  auto answer = co_await run_on(unpacks ? shared_.bundles : shared_.slow, shared_.io, std::move(end));
+  if (answer) body.answer = std::move(answer);
+  co_return body;
+}
+
+net::awaitable<Connection::Body> Connection::read_into(Parser& parser, BodySink& sink) {
+  auto began = SteadyClock::now();
+  std::uint64_t received = 0;
+  beast::flat_buffer& chunk = parser.get().body();
+  const auto append = [&sink, &chunk] {
+    const net::const_buffer bytes = chunk.cdata();
+    return sink.append(std::span(static_cast<const std::byte*>(bytes.data()), bytes.size()));
+  };
+  while (!parser.is_done()) {
+    const Read read = co_await read_portion(parser, began, received);
+    if (read == Read::ok && (chunk.size() == 0 || (chunk.size() < kBodyChunk && !parser.is_done()))) continue;
+    disarm();
+    // If the read has failed, the rest of the body will not arrive. What has arrived still goes to the sink,
+    // so that an upload in parts makes progress even if no connection lasts for a whole chunk.
+    const auto paused = SteadyClock::now();
+    std::optional<Response> refused;
+    if (chunk.size() > 0) refused = co_await run_on(shared_.slow, shared_.io, append);
+    if (read != Read::ok) co_return Body{read, {}};
+    if (refused) co_return Body{Read::ok, std::move(refused)};
+    began += SteadyClock::now() - paused;  // the time spent on our disk does not count as the client's
+    chunk.clear();
+  }
+  co_return Body{};
+}
+
+// Reads more of the body, or its end.
+net::awaitable<Read> Connection::read_portion(Parser& parser, SteadyClock::time_point began,
+                                              std::uint64_t& received) {
+  const std::size_t before = parser.get().body().size();
+  arm(pace(began, received));
+  error_code ec;
+  co_await beast::http::async_read_some(stream_, buffer_, parser, awaiting(ec));
+  const std::size_t got = parser.get().body().size() - before;
+  received += got;
+  shared_.api.counters().body_bytes += got;
+  co_return read_result(ec, timed_out_);
+}
+
+net::awaitable<bool> Connection::send_continue(const Request& request) {
+  if (request.header("expect").empty() || !request.has_body || buffer_.size() > 0) co_return true;
+  co_return co_await write_all("HTTP/1.1 100 Continue\r\n\r\n", {});
+}
+
+bool Connection::charge(std::uint64_t bytes) {
+  shared_.buffered -= charged_;
+  charged_ = 0;
+  if (shared_.buffered + bytes > kMaxBuffered) return false;
+  charged_ = bytes;
+  shared_.buffered += bytes;
+  return true;
+}
+
 // Counts the answer, unless it is small. An answer larger than kMaxAnswers is let through while no other
 // answer is counted.
 bool Connection::charge_answer(std::uint64_t bytes) {
@@ -154,23 +300,6 @@ bool Connection::charge_answer(std::uint64_t bytes) {
   if (shared_.answers > 0 && shared_.answers + bytes > kMaxAnswers) return false;
   shared_.answers += answer_charged_ = bytes;
   return true;
-}
-
-net::awaitable<Connection::Read> Connection::read_header(Parser& parser) {
-  if (buffer_.size() == 0) {
-    idle_ = true;
-    arm(SteadyClock::now() + steady_seconds(limits_.idle_seconds));
-    if (co_await fill() != Read::ok) co_return Read::closed;  // no request has begun, so nothing is answered
-    idle_ = false;
-  }
-  arm(SteadyClock::now() + steady_seconds(limits_.header_seconds));
-  while (true) {
-    const Parsed parsed = take_header(parser, buffer_);
-    if (parsed == Parsed::too_large) co_return Read::header_too_large;
-    if (parsed == Parsed::malformed) co_return Read::malformed;
-    if (parsed == Parsed::done) co_return Read::ok;
-    if (const Read read = co_await fill(); read != Read::ok) co_return read;
-  }
 }
 
 net::awaitable<bool> Connection::answer(const Request& request, const Response& response, bool keep_alive) {
@@ -185,8 +314,8 @@ net::awaitable<bool> Connection::answer(const Request& request, const Response& 
   co_return written&& keep_alive;
 }
 
-// Answers something that could not be read as a request. (`unread` is a named variable because GCC 12
-// destroys a temporary aggregate in a co_await twice.)
+// Answers bytes that could not be read as a request. (`unread` is a named variable because GCC 12 destroys a
+// temporary aggregate in a co_await twice.)
 net::awaitable<void> Connection::answer_unread(const Response& response) {
   const Request unread;
   co_await answer(unread, response, false);
@@ -205,6 +334,62 @@ net::awaitable<void> Connection::answer_failed_read(Read read) {
   if (read == Read::header_too_large)
     response = problem(431, fmt::format("the request header has more than {} bytes", limits_.header_bytes));
   co_await answer_unread(response);
+}
+
+net::awaitable<bool> Connection::write_all(std::string_view head, std::span<const std::byte> body) {
+  std::uint64_t sent = 0;
+  const bool written = co_await write_paced(head, body, SteadyClock::now(), sent);
+  if (written) disarm();
+  co_return written;
+}
+
+net::awaitable<bool> Connection::write_paced(std::string_view head, std::span<const std::byte> body,
+                                             SteadyClock::time_point began, std::uint64_t& sent) {
+  const std::array<net::const_buffer, 2> whole = {net::buffer(head), net::buffer(body.data(), body.size())};
+  beast::buffers_suffix left(whole);
+  while (beast::buffer_bytes(left) > 0) {
+    arm(pace(began, sent));
+    error_code ec;
+    const auto slice = beast::buffers_prefix(kWriteSlice, left);
+    const std::size_t n = co_await stream_.async_write_some(slice, awaiting(ec));
+    left.consume(n);
+    sent += n;
+    if (ec) co_return false;
+  }
+  co_return true;
+}
+
+net::awaitable<bool> Connection::write_file(std::string_view head, const FileBody& file) {
+  const auto began = SteadyClock::now();
+  std::uint64_t sent = 0;
+  std::vector<std::byte> slice(kWriteSlice);
+  for (std::uint64_t offset = 0; offset < file.size;) {
+    disarm();  // time spent on the disk does not count; only writing to the client does
+    auto work = [&slice, &file, offset] {
+      return read_slice(file, offset,
+                        std::span(slice).first(std::min<std::uint64_t>(slice.size(), file.size - offset)));
+    };
+    const std::size_t n = co_await run_on(shared_.slow, shared_.io, std::move(work));
+    if (n == 0) co_return false;
+    if (!co_await write_paced(offset == 0 ? head : std::string_view(), std::span(slice).first(n), began,
+                              sent))
+      co_return false;
+    offset += n;
+  }
+  if (file.size == 0) co_return co_await write_all(head, {});
+  disarm();
+  co_return true;
+}
+
+// Ends the answer, then reads on for a while and throws away what arrives. Closing the connection while the
+// client still sends would reset it, and the client would lose the answer.
+net::awaitable<void> Connection::linger() {
+  arm(SteadyClock::now() + steady_seconds(limits_.linger_seconds));
+  co_await stream_.send_goodbye();
+  for (std::uint64_t total = buffer_.size(); total < kLingerBytes; total += buffer_.size()) {
+    buffer_.consume(buffer_.size());
+    if (co_await fill() != Read::ok) break;
+  }
 }
 
 }  // namespace ls::http

@@ -2,10 +2,9 @@
 // that waits for all sockets). Includes Boost: only the files of the server loop may include this header.
 #pragma once
 
-#include <array>
-#include <boost/asio/awaitable.hpp>
+#include <boost/asio/async_result.hpp>
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/thread_pool.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
@@ -14,6 +13,8 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <type_traits>
+#include <utility>
 
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/net/byte_stream.h"
@@ -22,17 +23,33 @@
 
 namespace ls::http {
 
-namespace net = boost::asio;
-using Tcp = net::ip::tcp;
 using SteadyClock = std::chrono::steady_clock;
 
 inline SteadyClock::duration steady_seconds(double seconds) {
   return std::chrono::duration_cast<SteadyClock::duration>(std::chrono::duration<double>(seconds));
 }
 
+// Runs blocking work on a thread pool. The coroutine that awaits run_on() resumes on the network thread with
+// the result. `work` must not throw and must return a movable value. A work guard must keep `io` running
+// until `work` has returned.
+template <class Work>
+net::awaitable<std::invoke_result_t<Work&>> run_on(net::thread_pool& pool, net::io_context& io, Work work) {
+  using Value = std::invoke_result_t<Work&>;
+  auto initiate = [&pool, &io, work = std::move(work)](auto handler) mutable {
+    net::post(pool, [&io, work = std::move(work), handler = std::move(handler)]() mutable {
+      Value value = work();
+      net::post(io, [value = std::move(value), handler = std::move(handler)]() mutable {
+        std::move(handler)(std::move(value));
+      });
+    });
+  };
+  co_return co_await net::async_initiate<const net::use_awaitable_t<>, void(Value)>(std::move(initiate),
+                                                                                    net::use_awaitable);
+}
+
 class Connection;
 
-// State that all connections share. Only the network thread uses it, except for the thread pools.
+// State that all connections share. Only the network thread uses it, except the thread pools.
 struct Shared {
   net::io_context& io;
   net::thread_pool& quick;
@@ -57,13 +74,12 @@ class Connection {
   net::awaitable<void> serve();
 
   bool idle() const { return idle_; }
-  // For a stopping server: closes the connection now if no request is in progress, else after the answer to
-  // that request.
+  // For a server that stops: closes the connection immediately if no request is in progress, else after the
+  // answer to that request.
   void wind_down();
-  void cut();  // closes now
+  void cut();  // closes the connection immediately
 
  private:
-  enum class Read { ok, closed, too_slow, malformed, header_too_large };
   // The result of reading a body. If `answer` is set, the body was rejected with it, and the client may still
   // be sending the rest.
   struct Body {
@@ -71,48 +87,49 @@ class Connection {
     std::optional<Response> answer;
   };
 
-  // connection.cpp
   net::awaitable<bool> open();       // false: the caller closes the connection
   net::awaitable<bool> serve_one();  // false: the caller closes the connection
-  net::awaitable<Read> read_header(Parser& parser);
   net::awaitable<bool> serve_match(Parser& parser, const Match& match, Request& request);
   net::awaitable<Response> handle_on_executor(const Match& match, const Request& request);
-  // Counts an answer of this many bytes in Shared::answers. False: all answers together would exceed
-  // kMaxAnswers.
-  bool charge_answer(std::uint64_t bytes);
-  net::awaitable<bool> answer(const Request& request, const Response& response, bool keep_alive);
-  net::awaitable<void> answer_unread(const Response& response);
-  net::awaitable<void> answer_failed_read(Read read);
 
-  // body_reader.cpp
+  // Deadlines
+  void arm(SteadyClock::time_point deadline);
+  void watch(SteadyClock::time_point until);
+  void disarm();
+  SteadyClock::time_point pace(SteadyClock::time_point began, std::uint64_t bytes) const;
+
+  // Reading
+  net::awaitable<Read> fill();  // reads more bytes into buffer_
+  net::awaitable<Read> read_header(Parser& parser);
   net::awaitable<Body> read_whole(Parser& parser, Request& request, std::uint64_t limit);
   net::awaitable<Body> read_streamed(Parser& parser, const Match& match, const Request& request);
   net::awaitable<Body> read_into(Parser& parser, BodySink& sink);
-  net::awaitable<Read> read_portion(Parser& parser, std::string& into, SteadyClock::time_point began,
-                                    std::uint64_t& received);
+  net::awaitable<Read> read_portion(Parser& parser, SteadyClock::time_point began, std::uint64_t& received);
   net::awaitable<bool> send_continue(const Request& request);
   // Counts a request's body of this many bytes in Shared::buffered. False: all bodies together would exceed
   // kMaxBuffered.
   bool charge(std::uint64_t bytes);
 
-  // event_writer.cpp
-  net::awaitable<void> stream_events(const Request& request, const Response& response);
-  net::awaitable<void> write_events(EventQueue& queue, const Caller& reader);
-  void watch_reader();
-
-  // socket_io.cpp
-  net::awaitable<Read> fill();  // reads more bytes into buffer_
+  // Writing
+  net::awaitable<bool> answer(const Request& request, const Response& response, bool keep_alive);
+  net::awaitable<void> answer_unread(const Response& response);
+  net::awaitable<void> answer_failed_read(Read read);
+  // Counts an answer of this many bytes in Shared::answers. False: all answers together would exceed
+  // kMaxAnswers.
+  bool charge_answer(std::uint64_t bytes);
   net::awaitable<bool> write_all(std::string_view head, std::span<const std::byte> body);
   net::awaitable<bool> write_file(std::string_view head, const FileBody& file);
-  // Sends `head` and `body`, which is all or a slice of a response's body. Of the whole, `sent` bytes have
-  // been sent since `began`; it is increased by what is sent now. False: the client takes the bytes too
-  // slowly (see Limits::min_rate) or has gone.
+  // Sends `head` and `body`; `body` is the whole body of a response or a slice of it. The transfer of the
+  // whole body began at `began`; `sent` is its number of bytes sent so far, to which this call adds. False:
+  // the client receives too slowly (see Limits::min_rate) or has gone.
   net::awaitable<bool> write_paced(std::string_view head, std::span<const std::byte> body,
                                    SteadyClock::time_point began, std::uint64_t& sent);
   net::awaitable<void> linger();
-  void arm(SteadyClock::time_point deadline);
-  void disarm();
-  SteadyClock::time_point pace(SteadyClock::time_point began, std::uint64_t bytes) const;
+
+  // Event streams: event_writer.cpp
+  net::awaitable<void> stream_events(const Request& request, const Response& response);
+  net::awaitable<void> write_events(EventQueue& queue, const Caller& reader);
+  net::awaitable<void> reader_leaves();
 
   Stream stream_;
   Shared& shared_;
@@ -121,12 +138,10 @@ class Connection {
   SteadyClock::time_point deadline_ = SteadyClock::time_point::max();
   bool timed_out_ = false;
   bool idle_ = true;
-  bool reader_gone_ = false;                  // the reader of an event stream has closed the connection
   net::steady_timer* events_wait_ = nullptr;  // set while an event stream runs
   std::uint64_t charged_ = 0, answer_charged_ = 0;
-  std::array<char, 64> discard_{};
   beast::flat_buffer buffer_;
-  // Callbacks hold a weak_ptr to this and do nothing once the connection has been destroyed.
+  // Callbacks hold a weak_ptr to alive_ and do nothing once the connection has been destroyed.
   std::shared_ptr<const bool> alive_ = std::make_shared<bool>(true);
 };
 

@@ -47,7 +47,8 @@ void EventQueue::push(const coordinator::StreamEvent& event, const coordinator::
     text_ += text;
     ++events_;
   }
-  // Only the first event wakes the reader: one that is awake looks for more events before it waits again.
+  // Only the first event wakes the reader: a reader that is awake checks for more events before it waits
+  // again.
   if (first) wake_();
 }
 

@@ -23,24 +23,23 @@ class EventQueue {
     std::size_t bytes = 0;
   };
   // If `job` is set, the reader gets only the events of this job (and of its frames) and those that belong to
-  // no single job; if it is empty, all events. `after_id` is the id of the last event that the reader knows:
-  // if the first event pushed does not have the next id, the reader has missed events and gets a `reset`
+  // no single job; if it is empty, all events. `after_id` is the id of the last event that the reader knows.
+  // If the first event pushed does not have the next id, the reader has missed events and gets a `reset`
   // first. `wake` is called when the queue is no longer empty.
   EventQueue(Bounds bounds, std::string job, std::uint64_t after_id, std::function<void()> wake);
 
   // Adds an event; may be called on any thread, in the order of the events' ids. It never blocks. An event
   // that exceeds the bounds is dropped, and overflowed() is true from then on.
   void push(const coordinator::StreamEvent& event) { push(event, &event); }
-  // Adds `shown` in place of `event`: what the reader may see of it. Null: the reader may not see the event
-  // at all.
+  // Adds `shown`, the part of `event` that the reader may see. Null: the reader may not see the event at all.
   void push(const coordinator::StreamEvent& event, const coordinator::StreamEvent* shown);
 
-  // Removes the text of all waiting events from the queue and returns it, to be sent; empty if there is none.
+  // Removes the text of all waiting events from the queue and returns it for sending; empty if there is none.
   std::string take();
-  // True if the reader was too slow and an event had to be dropped. The connection then sends what take()
-  // returns and ends, and the reader connects again with the id of the last event that it got.
+  // True if the reader was too slow and an event had to be dropped. The connection then sends the result of
+  // take() and ends; the reader connects again with the id of the last event that it got.
   bool overflowed() const;
-  // No wake() is called after this returns.
+  // Detaches wake(): it is not called any more once this has returned.
   void close();
 
  private:

@@ -1,20 +1,17 @@
 // A connection that serves an event stream.
 #include <fmt/format.h>
 
+#include <array>
+#include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/post.hpp>
-#include <boost/asio/redirect_error.hpp>
-#include <boost/asio/use_awaitable.hpp>
 
-#include "coordinator/http/auth/visible.h"
+#include "coordinator/http/auth/auth.h"
+#include "coordinator/http/message/message.h"
 #include "coordinator/http/message/problem.h"
 #include "coordinator/http/net/connection.h"
-#include "coordinator/http/net/head_text.h"
-#include "coordinator/http/net/run_on.h"
 
 namespace ls::http {
 namespace {
-
-using boost::system::error_code;
 
 // Cleans up however the stream ends, even if the server is destroyed around it.
 struct Undo {
@@ -69,7 +66,7 @@ net::awaitable<void> Connection::stream_events(const Request& request, const Res
     co_await write_all(head, {});
     co_return;
   }
-  // An id without data sets the id from which a reconnecting browser continues, without being an event.
+  // An id without data is not an event; it only sets the id from which a reconnecting browser continues.
   head += fmt::format("retry: 1000\nid: {}\n\n", start.after);
   if (start.reset)
     head += fmt::format("event: reset\ndata: {{\"missed_from\":0,\"missed_to\":{}}}\n\n", start.after);
@@ -83,18 +80,18 @@ net::awaitable<void> Connection::stream_events(const Request& request, const Res
     });
   };
   auto subscription = co_await run_on(shared_.quick, shared_.io, std::move(subscribe));
-  watch_reader();
-  co_await write_events(*queue, wanted.reader);
+  using namespace net::experimental::awaitable_operators;
+  co_await (write_events(*queue, wanted.reader) || reader_leaves());
   queue->close();
   auto unsubscribe = [handle = std::move(subscription)]() mutable {
-    handle.reset();  // on a thread of the pool, because it may wait for a callback in progress
+    handle.reset();  // done on a thread of the pool, because it may wait for a callback in progress
     return true;
   };
   co_await run_on(shared_.quick, shared_.io, std::move(unsubscribe));
 }
 
 net::awaitable<void> Connection::write_events(EventQueue& queue, const Caller& reader) {
-  while (!shared_.stopping && !reader_gone_ && shared_.api.auth().still_valid(reader)) {
+  while (!shared_.stopping && shared_.api.auth().still_valid(reader)) {
     const bool last = queue.overflowed();
     const std::string text = queue.take();
     if (!text.empty()) {
@@ -107,19 +104,17 @@ net::awaitable<void> Connection::write_events(EventQueue& queue, const Caller& r
     }
     error_code ec;
     events_wait_->expires_after(steady_seconds(limits_.heartbeat_seconds));
-    co_await events_wait_->async_wait(net::redirect_error(net::use_awaitable, ec));
+    co_await events_wait_->async_wait(awaiting(ec));
     if (!ec && !co_await write_all(":\n\n", {})) co_return;
   }
 }
 
-// Watches for the end of an event stream's client. The client has nothing more to send after its request, so
+// Waits for the end of an event stream's client. The client has nothing more to send after its request, so
 // whatever arrives (most likely the end of the connection) ends the stream.
-void Connection::watch_reader() {
-  stream_.read_in_background(net::buffer(discard_), [this, alive = std::weak_ptr(alive_)] {
-    if (alive.expired()) return;
-    reader_gone_ = true;
-    if (events_wait_ != nullptr) events_wait_->cancel();
-  });
+net::awaitable<void> Connection::reader_leaves() {
+  std::array<char, 64> ignored{};
+  error_code ec;
+  co_await stream_.async_read_some(net::buffer(ignored), awaiting(ec));
 }
 
 }  // namespace ls::http

@@ -5,21 +5,17 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/executor_work_guard.hpp>
-#include <boost/asio/redirect_error.hpp>
-#include <boost/asio/use_awaitable.hpp>
-#include <charconv>
 #include <condition_variable>
 #include <mutex>
 #include <thread>
 
 #include "common/base/log.h"
+#include "common/base/parse_number.h"
 #include "coordinator/http/message/problem.h"
 #include "coordinator/http/net/connection.h"
 
 namespace ls::http {
 namespace {
-
-using boost::system::error_code;
 
 constexpr std::string_view kFull =
     "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/problem+json\r\nContent-Length: 106\r\n"
@@ -40,18 +36,15 @@ Result<Address> parse_address(const std::string& text) {
   Address address{text.substr(0, colon), text.substr(colon + 1)};
   if (address.host.front() == '[' && address.host.back() == ']')
     address.host = address.host.substr(1, address.host.size() - 2);
-  unsigned port = 0;
-  const char* end = address.port.data() + address.port.size();
-  const auto parsed = std::from_chars(address.port.data(), end, port);
-  if (parsed.ec != std::errc{} || parsed.ptr != end || port > 65535) return wrong();
+  if (!parse_number<std::uint16_t>(address.port)) return wrong();
   return address;
 }
 
 }  // namespace
 
 struct Server::State {
-  // The order of these members matters: destroying the io_context destroys the frames of coroutines, so all
-  // that these frames use must come before it.
+  // The order of these members matters: destroying the io_context destroys the frames of coroutines, so
+  // everything that these frames use must be declared before it.
   std::unique_ptr<net::thread_pool> quick, slow, bundles, remote;
   std::unique_ptr<Shared> shared;
   net::io_context io{1};
@@ -74,7 +67,8 @@ namespace {
 void refuse(Tcp::socket& socket) {
   error_code ignored;
   socket.non_blocking(true, ignored);
-  socket.write_some(net::buffer(kFull.data(), kFull.size()), ignored);  // fits into the empty send buffer
+  // Does not block: the answer fits into the empty send buffer
+  socket.write_some(net::buffer(kFull.data(), kFull.size()), ignored);
 }
 
 // Closes an idle connection to make room for a new one.
@@ -93,12 +87,12 @@ net::awaitable<void> Server::State::accept_loop() {
   net::steady_timer pause(io);
   while (!shared->stopping) {
     error_code ec;
-    Tcp::socket socket = co_await acceptor.async_accept(net::redirect_error(net::use_awaitable, ec));
+    Tcp::socket socket = co_await acceptor.async_accept(awaiting(ec));
     if (shared->stopping) co_return;
-    if (ec) {  // probably out of file descriptors: wait for some to be closed
+    if (ec) {  // probably there are no file descriptors left: wait until some are closed
       log_warn("", fmt::format("cannot accept an HTTP connection: {}", ec.message()));
       pause.expires_after(std::chrono::milliseconds(100));
-      co_await pause.async_wait(net::redirect_error(net::use_awaitable, ec));
+      co_await pause.async_wait(awaiting(ec));
       continue;
     }
     if (shared->open.size() >= shared->api.limits().connections && !make_room(*shared)) {
@@ -138,7 +132,8 @@ Result<std::unique_ptr<Server>> Server::listen(const std::string& address) {
   const Tcp::endpoint endpoint = found.begin()->endpoint();
   auto& acceptor = state->acceptor;
   acceptor.open(endpoint.protocol(), ec);
-  // SO_REUSEADDR only allows binding to a port that a predecessor has just left, not a second listener.
+  // SO_REUSEADDR allows binding to a port that an earlier process has just released, but not a second
+  // listener.
   if (!ec) acceptor.set_option(Tcp::acceptor::reuse_address(true), ec);
   if (!ec) acceptor.bind(endpoint, ec);
   if (!ec) acceptor.listen(net::socket_base::max_listen_connections, ec);

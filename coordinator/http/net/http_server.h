@@ -10,18 +10,31 @@
 
 namespace ls::http {
 
-class TlsIdentity;  // tls_identity.h
+// Certificate and key of the server. Read once, at the start.
+class TlsIdentity {
+ public:
+  // `cert` is the server's certificate with its chain up to the CA, `key` its private key, both in PEM.
+  // invalid_argument: one of them is malformed, or they do not belong together.
+  static Result<std::shared_ptr<const TlsIdentity>> make(const std::string& cert, const std::string& key);
+  ~TlsIdentity();
+
+ private:
+  friend class Stream;
+  struct Context;
+  explicit TlsIdentity(std::unique_ptr<Context> context);
+  std::unique_ptr<Context> context_;
+};
 
 class Server {
  public:
   // Listens on `address`, "host:port" ("[::1]:8080" for IPv6); with port 0 the system chooses the port. A
   // port in use is an error, because ports are never shared. Clients that connect wait until start().
   static Result<std::unique_ptr<Server>> listen(const std::string& address);
-  ~Server();  // stops
+  ~Server();  // calls stop()
 
   int port() const;  // valid until stop()
-  // Starts to serve requests by calls of `api`, which must exist until stop() has returned. With `tls`
-  // clients must use TLS; others get an error.
+  // Starts to serve requests by calling `api`, which must exist until stop() has returned. With `tls` clients
+  // must use TLS; others get an error.
   void start(Api& api, std::shared_ptr<const TlsIdentity> tls = nullptr);
   // Stops listening, ends event streams, waits up to Limits::stop_seconds for open requests and then closes
   // their connections.

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "coordinator/http/message/message.h"
 #include "coordinator/http/message/problem.h"
-#include "coordinator/http/message/uri.h"
 
 namespace ls::http {
 namespace {
@@ -46,21 +46,19 @@ std::optional<Response> refuse_header(const Header& header) {
   return std::nullopt;
 }
 
-bool broken(error_code ec) { return ec && ec != bhttp::error::need_more && ec != bhttp::error::need_buffer; }
-
 }  // namespace
 
 void prepare(Parser& parser, const Limits& limits) {
   parser.header_limit(static_cast<std::uint32_t>(limits.header_bytes));
-  parser.body_limit(boost::none);  // limited per route, while the body is read
+  parser.body_limit(boost::none);  // no limit here: the limit of the route is applied while the body is read
 }
 
-Parsed take_header(Parser& parser, beast::flat_buffer& buffer) {
-  error_code ec;
-  buffer.consume(parser.put(buffer.data(), ec));
-  if (ec == bhttp::error::header_limit) return Parsed::too_large;
-  if (broken(ec)) return Parsed::malformed;
-  return parser.is_header_done() ? Parsed::done : Parsed::more;
+Read read_result(error_code ec, bool timed_out) {
+  if (!ec) return Read::ok;
+  if (ec == bhttp::error::header_limit) return Read::header_too_large;
+  const bool ended = ec == bhttp::error::end_of_stream || ec == bhttp::error::partial_message;
+  if (ec.category() == error_code(bhttp::error::end_of_stream).category() && !ended) return Read::malformed;
+  return timed_out ? Read::too_slow : Read::closed;
 }
 
 std::variant<Response, Request> to_request(const Parser& parser) {
@@ -85,23 +83,6 @@ std::variant<Response, Request> to_request(const Parser& parser) {
   if (const auto length = parser.content_length()) request.content_length = *length;
   request.has_body = parser.chunked() || request.content_length.value_or(0) > 0;
   return request;
-}
-
-Portion take_body(Parser& parser, beast::flat_buffer& buffer, std::string& into) {
-  const std::size_t old = into.size(), room = buffer.size();
-  into.resize(old + room);
-  auto& body = parser.get().body();
-  body.data = into.data() + old;
-  body.size = room;
-  body.more = true;
-  error_code ec;
-  Portion portion;
-  portion.consumed = parser.put(buffer.data(), ec);
-  portion.got = room - body.size;
-  portion.malformed = broken(ec);
-  buffer.consume(portion.consumed);
-  into.resize(old + portion.got);
-  return portion;
 }
 
 }  // namespace ls::http

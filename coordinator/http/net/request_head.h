@@ -1,13 +1,11 @@
-// Parses the bytes of a request with Boost.Beast and converts the result to our own types. This part of
-// reading a request needs no socket. Includes Boost: only the files of the server loop (and their fuzzer) may
-// include this header.
+// The parser of a request, which is Boost.Beast's, and the conversion of what it parsed to our own types.
+// None of it needs a socket. Includes Boost: only the files of the server loop (and their fuzzer) may include
+// this header.
 #pragma once
 
 #include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/http/buffer_body.hpp>
+#include <boost/beast/http/basic_dynamic_body.hpp>
 #include <boost/beast/http/parser.hpp>
-#include <cstddef>
-#include <string>
 #include <variant>
 
 #include "coordinator/http/message/limits.h"
@@ -16,26 +14,18 @@
 namespace ls::http {
 
 namespace beast = boost::beast;
-using Parser = beast::http::request_parser<beast::http::buffer_body>;
+// The body has the bytes that have been read and not yet been taken out of it.
+using Parser = beast::http::request_parser<beast::http::basic_dynamic_body<beast::flat_buffer>>;
 
-// Sets the limits of a fresh parser.
+// Applies the limits to a new parser.
 void prepare(Parser& parser, const Limits& limits);
 
-enum class Parsed { more, done, malformed, too_large };
-// Parses the part of the header that the buffer holds. `more`: the header has not ended; the buffer's bytes
-// were consumed, or are too few to be parsed and stay in the buffer.
-Parsed take_header(Parser& parser, beast::flat_buffer& buffer);
+enum class Read { ok, closed, too_slow, malformed, header_too_large };
+// Returns what the error of a read means; `timed_out` if the read was cancelled by its deadline.
+Read read_result(boost::system::error_code ec, bool timed_out);
 
 // Converts the parsed header to a Request without a body. Returns a response instead if the header is
 // invalid.
 std::variant<Response, Request> to_request(const Parser& parser);
-
-struct Portion {
-  std::size_t consumed = 0;  // bytes of the buffer, including chunk headers
-  std::size_t got = 0;       // bytes that `into` grew by
-  bool malformed = false;
-};
-// Takes the part of the body in the buffer and appends it to `into`.
-Portion take_body(Parser& parser, beast::flat_buffer& buffer, std::string& into);
 
 }  // namespace ls::http

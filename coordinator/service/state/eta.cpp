@@ -12,8 +12,8 @@ struct CoreSeconds {
   std::optional<std::pair<double, double>> ci95;
 };
 
-// Predicts the core seconds that the job still needs; nullopt: unknown. May raise out.progress to what the
-// forecast of the target says.
+// Predicts the core seconds that the job still needs; nullopt: unknown. May raise out.progress to the
+// progress towards the target error.
 std::optional<CoreSeconds> core_seconds_left(const EtaInputs& facts, std::span<const ErrorPoint> points,
                                              Eta& out) {
   const auto known = [](double core) {
@@ -33,17 +33,17 @@ std::optional<CoreSeconds> core_seconds_left(const EtaInputs& facts, std::span<c
                      {{from_now(forecast->core_seconds_lo), from_now(forecast->core_seconds_hi)}}};
 }
 
-// How long threads wait at the end of a job with a target error, as multiples of a unit's duration (they then
-// render only units that will be dropped). Until the last needed unit is done they wait between 0 and 1 unit
-// (Graham 1969: list scheduling takes at most W / P + (1 - 1 / P) u), and as long again until a thread is
-// free for that unit. If the samples end the job, the number of units is known, and all threads end at about
-// the same time.
+// How long threads wait at the end of a job with a target error, as multiples of a unit's duration. (They do
+// not idle, but render units that will be dropped.) Until the last needed unit is done they wait between 0
+// and 1 unit (Graham 1969: list scheduling takes at most W / P + (1 - 1 / P) u). They wait as long again
+// until a thread is free for that last unit. If the samples end the job, the number of units is known, and
+// all threads end at about the same time.
 constexpr double kEven = 0, kLeastWait = 0, kMeanWait = .5, kMostWait = 2;
 
 // Returns the wall-clock seconds that `core` core seconds of work take on `cores` cores. A unit runs on one
 // thread, so at most facts.units_at_once cores are busy. The result is at least facts.unit_seconds, the
-// duration of one unit, or `core` if less than that is left. `wait` says how long threads wait for the last
-// units, as a multiple of a unit's duration.
+// duration of one unit, or `core` if less than that is left. `wait` is the time that threads wait for the
+// last units, as a multiple of a unit's duration.
 double seconds_on(double cores, double core, double wait, const EtaInputs& facts) {
   const double busy = facts.units_at_once > 0 ? std::min(cores, facts.units_at_once) : cores;
   const double waits = wait * facts.unit_seconds * std::max(0.0, 1 - 1 / busy);

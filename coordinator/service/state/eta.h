@@ -1,5 +1,5 @@
-// Predicts when a job will be done, from what has been measured so far. It has no state and no clock. A unit
-// is one round (range of samples) of one tile; a worker renders it on one thread.
+// Predicts when a job will be done, from measurements so far. It has no state and no clock. A unit is one
+// round (range of samples) of one tile; a worker renders it on one thread.
 #pragma once
 
 #include <optional>
@@ -21,10 +21,12 @@ struct EtaInputs {
   std::optional<double> target, time;
   double elapsed = 0;  // seconds since the first ray
   // CPU seconds per wall-clock second that the job's workers give it; if it is not running, that they would
+  // give it
   double cores = 0;
-  double cores_with_more = 0;  // the same with kMoreWorkers more workers; not above `cores`: they do not help
-  double unit_seconds = 0;     // mean core seconds of a remaining unit; 0: unknown
-  double units_at_once = 0;    // most units that can be rendered at the same time; 0: no limit
+  // `cores` with kMoreWorkers more workers; not above `cores` if more workers would not help
+  double cores_with_more = 0;
+  double unit_seconds = 0;   // mean core seconds of a remaining unit; 0: unknown
+  double units_at_once = 0;  // most units that can be rendered at the same time; 0: no limit
 };
 
 struct Eta {
@@ -36,10 +38,10 @@ struct Eta {
 };
 
 // The job ends by samples, target or time, whichever comes first. The core seconds until the target are
-// forecast at the last of `points` (convergence.h); what has been spent since is subtracted. Until the first
-// checkpoint, adaptive jobs use the scheduler's own prediction, without an interval. Since a unit runs on one
-// thread, few units keep few threads busy, and at the end of a job with a target threads wait for the last
-// units. A forecast's interval is cut at the sample limit.
+// forecast at the last of `points` (convergence.h); the core seconds spent since then are subtracted. Until
+// the first checkpoint, adaptive jobs use the scheduler's own prediction, without an interval. Since a unit
+// runs on one thread, few units keep few threads busy, and at the end of a job with a target threads wait for
+// the last units. A forecast's interval is cut at the sample limit.
 Eta eta_of(const EtaInputs& facts, std::span<const ErrorPoint> points);
 
 }  // namespace ls::coordinator

@@ -11,7 +11,7 @@ namespace ls::coordinator {
 
 struct EventHub::State {
   struct Listener {
-    std::uint64_t next = 0;  // the next event's id
+    std::uint64_t next = 0;  // id of the next event for this listener
     std::function<void(const StreamEvent&)> on_event;
   };
   Reserve reserve;
@@ -49,7 +49,7 @@ EventHub::EventHub(Reserve reserve) : state_(std::make_shared<State>()) {
   state_->thread = thread_.get_id();
 }
 
-EventHub::~EventHub() {
+void EventHub::close() {
   thread_.request_stop();
   if (thread_.joinable()) thread_.join();
 }
@@ -58,8 +58,8 @@ void EventHub::publish(std::string type, std::string data, std::string job, std:
   const std::lock_guard lock(state_->mutex);
   State& s = *state_;
   if (s.next_id >= s.reserved_end) {
-    // If the store cannot reserve ids now, events go on all the same, but their ids may be used again after a
-    // crash.
+    // If the store cannot reserve ids now, events are published nevertheless, but their ids may be used again
+    // after a crash.
     if (const auto first = s.reserve(limits::kEventIdBlock); !first)
       log_warn("", "cannot reserve event ids: " + first.error().message);
     s.reserved_end += limits::kEventIdBlock;
@@ -74,7 +74,7 @@ std::shared_ptr<void> EventHub::subscribe(std::uint64_t after_id,
   const std::lock_guard lock(state_->mutex);
   const std::uint64_t id = ++state_->last_listener;
   auto listener = std::make_shared<State::Listener>();
-  // `after_id` may be greater than any id given so far, if it is from a store that was lost. The listener
+  // `after_id` may be greater than any id given so far, if it comes from a store that was lost. The listener
   // must not wait until ids reach it.
   listener->next = std::min(after_id + 1, state_->next_id);
   listener->on_event = std::move(on_event);

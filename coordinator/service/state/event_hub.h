@@ -22,7 +22,8 @@ class EventHub {
   // first of them.
   using Reserve = std::function<Result<std::uint64_t>(std::uint64_t count)>;
   explicit EventHub(Reserve reserve);
-  ~EventHub();
+  ~EventHub() { close(); }
+  void close();  // waits until no listener is being called; afterwards no listener is called any more
 
   void publish(std::string type, std::string data, std::string job, std::string owner = {});
   // Calls `on_event` for every kept event with an id above `after_id`, then for new ones. The calls come from

@@ -41,7 +41,7 @@ FrameRange Sequence::range() const {
   const StoredJob &first = frames.front()->stored, &last = frames.back()->stored;
   if (first.spec.frames) return *first.spec.frames;
   if (last.spec.frames) return *last.spec.frames;
-  return {frame_of(first.id)->frame, frame_of(last.id)->frame, 1};  // both records are damaged
+  return {frame_of(first.id)->frame, frame_of(last.id)->frame, 1};  // used if both records are damaged
 }
 
 ReportFacts facts_of(const JobEntry& entry, TimePoint now) {

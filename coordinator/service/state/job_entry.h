@@ -1,5 +1,5 @@
-// A job as the coordinator keeps it in memory, and a sequence (a job with frames). Both are guarded by the
-// service's mutex (service/core.h).
+// A job in the coordinator's memory, and a sequence (a job with frames). Both are guarded by the service's
+// mutex (service/core.h).
 #pragma once
 
 #include <cstdint>
@@ -13,6 +13,7 @@
 #include "coordinator/assemble/assembly.h"
 #include "coordinator/assemble/job_report.h"
 #include "coordinator/assemble/reference_tiles.h"
+#include "coordinator/service/state/job_trace.h"
 #include "coordinator/store/jobs/job_store.h"
 #include "coordinator/store/log/partial_log.h"
 
@@ -23,10 +24,10 @@ struct Denoised;
 struct JobEntry {
   JobEntry(StoredJob job, TimePoint now);
 
-  // Sets up an image without any samples, and what its comparison with the reference needs.
+  // Creates an image without samples, and the tiles for the comparison with the reference.
   void begin_image();
-  void begin_comparison();  // of a job that has a reference
-  void free_image();        // only the job's record and its files are left
+  void begin_comparison();  // only for a job that has a reference
+  void free_image();        // afterwards only the job's record and its files are left
   // Seconds on the job's clock
   double elapsed(TimePoint now) const;
 
@@ -37,35 +38,42 @@ struct JobEntry {
   std::optional<Assembly> assembly;  // the image; nullopt once an ended job is on disk
   // Pictures to compare with the reference, if it has one, while there is an assembly
   std::optional<ReferenceTiles> reference_tiles;
-  // Noise of the reference, from the last comparison; nullopt: unknown
+  // Noise of the reference image, estimated by the last comparison; nullopt: unknown
   std::optional<ReferenceNoise> reference_noise;
-  // The denoised final image, until it is written; null: none is asked for, or it is not made yet
+  // The denoised final image, until it is written; null: the job has no denoising, or the image is not made
+  // yet
   std::shared_ptr<const Denoised> denoised;
   std::vector<ConvergencePoint> points;
   // Number of the current convergence curve. Points of an older curve, which had wrong or lost pixels, are
   // dropped
   std::uint64_t curve = 0;
-  bool unloaded = false;  // true if it has ended and is on disk only: the farm has forgotten it
-  // True if its user removed it, or another coordinator has it: nothing more of it is stored
+  // True if it has ended and only its files and its record remain: the farm has forgotten it
+  bool unloaded = false;
+  // True if its user removed it, or another coordinator has it: nothing more is stored for it
   bool removed = false;
   bool pin_unsaved = false;     // its numeric class is not stored yet, so its results cannot be stored either
   std::string audits;           // its open audits, as they were last written to disk (store/log/audit_file.h)
   std::string broken;           // why it could not be restored at the start
-  std::uint64_t finishing = 0;  // number of the final image that is being made; 0: none is
+  std::uint64_t finishing = 0;  // number of the final image that is being made; 0: none
   bool snapshot_running = false;
   std::uint64_t snapshots = 0;  // number of snapshots committed; used by the writer thread only
   TimePoint last_snapshot{}, last_progress{};
   bool progress_due = false;
   JobState last_state = JobState::queued;  // its state when it was last published
   std::optional<TimePoint> clock_zero;     // zero of the job's clock, while it runs
-  std::optional<TimePoint> still_since;    // since when its clock stands still, because the job is paused
-  double fold_seconds = 0;                 // seconds on the job's clock at the last fold
-  std::string trouble;                     // why the job waits
-  std::uint64_t resumes = 0;               // how often it was resumed
+  // Since when its clock is stopped, because the job is paused; nullopt: it runs
+  std::optional<TimePoint> still_since;
+  // Wall clock of the end of its rendering; the record has it from the moment at which the job's end is
+  // stored
+  double ended_unix = 0;
+  double fold_seconds = 0;    // seconds on the job's clock at the last fold
+  std::string trouble;        // why the job waits, for the user
+  std::uint64_t resumes = 0;  // how often it was resumed
   // The workers that each leased unit (tile and round) is leased to, for display
   std::map<std::pair<TileIndex, RoundIndex>, std::vector<WorkerId>> leased;
   // Seconds on the job's clock of each durable result, while a restart replays the results
   std::map<std::pair<TileIndex, RoundIndex>, double> replay_at;
+  std::unique_ptr<JobTrace> trace;  // null: the job is not traced
 };
 using EntryPtr = std::shared_ptr<JobEntry>;
 

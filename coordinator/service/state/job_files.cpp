@@ -73,8 +73,22 @@ Assembly JobFiles::load_image(const StoredJob& job, const TileGrid& grid) const 
   return loaded ? std::move(*loaded) : Assembly(grid, keep, aovs);
 }
 
+std::optional<SnapshotTiles> JobFiles::tiles_of_image(const StoredJob& job, const TileGrid& grid) const {
+  return SnapshotTiles::open(folder(job.id) / "film.snap", grid, aovs_of(job.settings), snapshot_format());
+}
+
+std::string JobFiles::image_version(const StoredJob& job) const {
+  return fmt::format("{} {}", job.id.value, thumbnail_name(job));
+}
+
+std::string JobFiles::thumbnail_name(const StoredJob& job) const {
+  std::error_code missing;
+  const auto written = fs::last_write_time(folder(job.id) / "film.snap", missing);
+  return fmt::format("thumbnail-{}.png", written.time_since_epoch().count());
+}
+
 bool JobFiles::image_is_lost(const StoredJob& job) const {
-  std::error_code unknown;  // set if the folder cannot be read: then the image does not count as lost
+  std::error_code unknown;  // an error means that the folder cannot be read: the image does not count as lost
   return on_disk() && !job.damaged && job.state == JobState::done &&
          !fs::exists(folder(job.id) / "image.exr", unknown) && !unknown;
 }

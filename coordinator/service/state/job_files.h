@@ -1,9 +1,10 @@
-// The folders of jobs in --data: DATA/jobs/ID has the partial log, the snapshot film.snap, and of a done job
-// image.exr and report.json. There are none if everything is in memory. It has no state that changes, so
-// it is used by several threads.
+// The folders of jobs in --data. DATA/jobs/ID contains the partial log and the snapshot film.snap, and for a
+// done job image.exr, report.json and the thumbnails made so far. There are no folders if everything is in
+// memory. The object does not change, so several threads may use it.
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,16 +25,23 @@ class JobFiles {
   // Removes the folder of a job that was removed. It is renamed first, so that a crash leaves nothing that
   // looks like a job.
   void discard_folder(const JobId& id) const;
-  void remove_discarded() const;  // what a crash has left of discard_folder()
-  // If other coordinators share the store, removes what is left here of jobs that they have taken over. A
-  // finished image stays.
+  void remove_discarded() const;  // removes folders that discard_folder() left when a crash interrupted it
+  // If other coordinators share the store, removes the local files of jobs that others have taken over,
+  // except finished images.
   void remove_unknown(const std::vector<StoredJob>& jobs) const;
 
-  // Creates the job's snapshot, under this suffix until it is committed.
+  // Creates a snapshot file of the job. Its name has this suffix until the snapshot is committed.
   Result<SnapshotFile> create_snapshot(const StoredJob& job, const TileGrid& grid,
                                        std::string_view suffix) const;
-  // Returns the image of the snapshot; one without samples if there is none.
+  // Returns the image in the snapshot; an image without samples if there is no snapshot.
   Assembly load_image(const StoredJob& job, const TileGrid& grid) const;
+  // Returns the tiles of the snapshot's image, to be read one by one; nullopt if there is no snapshot.
+  std::optional<SnapshotTiles> tiles_of_image(const StoredJob& job, const TileGrid& grid) const;
+  // Returns a name for the job's image as it is on disk. If the job continues, the next image gets another
+  // name.
+  std::string image_version(const StoredJob& job) const;
+  // Returns the file name of the thumbnail of that image.
+  std::string thumbnail_name(const StoredJob& job) const;
   // True if a done job's image is gone, which can happen if a record in Redis outlives the disk with the
   // pixels.
   bool image_is_lost(const StoredJob& job) const;

@@ -10,8 +10,8 @@
 namespace ls::coordinator {
 namespace {
 
-// Returns a random job id of 32 bits; if `wide`, of 64 bits. That is for a store in which other coordinators
-// make ids, too, and cannot be asked which they have used.
+// Returns a random job id of 32 bits; if `wide`, of 64 bits. 64 bits avoid collisions in a store where other
+// coordinators make ids, too, without asking them.
 JobId random_job_id(bool wide) {
   std::random_device device;
   return {wide ? fmt::format("j-{:08x}{:08x}", device(), device()) : fmt::format("j-{:08x}", device())};
@@ -59,8 +59,8 @@ Result<std::vector<EntryPtr>> JobTable::job_or_frames(const JobId& id) const {
 
 Result<std::string> JobTable::owner(const JobId& id) const {
   if (const auto entry = find(id)) return entry->stored.owner;
-  // The id may be that of a frame that does not exist, of a sequence that does. Its owner is that of the
-  // sequence, who then gets an error that names the frames.
+  // The id may name a missing frame of an existing sequence. The owner is then that of the sequence, who gets
+  // an error that lists the frames.
   const auto frame = frame_of(id);
   const auto sequence = sequences_.find(frame ? frame->sequence : id);
   if (sequence != sequences_.end()) return sequence->second.frames.front()->stored.owner;
@@ -73,7 +73,7 @@ JobId JobTable::unused_id() const {
   return id;
 }
 
-// The limit per user is lower than that for all, so that no single user can use up all jobs.
+// The limit per user is lower than the limit for all users, so that no single user can use up all jobs.
 Result<void> JobTable::room_for(const std::string& owner, std::size_t jobs) const {
   if (jobs_.size() + jobs > limits::kMaxJobs)
     return fail(Errc::resource_exhausted,

@@ -12,7 +12,7 @@ namespace {
 
 double pixels_of(const TileGrid& grid) { return static_cast<double>(grid.frame.width) * grid.frame.height; }
 
-// Returns the progress of a job with a number of samples, from 0 to 1. It counts samples, not units: units of
+// Returns the progress of a job with `spp_done` samples, from 0 to 1. It counts samples, not units: units of
 // late rounds have many times the samples of the first ones.
 double done_of(const StoredJob& job, double spp_done) {
   return job.spp ? std::min(1.0, spp_done / static_cast<double>(even_spp(*job.spp))) : 0;
@@ -29,7 +29,7 @@ void put_curve(JobView& v, const std::vector<ConvergencePoint>& all, const std::
 
 }  // namespace
 
-// Predicts when the job is done. `v` must have its times and its samples so far already.
+// Predicts when the job will be done. Requires that the times and samples of `v` are set.
 Eta JobViews::eta(const JobEntry& entry, const JobFigures& figures, const JobView& v) const {
   const StoredJob& job = entry.stored;
   EtaInputs facts;
@@ -37,7 +37,8 @@ Eta JobViews::eta(const JobEntry& entry, const JobFigures& figures, const JobVie
   facts.core_seconds = v.core_seconds;
   facts.core_left = figures.core_seconds_left;
   facts.core_to_limit = figures.core_seconds_to_limit;
-  facts.target = job.spec.target_error;
+  // The curve is that of the image itself: it says nothing of when the denoised layers reach a target.
+  if (job.spec.target_layer == TargetLayer::raw) facts.target = job.spec.target_error;
   facts.time = job.spec.time;
   facts.elapsed = v.elapsed_seconds;
   const double cores = farm_.cores_connected();
@@ -65,6 +66,8 @@ JobView JobViews::job(const JobEntry& entry) const {
   v.stopped = v.state == JobState::done && job.stopped ? std::string(to_string(*job.stopped)) : "";
   if (v.state == JobState::cancelled) v.stopped = to_string(StopReason::user);
   v.target_error = job.spec.target_error;
+  v.target_layer = job.spec.target_layer;
+  if (!job.denoised_checks.empty()) v.denoised_check = job.denoised_checks.back();
   v.denoise = job.spec.denoise;
   v.error = job.error.empty() ? entry.trouble : job.error;
   v.warnings = job.warnings;
@@ -72,6 +75,7 @@ JobView JobViews::job(const JobEntry& entry) const {
   v.size = job.settings.size;
   v.tile = job.settings.tile;
   v.priority = job.spec.priority;
+  v.focus = job.focus;
   v.max_workers = job.spec.max_workers;
   v.max_units = job.spec.max_units;
   v.memory_bytes = memory_need(job);

@@ -1,4 +1,4 @@
-// Makes the views: what clients see of jobs, sequences and workers (views/job_view.h).
+// Makes the views of jobs, sequences and workers that clients see (views/job_view.h).
 #pragma once
 
 #include "coordinator/domain/farm/farm.h"

@@ -1,5 +1,5 @@
-// Publishes what changes as events (event_hub.h). Events of a job's progress are held back so that none
-// follows another too soon; publish_due() sends them later.
+// Publishes changes of jobs and workers as events (event_hub.h). Events about a job's progress are held back
+// so that they keep a minimum distance; publish_due() sends them later.
 #pragma once
 
 #include <string>
@@ -17,7 +17,7 @@ class Publisher {
             const Records& records, const Clock& clock)
       : hub_(hub), views_(views), jobs_(jobs), workers_(workers), records_(records), clock_(clock) {}
 
-  // While the publisher is quiet, jobs and sequences are not published.
+  // If `quiet`, changes of jobs and sequences are not published.
   void set_quiet(bool quiet) { quiet_ = quiet; }
   bool quiet() const { return quiet_; }
 
@@ -26,7 +26,7 @@ class Publisher {
   void sequence(const JobId& id, bool at_once);
   void publish_due();
   void job_removed(const JobId& id, const std::string& owner);
-  void job_moved(const JobId& id, const std::string& owner);  // to another coordinator
+  void job_moved(const JobId& id, const std::string& owner);  // the job is now at another coordinator
   void tile(const JobEntry& entry, TileIndex tile, const PixelRect& rect, std::string_view state,
             std::uint64_t spp, const WorkerId& worker = {});
   void worker(const WorkerId& id, bool at_once);

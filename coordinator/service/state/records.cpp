@@ -62,7 +62,7 @@ Result<void> Records::put_quarantined() {
 
 void Records::log(const JobId& id, std::string text) {
   if (!jobs_.find(id)) return;
-  if (writes_.size() >= kMaxLogWrites) {  // slow disk, or too many messages
+  if (writes_.size() >= kMaxLogWrites) {  // the disk is slow, or there are too many messages
     ++lines_left_out_;
     return;
   }
@@ -81,6 +81,11 @@ void Records::add_point(const EntryPtr& entry, const ConvergencePoint& point) {
       log_error(fmt::format("job={}", id.value), added.error().message);
     failpoint("checkpoint-stored");
   });
+}
+
+void Records::forget_wrong_pixels(JobEntry& entry) {
+  entry.stored.denoised_checks.clear();
+  forget_curve(entry);
 }
 
 void Records::forget_curve(JobEntry& entry) {

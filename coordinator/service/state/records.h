@@ -1,5 +1,5 @@
-// Stores what must survive a restart: records of jobs, their logs and curves, quarantined workers. What the
-// farm depends on is stored at once, the rest in the background.
+// Stores everything that must survive a restart: records of jobs, their logs and curves, quarantined workers.
+// Facts on which the farm relies are stored immediately, the rest in the background.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,7 @@
 
 namespace ls::coordinator {
 
-// Writes to disk, made by one thread strictly in the order in which they were pushed.
+// A queue of writes to disk; one thread makes them strictly in the order in which they were pushed.
 using BackgroundWrites = WorkQueue<std::function<void()>>;
 
 class Records {
@@ -20,10 +20,10 @@ class Records {
   Records(JobStore& store, const JobTable& jobs, BackgroundWrites& writes)
       : store_(store), jobs_(jobs), writes_(writes) {}
 
-  // Stores the job's record. If it cannot, returns false, and trouble() says why.
+  // Stores the job's record. If this fails, returns false, and trouble() says why.
   bool put(const EntryPtr& entry);
-  // Calls `changes` and then stores all jobs that it has put, in one transaction: a sequence may have
-  // thousands of frames.
+  // Calls `changes`, and then stores all jobs for which it called put(), in one transaction: a sequence may
+  // have thousands of frames.
   Result<void> put_together(const std::function<void()>& changes);
   bool puts_together() const { return together_ != nullptr; }
   // Stores the numeric class that the job is pinned to, if it is not stored yet. After a restart a class that
@@ -33,7 +33,7 @@ class Records {
   void add_quarantined(QuarantinedWorker worker) { quarantined_.push_back(std::move(worker)); }
   // Stores the quarantined workers that are not stored yet. Until they are, no result may be stored.
   Result<void> put_quarantined();
-  // Why a record or a result could not be stored lately; empty if the last result was stored
+  // Why a record or a result could not be stored recently; empty if the last result was stored
   const std::string& trouble() const { return trouble_; }
   void set_trouble(std::string why) { trouble_ = std::move(why); }
 
@@ -42,6 +42,8 @@ class Records {
   // Drops the curve's points, which are of wrong or lost pixels. Checkpoints are taken again as tiles are
   // folded again.
   void forget_curve(JobEntry& entry);
+  // Drops the curve's points and the errors of denoised layers, which are of wrong pixels.
+  void forget_wrong_pixels(JobEntry& entry);
   void set_reference_error(const JobId& id, double spp, const ReferenceError& error);
 
  private:

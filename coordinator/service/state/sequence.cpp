@@ -30,8 +30,8 @@ std::optional<ErrorFigures> error_of(std::span<const JobView> frames) {
   return ErrorFigures{std::sqrt(square), relmse, relmse - std::sqrt(below), relmse + std::sqrt(above)};
 }
 
-// Returns the worst convergence status of the frames: in a mean, a frame that cannot be trusted would
-// disappear.
+// Returns the worst convergence status of the frames. A mean would hide a single frame that cannot be
+// trusted.
 std::optional<ConvergenceStatus> worst_of(std::span<const JobView> frames) {
   std::optional<ConvergenceStatus> worst;
   for (const JobView& f : frames) {
@@ -83,8 +83,8 @@ struct WorkLeft {
   std::uint64_t units = 0;
 };
 
-// Predicts the work that is left. A frame that has not begun is expected to cost as much as the others will:
-// their core seconds so far, divided by their progress.
+// Predicts the remaining work. A frame that has not begun is expected to cost as much as the others on
+// average: their core seconds so far, divided by their progress.
 WorkLeft work_left(std::span<const JobView> frames) {
   double spent = 0, progress = 0;
   WorkLeft out;
@@ -177,6 +177,7 @@ JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frame
   }
   v.spp = first.spp;
   v.target_error = first.target_error;
+  v.target_layer = first.target_layer;
   v.spp_asked = first.spp_asked;
   v.error_now = error_of(frames);
   v.convergence_status = worst_of(frames);
@@ -187,6 +188,8 @@ JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frame
   v.size = first.size;
   v.tile = first.tile;
   v.priority = first.priority;
+  const auto same_focus = [&](const JobView& f) { return f.focus == first.focus; };
+  if (std::all_of(frames.begin(), frames.end(), same_focus)) v.focus = first.focus;
   v.elapsed_seconds = facts.elapsed_seconds;
   v.submitted_unix = first.submitted_unix;
   add_up(v, frames);

@@ -1,18 +1,15 @@
 #include "coordinator/service/state/worker_entry.h"
 
-#include <charconv>
+#include "common/base/parse_number.h"
 
 namespace ls::coordinator {
 namespace {
 
-// Returns n of a lease id "PREFIX-n"; nullopt if the lease is of another start of the coordinator.
+// Returns n of a lease id "PREFIX-n"; nullopt if an earlier start of the coordinator made the lease.
 std::optional<std::uint64_t> lease_number(const LeaseId& id, const std::string& prefix) {
   const std::size_t dash = prefix.size();
   if (!id.value.starts_with(prefix) || id.value.size() <= dash || id.value[dash] != '-') return std::nullopt;
-  std::uint64_t n = 0;
-  const char* end = id.value.data() + id.value.size();
-  const auto parsed = std::from_chars(id.value.data() + dash + 1, end, n);
-  return parsed.ec == std::errc() && parsed.ptr == end ? std::optional(n) : std::nullopt;
+  return parse_number<std::uint64_t>(std::string_view(id.value).substr(dash + 1));
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// A worker as the coordinator keeps it in memory, and its connection. Both are guarded by the service's mutex
-// (service/core.h), except where a member says otherwise.
+// A worker in the coordinator's memory, and its connection. Both are guarded by the service's mutex
+// (service/core.h), except for members that are marked otherwise.
 #pragma once
 
 #include <atomic>
@@ -18,8 +18,8 @@ struct Connection {
   Connection(WorkerId id, std::uint64_t number, const WorkerHello& hello, std::shared_ptr<WorkerSink> to,
              std::string prefix);
   void close();
-  void note_lease(const LeaseId& lease);  // a lease was assigned over this stream
-  // False for a lease of an earlier stream of the worker
+  void note_lease(const LeaseId& lease);  // notes that a lease was assigned over this stream
+  // True if the lease was assigned over this stream, not over an earlier one of the worker
   bool assigned(const LeaseId& lease) const;
 
   const WorkerId worker;
@@ -28,7 +28,8 @@ struct Connection {
   const bool fake;
   const std::shared_ptr<WorkerSink> sink;
   bool open = true;
-  // True if a result of this worker waits for room, and its stream is not read meanwhile. Not guarded.
+  // True while a result of this worker waits for memory; its stream is not read meanwhile. May be used
+  // without the mutex.
   std::atomic<bool> held_back{false};
 
  private:

@@ -1,4 +1,4 @@
-// Files by digest: scenes and their assets.
+// The interface of blob stores. Blobs are files (scenes and their assets), stored by digest.
 #pragma once
 
 #include <cstddef>
@@ -19,15 +19,15 @@ class BlobStore {
  public:
   virtual ~BlobStore() = default;
   virtual bool has(const Digest& digest) const = 0;
-  // Like has(), but returns an error if the store cannot tell now whether it has the blob.
+  // Like has(), but returns an error if it is unknown at the moment whether the store has the blob.
   virtual Result<bool> find(const Digest& digest) const { return has(digest); }
-  // Returns an error if the storage (a disk or another machine) does not answer. Asks it once, which may take
-  // seconds.
+  // Returns an error if the storage (a disk or another machine) is unavailable. Sends it one request, which
+  // may take seconds.
   virtual Result<void> answers() const { return {}; }
   // Verifies that the blob exists and that its bytes have its digest. The blob is read for this only once per
   // process, and again if its file has changed since or if `again` is set (for callers that know of a reader
-  // who received wrong bytes). not_found: there is no such blob. failed_precondition: the blob was damaged;
-  // it has been moved aside and counts as missing.
+  // who received wrong bytes). not_found: there is no such blob. failed_precondition: the blob is damaged; it
+  // has been moved aside and counts as missing.
   virtual Result<void> prove(const Digest& digest, [[maybe_unused]] bool again = false) const {
     return has(digest) ? Result<void>()
                        : fail(Errc::not_found, std::string("there is no blob ").append(digest.hex()));
@@ -37,7 +37,7 @@ class BlobStore {
                                               std::uint64_t length) const = 0;
   virtual Result<void> put(const Digest& digest, std::span<const std::byte> bytes) = 0;
   // Receives a blob piece by piece, in order; finish() verifies the digest. If the Upload is destroyed before
-  // finish(), nothing of the blob is kept, unless it came from resume_upload().
+  // finish(), its bytes are dropped, unless it came from resume_upload().
   class Upload {
    public:
     virtual ~Upload() = default;
@@ -48,19 +48,19 @@ class BlobStore {
 
   // Uploads in parts
 
-  // Returns how many bytes of an incomplete blob the store has.
+  // Returns the number of bytes that the store has of an incomplete blob.
   virtual std::uint64_t received(const Digest&) const { return 0; }
-  // Continues an incomplete blob after its first `offset` bytes, which must be received();
-  // failed_precondition: they are not. Appended bytes are kept if the Upload is destroyed before finish(),
-  // even over restarts. From now on bytes from an earlier Upload of the same blob are rejected: the client
-  // has begun anew, so the earlier connection must have broken, even if that has not been noticed yet.
+  // Continues an incomplete blob after its first `offset` bytes. failed_precondition: `offset` is not
+  // received(). Appended bytes are kept if the Upload is destroyed before finish(), even over restarts. From
+  // now on bytes from an earlier Upload of the same blob are rejected: the client has reconnected, so the
+  // earlier connection must have broken, even if that has not been noticed yet.
   virtual Result<std::unique_ptr<Upload>> resume_upload(const Digest&, std::uint64_t) {
     return fail(Errc::unavailable, "this store takes no uploads in parts");
   }
 
   // Collection of unused blobs
 
-  // Returns the digests of all blobs or, if the argument is true, of all incomplete ones.
+  // Returns the digests of all complete blobs or, if the argument is true, of all incomplete ones.
   virtual Result<std::vector<Digest>> list(bool) const { return std::vector<Digest>{}; }
   virtual Result<void> remove(const Digest&) { return {}; }
   virtual void remove_unfinished(const Digest&) {}

@@ -62,9 +62,9 @@ Result<CollectedBlobs::Swept> CollectedBlobs::sweep(const std::set<Digest>& need
   for (const Digest& digest : idle_for_long(*blobs, needed)) {
     {
       const std::unique_lock nobody(using_, std::try_to_lock);
-      if (!nobody) break;  // a submission is in progress; the next sweep removes the rest
+      if (!nobody) break;  // a submission is in progress; the remaining blobs wait for the next sweep
       const std::lock_guard lock(mutex_);
-      if (idle_.erase(digest) == 0) continue;  // it was requested just now
+      if (idle_.erase(digest) == 0) continue;  // the blob was requested just now, so it stays
       going_.insert(digest);
     }
     const auto removed = inner_->remove(digest);

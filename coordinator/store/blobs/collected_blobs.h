@@ -1,10 +1,10 @@
-// A blob store that removes what no job needs: files of rejected bundles, of removed jobs, of interrupted
-// uploads. A blob is removed when for the duration `keep` no job has needed it and nobody has requested it;
-// an interrupted upload is removed when it has not grown for that long. Both durations begin again when the
+// A blob store that removes unused blobs: files of rejected bundles, of removed jobs, of interrupted uploads.
+// A blob is removed when for the duration `keep` no job has needed it and nobody has requested it; an
+// interrupted upload is removed when it has not grown for that long. Both durations start again when the
 // coordinator is restarted. Thread-safe.
 //
-// A submission never loses its files: whenever a caller asks for a blob, the blob's duration begins again,
-// and that cannot happen in the middle of the blob's removal. While in_use() is held nothing is removed.
+// A submission never loses its files: a request for a blob restarts the blob's duration, and waits if the
+// blob is being removed. While in_use() is held nothing is removed.
 #pragma once
 
 #include <condition_variable>
@@ -22,8 +22,8 @@ namespace ls::coordinator {
 
 class CollectedBlobs final : public BlobStore {
  public:
-  // If `keep` is nullopt, blobs are never removed, and interrupted uploads after a day (no other coordinator
-  // can be using them).
+  // If `keep` is nullopt, blobs are never removed; interrupted uploads are removed after a day. Requires that
+  // no other coordinator uses these blobs.
   CollectedBlobs(std::shared_ptr<BlobStore> inner, std::shared_ptr<const Clock> clock,
                  std::optional<Duration> keep)
       : inner_(std::move(inner)), clock_(std::move(clock)), keep_(keep) {}
@@ -31,8 +31,9 @@ class CollectedBlobs final : public BlobStore {
   struct Swept {
     std::uint64_t blobs = 0, unfinished = 0;  // number removed
   };
-  // Removes what has not been needed for long enough and returns how much that was. `needed` must hold every
-  // blob that a job names. Error: the store could not be listed, or something could not be removed.
+  // Removes blobs and uploads that are unused for long enough and returns their numbers. `needed` must
+  // contain every blob that a job names. Error: the store could not be listed, or something could not be
+  // removed.
   Result<Swept> sweep(const std::set<Digest>& needed);
   Result<Swept> sweep_unfinished();
   // Hold this from a submission's first check for a blob until its job counts as needing it.
@@ -68,7 +69,7 @@ class CollectedBlobs final : public BlobStore {
   mutable std::shared_mutex using_;
   mutable std::mutex mutex_;
   mutable std::condition_variable gone_;
-  // Blobs that are being removed, which may take a while; requests for them wait until they are gone.
+  // Blobs that are being removed, which may take a while; requests for them wait for the end of the removal.
   std::set<Digest> going_;
   mutable std::map<Digest, TimePoint> idle_;  // blobs that no job needs, and since when
   std::map<Digest, Unfinished> unfinished_;   // used by the sweeper only

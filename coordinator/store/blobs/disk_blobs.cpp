@@ -96,8 +96,8 @@ std::filesystem::path DiskBlobs::path(const Digest& digest) const {
 
 bool DiskBlobs::has(const Digest& digest) const { return ::access(path(digest).c_str(), R_OK) == 0; }
 
-// Returns an error if the disk cannot be read now (EIO, ESTALE, EACCES), because then it is unknown whether
-// the blob exists.
+// Returns an error if the disk cannot be read now (EIO, ESTALE, EACCES): then it is unknown whether the blob
+// exists.
 Result<bool> DiskBlobs::find(const Digest& digest) const {
   if (has(digest)) return true;
   if (errno == ENOENT || errno == ENOTDIR) return false;
@@ -117,8 +117,8 @@ Result<std::uint64_t> DiskBlobs::size(const Digest& digest) const {
   return stamp->bytes;
 }
 
-// Blobs read whole are hashed every time; a larger file, read in pieces, is hashed completely before the
-// first piece.
+// A blob that is read as a whole is hashed every time. A larger file, which is read in pieces, is hashed
+// completely before the first piece.
 Result<std::vector<std::byte>> DiskBlobs::read(const Digest& digest, std::uint64_t offset,
                                                std::uint64_t length) const {
   const auto seen = look_at(digest);
@@ -144,8 +144,8 @@ Result<void> DiskBlobs::prove(const Digest& digest, bool again) const {
   if (!known) return tl::unexpected(known.error());
   if (!again && proofs_.proven(digest, *known)) return {};
   const std::lock_guard lock(proving_);
-  // The stamp is taken before the file is read: if the file changes meanwhile, its stamp no longer matches,
-  // and the file is read again at the next request.
+  // The stamp is taken before the file is read. If the file changes meanwhile, the stamp no longer matches,
+  // and the next request reads the file again.
   const auto seen = look_at(digest);
   if (!seen) return tl::unexpected(seen.error());
   if (!again && proofs_.proven(digest, *seen)) return {};

@@ -4,15 +4,61 @@
 // digits>.damaged, and the blob counts as missing until the right bytes arrive.
 #pragma once
 
+#include <sys/stat.h>
+
+#include <cerrno>
+#include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 
+#include "common/base/digest.h"
 #include "coordinator/store/blobs/blob_store.h"
 #include "coordinator/store/blobs/upload_parts.h"
-#include "coordinator/store/blobs/verified_digests.h"
 
 namespace ls::coordinator {
+
+// Identifies a version of a file by its size, inode and time of last change (ctime, here `seconds` and
+// `nanoseconds`). Every write changes the ctime, and programs cannot set it.
+struct FileStamp {
+  std::uint64_t device = 0, inode = 0, bytes = 0;
+  std::int64_t seconds = 0, nanoseconds = 0;
+  bool operator==(const FileStamp&) const = default;
+};
+
+// Returns the file's present stamp; nullopt: it cannot be read, and errno says why.
+inline std::optional<FileStamp> stamp_of(const std::filesystem::path& path) {
+  struct stat info {};
+  if (::stat(path.c_str(), &info) != 0) return std::nullopt;
+  return FileStamp{info.st_dev, info.st_ino, static_cast<std::uint64_t>(info.st_size), info.st_ctim.tv_sec,
+                   info.st_ctim.tv_nsec};
+}
+
+// Remembers which files this process has read as a whole and found to match their digests, with each file's
+// stamp at that time. A file whose stamp has changed since must be read again. Thread-safe.
+class VerifiedDigests {
+ public:
+  // True if this blob's file matched its digest when it had this stamp.
+  bool proven(const Digest& digest, const FileStamp& stamp) const {
+    const std::lock_guard lock(mutex_);
+    const auto found = stamps_.find(digest);
+    return found != stamps_.end() && found->second == stamp;
+  }
+  void note(const Digest& digest, const FileStamp& stamp) {
+    const std::lock_guard lock(mutex_);
+    stamps_.insert_or_assign(digest, stamp);
+  }
+  void forget(const Digest& digest) {
+    const std::lock_guard lock(mutex_);
+    stamps_.erase(digest);
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<Digest, FileStamp> stamps_;
+};
 
 class DiskBlobs final : public BlobStore {
  public:
@@ -54,7 +100,8 @@ class DiskBlobs final : public BlobStore {
   std::filesystem::path folder_, work_;
   mutable VerifiedDigests proofs_;
   mutable std::mutex proving_;  // only one file is verified at a time: a second request waits for the result
-  // Held while a file is put in its place or moved aside, so that a file just repaired is not moved aside.
+  // Held while a file is put in its place or moved aside, so that a file that was just repaired is not moved
+  // aside.
   mutable std::mutex placing_;
   std::unique_ptr<UploadParts> parts_;
 };

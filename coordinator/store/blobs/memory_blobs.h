@@ -1,5 +1,5 @@
-// The blobs of a process that stores nothing (`lightshaft render`): each is in memory, or is a file that
-// stays where it is.
+// The blob store of a process that writes nothing to disk (`lightshaft render`): a blob is in memory, or is
+// an existing file that stays where it is.
 #pragma once
 
 #include <filesystem>

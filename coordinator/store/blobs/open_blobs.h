@@ -1,4 +1,4 @@
-// Opens the blob store that --blobs names.
+// Opens the blob store named by the option --blobs.
 #pragma once
 
 #include <filesystem>
@@ -10,9 +10,9 @@
 namespace ls::coordinator {
 
 // Opens the blob store that `where` names. If `where` is empty, blobs are kept in the folder `data`/blobs. If
-// it is an s3:// address, they are kept in that bucket, and `data`/blobs holds those that are being uploaded
-// or downloaded (s3_blobs.h). Any other `where` names a folder that several coordinators may share; `node` is
-// this coordinator's name among them.
+// it is an s3:// address, they are kept in that bucket, and `data`/blobs contains the ones that are being
+// uploaded or downloaded (s3_blobs.h). Any other `where` names a folder that several coordinators may share;
+// `node` is this coordinator's name among them.
 Result<std::shared_ptr<BlobStore>> open_blobs(const std::string& where, const std::filesystem::path& data,
                                               const std::string& node);
 

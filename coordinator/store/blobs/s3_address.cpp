@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cstdlib>
 #include <optional>
 
+#include "common/base/parse_number.h"
 #include "coordinator/store/blobs/s3_link.h"
 
 namespace ls::coordinator {
@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::string_view kScheme = "s3://";
 
-// Allows only characters that need no escaping in an address, so that the signed and the sent address are the
-// same.
+// Allows only characters that need no escaping in an address, so that the address that is signed equals the
+// one that is sent.
 bool plain(std::string_view text, std::string_view also) {
   return std::all_of(text.begin(), text.end(), [&](unsigned char c) {
     return std::isalnum(c) != 0 || also.find(static_cast<char>(c)) != std::string_view::npos;
@@ -33,11 +33,8 @@ tl::unexpected<Error> wrong(std::string_view url, std::string_view why) {
 
 // Parses a number of MiB from `least` to `most` and returns it in bytes.
 std::optional<std::uint64_t> mebibytes(std::string_view text, std::uint64_t least, std::uint64_t most) {
-  std::uint64_t value = 0;
-  const auto read = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (read.ec != std::errc() || read.ptr != text.data() + text.size() || value < least || value > most)
-    return {};
-  return value << 20;
+  const auto value = parse_number<std::uint64_t>(text);
+  return value && *value >= least && *value <= most ? std::optional(*value << 20) : std::nullopt;
 }
 
 Result<void> take_parameters(S3Address& address, std::string_view query, std::string_view url) {

@@ -5,6 +5,27 @@
 #include "common/base/log.h"
 
 namespace ls::coordinator {
+
+std::vector<Digest> LocalCopies::used(const Digest& digest, std::uint64_t bytes) {
+  gone(digest);
+  where_[digest] = order_.insert(order_.end(), {digest, bytes});
+  bytes_ += bytes;
+  std::vector<Digest> too_many;
+  while (most_ > 0 && bytes_ > most_ && order_.size() > 1) {
+    too_many.push_back(order_.front().digest);
+    gone(too_many.back());
+  }
+  return too_many;
+}
+
+void LocalCopies::gone(const Digest& digest) {
+  const auto found = where_.find(digest);
+  if (found == where_.end()) return;
+  bytes_ -= found->second->bytes;
+  order_.erase(found->second);
+  where_.erase(found);
+}
+
 namespace {
 
 constexpr int kReadTries = 3;
@@ -20,7 +41,7 @@ std::optional<Digest> digest_of_key(std::string_view key) {
 
 }  // namespace
 
-// An upload into the local folder that is then sent to the store.
+// An upload into the local folder. When it is complete, the file is sent to the S3 store.
 class S3Blobs::Passed final : public BlobStore::Upload {
  public:
   Passed(S3Blobs& store, std::unique_ptr<Upload> local, const Digest& digest)
@@ -93,7 +114,7 @@ Result<std::uint64_t> S3Blobs::size(const Digest& digest) const {
 
 Result<std::vector<std::byte>> S3Blobs::read(const Digest& digest, std::uint64_t offset,
                                              std::uint64_t length) const {
-  // Fetching is tried again, because between fetch and read the local copy may have been removed to make room
+  // Fetching is repeated if the local copy disappears between fetch and read: it may be removed to make room
   // for others, or moved aside as damaged.
   for (int tries = 1;; ++tries) {
     if (!local_->has(digest))
@@ -108,11 +129,12 @@ Result<std::vector<std::byte>> S3Blobs::read(const Digest& digest, std::uint64_t
 void S3Blobs::note_copy(const Digest& digest) const {
   {
     const std::lock_guard lock(mutex_);
-    if (!there_.contains(digest)) return;  // the S3 store may lack this blob, so it must not be removed here
+    // The S3 store may lack this blob, so the local file must not be removed
+    if (!there_.contains(digest)) return;
   }
   const auto bytes = local_->size(digest);
   if (!bytes) return;
-  for (const Digest& old : copies_.used(digest, *bytes))
+  for (const Digest& old : copies_.lock()->used(digest, *bytes))
     if (auto removed = local_->remove(old); !removed) log_warn("store=s3", removed.error().message);
 }
 
@@ -125,7 +147,7 @@ Result<void> S3Blobs::fetch(const Digest& digest) const {
   }
   const auto flight = coming_[digest] = std::make_shared<Flight>();
   lock.unlock();
-  // Another thread may have fetched the blob since the caller found no copy.
+  // Another thread may have fetched the blob since the caller checked for a copy.
   auto outcome = local_->has(digest) ? Result<void>() : fetch_now(digest);
   lock.lock();
   coming_.erase(digest);
@@ -219,7 +241,7 @@ Result<void> S3Blobs::remove(const Digest& digest) {
     there_.erase(digest);
   }
   if (auto gone = link_.remove(key_of(digest)); !gone) return gone;
-  copies_.gone(digest);
+  copies_.lock()->gone(digest);
   return local_->remove(digest);
 }
 

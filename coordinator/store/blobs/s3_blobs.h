@@ -1,22 +1,51 @@
 // Keeps blobs as objects PREFIX/ab/<64 hex digits> in an S3-compatible store, so that they outlive this
 // machine and other machines can read them. A local folder holds uploads until they are complete and
-// verified. It also keeps copies of the blobs that were read, up to S3Address::copies_bytes, so that an
-// object is fetched only if there is no copy of it; its digest is checked then. A blob exists if the S3 store
-// has it undamaged.
+// verified. It also keeps copies of the blobs that were read, up to S3Address::copies_bytes. An object is
+// fetched only if it has no copy; its digest is checked then. A blob exists if the S3 store has an undamaged
+// object for it.
 #pragma once
 
 #include <condition_variable>
+#include <cstdint>
+#include <list>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
+#include <vector>
 
+#include "common/base/digest.h"
+#include "common/base/guarded.h"
 #include "coordinator/store/blobs/disk_blobs.h"
-#include "coordinator/store/blobs/local_copies.h"
 #include "coordinator/store/blobs/s3_link.h"
 
 namespace ls::coordinator {
+
+// Remembers the local copies of a remote store's blobs and the time of their last use, and decides which
+// copies must be removed to make room for newer ones. It removes nothing itself.
+class LocalCopies {
+ public:
+  // All copies together may have at most `most` bytes; 0: no limit.
+  explicit LocalCopies(std::uint64_t most) : most_(most) {}
+
+  // Records that the local copy of this blob, which has this many bytes, has just been read or written.
+  // Returns the copies that the caller must remove to stay within the limit; this copy is never among them.
+  std::vector<Digest> used(const Digest& digest, std::uint64_t bytes);
+  void gone(const Digest& digest);
+  std::uint64_t bytes() const { return bytes_; }
+
+ private:
+  struct Copy {
+    Digest digest;
+    std::uint64_t bytes;
+  };
+
+  const std::uint64_t most_;
+  std::list<Copy> order_;  // the most recently used at the end
+  std::map<Digest, std::list<Copy>::iterator> where_;
+  std::uint64_t bytes_ = 0;
+};
 
 class S3Blobs final : public BlobStore {
  public:
@@ -27,8 +56,8 @@ class S3Blobs final : public BlobStore {
   bool has(const Digest& digest) const override { return find(digest).value_or(false); }
   Result<bool> find(const Digest& digest) const override;
   Result<void> answers() const override { return link_.answers(); }
-  // Verifies the local copy; a damaged copy is moved aside. Without a good copy it only checks that the S3
-  // store has the blob, because its bytes are verified when they are fetched.
+  // Verifies the local copy; a damaged copy is moved aside. Without an intact copy it only checks that the S3
+  // store has the blob, since the bytes are verified when they are fetched.
   Result<void> prove(const Digest& digest, bool again = false) const override;
   Result<std::uint64_t> size(const Digest& digest) const override;
   Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
@@ -59,10 +88,10 @@ class S3Blobs final : public BlobStore {
 
   S3Link link_;
   std::unique_ptr<DiskBlobs> local_;
-  mutable LocalCopies copies_;
+  mutable Guarded<LocalCopies> copies_;
   mutable std::mutex mutex_;
-  mutable std::set<Digest> there_;  // known to be in the store
-  // Blobs whose object in the S3 store is damaged, with the ETag of that object: such a blob counts as
+  mutable std::set<Digest> there_;  // blobs known to be in the S3 store
+  // Blobs whose object in the S3 store is damaged, with the ETag of that object. Such a blob counts as
   // missing until the ETag changes.
   mutable std::map<Digest, std::string> damaged_;
   struct Flight {

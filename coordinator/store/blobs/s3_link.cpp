@@ -16,10 +16,10 @@ namespace ls::coordinator {
 namespace {
 
 constexpr long kConnectSeconds = 10;
-constexpr long kStallSeconds = 30;          // a transfer without a byte for this long is ended
-constexpr long kAnswerSeconds = 5;          // a store that answers() later than this counts as unavailable
-constexpr std::size_t kMaxText = 8u << 20;  // most bytes of an answer that is a list or an error
-constexpr std::size_t kShownText = 300;     // most bytes of such an answer in a message
+constexpr long kStallSeconds = 30;              // a transfer without a byte for this long is ended
+constexpr long kAnswerSeconds = 5;              // the store counts as unavailable if answers() takes longer
+constexpr std::size_t kMaxText = 8u << 20;      // most bytes of an answer that is a list or an error
+constexpr std::size_t kShownText = 300;         // most bytes of such an answer that a message quotes
 constexpr std::size_t kMaxListed = 10'000'000;  // most keys in a list
 
 struct CloseFile {
@@ -33,7 +33,7 @@ struct Cleanup {
 };
 using Headers = std::unique_ptr<curl_slist, FreeList>;
 
-// The bytes of a file that a request still has to send, from the file's current position on.
+// The part of a file that a request still has to send; it begins at the file's current position.
 struct Source {
   std::FILE* file;
   std::uint64_t left;
@@ -214,7 +214,7 @@ Error S3Link::error_of(const Request& request, const Answer& answer) const {
   return {may_pass(answer.status) ? Errc::unavailable : Errc::internal, answered};
 }
 
-// Asks for an object that does not exist: the answer 404 shows that the store answers.
+// Requests an object that does not exist: the answer 404 shows that the store is available.
 Result<void> S3Link::answers() const {
   const Request request{.method = "HEAD", .key = "answers", .most_seconds = kAnswerSeconds};
   const auto answer = ask_once(request);

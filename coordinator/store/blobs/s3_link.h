@@ -1,6 +1,6 @@
-// Reads and writes objects in a bucket of an S3-compatible store. This is the coordinator's only user of
-// libcurl, which also signs the requests (AWS Signature Version 4). Addresses are in path style:
-// ENDPOINT/BUCKET/PREFIX/KEY. Thread-safe: each request has its own connection.
+// Reads and writes objects in a bucket of an S3-compatible store. It has its own use of libcurl, which also
+// signs the requests (AWS Signature Version 4). Addresses are in path style: ENDPOINT/BUCKET/PREFIX/KEY.
+// Thread-safe: each request has its own connection.
 #pragma once
 
 #include <cstdint>
@@ -18,29 +18,30 @@
 
 namespace ls::coordinator {
 
-// s3://BUCKET[/PREFIX][?endpoint=URL][&region=NAME][&part-mib=N][&copies-mib=N]. The keys come from the
-// environment, as for other tools: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and, if they are short-lived,
-// AWS_SESSION_TOKEN; AWS_REGION if the address names none. Default endpoint: Amazon's for the region.
+// An address s3://BUCKET[/PREFIX][?endpoint=URL][&region=NAME][&part-mib=N][&copies-mib=N]. The keys come
+// from the same environment variables as for other tools: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and, for
+// temporary keys, AWS_SESSION_TOKEN. AWS_REGION is used if the address has no region. The default endpoint is
+// Amazon's for the region.
 struct S3Address {
   std::string bucket, prefix;  // without slashes at its ends; may be empty
   std::string endpoint, region;
   // Larger files are sent in parts of this size; 5 MiB to 5 GiB
   std::uint64_t part_bytes = std::uint64_t{64} << 20;
   std::uint64_t copies_bytes = 0;  // most bytes of local copies; 0: no limit
-  std::string shown() const;       // for messages and logs
+  std::string shown() const;       // the address for messages and logs
 };
 Result<S3Address> parse_s3_url(std::string_view url);
 
 struct S3Keys {
   std::string id, secret, session;
 };
-// unauthenticated: names the missing variable.
+// Error unauthenticated: a variable is missing; the message names it.
 Result<S3Keys> s3_keys_from_environment();
 
 struct S3Options {
   S3Address address;
   S3Keys keys;
-  int attempts = 6;  // how often a request is tried if it fails in a way that may pass: no answer, 429, 5xx
+  int attempts = 6;  // most attempts for a request that fails in a way that may pass: no answer, 429, 5xx
   Duration first_pause = std::chrono::milliseconds(100), longest_pause = std::chrono::seconds(5);
 };
 
@@ -48,13 +49,13 @@ class S3Link {
  public:
   explicit S3Link(S3Options options);
 
-  // Sends one small request. Error: the store has not answered it within a few seconds.
+  // Sends one small request. Error: the store does not answer within a few seconds.
   Result<void> answers() const;
   struct Object {
     std::uint64_t bytes = 0;
     std::string etag;  // changes with the object's bytes
   };
-  Result<Object> look_at(const std::string& key) const;  // not_found
+  Result<Object> look_at(const std::string& key) const;  // error not_found: there is no such object
   using Sink = std::function<Result<void>(std::span<const std::byte>)>;
   // Reads the whole object and passes its bytes to `sink`, in order. If an attempt fails, the next one reads
   // the object from its start; `restart` is called before every attempt and must discard what `sink` has

@@ -12,7 +12,7 @@
 namespace ls::coordinator {
 namespace {
 
-constexpr std::uint64_t kMostParts = 10'000;  // per object, by the protocol
+constexpr std::uint64_t kMostParts = 10'000;  // most parts of an object, by the protocol
 constexpr std::uint64_t kChunk = 1u << 20;
 
 Result<Digest> digest_of(const std::filesystem::path& path, std::uint64_t offset, std::uint64_t bytes) {
@@ -78,13 +78,13 @@ Result<void> S3Link::send_parts(const std::string& key, const std::string& uploa
   // The store begins its answer before it has joined the parts, so an answer with status 200 may contain an
   // error.
   if (answer->status / 100 == 2 && xml_element(answer->text, "Code").empty()) return {};
-  // If the answer to an earlier attempt was lost, the upload is complete and the store no longer knows its
-  // parts: then the object exists.
+  // If the answer to an earlier attempt was lost, the upload may be complete and its id unknown to the store:
+  // then the object exists.
   if (const auto there = look_at(key); there && there->bytes == bytes) return {};
   return tl::unexpected(error_of(end, *answer));
 }
 
-// Lets the store remove the parts sent so far. Otherwise it would keep them, invisible but charged for.
+// Tells the store to delete the parts sent so far. Otherwise it would keep them, invisible but charged for.
 void S3Link::give_up_parts(const std::string& key, const std::string& upload) const {
   const Request request{.method = "DELETE", .key = key, .query = "uploadId=" + query_value(upload)};
   const auto answer = ask(request);

@@ -9,13 +9,13 @@ inline constexpr const char* kNoBytes = "e3b0c44298fc1c149afbf4c8996fb92427ae41e
 
 struct S3Link::Request {
   const char* method = "GET";
-  std::string key;                  // empty: the bucket itself
+  std::string key;                  // of the object; empty: the request is about the bucket
   std::string query;                // sorted and escaped, as signed; every name with '='
-  std::filesystem::path file = {};  // for PUT: `bytes` of this file from `offset` on
+  std::filesystem::path file = {};  // for PUT: the payload is `bytes` bytes of this file from `offset` on
   std::uint64_t offset = 0, bytes = 0;
   std::string body = {};           // for POST
   std::string payload = kNoBytes;  // SHA-256 of the payload
-  long most_seconds = 0;           // limit for the whole request; 0: it may last as long as bytes arrive
+  long most_seconds = 0;           // limit for the whole request; 0: no limit while bytes arrive
   const Sink* sink = nullptr;
   const std::function<Result<void>()>* restart = nullptr;
 };
@@ -23,14 +23,14 @@ struct S3Link::Answer {
   int status = 0;  // 0: no answer
   std::uint64_t length = 0;
   std::string etag;
-  std::string text;  // the body, if it was not passed to a sink; without an answer, the reason for that
-  std::optional<Error> refused;  // the sink's error
+  std::string text;  // the body, unless it was passed to a sink; if there is no answer, the reason
+  std::optional<Error> refused;  // the sink's error, which ended the request
 };
 
-// Returns the text of the first XML element with this name from position *at on, and sets *at to the position
-// behind that element (npos: there is none). Understands just enough XML for the answers of S3.
+// Returns the text of the first XML element with this name at or after position *at, and sets *at to the end
+// of that element (npos: there is none). Understands just enough XML for the answers of S3.
 std::string xml_element(std::string_view xml, std::string_view name, std::size_t* at = nullptr);
-// Escapes the text as a value in a query.
+// Escapes the text for use as a value in a query string.
 std::string query_value(std::string_view text);
 
 }  // namespace ls::coordinator

@@ -15,18 +15,17 @@
 
 namespace ls::coordinator {
 
-// Who may write to an incomplete blob's file: the Part with the latest `turn`, a number that increases with
-// each resume().
+// Decides who may write to an incomplete blob's file: the Part with the latest `turn`, a number that
+// increases with each resume(). Its lock is held during every change of the file.
 struct UploadParts::Slot {
-  std::mutex mutex;  // guards every change of the file
   std::uint64_t turn = 0;
   bool finishing = false;
 };
 
 class UploadParts::Part final : public BlobStore::Upload {
  public:
-  Part(std::shared_ptr<Slot> slot, std::uint64_t turn, const Digest& digest, File file, std::uint64_t size,
-       std::filesystem::path path, Publish publish)
+  Part(std::shared_ptr<Guarded<Slot>> slot, std::uint64_t turn, const Digest& digest, File file,
+       std::uint64_t size, std::filesystem::path path, Publish publish)
       : slot_(std::move(slot)),
         turn_(turn),
         digest_(digest),
@@ -36,12 +35,13 @@ class UploadParts::Part final : public BlobStore::Upload {
         path_(std::move(path)),
         publish_(std::move(publish)) {}
   ~Part() override {
-    if (!ended_) ::fdatasync(file_.fd());  // so that a power failure rarely loses bytes reported as received
+    // The sync keeps a power failure from losing bytes that were reported as received, in most cases
+    if (!ended_) ::fdatasync(file_.fd());
   }
 
   Result<void> append(std::span<const std::byte> bytes) override {
-    const std::lock_guard lock(slot_->mutex);
-    if (auto mine = my_turn_locked(); !mine) return mine;
+    const auto slot = slot_->lock();
+    if (auto mine = my_turn(*slot); !mine) return mine;
     if (bytes.size() > limits::kMaxBlobBytes - size_)
       return fail(Errc::resource_exhausted, fmt::format("blob {} is larger than the {} bytes allowed",
                                                         digest_.hex(), limits::kMaxBlobBytes));
@@ -51,24 +51,24 @@ class UploadParts::Part final : public BlobStore::Upload {
     return {};
   }
 
-  // Hashing a large file takes time. Others who want to write to it are rejected meanwhile.
+  // Hashing a large file takes time. Meanwhile other writers to the file are rejected.
   Result<void> finish() override {
     {
-      const std::lock_guard lock(slot_->mutex);
-      if (auto mine = my_turn_locked(); !mine) return mine;
-      slot_->finishing = true;
+      const auto slot = slot_->lock();
+      if (auto mine = my_turn(*slot); !mine) return mine;
+      slot->finishing = true;
     }
     const auto done = publish();
-    const std::lock_guard lock(slot_->mutex);
-    slot_->finishing = false;
-    ++slot_->turn;
+    const auto slot = slot_->lock();
+    slot->finishing = false;
+    ++slot->turn;
     ended_ = true;
     return done;
   }
 
  private:
-  Result<void> my_turn_locked() const {
-    if (slot_->turn == turn_ && !ended_) return {};
+  Result<void> my_turn(const Slot& slot) const {
+    if (slot.turn == turn_ && !ended_) return {};
     return fail(Errc::failed_precondition, "this upload has ended, or another request has gone on with it");
   }
   Result<void> publish() {
@@ -86,7 +86,7 @@ class UploadParts::Part final : public BlobStore::Upload {
     return publish_(digest_, path_);
   }
 
-  std::shared_ptr<Slot> slot_;
+  std::shared_ptr<Guarded<Slot>> slot_;
   std::uint64_t turn_;
   Digest digest_;
   File file_;
@@ -94,7 +94,7 @@ class UploadParts::Part final : public BlobStore::Upload {
   bool from_start_, ended_ = false;
   std::filesystem::path path_;
   Publish publish_;
-  Sha256 hash_;  // valid if all bytes came through this upload
+  Sha256 hash_;  // hash of the whole blob; valid only if all bytes came through this upload
 };
 
 UploadParts::UploadParts(std::filesystem::path folder, Publish publish)
@@ -111,18 +111,18 @@ std::uint64_t UploadParts::received(const Digest& digest) const {
   return ::stat(path(digest).c_str(), &info) == 0 ? static_cast<std::uint64_t>(info.st_size) : 0;
 }
 
-std::shared_ptr<UploadParts::Slot> UploadParts::slot(const Digest& digest) {
-  const std::lock_guard lock(mutex_);
-  std::erase_if(slots_, [](const auto& item) { return item.second.expired(); });
-  auto found = slots_[digest].lock();
-  if (!found) slots_[digest] = found = std::make_shared<Slot>();
+std::shared_ptr<Guarded<UploadParts::Slot>> UploadParts::slot(const Digest& digest) {
+  const auto slots = slots_.lock();
+  std::erase_if(*slots, [](const auto& item) { return item.second.expired(); });
+  auto found = (*slots)[digest].lock();
+  if (!found) (*slots)[digest] = found = std::make_shared<Guarded<Slot>>();
   return found;
 }
 
 Result<std::unique_ptr<BlobStore::Upload>> UploadParts::resume(const Digest& digest, std::uint64_t offset) {
   if (received(digest) == 0) make_room();
-  const auto slot = this->slot(digest);
-  const std::lock_guard lock(slot->mutex);
+  const auto guarded = slot(digest);
+  const auto slot = guarded->lock();
   const std::uint64_t there = received(digest);
   if (slot->finishing)
     return fail(Errc::failed_precondition,
@@ -133,7 +133,8 @@ Result<std::unique_ptr<BlobStore::Upload>> UploadParts::resume(const Digest& dig
                             digest.hex(), offset));
   auto file = File::open(path(digest), O_WRONLY | O_CREAT | O_APPEND);
   if (!file) return tl::unexpected(file.error());
-  return std::make_unique<Part>(slot, ++slot->turn, digest, std::move(*file), there, path(digest), publish_);
+  return std::make_unique<Part>(guarded, ++slot->turn, digest, std::move(*file), there, path(digest),
+                                publish_);
 }
 
 void UploadParts::make_room() {
@@ -154,8 +155,8 @@ void UploadParts::make_room() {
 }
 
 void UploadParts::remove(const Digest& digest) {
-  const auto slot = this->slot(digest);
-  const std::lock_guard lock(slot->mutex);
+  const auto guarded = slot(digest);
+  const auto slot = guarded->lock();
   if (slot->finishing) return;
   ++slot->turn;
   ::unlink(path(digest).c_str());

@@ -6,9 +6,9 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <vector>
 
+#include "common/base/guarded.h"
 #include "coordinator/store/blobs/blob_store.h"
 
 namespace ls::coordinator {
@@ -21,7 +21,7 @@ class UploadParts {
   ~UploadParts();
 
   std::uint64_t received(const Digest& digest) const;
-  // Does what BlobStore::resume_upload() says. If there are limits::kMaxUnfinishedUploads incomplete blobs
+  // Implements BlobStore::resume_upload(). If there are limits::kMaxUnfinishedUploads incomplete blobs
   // already, first removes the one that has not grown for the longest time.
   Result<std::unique_ptr<BlobStore::Upload>> resume(const Digest& digest, std::uint64_t offset);
   // Removes an incomplete blob. If its upload is in progress, the next bytes of that upload are rejected.
@@ -33,13 +33,12 @@ class UploadParts {
   class Part;
   UploadParts(std::filesystem::path folder, Publish publish);
   std::filesystem::path path(const Digest& digest) const { return folder_ / digest.hex(); }
-  std::shared_ptr<Slot> slot(const Digest& digest);
+  std::shared_ptr<Guarded<Slot>> slot(const Digest& digest);
   void make_room();
 
   std::filesystem::path folder_;
   Publish publish_;
-  std::mutex mutex_;
-  std::map<Digest, std::weak_ptr<Slot>> slots_;  // of uploads in progress
+  Guarded<std::map<Digest, std::weak_ptr<Guarded<Slot>>>> slots_;  // the uploads in progress
 };
 
 }  // namespace ls::coordinator

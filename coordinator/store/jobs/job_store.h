@@ -1,6 +1,6 @@
 // Stores everything about jobs except their pixels, which are in the partial log (store/log). There are two
-// basic implementations: SQLite, and memory (for `lightshaft render`). Thread-safe. With SQLite, what a put
-// or add has stored survives kill -9 and power loss.
+// basic implementations: SQLite, and memory (for `lightshaft render`). Thread-safe. With SQLite, data survive
+// kill -9 and power loss once a put or add has returned.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,9 @@
 #include "common/base/error.h"
 #include "common/base/id.h"
 #include "common/job/settings.h"
+#include "common/job/techniques.h"
 #include "common/protocol/messages.h"
+#include "coordinator/domain/denoised_target.h"
 #include "coordinator/domain/job_state.h"
 #include "coordinator/views/job_view.h"
 
@@ -25,34 +27,35 @@ namespace ls::coordinator {
 
 // The state of a job store's mirror, a Redis to which every change is copied
 struct StoreStatus {
-  std::string mirror;        // address of the mirror; empty: there is none
-  std::string trouble;       // why the mirror cannot be updated now; empty: it can
+  std::string mirror;  // address of the mirror; empty: there is none
+  // Why the mirror cannot be updated now; empty: it is up to date or can be updated
+  std::string trouble;
   std::uint64_t behind = 0;  // number of jobs not completely mirrored
 };
 
-// Where the coordinator is that has a job, if several coordinators share a store
+// The coordinator that owns a job, if several share a store
 struct JobLocation {
   std::string http;    // http://HOST:PORT; empty: unknown
-  bool alive = false;  // false: the job will be taken over, or has ended there
+  bool alive = false;  // false: the coordinator is gone; another will take the job over, unless it has ended
 };
 
 // Checks the value of --store: sqlite, or a redis:// address.
 Result<void> check_store(const std::string& store);
 
 // Totals of a job over all its units (a unit is one tile with one range of samples). They are written when
-// the job ends, so that a restart need not read its partials (the encoded pixel sums of its units).
+// the job ends, so that a restart does not have to read its partials (the encoded pixel sums of its units).
 struct JobTotals {
   double render_seconds = 0;  // from the first ray until the last unit's sums were added to the image
   double core_seconds = 0;    // CPU time that workers spent on rendering
   double load_seconds = 0;
   std::uint64_t peak_rss_bytes = 0;
   double spp_done = 0;
-  std::uint64_t units = 0;          // units done
-  std::uint64_t units_planned = 0;  // units that the job was to have; 0: the same as `units`
+  std::uint64_t units = 0;          // number of units done
+  std::uint64_t units_planned = 0;  // number of units that the job planned; 0: the same as `units`
   Health health;
-  TimeSplit time;                         // without `render`, which is core_seconds
+  TimeSplit time;                         // `render` is not set: it is core_seconds
   double began_unix = 0, ended_unix = 0;  // wall clock of the first ray and of the end; 0: not yet
-  // ImageError::verdict and few_hits at the last checkpoint; empty and nullopt if there was none.
+  // ImageError::verdict and few_hits at the last checkpoint; empty and nullopt if there was no checkpoint.
   std::string doubt;
   std::optional<std::uint64_t> few_hits;
   bool operator==(const JobTotals&) const = default;
@@ -63,29 +66,40 @@ struct StoredJob {
   std::string name;   // scene file name
   std::string owner;  // user name; empty: the administrator, or a record of an earlier version
   double submitted_unix = 0;
-  Digest scene;  // digest of its blob
+  // The span of the program that submitted the job, to which the job's trace belongs
+  // (common/trace/context.h); empty: none
+  std::string traceparent;
+  Digest scene;  // digest of the scene's blob
   RenderSettings settings;
-  JobSpec spec;  // as requested; spp as last extended
-  // Samples per pixel to render; nullopt: until an error target or a time limit.
+  JobSpec spec;  // as requested by the user; with spp as last extended
+  // Samples per pixel to render; nullopt: an error target or a time limit ends the job.
   std::optional<std::uint64_t> spp;
   std::vector<BlobRef> assets;
   std::vector<std::string> warnings;
-  bool reference_same_seed = false;  // what same_noise() says of the job and its reference image
+  bool reference_same_seed = false;  // result of same_noise() for the job and its reference image
   std::vector<std::string> features_used, features_left_out;
   std::string needs;  // canonical JSON (common/scene/analysis/needs.h); empty in records of earlier versions
-  std::string analysis;  // JSON: the renderer's features with reasons, and what was pruned; for the report
+  // JSON for the report: the renderer's features with reasons, and the pruned parts of the scene
+  std::string analysis;
   JobState state = JobState::queued;
   std::optional<StopReason> stopped;
   std::string error;
   std::optional<Digest> numeric_class;
-  std::string build;  // of the worker whose class the job was pinned to
-  bool fake = false;  // pinned to a fake worker; then only fake workers may render its units
+  std::string build;  // build of the worker whose class the job was pinned to
+  bool fake = false;  // true if pinned to a fake worker; then only fake workers may render its units
   JobTotals totals;
+  TechniqueSet techniques;  // that its workers used, as far as they have said
+  // Errors of the denoised layers on which the end of the job was or will be decided
+  // (domain/denoised_target.h)
+  std::vector<DenoisedCheck> denoised_checks;
   // Missing or damaged blobs: the job is paused until they are available
   std::set<Digest> missing_blobs;
+  // Pixels whose tiles are rendered before the others (domain/event.h: JobPlan::focus)
+  std::optional<PixelRect> focus;
   std::uint64_t revision = 0;  // number of changes, in stores that count them (Redis)
-  std::uint64_t fence = 0;     // number of the ownership, if several coordinators share a store
-  bool damaged = false;        // its record cannot be read: only id, `failed` and `error` are known
+  // Number of times the job has changed its owner, if several coordinators share a store (redis_members.h)
+  std::uint64_t fence = 0;
+  bool damaged = false;  // true if its record cannot be read: only id, `failed` and `error` are known
   bool operator==(const StoredJob&) const = default;
 };
 std::string to_json(const StoredJob& job);
@@ -114,7 +128,7 @@ class JobStore {
   virtual Result<std::vector<StoredJob>> jobs() const = 0;
   // Removes the job with its points and log; succeeds if the job is unknown.
   virtual Result<void> remove_job(const JobId& job) { return remove_jobs({&job, 1}); }
-  virtual Result<void> remove_jobs(std::span<const JobId> jobs) = 0;  // all or none
+  virtual Result<void> remove_jobs(std::span<const JobId> jobs) = 0;  // removes all jobs or none
 
   virtual Result<void> add_point(const JobId& job, const ConvergencePoint& point) = 0;
   // Sets the reference error of the point with these samples, replacing an earlier one.
@@ -127,12 +141,12 @@ class JobStore {
   virtual Result<void> add_log(const JobId& job, const LogLine& line) = 0;
   virtual Result<std::vector<LogLine>> log(const JobId& job) const = 0;
 
-  // Stores that a worker is quarantined. That is kept for good, even after the jobs are removed in which the
-  // worker was found out. If the worker is quarantined already, its first evidence stays.
+  // Stores that a worker is quarantined. The entry is permanent and outlives the jobs that revealed the
+  // worker. If the worker is quarantined already, its first evidence stays.
   virtual Result<void> quarantine(const QuarantinedWorker& worker) = 0;
   virtual Result<std::vector<QuarantinedWorker>> quarantined() const = 0;
 
-  // Durably adds `amount` to a named counter and returns the counter's value before. Serves to make ids that
+  // Durably adds `amount` to a named counter and returns the counter's previous value. Used to make ids that
   // must never repeat.
   virtual Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) = 0;
 
@@ -144,14 +158,16 @@ class JobStore {
     std::string from;  // the coordinator that had it
   };
   struct Moved {
-    std::vector<QuarantinedWorker> quarantined;  // by another coordinator; apply these before the rest
-    std::vector<JobId> lost;  // taken over by another coordinator: nothing of them is stored here any more
-    std::vector<Inherited> inherited;  // from a coordinator that is gone; may include jobs lost before
+    // Quarantined by another coordinator; apply these before the rest
+    std::vector<QuarantinedWorker> quarantined;
+    std::vector<JobId> lost;  // taken over by another coordinator: nothing is stored for them here any more
+    std::vector<Inherited> inherited;  // jobs from a coordinator that is gone; may include jobs lost before
   };
   virtual Moved moved() { return {}; }  // changes since the last call
   // Sets the addresses at which this coordinator can be reached.
   virtual void announce(const std::string&, const std::string&) {}
-  // Finds the coordinator of a job that this one does not have; may block for a second. nullopt: none has it.
+  // Finds the coordinator that owns a job unknown to this one; may block for a second. nullopt: no
+  // coordinator has it.
   virtual Result<std::optional<JobLocation>> locate_job(const JobId&) { return std::nullopt; }
 };
 

@@ -1,9 +1,10 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 
+#include <atomic>
 #include <memory>
-#include <mutex>
 
+#include "common/base/guarded.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/store/jobs/job_store.h"
 
@@ -44,9 +45,9 @@ Error db_error(sqlite3* db, std::string_view what) {
 // One SQL statement. Each call of bind() sets the next parameter.
 class Statement {
  public:
-  Statement(sqlite3* db, const char* sql) : db_(db) {
+  Statement(const Db& db, const char* sql) : db_(db.get()) {
     sqlite3_stmt* raw = nullptr;
-    sqlite3_prepare_v2(db, sql, -1, &raw, nullptr);
+    sqlite3_prepare_v2(db.get(), sql, -1, &raw, nullptr);
     statement_.reset(raw);
   }
   Statement& bind(std::string_view text) {
@@ -60,7 +61,7 @@ class Statement {
   }
   Statement& bind(const std::optional<double>& value) {
     if (value) return bind(*value);
-    ++bound_;  // an unbound parameter is null
+    ++bound_;  // a parameter that is not bound is null
     return *this;
   }
   Statement& bind(std::int64_t value) {
@@ -99,17 +100,39 @@ class Statement {
   int bound_ = 0;
 };
 
-Result<void> execute(sqlite3* db, const char* sql, std::string_view what) {
-  if (sqlite3_exec(db, sql, nullptr, nullptr, nullptr) != SQLITE_OK)
-    return tl::unexpected(db_error(db, what));
+Result<void> execute(const Db& db, const char* sql, std::string_view what) {
+  if (sqlite3_exec(db.get(), sql, nullptr, nullptr, nullptr) != SQLITE_OK)
+    return tl::unexpected(db_error(db.get(), what));
   return {};
+}
+
+// Runs `work` in one transaction, which is rolled back on an error.
+template <class Work>
+Result<void> all_or_nothing(const Db& db, const char* what, Work work) {
+  if (auto begun = execute(db, "BEGIN IMMEDIATE", what); !begun) return begun;
+  auto done = work();
+  if (done) done = execute(db, "COMMIT", what);
+  if (!done) (void)execute(db, "ROLLBACK", "take back what was begun");
+  return done;
+}
+
+Result<void> put(const Db& db, const StoredJob& job) {
+  return Statement(db,
+                   "INSERT INTO jobs(id, state, record) VALUES(?1, ?2, ?3) "
+                   "ON CONFLICT(id) DO UPDATE SET state = ?2, record = ?3")
+      .bind(job.id.value)
+      .bind(to_string(job.state))
+      .bind(to_json(job))
+      .run("store a job");
 }
 
 StoredJob damaged_job(std::string id, const Error& why) {
   StoredJob job;
   job.id.value = std::move(id);
   job.state = JobState::failed;
-  job.error = why.message + "; take the database from a backup, or delete the job and submit it again";
+  job.error =
+      why.message +
+      "; start the newer version, take the database from a backup, or delete the job and submit it again";
   job.damaged = true;
   return job;
 }
@@ -118,24 +141,21 @@ class SqliteJobStore final : public JobStore {
  public:
   explicit SqliteJobStore(Db db) : db_(std::move(db)) {}
 
-  Result<void> put_job(const StoredJob& job) override {
-    const std::lock_guard lock(mutex_);
-    return put_locked(job);
-  }
+  Result<void> put_job(const StoredJob& job) override { return put(*db_.lock(), job); }
 
   Result<void> put_jobs(std::span<const StoredJob> jobs) override {
-    const std::lock_guard lock(mutex_);
-    return all_or_nothing("store jobs", [&]() -> Result<void> {
+    const auto db = db_.lock();
+    return all_or_nothing(*db, "store jobs", [&]() -> Result<void> {
       for (const StoredJob& job : jobs)
-        if (auto done = put_locked(job); !done) return done;
+        if (auto done = put(*db, job); !done) return done;
       return {};
     });
   }
 
   Result<std::vector<StoredJob>> jobs() const override {
-    const std::lock_guard lock(mutex_);
+    const auto db = db_.lock();
     std::vector<StoredJob> all;
-    Statement rows(db_.get(), "SELECT record, id FROM jobs ORDER BY ordinal");
+    Statement rows(*db, "SELECT record, id FROM jobs ORDER BY ordinal");
     auto row = rows.step("read the jobs");
     for (; row && *row; row = rows.step("read the jobs")) {
       auto job = parse_stored_job(rows.text(0));
@@ -146,20 +166,20 @@ class SqliteJobStore final : public JobStore {
   }
 
   Result<void> remove_jobs(std::span<const JobId> jobs) override {
-    const std::lock_guard lock(mutex_);
-    return all_or_nothing("remove a job", [&]() -> Result<void> {
+    const auto db = db_.lock();
+    return all_or_nothing(*db, "remove a job", [&]() -> Result<void> {
       for (const JobId& job : jobs)
         for (const char* sql : {"DELETE FROM jobs WHERE id = ?", "DELETE FROM points WHERE job = ?",
                                 "DELETE FROM truths WHERE job = ?", "DELETE FROM log WHERE job = ?"})
-          if (auto done = Statement(db_.get(), sql).bind(job.value).run("remove a job"); !done) return done;
+          if (auto done = Statement(*db, sql).bind(job.value).run("remove a job"); !done) return done;
       return {};
     });
   }
 
   Result<void> add_point(const JobId& job, const ConvergencePoint& p) override {
-    const std::lock_guard lock(mutex_);
+    const auto db = db_.lock();
     return Statement(
-               db_.get(),
+               *db,
                "INSERT INTO points(job, seconds, core_seconds, spp, rmse, relmse, relmse_lo, relmse_hi, "
                "rmse_lo, rmse_hi) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
         .bind(job.value)
@@ -177,21 +197,21 @@ class SqliteJobStore final : public JobStore {
 
   Result<void> set_reference_error(const JobId& job, double spp,
                                    const ReferenceError& reference_error) override {
-    const std::lock_guard lock(mutex_);
-    Statement put(db_.get(),
-                  "INSERT OR REPLACE INTO truths(job, spp, rmse, relmse, flip, mse_stderr, relmse_stderr) "
-                  "VALUES(?, ?, ?, ?, ?, ?, ?)");
-    put.bind(job.value).bind(spp).bind(reference_error.rmse).bind(reference_error.relmse);
-    return put.bind(reference_error.flip)
+    const auto db = db_.lock();
+    Statement insert(*db,
+                     "INSERT OR REPLACE INTO truths(job, spp, rmse, relmse, flip, mse_stderr, relmse_stderr) "
+                     "VALUES(?, ?, ?, ?, ?, ?, ?)");
+    insert.bind(job.value).bind(spp).bind(reference_error.rmse).bind(reference_error.relmse);
+    return insert.bind(reference_error.flip)
         .bind(reference_error.mse_stderr)
         .bind(reference_error.relmse_stderr)
         .run("store a comparison with the reference");
   }
 
   Result<std::vector<ConvergencePoint>> points(const JobId& job) const override {
-    const std::lock_guard lock(mutex_);
+    const auto db = db_.lock();
     std::vector<ConvergencePoint> all;
-    Statement rows(db_.get(),
+    Statement rows(*db,
                    "SELECT seconds, core_seconds, spp, points.rmse, points.relmse, relmse_lo, relmse_hi, "
                    "truths.rmse, truths.relmse, truths.flip, rmse_lo, rmse_hi, mse_stderr, relmse_stderr "
                    "FROM points LEFT JOIN truths USING(job, spp) WHERE job = ? ORDER BY n");
@@ -211,19 +231,18 @@ class SqliteJobStore final : public JobStore {
   }
 
   Result<void> remove_points(const JobId& job) override {
-    const std::lock_guard lock(mutex_);
-    return all_or_nothing("remove the convergence of a job", [&]() -> Result<void> {
+    const auto db = db_.lock();
+    return all_or_nothing(*db, "remove the convergence of a job", [&]() -> Result<void> {
       for (const char* sql : {"DELETE FROM points WHERE job = ?", "DELETE FROM truths WHERE job = ?"})
-        if (auto done = Statement(db_.get(), sql).bind(job.value).run("remove the convergence of a job");
-            !done)
+        if (auto done = Statement(*db, sql).bind(job.value).run("remove the convergence of a job"); !done)
           return done;
       return {};
     });
   }
 
   Result<void> add_log(const JobId& job, const LogLine& line) override {
-    const std::lock_guard lock(mutex_);
-    if (auto done = Statement(db_.get(), "INSERT INTO log(job, unix, text) VALUES(?, ?, ?)")
+    const auto db = db_.lock();
+    if (auto done = Statement(*db, "INSERT INTO log(job, unix, text) VALUES(?, ?, ?)")
                         .bind(job.value)
                         .bind(line.unix_time)
                         .bind(line.text)
@@ -231,7 +250,7 @@ class SqliteJobStore final : public JobStore {
         !done)
       return done;
     if (++log_lines_ % limits::kLogLinesKept != 0) return {};
-    return Statement(db_.get(),
+    return Statement(*db,
                      "DELETE FROM log WHERE job = ?1 AND n NOT IN "
                      "(SELECT n FROM log WHERE job = ?1 ORDER BY n DESC LIMIT ?2)")
         .bind(job.value)
@@ -240,10 +259,10 @@ class SqliteJobStore final : public JobStore {
   }
 
   Result<std::vector<LogLine>> log(const JobId& job) const override {
-    const std::lock_guard lock(mutex_);
+    const auto db = db_.lock();
     std::vector<LogLine> all;
     Statement rows(
-        db_.get(),
+        *db,
         "SELECT unix, text FROM (SELECT n, unix, text FROM log WHERE job = ? ORDER BY n DESC LIMIT ?) "
         "ORDER BY n");
     rows.bind(job.value).bind(static_cast<std::int64_t>(limits::kLogLinesKept));
@@ -254,16 +273,16 @@ class SqliteJobStore final : public JobStore {
   }
 
   Result<void> quarantine(const QuarantinedWorker& worker) override {
-    const std::lock_guard lock(mutex_);
-    return Statement(db_.get(), "INSERT OR IGNORE INTO barred(worker, evidence) VALUES(?, ?)")
+    const auto db = db_.lock();
+    return Statement(*db, "INSERT OR IGNORE INTO barred(worker, evidence) VALUES(?, ?)")
         .bind(worker.worker.value)
         .bind(worker.evidence)
         .run("store that a worker is quarantined");
   }
   Result<std::vector<QuarantinedWorker>> quarantined() const override {
-    const std::lock_guard lock(mutex_);
+    const auto db = db_.lock();
     std::vector<QuarantinedWorker> all;
-    Statement rows(db_.get(), "SELECT worker, evidence FROM barred ORDER BY worker");
+    Statement rows(*db, "SELECT worker, evidence FROM barred ORDER BY worker");
     auto row = rows.step("read the quarantined workers");
     for (; row && *row; row = rows.step("read the quarantined workers"))
       all.push_back({{rows.text(0)}, rows.text(1)});
@@ -272,8 +291,8 @@ class SqliteJobStore final : public JobStore {
   }
 
   Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) override {
-    const std::lock_guard lock(mutex_);
-    Statement row(db_.get(),
+    const auto db = db_.lock();
+    Statement row(*db,
                   "INSERT INTO counters(name, value) VALUES(?1, ?2) "
                   "ON CONFLICT(name) DO UPDATE SET value = value + ?2 RETURNING value");
     row.bind(counter).bind(static_cast<std::int64_t>(amount));
@@ -285,34 +304,13 @@ class SqliteJobStore final : public JobStore {
   }
 
  private:
-  Result<void> put_locked(const StoredJob& job) {
-    return Statement(db_.get(),
-                     "INSERT INTO jobs(id, state, record) VALUES(?1, ?2, ?3) "
-                     "ON CONFLICT(id) DO UPDATE SET state = ?2, record = ?3")
-        .bind(job.id.value)
-        .bind(to_string(job.state))
-        .bind(to_json(job))
-        .run("store a job");
-  }
-
-  // Runs `work` in one transaction: all of it or nothing.
-  template <class Work>
-  Result<void> all_or_nothing(const char* what, Work work) {
-    if (auto begun = execute(db_.get(), "BEGIN IMMEDIATE", what); !begun) return begun;
-    auto done = work();
-    if (done) done = execute(db_.get(), "COMMIT", what);
-    if (!done) (void)execute(db_.get(), "ROLLBACK", "take back what was begun");
-    return done;
-  }
-
-  mutable std::mutex mutex_;
-  Db db_;
-  std::uint64_t log_lines_ = 0;
+  mutable Guarded<Db> db_;
+  std::atomic<std::uint64_t> log_lines_{0};
 };
 
 // Adds the columns that a database of an earlier version lacks. The earlier version can still read it
 // afterwards.
-Result<void> add_missing_columns(sqlite3* db, std::string_view what) {
+Result<void> add_missing_columns(const Db& db, std::string_view what) {
   for (const auto& [table, column] :
        {std::pair("points", "rmse_lo"), std::pair("points", "rmse_hi"), std::pair("truths", "mse_stderr"),
         std::pair("truths", "relmse_stderr")}) {
@@ -337,12 +335,13 @@ Result<std::unique_ptr<JobStore>> open_sqlite_job_store(const std::filesystem::p
   Db db(raw);
   const std::string what = fmt::format("open the job database {}", file.string());
   if (code != SQLITE_OK) return tl::unexpected(db_error(raw, what));
-  sqlite3_busy_timeout(raw, 5000);  // ms; only a backup or a curious person shares the file
-  // NORMAL would lose acknowledged work on power loss.
+  // milliseconds; the coordinator is the file's only regular user, but a backup may lock it
+  sqlite3_busy_timeout(raw, 5000);
+  // synchronous is FULL: with NORMAL, a power failure would lose acknowledged work.
   for (const char* sql :
        {"PRAGMA journal_mode = WAL", "PRAGMA synchronous = FULL", "PRAGMA foreign_keys = ON"})
-    if (auto done = execute(raw, sql, what); !done) return tl::unexpected(done.error());
-  Statement version(raw, "PRAGMA user_version");
+    if (auto done = execute(db, sql, what); !done) return tl::unexpected(done.error());
+  Statement version(db, "PRAGMA user_version");
   if (auto row = version.step(what); !row) return tl::unexpected(row.error());
   if (const auto found = version.integer(0); found > kSchemaVersion)
     return fail(
@@ -352,9 +351,9 @@ Result<std::unique_ptr<JobStore>> open_sqlite_job_store(const std::filesystem::p
             "--data folder",
             file.string(), found, kSchemaVersion));
   if (auto done = version.run(what); !done) return tl::unexpected(done.error());
-  if (auto done = execute(raw, kSchema, what); !done) return tl::unexpected(done.error());
-  if (auto done = add_missing_columns(raw, what); !done) return tl::unexpected(done.error());
-  if (auto done = execute(raw, fmt::format("PRAGMA user_version = {}", kSchemaVersion).c_str(), what); !done)
+  if (auto done = execute(db, kSchema, what); !done) return tl::unexpected(done.error());
+  if (auto done = add_missing_columns(db, what); !done) return tl::unexpected(done.error());
+  if (auto done = execute(db, fmt::format("PRAGMA user_version = {}", kSchemaVersion).c_str(), what); !done)
     return tl::unexpected(done.error());
   return std::make_unique<SqliteJobStore>(std::move(db));
 }

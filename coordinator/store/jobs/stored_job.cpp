@@ -28,7 +28,7 @@ json to_value(const JobTotals& t) {
           {"few_hits", t.few_hits ? json(*t.few_hits) : json()}};
 }
 
-// 0 if the key is missing, as in records of earlier versions.
+// Returns 0 if the key is missing, as in records of earlier versions.
 std::uint64_t count_or_none(const json& j, const char* key) {
   const auto found = j.find(key);
   return found == j.end() ? 0 : count_of(*found);
@@ -41,7 +41,7 @@ Health health_of(const json& totals) {
     if (!read) throw std::invalid_argument(read.error().message);
     return std::move(*read);
   }
-  // A record of an earlier version, without causes.
+  // A record of an earlier version, which counted bad samples without their causes.
   health.add(HealthCause::unnamed, count_of(totals.at("nonfinite")));
   health.add(HealthCause::negative, count_of(totals.at("negative")));
   health.add(HealthCause::majorant_violation, count_of(totals.at("majorant_violations")));
@@ -95,6 +95,7 @@ StoredJob stored_from(const json& j) {
   job.name = j.at("name");
   job.owner = j.value("owner", std::string());
   job.submitted_unix = j.at("submitted_unix");
+  job.traceparent = j.value("traceparent", std::string());
   job.scene = digest_from(j.at("scene"));
   job.settings = required(parse_render_settings(j.at("settings").get<std::string>()));
   job.spec = required(parse_job_spec(j.at("spec").get<std::string>()));
@@ -119,6 +120,14 @@ StoredJob stored_from(const json& j) {
   job.totals = totals_of(j.at("totals"));
   if (const auto missing_blobs = j.find("awaited"); missing_blobs != j.end())
     for (const auto& digest : *missing_blobs) job.missing_blobs.insert(digest_from(digest));
+  job.techniques = TechniqueSet::of_bits(j.value("techniques", 0u));  // missing in earlier versions
+  if (const auto checks = j.find("denoised_checks"); checks != j.end())
+    for (const json& c : *checks)
+      job.denoised_checks.push_back(
+          {number_of(c.at("spp")), number_of(c.at("relmse")),
+           c.at("at_most").is_null() ? std::nullopt : std::optional(number_of(c.at("at_most")))});
+  if (const auto focus = j.find("focus"); focus != j.end())
+    job.focus = PixelRect{focus->at(0), focus->at(1), focus->at(2), focus->at(3)};
   job.revision = count_or_none(j, "revision");
   job.fence = count_or_none(j, "fence");
   return job;
@@ -151,11 +160,19 @@ std::string to_json(const StoredJob& job) {
          {"build", job.build},
          {"totals", to_value(job.totals)}};
   for (const Digest& digest : job.missing_blobs) j["awaited"].push_back(digest.hex());
+  if (job.techniques != TechniqueSet{}) j["techniques"] = job.techniques.bits();
+  for (const DenoisedCheck& c : job.denoised_checks)
+    j["denoised_checks"].push_back({{"spp", finite(c.spp)},
+                                    {"relmse", finite(c.relmse)},
+                                    {"at_most", c.at_most ? json(finite(*c.at_most)) : json()}});
   if (job.reference_same_seed) j["reference_same_seed"] = true;
   if (job.fake) j["fake"] = true;
+  if (!job.traceparent.empty()) j["traceparent"] = job.traceparent;
+  if (job.focus) j["focus"] = {job.focus->x0, job.focus->y0, job.focus->x1, job.focus->y1};
   if (job.revision != 0) j["revision"] = job.revision;
   if (job.fence != 0) j["fence"] = job.fence;
-  // Names and messages may come from a worker: invalid UTF-8 is replaced and never throws.
+  // Names and messages may come from a worker. Invalid UTF-8 in them is replaced, so that dump() never
+  // throws.
   return j.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
@@ -163,7 +180,8 @@ Result<StoredJob> parse_stored_job(std::string_view text) {
   try {
     return stored_from(json::parse(text));
   } catch (const std::exception& e) {
-    return fail(Errc::internal, fmt::format("the record of a job is damaged: {}", e.what()));
+    return fail(Errc::internal,
+                fmt::format("the record of a job is damaged, or a newer version wrote it: {}", e.what()));
   }
 }
 

@@ -8,22 +8,120 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "common/base/log.h"
 #include "common/protocol/limits.h"
 #include "coordinator/base/limits.h"
-#include "coordinator/store/log/partial_header.h"
 
 namespace ls::coordinator {
+
+// The binary header of a record in the partial log, which holds one partial: the encoded
+// pixel sums of one unit, that is of one tile and one range of samples.
+constexpr std::uint32_t kPartialMagic = 0x3250534c;  // "LSP2"
+// "LSP1": records of an earlier version, with three counters instead of the health text
+constexpr std::uint32_t kOldPartialMagic = 0x3150534c;
+
+// Little endian, as on every supported machine.
+struct RawHeader {
+  std::uint32_t magic = kPartialMagic, bytes = 0;
+  std::uint32_t tile = 0, round = 0;
+  std::uint64_t s0 = 0, s1 = 0;
+  std::array<std::uint8_t, 32> digest{};
+  double cpu_seconds = 0, at_seconds = 0;
+  std::uint64_t health_bytes = 0, health_check = 0, unused = 0;
+  std::array<char, ls::limits::kIdBytes> worker{};
+  std::uint64_t payload_check = 0;
+  std::uint64_t header_check = 0;  // checksum of the header's preceding bytes
+
+  std::uint64_t text_bytes() const { return magic == kPartialMagic ? health_bytes : 0; }
+  std::uint64_t record_bytes() const { return sizeof(RawHeader) + bytes + text_bytes(); }
+};
+static_assert(sizeof(RawHeader) == 184);
+
 namespace {
+
+// Returns the first 8 bytes of the SHA-256.
+std::uint64_t check_of(std::span<const std::byte> bytes) {
+  const Digest digest = sha256(bytes);
+  std::uint64_t check = 0;
+  std::memcpy(&check, digest.bytes.data(), sizeof check);
+  return check;
+}
+
+std::uint64_t header_check(const RawHeader& raw) {
+  return check_of(std::as_bytes(std::span(&raw, 1)).first(offsetof(RawHeader, header_check)));
+}
+
+RawHeader pack(const PartialRecord& record, std::span<const std::byte> exr,
+               std::span<const std::byte> health) {
+  RawHeader raw;
+  raw.bytes = static_cast<std::uint32_t>(exr.size());
+  raw.tile = record.tile;
+  raw.round = record.round;
+  raw.s0 = record.samples.s0;
+  raw.s1 = record.samples.s1;
+  raw.digest = record.digest.bytes;
+  raw.cpu_seconds = record.cpu_seconds;
+  raw.at_seconds = record.at_seconds;
+  raw.health_bytes = health.size();
+  if (!health.empty()) raw.health_check = check_of(health);
+  std::memcpy(raw.worker.data(), record.worker.value.data(),
+              std::min(record.worker.value.size(), raw.worker.size()));
+  raw.payload_check = check_of(exr);
+  raw.header_check = header_check(raw);
+  return raw;
+}
+
+PartialRecord unpack(const RawHeader& raw, Health health) {
+  PartialRecord record;
+  record.tile = raw.tile;
+  record.round = raw.round;
+  record.samples = {raw.s0, raw.s1};
+  record.digest.bytes = raw.digest;
+  record.cpu_seconds = raw.cpu_seconds;
+  record.at_seconds = raw.at_seconds;
+  record.health = std::move(health);
+  record.worker.value.assign(raw.worker.data(), strnlen(raw.worker.data(), raw.worker.size()));
+  return record;
+}
+
+// Makes the content of a full segment's index file: the headers of all its records, one after the other, and
+// their SHA-256. With the index a restart reads only this file; without it, it has to search the 64 MiB of
+// the segment for headers.
+std::vector<std::byte> pack_index(std::span<const RawHeader> headers) {
+  const auto raw = std::as_bytes(headers);
+  std::vector<std::byte> out(raw.begin(), raw.end());
+  const Digest digest = sha256(raw);
+  const auto end = std::as_bytes(std::span(digest.bytes));
+  out.insert(out.end(), end.begin(), end.end());
+  return out;
+}
+
+// Returns the headers in an index file; nullopt: the file is damaged, or the segment does not have the size
+// that the index implies, `segment_bytes`.
+std::optional<std::vector<RawHeader>> unpack_index(std::span<const std::byte> bytes,
+                                                   std::uint64_t segment_bytes) {
+  const std::size_t end = sizeof(Digest::bytes);
+  if (bytes.size() < end || (bytes.size() - end) % sizeof(RawHeader) != 0) return std::nullopt;
+  const auto raw = bytes.first(bytes.size() - end);
+  const Digest digest = sha256(raw);
+  if (std::memcmp(digest.bytes.data(), bytes.data() + raw.size(), end) != 0) return std::nullopt;
+  std::vector<RawHeader> headers(raw.size() / sizeof(RawHeader));
+  std::memcpy(static_cast<void*>(headers.data()), raw.data(), raw.size());
+  std::uint64_t size = 0;
+  for (const RawHeader& header : headers) size += header.record_bytes();
+  return size == segment_bytes ? std::optional(std::move(headers)) : std::nullopt;
+}
 
 constexpr std::uint64_t kHealthBytes = 64 << 10;
 
-// Returns the header at `offset`; nullopt if there is no valid one, or its record is not completely within
-// the file's `size` bytes.
+// Returns the header at `offset`; nullopt if there is no valid header, or its record extends beyond the
+// file's `size` bytes.
 std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::uint64_t size,
                                    const std::filesystem::path& path) {
   if (size - offset < sizeof(RawHeader)) return std::nullopt;
@@ -39,7 +137,7 @@ std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::
   return raw;
 }
 
-// Returns the unit's health from the record at `offset`; nullopt: its text is damaged.
+// Returns the unit's health from the record at `offset`; nullopt: the health text is damaged.
 std::optional<Health> health_at(const File& file, std::uint64_t offset, const RawHeader& raw,
                                 const std::filesystem::path& path) {
   Health health;
@@ -70,7 +168,7 @@ std::filesystem::path PartialLog::index_path(std::uint32_t segment) const {
 }
 
 Result<std::unique_ptr<PartialLog>> PartialLog::open(std::filesystem::path folder) {
-  // If `folder` exists, make_folder() checks that it is a folder
+  // An existing `folder` is left to make_folder(), which checks that it is a folder
   if (std::error_code error; std::filesystem::exists(folder, error) || error)
     if (auto made = make_folder(folder); !made) return tl::unexpected(made.error());
   std::unique_ptr<PartialLog> log(new PartialLog(std::move(folder)));
@@ -127,8 +225,8 @@ Result<void> PartialLog::scan(std::uint32_t segment, bool last) {
     at += raw->record_bytes();
   }
   if (at == size) return {};
-  // In an older segment this is disk damage: the units behind it are rendered again, and the bytes are kept
-  // for examination.
+  // In a segment other than the last this is disk damage. The units behind it are rendered again, and the
+  // bytes are kept for examination.
   cut_bytes_ += size - at;
   log_warn(fmt::format("file={} offset={} bytes={}", path.string(), at, size - at),
            last ? "cut a torn record" : "left out damaged records; their units are rendered again");
@@ -152,8 +250,8 @@ Result<void> PartialLog::start_segment(std::uint32_t segment) {
   return {};
 }
 
-// Best effort: without the index a restart scans the segment. A segment abandoned after a failed write or
-// sync gets no index.
+// Failures are ignored: without the index a restart scans the segment. A segment that was abandoned after a
+// failed write or sync gets no index.
 void PartialLog::finish_segment() {
   std::uint64_t bytes = 0;
   for (const RawHeader& header : headers_) bytes += header.record_bytes();
@@ -188,8 +286,8 @@ Result<PartialLog::Place> PartialLog::append(const PartialRecord& record, std::s
   if (written) written = write_all(current_, exr, path);
   if (written && !health.empty()) written = write_all(current_, health, path);
   if (!written) {
-    // The next record must not follow an incomplete one. If the incomplete record cannot be cut off, the next
-    // record opens a new segment.
+    // The next record must not follow an incomplete one. If the incomplete record cannot be cut off, the
+    // segment counts as full, so that the next record opens a new one.
     if (::ftruncate(current_.fd(), static_cast<off_t>(size_)) != 0) size_ = limits::kMaxSegmentBytes;
     return tl::unexpected(written.error());
   }

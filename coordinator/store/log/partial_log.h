@@ -26,15 +26,15 @@ struct PartialRecord {
   TileIndex tile = 0;
   RoundIndex round = 0;
   SampleRange samples;
-  Digest digest;  // unit digest
+  Digest digest;  // digest of the unit's pixels
   WorkerId worker;
   double cpu_seconds = 0;
-  double at_seconds = 0;  // since the job's first ray
+  double at_seconds = 0;  // time of storing, in seconds since the job's first ray
   Health health;
   bool operator==(const PartialRecord&) const = default;
 };
 
-struct RawHeader;  // partial_header.h
+struct RawHeader;
 
 class PartialLog {
  public:
@@ -42,9 +42,9 @@ class PartialLog {
 
   struct Place {
     std::uint32_t segment = 0;
-    std::uint64_t offset = 0;  // of the EXR bytes
+    std::uint64_t offset = 0;  // position of the EXR bytes in the segment
     std::uint32_t bytes = 0;
-    std::uint64_t check = 0;  // first 8 bytes of their SHA-256
+    std::uint64_t check = 0;  // first 8 bytes of the SHA-256 of the EXR bytes
   };
   struct Entry {
     PartialRecord record;
@@ -52,16 +52,16 @@ class PartialLog {
   };
 
   // Reads the records of all segments in `folder`, in order. It checks the headers in all segments, but the
-  // EXR bytes only in the last one: every other segment was synced before the next one began, so only the
-  // last may end in a torn record. If there is no segment, the first append() creates the folder and one, so
-  // that a waiting job has no files.
+  // EXR bytes only in the last one: a segment is synced before the next one begins, so only the last may end
+  // in a torn record. If there is no segment, nothing is created until the first append(), so that a waiting
+  // job has no files.
   static Result<std::unique_ptr<PartialLog>> open(std::filesystem::path folder);
 
   const std::vector<Entry>& found() const { return found_; }  // records found by open()
   std::uint64_t cut_bytes() const { return cut_bytes_; }      // torn or damaged bytes skipped by open()
   void forget_found() { std::vector<Entry>().swap(found_); }
 
-  // After an error the file is unchanged.
+  // On an error the file is unchanged.
   Result<Place> append(const PartialRecord& record, std::span<const std::byte> exr);
   // Makes the records appended so far durable. Error: no record appended since the last successful sync() is
   // durable; the caller may append them again.
@@ -81,10 +81,10 @@ class PartialLog {
   std::filesystem::path folder_;
   File current_;
   std::uint32_t segment_ = 0;
-  std::uint64_t size_ = 0;  // of the current segment
+  std::uint64_t size_ = 0;  // size of the current segment
   bool unsynced_ = false;
-  std::optional<Error> lost_;       // a full segment could not be synced; reported by the next sync()
-  std::vector<RawHeader> headers_;  // of the current segment
+  std::optional<Error> lost_;       // set if a full segment could not be synced; reported by the next sync()
+  std::vector<RawHeader> headers_;  // headers of the records in the current segment
   std::vector<Entry> found_;
   std::uint64_t cut_bytes_ = 0;
 };

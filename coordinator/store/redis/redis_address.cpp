@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
-#include <charconv>
-
+#include "common/base/parse_number.h"
+#include "coordinator/base/percent_decode.h"
 #include "coordinator/store/redis/redis_link.h"
 
 namespace ls::coordinator {
@@ -9,34 +9,8 @@ namespace {
 
 // Returns the number if the whole text is a number from `lo` to `hi`.
 std::optional<int> whole_number(std::string_view text, int lo, int hi) {
-  int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || value < lo || value > hi) return {};
-  return value;
-}
-
-int hex_digit(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return -1;
-}
-
-// %40 -> @, as in user names and passwords of a URL (RFC 3986, section 2.1).
-std::optional<std::string> percent_decoded(std::string_view text) {
-  std::string out;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (text[i] != '%') {
-      out += text[i];
-      continue;
-    }
-    if (i + 2 >= text.size()) return {};
-    const int high = hex_digit(text[i + 1]), low = hex_digit(text[i + 2]);
-    if (high < 0 || low < 0) return {};
-    out += static_cast<char>(high * 16 + low);
-    i += 2;
-  }
-  return out;
+  const auto value = parse_number<int>(text);
+  return value && *value >= lo && *value <= hi ? value : std::nullopt;
 }
 
 // HOST, HOST:PORT or [IPV6]:PORT.
@@ -67,7 +41,7 @@ bool take_host(std::string_view text, RedisAddress& address) {
 bool take_user(std::string_view text, RedisAddress& address) {
   const auto colon = text.find(':');
   if (colon == std::string_view::npos) return false;
-  auto user = percent_decoded(text.substr(0, colon)), password = percent_decoded(text.substr(colon + 1));
+  auto user = percent_decode(text.substr(0, colon)), password = percent_decode(text.substr(colon + 1));
   if (!user || !password || password->empty()) return false;
   address.user = std::move(*user);
   address.password = std::move(*password);
@@ -82,7 +56,7 @@ std::string RedisAddress::shown() const {
 }
 
 Result<RedisAddress> parse_redis_url(std::string_view url) {
-  // The URL itself is not repeated: it may hold a password.
+  // The messages do not quote the URL, since it may contain a password.
   const auto bad = [](std::string_view what) {
     return fail(Errc::invalid_argument,
                 fmt::format("--store: {}; write redis://[USER:PASSWORD@]HOST[:PORT][/DB]", what));

@@ -9,8 +9,8 @@
 namespace ls::coordinator {
 namespace {
 
-// Returns an error if other coordinators share this Redis: without --shared this coordinator would take all
-// of their jobs for its own.
+// Returns an error if other coordinators share this Redis. Without --shared this coordinator would take over
+// all of their jobs.
 Result<void> refuse_shared(RedisLink& link) {
   auto nodes = link.run({"HKEYS", "lightshaft:nodes"});
   if (!nodes) return tl::unexpected(nodes.error());
@@ -27,10 +27,10 @@ Result<void> refuse_shared(RedisLink& link) {
   return {};
 }
 
-// Opens the store of a coordinator that shares its Redis. It first sends a heartbeat, so that from then on
-// nobody takes over its jobs, and then finds out which jobs it still owns.
+// Opens the store of a coordinator that shares its Redis. It first sends a heartbeat, so that from then on no
+// other coordinator takes over its jobs, and then finds out which jobs it still owns.
 Result<std::unique_ptr<JobStore>> open_shared(std::unique_ptr<JobStore> local, RedisStoreOptions options) {
-  const auto box = std::make_shared<RedisJobStore*>(nullptr);  // set before the members' thread starts
+  const auto box = std::make_shared<RedisJobStore*>(nullptr);  // filled in before the members' thread starts
   auto members = std::make_unique<RedisMembers>(
       MemberOptions{.address = options.address, .node = options.node},
       RedisMembers::Callbacks{

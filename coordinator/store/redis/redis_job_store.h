@@ -1,11 +1,11 @@
 // A job store whose jobs are also in Redis. Every change goes to a durable local store first (SQLite), and a
 // separate thread copies it from there to Redis. So no decision of the farm waits for Redis. While Redis is
-// unavailable its data only fall behind, and what Redis has lost (its last second, or writes before a
-// failover) is written again.
+// unavailable, its data are merely out of date; data that Redis has lost (its last second, or writes before a
+// failover) are written again.
 //
 // Each record has a revision that increases with every change. At open() both sides are compared, and the
 // higher revision wins: a machine that lost its disk gets its jobs back from Redis, and a Redis that lost its
-// memory gets them from the disk. What is stored where: docs/decisions/0023-redis.md.
+// memory gets them from the disk. Which data are stored where: docs/decisions/0023-redis.md.
 //
 // Keys: lightshaft:jobs (set of ids), lightshaft:job:ID (hash: revision, record, points, log),
 // lightshaft:counters (hash), lightshaft:memory (a random word that shows whether Redis has lost its data).
@@ -22,16 +22,17 @@ struct RedisStoreOptions {
   RedisAddress address;
   RedisLink::Timeouts timeouts;
   Duration first_retry = std::chrono::milliseconds(100), longest_retry = std::chrono::seconds(2);
-  // While there are no changes to send, how often to check that Redis answers and still has its data
+  // Interval of the checks that Redis answers and still has its data, used while there are no changes to send
   Duration check_every = std::chrono::seconds(1);
-  // This coordinator's name among several that share the Redis (redis_members.h); empty: no other one does.
+  // This coordinator's name among several that share the Redis (redis_members.h); empty: it shares the Redis
+  // with no other.
   std::string node;
 };
 
 // Opens a store that keeps its jobs in `local` and copies them to Redis. If Redis does not answer, the store
-// opens nevertheless and updates Redis later, with two exceptions, which are the error `unavailable`: `local`
-// has no job (then jobs in Redis would be overlooked), or other coordinators share the Redis (then this one
-// may no longer own the jobs in `local`).
+// opens nevertheless and updates Redis later. There are two exceptions, with the error `unavailable`: if
+// `local` has no job, the jobs in Redis would be overlooked; if other coordinators share the Redis, this one
+// may no longer own the jobs in `local`.
 Result<std::unique_ptr<JobStore>> open_redis_job_store(std::unique_ptr<JobStore> local,
                                                        RedisStoreOptions options);
 

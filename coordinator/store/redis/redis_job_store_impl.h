@@ -1,5 +1,5 @@
-// The class behind redis_job_store.h. redis_job_store.cpp opens it, redis_job_store_send.cpp has the thread
-// that updates Redis, this header what the coordinator's other threads call.
+// The class behind redis_job_store.h. redis_job_store.cpp opens the store, redis_job_store_send.cpp contains
+// the thread that updates Redis, and this header the functions that the coordinator's other threads call.
 #pragma once
 
 #include <fmt/format.h>
@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <condition_variable>
 #include <map>
-#include <mutex>
 #include <set>
 #include <thread>
 #include <utility>
 
+#include "common/base/guarded.h"
 #include "common/base/log.h"
 #include "coordinator/store/redis/redis_job_store.h"
 #include "coordinator/store/redis/redis_pull.h"
@@ -26,31 +26,33 @@ class RedisJobStore final : public JobStore {
         options_(std::move(options)),
         link_(std::move(link)),
         members_(std::move(members)) {
+    const auto state = state_.lock();
     for (const StoredJob& job : jobs) {
-      revisions_[job.id] = job.revision;
-      fences_[job.id] = std::max(job.fence, first_fence());
+      state->revisions[job.id] = job.revision;
+      state->fences[job.id] = std::max(job.fence, first_fence());
     }
     if (const auto quarantined = local_->quarantined())
-      for (const QuarantinedWorker& worker : *quarantined) quarantined_[worker.worker] = worker.evidence;
+      for (const QuarantinedWorker& worker : *quarantined)
+        state->quarantined[worker.worker] = worker.evidence;
     sender_ = std::jthread([this](const std::stop_token& token) { send_loop(token); });
   }
 
   Result<void> put_job(const StoredJob& job) override { return put_jobs({&job, 1}); }
 
   Result<void> put_jobs(std::span<const StoredJob> jobs) override {
-    const std::lock_guard lock(mutex_);
+    const auto state = state_.lock();
     std::vector<StoredJob> revised;
     for (const StoredJob& job : jobs) {
-      if (lost_.contains(job.id)) continue;  // another coordinator owns the record
-      const auto known = revisions_.find(job.id);
+      if (state->lost.contains(job.id)) continue;  // another coordinator owns the record
+      const auto known = state->revisions.find(job.id);
       revised.push_back(job);
-      revised.back().revision = (known == revisions_.end() ? 0 : known->second) + 1;
-      revised.back().fence = fences_.try_emplace(job.id, first_fence()).first->second;
+      revised.back().revision = (known == state->revisions.end() ? 0 : known->second) + 1;
+      revised.back().fence = state->fences.try_emplace(job.id, first_fence()).first->second;
     }
     if (auto put = local_->put_jobs(revised); !put) return put;
     for (const StoredJob& job : revised) {
-      revisions_[job.id] = job.revision;
-      due_[job.id].take(job);
+      state->revisions[job.id] = job.revision;
+      state->due[job.id].take(job);
     }
     wake_.notify_one();
     return {};
@@ -59,20 +61,20 @@ class RedisJobStore final : public JobStore {
   Result<std::vector<StoredJob>> jobs() const override { return local_->jobs(); }
 
   Result<void> remove_jobs(std::span<const JobId> jobs) override {
-    const std::lock_guard lock(mutex_);
-    // The jobs are marked as removed before anything else: Redis still has them until it can be updated, and
-    // they must not be copied back from there.
+    const auto state = state_.lock();
+    // The jobs are marked as removed first. Redis still has them until it is updated, and the marks prevent
+    // that they are copied back from there.
     for (const JobId& job : jobs)
-      if (revisions_.contains(job))
+      if (state->revisions.contains(job))
         if (auto marked = local_->reserve(removal_mark(job), 1); !marked)
           return tl::unexpected(marked.error());
     if (auto removed = local_->remove_jobs(jobs); !removed) return removed;
     for (const JobId& job : jobs) {
-      fences_.erase(job);
-      lost_.erase(job);
-      if (revisions_.erase(job) == 0) continue;
-      due_[job] = Due{};
-      due_[job].removed = true;
+      state->fences.erase(job);
+      state->lost.erase(job);
+      if (state->revisions.erase(job) == 0) continue;
+      state->due[job] = Due{};
+      state->due[job].removed = true;
     }
     wake_.notify_one();
     return {};
@@ -104,9 +106,9 @@ class RedisJobStore final : public JobStore {
 
   Result<void> quarantine(const QuarantinedWorker& worker) override {
     if (auto kept = local_->quarantine(worker); !kept) return kept;
-    const std::lock_guard lock(mutex_);
-    if (quarantined_.try_emplace(worker.worker, worker.evidence).second)
-      quarantined_due_.insert(worker.worker);
+    const auto state = state_.lock();
+    if (state->quarantined.try_emplace(worker.worker, worker.evidence).second)
+      state->quarantined_due.insert(worker.worker);
     wake_.notify_one();
     return {};
   }
@@ -115,24 +117,24 @@ class RedisJobStore final : public JobStore {
   Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) override {
     auto before = local_->reserve(counter, amount);
     if (!before) return before;
-    const std::lock_guard lock(mutex_);
-    auto& recorded = counters_[counter];
+    const auto state = state_.lock();
+    auto& recorded = state->counters[counter];
     recorded = std::max(recorded, *before + amount);
     wake_.notify_one();
     return before;
   }
 
   StoreStatus status() const override {
-    const std::lock_guard lock(mutex_);
-    std::string trouble = trouble_.empty() ? not_kept_ : trouble_;
+    const auto state = state_.lock();
+    std::string trouble = state->trouble.empty() ? state->not_kept : state->trouble;
     if (trouble.empty() && members_) trouble = members_->stranded();
     return {options_.address.shown(), std::move(trouble),
-            due_.size() + sending_ + (all_due_ ? revisions_.size() : 0)};
+            state->due.size() + state->sending + (state->all_due ? state->revisions.size() : 0)};
   }
 
   Moved moved() override {
-    const std::lock_guard lock(mutex_);
-    return std::exchange(moved_, {});
+    const auto state = state_.lock();
+    return std::exchange(state->moved, {});
   }
   void announce(const std::string& http, const std::string& grpc) override {
     if (members_) members_->announce(http, grpc);
@@ -142,12 +144,13 @@ class RedisJobStore final : public JobStore {
     auto owner = members_->owner_of(id);
     if (!owner) return tl::unexpected(owner.error());
     if (!*owner) return std::nullopt;
-    // This node owns the job in Redis but does not have it: it is still taking the job over, or removing it.
+    // This node owns the job in Redis but does not have it yet or any more: it is still taking the job over,
+    // or removing it.
     if ((*owner)->node == options_.node) {
-      const std::lock_guard lock(mutex_);
-      const auto due = due_.find(id);
-      return due != due_.end() && due->second.removed ? std::nullopt
-                                                      : std::optional<JobLocation>(JobLocation{});
+      const auto state = state_.lock();
+      const auto due = state->due.find(id);
+      return due != state->due.end() && due->second.removed ? std::nullopt
+                                                            : std::optional<JobLocation>(JobLocation{});
     }
     return JobLocation{(*owner)->http, (*owner)->alive};
   }
@@ -159,48 +162,50 @@ class RedisJobStore final : public JobStore {
       StoredJob& job = one.job.job;
       job.fence = one.fence;
       auto kept = keep_inherited(*local_, one.job);
-      const std::lock_guard lock(mutex_);
-      // Redis says that this node owns the job, so the members' thread will try to store it again.
+      const auto state = state_.lock();
+      // Redis says that this node owns the job. If it cannot be stored now, the members' thread will repeat
+      // this.
       if (!kept) {
-        if (not_kept_.empty())
+        if (state->not_kept.empty())
           log_error(fmt::format("job={}", job.id.value),
                     "cannot be taken over now, and is tried again: " + kept.error().message);
-        not_kept_ = fmt::format("job {} cannot be taken over: {}", job.id.value, kept.error().message);
+        state->not_kept = fmt::format("job {} cannot be taken over: {}", job.id.value, kept.error().message);
         continue;
       }
-      not_kept_.clear();
-      revisions_[job.id] = job.revision;
-      fences_[job.id] = job.fence;
-      lost_.erase(job.id);
-      moved_.inherited.push_back({std::move(job), std::move(one.from)});
+      state->not_kept.clear();
+      state->revisions[job.id] = job.revision;
+      state->fences[job.id] = job.fence;
+      state->lost.erase(job.id);
+      state->moved.inherited.push_back({std::move(job), std::move(one.from)});
     }
   }
 
   void apply(const std::vector<QuarantinedWorker>& workers) {
     for (const QuarantinedWorker& worker : workers) {
-      const std::lock_guard lock(mutex_);
-      if (quarantined_.contains(worker.worker)) continue;
-      // A quarantine that cannot be stored here is applied anyway; after a restart it is read from Redis
-      // again.
+      const auto state = state_.lock();
+      if (state->quarantined.contains(worker.worker)) continue;
+      // A quarantine that cannot be stored locally is applied nevertheless; after a restart it is read from
+      // Redis again.
       if (auto kept = local_->quarantine(worker); !kept) {
         log_error(fmt::format("worker={}", worker.worker.value), kept.error().message);
       }
-      quarantined_[worker.worker] = worker.evidence;
-      moved_.quarantined.push_back(worker);
+      state->quarantined[worker.worker] = worker.evidence;
+      state->moved.quarantined.push_back(worker);
     }
   }
 
-  // Gets the jobs that this node owns according to Redis and returns those of them that it does not have.
+  // Returns those jobs of `ids`, the jobs that this node owns according to Redis, that this node does not
+  // have.
   std::vector<JobId> unknown(std::vector<JobId> ids) {
-    const std::lock_guard lock(mutex_);
+    const auto state = state_.lock();
     std::erase_if(ids, [&](const JobId& id) {
-      if (revisions_.contains(id)) return true;
-      const auto due = due_.find(id);
-      if (due != due_.end() && due->second.removed) return true;
+      if (state->revisions.contains(id)) return true;
+      const auto due = state->due.find(id);
+      if (due != state->due.end() && due->second.removed) return true;
       const auto removed = local_->reserve(removal_mark(id), 0);
       if (!removed || *removed == 0) return !removed.has_value();
-      due_[id] = Due{};
-      due_[id].removed = true;  // the removal has not reached Redis
+      state->due[id] = Due{};
+      state->due[id].removed = true;  // this node has removed the job, but Redis does not know yet
       wake_.notify_one();
       return true;
     });
@@ -208,10 +213,11 @@ class RedisJobStore final : public JobStore {
   }
 
   void lose(const std::vector<LostJob>& jobs) {
-    const std::lock_guard lock(mutex_);
+    const auto state = state_.lock();
     for (const LostJob& job : jobs)
-      if (const auto mine = fences_.find(job.id); mine != fences_.end() && mine->second < job.fence)
-        lose_locked(job.id);
+      if (const auto mine = state->fences.find(job.id);
+          mine != state->fences.end() && mine->second < job.fence)
+        lose(*state, job.id);
   }
 
   void start_members() {
@@ -219,11 +225,11 @@ class RedisJobStore final : public JobStore {
   }
 
  private:
-  // Which changes of one job have not been sent to Redis yet
+  // The changes of one job that have not been sent to Redis yet
   struct Due {
     std::optional<std::string> record;
-    std::string state;           // of the record
-    std::uint64_t revision = 0;  // of the record
+    std::string state;           // state of the job in the record
+    std::uint64_t revision = 0;  // revision of the record
     bool points = false, log = false, removed = false;
 
     void take(const StoredJob& job) {
@@ -234,43 +240,62 @@ class RedisJobStore final : public JobStore {
     }
   };
 
+  // Facts about the jobs, and the changes that must still be sent to Redis
+  struct State {
+    bool idle() const { return due.empty() && counters.empty() && quarantined_due.empty() && !all_due; }
+
+    std::map<JobId, std::uint64_t> revisions;  // latest revision of every job
+    // Fence of every job (see redis_members.h); 0: the job was never shared
+    std::map<JobId, std::uint64_t> fences;
+    std::set<JobId> lost;  // jobs that others own now: their updates are not stored
+    Moved moved;           // the result of the next call of moved()
+    std::map<JobId, Due> due;
+    // Number of jobs that are being sent to Redis: they have left `due` but are not in Redis yet.
+    std::size_t sending = 0;
+    JobId sent_last;  // last job sent from `due`; the next batch starts after it
+    std::map<std::string, std::uint64_t> counters;
+    std::map<WorkerId, std::string> quarantined;  // all known quarantined workers
+    std::set<WorkerId> quarantined_due;
+    std::string not_kept;  // why a job that was taken over could not be stored here yet
+    bool all_due = true;   // true until all jobs have been compared with Redis to find those that it lacks
+    std::string trouble;
+  };
+
   bool shared() const { return !options_.node.empty(); }
   std::uint64_t first_fence() const { return shared() ? 1 : 0; }
 
   // Forgets a job that another coordinator owns now: its later updates are ignored, and moved() reports it,
   // so that the coordinator drops it.
-  void lose_locked(const JobId& job) {
-    if (!revisions_.contains(job)) return;
-    revisions_.erase(job);
-    fences_.erase(job);
-    due_.erase(job);
-    std::erase_if(moved_.inherited, [&](const Inherited& one) { return one.job.id == job; });
-    lost_.insert(job);
-    moved_.lost.push_back(job);
+  void lose(State& state, const JobId& job) {
+    if (!state.revisions.contains(job)) return;
+    state.revisions.erase(job);
+    state.fences.erase(job);
+    state.due.erase(job);
+    std::erase_if(state.moved.inherited, [&](const Inherited& one) { return one.job.id == job; });
+    state.lost.insert(job);
+    state.moved.lost.push_back(job);
     if (auto gone = local_->remove_job(job); !gone)
       log_error(fmt::format("job={}", job.value),
                 "another coordinator has it, and its record stays here: " + gone.error().message);
   }
 
-  // Stores an update by keep() and marks by edit() what of the job must be sent to Redis. Updates of a job
-  // that another coordinator owns now are ignored: if the job comes back, they must not be in the local
+  // Stores an update by keep(), and marks by edit() which data of the job must be sent to Redis. Updates of a
+  // job that another coordinator owns now are ignored: if the job comes back, they must not be in the local
   // store.
   template <class Keep, class Edit>
   Result<void> note(const JobId& job, Keep keep, Edit edit) {
-    const std::lock_guard lock(mutex_);
-    if (lost_.contains(job)) return {};
+    const auto state = state_.lock();
+    if (state->lost.contains(job)) return {};
     if (auto kept = keep(); !kept) return kept;
-    if (revisions_.contains(job)) edit(due_[job]);
+    if (state->revisions.contains(job)) edit(state->due[job]);
     wake_.notify_one();
     return {};
   }
 
-  bool idle() const { return due_.empty() && counters_.empty() && quarantined_due_.empty() && !all_due_; }
-
   // The thread that updates Redis
   void send_loop(const std::stop_token& token);
   void send_the_rest();
-  void set_trouble(const Result<void>& recorded);
+  static void set_trouble(State& state, const Result<void>& sent);
   Result<void> send_once();
   Result<void> check_memory();
   Result<void> note_all_behind();
@@ -282,26 +307,13 @@ class RedisJobStore final : public JobStore {
 
   std::unique_ptr<JobStore> local_;
   RedisStoreOptions options_;
-  mutable std::mutex mutex_;
+  mutable Guarded<State> state_;
   std::condition_variable_any wake_;
-  std::map<JobId, std::uint64_t> revisions_;  // of every job
-  std::map<JobId, std::uint64_t> fences_;     // of every job (see redis_members.h); 0: never shared
-  std::set<JobId> lost_;                      // jobs that others own now: their updates are not stored
-  Moved moved_;                               // what the next call of moved() returns
-  std::map<JobId, Due> due_;
-  // Number of jobs being sent to Redis: they are no longer in due_, nor in Redis yet.
-  std::size_t sending_ = 0;
-  JobId sent_last_;  // last due job sent; the next ones follow it in order
-  std::map<std::string, std::uint64_t> counters_;
-  std::map<WorkerId, std::string> quarantined_;  // all known
-  std::set<WorkerId> quarantined_due_;
-  std::string not_kept_;             // why a job taken over could not be stored here yet
-  std::unique_ptr<RedisLink> link_;  // this and memory_ are used by the sending thread only
-  std::string memory_;               // the word of lightshaft:memory when last read; empty: unknown
-  bool all_due_ = true;              // it must still be found out which jobs Redis lacks
-  std::string trouble_;
+  std::unique_ptr<RedisLink> link_;  // link_ and memory_ are used by the sending thread only
+  std::string memory_;               // the last known value of lightshaft:memory; empty: unknown
   std::unique_ptr<RedisMembers> members_;
-  std::jthread sender_;  // last member: this and the members' thread end before what they use
+  // The last member, so that this thread and the members' thread end before the other members are destroyed
+  std::jthread sender_;
 };
 
 }  // namespace ls::coordinator

@@ -8,49 +8,49 @@
 
 namespace ls::coordinator {
 namespace {
-// How many jobs are sent in one batch, which then has a few MB at most.
+// Number of jobs sent in one batch, which then has a few MB at most.
 constexpr std::size_t kJobsAtOnce = 64;
 }  // namespace
 
 // The thread that updates Redis
 void RedisJobStore::send_loop(const std::stop_token& token) {
   Duration pause = options_.first_retry;
-  std::unique_lock lock(mutex_);
+  auto state = state_.lock();
   while (!token.stop_requested()) {
-    (void)wake_.wait_for(lock, token, options_.check_every, [&] { return !idle(); });
+    (void)wake_.wait_for(state, token, options_.check_every, [&] { return !state->idle(); });
     if (token.stop_requested()) break;
-    lock.unlock();
+    state.unlock();
     const auto sent = send_once();
-    lock.lock();
-    set_trouble(sent);
+    state.lock();
+    set_trouble(*state, sent);
     if (sent) {
       pause = options_.first_retry;
       continue;
     }
-    (void)wake_.wait_for(lock, token, pause, [] { return false; });
+    (void)wake_.wait_for(state, token, pause, [] { return false; });
     pause = std::min(pause * 2, options_.longest_retry);
   }
-  lock.unlock();
+  state.unlock();
   send_the_rest();
 }
 
-// At shutdown, sends what Redis still lacks. It tries twice, because the first attempt fails if the
-// connection broke unnoticed. What remains unsent is on the disk.
+// At shutdown, sends the changes that Redis still lacks. It tries twice, because the first attempt fails if
+// the connection broke unnoticed. Changes that remain unsent are on the disk.
 void RedisJobStore::send_the_rest() {
   int failed = 0;
   for (bool more = true; more && failed < 2;) {
     const bool sent = send_once().has_value();
     if (!sent) ++failed;
-    const std::lock_guard lock(mutex_);
-    more = !sent || !idle();
+    const auto state = state_.lock();
+    more = !sent || !state->idle();
   }
 }
 
-void RedisJobStore::set_trouble(const Result<void>& sent) {
-  const std::string before = std::exchange(trouble_, sent ? "" : sent.error().message);
+void RedisJobStore::set_trouble(State& state, const Result<void>& sent) {
+  const std::string before = std::exchange(state.trouble, sent ? "" : sent.error().message);
   if (before.empty() && !sent)
     log_warn("store=redis",
-             trouble_ + "; jobs go on, kept on this machine's disk, and Redis is told when it is back");
+             state.trouble + "; jobs go on, kept on this machine's disk, and Redis is told when it is back");
   if (!before.empty() && sent)
     log_info("store=redis", "Redis answers again and is being told what it missed");
 }
@@ -65,7 +65,7 @@ Result<void> RedisJobStore::send_once() {
   }
   if (auto same = check_memory(); !same) return same;
   if (auto all = note_all_behind(); !all) return all;
-  // Quarantined workers are sent before the jobs, because a coordinator that takes the jobs over must know of
+  // Quarantined workers are sent before the jobs, so that a coordinator that takes over the jobs knows of
   // them
   if (auto sent = send_quarantined(); !sent) return sent;
   if (auto sent = send_counters(); !sent) return sent;
@@ -73,7 +73,7 @@ Result<void> RedisJobStore::send_once() {
 }
 
 // Reads a random word that stays in Redis as long as the other data there. If the word has changed, Redis has
-// lost its data or is another Redis; then all jobs are compared with it again.
+// lost its data or is another Redis: all jobs are then compared with it again.
 Result<void> RedisJobStore::check_memory() {
   auto word = link_->run({"GET", kRedisMemory});
   if (!word) return tl::unexpected(word.error());
@@ -85,29 +85,29 @@ Result<void> RedisJobStore::check_memory() {
     if (!word) return tl::unexpected(word.error());
   }
   memory_ = word->text;
-  const std::lock_guard lock(mutex_);
-  all_due_ = true;
+  const auto state = state_.lock();
+  state->all_due = true;
   return {};
 }
 
-// Finds out which jobs Redis lacks or has in a lower revision, and marks them to be sent completely.
+// Finds the jobs that Redis lacks or has in a lower revision, and marks them to be sent completely.
 Result<void> RedisJobStore::note_all_behind() {
   std::vector<std::pair<JobId, std::uint64_t>> known;
   {
-    const std::lock_guard lock(mutex_);
-    if (!all_due_) return {};
-    known.assign(revisions_.begin(), revisions_.end());
+    const auto state = state_.lock();
+    if (!state->all_due) return {};
+    known.assign(state->revisions.begin(), state->revisions.end());
   }
   auto behind = jobs_behind(*link_, known);
   if (!behind) return tl::unexpected(behind.error());
   auto jobs = behind->empty() ? Result<std::vector<StoredJob>>() : local_->jobs();
   if (!jobs) return tl::unexpected(jobs.error());
-  const std::lock_guard lock(mutex_);
-  all_due_ = false;
-  for (const auto& [worker, evidence] : quarantined_) quarantined_due_.insert(worker);
+  const auto state = state_.lock();
+  state->all_due = false;
+  for (const auto& [worker, evidence] : state->quarantined) state->quarantined_due.insert(worker);
   for (const StoredJob& job : *jobs) {
-    if (job.damaged || !behind->contains(job.id) || !revisions_.contains(job.id)) continue;
-    Due& due = due_[job.id];
+    if (job.damaged || !behind->contains(job.id) || !state->revisions.contains(job.id)) continue;
+    Due& due = state->due[job.id];
     if (!due.record) due.take(job);
     due.points = due.log = true;
   }
@@ -118,10 +118,10 @@ Result<void> RedisJobStore::send_quarantined() {
   std::vector<RedisLink::Command> commands;
   std::set<WorkerId> due;
   {
-    const std::lock_guard lock(mutex_);
-    due.swap(quarantined_due_);
+    const auto state = state_.lock();
+    due.swap(state->quarantined_due);
     for (const WorkerId& worker : due)
-      commands.push_back({"HSETNX", kRedisQuarantined, worker.value, quarantined_.at(worker)});
+      commands.push_back({"HSETNX", kRedisQuarantined, worker.value, state->quarantined.at(worker)});
   }
   if (due.empty()) return {};
   auto replies = link_->run_all(commands);
@@ -130,18 +130,18 @@ Result<void> RedisJobStore::send_quarantined() {
   for (std::size_t i = 0; replies && i < replies->size() && !failed; ++i)
     if (!(*replies)[i]) failed = (*replies)[i].error();
   if (!failed) return {};
-  const std::lock_guard lock(mutex_);
-  quarantined_due_.merge(due);
+  const auto state = state_.lock();
+  state->quarantined_due.merge(due);
   return tl::unexpected(*failed);
 }
 
 Result<void> RedisJobStore::send_counters() {
   std::map<std::string, std::uint64_t> counters;
   {
-    const std::lock_guard lock(mutex_);
-    counters.swap(counters_);
+    const auto state = state_.lock();
+    counters.swap(state->counters);
   }
-  if (counters.empty() || shared()) return {};  // shared: each coordinator has its own
+  if (counters.empty() || shared()) return {};  // coordinators that share a Redis have their own counters
   RedisLink::Command command{"HSET", kRedisCounters};
   for (const auto& [name, value] : counters) {
     command.push_back(name);
@@ -149,28 +149,28 @@ Result<void> RedisJobStore::send_counters() {
   }
   auto sent = link_->run(command);
   if (sent) return {};
-  const std::lock_guard lock(mutex_);
-  for (const auto& [name, value] : counters) counters_[name] = std::max(counters_[name], value);
+  const auto state = state_.lock();
+  for (const auto& [name, value] : counters) state->counters[name] = std::max(state->counters[name], value);
   return tl::unexpected(sent.error());
 }
 
 Result<void> RedisJobStore::send_jobs() {
   std::map<JobId, Due> taken;
   std::vector<RedisLink::Command> commands;
-  std::vector<JobId> owner;               // the job of each command
-  std::map<JobId, std::uint64_t> fences;  // under which each job is written
+  std::vector<JobId> owner;               // the job that each command belongs to
+  std::map<JobId, std::uint64_t> fences;  // fence with which each job is written
   {
-    const std::lock_guard lock(mutex_);
+    const auto state = state_.lock();
     // Round robin, so that a job that Redis always rejects does not delay the others.
-    while (!due_.empty() && taken.size() < kJobsAtOnce) {
-      auto next = due_.upper_bound(sent_last_);
-      if (next == due_.end()) next = due_.begin();
-      sent_last_ = next->first;
-      taken.insert(due_.extract(next));
+    while (!state->due.empty() && taken.size() < kJobsAtOnce) {
+      auto next = state->due.upper_bound(state->sent_last);
+      if (next == state->due.end()) next = state->due.begin();
+      state->sent_last = next->first;
+      taken.insert(state->due.extract(next));
     }
-    sending_ = taken.size();
+    state->sending = taken.size();
     for (const auto& [id, due] : taken)
-      if (const auto fence = fences_.find(id); fence != fences_.end()) fences.insert(*fence);
+      if (const auto fence = state->fences.find(id); fence != state->fences.end()) fences.insert(*fence);
   }
   for (const auto& [id, due] : taken)
     for (auto& command : commands_of(id, due)) {
@@ -187,9 +187,10 @@ Result<void> RedisJobStore::send_jobs() {
     if (!reply) refused.insert(owner[i]);
     if (reply && taken.at(owner[i]).removed) continue;
     if (reply && shared() && reply->number == static_cast<int>(PutAnswer::lost)) {
-      const std::lock_guard lock(mutex_);
-      const auto now = fences_.find(owner[i]), then = fences.find(owner[i]);
-      if (now != fences_.end() && then != fences.end() && now->second == then->second) lose_locked(owner[i]);
+      const auto state = state_.lock();
+      const auto now = state->fences.find(owner[i]), then = fences.find(owner[i]);
+      if (now != state->fences.end() && then != fences.end() && now->second == then->second)
+        lose(*state, owner[i]);
     }
     if (reply && !shared() && commands[i].front() == "EVAL" &&
         reply->number != static_cast<int>(PutAnswer::put))
@@ -208,11 +209,12 @@ std::vector<RedisLink::Command> RedisJobStore::commands_of(const JobId& id, cons
   RedisUpdate update{.id = id, .revision = due.revision, .record = due.record, .node = options_.node};
   update.state = due.state;
   {
-    const std::lock_guard lock(mutex_);
-    const auto known = revisions_.find(id);
-    if (known == revisions_.end()) return {};  // the job was removed meanwhile; its removal will be sent
+    const auto state = state_.lock();
+    const auto known = state->revisions.find(id);
+    if (known == state->revisions.end())
+      return {};  // the job was removed meanwhile; its removal will be sent
     if (!due.record) update.revision = known->second;
-    if (const auto fence = fences_.find(id); fence != fences_.end()) update.fence = fence->second;
+    if (const auto fence = state->fences.find(id); fence != state->fences.end()) update.fence = fence->second;
   }
   if (due.points)
     if (auto points = local_->points(id)) update.points = points_json(*points);
@@ -221,12 +223,12 @@ std::vector<RedisLink::Command> RedisJobStore::commands_of(const JobId& id, cons
   return {put_command(update)};
 }
 
-// Marks again the changes that could not be sent as to be sent.
+// Marks changes that could not be sent, so that the next batch includes them.
 void RedisJobStore::give_back(std::map<JobId, Due> taken) {
-  const std::lock_guard lock(mutex_);
-  sending_ = 0;
+  const auto state = state_.lock();
+  state->sending = 0;
   for (auto& [id, old] : taken) {
-    const auto [now, fresh] = due_.try_emplace(id, old);
+    const auto [now, fresh] = state->due.try_emplace(id, old);
     if (fresh || now->second.removed) continue;
     if (!now->second.record) {
       now->second.record = std::move(old.record);

@@ -7,7 +7,7 @@
 namespace ls::coordinator {
 namespace {
 
-// Replies deeper or longer than our commands can have do not come from a Redis.
+// A reply that is deeper or longer than our commands can cause does not come from a Redis.
 constexpr int kMaxDepth = 4;
 
 timeval timeval_of(Duration d) {

@@ -16,20 +16,20 @@ struct redisContext;
 
 namespace ls::coordinator {
 
-// redis://[USER:PASSWORD@]HOST[:PORT][/DB]; an IPv6 host is in brackets. TLS (rediss://) is rejected with a
-// message that says so.
+// An address redis://[USER:PASSWORD@]HOST[:PORT][/DB]; an IPv6 host is in brackets. TLS (rediss://) is
+// rejected with a message that says so.
 struct RedisAddress {
   std::string host = "127.0.0.1";
   int port = 6379;
   int db = 0;
   std::string user, password;
-  std::string shown() const;  // without the password, for messages and logs
+  std::string shown() const;  // the address without the password, for messages and logs
   bool operator==(const RedisAddress&) const = default;
 };
 Result<RedisAddress> parse_redis_url(std::string_view url);
 
-// A reply of Redis. A status or a text is in `text`, an integer in `number`, an array in `items`. If Redis
-// replies with an error, the Result has that error and there is no RedisReply.
+// A reply of Redis. A status or a text is in `text`, an integer in `number`, an array in `items`. An error
+// reply becomes the error of a Result, so it is never a RedisReply.
 struct RedisReply {
   bool nil = false;
   std::int64_t number = 0;
@@ -49,12 +49,12 @@ class RedisLink {
 
   using Command = std::vector<std::string>;  // the command's name and its arguments, which may have any bytes
   Result<RedisReply> run(const Command& command);
-  // Sends all commands without waiting between them and returns their replies in the same order. An error
-  // that Redis replies to one command is in that command's Result. An error of the connection fails the whole
-  // call, and then it is unknown which commands Redis has carried out.
+  // Sends all commands without waiting in between and returns their replies in the same order. An error reply
+  // to one command becomes the error of that command's Result. An error of the connection fails the whole
+  // call; it is then unknown which commands Redis has carried out.
   Result<std::vector<Result<RedisReply>>> run_all(std::span<const Command> commands);
 
-  bool broken() const { return broken_; }  // true after a connection error: make a new RedisLink
+  bool broken() const { return broken_; }  // true after a connection error: a new RedisLink is needed
 
  private:
   struct Close {

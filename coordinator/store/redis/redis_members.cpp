@@ -11,7 +11,7 @@
 namespace ls::coordinator {
 namespace {
 
-constexpr const char* kHeirMilliseconds = "15000";  // longer than taking a batch of jobs takes
+constexpr const char* kHeirMilliseconds = "15000";  // longer than it takes to take over a batch of jobs
 
 // Sends a node's heartbeat. ARGV: node, addresses, lease in ms, start, number of lost jobs handled. Returns
 // {lost jobs, node, alive, node, alive, ...}.
@@ -31,7 +31,7 @@ return answer
 )";
 
 // Takes over a job. ARGV: job, dead node, node that takes it, sequence or ''. Returns nothing if the dead
-// node is alive again or no longer has the job.
+// node is alive again or no longer owns the job.
 constexpr const char* kTake = R"(
 local key = 'lightshaft:job:' .. ARGV[1]
 if redis.call('EXISTS', 'lightshaft:alive:' .. ARGV[2]) == 1 then return {} end
@@ -57,7 +57,7 @@ end
 return redis.call('DEL', 'lightshaft:heir:' .. ARGV[1])
 )";
 
-// Returns a number above ARGV[1] that no other coordinator gets.
+// Returns a number above ARGV[1] that no other coordinator ever gets.
 constexpr const char* kStart = R"(
 local last = tonumber(redis.call('HGET', 'lightshaft:counters', 'shared-starts') or '0')
 local start = string.format('%.0f', math.max(last, tonumber(ARGV[1])) + 1)
@@ -65,8 +65,8 @@ redis.call('HSET', 'lightshaft:counters', 'shared-starts', start)
 return start
 )";
 
-// Returns the job that decides who takes `job` over: for a frame its sequence, because all frames of a
-// sequence must belong to one coordinator; else the job itself.
+// Returns the id that decides which node takes `job` over: for a frame the id of its sequence, because all
+// frames of a sequence must belong to one coordinator; else the job's own id.
 JobId group_of(const JobId& job) {
   const auto frame = frame_of(job);
   return frame ? frame->sequence : job;
@@ -81,7 +81,7 @@ Result<RedisLink*> RedisMembers::link() {
   if (!link_ || link_->broken()) {
     link_.reset();
     absence_.begin_again();
-    own_unclear_ = true;    // it is unknown which of the last commands Redis has carried out
+    own_unclear_ = true;    // it is unknown whether Redis has carried out the last commands
     quarantined_seen_ = 0;  // the new connection may lead to another Redis
     auto fresh = RedisLink::connect(options_.address, options_.timeouts);
     if (!fresh) return tl::unexpected(fresh.error());
@@ -164,7 +164,7 @@ Result<void> RedisMembers::look_for_quarantined() {
 }
 
 // Finds jobs that this node owns in Redis but does not have, and takes them over. This is repeated at every
-// heartbeat until the node has all of them, because nobody else takes the jobs of a living node.
+// heartbeat until the node has all of them, because no other node takes the jobs of a living node.
 Result<void> RedisMembers::look_for_stranded() {
   if (!own_unclear_ || !callbacks_.unknown) return {};
   auto owned = link_->run({"SMEMBERS", "lightshaft:owned:" + options_.node});
@@ -240,8 +240,8 @@ Result<std::vector<JobId>> RedisMembers::left_unfinished(const std::string& dead
 }
 
 Result<std::optional<TakenJob>> RedisMembers::take(const JobId& id, const std::string& dead) {
-  // First check that the job can be read; otherwise this node would own a job that it cannot use, and no
-  // other could take it.
+  // Checks first that the job can be read. Otherwise this node would own a job that it cannot use, and no
+  // other node could take it.
   auto before = link_->run({"HGETALL", redis_job_key(id)});
   if (!before) return tl::unexpected(before.error());
   if (!readable(id, parse_redis_job(*before), "it stays with the coordinator that is gone"))
@@ -253,7 +253,7 @@ Result<std::optional<TakenJob>> RedisMembers::take(const JobId& id, const std::s
   if (!fields) return tl::unexpected(fields.error());
   if (fields->items.empty()) return std::nullopt;
   auto job = parse_redis_job(*fields);
-  // The job is this node's by now; look_for_stranded() will check it again.
+  // This node owns the job by now; look_for_stranded() will check the job again.
   if (!job || job->job.id != id) return std::nullopt;
   const std::uint64_t fence = job->fence;
   return TakenJob{std::move(*job), fence, dead};

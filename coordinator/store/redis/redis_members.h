@@ -1,14 +1,14 @@
 // The coordinators that share a Redis, also called nodes. Each node renews a heartbeat in Redis every second.
 // Each job belongs to one node: the job's hash in Redis names this owner and a fence, a number that increases
-// with every new owner. A heartbeat expires after MemberOptions::lease; a node without one in
-// MemberOptions::looks consecutive polls counts as dead. The first node to notice takes over the dead node's
-// unfinished jobs one by one, each in one atomic step of Redis that also raises the fence. From then on Redis
-// rejects writes of the old owner (redis_records.h). If the old owner was only asleep, it finds the jobs on
-// its list of lost jobs and drops them.
+// with every new owner. A heartbeat expires after MemberOptions::lease; a node counts as dead if
+// MemberOptions::looks consecutive polls find no heartbeat of it. The first node to notice takes over the
+// dead node's unfinished jobs one by one, each in one atomic step of Redis that also raises the fence. From
+// then on Redis rejects writes of the old owner (redis_records.h). If the old owner was only suspended, it
+// finds the jobs on its list of lost jobs and drops them.
 //
 // All expiry times are Redis's own (PX), so the clocks of the machines need not agree.
 //
-// Keys: lightshaft:alive:NODE (its addresses as JSON; expires), lightshaft:nodes (hash, the same for good),
+// Keys: lightshaft:alive:NODE (its addresses as JSON; expires), lightshaft:nodes (hash: the same, permanent),
 // lightshaft:barred (hash: quarantined worker -> evidence), lightshaft:owned:NODE (set of the node's jobs),
 // lightshaft:lost:NODE (list of jobs that others took from it), lightshaft:heir:NODE (the node that is taking
 // over its jobs), lightshaft:sequences (hash: sequence, i.e. a job with several frames -> owner), and
@@ -16,6 +16,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -24,16 +25,44 @@
 #include <thread>
 #include <vector>
 
-#include "coordinator/store/redis/failure_detector.h"
 #include "coordinator/store/redis/redis_records.h"
 
 namespace ls::coordinator {
+
+// Decides which coordinators count as dead: those without a heartbeat in `looks` consecutive polls. It counts
+// polls, not seconds, and starts counting again after this process or Redis was stopped for a while, so that
+// such a pause does not count against the others.
+class FailureDetector {
+ public:
+  explicit FailureDetector(int looks) : looks_(looks) {}
+
+  // `known`: all coordinators, and whether each is alive. Returns those that count as dead.
+  std::vector<std::string> look(const std::map<std::string, bool>& known) {
+    std::map<std::string, int> now;
+    std::vector<std::string> gone;
+    for (const auto& [name, alive] : known) {
+      if (alive) continue;
+      const auto before = absent_.find(name);
+      const int times = (before == absent_.end() ? 0 : before->second) + 1;
+      now.emplace(name, times);
+      if (times >= looks_) gone.push_back(name);
+    }
+    absent_ = std::move(now);
+    return gone;
+  }
+  // Forgets all earlier polls.
+  void begin_again() { absent_.clear(); }
+
+ private:
+  int looks_;
+  std::map<std::string, int> absent_;  // consecutive polls without a sign of life, per coordinator
+};
 
 struct MemberOptions {
   RedisAddress address;
   std::string node;  // this coordinator's permanent name
   RedisLink::Timeouts timeouts{std::chrono::milliseconds(500), std::chrono::seconds(1)};
-  Duration beat = std::chrono::seconds(1);   // between two heartbeats, and two polls of the others
+  Duration beat = std::chrono::seconds(1);   // interval of the heartbeats, and of the polls of the others
   Duration lease = std::chrono::seconds(4);  // how long a heartbeat is valid
   int looks = 2;                             // polls without a heartbeat after which a node counts as dead
 };
@@ -53,39 +82,39 @@ struct TakenJob {
 
 struct LostJob {
   JobId id;
-  // Fence of the new owner; if this node has a higher one, it has got the job back since.
+  // The new owner's fence. If this node has a higher one, it has become the owner again since.
   std::uint64_t fence = 0;
   bool operator==(const LostJob&) const = default;
 };
 
 class RedisMembers {
  public:
-  struct Callbacks {  // called on the members' thread; the same loss may be reported twice
+  struct Callbacks {  // functions called on the members' thread; the same loss may be reported twice
     std::function<void(std::vector<TakenJob>)> taken;
     std::function<void(const std::vector<LostJob>&)> lost;
-    // Called with all workers that any coordinator has quarantined, whenever their number has grown, and
-    // before `taken`.
+    // Called with all workers that any coordinator has quarantined, whenever their number has grown; it
+    // precedes `taken`.
     std::function<void(const std::vector<QuarantinedWorker>&)> quarantined = {};
-    // Gets the jobs that this node owns according to Redis, and must return those of them that this node does
-    // not have. If this is not set, that is not checked.
+    // Gets the jobs that this node owns according to Redis, and must return those that this node does not
+    // have. If it is not set, this check is skipped.
     std::function<std::vector<JobId>(std::vector<JobId>)> unknown = {};
   };
   RedisMembers(MemberOptions options, Callbacks callbacks);
 
-  // Sends the first heartbeat, so that from now on nobody takes this node's jobs.
+  // Sends the first heartbeat, so that from now on no other node takes this node's jobs.
   Result<void> join();
   void announce(const std::string& http, const std::string& grpc);
-  // Returns a number above `least` that no other coordinator on this Redis gets.
+  // Returns a number above `least` that no other coordinator on this Redis ever gets.
   Result<std::uint64_t> unique_start(std::uint64_t least);
-  // Returns the coordinator that owns a job or sequence; nullopt: nobody owns it. Waits for Redis, but at
+  // Returns the coordinator that owns a job or sequence; nullopt: it has no owner. Waits for Redis, but at
   // most a second.
   Result<std::optional<Member>> owner_of(const JobId& id);
 
   // Sends a heartbeat, drops lost jobs, polls the other coordinators, and takes over the jobs of dead ones.
-  // Also takes over jobs that became this node's in an earlier call but did not arrive, because the answer of
-  // Redis was lost or they could not be stored.
+  // Also completes takeovers of earlier calls that failed because the answer of Redis was lost or the job
+  // could not be stored.
   Result<void> beat();
-  // Says which job this node owns in Redis but cannot read there; empty: there is none.
+  // Names a job that this node owns in Redis but cannot read there; empty: there is none.
   std::string stranded() const;
   // Starts the thread that calls beat() regularly.
   void start();
@@ -104,21 +133,21 @@ class RedisMembers {
 
   MemberOptions options_;
   Callbacks callbacks_;
-  mutable std::mutex mutex_;  // guards what announce() sets and stranded() returns
+  mutable std::mutex mutex_;  // guards the addresses set by announce() and the text returned by stranded()
   std::string http_, grpc_, stranded_;
-  std::unique_ptr<RedisLink> link_;  // this and the following members are used by the heartbeat thread only
+  std::unique_ptr<RedisLink> link_;  // link_ and the members below are used by the heartbeat thread only
   FailureDetector absence_;
   std::set<std::string> settled_;      // dead nodes that have no jobs left to take over
-  std::size_t lost_taken_ = 0;         // entries of the list of lost jobs handled so far
-  std::int64_t quarantined_seen_ = 0;  // number reported so far
-  bool own_unclear_ = true;            // this node may own jobs that it does not know of
+  std::size_t lost_taken_ = 0;         // number of entries of the list of lost jobs handled so far
+  std::int64_t quarantined_seen_ = 0;  // number of quarantined workers reported so far
+  bool own_unclear_ = true;            // true if this node may own jobs that it does not know of
   std::set<JobId> unreadable_;         // unreadable jobs that were reported already
   std::uint64_t start_ = 0;
   std::string trouble_;
 
-  std::mutex asking_;  // guards the link of owner_of()
+  std::mutex asking_;  // guards the connection of owner_of()
   std::unique_ptr<RedisLink> asking_link_;
-  std::jthread beater_;  // last member
+  std::jthread beater_;  // the last member: it ends before the others are destroyed
 };
 
 }  // namespace ls::coordinator

@@ -11,8 +11,8 @@
 namespace ls::coordinator {
 namespace {
 
-// Added to counters read from Redis, because Redis may have lost its last writes to them. Ids stay unique as
-// long as there are far fewer than a million reservations per second.
+// Added to counters read from Redis, which may have lost its last writes to them. Ids stay unique as long as
+// there are far fewer than a million reservations per second.
 constexpr std::uint64_t kCountsLost = 1'000'000;
 
 // Runs several commands in batches; an error of any of them fails the call.
@@ -37,7 +37,7 @@ Result<std::vector<std::uint64_t>> revisions_of(RedisLink& link, std::span<const
     const auto portion = std::span(commands).subspan(i, std::min(kAskedAtOnce, commands.size() - i));
     auto replies = link.run_all(portion);
     if (!replies) return tl::unexpected(replies.error());
-    // An unreadable revision counts as 0 and does not prevent reading the others.
+    // A revision that cannot be read counts as 0, so that the others are still read.
     for (const auto& reply : *replies) revisions.push_back(reply ? counter_of(reply->text) : 0);
   }
   return revisions;
@@ -58,8 +58,8 @@ Result<void> pull_counters(RedisLink& link, JobStore& local) {
   return {};
 }
 
-// Returns those jobs of `ids` of which Redis has a higher revision than `here` (revisions by id), without the
-// jobs that were removed here.
+// Returns those jobs of `ids` that Redis has in a higher revision than `here` (revisions by id). Jobs that
+// were removed here are left out.
 Result<std::vector<JobId>> wanted_of(RedisLink& link, JobStore& local,
                                      const std::map<JobId, std::uint64_t>& here,
                                      const std::vector<JobId>& ids, const std::string& node) {
@@ -138,7 +138,7 @@ Result<void> keep_from_redis(JobStore& local, const RedisJob& job) {
 std::string removal_mark(const JobId& job) { return "removed:" + job.value; }
 
 Result<void> keep_inherited(JobStore& local, const RedisJob& job) {
-  // Local data is from an earlier ownership.
+  // The local data are from an earlier ownership of the job.
   if (auto removed = local.remove_job(job.job.id); !removed) return removed;
   return keep_from_redis(local, job);
 }

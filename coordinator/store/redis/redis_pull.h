@@ -11,22 +11,21 @@
 
 namespace ls::coordinator {
 
-// Name of the counter in the local store that marks a job as removed.
+// Returns the name of the counter in the local store that marks a job as removed.
 std::string removal_mark(const JobId& job);
 
-// Copies from Redis to `local` the jobs, with their points (of the convergence curve) and logs, of which
-// Redis has a higher revision than `known`, the jobs of `local`, or which `local` never had; also the
-// counters. Unreadable records are reported and left where they are.
+// Copies jobs from Redis to `local`, with their points (of the convergence curve) and logs, and also the
+// counters. Copied are jobs that `local` never had, and those that Redis has in a higher revision than
+// `known`, the jobs of `local`. Records that cannot be read are reported and left where they are.
 Result<void> pull_from_redis(RedisLink& link, JobStore& local, std::span<const StoredJob> known);
 
-// Does the same if several coordinators share the Redis: copies the jobs that `node` still owns, and removes
+// The same for several coordinators that share the Redis: copies the jobs that `node` still owns, and removes
 // from `local` those that another coordinator has taken over.
 Result<void> pull_owned(RedisLink& link, JobStore& local, const std::string& node);
 
-// Stores a job, its points and its log in `local`; if `local` has more points or log lines, they stay.
+// Stores a job, its points and its log in `local`. If `local` has more points or log lines, these stay.
 Result<void> keep_from_redis(JobStore& local, const RedisJob& job);
-// Does the same for a job that another coordinator owned until now: replaces everything that `local` has of
-// the job.
+// Stores a job that another coordinator owned until now. It replaces everything that `local` has of the job.
 Result<void> keep_inherited(JobStore& local, const RedisJob& job);
 
 // Returns those jobs of `known` (pairs of id and revision) that Redis lacks or has in a lower revision.

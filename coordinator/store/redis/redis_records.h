@@ -1,5 +1,5 @@
-// Encodes the commands that write jobs to Redis, and decodes the replies. It has no connection and works on
-// texts only.
+// Encodes the commands that write jobs to Redis, and decodes the replies. It handles texts only and has no
+// connection.
 #pragma once
 
 #include <map>
@@ -14,21 +14,21 @@ inline constexpr const char* kRedisJobs = "lightshaft:jobs";
 inline constexpr const char* kRedisMemory = "lightshaft:memory";
 inline constexpr const char* kRedisCounters = "lightshaft:counters";
 inline constexpr const char* kRedisQuarantined = "lightshaft:barred";  // hash: worker -> evidence
-inline constexpr std::size_t kAskedAtOnce = 256;  // commands sent without waiting for an answer
+inline constexpr std::size_t kAskedAtOnce = 256;  // most commands sent without waiting for an answer
 std::string redis_job_key(const JobId& id);
-std::uint64_t counter_of(const std::string& text);  // 0: not a number
-// True if the text has the form of a job's id. Ids become names of folders, so other texts that are found in
-// Redis must not be taken for ids.
+std::uint64_t counter_of(const std::string& text);  // returns 0 for a text that is not a number
+// True if the text has the form of a job's id. Ids become names of folders, so other texts found in Redis
+// must not be used as ids.
 bool is_job_id(std::string_view id);
-std::vector<QuarantinedWorker> quarantined_workers(const RedisReply& fields);  // from the reply to HGETALL
+std::vector<QuarantinedWorker> quarantined_workers(const RedisReply& fields);  // decodes the reply to HGETALL
 
 // Changes of one job for Redis; fields that are not set stay as they are.
 struct RedisUpdate {
   JobId id;
-  std::uint64_t revision = 0;  // revision of `record`; if that is not set, the latest known revision
+  std::uint64_t revision = 0;  // revision of `record`; if `record` is not set, the latest known revision
   std::optional<std::string> record, points, log;
   // Set if several coordinators share the Redis: the coordinator that writes, its fence (redis_members.h),
-  // and the job's state, which is then stored beside the record.
+  // and the job's state, which is stored as a field beside the record.
   std::string node;
   std::uint64_t fence = 0;
   std::string state;
@@ -38,8 +38,8 @@ enum class PutAnswer { later_revision = 0, put = 1, lost = -1 };
 // later_revision if Redis has a higher revision of the job, or lost if another coordinator owns the job by
 // now, with a higher fence.
 RedisLink::Command put_command(const RedisUpdate& update);
-// Makes the commands that remove a job. With a `node` (if coordinators share the Redis) they remove nothing
-// of a job that another node owns.
+// Makes the commands that remove a job. `node` is set if coordinators share the Redis: jobs that another node
+// owns are then left alone.
 std::vector<RedisLink::Command> remove_commands(const JobId& id, const std::string& node = "");
 
 std::string points_json(const std::vector<ConvergencePoint>& points);
@@ -49,10 +49,10 @@ struct RedisJob {
   StoredJob job;
   std::vector<ConvergencePoint> points;
   std::vector<LogLine> log;
-  std::string owner, from;  // the node that owns the job, and the one that did before; empty: unknown
+  std::string owner, from;  // the node that owns the job, and the previous owner; empty: unknown
   std::uint64_t fence = 0;  // the owner's fence
 };
-// Decodes the reply to HGETALL.
+// Decodes the reply to HGETALL of a job.
 Result<RedisJob> parse_redis_job(const RedisReply& fields);
 
 }  // namespace ls::coordinator

@@ -24,6 +24,7 @@ from .errors import (
     SceneDictError,
     SceneRejected,
     SceneWarning,
+    StageRejected,
     Unauthorised,
     WaitTimeout,
 )
@@ -53,6 +54,7 @@ __all__ = [
     "SceneRejected",
     "SceneWarning",
     "Snapshot",
+    "StageRejected",
     "Unauthorised",
     "WaitTimeout",
     "models",

@@ -22,7 +22,7 @@ class Diagnostic:
     length: int = 1
     path: str = ""
     """Of a scene that was submitted as a dictionary: the keys that lead to the place, as in
-    'ball.bsdf.alpha'."""
+    'ball.bsdf.alpha'. Of a stage of USD: the path of a prim."""
 
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}:{self.column}" if self.line else self.file
@@ -73,7 +73,8 @@ class LightshaftError(Exception):
 
     @property
     def path(self) -> str | None:
-        """Of a scene that was submitted as a dictionary: the keys that lead to the first error."""
+        """Of a scene that was submitted as a dictionary: the keys that lead to the first error; of a stage
+        of USD, the path of the prim."""
         first = self._first()
         return first.path or None if first else None
 
@@ -91,6 +92,10 @@ class SceneRejected(LightshaftError):
 
 class SceneDictError(SceneRejected):
     """A dictionary cannot be made into a scene; `path` is the place within it."""
+
+
+class StageRejected(SceneRejected):
+    """A stage of USD cannot be made into a scene; `path` is that of the first prim that is wrong."""
 
 
 class RequestRejected(LightshaftError):

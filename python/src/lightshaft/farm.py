@@ -56,18 +56,20 @@ class Farm:
         folder: PathLike | None = None,
         allow: Iterable[PathLike] = (),
         assets: Mapping[str, PathLike | bytes] | None = None,
+        camera: str | None = None,
         **spec: Unpack[models.JobSpec],
     ) -> Job:
         """Hands in a scene with the files that it names.
 
-        `scene`: the path of an XML file, a string of XML, or a dictionary as for Mitsuba's load_dict. Files
-        are looked for in `folder` (default: that of the scene's file, else the working directory); files
-        outside of it are sent only if they lie in one of the folders `allow`. `assets`: {name in the scene:
-        path or bytes}, which go first. The rest are the job's settings (models.JobSpec): spp, target_error,
-        time, size, denoise, aov, ... `reference` may be a path.
+        `scene`: the path of an XML file, of a stage of USD or of an archive (.zip, .tar, .tar.gz), a string
+        of XML, or a dictionary as for Mitsuba's load_dict, which may hold arrays. Files are looked for in
+        `folder` (default: that of the scene's file, else the working directory); files outside of it are
+        sent only if they lie in one of the folders `allow`. `assets`: {name in the scene: path or bytes},
+        which go first. `camera`: of a stage that has several, the path of one. The rest are the job's
+        settings (models.JobSpec): spp, target_error, time, size, denoise, aov, ... `reference` may be a path.
         """
         answer = self._transport.run(
-            submission.submit(scene, spec, submission.Options(name, folder, allow, assets))
+            submission.submit(scene, spec, submission.Options(name, folder, allow, assets, camera))
         )
         for text in submission.warnings_of(answer):
             warnings.warn(text, SceneWarning, stacklevel=2)

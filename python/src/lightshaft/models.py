@@ -3,6 +3,31 @@
 from typing import Any, Literal, NotRequired, TypedDict, Union
 
 
+class Layers(TypedDict):
+    size: list[int]
+    """Width and height of level 0."""
+    max_level: int
+    max_side: int
+    """Pixels on a side of one request."""
+    max_pixels: int
+    """Pixels of level 0 that one request may stand for."""
+    layers: list["LayersLayers"]
+
+
+class LayersLayers(TypedDict):
+    name: str
+    """`rgb`; `stderr`, the standard error of each value of it; `error`, the relative standard error of a
+    pixel; `spp`, its samples; AOVs."""
+    channels: list[str]
+    """Of a cryptomatte `id0`, `coverage0` and so on: the three identifiers with the largest coverage."""
+    format: Literal["half", "float"]
+    blocks: Literal["mean", "error_of_mean", "root_mean_square", "first"]
+    """How the pixels of a block become one in levels above 0."""
+    names: NotRequired[Union[dict[str, str], None]]
+    """Of a cryptomatte: name -> identifier, eight hexadecimal digits of the float's bits. null: not
+    known."""
+
+
 class Problem(TypedDict):
     """RFC 9457."""
     type: str
@@ -40,6 +65,9 @@ class JobSpec(TypedDict):
     spp: NotRequired[int]
     target_error: NotRequired[float]
     """relMSE"""
+    target_layer: NotRequired[Literal["raw", "denoised"]]
+    """Whose relMSE target_error means: that of the image as rendered (raw, the default), or that of its
+    denoised layers, which are then made. 409 if the coordinator has no Open Image Denoise."""
     time: NotRequired[float]
     """seconds"""
     seed: NotRequired[int]
@@ -72,6 +100,24 @@ class JobSpec(TypedDict):
     squared difference. It must be independent of the job: of another seed."""
 
 
+class Video(TypedDict):
+    state: Literal["none", "waiting", "making", "ready", "failed"]
+    fps: Union[float, None]
+    """Asked; null: there is no video."""
+    exposure: Union[float, None]
+    """Asked, in stops."""
+    layer: Union[str, None]
+    """Asked: rgb or denoised."""
+    frames: int
+    """That it has."""
+    frames_done: int
+    """That are in it so far."""
+    bytes: Union[int, None]
+    """Of a video that is ready."""
+    error: Union[str, None]
+    """Why it failed."""
+
+
 class JobChange(TypedDict):
     state: NotRequired[Literal["paused", "running", "cancelled"]]
     priority: NotRequired[int]
@@ -81,6 +127,11 @@ class JobChange(TypedDict):
     target_error: NotRequired[float]
     """Of a job that has one. A smaller one goes on where a larger one ended, to the same pixels as with the
     smaller one from the first. Not together with `spp`."""
+    focus: NotRequired[Union[list[int], None]]
+    """[x0, y0, x1, y1] in pixels, x1 and y1 excluded: the tiles that these pixels lie in get the next
+    samples before all others. null: all tiles are treated alike again. It changes the order of the work
+    alone; an image by spp or target_error has the same bits with and without it. Kept with the job. Of a
+    sequence: of all its frames."""
 
 
 class Job(TypedDict):
@@ -99,6 +150,10 @@ class Job(TypedDict):
     """null: its target error or its time ends it, and spp is only the most that any pixel gets."""
     target_error: NotRequired[Union[float, None]]
     """relMSE, asked."""
+    target_layer: NotRequired[Union[str, None]]
+    """Whose relMSE target_error means: raw or denoised; null: there is no target."""
+    denoised_check: NotRequired[Union["JobDenoisedCheck", None]]
+    """When the error of the denoised layers was last compared with the target."""
     denoise: NotRequired[bool]
     """The image also gets the layers denoised.R, G, B."""
     spp_done: NotRequired[float]
@@ -147,6 +202,9 @@ class Job(TypedDict):
     """[width, height]"""
     tile: NotRequired[int]
     priority: NotRequired[int]
+    focus: NotRequired[Union[list[int], None]]
+    """[x0, y0, x1, y1]: the pixels whose tiles get the next samples first; null: all tiles are treated
+    alike. Of a sequence: that of all frames, if they have the same."""
     max_workers: NotRequired[Union[int, None]]
     """Asked."""
     max_units: NotRequired[Union[int, None]]
@@ -158,6 +216,8 @@ class Job(TypedDict):
     elapsed_seconds: NotRequired[float]
     core_seconds: NotRequired[float]
     """CPU time of workers for its units."""
+    queued_core_seconds: NotRequired[float]
+    """Predicted CPU time of its units that no worker holds; 0 also if nothing was measured yet."""
     time: NotRequired["TimeSplit"]
     submitted_unix: NotRequired[float]
     sequence: NotRequired[Union[str, None]]
@@ -168,6 +228,16 @@ class Job(TypedDict):
     """Of a sequence. Its other figures are of all frames together: sums, means over pixels (errors: over
     the frames that have some), and elapsed_seconds from the first ray of any frame to the last fold."""
     health: NotRequired["Health"]
+
+
+class JobDenoisedCheck(TypedDict):
+    """When the error of the denoised layers was last compared with the target."""
+    spp: NotRequired[float]
+    """Mean over pixels, then."""
+    relmse: NotRequired[float]
+    """Estimated."""
+    at_most: NotRequired[Union[float, None]]
+    """Upper end of the 95 % interval, which is compared; null: it is not known."""
 
 
 class JobReference(TypedDict):
@@ -344,6 +414,11 @@ class Report(TypedDict):
     submitted_unix: NotRequired[float]
     target_error: NotRequired[Union[float, None]]
     """relMSE that was asked for."""
+    target_layer: NotRequired[Union[str, None]]
+    """Whose relMSE that is: raw or denoised; null: there is no target."""
+    denoised_checks: NotRequired[list["ReportDenoisedChecks"]]
+    """Of a job whose target is that of the denoised layers: each comparison with it. The job ends when the
+    upper end is at most the target twice in succession."""
     forecast: NotRequired[Union["ReportForecast", None]]
     """What it costs to come down to the target (asked: true) or, where that is reached or there is none, to
     half of relmse."""
@@ -393,6 +468,9 @@ class Report(TypedDict):
     """Of a sequence: SHA-256 over the 32 bytes of each frame's, in order, once all are done."""
     features_used: list[str]
     features_left_out: list[str]
+    techniques: NotRequired[list["ReportTechniques"]]
+    """What the workers' integrator did besides directions and next-event estimation at vertices to find
+    light. What each costs and brings: tests/bench/techniques.py."""
     needs: NotRequired[Union[dict[str, Any], None]]
     """What the scene needs of the renderer, as flags and counts; null for jobs of earlier versions."""
     analysis: NotRequired[Union[dict[str, Any], None]]
@@ -431,6 +509,15 @@ class Report(TypedDict):
     convergence: list["ReportConvergence"]
 
 
+class ReportDenoisedChecks(TypedDict):
+    spp: NotRequired[float]
+    """Mean over pixels, then."""
+    relmse: NotRequired[float]
+    """Estimated."""
+    at_most: NotRequired[Union[float, None]]
+    """Upper end of the 95 % interval; null: it is not known."""
+
+
 class ReportForecast(TypedDict):
     """What it costs to come down to the target (asked: true) or, where that is reached or there is none, to
     half of relmse."""
@@ -465,6 +552,19 @@ class ReportDenoised(TypedDict):
     """Why there is no denoised image; then nothing else stands here."""
 
 
+class ReportTechniques(TypedDict):
+    name: NotRequired[str]
+    what: NotRequired[str]
+    off: NotRequired["ReportTechniquesOff"]
+    """Parameter of the scene's integrator that switches it off."""
+
+
+class ReportTechniquesOff(TypedDict):
+    """Parameter of the scene's integrator that switches it off."""
+    parameter: NotRequired[str]
+    value: NotRequired[str]
+
+
 class ReportConvergence(TypedDict):
     seconds: NotRequired[float]
     core_seconds: NotRequired[float]
@@ -492,13 +592,29 @@ class ReportConvergence(TypedDict):
 class WhoAmIAnswer(TypedDict):
     role: Literal["admin", "submit", "read"]
     user: str
+    version: str
+    """Of the coordinator's program."""
 
 
 class ListJobsAnswer(TypedDict):
     jobs: list["Job"]
+    total: int
+    """Jobs that were asked for, on all pages."""
+    states: dict[str, int]
+    """How many jobs this token may see in each state, whatever was asked for."""
+    owners: list[str]
+    """Of all jobs that this token may see."""
 
 
 class SubmitJobAnswer(TypedDict):
+    id: str
+    url: str
+    warnings: list[str]
+    reference_same_seed: NotRequired[bool]
+    """The reference was rendered of this scene with this seed: the true figures will say nothing."""
+
+
+class SubmitAgainAnswer(TypedDict):
     id: str
     url: str
     warnings: list[str]

@@ -1,13 +1,15 @@
 """Makes the XML of a scene from a dictionary in the style of Mitsuba's mi.load_dict.
 
 Each element stands on a line of its own, and SceneText remembers which keys led to it: an error that the
-farm reports for a line is told as one of the dictionary.
+farm reports for a line is told as one of the dictionary. Arrays become files beside the XML
+(scene_arrays.py), named by their content.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import difflib
+import hashlib
 import os
 import re
 from collections.abc import Mapping
@@ -18,6 +20,7 @@ import numpy as np
 
 from ._plugins import ELEMENTS
 from .errors import Diagnostic, SceneDictError
+from .scene_arrays import NoFile, file_of
 
 MAX_NESTING = 64  # as the scene format allows
 MAX_ELEMENTS = 500_000
@@ -29,6 +32,8 @@ class SceneText:
     xml: str
     paths: tuple[str, ...]
     """For each line the keys that led to it, joined by dots."""
+    files: Mapping[str, bytes] = dataclasses.field(default_factory=dict)
+    """Of arrays, by the names that the XML has for them."""
 
     def path_of(self, line: int) -> str:
         return self.paths[line - 1] if 0 < line <= len(self.paths) else ""
@@ -46,7 +51,7 @@ def scene_of_dict(scene: Mapping[str, Any]) -> SceneText:
         if key != "type":
             writer.write(1, "", key, value, names_it=True)
     writer.add(0, "", "</scene>")
-    return SceneText("\n".join(writer.lines) + "\n", tuple(writer.paths))
+    return SceneText("\n".join(writer.lines) + "\n", tuple(writer.paths), writer.files)
 
 
 def _wrong(path: str, text: str) -> SceneDictError:
@@ -57,6 +62,7 @@ class _Writer:
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.paths: list[str] = []
+        self.files: dict[str, bytes] = {}
 
     def add(self, depth: int, path: str, line: str) -> None:
         if len(self.lines) >= MAX_ELEMENTS:
@@ -126,13 +132,28 @@ class _Writer:
             head += f" name={_quoted(path, key)}"
         if name is not None:
             head += f" id={_quoted(path, name)}"
-        inner = {k: v for k, v in value.items() if k not in ("type", "id")}
+        inner = self.with_files(
+            path, kind, {k: v for k, v in value.items() if k not in ("type", "id")}
+        )
         if not inner:
             return self.add(depth, path, f"{head}/>")
         self.add(depth, path, f"{head}>")
         for inner_key, inner_value in inner.items():
             self.write(depth + 1, path, inner_key, inner_value)
         self.add(depth, path, f"</{element}>")
+
+    def with_files(self, path: str, kind: str, values: dict[str, Any]) -> dict[str, Any]:
+        """The values with the name of a file in the place of arrays."""
+        try:
+            made = file_of(kind, values)
+        except NoFile as error:
+            raise _wrong(f"{path}.{error.key}", error.text) from None
+        if made is None:
+            return values
+        data, ending, keys = made
+        name = f"array-{hashlib.sha256(data).hexdigest()[:32]}{ending}"
+        self.files[name] = data
+        return {"filename": name, **{k: v for k, v in values.items() if k not in keys}}
 
     def write_value(self, depth: int, path: str, key: str, value: Any) -> None:
         name = _quoted(path, key)
@@ -177,7 +198,9 @@ class _Writer:
             raise _wrong(
                 path,
                 f"an array of shape {array.shape} cannot stand here: three numbers are a point or vector, "
-                "4 x 4 a transform; a colour is {'type': 'rgb', 'value': ...}",
+                "4 x 4 a transform; a colour is {'type': 'rgb', 'value': ...}; images are the 'data' of a "
+                "'bitmap' or 'envmap', grids that of a 'gridvolume', and a mesh is a 'ply' with "
+                "'vertex_positions' and 'faces'",
             )
 
 

@@ -163,12 +163,13 @@ def find_files(
 ) -> dict[str, Source]:
     """All files that the scene names and that are there."""
     parsed: dict[str, list[Element]] = {}
-    for frame in _frame_numbers(frames):
+    for frame in frame_numbers(frames):
         _Finder(folders, dict(defines or {}), frame, parsed).find(text)
     return folders.sources
 
 
-def _frame_numbers(frames: str | None) -> Iterator[int | None]:
+def frame_numbers(frames: str | None) -> Iterator[int | None]:
+    """Of a range such as 1-10x2. None: there is no range, or what is given is none."""
     match = re.fullmatch(r"(\d{1,7})(?:-(\d{1,7})(?:x(\d{1,7}))?)?", frames or "")
     if not match:  # the farm says what is wrong with it
         yield None

@@ -7,11 +7,19 @@ import json
 import os
 import pathlib
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeAlias
+from urllib.parse import urlencode
 
 from . import models
-from .errors import BadAnswer, FarmBusy, LightshaftError, RequestRejected, SceneRejected
+from .errors import (
+    BadAnswer,
+    Diagnostic,
+    FarmBusy,
+    LightshaftError,
+    RequestRejected,
+    SceneRejected,
+)
 from .scene_dict import SceneText, scene_of_dict
 from .scene_files import MAX_SCENE_BYTES, Folders, PathLike, Source, find_files, read_scene
 from .steps import (
@@ -21,6 +29,7 @@ from .steps import (
     Retry,
     Steps,
     ask,
+    ask_json,
     post_json,
     problem_of,
     succeed,
@@ -28,6 +37,7 @@ from .steps import (
     work,
 )
 
+STAGES = (".usd", ".usda", ".usdc", ".usdz")
 Scene: TypeAlias = str | os.PathLike[str] | Mapping[str, Any]
 
 
@@ -39,6 +49,7 @@ class Options:
     folder: PathLike | None = None
     allow: Iterable[PathLike] = ()
     assets: Mapping[str, PathLike | bytes] | None = None
+    camera: str | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,14 +57,17 @@ class Prepared:
     name: str
     scene: Source
     files: Mapping[str, Source]
-    dictionary: SceneText | None = None
-    """If it was made from a dictionary."""
+    text_of: Callable[[str], SceneText | None] = lambda file: None
+    """By the name of a scene file: its text, if it was made from a dictionary or a stage."""
+    warnings: tuple[str, ...] = ()
 
 
 def submit(scene: Scene, spec: Mapping[str, Any], options: Options) -> Steps[models.SubmitJobAnswer]:
     settings = {name: value for name, value in spec.items() if value is not None}
     if isinstance(settings.get("defines"), Mapping):
         settings["defines"] = {str(name): str(value) for name, value in settings["defines"].items()}
+    if archive := _archive_of(scene):
+        return (yield from _submit_archive(*archive, settings, options))
     prepared = yield from work(lambda: prepare(scene, settings, options))
     yield from _send_reference(settings)
     yield from _send_missing(
@@ -66,12 +80,61 @@ def submit(scene: Scene, spec: Mapping[str, Any], options: Options) -> Steps[mod
         "spec": _as_json(settings),
     }
     try:
-        answer = yield from post_json("/api/v1/jobs", body)
+        answer = _with_id((yield from post_json("/api/v1/jobs", body)))
     except SceneRejected as error:
-        raise _with_paths(error, prepared.dictionary) from None
+        raise _with_paths(error, prepared) from None
+    told = answer.get("warnings")
+    answer["warnings"] = [*prepared.warnings, *(told if isinstance(told, list) else [])]
+    return answer
+
+
+def _with_id(answer: Mapping[str, Any]) -> models.SubmitJobAnswer:
     if not isinstance(answer.get("id"), str):
         raise BadAnswer("the farm's answer names no job")
     return answer  # type: ignore[return-value]
+
+
+def _archive_of(scene: Any) -> tuple[pathlib.Path, str] | None:
+    """The path and the media type of an archive; None if the scene is none."""
+    if not isinstance(scene, (str, os.PathLike)) or str(scene).lstrip("\ufeff \t\r\n").startswith("<"):
+        return None
+    path = pathlib.Path(scene)
+    name = path.name.lower()
+    if name.endswith(".zip"):
+        return path, "application/zip"
+    return (path, "application/x-tar") if name.endswith((".tar", ".tar.gz", ".tgz")) else None
+
+
+def _submit_archive(
+    path: pathlib.Path, kind: str, settings: dict[str, Any], options: Options
+) -> Steps[models.SubmitJobAnswer]:
+    """A scene with all its files in one archive is unpacked by the farm; what it takes is checked there."""
+    for option in ("name", "folder", "allow", "assets", "camera"):
+        if getattr(options, option):
+            raise RequestRejected(f"{path} is an archive, which has all its files: {option} means nothing")
+    yield from _send_reference(settings)
+    query = _as_query(path, _as_json(settings))
+    source = yield from work(lambda: Source.of_file(path))
+    data = yield from work(lambda: source.read(0, source.size))
+    return _with_id((yield from ask_json(Call("POST", f"/api/v1/jobs?{query}", data, kind))))
+
+
+def _as_query(path: pathlib.Path, spec: Mapping[str, Any]) -> str:
+    pairs: list[tuple[str, str]] = []
+    for name, value in spec.items():
+        if name == "defines" and isinstance(value, Mapping):
+            pairs += [("define", f"{key}={text}") for key, text in value.items()]
+        elif name == "size" and isinstance(value, list):
+            pairs.append((name, "x".join(map(str, value))))
+        elif isinstance(value, bool):
+            pairs.append((name, str(value).lower()))
+        elif isinstance(value, list):
+            pairs.append((name, ",".join(map(str, value))))
+        elif isinstance(value, (str, int, float)):
+            pairs.append((name, str(value)))
+        else:
+            raise RequestRejected(f"{name} of the archive {path} must be given in its job.json")
+    return urlencode(pairs)
 
 
 def warnings_of(answer: models.SubmitJobAnswer) -> list[str]:
@@ -83,6 +146,10 @@ def warnings_of(answer: models.SubmitJobAnswer) -> list[str]:
 
 def prepare(scene: Scene, spec: Mapping[str, Any], options: Options) -> Prepared:
     """The scene's text, and its files with their digests."""
+    if isinstance(scene, (str, os.PathLike)) and os.fspath(scene).lower().endswith(STAGES):
+        return _prepare_stage(scene, spec, options)
+    if options.camera is not None:
+        raise RequestRejected("camera= chooses among the cameras of a stage of USD; this scene is none")
     dictionary = None
     if isinstance(scene, Mapping):
         dictionary = scene_of_dict(scene)
@@ -91,10 +158,6 @@ def prepare(scene: Scene, spec: Mapping[str, Any], options: Options) -> Prepared
         text, name, folder = scene.encode("utf-8", "surrogatepass"), "scene.xml", pathlib.Path()
     elif isinstance(scene, (str, os.PathLike)):
         path = pathlib.Path(scene)
-        if path.name.lower().endswith((".zip", ".tar", ".tar.gz", ".tgz")):
-            raise RequestRejected(
-                f"{path} is an archive: unpack it and submit its scene, or use `lightshaft submit`"
-            )
         text, name, folder = read_scene(path), path.name, path.parent
     else:
         raise RequestRejected(
@@ -105,7 +168,9 @@ def prepare(scene: Scene, spec: Mapping[str, Any], options: Options) -> Prepared
             f"the scene is larger than the {MAX_SCENE_BYTES >> 20} MiB of a scene file"
         )
     folders = Folders(
-        folder if options.folder is None else options.folder, options.allow, options.assets
+        folder if options.folder is None else options.folder,
+        options.allow,
+        {**(dictionary.files if dictionary else {}), **(options.assets or {})},
     )
     # Settings of a wrong kind are left to the farm, which tells what it wants.
     defines, frames = spec.get("defines"), spec.get("frames")
@@ -115,7 +180,29 @@ def prepare(scene: Scene, spec: Mapping[str, Any], options: Options) -> Prepared
         defines if isinstance(defines, Mapping) else None,
         None if frames is None else str(frames),  # the farm takes the number of one frame, too
     )
-    return Prepared(options.name or name, Source.of_bytes(text), files, dictionary)
+    return Prepared(options.name or name, Source.of_bytes(text), files, lambda file: dictionary)
+
+
+def _prepare_stage(scene: PathLike, spec: Mapping[str, Any], options: Options) -> Prepared:
+    from . import usd  # only now: it needs packages that are optional
+
+    if options.assets:
+        raise RequestRejected("assets= does not go with a stage of USD, which finds its files itself")
+    frames, given = spec.get("frames"), spec.get("size")
+    size = None
+    if isinstance(given, (list, tuple)) and len(given) == 2:  # else the farm says what it wants
+        size = int(given[0]), int(given[1])
+    stage = usd.read(
+        scene,
+        camera=options.camera,
+        frames=None if frames is None else str(frames),
+        size=size,
+        folder=options.folder,
+        allow=options.allow,
+    )
+    text = Source.of_bytes(stage.main.xml.encode())
+    name = options.name or pathlib.Path(scene).name
+    return Prepared(name, text, stage.files, stage.text_of, stage.warnings)
 
 
 def _as_json(spec: Mapping[str, Any]) -> dict[str, Any]:
@@ -130,13 +217,17 @@ def _as_json(spec: Mapping[str, Any]) -> dict[str, Any]:
     return loaded
 
 
-def _with_paths(error: SceneRejected, dictionary: SceneText | None) -> SceneRejected:
-    """Of a dictionary, the places in the XML that was made of it mean nothing to its author: tell the
-    keys."""
-    if dictionary is None:
-        return error
-    diagnostics = [dataclasses.replace(d, path=dictionary.path_of(d.line)) for d in error.diagnostics]
-    return SceneRejected(error.message, diagnostics=diagnostics, status=error.status)
+def _with_paths(error: SceneRejected, prepared: Prepared) -> SceneRejected:
+    """The places in XML that was made from a dictionary or a stage mean nothing to its author: tell the
+    keys, or the prim."""
+
+    def told(d: Diagnostic) -> Diagnostic:
+        text = prepared.text_of(d.file)
+        return d if text is None else dataclasses.replace(d, path=text.path_of(d.line))
+
+    return SceneRejected(
+        error.message, diagnostics=[told(d) for d in error.diagnostics], status=error.status
+    )
 
 
 def _send_reference(spec: dict[str, Any]) -> Steps[None]:

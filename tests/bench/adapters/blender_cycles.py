@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Adapter of `lightshaft compare` for Blender Cycles: one process per seed, pictures of four times the samples each, from nothing.
+"""Adapter of race.py for Blender Cycles: one process per seed, pictures of four times the samples each, from nothing.
 
 usage: blender_cycles.py SCENE FOLDER --time S [--clock wall|cpu] --seed N --threads N --size W H [--denoise]
 Averaging renders would spoil what its low-discrepancy samples gain, so each picture is rendered anew. What a render costs

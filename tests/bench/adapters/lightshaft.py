@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Adapter of `lightshaft compare` for another build of Lightshaft: one picture, and what it cost after loading.
+"""Adapter of race.py for another build of Lightshaft: one picture, and what it cost after loading.
 
 usage: lightshaft.py SCENE IMAGE.exr TIMES.json --spp N --seed N --threads N --size WxH
 Runs the `lightshaft` that PATH finds first.

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Adapter of `lightshaft compare` for Mitsuba 3: one process per seed, whose picture is noted as its samples double.
+"""Adapter of race.py for Mitsuba 3: one process per seed, whose picture is noted as its samples double.
 
 usage: mitsuba3.py SCENE FOLDER --time S [--clock wall|cpu] --seed N --threads N --size W H --integrator volpath|volpathmis
        [--variant llvm_ad_rgb]

@@ -1,4 +1,4 @@
-"""What the adapters for `lightshaft compare` share: its clock, and the list of pictures that it reads."""
+"""What the adapters of race.py share: its clock, and the list of pictures that it reads."""
 import argparse
 import json
 import pathlib

@@ -9,20 +9,12 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/fake_clock.h"
 #include "tests/unit/agent/scripted_coordinator.h"
 #include "worker/agent/agent.h"
 #include "worker/fake/fake.h"
 
 namespace ls::worker {
-
-class AtomicClock final : public Clock {
- public:
-  TimePoint now() const override { return TimePoint(Duration(now_.load())); }
-  void advance(Duration d) { now_ += d.count(); }
-
- private:
-  std::atomic<Duration::rep> now_{1'000'000'000};
-};
 
 // Blobs straight from the coordinator, no disk.
 class FetchedFiles final : public BlobFiles {
@@ -111,7 +103,7 @@ class AgentTest : public testing::Test {
   }
 
   ScriptedCoordinator coordinator_;
-  AtomicClock clock_;
+  FakeClock clock_;
   FetchedFiles files_{coordinator_};
   std::unique_ptr<RenderBackend> backend_;
   std::unique_ptr<Agent> agent_;

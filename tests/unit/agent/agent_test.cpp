@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/image/film/fake_pixels.h"
 #include "tests/unit/agent/agent_rig.h"
+#include "worker/fake/fake_pixels.h"
 
 namespace ls::worker {
 namespace {
@@ -85,6 +85,41 @@ TEST_F(AgentTest, DrainsWhenTheCoordinatorSaysSo) {
   coordinator_.tell(DrainNow{});
 
   EXPECT_TRUE(join());
+}
+
+TEST_F(AgentTest, EndsWhenItHasHadNoWorkForItsIdleLimit) {
+  start({.idle_limit = std::chrono::seconds(60)});
+  pass(std::chrono::seconds(59));
+  coordinator_.tell(assign("l-1", "j-1", {0, 1}));
+  coordinator_.wait_for([](auto& c) { return c.results.size() == 2; });
+
+  // 118 s since the start are 59 s since the work: a lease is still taken.
+  pass(std::chrono::seconds(59));
+  coordinator_.tell(assign("l-2", "j-1", {2}));
+  coordinator_.wait_for([](auto& c) { return c.results.size() == 3; });
+
+  wait_while_time_passes([](auto& c) { return c.draining == 1; });
+  EXPECT_TRUE(join());
+  EXPECT_TRUE(coordinator_.returned.empty());
+}
+
+TEST_F(AgentTest, DoesNotEndWhileAUnitTakesLongerThanTheIdleLimit) {
+  start({.idle_limit = std::chrono::seconds(60)}, {.fault = {FakeFault::Kind::hang, 1}});
+  coordinator_.tell(assign("l-1", "j-1", {0}));
+  wait_while_time_passes([](auto& c) {
+    return !c.progress.empty() && c.progress.back().activity == "rendering" && c.progress.size() > 80;
+  });
+
+  EXPECT_EQ(coordinator_.draining, 0);
+}
+
+TEST_F(AgentTest, FailsWhenItHasNotJoinedWithinItsIdleLimit) {
+  coordinator_.answer_hello_with(Refused{{Errc::unavailable, "starting"}, true});
+  start({.idle_limit = std::chrono::seconds(60)});
+
+  pass(std::chrono::seconds(61));
+
+  EXPECT_THAT(join().error().message, HasSubstr("did not join the coordinator within 60 s"));
 }
 
 TEST_F(AgentTest, GivesUpDrainingAfterItsLimitAndSaysWhatIsLost) {

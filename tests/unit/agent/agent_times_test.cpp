@@ -10,7 +10,7 @@ namespace {
 // still, 1/2 s of rendering, of which its thread has a core for 1/8).
 class TimedBackend final : public RenderBackend {
  public:
-  TimedBackend(std::unique_ptr<RenderBackend> fake, AtomicClock& clock)
+  TimedBackend(std::unique_ptr<RenderBackend> fake, FakeClock& clock)
       : fake_(std::move(fake)), clock_(clock) {}
   Digest numeric_class() const override { return fake_->numeric_class(); }
   tl::expected<void, UnitFailure> prepare(const LocalJob& job) override {
@@ -29,7 +29,7 @@ class TimedBackend final : public RenderBackend {
 
  private:
   std::unique_ptr<RenderBackend> fake_;
-  AtomicClock& clock_;
+  FakeClock& clock_;
 };
 
 TEST_F(AgentTest, TellsWhatLoadingTookOnceAndHowLongItsThreadStoodStillOrWaited) {

@@ -65,7 +65,7 @@ DOORS = [
     Door("OpenEXR", r"^(OpenEXR/|Imf\w*\.h|Iex\w*\.h|half\.h)", r"^common/image/exr/", "common/image/exr"),
     Door("gRPC", r"^(grpc|grpcpp|grpc\+\+)/|^proto/\w+\.grpc\.pb\.h$", r"^(coordinator/rpc|worker/client)/", "the two ends of the stream"),
     Door("protobuf", r"^google/protobuf/|^proto/\w+\.pb\.h$", r"^(coordinator/rpc|worker/client|proto)/", "proto and the two ends of the stream"),
-    Door("Boost", r"^boost/(?!math/)", r"^coordinator/http/net/", "the HTTP server"),
+    Door("Boost", r"^boost/(?!math/)", r"^coordinator/http/(net/|message/message\.cpp$)", "the HTTP server"),
     Door("Boost.Math", r"^boost/math/", r"^validation/measure/hypothesis_tests\.cpp$", "the statistics of tests and races"),
     Door("libarchive", r"^archive(_entry)?\.h$", r"^coordinator/http/bundle/archive\.(h|cpp)$", "one file pair of the HTTP door"),
     Door("SQLite", r"^sqlite3\.h$", r"^coordinator/store/", "the store"),
@@ -75,10 +75,10 @@ DOORS = [
     Door("libpng", r"^png\.h$", r"^common/(assets/png_\w+|image/exr/preview)\.cpp$", "its decoder, and the preview"),
     Door("libjpeg", r"^(jpeglib|turbojpeg)\.h$", r"^common/assets/jpeg_\w+\.cpp$", "its decoder"),
     Door("stb", r"^(stb/)?stb_", r"^common/assets/hdr_\w+\.cpp$", "the HDR decoder"),
-    Door("OpenSSL", r"^openssl/", r"^(common/base/(digest|secret)|coordinator/http/(auth/auth|auth/token_file|net/byte_stream)|coordinator/tls/certificates)\.cpp$", "digests, tokens, TLS"),
+    Door("OpenSSL", r"^openssl/", r"^(common/base/(digest|secret)|common/report/html|coordinator/http/(auth/auth|auth/token_file|net/byte_stream)|coordinator/tls/certificates)\.cpp$", "digests, tokens, TLS, Base64"),
     Door("TBB", r"^(tbb|oneapi)/", r"^worker/render/", "the renderer"),
-    Door("CLI11", r"^CLI/", r"^cli/|/(main|options)\.cpp$", "the executables"),
-    Door("libcurl", r"^curl/", r"^cli/|^coordinator/(store/blobs/s3_link|webhooks/post)\.cpp$", "the command line's client, the link to S3, and what posts webhooks"),
+    Door("CLI11", r"^CLI/", r"^cli/|/(main|options)\.cpp$|^common/command_line/command\.cpp$", "the executables, and what describes their command lines"),
+    Door("libcurl", r"^curl/", r"^cli/|^coordinator/store/blobs/s3_link\.cpp$|^common/http/post\.cpp$", "the command line's client, the link to S3, and what posts webhooks and traces"),
     Door("nlohmann-json", r"^nlohmann/(?!json_fwd)", EVERYWHERE, "our own code"),
 ]
 # In tests a library may be needed as an oracle or to make broken files; doors bind the product.
@@ -91,9 +91,9 @@ LONG_FILES = {}  # path: reason
 CLOCK_READERS = re.compile(r"^common/base/clock\.(h|cpp)$|(^|/)main\.cpp$|^tests/(?!unit/domain/)")
 CLOCK_EXCEPTIONS = {
     "coordinator/http/auth/auth.cpp": "a session's end is a wall-clock date inside the cookie; the function is injected",
-    "coordinator/http/net/body_reader.cpp": "deadlines of sockets, which Asio takes as points in time",
     "coordinator/http/net/connection.cpp": "deadlines of sockets, which Asio takes as points in time",
-    "coordinator/http/net/socket_io.cpp": "deadlines of sockets, which Asio takes as points in time",
+    "cli/doctor/farm_facts.cpp": "the wall-clock time, to compare it with the coordinator's",
+    "cli/commands/farm_up_command.cpp": "the wall-clock time, by which Docker and Kubernetes say when a worker began",
     "coordinator/service/state/job_entry.cpp": "the wall-clock time of a submission, for people",
     "coordinator/rpc/rpc_server.cpp": "gRPC's Shutdown takes a point in time",
     "worker/fake/fake.cpp": "plays a slow renderer",
@@ -117,6 +117,7 @@ ASSERTION = re.compile(r"^\s*(?:assert\b|(?:EXPECT|ASSERT)_\w+\()(.*)")
 ASSIGNMENT = re.compile(r"^\s*(?:const |auto |double |float )*(\w+) = (.*)")
 
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"]+)[>"]', re.M)
+LOCKED_NAME = re.compile(r"\b\w+_locked\b")
 NOW = re.compile(r"::now\s*\(\s*\)")
 SLEEP = re.compile(r"\bsleep_(for|until)\b|(?<![\w.])(u|nano)?sleep\s*\(|\b(time|asyncio)\.sleep\b")
 SHELL_SLEEP = re.compile(r"^\s*sleep\s|[;&|]\s*sleep\s", re.M)
@@ -296,6 +297,13 @@ def short_files(tree):
             yield f"{path} is short enough now: take it off the list of long files"
 
 
+def the_type_says_who_holds_the_lock(tree):
+    """A name that asks its callers to hold a lock is checked by nobody; Guarded<> (common/base/guarded.h) is."""
+    for path, text in product(tree).items():
+        for name in sorted(set(LOCKED_NAME.findall(without_texts(text)))):
+            yield f"{path}: {name}: take a reference to the state of a Guarded<> instead of asking callers to hold a lock"
+
+
 def nothing_unfinished(tree):
     for path, text in tree.items():
         for match in UNFINISHED.finditer(text):
@@ -389,5 +397,5 @@ def constants_are_listed(tree):
 
 
 RULES = [layering, quoted_includes_exist, include_cycles, folder_cycles, small_rooms, doors, library_types_stay_behind_their_doors, headers_are_guarded,
-         short_files, nothing_unfinished, clock_is_injected, tests_do_not_sleep, tests_assert_no_times, nobody_exits, exceptions_are_files,
-         constants_are_listed]
+         short_files, the_type_says_who_holds_the_lock, nothing_unfinished, clock_is_injected, tests_do_not_sleep, tests_assert_no_times, nobody_exits,
+         exceptions_are_files, constants_are_listed]

@@ -115,6 +115,11 @@ class Rules(unittest.TestCase):
     def test_lengths(self):
         self.assert_finds(architecture.short_files, {"web/a.js": "\n" * 801, "web/b.js": "\n" * 800}, "web/a.js has 801")
 
+    def test_locked_names(self):
+        self.assert_finds(architecture.the_type_says_who_holds_the_lock, {
+            "coordinator/a.h": "void send_locked();  // not for drop_locked\n", "coordinator/b.h": "bool locked; int unlocked;", "tests/c.cpp": "send_locked();"},
+            "coordinator/a.h: send_locked")
+
     def test_unfinished(self):
         word = "TO" + "DO"
         self.assert_finds(architecture.nothing_unfinished, {"cli/a.cpp": f"\n// {word}: later\n", "cli/b.cpp": "f(\"tmp.XX" + "XXXX\")"}, "cli/a.cpp:2")

@@ -4,13 +4,13 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "common/image/film/fake_pixels.h"
 #include "coordinator/assemble/assembly.h"
 #include "coordinator/assemble/job_report.h"
 #include "coordinator/assemble/snapshot.h"
 #include "coordinator/assemble/verify.h"
 #include "coordinator/base/limits.h"
 #include "tests/unit/store/temp_folder.h"
+#include "worker/fake/fake_pixels.h"
 
 namespace ls::coordinator {
 namespace {

@@ -1,6 +1,6 @@
-#include "coordinator/assemble/unit_costs.h"
-
 #include <gtest/gtest.h>
+
+#include "coordinator/assemble/assembly.h"
 
 namespace ls::coordinator {
 namespace {

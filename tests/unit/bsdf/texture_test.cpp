@@ -229,5 +229,50 @@ TEST(Bitmap, AnOpacityIsTheAlphaChannelIfThatMasks) {
   EXPECT_EQ(plain.eval({0}, right), C3(.5f));
 }
 
+TEST(Bitmap, GivesOneChannelAsANumber) {
+  const ImageData codes{1, 1, 4, {51, 102, 153, 204}, {}, true};
+  const std::pair<Channel, float> channels[] = {
+      {Channel::red, .2f}, {Channel::green, .4f}, {Channel::blue, .6f}, {Channel::alpha, .8f}};
+
+  for (const auto& [channel, want] : channels) {
+    BitmapTexture b{{0}};
+    b.channel = channel;
+    EXPECT_EQ(table(with(b), codes).eval({0}, {.5f, .5f}), C3(want));
+  }
+}
+
+TEST(Bitmap, ChannelsThatItLacksAreGreyOrOne) {
+  BitmapTexture blue{{0}}, alpha{{0}};
+  blue.channel = Channel::blue;
+  alpha.channel = Channel::alpha;
+
+  EXPECT_EQ(table(with(blue), ImageData{1, 1, 2, {51, 102}, {}, true}).eval({0}, {0, 0}), C3(.2f));
+  EXPECT_EQ(table(with(alpha), ImageData{1, 1, 2, {51, 102}, {}, true}).eval({0}, {0, 0}), C3(.4f));
+  EXPECT_EQ(table(with(alpha), ramp()).eval({0}, {0, 0}), C3(1));
+}
+
+TEST(Product, MultipliesAndCuts) {
+  Scene s;
+  s.textures = {ConstantTexture{{.5, .25, 1}}, ConstantTexture{{.5, 1, .5}}, ProductTexture{{0}, {1}},
+                ProductTexture{{0}, {1}, .25}, ProductTexture{{2}, {1}, .3}};
+
+  const TextureTable t = table(s, ramp());
+
+  EXPECT_EQ(t.eval({2}, {0, 0}), C3(.25f, .25f, .5f));
+  EXPECT_EQ(t.mean({2}), C3(.25f, .25f, .5f));
+  EXPECT_EQ(t.number({3}, {0, 0}), 1);  // a luminance of at least .25
+  EXPECT_EQ(t.number({4}, {0, 0}), 0);  // and below .3
+}
+
+TEST(Product, RefusesCirclesAndWhatIsMissing) {
+  Scene s;
+  s.textures = {ProductTexture{{1}, {1}}, ProductTexture{{0}, {0}}};
+  EXPECT_THAT(build_error(s), HasSubstr("textures contain each other in a circle"));
+  s.textures = {ProductTexture{{0}, {7}}};
+  EXPECT_THAT(build_error(s), HasSubstr("names a texture that does not exist"));
+  s.textures = {ConstantTexture{}, ProductTexture{{0}, {0}, -1}};
+  EXPECT_THAT(build_error(s), HasSubstr("the threshold -1 of a product"));
+}
+
 }  // namespace
 }  // namespace ls::render

@@ -5,23 +5,16 @@
 #include <cmath>
 
 #include "tests/unit/bsdf/materials.h"
+#include "validation/fixtures/closed_forms.h"
 #include "worker/render/bsdf/fresnel.h"
 
 namespace ls::render::test {
 namespace {
 
+using cases::walsh;
 using testing::HasSubstr;
 
 const V3 kUp(0, 0, 1), kDown(0, 0, -1);
-
-// The diffuse reflectance of a plane boundary from outside (Walsh 1926).
-double walsh(double n) {
-  const double n2 = n * n, n4 = n2 * n2;
-  return .5 + (n - 1) * (3 * n + 1) / (6 * sqr(n + 1)) +
-         n2 * sqr(n2 - 1) / std::pow(n2 + 1, 3) * std::log((n - 1) / (n + 1)) -
-         2 * n2 * n * (n2 + 2 * n - 1) / ((n2 + 1) * (n4 - 1)) +
-         8 * n4 * (n4 + 1) / ((n2 + 1) * sqr(n4 - 1)) * std::log(n);
-}
 
 TEST(Plastic, InternalReflectanceIsTheClosedForm) {
   for (const double n : {1.1, 1.33, 1.5, 1.9, 3.}) {

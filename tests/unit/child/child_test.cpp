@@ -14,11 +14,11 @@
 #include <iterator>
 #include <thread>
 
-#include "common/image/film/fake_pixels.h"
 #include "common/protocol/limits.h"
 #include "worker/child/protocol.h"
 #include "worker/child/serve.h"
 #include "worker/fake/fake.h"
+#include "worker/fake/fake_pixels.h"
 
 namespace ls::worker {
 namespace {

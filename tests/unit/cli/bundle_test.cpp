@@ -1,9 +1,8 @@
-#include "cli/farm/upload_bundle.h"
-
 #include <gtest/gtest.h>
 
-#include "coordinator/http/api/spec_query.h"
-#include "coordinator/http/message/uri.h"
+#include "cli/farm/farm_api.h"
+#include "coordinator/http/api/handlers.h"
+#include "coordinator/http/message/message.h"
 
 namespace ls::cli {
 namespace {

@@ -1,8 +1,7 @@
-#include "cli/output/health_lines.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cli/output/convergence_text.h"
 #include "common/job/health_notes.h"
 
 namespace ls::cli {

@@ -1,5 +1,3 @@
-#include "cli/local/instructions.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -7,7 +5,7 @@
 #include <array>
 #include <cerrno>
 
-#include "cli/local/variants.h"
+#include "cli/local/instructions.h"
 #include "common/base/digest.h"
 
 namespace ls::cli {

@@ -1,5 +1,3 @@
-#include "cli/local/local_link.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/local/local_farm.h"
 #include "coordinator/store/blobs/memory_blobs.h"
 
 namespace ls::cli {

@@ -1,5 +1,3 @@
-#include "cli/output/output_file.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,7 +5,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "cli/local/partial_dir.h"
+#include "cli/output/output_file.h"
 
 namespace ls::cli {
 namespace {

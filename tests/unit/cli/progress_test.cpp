@@ -33,6 +33,21 @@ TEST(ProgressLine, TellsErrorAndForecastWithTheirIntervals) {
       "(3:06 to 5:30), 1:06 with 8 more");
 }
 
+TEST(ProgressLine, HasNoBarInALog) {
+  EXPECT_EQ(progress_line(kForecast, 0, false),
+            " 42 % 27.2 spp  3.14 M samples/s  relMSE 0.0123 (0.0118 to 0.0129), target 0.001  4:12 left "
+            "(3:06 to 5:30), 1:06 with 8 more");
+}
+
+TEST(ProgressBar, WritesALineWheneverTheWholePercentHasChanged) {
+  ProgressBar bar(ProgressForm::lines);
+  testing::internal::CaptureStderr();
+
+  for (const double progress : {.0, .004, .01, .019, 1.}) bar.show({"running", progress, 100 * progress});
+
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "  0 % 0.0 spp\n  1 % 1.0 spp\n100 % 100.0 spp\n");
+}
+
 TEST(ProgressLine, KeepsErrorAndForecastOnANarrowTerminal) {
   EXPECT_EQ(progress_line(kForecast, 90),
             " 42 % [######          ] 27.2 spp  relMSE 0.0123, target 0.001  4:12 left (3:06 to 5:30)");

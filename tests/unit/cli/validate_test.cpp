@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -26,6 +27,21 @@ TEST(ValidateStats, TailsAreThoseOfTheTables) {
   EXPECT_NEAR(chi2_tail(124.342113, 100), .05, 1e-6);
   EXPECT_NEAR(chi2_tail(70.064895, 100), .99, 1e-6);
   EXPECT_NEAR(chi2_tail(2, 2), std::exp(-1.), 1e-12);
+}
+
+TEST(ValidateStats, ChiSquareMergesRareCellsAndFindsSamplesWithoutDensity) {
+  // 2 + 3 + 15 make a cell of 20; the statistic is (24 - 20)^2 / 20 + (36 - 40)^2 / 40.
+  const std::array<double, 4> expected{2, 40, 3, 15}, observed{5, 36, 4, 15};
+  const ChiSquare merged = chi_square(expected, observed, 10);
+  EXPECT_EQ(merged.freedom, 1);
+  EXPECT_DOUBLE_EQ(merged.statistic, 16. / 20 + 16. / 40);
+  EXPECT_EQ(merged.p, chi2_tail(merged.statistic, 1));
+  EXPECT_EQ(merged.impossible, 0);
+  // Edges of cells are rounded: a few samples may lie in an empty one.
+  for (const double strays : {10., 11.}) {
+    const std::array<double, 2> none{0, 100}, some{strays, 100 - strays};
+    EXPECT_EQ(chi_square(none, some, 10).impossible, strays > 10 ? strays : 0);
+  }
 }
 
 // The levels that Nori prints for .01 and 4, 3 and 2 references.

@@ -74,7 +74,7 @@ Ran ran(const Scratch& scratch, const std::vector<double>& speeds, std::size_t s
   Ran out;
   out.race.conditions.size = kRaceSize;
   for (std::size_t e = 0; e < speeds.size(); ++e)
-    out.race.entrants.push_back({"speed " + std::to_string(speeds[e]), true, true});
+    out.race.entrants.push_back({"speed " + std::to_string(speeds[e]), true});
   const std::atomic<bool> stop{false};
   out.lanes = run_lanes(
       speeds.size(), seeds,

@@ -32,7 +32,7 @@ Results results(double second_speed = 5) {
   Race race;
   race.scene = "fog, \"thick\"";
   race.conditions = {10, RaceClock::wall, 2, UINT64_C(1) << 31, {64, 48}};
-  race.entrants = {{"Lightshaft <b>|volpath", true, true}, {"Other"}};
+  race.entrants = {{"Lightshaft <b>|volpath", true}, {"Other"}};
   for (std::size_t s = 0; s < 3; ++s) {
     race.lanes.push_back(lane(0, s, 10 + static_cast<double>(s),
                               {2, 4, 8, 16, 32, 64, 128, 192, 200 + 2. * static_cast<double>(s)}));

@@ -1,4 +1,4 @@
-// Turns, rounds and runs of a race, at times that are told.
+// Turns and rounds of a race, at times that are told.
 #include "compare/schedule.h"
 
 #include <gtest/gtest.h>
@@ -43,14 +43,6 @@ TEST(Turns, NobodyIsEverAheadByMoreThanOneTurn) {
   }
 }
 
-TEST(Turns, ALongOneFallsIntoTheMiddleOfTheOthers) {
-  const auto order = play({1, 10});
-
-  const auto at = std::find(order.begin(), order.end(), 1u) - order.begin();
-  EXPECT_GE(at, 4);
-  EXPECT_LE(at, 6);
-}
-
 TEST(Turns, EachSeedBeginsWithAnother) {
   EXPECT_EQ(play({1, 1, 1}, 0).front(), 0u);
   EXPECT_EQ(play({1, 1, 1}, 1).front(), 1u);
@@ -81,35 +73,6 @@ TEST(RoundsOfARace, EndAtTheSamplesAskedFor) {
   EXPECT_EQ(next_range(6, .1, 1e9, 100), (SampleRange{64, 100}));
   EXPECT_EQ(next_range(0, 0, 1e9, 1), (SampleRange{0, 2}));
   EXPECT_FALSE(next_range(6, .1, 1e9, 64));
-}
-
-// Runs a program that needs 2 s to start and .5 s a sample.
-std::vector<std::uint64_t> runs(double start, double per_sample, double time, std::uint64_t most = 1 << 20) {
-  std::vector<PastRun> past;
-  std::vector<std::uint64_t> spp;
-  while (const auto next = next_run(past, 4, time, most)) {
-    past.push_back({next->spp, start + per_sample * static_cast<double>(next->spp)});
-    spp.push_back(next->spp);
-    if (spp.size() > 100) break;
-  }
-  return spp;
-}
-
-TEST(RunsOfAProgram, GrowFourfoldAndFillTheTime) {
-  const auto spp = runs(2, .5, 100);
-
-  EXPECT_EQ(spp, (std::vector<std::uint64_t>{4, 16, 64, 196}));  // 2 + 196 / 2 = 100
-}
-
-TEST(RunsOfAProgram, OneRunIsEnoughIfItFills) { EXPECT_EQ(runs(0, 10, 20), (std::vector<std::uint64_t>{4})); }
-
-TEST(RunsOfAProgram, EndForOneWhoseCostDoesNotRise) {
-  EXPECT_LE(runs(1, 0, 100, UINT64_MAX / 8).size(), 12u);
-}
-
-TEST(RunsOfAProgram, KeepTheSamplesAskedFor) {
-  EXPECT_EQ(runs(0, .001, 100, 30), (std::vector<std::uint64_t>{4, 16, 30}));
-  EXPECT_EQ(runs(0, .001, 100, 2), (std::vector<std::uint64_t>{2}));
 }
 
 TEST(Costs, CpuSecondsCountByTheThread) {

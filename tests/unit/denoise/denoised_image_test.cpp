@@ -8,7 +8,7 @@
 #include <functional>
 #include <random>
 
-#include "common/image/film/fake_pixels.h"
+#include "worker/fake/fake_pixels.h"
 
 namespace ls {
 namespace {

@@ -1,14 +1,12 @@
 // The stop rule by itself: which tiles decide together, where samples go, and that order never matters.
-#include "coordinator/domain/adaptive_stop.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numeric>
 #include <random>
 
+#include "coordinator/domain/adaptive_stop.h"
 #include "coordinator/domain/limits.h"
-#include "coordinator/domain/stop_groups.h"
 #include "tests/unit/domain/stop_oracle.h"
 
 namespace ls::coordinator {

@@ -232,9 +232,7 @@ TEST(Figures, AWorkerThatSharesItsCoresIsExpectedLater) {
 }
 
 TEST(Figures, TellWhoseThreadsWorkOnAJob) {
-  Rig rig;
-  rig.join("w", 4);
-  rig.submit(plan_of("j", 1000, 2));
+  Rig rig(plan_of("j", 1000, 2), {{"w", 4}});
   EXPECT_EQ(rig.job().cores, 4);
   rig.join("v", 2);
   EXPECT_EQ(rig.job().cores, 6);

@@ -15,6 +15,11 @@ namespace ls::coordinator {
 class Clockwork {
  public:
   explicit Clockwork(Farm::Options options = {.lease_prefix = "t"}) : rig(std::move(options)) {}
+  Clockwork(JobPlan plan, const Workers& workers, Farm::Options options = {.lease_prefix = "t"})
+      : Clockwork(std::move(options)) {
+    for (const auto& [name, threads] : workers) join(name, threads);
+    rig.submit(std::move(plan));
+  }
 
   Rig rig;
   std::function<double(const UnitKey&)> cost = [](const UnitKey&) { return 0.5; };  // core seconds

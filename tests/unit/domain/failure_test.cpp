@@ -32,9 +32,7 @@ TEST(Failure, AUnitThatFailsOnThreeWorkersFailsTheJobWithPlaceAndReplay) {
 }
 
 TEST(Failure, ALoneWorkerGetsASecondAttempt) {
-  Rig rig;
-  rig.join("a", 1);
-  rig.submit(plan_of("j", 1, 2));
+  Rig rig(plan_of("j", 1, 2), {{"a", 1}});
 
   rig.fail("a");
   EXPECT_EQ(rig.job().state, JobState::running);
@@ -44,10 +42,7 @@ TEST(Failure, ALoneWorkerGetsASecondAttempt) {
 }
 
 TEST(Failure, OneWorkersWordThatTheSceneIsAtFaultFailsNoJob) {
-  Rig rig;
-  rig.join("a", 1);
-  rig.join("b", 1);
-  rig.submit(plan_of("j", 5, 2));
+  Rig rig(plan_of("j", 5, 2), {{"a", 1}, {"b", 1}});
 
   while (!rig.held[{"a"}].empty()) rig.fail("a", true);
   EXPECT_EQ(rig.job().state, JobState::running);
@@ -117,7 +112,7 @@ TEST(Failure, AWorkerThatFailsThreeUnitsGetsNoMoreOfTheJob) {
   EXPECT_EQ(rig.worker("bad").state, WorkerState::connected) << "one job alone says little";
 }
 
-TEST(Failure, AWorkerThatFailsInTwoJobsIsSickAndForgivenWithTime) {
+TEST(Failure, AWorkerThatFailsInTwoJobsIsUnhealthyAndForgivenWithTime) {
   Rig rig;
   rig.join("bad", 1);
   rig.join("good", 1);
@@ -127,14 +122,14 @@ TEST(Failure, AWorkerThatFailsInTwoJobsIsSickAndForgivenWithTime) {
 
   rig.lose("good");
   rig.submit(plan_of("l", 2, 2));
-  EXPECT_EQ(rig.farm.why_waiting({"l"}), "bad is sick");
+  EXPECT_EQ(rig.farm.why_waiting({"l"}), "bad is unhealthy");
   rig.pass(kForgiveAfter);
 
   EXPECT_EQ(rig.worker("bad").state, WorkerState::connected);
   EXPECT_FALSE(rig.held[{"bad"}].empty());
 }
 
-TEST(Failure, CrashingScenesDoNotMakeTheirWorkersSick) {
+TEST(Failure, CrashingScenesDoNotMakeTheirWorkersUnhealthy) {
   Rig rig;
   rig.join("a", 4);
   for (const char* id : {"j", "k", "l"}) {
@@ -147,10 +142,7 @@ TEST(Failure, CrashingScenesDoNotMakeTheirWorkersSick) {
 }
 
 TEST(Failure, IsForgottenOnceTheUnitIsRendered) {
-  Rig rig;
-  rig.join("a", 1);
-  rig.join("b", 1);
-  rig.submit(plan_of("j", 1, 2));
+  Rig rig(plan_of("j", 1, 2), {{"a", 1}, {"b", 1}});
   rig.fail("a");
 
   ASSERT_EQ(rig.held[{"b"}].size(), 1u) << "retried elsewhere";

@@ -31,9 +31,7 @@ TEST(Job, RunsFromQueuedToDone) {
 }
 
 TEST(Job, EarlyArrivalsWaitToBeFoldedInOrder) {
-  Rig rig;
-  rig.join("w", 8);
-  rig.submit(plan_of("j", 1, 16));
+  Rig rig(plan_of("j", 1, 16), {{"w", 8}});
   std::vector<Rig::Held> units(rig.held[{"w"}].begin(), rig.held[{"w"}].end());
   ASSERT_EQ(units.size(), 4u);
 
@@ -44,13 +42,12 @@ TEST(Job, EarlyArrivalsWaitToBeFoldedInOrder) {
 }
 
 TEST(Job, ASecondEqualResultIsDropped) {
-  Rig rig;
-  rig.join("w", 1);
-  rig.submit(plan_of("j", 2, 2));
+  Rig rig(plan_of("j", 2, 2), {{"w", 1}});
   const Rig::Held unit = rig.take("w");
   rig.result("w", unit);
 
-  EXPECT_EQ(rig.farm.wanted(unit.key()).verdict, Wanted::Verdict::duplicate);
+  EXPECT_EQ(rig.farm.wanted(unit.key(), digest_number(1)).verdict, Wanted::Verdict::duplicate);
+  EXPECT_EQ(rig.farm.wanted(unit.key(), digest_number(2)).verdict, Wanted::Verdict::other_class);
   const auto again = rig.result("w", unit);
 
   EXPECT_EQ(of<DropDuplicate>(again).size(), 1u);
@@ -59,10 +56,7 @@ TEST(Job, ASecondEqualResultIsDropped) {
 }
 
 TEST(Job, ASecondDifferentResultIsEvidenceAndFailsTheJob) {
-  Rig rig({.lease_prefix = "t", .audit_rate = 1});
-  rig.join("a", 1);
-  rig.join("b", 1);
-  rig.submit(plan_of("j", 5, 2));
+  Rig rig(plan_of("j", 5, 2), {{"a", 1}, {"b", 1}}, {.lease_prefix = "t", .audit_rate = 1});
   const Rig::Held unit = rig.take("a");
   rig.result("a", unit);  // which b is asked to render again
 
@@ -78,9 +72,7 @@ TEST(Job, ASecondDifferentResultIsEvidenceAndFailsTheJob) {
 }
 
 TEST(Job, ResultsNobodyAskedForAreDropped) {
-  Rig rig;
-  rig.join("w", 1);
-  rig.submit(plan_of("j", 2, 4));
+  Rig rig(plan_of("j", 2, 4), {{"w", 1}});
   const auto offer = [&](UnitKey key, SampleRange range) {
     return of<DropUnwanted>(rig.send(UnitAccepted{key, range, digest_number(1), {"w"}, 0.1})).size();
   };
@@ -97,9 +89,7 @@ TEST(Job, ResultsNobodyAskedForAreDropped) {
 }
 
 TEST(Job, PauseStopsLeasesResumeGoesOn) {
-  Rig rig;
-  rig.join("w", 1);
-  rig.submit(plan_of("j", 20, 2));
+  Rig rig(plan_of("j", 20, 2), {{"w", 1}});
   rig.send(JobPaused{{"j"}});
   EXPECT_EQ(rig.job().state, JobState::paused);
 
@@ -114,9 +104,7 @@ TEST(Job, PauseStopsLeasesResumeGoesOn) {
 }
 
 TEST(Job, PauseTakesBackWhatIsNotBegunAndLeavesWhatIsInHand) {
-  Rig rig;
-  rig.join("w", 2);
-  rig.submit(plan_of("j", 200, 2));
+  Rig rig(plan_of("j", 200, 2), {{"w", 2}});
   for (int i = 0; i < 10; ++i) rig.render("w");
   ASSERT_GT(rig.worker("w").leases, 1u);
 
@@ -133,25 +121,20 @@ TEST(Job, PauseTakesBackWhatIsNotBegunAndLeavesWhatIsInHand) {
 }
 
 TEST(Job, CancelTakesLeasesBackAtOnce) {
-  Rig rig;
-  rig.join("a", 2);
-  rig.join("b", 2);
-  rig.submit(plan_of("j", 50, 2));
+  Rig rig(plan_of("j", 50, 2), {{"a", 2}, {"b", 2}});
 
   const auto effects = rig.send(JobCancelled{{"j"}});
 
   EXPECT_EQ(sent<CancelJob>(effects).size(), 2u);
   EXPECT_EQ(rig.job().state, JobState::cancelled);
   EXPECT_EQ(rig.worker("a").units_out, 0u);
-  EXPECT_EQ(rig.farm.wanted({{"j"}, 0, 0}).verdict, Wanted::Verdict::no);
+  EXPECT_EQ(rig.farm.wanted({{"j"}, 0, 0}, {}).verdict, Wanted::Verdict::no);
   rig.send(JobForgotten{{"j"}});
   EXPECT_TRUE(rig.farm.jobs().empty());
 }
 
 TEST(Job, TheUserMayStopItWithWhatIsLeased) {
-  Rig rig;
-  rig.join("w", 1);
-  rig.submit(plan_of("j", 4, 1024));
+  Rig rig(plan_of("j", 4, 1024), {{"w", 1}});
   for (int i = 0; i < 30; ++i) rig.render("w");
 
   rig.send(JobStopped{{"j"}});
@@ -174,7 +157,7 @@ TEST(Extend, AFinishedJobGoesOnWithItsCutRoundRenderedAgainInFull) {
   ASSERT_EQ(of<ReopenRound>(effects).size(), 1u);
   EXPECT_EQ(of<ReopenRound>(effects)[0].round, 2u);
   EXPECT_EQ(rig.job().state, JobState::running);
-  EXPECT_EQ(rig.farm.wanted({{"j"}, 0, 2}).samples, (SampleRange{4, 8}));
+  EXPECT_EQ(rig.farm.wanted({{"j"}, 0, 2}, digest_number(1)).samples, (SampleRange{4, 8}));
   EXPECT_EQ(
       of<DropUnwanted>(rig.send(UnitAccepted{{{"j"}, 0, 2}, {4, 6}, digest_number(1), {"w"}, 0.1})).size(),
       1u)
@@ -187,9 +170,7 @@ TEST(Extend, AFinishedJobGoesOnWithItsCutRoundRenderedAgainInFull) {
 }
 
 TEST(Extend, ARunningJobsCutRoundIsTakenBackFromWorkers) {
-  Rig rig;
-  rig.join("w", 2);
-  rig.submit(plan_of("j", 3, 6));
+  Rig rig(plan_of("j", 3, 6), {{"w", 2}});
   while (rig.job().rounds_complete < 2) rig.render("w");
   rig.render("w");  // one cut unit folded, others leased
   const Rig::Held cut = rig.held[{"w"}].front();
@@ -205,9 +186,7 @@ TEST(Extend, ARunningJobsCutRoundIsTakenBackFromWorkers) {
 }
 
 TEST(Extend, ToNoMoreThanThereIsChangesNothing) {
-  Rig rig;
-  rig.join("w", 2);
-  rig.submit(plan_of("j", 3, 6));
+  Rig rig(plan_of("j", 3, 6), {{"w", 2}});
   rig.render_all();
 
   EXPECT_TRUE(rig.send(JobExtended{{"j"}, 6}).empty());

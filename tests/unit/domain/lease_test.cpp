@@ -15,9 +15,7 @@ std::vector<LeaseUnit> units_of(const std::vector<Effect>& effects, const std::s
 }
 
 TEST(Lease, PreviewsComeFirstEveryTileOnceBeforeAnyTwice) {
-  Rig rig;
-  rig.join("w", 2);
-  rig.submit(plan_of("j", 10, 8));
+  Rig rig(plan_of("j", 10, 8), {{"w", 2}});
 
   std::vector<RoundIndex> rounds;
   while (!rig.held[{"w"}].empty()) {
@@ -179,9 +177,7 @@ TEST(Lease, TagsOfTheJobMustBeTheWorkers) {
 }
 
 TEST(Lease, ADrainingWorkerGetsNoMoreAndItsRestGoesToOthers) {
-  Rig rig;
-  rig.join("a", 1);
-  rig.submit(plan_of("j", 3, 2));
+  Rig rig(plan_of("j", 3, 2), {{"a", 1}});
   rig.send(WorkerDrains{{"a"}});
   rig.render("a");
   std::vector<UnitKey> rest;
@@ -200,9 +196,7 @@ TEST(Lease, ADrainingWorkerGetsNoMoreAndItsRestGoesToOthers) {
 }
 
 TEST(Lease, AWorkerThatGivesALeaseBackGetsNoneBeforeTheNextTick) {
-  Rig rig;
-  rig.join("a", 1);
-  rig.submit(plan_of("j", 1, 2));
+  Rig rig(plan_of("j", 1, 2), {{"a", 1}});
   const Rig::Held unit = rig.take("a");
 
   EXPECT_TRUE(sent<AssignLease>(rig.send(LeaseCameBack{{"a"}, {unit.lease, {unit.key()}}})).empty());
@@ -212,9 +206,7 @@ TEST(Lease, AWorkerThatGivesALeaseBackGetsNoneBeforeTheNextTick) {
 }
 
 TEST(Lease, ALostWorkersUnitsGoToOthersForFree) {
-  Rig rig;
-  rig.join("a", 2);
-  rig.submit(plan_of("j", 4, 2));
+  Rig rig(plan_of("j", 4, 2), {{"a", 2}});
   rig.join("b", 2);
 
   const auto effects = rig.lose("a");
@@ -242,9 +234,7 @@ TEST(Lease, AStaleStreamsEndMeansNothing) {
 }
 
 TEST(Deadline, ExpiredUnitsAreRenderedByOthersAndTheLateResultStillCounts) {
-  Rig rig;
-  rig.join("slow", 1);
-  rig.submit(plan_of("j", 1, 2));
+  Rig rig(plan_of("j", 1, 2), {{"slow", 1}});
   const Rig::Held unit = rig.take("slow");
   rig.pass(kDeadlineSlack + kLoadSlack);
   EXPECT_EQ(rig.job().units_queued, 1u);
@@ -260,9 +250,7 @@ TEST(Deadline, ExpiredUnitsAreRenderedByOthersAndTheLateResultStillCounts) {
 }
 
 TEST(Deadline, ProgressRenewsItButNotForever) {
-  Rig rig;
-  rig.join("w", 1);
-  rig.submit(plan_of("j", 1, 2));
+  Rig rig(plan_of("j", 1, 2), {{"w", 1}});
   const LeaseId lease = rig.held[{"w"}].front().lease;
 
   Duration waited{};
@@ -277,9 +265,7 @@ TEST(Deadline, ProgressRenewsItButNotForever) {
 
 TEST(Deadline, IsRenewedByItsHolderAndByItsFullNameAlone) {
   for (const bool by_another : {true, false}) {
-    Rig rig;
-    rig.join("w", 1);
-    rig.submit(plan_of("j", 1, 2));
+    Rig rig(plan_of("j", 1, 2), {{"w", 1}});
     const LeaseId held = rig.held[{"w"}].front().lease;
     rig.join("other", 1);
     const LeaseId named = by_another ? held : LeaseId{held.value + "x"};
@@ -295,9 +281,7 @@ TEST(Deadline, IsRenewedByItsHolderAndByItsFullNameAlone) {
 }
 
 TEST(Deadline, IsNeverMovedForwardByProgress) {
-  Rig rig;
-  rig.join("w", 1);
-  rig.submit(plan_of("j", 3, 2));
+  Rig rig(plan_of("j", 3, 2), {{"w", 1}});
   rig.render("w");
   const LeaseId lease = rig.held[{"w"}].front().lease;  // made out before the job's world was loaded
 
@@ -400,9 +384,7 @@ TEST(TakingBack, AWorkerThatHasNotLoadedTheJobTakesNothing) {
 }
 
 TEST(Speculation, AnIdleWorkerCopiesOverdueUnitsOnce) {
-  Rig rig;
-  rig.join("slow", 1);
-  rig.submit(plan_of("j", 1, 2));
+  Rig rig(plan_of("j", 1, 2), {{"slow", 1}});
   rig.join("idle", 1);
   rig.join("idle2", 1);
   EXPECT_TRUE(rig.held[{"idle"}].empty()) << "not overdue yet";

@@ -122,7 +122,7 @@ void Month::see(int home, const Effect& effect) {
                           ++counts_.units;
                         },
                         [&](const Fold& e) { see_fold(home, e); },
-                        [&](const UnitsFreed& e) { counts_.again += e.units.size(); },
+                        [&](const UnitsFreed& e) { counts_.again += e.audit ? 0 : e.units.size(); },
                         [&](const DropDuplicate&) { ++counts_.audits; },
                         [&](const JobStateChanged& e) {
                           if (e.to == JobState::failed || e.to == JobState::cancelled) see_end(e.job);

@@ -45,5 +45,58 @@ TEST(Pin, WhereNothingIsAuditedTheFirstWorkerPins) {
   EXPECT_EQ(rig.job().numeric_class, digest_number(9));
 }
 
+TEST(Pin, AWorkerOfAnotherVersionFinishesJobsOfItsClassAndBeginsNone) {
+  Rig rig;
+  rig.join("old", 1, 1);
+  rig.submit(plan_of("begun", 1, 2));
+  ASSERT_EQ(rig.farm.job({"begun"})->numeric_class, digest_number(1));
+  rig.lose("old");
+
+  rig.join_another_version("old", 1, 1);
+  rig.submit(plan_of("new", 4, 2));
+  EXPECT_EQ(rig.held[{"old"}].size(), 1u) << "the unit of the job that it began, and no other";
+  EXPECT_EQ(rig.held[{"old"}].front().job.value, "begun");
+  EXPECT_EQ(rig.farm.why_waiting({"new"}),
+            "old is of another version than the coordinator and begins no job");
+  EXPECT_EQ(rig.farm.audit(), "");
+
+  rig.join("new", 1, 2);
+  EXPECT_EQ(rig.farm.job({"new"})->numeric_class, digest_number(2));
+  EXPECT_EQ(rig.farm.why_waiting({"new"}), "");
+  EXPECT_EQ(rig.farm.audit(), "");
+}
+
+TEST(Pin, WorkersThatMayNotBeginAJobGetItsUnitsAsSoonAsItHasTheirClass) {
+  for (const bool chosen : {true, false}) {
+    Rig rig;
+    rig.join_another_version("old", 1, 1);
+    rig.submit(plan_of("j", 40, 2));
+    ASSERT_TRUE(rig.held[{"old"}].empty());
+
+    if (chosen)
+      rig.send(ClassChosen{{"j"}, digest_number(1)});  // by a result from before a restart
+    else
+      rig.join("of the same class", 1, 1);
+
+    EXPECT_FALSE(rig.held[{"old"}].empty());
+    EXPECT_EQ(rig.farm.audit(), "");
+  }
+}
+
+TEST(Pin, TheClassOfTheFirstResultToBeStoredIsThatOfTheJob) {
+  Rig rig(audited(0));
+  rig.submit(plan_of("j", 4, 2));
+  EXPECT_FALSE(rig.farm.wanted({{"j"}, 0, 0}, digest_number(1)).pinned);
+
+  const auto pinned = of<JobPinned>(rig.send(ClassChosen{{"j"}, digest_number(1)}));
+  const auto again = rig.send(ClassChosen{{"j"}, digest_number(2)});
+
+  ASSERT_EQ(pinned.size(), 1u);
+  EXPECT_EQ(pinned[0].numeric_class, digest_number(1));
+  EXPECT_TRUE(of<JobPinned>(again).empty());
+  EXPECT_EQ(rig.farm.wanted({{"j"}, 0, 0}, digest_number(2)).verdict, Wanted::Verdict::other_class);
+  EXPECT_EQ(rig.farm.audit(), "");
+}
+
 }  // namespace
 }  // namespace ls::coordinator

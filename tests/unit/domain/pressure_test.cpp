@@ -6,9 +6,7 @@ namespace {
 
 // Behind the result that waits the worker's own words wait, too.
 TEST(Deadline, IsNotPassedWhileTheCoordinatorHasNoRoomForTheWorkersResult) {
-  Rig rig;
-  rig.join("w", 1);
-  rig.submit(plan_of("j", 1, 2));
+  Rig rig(plan_of("j", 1, 2), {{"w", 1}});
 
   for (Duration waited{}; waited < 2 * kNoGrowthLimit; waited += 1s) {
     rig.send(ResultsWait{{"w"}});

@@ -55,6 +55,8 @@ inline JobPlan plan_of(const std::string& id, int tiles, std::optional<std::uint
   return plan;
 }
 
+using Workers = std::vector<std::pair<std::string, int>>;  // names and numbers of threads
+
 // Drives a farm by hand: plays the assembler (folds at once) and keeps what each worker holds.
 class Rig {
  public:
@@ -66,11 +68,19 @@ class Rig {
   };
 
   explicit Rig(Farm::Options options = {.lease_prefix = "t"}) : farm(std::move(options)) {}
+  // A farm whose workers, each with its threads, have joined before the job was submitted.
+  Rig(JobPlan plan, const Workers& workers, Farm::Options options = {.lease_prefix = "t"})
+      : Rig(std::move(options)) {
+    for (const auto& [name, threads] : workers) join(name, threads);
+    submit(std::move(plan));
+  }
 
   Farm farm;
   TimePoint now{};
   std::map<WorkerId, std::deque<Held>> held;
   std::function<double(const UnitKey&)> rel_error = [](const UnitKey&) { return 1.0; };
+  // The upper end that a check of the denoised layers finds, at once; empty: the test answers
+  std::function<double(const CheckDenoised&)> denoised;
   double cpu_seconds = 0.01;  // that each unit reports
   double wait_seconds = 0;    // and that its thread waited
 
@@ -83,6 +93,8 @@ class Rig {
         if (const Fold* fold = std::get_if<Fold>(&effect)) {
           events.push_back(UnitFolded{fold->unit, fold->samples, rel_error(fold->unit)});
         }
+        if (const CheckDenoised* check = std::get_if<CheckDenoised>(&effect); check != nullptr && denoised)
+          events.push_back(DenoisedChecked{check->job, {check->spp, 0, denoised(*check)}});
         observe(effect);
         all.push_back(std::move(effect));
       }
@@ -106,6 +118,11 @@ class Rig {
                              std::move(tags),
                              memory,
                              std::move(blobs)});
+  }
+  std::vector<Effect> join_another_version(const std::string& name, int threads,
+                                           std::uint64_t numeric_class) {
+    return send(WorkerJoined{
+        {name}, ++epochs_[{name}], name, digest_number(numeric_class), threads, {}, 0, {}, false});
   }
   std::vector<Effect> lose(const std::string& name) {
     held.erase({name});

@@ -56,10 +56,7 @@ TEST(Audit, TakesTheShareAskedFor) {
 
 // What is audited of the first results of "a", while "b" does nothing.
 std::vector<JobRestored::Audit> opened(Farm::Options options, int results) {
-  Rig rig(std::move(options));
-  rig.join("a", 1);
-  rig.join("b", 1);
-  rig.submit(plan_of("j", 200, 2));
+  Rig rig(plan_of("j", 200, 2), {{"a", 1}, {"b", 1}}, std::move(options));
   for (int i = 0; i < results; ++i) rig.render("a");
   return rig.farm.open_audits({"j"});
 }
@@ -77,9 +74,7 @@ TEST(Audit, ChoosesUnitsByASeedThatNoWorkerKnows) {
 }
 
 TEST(Audit, ALoneWorkerIsNotAudited) {
-  Clockwork work(audited_farm(1));
-  work.join("a", 2);
-  work.rig.submit(plan_of("j", 20, 4));
+  Clockwork work(plan_of("j", 20, 4), {{"a", 2}}, audited_farm(1));
 
   work.run();
 
@@ -88,10 +83,7 @@ TEST(Audit, ALoneWorkerIsNotAudited) {
 }
 
 TEST(Audit, IsGivenUpWhenNobodyElseIsLeftAndTheJobEnds) {
-  Clockwork work(audited_farm(1));
-  work.join("a", 1);
-  work.join("b", 1);
-  work.rig.submit(plan_of("j", 20, 4));
+  Clockwork work(plan_of("j", 20, 4), {{"a", 1}, {"b", 1}}, audited_farm(1));
   work.run(3);
   work.rig.lose("b");
 
@@ -115,10 +107,7 @@ JobRestored restored(Digest accepted, JobRestored::Audit audit, int tiles = 6) {
 const Digest kRight = honest({{"j"}, 0, 0}, {0, 2}), kWrong = digest_number(5);
 
 TEST(Audit, UnderWayIsKnownUntilItIsDecided) {
-  Rig rig(audited_farm(1));
-  rig.join("a", 1);
-  rig.join("b", 1);
-  rig.submit(plan_of("j", 6, 2));
+  Rig rig(plan_of("j", 6, 2), {{"a", 1}, {"b", 1}}, audited_farm(1));
   EXPECT_TRUE(rig.farm.take_changed_audits().empty());
 
   const Rig::Held unit = rig.take("a");
@@ -145,6 +134,24 @@ TEST(Audit, IsGoneOnWithAfterARestart) {
   EXPECT_EQ(rig.farm.audits().equal, 1u);
 }
 
+TEST(Audit, SaysThatItsLeaseEndedWhenItsWorkerIsLost) {
+  Rig rig(audited_farm(0));
+  rig.send(restored(kRight, {0, 0, std::nullopt}));
+  rig.join("a", 1);
+  rig.join("b", 1);
+  const UnitKey audited{{"j"}, 0, 0};
+  const auto of_b = rig.held[{"b"}];
+  const auto asked =
+      std::find_if(of_b.begin(), of_b.end(), [&](const Rig::Held& h) { return h.key() == audited; });
+  ASSERT_NE(asked, of_b.end());
+
+  const auto freed = of<UnitsFreed>(rig.lose("b"));
+
+  EXPECT_TRUE(std::any_of(freed.begin(), freed.end(), [&](const UnitsFreed& f) {
+    return f.audit && f.lease == asked->lease && f.units == std::vector{audited};
+  }));
+}
+
 TEST(Audit, OfAResultWhoseDigestIsNotKnownAccusesNobody) {
   Rig rig(audited_farm(0));
   rig.send(restored(Digest{}, {0, 0, std::nullopt}));
@@ -158,9 +165,7 @@ TEST(Audit, OfAResultWhoseDigestIsNotKnownAccusesNobody) {
 }
 
 TEST(Audit, IsNotEndedByTheWordOfAWorkerThatNobodyAsked) {
-  Rig rig(audited_farm(1));
-  rig.join("a", 1);
-  rig.submit(plan_of("j", 6, 2));
+  Rig rig(plan_of("j", 6, 2), {{"a", 1}}, audited_farm(1));
   rig.join("b", 1);
   rig.join("c", 1);
   const Rig::Held unit = rig.take("a");
@@ -187,9 +192,7 @@ TEST(Audit, DoesNotGoOnByTheWordOfAQuarantinedWorker) {
 }
 
 TEST(FaultyWorker, WhatItsPixelsWereACheckpointOfIsOneAgain) {
-  Rig rig(audited_farm(0));
-  rig.join("a", 1);
-  rig.submit(plan_of("j", 2, 6));
+  Rig rig(plan_of("j", 2, 6), {{"a", 1}}, audited_farm(0));
   rig.render("a");
   ASSERT_EQ(of<Checkpoint>(rig.render("a")).size(), 1u);
 
@@ -386,10 +389,7 @@ TEST(FaultyWorker, OneThatIsFoundElsewhereLosesWhatItHoldsAndWhatItHasRendered) 
 }
 
 TEST(FaultyWorker, OneThatContradictsItselfNeedsNoThirdWorker) {
-  Rig rig(audited_farm(0));
-  rig.join("a", 1);
-  rig.join("b", 1);
-  rig.submit(plan_of("j", 6, 2));
+  Rig rig(plan_of("j", 6, 2), {{"a", 1}, {"b", 1}}, audited_farm(0));
   const Rig::Held unit = rig.take("a");
   rig.result("a", unit);
 
@@ -417,10 +417,7 @@ TEST(FaultyWorker, ThreeDifferentAnswersFailTheJob) {
 
 // With a job that another coordinator had, and knew the liar by.
 TEST(FaultyWorker, ThatIsHereAlreadyGetsNothingFromWhenItIsKnown) {
-  Rig rig(audited_farm(0));
-  rig.join("a", 1);
-  rig.join("b", 1);
-  rig.submit(plan_of("j", 6, 2));
+  Rig rig(plan_of("j", 6, 2), {{"a", 1}, {"b", 1}}, audited_farm(0));
   ASSERT_GT(rig.worker("a").units_out, 0u);
 
   const auto effects = rig.send(WorkerQuarantined{{"a"}, "quarantined: it lied"});

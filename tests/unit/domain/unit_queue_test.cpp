@@ -68,6 +68,39 @@ TEST(UnitQueue, WhatCameBackGoesFirstAmongItsLike) {
                                                          unit_code(7, 0), unit_code(7, 1)}));
 }
 
+TEST(UnitQueue, TilesOfTheFocusGoFirstWhateverTheirRounds) {
+  const UnitTable units(3);
+  UnitQueue queue(3, 2);
+  queue.pop(unit_code(0, 0));
+  queue.put_back(unit_code(0, 0));
+  queue.set_focus({2});
+  EXPECT_EQ(queue.front(units, nobody), unit_code(0, 2));
+  queue.pop(unit_code(0, 2));
+  EXPECT_EQ(queue.front(units, nobody), unit_code(1, 2));
+  queue.pop(unit_code(1, 2));
+  queue.put_back(unit_code(0, 2));
+  EXPECT_EQ(queue.surely_waiting(), 5u);
+  auto rest = queue;
+  EXPECT_EQ(all_of(rest, units), (std::vector<UnitCode>{unit_code(0, 2), unit_code(0, 0), unit_code(0, 1),
+                                                        unit_code(1, 0), unit_code(1, 1)}));
+  queue.set_focus({});
+  EXPECT_EQ(all_of(queue, units), (std::vector<UnitCode>{unit_code(0, 0), unit_code(0, 2), unit_code(0, 1),
+                                                         unit_code(1, 0), unit_code(1, 1)}));
+}
+
+// A focus does not move speculative units forward: they may turn out not to be needed.
+TEST(UnitQueue, TheFocusDoesNotChangeTheOrderOfWhatIsOnlyProbablyWanted) {
+  const UnitTable units(2);
+  UnitQueue queue(2, 7);
+  queue.set_wanted(0, 6, 2);
+  queue.set_wanted(1, 6, 1);
+  queue.set_focus({1});
+  const auto order = all_of(queue, units);
+  EXPECT_EQ(order.front(), unit_code(0, 1));
+  EXPECT_EQ(order.at(6), unit_code(0, 0));
+  EXPECT_EQ(order.at(12), unit_code(6, 0));
+}
+
 TEST(UnitQueue, AnErrorThatIsNotKnownStandsForAGreatOne) {
   const UnitTable units(2);
   UnitQueue queue(2, 7);
@@ -81,6 +114,7 @@ struct Oracle {
   std::vector<RoundIndex> next, end, window, before;
   std::vector<double> variance;
   std::set<UnitCode> returned;
+  std::vector<bool> focus;
   bool all = true;
 
   bool wanted(UnitCode code) const { return all || round_of(code) < before[tile_of(code)]; }
@@ -90,15 +124,16 @@ struct Oracle {
     return variance[tile_of(code)] /
            (static_cast<double>(round_range(r - 1).s1) * static_cast<double>(round_range(r).s1));
   }
+  int line_of(UnitCode code) const { return !wanted(code) ? 2 : focus[tile_of(code)] ? 0 : 1; }
   std::optional<UnitCode> front() const {
     std::optional<UnitCode> best;
-    for (const bool sure : {true, false}) {
+    for (const int line : {0, 1, 2}) {
       for (const UnitCode code : returned)
-        if (wanted(code) == sure) return code;
+        if (line_of(code) == line) return code;
       for (TileIndex t = 0; t < next.size(); ++t) {
         if (next[t] >= std::min(end[t], window[t])) continue;
         const UnitCode code = unit_code(next[t], t);
-        if (wanted(code) != sure) continue;
+        if (line_of(code) != line) continue;
         if (!best || gain(code) > gain(*best) || (gain(code) == gain(*best) && code < *best)) best = code;
       }
       if (best) return best;
@@ -125,7 +160,7 @@ TEST(UnitQueue, IsWhatLookingThroughAllUnitsSays) {
     const UnitTable units(tiles);
     UnitQueue queue(tiles, rounds);
     const std::vector<RoundIndex> none(tiles), most(tiles, rounds);
-    Oracle oracle{none, most, most, most, std::vector<double>(tiles), {}};
+    Oracle oracle{none, most, most, most, std::vector<double>(tiles), {}, std::vector<bool>(tiles)};
     for (int step = 0; step < 3000; ++step) {
       const TileIndex t = below(tiles);
       const std::uint32_t what = below(40);
@@ -157,7 +192,12 @@ TEST(UnitQueue, IsWhatLookingThroughAllUnitsSays) {
         queue.set_end(t, end);
         oracle.end[t] = end;
         for (RoundIndex r = end; r < rounds; ++r) oracle.returned.erase(unit_code(r, t));
-      } else if (below(10) == 0) {
+      } else if (below(2) == 0) {
+        std::vector<TileIndex> focus;
+        for (TileIndex i = 0; i < tiles; ++i)
+          if (oracle.focus[i] = below(2) == 0; oracle.focus[i]) focus.push_back(i);
+        queue.set_focus(focus);
+      } else if (below(5) == 0) {
         queue.want_all();
         oracle.all = true;
         oracle.before = most;

@@ -101,6 +101,12 @@ void Walk::user_acts() {
       return send(JobPaused{id});
     case 6:
       return send(JobPriority{id, static_cast<int>(pick(5)) - 2});
+    case 7: {
+      const FrameSize frame = jobs_[id].plan.grid.frame;
+      const int x0 = static_cast<int>(pick(static_cast<std::uint64_t>(frame.width)));
+      const PixelRect half{x0, 0, frame.width, frame.height};
+      return send(JobFocused{id, chance(30) ? std::nullopt : std::optional(half)});
+    }
     default:
       return send(JobResumed{id});
   }
@@ -205,6 +211,9 @@ void Walk::restart() {
     const JobFigures f = farm_.job(id).value();
     job.plan = farm_.plan(id).value();
     if (f.state == JobState::done) ended_before_.insert(id);
+    // When its time is up, a job with a target folds results beyond the level of its target. After a restart
+    // the target may end it, with more rounds than the target needs.
+    if (job.plan.time && job.plan.target_error && f.state != JobState::done) job.disturbed = true;
     JobRestored event{job.plan, f.state,    f.stopped, f.numeric_class,
                       {},       job.folded, {},        f.first_ray ? 0.5 : 0.0};
     for (const auto& [key, r] : job.accepted)

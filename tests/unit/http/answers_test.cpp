@@ -4,7 +4,7 @@
 #include <fstream>
 #include <future>
 
-#include "coordinator/http/api/process_figures.h"
+#include "coordinator/http/api/metrics.h"
 #include "tests/unit/http/server_fixture.h"
 #include "tests/unit/store/temp_folder.h"
 

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <set>
 
-#include "coordinator/http/api/spec_query.h"
+#include "coordinator/http/api/handlers.h"
 #include "coordinator/http/message/problem.h"
 #include "tests/unit/http/fixture.h"
 
@@ -180,8 +180,8 @@ TEST_F(Jobs, ThatDoNotExistAre404EverywhereTheyAreNamed) {
          std::vector<std::string>{"j-99", "..", "%2e%2e", "a%20b", std::string(200, 'a')}) {
       std::string target(route.pattern);
       target.replace(target.find("{id}"), 4, id);
-      const bool patch = route.method == Method::patch;
-      EXPECT_EQ(ask(route.method, target, patch ? R"({"spp":4})" : "").status, 404) << target;
+      const bool has_body = route.method == Method::patch || route.method == Method::post;
+      EXPECT_EQ(ask(route.method, target, has_body ? R"({"spp":4})" : "").status, 404) << target;
     }
   }
 }
@@ -243,7 +243,8 @@ TEST_F(Routes, AskForATokenUnlessTheyAreOpen) {
 TEST_F(Routes, SayWhoAsks) {
   const Response answer = ask(Method::get, "/api/v1/session");
   EXPECT_EQ(answer.status, 200);
-  EXPECT_EQ(json_of(answer), (nlohmann::json{{"role", "admin"}, {"user", ""}}));
+  EXPECT_EQ(json_of(answer),
+            (nlohmann::json{{"role", "admin"}, {"user", ""}, {"version", LIGHTSHAFT_VERSION}}));
 }
 
 TEST_F(Routes, TellWhichMethodsArePossible) {

@@ -1,8 +1,7 @@
-#include "coordinator/http/net/event_queue.h"
-
 #include <gtest/gtest.h>
 
-#include "coordinator/http/net/head_text.h"
+#include "coordinator/http/message/message.h"
+#include "coordinator/http/net/event_queue.h"
 
 namespace ls::http {
 namespace {

@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "coordinator/http/api/api.h"
-#include "coordinator/http/message/uri.h"
+#include "coordinator/http/message/message.h"
 #include "tests/support/eventually.h"
 #include "tests/unit/http/watched_stores.h"
 #include "tests/unit/service/fake_farm.h"

@@ -1,6 +1,6 @@
 // What a submit token sees of jobs, workers and events: its own. (All routes:
 // tests/system/test_authorisation.py.)
-#include "coordinator/http/auth/visible.h"
+#include "coordinator/http/auth/auth.h"
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {

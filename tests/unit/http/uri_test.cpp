@@ -1,4 +1,4 @@
-#include "coordinator/http/message/uri.h"
+#include "coordinator/http/message/message.h"
 
 #include <gtest/gtest.h>
 

@@ -8,8 +8,8 @@
 #include <tuple>
 
 #include "common/image/exr/exr_file.h"
-#include "common/image/film/fake_pixels.h"
 #include "tests/unit/image/support.h"
+#include "worker/fake/fake_pixels.h"
 
 namespace ls {
 namespace {

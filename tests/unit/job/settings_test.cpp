@@ -97,6 +97,18 @@ TEST(JobSpec, ReadsEveryKeyOfTheContract) {
   EXPECT_EQ(parse_job_spec(canonical_json(*spec)).value(), *spec);
 }
 
+TEST(JobSpec, ATargetOfTheDenoisedLayersAsksForThemToo) {
+  const JobSpec spec = parse_job_spec(R"({"target_error":0.1,"target_layer":"denoised"})").value();
+  EXPECT_EQ(spec.target_layer, TargetLayer::denoised);
+  EXPECT_TRUE(spec.denoise);
+  EXPECT_EQ(parse_job_spec(canonical_json(spec)).value(), spec);
+  const JobSpec raw = parse_job_spec(R"({"target_error":0.1,"target_layer":"raw"})").value();
+  EXPECT_EQ(raw, parse_job_spec(R"({"target_error":0.1})").value());
+  EXPECT_FALSE(raw.denoise);
+  EXPECT_THAT(spec_error(R"({"target_layer":"clean"})"), HasSubstr("'target_layer' must be \"raw\" or"));
+  EXPECT_THAT(spec_error(R"({"target_layer":"denoised","denoise":false})"), HasSubstr("'denoise' is false"));
+}
+
 TEST(JobSpec, TakesTheSizeInBothForms) {
   EXPECT_EQ(parse_job_spec(R"({"size": "1920x1080"})")->size, (FrameSize{1920, 1080}));
   EXPECT_EQ(parse_job_spec(R"({"size": [1920, 1080]})")->size, (FrameSize{1920, 1080}));

@@ -126,6 +126,22 @@ TEST(Convert, ReadsEveryCoordinatorMessageBackAsItWas) {
   }
 }
 
+TEST(Convert, PassesTheSpanOfALeaseOnAndTheTimeSinceWhenAUnitIsHeld) {
+  AssignLease lease = assignment();
+  lease.trace = trace::parse_traceparent("00-0af7651916cd43dd8448eb211c80319c-b7ad6b7169203331-01");
+  EXPECT_EQ(over_the_wire(ToWorker(lease), pb::ToWorker{}).value(), ToWorker(lease));
+
+  UnitResult result = std::get<UnitResult>(kFromWorker[3]);
+  result.held_unix_ns = 1'700'000'000'000'000'000;
+  EXPECT_EQ(over_the_wire(FromWorker(result), pb::FromWorker{}).value(), FromWorker(result));
+}
+
+TEST(Convert, IgnoresTheSpanOfALeaseThatIsNone) {
+  pb::ToWorker wire = to_wire(ToWorker(assignment()));
+  wire.mutable_assign()->set_traceparent(std::string(1 << 16, '-'));
+  EXPECT_EQ(from_wire(wire).value(), ToWorker(assignment()));
+}
+
 // Each row damages a good message in one place; the error must name that place.
 struct Damage {
   const char* field;

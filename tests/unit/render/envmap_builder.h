@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "tests/support/sky_builder.h"
+#include "tests/support/scene_builder.h"
 #include "worker/render/lights/envmap.h"
 
 namespace ls::render {

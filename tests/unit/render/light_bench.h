@@ -46,11 +46,7 @@ struct LightBench {
 };
 inline test::SceneBuilder area(const ls::Geometry& g, const Transform& t, bool flip = false) {
   test::SceneBuilder builder;
-  const TextureIndex one = builder.texture({1, 1, 1});
-  const BsdfIndex black = builder.diffuse(0);
-  Shape& s = builder.shape(g, t, black);
-  s.emitter = AreaEmitter{one};
-  s.flip_normals = flip;
+  builder.lamp(g, t).flip_normals = flip;
   return builder;
 }
 // 5 standard errors of what independent samples would give, and float32 (the light's offset from its own

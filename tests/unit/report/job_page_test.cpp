@@ -264,10 +264,9 @@ TEST(JobPage, ATableThatIsCutSaysSo) {
 TEST(JobPage, SaysWhoseSecondsItCounts) {
   const std::string page = page_of(some_report());
 
-  for (const char* words :
-       {"getting the files that the scene names", "reading them and building the world",
-        "Seconds of threads: of <i>render</i> their CPU time, of the others by the clock.",
-        "<b>0.500</b><small>1 / (relMSE × seconds), 3.5 threads</small>"})
+  for (const char* words : {"getting the files that the scene names", "reading them and building the world",
+                            "Seconds of threads: of render their CPU time, of the others by the clock.",
+                            "<b>0.500</b><small>1 / (relMSE × seconds), 3.5 threads</small>"})
     expect(page, words);
 }
 

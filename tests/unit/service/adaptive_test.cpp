@@ -36,8 +36,7 @@ Outcome outcome(const Coordinator& coordinator, const JobId& job) {
 Outcome at_once(const JobSpec& spec) {
   auto coordinator = open_at({});
   const JobId job = submit(*coordinator, spec);
-  FakeFarm farm(*coordinator, 1);
-  EXPECT_TRUE(farm.finish(job));
+  EXPECT_TRUE(finish(*coordinator, job));
   return outcome(*coordinator, job);
 }
 
@@ -87,8 +86,7 @@ TEST(Adaptive, ACheckpointCostsWhatItsOwnSamplesTook) {
 TEST(Adaptive, TilesThatNeedMoreGetMoreAndTheImageSaysSo) {
   auto coordinator = open_at({});
   const JobId job = submit(*coordinator, spec_with(kTarget));
-  FakeFarm farm(*coordinator, 2);
-  ASSERT_TRUE(farm.finish(job));
+  ASSERT_TRUE(finish(*coordinator, job, 2));
 
   const auto spp = spp_of_tiles(*coordinator, job);
   EXPECT_GT(spp.front(), spp.back());
@@ -121,8 +119,7 @@ TEST(Adaptive, EachTileSaysItsOwnErrorAndTheirMeanIsTheImages) {
   const JobId job = submit(*coordinator, spec_with(kTarget));
   const auto untouched = nlohmann::json::parse(tiles_json(*coordinator->tiles(job)))["tiles"];
   EXPECT_TRUE(untouched[0]["relmse"].is_null());
-  FakeFarm farm(*coordinator, 1);
-  ASSERT_TRUE(farm.finish(job));
+  ASSERT_TRUE(finish(*coordinator, job));
 
   double sum = 0, pixels = 0;
   const std::vector<TileView> all = coordinator->tiles(job).value();
@@ -184,17 +181,9 @@ TEST(Adaptive, ACoordinatorKilledAnywhereGivesTheSamePixels) {
   const Outcome expected = at_once(spec_with(kTarget));
   for (const int k : {1, 40, 95, 101, 107, 113, 119, 125}) {
     TempFolder dir;
-    JobId job;
-    {
-      auto coordinator = open_at(dir.path());
-      job = submit(*coordinator, spec_with(kTarget));
-      FakeFarm farm(*coordinator, 2);
-      farm.stop_after = k;
-      farm.finish(job);
-    }
+    const JobId job = interrupted(dir.path(), k, 2, spec_with(kTarget));
     auto coordinator = open_at(dir.path());
-    FakeFarm farm(*coordinator, 3);
-    ASSERT_TRUE(farm.finish(job)) << k;
+    ASSERT_TRUE(finish(*coordinator, job, 3)) << k;
     const Outcome there = outcome(*coordinator, job);
     EXPECT_EQ(there.pixels, expected.pixels) << k;
     EXPECT_EQ(there.stopped, "error") << k;
@@ -207,10 +196,7 @@ TEST(Adaptive, HalvingTheTargetOfAFinishedJobGivesTheBitsOfOneThatHadItFromTheFi
     TempFolder dir;
     auto coordinator = open_at(way == 0 ? std::filesystem::path{} : dir.path());
     const JobId job = submit(*coordinator, spec_with(kTarget));
-    {
-      FakeFarm farm(*coordinator, 2);
-      ASSERT_TRUE(farm.finish(job));
-    }
+    ASSERT_TRUE(finish(*coordinator, job, 2));
     if (way == 2) {
       coordinator.reset();
       coordinator = open_at(dir.path());
@@ -219,8 +205,7 @@ TEST(Adaptive, HalvingTheTargetOfAFinishedJobGivesTheBitsOfOneThatHadItFromTheFi
     EXPECT_FALSE(coordinator->change(job, {{}, {}, {}, 2 * kTarget})) << "it is better than that";
     ASSERT_TRUE(coordinator->change(job, {{}, {}, {}, kTarget / 2}));
     EXPECT_EQ(coordinator->job(job)->state, JobState::running);
-    FakeFarm farm(*coordinator, 2);
-    ASSERT_TRUE(farm.finish(job));
+    ASSERT_TRUE(finish(*coordinator, job, 2));
     const Outcome there = outcome(*coordinator, job);
     EXPECT_EQ(there.pixels, expected.pixels) << way;
     EXPECT_EQ(there.spp, expected.spp);
@@ -232,16 +217,12 @@ TEST(Adaptive, ExtendedBySamplesItHasTheBitsOfAJobBySamples) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   const JobId job = submit(*coordinator, spec_with(kTarget));
-  {
-    FakeFarm farm(*coordinator, 2);
-    ASSERT_TRUE(farm.finish(job));
-  }
+  ASSERT_TRUE(finish(*coordinator, job, 2));
   const auto spp = spp_of_tiles(*coordinator, job);
   const std::uint64_t most = *std::max_element(spp.begin(), spp.end());
   ASSERT_TRUE(extend(*coordinator, job, most + 40));
   EXPECT_FALSE(coordinator->job(job)->target_error) << "it is reached";
-  FakeFarm farm(*coordinator, 2);
-  ASSERT_TRUE(farm.finish(job));
+  ASSERT_TRUE(finish(*coordinator, job, 2));
 
   EXPECT_EQ(outcome(*coordinator, job).pixels, at_once(spec_with({}, most + 40)).pixels);
   EXPECT_EQ(outcome(*coordinator, job).stopped, "spp");
@@ -250,8 +231,7 @@ TEST(Adaptive, ExtendedBySamplesItHasTheBitsOfAJobBySamples) {
 TEST(Adaptive, TheSampleLimitHoldsForEveryTile) {
   auto coordinator = open_at({});
   const JobId job = submit(*coordinator, spec_with(kTarget, 150));
-  FakeFarm farm(*coordinator, 2);
-  ASSERT_TRUE(farm.finish(job));
+  ASSERT_TRUE(finish(*coordinator, job, 2));
   const auto spp = spp_of_tiles(*coordinator, job);
   EXPECT_EQ(*std::max_element(spp.begin(), spp.end()), 150u);
 }

@@ -81,8 +81,7 @@ TEST_F(Awaited, TheJobGoesOnByItselfWhenTheFileIsHereAgain) {
 
   ASSERT_TRUE(goes_on());
   EXPECT_THAT(coordinator->job(job)->error, Not(HasSubstr("waits for its file")));
-  FakeFarm farm(*coordinator, 1);
-  EXPECT_TRUE(farm.finish(job));
+  EXPECT_TRUE(finish(*coordinator, job));
 }
 
 TEST_F(Awaited, AFileThatIsGoneIsWaitedForOverARestart) {

@@ -50,8 +50,7 @@ TEST(Restore, ADamagedRecordFailsItsJobAloneUntilItIsRemoved) {
   EXPECT_FALSE(coordinator->image_png(bad, 0));
   EXPECT_FALSE(coordinator->tiles(bad));
   EXPECT_FALSE(set_priority(*coordinator, bad, 3));
-  FakeFarm farm(*coordinator, 1);
-  ASSERT_TRUE(farm.finish(good));
+  ASSERT_TRUE(finish(*coordinator, good));
   EXPECT_EQ(pixels(*coordinator, good), reference_pixels());
   ASSERT_TRUE(coordinator->remove(bad));
   EXPECT_EQ(coordinator->job(bad).error().code, Errc::not_found);
@@ -74,15 +73,13 @@ TEST(Restore, AnUnreadableFolderFailsItsJobAloneUntilItIsRepaired) {
     auto coordinator = open_at(dir.path());
     EXPECT_EQ(coordinator->job(bad)->state, JobState::failed);
     EXPECT_THAT(coordinator->job(bad)->error, HasSubstr("restart the coordinator"));
-    FakeFarm farm(*coordinator, 1);
-    ASSERT_TRUE(farm.finish(good));
+    ASSERT_TRUE(finish(*coordinator, good));
   }
   fs::remove(folder);
   fs::rename(dir.path() / "aside", folder);
 
   auto coordinator = open_at(dir.path());
-  FakeFarm farm(*coordinator, 1);
-  ASSERT_TRUE(farm.finish(bad)) << "it goes on as if nothing had been";
+  ASSERT_TRUE(finish(*coordinator, bad)) << "it goes on as if nothing had been";
   EXPECT_EQ(pixels(*coordinator, bad), reference_pixels());
 }
 
@@ -140,8 +137,7 @@ TEST(Done, AJobWhoseSnapshotIsLostIsFoldedAgainWhenItIsExtended) {
     if (results_too) fs::remove(dir.path() / "jobs" / job.value / "partials-000.seg");
     auto coordinator = open_at(dir.path());
     ASSERT_TRUE(extend(*coordinator, job, 70));
-    FakeFarm farm(*coordinator, 2);
-    ASSERT_TRUE(farm.finish(job));
+    ASSERT_TRUE(finish(*coordinator, job, 2));
     EXPECT_EQ(pixels(*coordinator, job), reference_pixels(70)) << results_too;
   }
 }
@@ -225,8 +221,7 @@ TEST(Change, ATargetSurvivesARestart) {
   }
   auto coordinator = open_at(dir.path());
   EXPECT_EQ(coordinator->job(job)->target_error, .003);
-  FakeFarm farm(*coordinator, 1);
-  ASSERT_TRUE(farm.finish(job));
+  ASSERT_TRUE(finish(*coordinator, job));
   EXPECT_LE(report(*coordinator, job)["relmse"].get<double>(), .003);
 }
 

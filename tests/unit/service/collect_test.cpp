@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "tests/support/fake_clock.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 

@@ -51,8 +51,7 @@ TEST(ServiceDenoise, AddsLayersToTheImageAndTheirErrorToTheReport) {
   for (const std::filesystem::path& data : {dir.path() / "disk", std::filesystem::path()}) {
     auto coordinator = open_with(data, fake("blurs"));
     const JobId job = submit(*coordinator, denoised_job());
-    FakeFarm farm(*coordinator, 2);
-    ASSERT_TRUE(farm.finish(job));
+    ASSERT_TRUE(finish(*coordinator, job, 2));
 
     const FinalPicture image = image_of(*coordinator, job);
     ASSERT_TRUE(image.changed && image.changed->empty()) << "the seal covers all layers";
@@ -88,8 +87,7 @@ TEST(ServiceDenoise, TheTrueErrorIsOfTheJobsOwnReference) {
       ASSERT_TRUE(coordinator->blobs().put(*spec.reference, exr));
       jobs.push_back(submit(*coordinator, spec));
     }
-    FakeFarm farm(*coordinator, 2);
-    ASSERT_TRUE(farm.finish(jobs[0]) && farm.finish(jobs[1]));
+    ASSERT_TRUE(finish(*coordinator, jobs[0], 2) && finish(*coordinator, jobs[1], 2));
 
     EXPECT_EQ(pixels(*coordinator, jobs[0]), pixels(*coordinator, jobs[1]));
     for (std::size_t i = 0; i < 2; ++i) {
@@ -111,8 +109,7 @@ TEST(ServiceDenoise, LeavesTheImageItselfAlone) {
   plain.denoise = false;
   plain.aov = {"denoising_albedo", "denoising_normal"};
   const JobId with = submit(*coordinator, denoised_job()), without = submit(*coordinator, plain);
-  FakeFarm farm(*coordinator, 2);
-  ASSERT_TRUE(farm.finish(with) && farm.finish(without));
+  ASSERT_TRUE(finish(*coordinator, with, 2) && finish(*coordinator, without, 2));
 
   EXPECT_EQ(report(*coordinator, with)["pixels_sha256"], report(*coordinator, without)["pixels_sha256"]);
   EXPECT_FALSE(report(*coordinator, without).contains("denoised"));
@@ -136,8 +133,7 @@ TEST(ServiceDenoise, ADenoiserThatIsLostMeanwhileCostsTheLayersAlone) {
   auto coordinator = open_with(dir.path() / "data", library);
   const JobId job = submit(*coordinator, denoised_job());
   std::filesystem::remove(library);
-  FakeFarm farm(*coordinator, 2);
-  ASSERT_TRUE(farm.finish(job));
+  ASSERT_TRUE(finish(*coordinator, job, 2));
 
   EXPECT_EQ(coordinator->job(job)->state, JobState::done);
   const FinalPicture image = image_of(*coordinator, job);

@@ -139,7 +139,7 @@ TEST(Views, ShowAbsentFiguresAsNullAndKeepBadTextReadable) {
         "verdict", "slope", "slope_ci95", "efficiency_per_core", "pixels_without_samples"})
     EXPECT_TRUE(j.at(key).is_null()) << key;
   EXPECT_EQ(j["state"], "queued");
-  EXPECT_EQ(nlohmann::json::parse(jobs_json({v, v}))["jobs"].size(), 2u);
+  EXPECT_EQ(nlohmann::json::parse(jobs_json(JobsPage{{v, v}}))["jobs"].size(), 2u);
 }
 
 TEST(Views, TellWhetherTheFiguresAreToBeTrusted) {

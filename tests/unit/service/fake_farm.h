@@ -13,8 +13,8 @@
 #include <random>
 #include <set>
 
-#include "common/image/film/fake_pixels.h"
 #include "coordinator/service/coordinator.h"
+#include "worker/fake/fake_pixels.h"
 
 namespace ls::coordinator {
 
@@ -45,16 +45,17 @@ class Mailbox {
     mail_.emplace_back(worker, std::move(message));
     arrived_.notify_all();
   }
-  // Nothing within 20 s: a test hangs no longer than that.
-  std::optional<std::pair<int, ToWorker>> take(const std::function<void()>& meanwhile = {}) {
-    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  // The first message; nullopt if `enough`, which is asked every 2 ms, holds before one arrives, or after
+  // 60 s: a test hangs no longer than that.
+  std::optional<std::pair<int, ToWorker>> take(const std::function<bool()>& enough = [] { return false; }) {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     std::unique_lock lock(mutex_);
     while (mail_.empty()) {
       if (std::chrono::steady_clock::now() > until) return std::nullopt;
-      arrived_.wait_for(lock, std::chrono::milliseconds(meanwhile ? 2 : 1000));
-      if (!mail_.empty() || !meanwhile) continue;
+      arrived_.wait_for(lock, std::chrono::milliseconds(2));
+      if (!mail_.empty()) break;
       lock.unlock();
-      meanwhile();
+      if (enough()) return std::nullopt;
       lock.lock();
     }
     auto first = std::move(mail_.front());
@@ -71,10 +72,6 @@ class Mailbox {
       return true;
     });
     return taken;
-  }
-  void wait_a_moment() {
-    std::unique_lock lock(mutex_);
-    arrived_.wait_for(lock, std::chrono::milliseconds(2));
   }
   bool empty() {
     const std::lock_guard lock(mutex_);
@@ -128,10 +125,16 @@ class FakeFarm {
   std::vector<ResultAck> refusals;
   static inline std::string token;
 
-  // Works until all units that are out have been acknowledged and `until` holds.
+  // Works until `until` holds. What it waits for may come without a message: a check of the denoised layers,
+  // or the final image, may end a job.
   bool run(const std::function<bool()>& until) {
     while (!until()) {
-      const auto letter = ticks ? mail_->take([this] { coordinator_.tick(); }) : mail_->take();
+      bool holds = false;
+      const auto letter = mail_->take([&] {
+        if (ticks) coordinator_.tick();
+        return holds = until();
+      });
+      if (holds) return true;
       if (!letter) {
         ADD_FAILURE() << "the farm stands still";
         return false;
@@ -142,31 +145,28 @@ class FakeFarm {
     }
     return true;
   }
+  bool work_until_paused(const JobId& job) {
+    return run([&] { return coordinator_.job(job)->state == JobState::paused; });
+  }
   bool finish(const JobId& job) {
-    const bool finished = run([&] {
+    const bool ended = run([&] {
       const auto state = coordinator_.job(job)->state;
-      if (state == JobState::failed || state == JobState::cancelled || state == JobState::done) return true;
-      // Everything is rendered: only the final image is missing, or an audit is still to come.
-      const auto all_done = [&] {
-        const auto view = coordinator_.job(job);
-        return view->state == JobState::running && view->units_done == view->units_total && mail_->empty();
-      };
-      while (all_done()) mail_->wait_a_moment();
-      return coordinator_.job(job)->state == JobState::done;
+      return state == JobState::failed || state == JobState::cancelled || state == JobState::done;
     });
-    // A job can be done before the letters of its last units are read; a refusal may be among them.
+    // A job can end before the letters of its last units are read; a refusal may be among them.
     for (const ToWorker& letter : mail_->acks()) note_refusal(letter);
-    return finished;
+    return ended;
   }
   std::vector<std::unique_ptr<WorkerSession>>& sessions() { return sessions_; }
 
   void brief(const AssignLease& assign) {
     if (assign.brief) briefs_[assign.lease.job] = *assign.brief;
   }
-  UnitResult render_unit(const Lease& lease, const LeaseUnit& unit) {
+  UnitResult render_unit(const Lease& lease, const LeaseUnit& unit,
+                         std::string_view numeric_class = "fake class") {
     const JobBrief& brief = briefs_.at(lease.job);
     const Partial partial =
-        fake_partial({brief.scene, brief.settings_digest, sha256("fake class"), unit.rect, unit.samples},
+        fake_partial({brief.scene, brief.settings_digest, sha256(numeric_class), unit.rect, unit.samples},
                      aovs_of(brief.settings));
     UnitResult r;
     r.unit = {lease.job, unit.tile, unit.round};
@@ -224,6 +224,21 @@ inline JobId submit(Coordinator& coordinator, JobSpec spec = {}) {
   return id.value_or(JobId{});
 }
 
+// A job whose coordinator dies, without a shutdown, once its workers have handed in so many results.
+inline JobId interrupted(const std::filesystem::path& data, int results, int workers, JobSpec spec = {}) {
+  auto coordinator = open_at(data);
+  const JobId job = submit(*coordinator, std::move(spec));
+  FakeFarm farm(*coordinator, workers);
+  farm.stop_after = results;
+  farm.finish(job);
+  return job;
+}
+
+// Whether the job ends, rendered by so many honest workers.
+inline bool finish(Coordinator& coordinator, const JobId& job, int workers = 1) {
+  return FakeFarm(coordinator, workers).finish(job);
+}
+
 inline Result<void> pause(Coordinator& coordinator, const JobId& job) {
   return coordinator.change(job, {.state = JobState::paused});
 }
@@ -250,8 +265,7 @@ inline std::string reference_pixels(std::optional<std::uint64_t> spp = {}) {
   JobSpec spec;
   spec.spp = spp;
   const JobId job = submit(*coordinator, spec);
-  FakeFarm farm(*coordinator, 1);
-  EXPECT_TRUE(farm.finish(job));
+  EXPECT_TRUE(finish(*coordinator, job));
   return pixels(*coordinator, job);
 }
 

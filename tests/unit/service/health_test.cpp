@@ -154,8 +154,7 @@ TEST(ServiceHealth, IsToldWithPlaceAndCommandInReportViewAndImage) {
 TEST(ServiceHealth, OfAHealthyJobIsClean) {
   auto coordinator = open_at({});
   const JobId job = submit_spp(*coordinator, 4);
-  FakeFarm farm(*coordinator, 1);
-  ASSERT_TRUE(farm.finish(job));
+  ASSERT_TRUE(finish(*coordinator, job));
   EXPECT_TRUE(coordinator->job(job)->health.clean());
   EXPECT_EQ(report(*coordinator, job)["health"]["clean"], true);
   const auto image = coordinator->image_exr(job).value();

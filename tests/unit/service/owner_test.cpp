@@ -3,6 +3,7 @@
 
 #include <mutex>
 
+#include "tests/support/fake_clock.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -68,8 +69,7 @@ TEST(Owner, IsWithEveryEventOfTheJobToItsRemoval) {
     heard.notify_all();
   });
   const JobId id = submit_as(*coordinator, "anna");
-  FakeFarm farm(*coordinator, 1);
-  ASSERT_TRUE(farm.finish(id));
+  ASSERT_TRUE(finish(*coordinator, id));
   ASSERT_TRUE(coordinator->remove(id));
 
   std::unique_lock lock(mutex);

@@ -1,47 +1,21 @@
 // More results than there is room for: they wait in the streams of their workers.
 #include <gtest/gtest.h>
 
-#include <condition_variable>
 #include <mutex>
 #include <thread>
 
 #include "coordinator/base/limits.h"
 #include "coordinator/domain/limits.h"
 #include "tests/unit/service/fake_farm.h"
+#include "tests/unit/service/gate_clock.h"
 #include "tests/unit/store/temp_folder.h"
 
 namespace ls::coordinator {
 namespace {
 
-// Moves by hand; while it is shut nobody but its maker gets past now(), so that no result is checked.
-class Gate final : public Clock {
- public:
-  TimePoint now() const override {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return !shut_ || std::this_thread::get_id() == maker_; });
-    return at_;
-  }
-  void shut(bool is) {
-    const std::lock_guard lock(mutex_);
-    shut_ = is;
-    changed_.notify_all();
-  }
-  void advance(Duration by) {
-    const std::lock_guard lock(mutex_);
-    at_ += by;
-  }
-
- private:
-  const std::thread::id maker_ = std::this_thread::get_id();
-  mutable std::mutex mutex_;
-  mutable std::condition_variable changed_;
-  bool shut_ = false;
-  TimePoint at_{std::chrono::hours(1)};
-};
-
 TEST(Pressure, ResultsThatFindNoRoomWaitAndTheirLeasesDoNotPass) {
   TempFolder dir;
-  auto clock = std::make_shared<Gate>();
+  auto clock = std::make_shared<GateClock>();
   Coordinator::Options options;
   options.data = dir.path();
   options.clock = clock;

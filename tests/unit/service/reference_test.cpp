@@ -119,8 +119,7 @@ TEST(ServiceReference, SurvivesARestart) {
       farm.finish(job);
     }
     auto coordinator = open_at(dir.path() / std::to_string(k));
-    FakeFarm farm(*coordinator, 1);
-    ASSERT_TRUE(farm.finish(job));
+    ASSERT_TRUE(finish(*coordinator, job));
     EXPECT_EQ(truths(*coordinator, job), expected) << k;
   }
 }
@@ -174,8 +173,7 @@ TEST(ServiceReference, IsNotNeededForMaps) {
   spec.spp = 4;
   const JobId job = submit(*coordinator, spec);
   EXPECT_TRUE(coordinator->error_png(job));  // nothing is rendered yet
-  FakeFarm farm(*coordinator, 1);
-  ASSERT_TRUE(farm.finish(job));
+  ASSERT_TRUE(finish(*coordinator, job));
   EXPECT_TRUE(coordinator->error_png(job));
   EXPECT_TRUE(coordinator->samples_png(job));
   EXPECT_FALSE(coordinator->samples_png({"j-none"}));

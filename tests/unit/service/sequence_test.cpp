@@ -27,8 +27,7 @@ std::string pixels_with_seed(std::uint64_t seed, std::uint64_t spp = 4) {
   spec.seed = seed;
   spec.spp = spp;
   const JobId job = submit(*coordinator, spec);
-  FakeFarm farm(*coordinator, 1);
-  EXPECT_TRUE(farm.finish(job));
+  EXPECT_TRUE(finish(*coordinator, job));
   return pixels(*coordinator, job);
 }
 
@@ -58,9 +57,7 @@ TEST(Sequence, IsOneJobWhoseFramesHaveThePixelsOfJobsOfTheirOwn) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   const JobId id = submit(*coordinator, frames(3, 5));
-  FakeFarm farm(*coordinator, 2);
-
-  ASSERT_TRUE(farm.finish(id));
+  ASSERT_TRUE(finish(*coordinator, id, 2));
 
   ASSERT_EQ(coordinator->jobs().size(), 1u);
   const JobView view = coordinator->job(id).value();
@@ -124,9 +121,7 @@ TEST(Sequence, SurvivesAKillInTheMiddle) {
   EXPECT_GE(back.units_done, before);
   EXPECT_EQ(back.frames->all.size(), 4u);
   EXPECT_EQ(to_string(back.frames->range), "1-4");
-  FakeFarm farm(*coordinator, 1);
-
-  ASSERT_TRUE(farm.finish(id));
+  ASSERT_TRUE(finish(*coordinator, id));
 
   for (std::uint32_t frame = 1; frame <= 4; ++frame)
     EXPECT_EQ(pixels(*coordinator, frame_job(id, frame)), pixels_with_seed(frame)) << frame;
@@ -294,9 +289,7 @@ TEST(Sequence, ItsEventsAreItsOwnAndItsFrames) {
     if (e.type == "job" && e.job == id.value) last = nlohmann::json::parse(e.data);
     told_more.notify_all();
   });
-  FakeFarm farm(*coordinator, 1);
-
-  ASSERT_TRUE(farm.finish(id));
+  ASSERT_TRUE(finish(*coordinator, id));
 
   std::unique_lock lock(mutex);
   ASSERT_TRUE(told_more.wait_for(lock, std::chrono::seconds(20),

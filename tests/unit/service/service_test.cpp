@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "common/base/log.h"
+#include "tests/support/fake_clock.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"
 
@@ -20,9 +21,7 @@ TEST(Service, RendersAJobOnDiskToThePixelsOfOneInMemory) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
   const JobId job = submit(*coordinator);
-  FakeFarm farm(*coordinator, 2);
-
-  ASSERT_TRUE(farm.finish(job));
+  ASSERT_TRUE(finish(*coordinator, job, 2));
 
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels());
   const auto r = report(*coordinator, job);
@@ -78,14 +77,7 @@ TEST(Service, ARestartAtAnyPointLosesNothingThatCounts) {
   const std::string expected = reference_pixels();
   for (int k = 0; k <= 8; ++k) {
     TempFolder dir;
-    JobId job;
-    {
-      auto coordinator = open_at(dir.path());
-      job = submit(*coordinator);
-      FakeFarm farm(*coordinator, 1);
-      farm.stop_after = k;
-      farm.finish(job);
-    }  // no shutdown: what is in flight is dropped
+    const JobId job = interrupted(dir.path(), k, 1);
     auto coordinator = open_at(dir.path());
     ASSERT_TRUE(coordinator->job(job)) << k;
     FakeFarm farm(*coordinator, 1);  // with two, units that move to the idle one are rendered by both
@@ -99,21 +91,13 @@ TEST(Service, ASegmentCutAtAnyByteIsRenderedAgainToTheSamePixels) {
   const std::string expected = reference_pixels();
   for (const double share : {0.0, .13, .5, .77, .999}) {
     TempFolder dir;
-    JobId job;
-    {
-      auto coordinator = open_at(dir.path());
-      job = submit(*coordinator);
-      FakeFarm farm(*coordinator, 1);
-      farm.stop_after = 6;
-      farm.finish(job);
-    }
+    const JobId job = interrupted(dir.path(), 6, 1);
     const auto segment = dir.path() / "jobs" / job.value / "partials-000.seg";
     const auto size = static_cast<double>(std::filesystem::file_size(segment));
     std::filesystem::resize_file(segment, static_cast<std::uintmax_t>(size * share));
 
     auto coordinator = open_at(dir.path());
-    FakeFarm farm(*coordinator, 1);
-    ASSERT_TRUE(farm.finish(job)) << share;
+    ASSERT_TRUE(finish(*coordinator, job)) << share;
     EXPECT_EQ(pixels(*coordinator, job), expected) << share;
   }
 }
@@ -181,10 +165,7 @@ TEST(Service, AnExtendedJobHasTheBitsOfOneRenderedAtOnce) {
     JobSpec spec;
     spec.spp = 11;  // 12: the last round is cut
     const JobId job = submit(*coordinator, spec);
-    {
-      FakeFarm farm(*coordinator, 1);
-      ASSERT_TRUE(farm.finish(job));
-    }
+    ASSERT_TRUE(finish(*coordinator, job));
     EXPECT_EQ(pixels(*coordinator, job), reference_pixels(12));
     if (restart) {
       coordinator.reset();
@@ -194,8 +175,7 @@ TEST(Service, AnExtendedJobHasTheBitsOfOneRenderedAtOnce) {
     ASSERT_TRUE(extend(*coordinator, job, 70));
     EXPECT_EQ(coordinator->job(job)->state, JobState::running);
 
-    FakeFarm farm(*coordinator, 2);
-    ASSERT_TRUE(farm.finish(job));
+    ASSERT_TRUE(finish(*coordinator, job, 2));
 
     EXPECT_EQ(pixels(*coordinator, job), reference_pixels(70));
     EXPECT_EQ(report(*coordinator, job)["spp"], 70);
@@ -219,23 +199,13 @@ TEST(Service, ACancelledJobIgnoresResults) {
   EXPECT_EQ(extend(*coordinator, job, 64).error().code, Errc::failed_precondition);
 }
 
-// Read by the service's threads while the test moves it.
-class SharedClock final : public Clock {
- public:
-  TimePoint now() const override { return TimePoint{Duration{at_.load()}}; }
-  void advance(Duration d) { at_ += d.count(); }
-
- private:
-  std::atomic<std::int64_t> at_{0};
-};
-
 TEST(Service, ARestartFromASnapshotAndWhatCameAfterItGivesTheSamePixels) {
   const std::string expected = reference_pixels();
   for (int k = 2; k <= 8; k += 2) {
     TempFolder dir;
     JobId job;
     {
-      const auto clock = std::make_shared<SharedClock>();
+      const auto clock = std::make_shared<FakeClock>();
       Coordinator::Options options;
       options.data = dir.path();
       options.clock = clock;
@@ -256,8 +226,7 @@ TEST(Service, ARestartFromASnapshotAndWhatCameAfterItGivesTheSamePixels) {
       ASSERT_TRUE(std::filesystem::exists(snapshot)) << k;
     }
     auto coordinator = open_at(dir.path());
-    FakeFarm farm(*coordinator, 1);
-    ASSERT_TRUE(farm.finish(job));
+    ASSERT_TRUE(finish(*coordinator, job));
     EXPECT_EQ(pixels(*coordinator, job), expected) << k;
     EXPECT_EQ(coordinator->convergence(job)->size(), 4u) << k;
   }
@@ -316,17 +285,9 @@ TEST(Service, ATargetErrorStopsTheJobAndSurvivesARestart) {
   ASSERT_EQ(report(*whole, at_once)["stopped"], "error");
 
   TempFolder dir;
-  JobId job;
-  {
-    auto coordinator = open_at(dir.path());
-    job = submit(*coordinator, spec);
-    FakeFarm farm(*coordinator, 2);
-    farm.stop_after = 9;
-    farm.finish(job);
-  }
+  const JobId job = interrupted(dir.path(), 9, 2, spec);
   auto coordinator = open_at(dir.path());
-  FakeFarm farm(*coordinator, 2);
-  ASSERT_TRUE(farm.finish(job));
+  ASSERT_TRUE(finish(*coordinator, job, 2));
   EXPECT_EQ(pixels(*coordinator, job), pixels(*whole, at_once));
   EXPECT_LE(report(*coordinator, job)["relmse"].get<double>(), .003);
 }

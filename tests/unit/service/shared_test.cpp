@@ -7,6 +7,7 @@
 
 #include "coordinator/store/blobs/memory_blobs.h"
 #include "tests/support/eventually.h"
+#include "tests/support/fake_clock.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/service/moving_store.h"
 #include "tests/unit/store/temp_folder.h"
@@ -28,19 +29,9 @@ class FarBlobs final : public MemoryBlobs {
   }
 };
 
-// Moved while the service's threads look at it.
-class CommonClock final : public Clock {
- public:
-  TimePoint now() const override { return TimePoint{} + Duration{now_.load()}; }
-  void advance(Duration d) { now_ += d.count(); }
-
- private:
-  std::atomic<Duration::rep> now_{0};
-};
-
 struct Shared : ::testing::Test {
   TempFolder folder;
-  std::shared_ptr<CommonClock> clock = std::make_shared<CommonClock>();
+  std::shared_ptr<FakeClock> clock = std::make_shared<FakeClock>();
   std::shared_ptr<FarBlobs> blobs = std::make_shared<FarBlobs>();
   std::shared_ptr<MovingStore> store = std::make_shared<MovingStore>();
   std::unique_ptr<Coordinator> coordinator = open();
@@ -90,8 +81,7 @@ TEST_F(Shared, ATakeoverWaitsForBlobsThatDoNotAnswerAndIsThenMade) {
   }));
 
   EXPECT_NE(coordinator->job(job.id)->state, JobState::failed) << coordinator->job(job.id)->error;
-  FakeFarm farm(*coordinator, 1);
-  ASSERT_TRUE(farm.finish(job.id));
+  ASSERT_TRUE(finish(*coordinator, job.id));
   EXPECT_EQ(pixels(*coordinator, job.id), reference_pixels(16));
 }
 
@@ -156,8 +146,7 @@ TEST_F(Shared, AnInheritedJobBeginsWithNothingThatLayHere) {
 
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "jobs" / job.id.value / "film.snap"));
   EXPECT_EQ(coordinator->job(job.id)->units_done, 0u);
-  FakeFarm farm(*coordinator, 1);
-  ASSERT_TRUE(farm.finish(job.id));
+  ASSERT_TRUE(finish(*coordinator, job.id));
   EXPECT_EQ(pixels(*coordinator, job.id), reference_pixels(32));
 }
 

@@ -85,8 +85,7 @@ TEST(Trust, WhatALiarLeftInTheLogIsNotTakenUpAfterARestart) {
   }
 
   auto coordinator = open_audited(folder.path(), 0);
-  FakeFarm farm(*coordinator, 2);
-  ASSERT_TRUE(farm.finish(job));
+  ASSERT_TRUE(finish(*coordinator, job, 2));
 
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels(512));
 }
@@ -131,8 +130,7 @@ TEST(Trust, AnAuditUnderWayIsGoneOnWithAfterARestart) {
   }
 
   auto coordinator = open_audited(folder.path(), 0);
-  FakeFarm farm(*coordinator, 3);
-  ASSERT_TRUE(farm.finish(job));
+  ASSERT_TRUE(finish(*coordinator, job, 3));
 
   EXPECT_GE(coordinator->audits().equal, 1u);
   EXPECT_EQ(coordinator->audits().workers_quarantined, 1u) << "one result was wrong";

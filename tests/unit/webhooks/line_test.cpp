@@ -1,6 +1,6 @@
-#include "coordinator/webhooks/line.h"
-
 #include <gtest/gtest.h>
+
+#include "coordinator/webhooks/webhook_outbox.h"
 
 namespace ls::coordinator::webhooks {
 namespace {

@@ -14,6 +14,8 @@
 #include "common/base/digest.h"
 #include "common/base/secret.h"
 #include "coordinator/base/limits.h"
+#include "tests/support/eventually.h"
+#include "tests/support/span_collector.h"
 
 namespace ls::coordinator {
 namespace {
@@ -25,13 +27,13 @@ constexpr const char* kScene = R"(<scene version="3.0.0">
 // A receiver that answers as it is told, and remembers what came.
 class Receiver {
  public:
-  Result<int> take(const webhooks::Post& post) {
+  Result<HttpAnswer> take(const HttpPost& post) {
     const std::lock_guard lock(mutex_);
     posts_.push_back(post);
     came_.notify_all();
-    return answer;
+    return HttpAnswer{answer, ""};
   }
-  std::vector<webhooks::Post> wait_for(std::size_t count) {
+  std::vector<HttpPost> wait_for(std::size_t count) {
     std::unique_lock lock(mutex_);
     EXPECT_TRUE(came_.wait_for(lock, std::chrono::seconds(60), [&] { return posts_.size() >= count; }));
     return posts_;
@@ -41,10 +43,10 @@ class Receiver {
  private:
   std::mutex mutex_;
   std::condition_variable came_;
-  std::vector<webhooks::Post> posts_;
+  std::vector<HttpPost> posts_;
 };
 
-std::string header(const webhooks::Post& post, const std::string& name) {
+std::string header(const HttpPost& post, const std::string& name) {
   for (const auto& [key, value] : post.headers)
     if (key == name) return value;
   return "";
@@ -76,7 +78,7 @@ class WebhooksTest : public ::testing::Test {
                                         folder_ / "outbox",
                                         std::make_shared<SystemClock>(),
                                         [] { return 1700000000.5; },
-                                        [&](const webhooks::Post& post) { return receiver.take(post); }});
+                                        [&](const HttpPost& post) { return receiver.take(post); }});
     EXPECT_TRUE(started);
     return std::move(*started);
   }
@@ -85,7 +87,7 @@ class WebhooksTest : public ::testing::Test {
     EXPECT_TRUE(id);
     return *id;
   }
-  std::vector<std::string> events(const std::vector<webhooks::Post>& posts) {
+  std::vector<std::string> events(const std::vector<HttpPost>& posts) {
     std::vector<std::string> names;
     for (const auto& post : posts) names.push_back(header(post, "Lightshaft-Event"));
     return names;
@@ -123,6 +125,42 @@ TEST_F(WebhooksTest, SignsTimeAndBodyWithTheSecret) {
 
   EXPECT_EQ(header(post, "Lightshaft-Signature"),
             "t=1700000000,v1=" + hmac_sha256("the secret", "1700000000." + post.body));
+}
+
+TEST_F(WebhooksTest, OfATracedJobCarriesTheSpanOfItsDelivery) {
+  test::SpanCollector collector;
+  const auto tracer = collector.tracer();
+  coordinator_.reset();
+  Coordinator::Options options;
+  options.data = folder_ / "data";
+  options.tracer = tracer;
+  coordinator_ = std::move(*Coordinator::open(std::move(options)));
+  Receiver receiver;
+  receiver.answer = 500;
+  {
+    const auto webhooks =
+        Webhooks::start(*coordinator_, {{"http://receiver/hook?key=secret"},
+                                        "the secret",
+                                        folder_ / "outbox",
+                                        std::make_shared<SystemClock>(),
+                                        [] { return 1700000000.5; },
+                                        [&](const HttpPost& post) { return receiver.take(post); },
+                                        tracer});
+    const JobId job = submit();
+    receiver.wait_for(1);
+    EXPECT_TRUE(coordinator_->trace_of(job));
+  }
+  const auto told = trace::parse_traceparent(header(receiver.wait_for(1)[0], "traceparent"));
+  const auto job = coordinator_->trace_of(coordinator_->jobs().front().id);
+  ASSERT_TRUE(told && job);
+  EXPECT_EQ(told->trace, job->trace);
+
+  ASSERT_TRUE(test::eventually([&] { return !collector.named("deliver webhook").empty(); }));
+  const auto span = collector.named("deliver webhook").at(0);
+  EXPECT_EQ(span.id, hex(told->span));
+  EXPECT_EQ(span.parent, hex(job->span));
+  EXPECT_EQ(span.json["status"]["code"], 2);
+  EXPECT_EQ(span.json.dump().find("secret"), std::string::npos);
 }
 
 // RFC 4231, test case 2.
@@ -191,8 +229,8 @@ TEST_F(WebhooksTest, DoesNotTellOfJobsFromBeforeItWasAskedTo) {
 TEST_F(WebhooksTest, RefusesWhatIsNoWebAddress) {
   for (const char* url :
        {"file:///etc/passwd", "gopher://a", "receiver/hook", "http://a b/", "http://a\r\nX: y"})
-    EXPECT_FALSE(webhooks::check_url(url)) << url;
-  EXPECT_TRUE(webhooks::check_url("https://receiver.example/hook?x=1"));
+    EXPECT_FALSE(check_http_url(url, "--webhook")) << url;
+  EXPECT_TRUE(check_http_url("https://receiver.example/hook?x=1", "--webhook"));
 }
 
 TEST_F(WebhooksTest, WhatWentByUnseenIsToldAfterAll) {
@@ -212,7 +250,7 @@ TEST_F(WebhooksTest, WhatWentByUnseenIsToldAfterAll) {
                                           folder_ / "outbox",
                                           std::make_shared<SystemClock>(),
                                           [] { return 1700000000.5; },
-                                          [&](const webhooks::Post& post) { return receiver.take(post); }});
+                                          [&](const HttpPost& post) { return receiver.take(post); }});
   ASSERT_TRUE(webhooks);
 
   ASSERT_TRUE(farm->cancel(ends));

@@ -1,4 +1,5 @@
-// Fixed answers of a coordinator, for the storybook and its tests. The shapes are those of the HTTP interface.
+// Fixed answers of a coordinator, for the storybook and its tests. They have the form of the HTTP interface's
+// answers.
 
 const kNow = 1765000000; // unix seconds
 
@@ -16,7 +17,7 @@ const half = {
 
 const kTrusted = { kind: "converging", words: "converging as expected", trusted: true };
 const kHeavy = { kind: "heavy_tail", words: "don't trust yet: few pixels carry the error (like 16 of 230400; the worst one 25 %); bright outliers may still be missing", trusted: false };
-// Only its target ends it, and a few bright pixels keep its error from being known.
+// Only its target ends this job, and its error is unknown because of a few bright pixels.
 const untrusted = {
   progress: 0.071, spp: 65536, spp_asked: null, spp_done: 36, rmse: 0.0921, rmse_ci95: [0.0876, 0.0968], relmse: 0.0386, relmse_ci95: [0.0351, 0.0424], target_error: 0.005,
   eta_seconds: 4310, eta_ci95: [3200, 6100], eta_with_more: { workers: 8, seconds: 1140, ci95: [850, 1600] }, units_done: 2448, units_total: 34680, elapsed_seconds: 880, core_seconds: 3490,
@@ -46,7 +47,7 @@ export const unhealthy = job("j-7f3a91c2", "steam-bath.xml", "running", {
   warnings: ["steam-bath.xml:31:9: warning: 'strict_normals' means nothing here and is ignored", "steam-bath.xml:52:5: warning: 37 voxels of \"steam\" were negative and became 0"],
 });
 
-// A sequence, and the one of its frames that is shown.
+// A sequence, and the frame of it that is shown.
 const kSequence = "j-3d90be12";
 const frameState = (frame) => (frame < 5 ? "done" : frame === 5 ? "running" : frame === 9 ? "failed" : "queued");
 const frameList = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10].map((frame) => ({
@@ -80,7 +81,7 @@ export const workers = [
   worker("w-5", "lab-04", { state: "lost", activity: "", job: "", units_done: 17, cpu_seconds: 70, rss_bytes: null, last_seen_seconds: 372 }),
 ];
 
-// Error falls as 1/time, with the scatter of a real run; [seconds, relative scatter].
+// Points of a run: the error falls as 1/time, with the scatter of a real run; [seconds, relative scatter].
 const kRun = [[0.9, 1.06], [1.8, 0.97], [3.6, 1.03], [7.1, 1.01], [14.4, 0.985], [28.6, 1.02], [57.8, 0.99], [116, 1.01], [187, 1]];
 export const report = {
   target_error: 0.001, slope: -0.98, slope_ci95: [-1.06, -0.9], trend: "converging as expected", trusted: true, verdict: "converging as expected", verdict_kind: "converging",
@@ -100,7 +101,7 @@ export const untrustedReport = {
 };
 export const doubtful = { ...report, trusted: false, verdict_kind: "heavy_tail", verdict: "Don't trust this estimate yet: a few pixels carry most of the error." };
 
-// With a reference, the true error stands beside the estimate.
+// With a reference, the true error is shown beside the estimate.
 export const compared = { ...report, convergence: report.convergence.map((p, i) => ({ ...p, true_relmse: p.relmse * (1.06 - 0.02 * (i % 4)), true_rmse: p.rmse, true_flip: 0.4 / Math.sqrt(p.spp) })) };
 export const comparedJob = job("j-7f3a91c2", "steam-bath.xml", "running", { ...half, submitted_unix: kNow - 240, few_hits: 12, reference: { rmse: 0.0319, relmse: 0.00443, flip: 0.0271 } });
 

@@ -1,7 +1,8 @@
 // The storybook: demo.html?view=NAME shows one view from fixed data, without a farm; demo.html lists them.
 import "../js/live_image.js";
+import "../js/viewer/float_view.js";
 import { h, patch } from "../js/dom.js";
-import { withOpen, withUi } from "../js/state.js";
+import { withList, withOpen, withUi, withViewer } from "../js/state.js";
 import { page } from "../js/views/shell.js";
 import { paint, paintMap } from "./picture.js";
 import { stories } from "./stories.js";
@@ -19,6 +20,9 @@ function show(state) {
     toggleTiles: () => set(withOpen(state, { showTiles: !state.open.showTiles })),
     setLayer: (layer) => set(withOpen(state, { layer })),
     setClock: (clock) => set(withOpen(state, { clock, picked: null })),
+    look: (more) => set(withViewer(state, { view: { ...state.viewer.view, ...more } })),
+    thumbnail: () => async () => paint(80, 45, 1, 0),
+    pickJob: (id) => set(withList(state, { picked: new Set([...state.list.picked, id]) })),
     image: imageOf(state),
   };
   // Every other action needs a farm.

@@ -1,7 +1,7 @@
-// A stand-in for a render: shafts of light through a dusty room, painted by a formula. Where a tile has few samples it is
-// noisy, so the storybook's image looks like one that fills in. Deterministic.
+// A stand-in for a render: shafts of light through a dusty room, computed from a formula. Tiles with few
+// samples are noisy, so the storybook's image looks like one that is being rendered. Deterministic.
 
-function hash(x, y, k) {
+export function hash(x, y, k) {
   let n = Math.imul(x, 374761393) ^ Math.imul(y, 668265263) ^ Math.imul(k, 2147483629);
   n = Math.imul(n ^ (n >>> 13), 1274126177);
   return ((n ^ (n >>> 16)) >>> 0) / 2 ** 32;
@@ -22,7 +22,7 @@ function shafts(u, v) {
   return light;
 }
 
-function radiance(u, v) {
+export function radiance(u, v) {
   const floor = smooth(0.78, 0.8, v);
   const beam = shafts(u, v);
   const pool = floor * shafts(u, v) * 1.7;

@@ -1,6 +1,10 @@
-// The views as the storybook shows them: a name -> a state. Made through the same functions as the live page.
+// The states of the page that the storybook shows, by name. They are made by the same functions as on the
+// live page.
 import * as data from "./data.js";
-import { initialState, openJob, withEvent, withJobs, withOpen, withSubmit, withTiles, withUi, withWorkers } from "../js/state.js";
+import { kPlain } from "../js/viewer/address.js";
+import { numbers } from "./numbers.js";
+import { kWholeList } from "../js/job_list.js";
+import { initialState, openJob, withEvent, withJobs, withList, withListed, withOpen, withSubmit, withTiles, withUi, withWorkers } from "../js/state.js";
 
 const signedIn = (route = { view: "jobs", id: null, frame: null }) => ({ ...initialState(), me: { role: "admin", user: "" }, session: "in", link: "live", route });
 const farm = (route) => withWorkers(withJobs(signedIn(route), data.jobs), data.workers);
@@ -13,6 +17,12 @@ function jobPage(id, more = {}, jobs = data.jobs) {
 function rendering() {
   const state = withTiles(jobPage("j-7f3a91c2"), data.tiles);
   return withEvent(withEvent(state, "tile", data.foldedTile(101, "lab-02")), "tile", data.foldedTile(102, "lab-01"));
+}
+
+function viewing(view, more = {}) {
+  const id = "j-91d2c3f4";
+  const state = farm({ view: "view", id, frame: null });
+  return { ...state, viewer: { id, view: { ...kPlain, ...view }, a: numbers(0.05), b: null, file: null, tool: "pan", probe: null, figures: null, flip: null, problem: null, changed: 0, ...more } };
 }
 
 const file = (path, bytes) => ({ path, file: { name: path.split("/").pop(), size: bytes } });
@@ -37,6 +47,8 @@ export const stories = {
   "jobs-empty": () => withWorkers(withJobs(signedIn(), []), []),
   jobs: () => farm(),
   "jobs-confirm": () => withUi(farm(), { confirming: "j-7f3a91c2" }),
+  "jobs-page": () => withListed(withList(withWorkers(signedIn(), data.workers), { asked: { ...kWholeList, states: ["running", "done"], page: 2 }, picked: new Set(["j-7f3a91c2", "j-91d2c3f4"]) }),
+    { jobs: data.jobs, total: 3214, states: { running: 12, queued: 80, paused: 1, done: 3080, failed: 30, cancelled: 11 }, owners: ["", "anna", "bert"] }),
   "jobs-lost": () => withUi({ ...farm(), link: "lost" }, { notice: "The coordinator does not answer. Is it still running, and is this machine on its network?" }),
   job: rendering,
   "job-reference": () => withTiles(jobPage("j-7f3a91c2", { report: data.compared }, [data.comparedJob]), data.tiles),
@@ -50,6 +62,12 @@ export const stories = {
   "job-failed": () => jobPage("j-c6e8b510", { report: null }),
   "job-unhealthy": () => withTiles(jobPage("j-7f3a91c2", { report: data.doubtful }, [data.unhealthy]), data.tiles),
   "job-unknown": () => ({ ...farm({ view: "job", id: "nope" }), open: { ...openJob("nope"), problem: "There is no job \"nope\"." } }),
+  viewer: () => viewing({ region: [300, 250, 420, 330] }, {
+    probe: { pixel: [233, 120], layer: "rgb", values: [0.7341, 0.5512, 0.3305], error: [0.0184, 0.0138, 0.0083], samples: 512 },
+    figures: { level: 0, mean: [0.2113, 0.1672, 0.1104], error: [0.0004, 0.0003, 0.0002], relmse: null } }),
+  "viewer-compare": () => viewing({ other: "j-0a4417bb", by: "wipe", split: 0.45, exposure: 1 }, { b: numbers(0.7) }),
+  "viewer-error": () => viewing({ layer: "error" }),
+  "viewer-objects": () => viewing({ layer: "crypto_object", matte: ["lamp"] }),
   workers: () => farm({ view: "workers", id: null }),
   "workers-empty": () => withWorkers(withJobs(signedIn({ view: "workers", id: null }), []), []),
   submit: () => farm({ view: "submit", id: null }),

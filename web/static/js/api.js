@@ -1,4 +1,5 @@
-// The one way to the coordinator's HTTP interface. Every failure becomes an ApiError whose message is for a person.
+// All requests to the coordinator's HTTP interface. Every failure becomes an ApiError whose message is for
+// the user.
 
 const kBase = "/api/v1";
 
@@ -42,11 +43,17 @@ export const api = {
   signOut: () => call("DELETE", "/session"),
   /** {role, user} of the session. */
   me: async () => (await call("GET", "/session")).json(),
-  jobs: async () => (await (await call("GET", "/jobs")).json()).jobs,
+  /** {jobs, total, states, owners} of a page, see job_list.js. */
+  list: async (parameters) => (await call("GET", `/jobs?${parameters}`)).json(),
   job: async (id) => (await call("GET", jobPath(id))).json(),
   tiles: async (id) => (await (await call("GET", `${jobPath(id)}/tiles`)).json()).tiles,
   report: async (id) => (await call("GET", `${jobPath(id)}/report`)).json(),
   workers: async () => (await (await call("GET", "/workers")).json()).workers,
+  remove: (id) => call("DELETE", jobPath(id)),
+  again: async (id, changes) => (await call("POST", `${jobPath(id)}/again`, json(changes))).json(),
+  thumbnail: async (id, signal) => createImageBitmap(await (await call("GET", `${jobPath(id)}/thumbnail.png`, { signal })).blob()),
+  /** Changes a job: {state, focus, ...}; what it is then. */
+  change: async (id, changes) => (await call("PATCH", jobPath(id), json(changes))).json(),
   setState: (id, state) => call("PATCH", jobPath(id), json({ state })),
   /** layer: "picture" or "denoised". */
   image: async (id, exposure, layer, signal) => {
@@ -55,6 +62,14 @@ export const api = {
   },
   /** kind: "error" or "samples". */
   map: async (id, kind, signal) => createImageBitmap(await (await call("GET", `${jobPath(id)}/${kind}.png`, { signal })).blob()),
+  /** {size, max_level, layers: [{name, channels, format, blocks, names}]}. */
+  layers: async (id) => (await call("GET", `${jobPath(id)}/layers`)).json(),
+  /** The numbers of a rectangle of a mip level, as an ArrayBuffer. */
+  pixels: async (id, layer, level, rect) =>
+    (await call("GET", `${jobPath(id)}/pixels?layer=${encodeURIComponent(layer)}&level=${level}&rect=${rect.join()}`)).arrayBuffer(),
+  /** {state, frames, frames_done, fps, exposure, bytes, error}. */
+  video: async (id) => (await call("GET", `${jobPath(id)}/video`)).json(),
+  makeVideo: async (id, asked) => (await call("POST", `${jobPath(id)}/video`, json(asked))).json(),
   missingBlobs: async (digests) => (await (await call("POST", "/blobs/missing", json({ digests }))).json()).missing,
   putBlob: (digest, body) =>
     call("PUT", `/blobs/${digest}`, { headers: { "Content-Type": "application/octet-stream" }, body }),
@@ -67,5 +82,7 @@ export const downloads = {
   report: (id) => `${kBase}${jobPath(id)}/report`,
   page: (id) => `${kBase}${jobPath(id)}/report.html`,
   csv: (id) => `${kBase}${jobPath(id)}/convergence.csv`,
+  thumbnail: (id, version) => `${kBase}${jobPath(id)}/thumbnail.png?v=${version}`,
+  video: (id) => `${kBase}${jobPath(id)}/video.mp4`,
   log: (id) => `${kBase}${jobPath(id)}/log`,
 };

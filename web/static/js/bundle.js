@@ -1,7 +1,7 @@
-// From dropped files to what a job needs: which file is the scene, which files it names, what is missing, what is not
-// used. Only what the scene names is sent.
+// Turns dropped files into a job: finds the scene among them, the files that it names, missing and unused
+// files. Only files that the scene names are sent.
 
-const kIncludeDepth = 15; // limits of the coordinator's reader
+const kIncludeDepth = 15; // the same limits as in the coordinator's reader
 const kIncludes = 256;
 
 /** Files of a drop or of an <input type=file>, with their paths: [{path, file}]. Folders are walked. */
@@ -20,7 +20,7 @@ async function walk(entry) {
   }
   const reader = entry.createReader();
   const children = [];
-  for (;;) { // readEntries hands out at most 100 at a time
+  for (;;) { // readEntries returns at most 100 entries per call
     const some = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
     if (some.length === 0) break;
     children.push(...some);
@@ -64,12 +64,12 @@ export async function plan(files, main) {
 
 /** What a scene names, found as the coordinator's reader finds it (common/scene/reader/load_document.cpp, reader.cpp). */
 class Survey {
-  found = new Map(); // name -> {path, file}
+  found = new Map(); // files found: name -> {path, file}
   missing = new Set();
   hasParameters = false;
   #files;
   #main;
-  #paths = []; // of <path>, the latest first
+  #paths = []; // folders of <path> elements, the latest first
   #strings = new Set();
   #includes = 0;
 

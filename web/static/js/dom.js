@@ -1,9 +1,10 @@
-// A view is a function of state that returns a tree of h(...) nodes; patch() makes the page look like it, touching only
-// what changed, so focus, scroll position and running animations survive. Text is only ever a text node: nothing here
-// parses markup.
+// A view is a function of the state that returns a tree of h(...) nodes. patch() makes the page match the
+// tree and changes only the differences, so focus, scroll position and running animations survive. Text
+// always becomes a text node: nothing here parses markup.
 
 const kSvg = "http://www.w3.org/2000/svg";
-const kNode = Symbol("node"); // marks what h() made: no JSON from elsewhere can have it, whatever its fields are called
+// Marks nodes made by h(): data from JSON cannot have this key, whatever its fields are called
+const kNode = Symbol("node");
 
 /**
  * h("a", {href, class, key, onclick, style: {"--x": 1}, ".prop": value}, ...children)
@@ -42,7 +43,8 @@ function patchChildren(parent, nodes) {
     nodeOf.set(element, node);
     return element;
   });
-  // What goes, goes first: then what stays is in its place already. Moving an element would restart its animation.
+  // Elements that disappear are removed first. The remaining ones are then already in place: moving an
+  // element would restart its animation.
   const staying = new Set(elements);
   for (const child of [...parent.childNodes]) if (!staying.has(child)) child.remove();
   elements.forEach((element, i) => {
@@ -86,7 +88,7 @@ function update(element, old, node) {
   for (const [name, value] of Object.entries(node.attributes)) {
     if (before[name] !== value) assign(element, name, value, before[name]);
   }
-  // An element that was never given children (a custom element) looks after its own.
+  // An element without children in any tree (a custom element) manages its own children.
   if (node.children.length > 0 || old?.children.length > 0) patchChildren(element, node.children);
 }
 

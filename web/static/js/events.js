@@ -1,6 +1,7 @@
-// The coordinator's event stream. After a lost connection the browser resumes by itself with Last-Event-ID; when the
-// coordinator was away for longer, or refused, a new stream is opened with growing pauses. onOpen is called after every
-// (re)connection and on `reset` (events were missed that are kept no longer): the caller then fetches fresh lists.
+// The coordinator's event stream. After a lost connection the browser resumes by itself with Last-Event-ID.
+// If the coordinator was away for longer, or rejected the request, a new stream is opened, after pauses that
+// grow. onOpen is called after every (re)connection and on `reset` (some missed events are no longer kept):
+// the caller then fetches complete lists.
 
 const kFirstPauseMs = 500;
 const kLongestPauseMs = 15000;
@@ -39,7 +40,7 @@ export function openEvents(handlers, url = "/api/v1/events") {
     try {
       data = JSON.parse(text);
     } catch {
-      return; // one malformed event must not stop the page; the next snapshot repairs what it said
+      return; // a malformed event must not stop the page; the next complete list corrects its data
     }
     handlers.onEvent(type, data);
   }

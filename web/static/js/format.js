@@ -1,4 +1,4 @@
-// Figures as people read them.
+// Figures as people read them. Reports (common/report/words.cpp) show them alike: tests/support/shown.json.
 
 export const kAbsent = "–";
 const kSuperscript = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
@@ -10,10 +10,9 @@ export const superscript = (n) => [...String(n)].map((c) => kSuperscript[c]).joi
 export function figure(x, digits = 3) {
   if (!known(x)) return kAbsent;
   if (x === 0) return "0";
-  const exponent = Math.floor(Math.log10(Math.abs(x)));
-  if (exponent >= -3 && exponent < 5) return x.toLocaleString("en", { minimumSignificantDigits: digits, maximumSignificantDigits: digits });
-  const [mantissa, power] = x.toExponential(digits - 1).split("e");
-  return `${mantissa} × 10${superscript(Number(power))}`;
+  const [mantissa, power] = x.toExponential(digits - 1).split("e"); // rounded first: 9.996 has the exponent of 10.0
+  if (power < -3 || power >= 5) return `${mantissa} × 10${superscript(Number(power))}`;
+  return x.toLocaleString("en", { minimumSignificantDigits: digits, maximumSignificantDigits: digits });
 }
 
 /** A figure that a person chose: with the digits it was given. */
@@ -41,7 +40,7 @@ export function bytes(n) {
     n /= 1024;
     i += 1;
   }
-  return `${i === 0 || n >= 100 ? Math.round(n) : n.toPrecision(2)} ${units[i]}`;
+  return `${i === 0 || n >= 100 ? Math.round(n) : n.toFixed(1)} ${units[i]}`;
 }
 
 export const count = (n) => (known(n) ? Math.round(n).toLocaleString("en") : kAbsent);
@@ -53,7 +52,7 @@ export function percent(x) {
   return x < 1 && whole === 100 ? "> 99 %" : `${whole} %`;
 }
 export const plural = (n, one, many = `${one}s`) => `${count(n)} ${n === 1 ? one : many}`;
-export const spp = (x) => (known(x) ? (x < 100 && x % 1 ? x.toFixed(1) : count(x)) : kAbsent);
+export const spp = (x) => (known(x) ? (x < 100 ? String(Math.round(10 * x) / 10) : count(x)) : kAbsent);
 export const exposure = (ev) => `${ev > 0 ? "+" : ev < 0 ? "−" : ""}${Math.abs(ev).toFixed(1)} EV`;
 export const shortId = (id) => (id.length > 12 ? id.slice(0, 8) : id);
 export const jobName = (job) => job.name || `job ${shortId(job.id)}`;

@@ -1,5 +1,8 @@
-// What a person can do to a job and to its page.
-import { withJob, withOpen, withUi } from "./state.js";
+// What the user can do with a job and its page.
+import { frameHref } from "./route.js";
+import { doneFrames, withJob, withOpen, withUi } from "./state.js";
+
+const kVideoPauseMs = 1000;
 
 export function makeJobActions({ get, set, attempt, api }) {
   async function change(id, wanted) {
@@ -10,15 +13,64 @@ export function makeJobActions({ get, set, attempt, api }) {
     set(job ? withJob(next, job) : next);
   }
 
+  const film = (more) => set(withOpen(get(), { film: more }));
+
+  /** The frame that is seen becomes the one that the page shows; the address says so without a new step in its history. */
+  function settleFilm() {
+    const { open, jobs } = get();
+    const frame = open?.film && jobs.get(open.id)?.frames?.list?.find((one) => one.id === open.film.id);
+    if (frame) turnTo(frameHref(open.id, frame.frame));
+  }
+
+  /** What is seen of the film stays until the page shows the frame: main.js ends it when the address changes. */
+  function turnTo(href) {
+    const { film: before } = get().open;
+    if (window.location.hash === href) film(null);
+    else {
+      if (before) film({ ...before, playing: false });
+      window.location.replace(href);
+    }
+  }
+
+  function playFilm() {
+    const { open, jobs } = get();
+    if (open.film?.playing) return settleFilm();
+    const done = doneFrames(jobs.get(open.id));
+    const from = done.find((frame) => frame.id === (open.film?.id ?? open.shown)) ?? done[0];
+    return film({ id: from.id, playing: true });
+  }
+
+  /** Asks for the video again and again until it is made, as long as the page of its sequence is open. */
+  async function watchVideo(id, answer) {
+    const video = await answer.catch((error) => ({ state: "failed", error: error.message }));
+    if (!video || get().open?.id !== id) return;
+    set(withOpen(get(), { video }));
+    if (video.state === "waiting" || video.state === "making") setTimeout(() => (get().open?.id === id ? watchVideo(id, api.video(id)) : null), kVideoPauseMs);
+  }
+
+  const pictureOf = (id, exposure, signal) => {
+    const { layer } = get().open;
+    return layer === "picture" || layer === "denoised" ? api.image(id, exposure, layer, signal) : api.map(id, layer, signal);
+  };
+
   return {
+    playFilm,
+    settleFilm,
+    scrubFilm: (id) => film({ id, playing: false }),
+    turnFilm: (id) => (get().open?.film?.playing ? film({ id, playing: true }) : null),
+    setFps: (fps) => set(withOpen(get(), { fps })),
+    showFrameOf: (id, frame) => turnTo(frameHref(id, frame)),
+    filmPicture: (id, signal) => pictureOf(id, get().open.exposure, signal),
+    /** Of a sequence that was opened: there may be a video already, or one is being made. */
+    openVideo: (id) => watchVideo(id, api.video(id).catch(() => null)),
+    makeVideo: (id) => {
+      const { exposure, fps, layer } = get().open;
+      return watchVideo(id, api.makeVideo(id, { exposure, fps, ...(layer === "denoised" ? { layer } : {}) }));
+    },
     setState: change,
     cancel: (id) => change(id, "cancelled"),
     confirm: (id) => set(withUi(get(), { confirming: id })),
-    image: (exposure, signal) => {
-      const { shown, layer } = get().open;
-      if (layer === "picture" || layer === "denoised") return api.image(shown, exposure, layer, signal);
-      return api.map(shown, layer, signal);
-    },
+    image: (exposure, signal) => pictureOf(get().open.shown, exposure, signal),
     setLayer: (layer) => set(withOpen(get(), { layer })),
     setClock: (clock) => set(withOpen(get(), { clock, picked: null })),
     onExposure: (event) => set(withOpen(get(), { exposure: Number(event.currentTarget.value) })),

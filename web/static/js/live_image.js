@@ -1,21 +1,22 @@
-// <live-image>: paints what `source(exposure, signal)` gives (an ImageBitmap or canvas), again whenever `version` or
-// `exposure` changes, with at most one request under way and a pause that grows with the request's cost. A new exposure
-// shows at once, approximated by brightness, until the coordinator's own picture arrives.
+// <live-image>: shows the ImageBitmap or canvas that `source(exposure, signal)` returns. It requests it again
+// when `version` or `exposure` changes, with at most one request in progress and a pause that grows with the
+// request's duration. A new exposure is shown immediately, approximated by brightness, until the
+// coordinator's own picture arrives.
 
 const kShortestPauseMs = 400;
-const kPausePerCost = 3; // a picture that took 1 s is not asked for again within 3 s
-const kFirstRetryMs = 500; // after a failure, doubled by each further one
+const kPausePerCost = 3; // pause per duration of a request: after one of 1 s the next begins 3 s later
+const kFirstRetryMs = 500; // pause after the first failure; doubled by each further one
 const kLongestRetryMs = 15_000;
 
 class LiveImage extends HTMLElement {
   #canvas = document.createElement("canvas");
   #values = { source: null, version: null, exposure: 0, size: 0 };
   #shown = null; // {version, exposure} of the picture on the canvas
-  #request = null; // AbortController of the request under way
+  #request = null; // AbortController of the request in progress
   #timer = 0;
-  #notBefore = 0; // performance.now()
-  #failures = 0; // in a row, of what is wanted now
-  #retryAt = 0; // performance.now()
+  #notBefore = 0; // time by performance.now() before which no request is made
+  #failures = 0; // number of consecutive failures for the wanted picture
+  #retryAt = 0; // time of the next attempt, by performance.now()
 
   connectedCallback() {
     this.append(this.#canvas);
@@ -33,7 +34,7 @@ class LiveImage extends HTMLElement {
     this.#values.version = version;
     this.#schedule();
   }
-  set size(size) { // width * 65536 + height, one number so that equal sizes compare equal
+  set size(size) { // width * 65536 + height: as one number, equal sizes compare equal
     this.#canvas.width = Math.floor(size / 65536);
     this.#canvas.height = size % 65536;
   }
@@ -69,8 +70,9 @@ class LiveImage extends HTMLElement {
       this.#shown = { version, exposure };
       this.#failures = 0;
     } catch {
-      // Nothing folded yet, or a hiccup: the last picture stays, and it is asked for again, ever more rarely, or at the
-      // next change. The page's own status says when the coordinator is away.
+      // There may be no samples yet, or a temporary failure. The last picture stays, and a new one is
+      // requested at growing intervals, or at the next change. The page's own status shows when the
+      // coordinator is unreachable.
       this.#retryAt = performance.now() + Math.min(kFirstRetryMs * 2 ** this.#failures, kLongestRetryMs);
       this.#failures += 1;
     }

@@ -1,16 +1,23 @@
-// Wires the page: one state, the actions that change it, the routes, the event stream.
+// Connects the parts of the page: the state, the actions that change it, the routes, the event stream.
+import "./film.js";
 import "./live_image.js";
+import "./viewer/float_view.js";
 import { api } from "./api.js";
 import { patch } from "./dom.js";
 import { openEvents } from "./events.js";
 import { routeOf, takeToken } from "./route.js";
+import { makeAgainActions } from "./again_actions.js";
 import { makeJobActions } from "./job_actions.js";
+import { listOf, parametersOf } from "./job_list.js";
+import { makeListActions } from "./list_actions.js";
 import { makeSubmitActions } from "./submit_actions.js";
+import { makeViewerActions } from "./viewer_actions.js";
 import { jobName } from "./format.js";
-import { initialState, openJob, shownOf, withEvent, withJob, withJobs, withOpen, withTiles, withUi, withWorkers } from "./state.js";
+import { initialState, openJob, shownOf, withEvent, withJob, withList, withListed, withOpen, withTiles, withUi, withWorkers, withoutJob } from "./state.js";
 import { page } from "./views/shell.js";
 
 const kReportPauseMs = 2000;
+const kListPauseMs = 50;
 const kPhone = "(max-width: 40rem)";
 
 let state = initialState();
@@ -28,7 +35,7 @@ function set(next) {
 function draw() {
   drawing = false;
   patch(document.getElementById("app"), ...page(state, actions));
-  const job = state.route.view === "job" ? state.jobs?.get(state.route.id) : null;
+  const job = ["job", "view"].includes(state.route.view) ? state.jobs?.get(state.route.id) : null;
   document.title = state.session === "out" ? "Lightshaft" : `${job ? jobName(job) : { workers: "Workers", submit: "New job" }[state.route.view] ?? "Jobs"} · Lightshaft`;
 }
 
@@ -70,10 +77,11 @@ async function signIn(token) {
 
 /** Shows the farm. Returns the error if that is not possible. */
 async function enter() {
-  let jobs;
+  let page;
   let me;
+  const asked = state.route.view === "jobs" ? listOf(state.route.query) : state.list.asked;
   try {
-    [jobs, me] = await Promise.all([api.jobs(), api.me()]);
+    [page, me] = await Promise.all([api.list(parametersOf(asked, Date.now() / 1000)), api.me()]);
   } catch (error) {
     if (error.status === 401) signedOut();
     else if (state.session === "unknown") {
@@ -82,7 +90,7 @@ async function enter() {
     }
     return error;
   }
-  set(withUi({ ...withJobs(state, jobs), me, session: "in" }, { signInError: null, notice: null }));
+  set(withUi({ ...withListed(withList(state, { asked }), page), me, session: "in" }, { signInError: null, notice: null }));
   closeEvents ??= openEvents({ onOpen, onLost, onEvent });
   showRoute();
   return null;
@@ -97,7 +105,7 @@ function signedOut(message = null) {
 // ---- events ----
 
 const recordings = new Set();
-const newest = new Map(); // what was asked for -> number of the latest request whose answer is shown
+const newest = new Map(); // for each kind of request, the number of the latest one whose answer is shown
 let asked = 0;
 
 /**
@@ -121,19 +129,26 @@ async function snapshot(what, fetch, apply) {
 async function onOpen() {
   set({ ...state, link: "live" });
   await Promise.all([
-    snapshot("jobs", () => attempt(api.jobs), withJobs),
+    actions.refreshList(),
     snapshot("workers", () => attempt(api.workers), withWorkers)]);
+  actions.viewerEvent(null);
   await refreshOpen();
 }
 
 function onLost(closed) {
   set({ ...state, link: "lost" });
-  if (closed) api.workers().catch((error) => (error.status === 401 ? signedOut() : null)); // a stream can't say why
+  // an event stream cannot say why it failed, so another request finds out
+  if (closed) api.workers().catch((error) => (error.status === 401 ? signedOut() : null));
 }
 
 function onEvent(type, data) {
   for (const events of recordings) events.push([type, data]);
+  const before = type === "job" ? state.jobs?.get(data.id)?.state : null;
   set(withEvent(state, type, data));
+  // The coordinator decides which jobs are listed, and in which order; events only change the numbers in the
+  // list.
+  if (type === "job" && !data.sequence && before !== data.state) actions.refreshList(kListPauseMs);
+  actions.viewerEvent(type, data);
   if (type === "job" && data.id === state.open?.id) showFrame();
   if (type === "job" && data.id === state.open?.shown && !reportTimer) {
     reportTimer = setTimeout(refreshReport, kReportPauseMs);
@@ -144,7 +159,7 @@ async function refreshReport() {
   reportTimer = 0;
   const id = state.open?.shown;
   if (!id || state.jobs?.get(id)?.frames) return; // a sequence whose frames are not known yet
-  const report = await api.report(id).catch(() => null); // none before the first checkpoint
+  const report = await api.report(id).catch(() => null); // there is no report before the first checkpoint
   if (report && state.open?.shown === id) set(withOpen(state, { report }));
 }
 
@@ -153,7 +168,7 @@ async function refreshOpen() {
   if (!id) return;
   try {
     await snapshot("job", () => api.job(id), (now, job) => (now.open?.id === id ? withJob(now, job) : now));
-    if (state.open?.id !== id || !state.jobs.has(id)) return; // removed meanwhile
+    if (state.open?.id !== id || !state.jobs.has(id)) return; // the job was removed or closed meanwhile
     set(withOpen(state, { problem: null }));
     if (!showFrame()) await refreshShown();
   } catch (error) {
@@ -163,7 +178,9 @@ async function refreshOpen() {
 
 function openFailed(error) {
   if (error.status === 401) signedOut();
-  else if (error.status !== 404 || !state.open?.problem) set(withOpen(state, { problem: error.message })); // a removed job says so itself
+  else if (error.status === 404 && state.jobs?.has(state.open?.id)) set(withoutJob(state, state.open.id));
+  // a removed job has its own message
+  else if (error.status !== 404 || !state.open?.problem) set(withOpen(state, { problem: error.message }));
 }
 
 /** The image, tiles and figures of the frame that the page is to show. True if that is another one than before. */
@@ -171,8 +188,8 @@ function showFrame() {
   const { open, route } = state;
   const shown = open && shownOf(state, open.id, route.frame);
   if (!open || open.shown === shown) return false;
-  const { exposure, showTiles, layer, clock } = open;
-  set({ ...state, open: { ...openJob(open.id, shown), exposure, showTiles, layer, clock } });
+  const { exposure, showTiles, layer, clock, film, fps, video } = open;
+  set({ ...state, open: { ...openJob(open.id, shown), exposure, showTiles, layer, clock, film, fps, video } });
   refreshShown().catch(openFailed);
   return true;
 }
@@ -203,10 +220,16 @@ function showRoute() {
   const turned = !moved && route.frame !== state.route.frame;
   const open = route.view !== "job" ? null : state.open?.id === route.id ? state.open : openJob(route.id);
   const fresh = open && open !== state.open;
-  set(withUi({ ...state, route, open }, moved ? { confirming: null, notice: null } : {}));
+  set(withUi({ ...state, route, open }, moved ? { confirming: null, notice: null, again: null } : {}));
   if (moved) window.scrollTo(0, 0);
-  if (fresh && state.session === "in") refreshOpen();
-  else if (turned) showFrame();
+  if (route.view === "jobs" && state.session === "in") actions.openList(route.query);
+  if (route.view !== "view") actions.closeViewer();
+  else if (state.session === "in") actions.openViewer(route);
+  if (fresh && state.session === "in") refreshOpen().then(() => (state.jobs?.get(route.id)?.frames ? actions.openVideo(route.id) : null));
+  else if (turned) {
+    set(withOpen(state, { film: null }));
+    showFrame();
+  }
 }
 window.addEventListener("hashchange", () => {
   const token = takeToken(window.location, window.history);
@@ -216,7 +239,7 @@ window.addEventListener("hashchange", () => {
 
 // ---- actions ----
 
-const seam = { get: () => state, set, attempt, api };
+const seam = { get: () => state, set, attempt, api, snapshot };
 const actions = {
   signIn,
   signOut: async () => {
@@ -225,7 +248,10 @@ const actions = {
   },
   dismiss: () => set(withUi(state, { notice: null })),
   ...makeJobActions(seam),
+  ...makeListActions(seam),
+  ...makeAgainActions(seam),
   ...makeSubmitActions(seam),
+  ...makeViewerActions(seam),
 };
 
 start();

@@ -1,13 +1,14 @@
 // Logarithmic axes for the error plot: ranges, ticks, labels. No drawing. common/report/log_axis.cpp, which draws the
 // same plot into reports, follows the same rules.
 import { superscript } from "./format.js";
+import { denoisedTarget } from "./verdict.js";
 
-const kMargin = 0.06; // of the range, on either side
-const kShort = 2.2; // decades; on a shorter axis 2 and 5 are labelled, too
-const kFine = 4.5; // decades; on a shorter axis 2 to 9 have lines
+const kMargin = 0.06; // margin on either side, as a share of the range
+const kShort = 2.2; // decades: a shorter axis also has labels at 2 and 5
+const kFine = 4.5; // decades: a shorter axis has lines at 2 to 9
 const kMostLabels = 8;
-const kFewTimes = 4; // labels of time, before those between are added
-const kFarthest = 300; // decades from 1: beyond it numbers end
+const kFewTimes = 4; // with fewer labels of time, intermediate times are added
+const kFarthest = 300; // largest distance from 1 in decades: near the range of numbers
 const [kMinute, kHour, kDay] = [60, 3600, 86400];
 
 /** A log axis from values in [lo, hi] (both > 0) to pixels [from, to]; at least one decade wide. */
@@ -79,14 +80,15 @@ export const drawable = (convergence, key) =>
 export function aheadOf(job, report, key) {
   const last = drawable(report?.convergence, key).at(-1);
   const forecast = report?.forecast;
-  const target = job.target_error;
+  const target = denoisedTarget(job) ? null : job.target_error;
   if (!last || !(target > 0) || last.relmse <= target) return null;
   if (key === "seconds" && job.eta_seconds > 0 && Array.isArray(job.eta_ci95)) {
     const [lo, hi] = job.eta_ci95.map((eta) => job.elapsed_seconds + eta);
     return { x: job.elapsed_seconds + job.eta_seconds, lo, hi, more: job.eta_with_more?.seconds > 0 ? job.elapsed_seconds + job.eta_with_more.seconds : null };
   }
   if (!(forecast?.asked && forecast.core_seconds > 0)) return null;
-  const pace = key === "seconds" ? last.seconds / last.core_seconds : 1; // as it went so far
+  // The remaining time assumes the previous pace
+  const pace = key === "seconds" ? last.seconds / last.core_seconds : 1;
   const at = (core) => last[key] + pace * core;
   const [lo, hi] = Array.isArray(forecast.core_seconds_ci95) ? forecast.core_seconds_ci95.map(at) : [null, null];
   return Number.isFinite(pace) ? { x: at(forecast.core_seconds), lo, hi, more: null } : null;

@@ -1,13 +1,19 @@
-// The address bar: #/jobs, #/jobs/ID, #/jobs/ID/FRAME of a sequence, #/workers, #/submit, and #token=... which signs in and leaves no trace.
+// The routes in the address bar: #/jobs, #/jobs/ID, #/jobs/ID/FRAME for a frame of a sequence,
+// #/view/ID?VIEW, #/workers, #/submit, and #token=..., which signs in and is then removed from the address.
 
 export function routeOf(hash) {
-  const [view, id, frame] = hash.replace(/^#\/?/, "").split("/");
+  const [path, query = ""] = hash.replace(/^#\/?/, "").split("?");
+  const [view, id, frame] = path.split("/");
+  if (view === "view" && id) return { view: "view", id: decoded(id), frame: null, query };
   if (view === "jobs" && id) return { view: "job", id: decoded(id), frame: /^\d{1,7}$/.test(frame) ? Number(frame) : null };
-  return { view: ["workers", "submit"].includes(view) ? view : "jobs", id: null, frame: null };
+  return { view: ["workers", "submit"].includes(view) ? view : "jobs", id: null, frame: null, query };
 }
 
 /** Of one frame, or (null) of the sequence, whose page then follows what is rendered. */
 export const frameHref = (id, frame) => `#/jobs/${encodeURIComponent(id)}${frame === null ? "" : `/${frame}`}`;
+
+/** The viewer of a job, or of one frame of a sequence, whose id that frame has. */
+export const viewHref = (id, query = "") => `#/view/${encodeURIComponent(id)}${query ? `?${query}` : ""}`;
 
 /** The page of a job, which may be a frame: the page of its sequence, at this frame. */
 export function jobHref(id) {
@@ -25,7 +31,7 @@ function decoded(text) {
   try {
     return decodeURIComponent(text);
   } catch {
-    return text; // a mistyped %: no such job, which the page then says
+    return text; // an incomplete % code: there is no such job, and the page will say so
   }
 }
 

@@ -1,6 +1,6 @@
-// SHA-256 of a file, as lower-case hex. The browser's own implementation is used where it may be (a secure context:
-// https or localhost, and a file that fits into memory); a farm on a plain http address in the lab falls back to the
-// one below, which reads the file piece by piece.
+// SHA-256 of a file, as lower-case hexadecimal digits. The browser's own implementation is used where it is
+// available (in a secure context: https or localhost) and the file fits into memory. Otherwise, for example
+// on a plain http address, the implementation below reads the file piece by piece.
 
 const kInMemoryBytes = 256 * 2 ** 20;
 const kPieceBytes = 4 * 2 ** 20; // a multiple of the 64-byte block

@@ -1,29 +1,34 @@
-// Everything the page knows, as one value, and how it changes: pure functions (state, what happened) -> state.
+// The state of the page as one value, and its changes: pure functions (state, event) -> state.
 
-const kFlashes = 48; // folded tiles that still glow
-export const kPalette = 10; // worker colours in css/tokens.css
+import { kWholeList } from "./job_list.js";
+
+const kFlashes = 48; // most recently folded tiles that are highlighted
+export const kPalette = 10; // number of worker colours in css/tokens.css
 
 export function initialState() {
   return {
-    session: "unknown", // "in", "out"
-    me: { role: "read", user: "" }, // the least, until it is known
-    link: "connecting", // "live", "lost"
+    session: "unknown", // also "in", "out"
+    me: { role: "read", user: "" }, // the role with the fewest rights, until the role is known
+    link: "connecting", // also "live", "lost"
     route: { view: "jobs", id: null, frame: null },
-    jobs: null, // Map id -> job JSON, of frames only the one that is shown; null: not known yet
+    // a page of the list of jobs; ids: null until it is known
+    list: { asked: kWholeList, ids: null, total: 0, states: {}, owners: [], picked: new Set() },
+    jobs: null, // Map id -> job JSON; of frames only the one that is shown; null: not known yet
     workers: null, // Map id -> worker JSON
     colours: new Map(), // worker name -> index into the palette, in order of appearance
-    open: null, // what belongs to the one job that is shown, see openJob()
+    open: null, // the state of the job that is open, see openJob()
+    viewer: null, // the state of the viewer, see viewer_actions.js
     submit: emptySubmission(),
-    narrow: false, // the page is as wide as a phone
-    ui: { confirming: null, busy: null, notice: null, signInError: null, signingIn: false },
+    narrow: false, // true if the page is as narrow as a phone
+    ui: { confirming: null, busy: null, notice: null, again: null, signInError: null, signingIn: false },
   };
 }
 
 export const emptySubmission = () => ({
-  files: [], // {path, file}
-  main: null, // path of the scene
-  plan: null, // of bundle.js
-  phase: "choose", // "hashing", "sending", "refused"
+  files: [], // items: {path, file}
+  main: null, // path of the scene file
+  plan: null, // the plan made by bundle.js
+  phase: "choose", // also "hashing", "sending", "refused"
   progress: 0,
   step: "",
   error: null, // {message, diagnostics}
@@ -32,17 +37,20 @@ export const emptySubmission = () => ({
 
 export const openJob = (id, shown = id) => ({
   id,
-  shown, // the job whose image and figures are on the page: itself, or of a sequence one of its frames
+  shown, // the job whose image and numbers are shown: the open job, or for a sequence one of its frames
   report: null,
-  tiles: new Map(), // tile -> {rect, spp, workers} of the tiles in flight
-  flashes: [], // {key, rect, worker} of tiles folded lately
-  folds: 0, // grows with every fold: the image has changed
+  tiles: new Map(), // tile -> {rect, spp, workers} of the tiles being rendered
+  flashes: [], // {key, rect, worker} of recently folded tiles
+  folds: 0, // number of folds: a change means that the image has changed
   exposure: 0,
   showTiles: true,
-  layer: "picture", // or "denoised"; over the image: "error", "samples"
-  clock: "seconds", // of the plot: "core_seconds"
+  layer: "picture", // or "denoised"; as a map over the image: "error", "samples"
+  clock: "seconds", // axis of the plot; or "core_seconds"
   picked: null, // point of the plot under the pointer
-  problem: null, // why it can't be shown
+  problem: null, // why the job cannot be shown
+  film: null, // {id, playing} while frames of a sequence are scrubbed or played: the frame that is seen
+  fps: 24, // pictures per second of what is played, and of a video
+  video: null, // what the coordinator says of the sequence's video
 });
 
 /** What the coordinator would not take from this token anyway is not offered. */
@@ -52,17 +60,23 @@ export const ownerOf = (job) => job.owner || "admin";
 
 export const withUi = (state, ui) => ({ ...state, ui: { ...state.ui, ...ui } });
 export const withOpen = (state, open) => (state.open ? { ...state, open: { ...state.open, ...open } } : state);
+export const withList = (state, list) => ({ ...state, list: { ...state.list, ...list } });
+/** A page of the list, as the coordinator answers. */
+export const withListed = (state, { jobs, total, states, owners }) => withList(withJobs(state, jobs), { ids: jobs.map((job) => job.id), total, states, owners });
+export const withViewer = (state, viewer) => (state.viewer ? { ...state, viewer: { ...state.viewer, ...viewer } } : state);
 export const withSubmit = (state, submit) => ({ ...state, submit: { ...state.submit, ...submit } });
 
 /** A list has no frames, nor which frames a sequence has: what the open page knows of them stays. */
 export function withJobs(state, jobs) {
-  const next = new Map(jobs.map((job) => [job.id, withList(job, state.jobs?.get(job.id))]));
-  const shown = state.open && state.jobs?.get(state.open.shown);
-  if (shown && next.has(state.open.id)) next.set(shown.id, next.get(shown.id) ?? shown);
+  const next = new Map(jobs.map((job) => [job.id, withFrames(job, state.jobs?.get(job.id))]));
+  // The jobs that are shown need not be in the list
+  for (const id of [state.open?.id, state.open?.shown, state.viewer?.id]) {
+    if (!next.has(id) && state.jobs?.has(id)) next.set(id, state.jobs.get(id));
+  }
   return { ...state, jobs: next };
 }
 
-const withList = (job, before) => (job.frames && !job.frames.list && before?.frames?.list ? { ...job, frames: { ...job.frames, list: before.frames.list } } : job);
+const withFrames = (job, before) => (job.frames && !job.frames.list && before?.frames?.list ? { ...job, frames: { ...job.frames, list: before.frames.list } } : job);
 
 export function withWorkers(state, workers) {
   const names = workers.map((worker) => worker.name).sort();
@@ -100,14 +114,14 @@ export function withJob(state, job) {
     const list = sequence.frames.list.map((frame) => (frame.id === job.id ? { ...frame, ...sharedFigures(job) } : frame));
     jobs.set(sequence.id, { ...sequence, frames: { ...sequence.frames, list } });
   }
-  if (!job.sequence || state.open?.shown === job.id) jobs.set(job.id, withList(job, jobs.get(job.id)));
+  if (!job.sequence || state.open?.shown === job.id || state.viewer?.id === job.id) jobs.set(job.id, withFrames(job, jobs.get(job.id)));
   const next = { ...state, jobs };
   const over = state.open?.shown === job.id && isOver(job);
   return over ? withOpen(next, { tiles: new Map(), folds: state.open.folds + 1 }) : next;
 }
 
 /** A job that somebody removed takes its frames along; a page that shows it says so. */
-function withoutJob(state, id) {
+export function withoutJob(state, id) {
   const jobs = new Map([...(state.jobs ?? [])].filter(([key, job]) => key !== id && job.sequence !== id));
   const next = { ...state, jobs };
   return state.open?.id === id ? withOpen(next, { problem: "Somebody has removed this job, with its image and report.", tiles: new Map() }) : next;
@@ -131,7 +145,7 @@ function withWorker(state, worker) {
 
 function withTile(state, { tile, rect, state: what, spp, worker: id }) {
   const open = state.open;
-  const worker = state.workers?.get(id)?.name ?? id; // events name workers by their id, lists by their name
+  const worker = state.workers?.get(id)?.name ?? id; // events contain a worker's id, lists its name
   const tiles = new Map(open.tiles);
   const before = tiles.get(tile);
   const others = (before?.workers ?? []).filter((name) => name !== worker);
@@ -148,12 +162,16 @@ function withTile(state, { tile, rect, state: what, spp, worker: id }) {
 
 // ---- what views ask ----
 
+/** The frames of a sequence that are done, in order. */
+export const doneFrames = (job) => (job?.frames?.list ?? []).filter((frame) => frame.state === "done");
+
 const kOver = new Set(["done", "failed", "cancelled"]);
 export const isOver = (job) => kOver.has(job.state);
 export const colourOf = (state, worker) => state.colours.get(worker) ?? 0;
 
-/** Running first, then waiting, then what is over; the newest first within each. */
+/** Those of the page that is seen; without a page all: running first, then waiting, then what is over; the newest first within each. */
 export function jobsInOrder(state) {
+  if (state.list.ids) return state.list.ids.map((id) => state.jobs.get(id)).filter(Boolean);
   const rank = { running: 0, paused: 1, queued: 2 };
   return [...(state.jobs?.values() ?? [])].filter((job) => !job.sequence).sort(
     (a, b) => (rank[a.state] ?? 3) - (rank[b.state] ?? 3) || b.submitted_unix - a.submitted_unix || (a.id < b.id ? -1 : 1));

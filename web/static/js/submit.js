@@ -1,4 +1,5 @@
-// Sending a job: name every file by its SHA-256, ask which the coordinator lacks, send those, then the job.
+// Submits a job: computes the SHA-256 of every file, asks the coordinator which ones it lacks, sends these,
+// and then the job.
 import { sha256 } from "./sha256.js";
 
 /** The `spec` of the contract from the form's texts; empty fields are left to the scene. Throws with a message for people. */

@@ -1,4 +1,4 @@
-// What a person can do on the page "New job".
+// What the user can do on the page "New job".
 import { filesOfDrop, filesOfList, plan as planOf, scenesAmong } from "./bundle.js";
 import { emptySubmission, withSubmit } from "./state.js";
 import { submitJob } from "./submit.js";
@@ -7,7 +7,7 @@ export function makeSubmitActions({ get, set, api }) {
   const busy = () => ["hashing", "sending"].includes(get().submit.phase);
 
   async function take(files, main = null) {
-    if (busy()) return; // what is being sent stays as it is
+    if (busy()) return; // files cannot be changed while they are being sent
     const all = merged(get().submit.files, files);
     const scene = main ?? get().submit.main ?? scenesAmong(all)[0] ?? null;
     set(withSubmit(get(), { files: all, main: scene, plan: null, phase: "choose", error: null }));
@@ -37,7 +37,8 @@ export function makeSubmitActions({ get, set, api }) {
   return {
     onFiles: (event) => {
       take(filesOfList(event.currentTarget.files));
-      event.currentTarget.value = ""; // so that choosing the same file again, after an edit, is a change
+      // Otherwise choosing the same file again, after an edit, would not be a change
+      event.currentTarget.value = "";
     },
     onDrop: async (event) => {
       event.preventDefault();

@@ -1,7 +1,7 @@
-// Whether a job's figures of its own error are to be relied on, and what is said in their place where they are not.
+// Whether the error figures of a job can be trusted, and the text that is shown otherwise.
 import { duration, figure, interval } from "./format.js";
+import { phrases } from "./phrases.js";
 
-export const kDoubt = "don't trust yet";
 const kDoubtful = new Set(["heavy_tail", "bias_floor"]);
 
 /** {kind, words, trusted}; that of an older coordinator has no `trusted`. */
@@ -13,17 +13,20 @@ export const verdictOf = (job, report) =>
 
 /** "95 %: 0.00390 – 0.00448", or why there is no interval. */
 export function confidence(job, ci) {
-  if (doubtful(job.verdict)) return kDoubt;
+  if (doubtful(job.verdict)) return phrases.doubt;
   if (job.pixels_without_samples > 0) return "of the part rendered so far";
   const known = interval(ci);
   return known ? `95 %: ${known}` : null;
 }
 
 /** A figure against a reference; 0 is never what is meant. */
-export const trueFigure = (value, belowNoise) => (belowNoise === true ? "below the reference's noise" : figure(value));
+export const trueFigure = (value, belowNoise) => (belowNoise === true ? phrases.belowNoise : figure(value));
 
 /** Bright outliers that are still missing only ever add to the time to a target; samples that are counted take what they take. */
-export const atLeast = (job) => job.target_error > 0 && doubtful(job.verdict);
+export const atLeast = (job) => job.target_error > 0 && !denoisedTarget(job) && doubtful(job.verdict);
+
+/** Whether the target error means the denoised layers; the curve and its forecast are of the image itself. */
+export const denoisedTarget = (job) => job.target_layer === "denoised";
 
 export function timeLeft(job) {
   const known = typeof job.eta_seconds === "number";

@@ -14,8 +14,8 @@ struct AssetLoader {
   const Scene& scene;
   const AssetFiles& files;
 
-  // The local file of the scene's asset number i. Fails with Errc::internal if the caller of build_world()
-  // supplied no file with that asset's digest.
+  // Returns the local file of the scene's asset number i. Fails with Errc::internal if the caller of
+  // build_world() supplied no file with that asset's digest.
   Result<std::filesystem::path> path(AssetIndex i) const {
     const Asset& asset = scene.assets.at(i.value);
     const auto it = files.find(asset.digest);

@@ -4,34 +4,35 @@
 // (docs/decisions/0012-what-a-scene-needs.md).
 #pragma once
 
-#include "worker/render/base/built.h"
-
 namespace ls::render {
 
 struct Features {
-  bool media = false;      // any participating medium
-  bool grids = false;      // heterogeneous media
-  bool chromatic = false;  // extinction that differs between channels
-  bool emission = false;   // media that emit light
+  bool media = false;      // there are participating media
+  bool grids = false;      // there are heterogeneous media
+  bool chromatic = false;  // the extinction of some medium differs between channels
+  bool emission = false;   // some medium emits light
   // The scene has nested or intersecting media (medium_stack.h), or coincident surfaces of which one is null,
   // that is, index-matched (coincident.h).
   bool overlaps = false;
   // The scene has surfaces that light passes straight through: index-matched ones, masks, thin dielectrics.
   bool passing = false;
-  bool split = false;  // light AOVs: each sample's radiance split into its components (light_components.h)
-  // Light is sampled at several points of the camera's segments through media (camera_segment_nee.h), or
-  // directions and flights also go near lamps (lamp_directions.h, lamp_flight.h).
+  // The radiance of each sample is split into the components of the light AOVs (light_components.h).
+  bool split = false;
+  // Light is sampled at several points of the camera's segments through media (camera_segment_nee.h), or the
+  // sampling of directions and flights prefers the neighbourhood of lamps (lamp_directions.h, lamp_flight.h).
   bool aimed = false;
-  // Features that every variant has, unless the build leaves them out (built.h): index-matched surfaces, null
-  // transmission, equi-angular sampling, lights that rays can hit, and the checks that count bad samples.
-  bool boundaries = kBuilt.boundaries, null_transmission = kBuilt.null_transmission;
-  bool equiangular = kBuilt.equiangular, found_lights = kBuilt.found_lights, health = kBuilt.health;
+  // Vertices of paths are connected to points that a directional emitter lights (light_vertices.h).
+  bool connected = false;
+  // The integrator is `whitted`: a path goes on after mirrors and clear glass alone, and ends with the light
+  // that reaches the first other surface straight from a lamp.
+  bool whitted = false;
   bool operator==(const Features&) const = default;
 
   constexpr bool covers(const Features& need) const {
     return (media || !need.media) && (grids || !need.grids) && (chromatic || !need.chromatic) &&
            (emission || !need.emission) && (overlaps || !need.overlaps) && (passing || !need.passing) &&
-           (aimed || !need.aimed) && (split || !need.split);
+           (aimed || !need.aimed) && (connected || !need.connected) && (whitted || !need.whitted) &&
+           (split || !need.split);
   }
 };
 inline constexpr Features kEveryScene{
@@ -41,15 +42,5 @@ inline constexpr Features kEverything = [] {
   all.split = true;
   return all;
 }();
-
-// The features compiled into this build.
-inline constexpr Features kBuiltFeatures{.media = kBuilt.media,
-                                         .grids = kBuilt.grids,
-                                         .chromatic = kBuilt.chromatic,
-                                         .emission = kBuilt.emission,
-                                         .overlaps = kBuilt.overlaps,
-                                         .passing = true,
-                                         .split = true,
-                                         .aimed = true};
 
 }  // namespace ls::render

@@ -6,7 +6,7 @@
 
 namespace ls::render {
 
-// Limits TBB to `threads` threads in this process for as long as the returned object lives. If several such
+// Limits TBB to `threads` threads in this process as long as the returned object lives. If several such
 // objects live, the lowest limit applies.
 std::shared_ptr<void> limit_threads(int threads);
 

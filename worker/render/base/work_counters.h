@@ -1,6 +1,6 @@
 // Work counters: how often each thread did each kind of work. Tests and benchmarks use them to show that a
-// scene pays nothing for features it does not use. They exist only in builds with LIGHTSHAFT_COUNT; in all
-// others LS_COUNT expands to a statement without effect.
+// scene pays nothing for features that it does not use. They exist only in builds with LIGHTSHAFT_COUNT; in
+// all others LS_COUNT expands to a statement without effect.
 #pragma once
 
 #include <cstdint>

@@ -1,11 +1,12 @@
-// The surface scattering functions (BSDFs) of a scene, in one flat table by index. A switch on the material's
-// kind selects the code, and a texture is looked up only where it is not constant. The values are those of
-// Mitsuba 3 (separable Smith masking, its Beckmann rational fit, its rough plastic tables).
+// The surface scattering functions (BSDFs) of a scene, in one flat table by index. Each kind of material is a
+// struct in the file of its family (material.h). A texture is looked up only if it is not constant. The
+// values are those of Mitsuba 3 (separable Smith masking, its Beckmann rational fit, its rough plastic
+// tables).
 //
 // Some surfaces have null transmission (mask, thin dielectric): part of the light passes straight through.
-// Paths and shadow rays pass through without a vertex, so that next-event estimation reaches lights behind;
-// eval() and sample() cover only the light that does not pass straight through. Their values are not
-// normalised to it: they remain fractions of all the light that arrives.
+// Paths and shadow rays pass such a surface without a vertex, so that next-event estimation reaches lights
+// behind it; eval() and sample() cover only the light that does not pass straight through. Their values are
+// not normalised to it: they remain fractions of all the light that arrives.
 //
 // Local frame: z = shading normal, x and y = the tangents that anisotropy refers to. wo (towards the viewer
 // or the previous vertex) and wi (towards the next vertex or the light) are unit vectors that point AWAY from
@@ -36,16 +37,17 @@ struct BsdfEval {
 
 struct BsdfSample {
   V3 wi{0, 0, 1};
-  C3 weight{0, 0, 0};  // f |cos wi| / pdf, lobe choice included; for delta lobes the factor itself
-  float pdf = 0;       // [1/sr], equal to eval(wi).pdf; for delta lobes the probability of the lobe
+  // F |cos wi| / pdf, including the choice of the lobe; for delta lobes the factor itself
+  C3 weight{0, 0, 0};
+  float pdf = 0;  // [1/sr], equal to eval(wi).pdf; for delta lobes the probability of the lobe
   bool delta = false;
-  bool transmitted = false;  // wi is on the other side of the surface than wo
+  bool transmitted = false;  // true if wi is on the other side of the surface than wo
   float eta = 1;  // refractive index on the side of wi over that on the side of wo; 1 unless refracted
 };
 
 struct NullTransmission {
   C3 transmission{0, 0, 0};  // share of light that passes straight through
-  // The probability with which a path is to pass straight through. It is below 1 wherever the surface can
+  // The probability with which a path should pass straight through. It is below 1 wherever the surface can
   // also scatter otherwise.
   float probability = 0;
 };
@@ -57,9 +59,9 @@ class BsdfTable {
   BsdfTable(BsdfTable&&) noexcept;
   BsdfTable& operator=(BsdfTable&&) noexcept;
 
-  // Builds the table of the scene's materials. `textures` must outlive it. Fails with invalid_argument on an
-  // index out of range, a material that contains itself, a two-sided material one of whose sides lets light
-  // through, and an index of refraction or roughness that is not a positive finite number.
+  // Builds the table of the scene's materials. `textures` must outlive it. Fails with invalid_argument if an
+  // index is out of range, if a material contains itself, if one side of a two-sided material lets light
+  // through, or if an index of refraction or a roughness is not a positive finite number.
   static Result<BsdfTable> build(const Scene& scene, const TextureTable& textures);
 
   BsdfEval eval(BsdfIndex i, const UvPoint& uv, const V3& wo, const V3& wi) const;
@@ -68,38 +70,32 @@ class BsdfTable {
   // the surface.
   std::optional<BsdfSample> sample(BsdfIndex i, const UvPoint& uv, const V3& wo, float u_lobe, V2 u) const;
 
-  // The null transmission at `uv` for light that travels along the direction w, which may cross the surface
-  // from either side.
+  // Returns the null transmission at `uv` for light that travels along the direction w, which may cross the
+  // surface from either side.
   NullTransmission null_transmission(BsdfIndex i, const UvPoint& uv, const V3& w) const;
 
-  bool is_null(BsdfIndex i) const;                // an index-matched boundary: light passes unchanged
-  bool has_null_transmission(BsdfIndex i) const;  // part of the light passes straight through, part does not
-  bool has_smooth(BsdfIndex i) const;             // has a lobe that is not a delta: use next-event estimation
-  bool reads_uv(BsdfIndex i) const;               // some parameter is a texture
-  bool anisotropic(BsdfIndex i) const;            // the tangents of the local frame matter
-  bool reads_slopes(BsdfIndex i) const;           // dp/du and dp/dv matter (see UvPoint)
+  // True for an index-matched boundary: light passes unchanged
+  bool is_null(BsdfIndex i) const;
+  // True if part of the light passes straight through and part does not
+  bool has_null_transmission(BsdfIndex i) const;
+  // True if there is a lobe that is not a delta, so that next-event estimation is useful
+  bool has_smooth(BsdfIndex i) const;
+  bool reads_uv(BsdfIndex i) const;      // true if some parameter is a texture
+  bool anisotropic(BsdfIndex i) const;   // true if the tangents of the local frame matter
+  bool reads_slopes(BsdfIndex i) const;  // true if dp/du and dp/dv matter (see UvPoint)
   std::size_t size() const;
   std::uint64_t bytes() const;
-  std::uint64_t clamped_inputs() const;  // reflectances clamped to [0, 1]
+  std::uint64_t clamped_inputs() const;  // number of reflectances clamped to [0, 1]
 
   struct Material;
-  struct Principled;
 
  private:
-  // eval() and sample() for the one-sided material kinds other than uniform diffuse.
-  BsdfEval eval_lobes(const Material& m, const UvPoint& uv, const V3& wo, const V3& wi) const;
-  std::optional<BsdfSample> sample_lobes(const Material& m, const UvPoint& uv, const V3& wo, float u_lobe,
+  // eval() and sample() for all kinds except two-sided and uniform diffuse.
+  BsdfEval eval_other(const Material& m, const UvPoint& uv, const V3& wo, const V3& wi) const;
+  std::optional<BsdfSample> sample_other(const Material& m, const UvPoint& uv, const V3& wo, float u_lobe,
                                          V2 u) const;
-  BsdfEval eval_wide(const Material& m, const UvPoint& uv, const V3& wo, const V3& wi) const;
-  std::optional<BsdfSample> sample_wide(const Material& m, const UvPoint& uv, const V3& wo, float u_lobe,
-                                        V2 u) const;
-  std::optional<BsdfSample> sample_part(std::uint32_t part, const UvPoint& uv, const V3& wo, float u_lobe,
-                                        V2 u) const;
-  struct Mixture;
-  Mixture mixture(const Material& m, const UvPoint& uv, const V3& wo) const;
 
   std::vector<Material> materials_;
-  std::vector<Principled> principled_;  // additional parameters of principled materials
   // The compensation tables of the materials with multiple_scattering; the materials point at them.
   std::vector<std::unique_ptr<const MicrofacetEnergy>> energies_;
   const TextureTable* textures_ = nullptr;

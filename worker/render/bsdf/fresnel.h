@@ -35,10 +35,10 @@ inline DielectricFresnel fresnel_dielectric(double cos_i, double eta) {
   return f;
 }
 
-// Diffuse reflectance of a smooth boundary for light from inside, whose index is eta times the outside's. The
-// value for light from the less dense side is computed by Simpson's rule (the integrand 2 F mu is smooth for
-// an index above 1: relative error below 1e-7), and the value for the denser side follows from it by
-// reciprocity.
+// Returns the diffuse reflectance of a smooth boundary for light from inside, where the index is eta times
+// that outside. The value for light from the less dense side is computed by Simpson's rule (the integrand 2 F
+// mu is smooth for an index above 1: relative error below 1e-7); the value for the denser side follows from
+// it by reciprocity.
 inline double internal_diffuse_reflectance(double eta) {
   const double n = std::max(eta, 1 / eta);
   constexpr int kSteps = 256;
@@ -51,19 +51,20 @@ inline double internal_diffuse_reflectance(double eta) {
   return eta >= 1 ? 1 - (1 - into_denser) / (n * n) : into_denser;
 }
 
-// Reflectance of a conductor whose complex index, relative to the outside, is eta + i k, for the cosine of
-// incidence cos_i in [0, 1]. With eta = 0 everything is reflected.
+// Returns the reflectance of a conductor whose complex index, relative to the outside, is eta + i k, for the
+// cosine of incidence cos_i in [0, 1]. With eta = 0 everything is reflected.
 inline float fresnel_conductor(float cos_i, float eta, float k) {
   const float c2 = cos_i * cos_i, s2 = (1 - cos_i) * (1 + cos_i);
-  // t1 is eta^2 - k^2 - s2, computed so that it is accurate also where it nearly vanishes.
+  // t1 is eta^2 - k^2 - s2, in a form that is accurate even where it nearly vanishes.
   const float t1 = (eta - 1) * (eta + 1) - k * k + c2;
   const float a2b2 = safe_sqrt(t1 * t1 + 4 * k * k * eta * eta);
   const float a = safe_sqrt(.5f * (a2b2 + t1));
   const float p = a2b2 + c2, q = 2 * cos_i * a;
   if (!(p + q > 0)) return 1;
-  const float rs = std::max(0.f, p - q) / (p + q);  // for an index of 1, rounding leaves either sign
+  // With an index of 1, p - q may have either sign by rounding
+  const float rs = std::max(0.f, p - q) / (p + q);
   const float u = a2b2 * c2 + s2 * s2, v = q * s2;
-  if (!(u + v > 0)) return rs;  // eta = k = 0 at normal incidence
+  if (!(u + v > 0)) return rs;  // true if eta = k = 0 at normal incidence
   return .5f * (rs + rs * (u - v) / (u + v));
 }
 inline C3 fresnel_conductor(float cos_i, const C3& eta, const C3& k) {

@@ -1,40 +1,84 @@
-// Helpers shared by the lobes of several material kinds.
+// The common part of all kinds of materials: their parameters, the lookup of these, and the interface of a
+// kind.
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <variant>
 
-#include "worker/render/base/built.h"
+#include "worker/render/base/kinds.h"
+#include "worker/render/bsdf/bsdf.h"
 #include "worker/render/bsdf/fresnel.h"
-#include "worker/render/bsdf/material.h"
+#include "worker/render/bsdf/microfacet.h"
 
 namespace ls::render {
 
-struct Lookup {
-  const TextureTable& textures;
-  V2 uv;  // of the surface
-  const FacePoint* face;
+// One parameter of a material, such as a reflectance or a roughness: its value if it is constant, else the
+// texture that contains it.
+struct Slot {
+  C3 value{1, 1, 1};
+  TextureIndex texture;
+  bool constant = true;
+};
 
-  Lookup(const TextureTable& table, const UvPoint& at) : textures(table), uv(at.uv), face(at.face) {}
+template <class... Slots>
+bool any_texture(const Slots&... slots) {
+  return !(slots.constant && ...);
+}
+
+struct Roughness {
+  Microfacet distribution = Microfacet::beckmann;
+  Slot u, v;
+
+  bool same_along_both() const {
+    return u.constant ? v.constant && u.value == v.value : !v.constant && u.texture == v.texture;
+  }
+  bool always_mirror() const {
+    return u.constant && v.constant && u.value.x < kSpecularAlpha && v.value.x < kSpecularAlpha;
+  }
+};
+
+// Reads the parameters of a material at one point of a surface.
+struct Lookup {
+  const BsdfTable& table;  // for materials that consist of others
+  const TextureTable& textures;
+  const UvPoint& at;
+
   C3 reflectance(const Slot& s) const {
-    if (!kBuilt.textures || s.constant) return s.value;
-    const C3 c = textures.eval(s.texture, uv, face);
+    if (s.constant) return s.value;
+    const C3 c = textures.eval(s.texture, at.uv, at.face);
     return {std::clamp(c.x, 0.f, 1.f), std::clamp(c.y, 0.f, 1.f), std::clamp(c.z, 0.f, 1.f)};
   }
   float scalar(const Slot& s) const {
-    if (kBuilt.textures && !s.constant) return textures.number(s.texture, uv, face);
+    if (!s.constant) return textures.number(s.texture, at.uv, at.face);
     const C3& c = s.value;
     return c.x == c.y && c.y == c.z ? c.x : luminance(c);
   }
   float share(const Slot& s) const { return std::clamp(scalar(s), 0.f, 1.f); }
-  struct Roughness {
+  struct RoughnessHere {
     Microfacets facets;
     bool mirror;
   };
-  Roughness roughness(const BsdfTable::Material& m) const {
-    const float u = scalar(m.alpha_u), v = scalar(m.alpha_v);
-    return {{m.distribution, std::max(u, kMinAlpha), std::max(v, kMinAlpha)},
+  RoughnessHere roughness(const Roughness& r) const {
+    const float u = scalar(r.u), v = scalar(r.v);
+    return {{r.distribution, std::max(u, kMinAlpha), std::max(v, kMinAlpha)},
             u < kSpecularAlpha && v < kSpecularAlpha};
   }
+};
+
+// The interface of a kind of material, with defaults. Each kind derives from this class and hides the members
+// that differ from the defaults; every kind must define sample().
+struct MaterialKind {
+  // True if the back is black: eval() and sample() are then called only for directions above the surface.
+  static constexpr bool kFrontOnly = true;
+  static constexpr bool kSmooth = false;       // true if it has a lobe that is not a delta
+  static constexpr bool kReadsSlopes = false;  // see BsdfTable::reads_slopes
+
+  static bool reads_uv() { return false; }
+  static bool anisotropic() { return false; }
+  static std::array<BsdfIndex, 0> parts() { return {}; }  // the materials that it consists of
+  static BsdfEval eval(const Lookup&, const V3& /*wo*/, const V3& /*wi*/) { return {}; }
+  static NullTransmission null_transmission(const Lookup&, const V3& /*w*/) { return {}; }
 };
 
 inline V3 mirrored(const V3& w) { return {-w.x, -w.y, w.z}; }
@@ -45,26 +89,6 @@ inline std::optional<BsdfSample> sample_mirror(const C3& weight, const V3& wo) {
   s.weight = weight;
   s.pdf = 1;
   s.delta = true;
-  return s;
-}
-
-inline std::optional<BsdfSample> sample_dielectric(const BsdfTable::Material& m, const Lookup& look,
-                                                   const V3& wo, float u_lobe) {
-  const DielectricFresnel f = fresnel_dielectric(wo.z, m.ior);
-  const float R = static_cast<float>(f.reflectance);
-  if (u_lobe < R) {
-    auto s = sample_mirror(look.reflectance(m.specular_slot), wo);
-    s->pdf = R;
-    return s;
-  }
-  const float eta_ti = static_cast<float>(f.eta_ti);
-  BsdfSample s;
-  s.wi = m.ior == 1 ? -wo : normalize(V3(-eta_ti * wo.x, -eta_ti * wo.y, static_cast<float>(f.cos_t)));
-  s.weight = look.reflectance(m.second_slot) * static_cast<float>(f.eta_ti * f.eta_ti);
-  s.pdf = 1 - R;
-  s.delta = true;
-  s.transmitted = true;
-  s.eta = static_cast<float>(f.eta_it);
   return s;
 }
 

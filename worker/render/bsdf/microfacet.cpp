@@ -28,7 +28,7 @@ double erf_inverse(double x) {
 // each step that does not converge quadratically halves the bracket, and 64 halvings exhaust a double.
 double visible_slope(double cos_theta, double sin_theta, double u) {
   constexpr double kHalfSqrtPi = .886226925452758014;
-  constexpr double kEnd = 6.5;  // exp(-42): beyond any float32 u
+  constexpr double kEnd = 6.5;  // exp(-42) is smaller than any float32 u > 0
   const auto H = [&](double s, double e) {
     return cos_theta * kHalfSqrtPi * std::erfc(-s) + .5 * sin_theta * e;
   };

@@ -1,10 +1,10 @@
 // Beckmann and GGX microfacets, anisotropic, with separable Smith masking G = G1(wi) G1(wo), as in Mitsuba.
 // All directions are unit vectors in the local frame, above the surface (z > 0). The functions return G1 /
-// cos and densities over D, so that callers need not divide by a cosine. ax and ay are the roughnesses
+// cos, and densities divided by D, so that callers need not divide by a cosine. ax and ay are the roughnesses
 // (alpha) along x and y.
 //
-// Beckmann's G1 in the *value* is Walter's rational fit (relative error below 0.35 %), because the dialect
-// defines the material by it; in the sampling *density* it is the exact one, so that the density is exact.
+// The *value* of a Beckmann BSDF uses Walter's rational fit of G1 (relative error below 0.35 %), as in
+// Mitsuba. The *density* of sampling uses the exact G1, since the density must be exact.
 #pragma once
 
 #include "common/scene/scene.h"
@@ -17,35 +17,34 @@ namespace ls::render {
 inline constexpr float kSpecularAlpha = 1e-3f;
 inline constexpr float kMinAlpha = 1e-4f;
 
-// The length of the tangential part of w after stretching w to (ax x, ay y, z), where the surface looks like
-// one of roughness 1.
+// Returns the length of the tangential part of w after stretching w to (ax x, ay y, z). In the stretched
+// space the surface has roughness 1.
 inline float stretched_sine(const V3& w, float ax, float ay) {
   return std::sqrt(sqr(ax * w.x) + sqr(ay * w.y));
 }
 
 namespace ggx {
-// The density of microfacet normals m. Written with the tangential part of m, to avoid cancellation near the
-// normal.
+// The density of microfacet normals m. It is computed from the tangential part of m, to avoid cancellation
+// near the normal.
 inline float D(const V3& m, float ax, float ay) {
   return 1 / (kPi * ax * ay * sqr(sqr(m.x / ax) + sqr(m.y / ay) + m.z * m.z));
 }
 inline float G1_over_cos(const V3& w, float ax, float ay) {
   return 2 / (w.z + std::sqrt(sqr(ax * w.x) + sqr(ay * w.y) + w.z * w.z));
 }
-// The factor k of bounded visible normals (Tokuyoshi and Eto 2024). It shrinks the part of the sampled
-// spherical cap below the horizon, so that fewer normals are sampled that reflect wo downwards.
+// The factor k of bounded visible normals (Tokuyoshi and Eto 2024). It reduces the part of the sampled
+// spherical cap below the horizon, so that fewer of the sampled normals reflect wo downwards.
 inline float bound_k(const V3& wo, float ax, float ay) {
   const float a = std::min(std::min(ax, ay), 1.f), s = 1 + std::sqrt(wo.x * wo.x + wo.y * wo.y);
   return (1 - a * a) * s * s / (s * s + a * a * wo.z * wo.z);
 }
-// The density of the direction that wo is reflected to by sample_normal() with k = bound_k(), divided by
-// D(m).
+// The density of the direction into which sample_normal() with k = bound_k() reflects wo, divided by D(m).
 inline float pdf_over_D(const V3& wo, float ax, float ay) {
   const float t = std::sqrt(sqr(ax * wo.x) + sqr(ay * wo.y) + wo.z * wo.z);
   return .5f / (bound_k(wo, ax, ay) * wo.z + t);
 }
 // Samples a microfacet normal that is visible from wo. u is in [0, 1)^2. k = 1 samples all visible normals; k
-// = bound_k() leaves out normals that reflect wo downwards.
+// = bound_k() excludes normals that reflect wo downwards.
 inline V3 sample_normal(const V3& wo, float ax, float ay, const V2& u, float k) {
   const V3 i = normalize(V3(ax * wo.x, ay * wo.y, wo.z));
   const float b = k * i.z;
@@ -59,7 +58,8 @@ inline V3 sample_normal(const V3& wo, float ax, float ay, const V2& u, float k) 
 namespace beckmann {
 inline float D(const V3& m, float ax, float ay) {
   const float c2 = m.z * m.z, e = (sqr(m.x / ax) + sqr(m.y / ay)) / c2;
-  return e < 87 ? std::exp(-e) / (kPi * ax * ay * c2 * c2) : 0;  // also 0 where e is NaN: c2 = 0
+  // The result is also 0 if e is NaN, that is, if c2 = 0
+  return e < 87 ? std::exp(-e) / (kPi * ax * ay * c2 * c2) : 0;
 }
 inline float G1_over_cos(const V3& w, float ax, float ay) {
   const float s = stretched_sine(w, ax, ay);
@@ -79,7 +79,7 @@ inline float pdf_over_D(const V3& wo, float ax, float ay) { return .25f * exact_
 // Samples a microfacet normal that is visible from wo, by inversion, in double; u is in [0, 1)^2.
 V3 sample_normal(const V3& wo, float ax, float ay, const V2& u);
 // The inverse, at u, of the cumulative distribution of visible slopes along the viewing direction, for
-// roughness 1 and a viewer at the angle theta from the normal.
+// roughness 1 and an angle theta between the viewer and the normal.
 double visible_slope(double cos_theta, double sin_theta, double u);
 double erf_inverse(double x);
 }  // namespace beckmann

@@ -10,18 +10,21 @@
 namespace ls::render {
 namespace {
 
-// The tables' intervals first lie between powers of two, kOctaves of them, because near grazing angles the
-// functions vary on the scale of alpha, which is at least 1/1024. Each is halved at most kDeepest times: 2^12
-// parts reach the resolution of float32.
+// The tables' intervals are at first the octaves between powers of two, kOctaves of them: near grazing angles
+// the functions vary on the scale of alpha, which is at least 1/1024. Each interval is halved at most
+// kDeepest times: 2^12 parts reach the resolution of float32. A table that has kMostEntries is not refined
+// further: with roughnesses beyond all measure the functions are nothing but rounding.
 constexpr int kOctaves = 16, kDeepest = 12;
+constexpr std::size_t kMostEntries = 1024;
 
 const Quadrature& quadrature(double eta) {
   static const Quadrature kSmooth = gauss_legendre(64), kKinked = gauss_legendre(128);
-  return eta >= 1 ? kSmooth : kKinked;  // for eta below 1 the integrand has a kink, at total reflection
+  // With eta below 1 the integrand has a kink where total reflection begins
+  return eta >= 1 ? kSmooth : kKinked;
 }
 
-// The masking of the viewer as the BSDF's value has it, divided by the masking in the density of visible
-// normals. The ratio is not 1 for Beckmann, whose value uses a fit (microfacet.h).
+// The masking of the viewer in the BSDF's value, divided by the masking in the density of visible normals.
+// The ratio is not 1 for Beckmann, whose value uses a fit (microfacet.h).
 double fit(Microfacet type, double alpha, double mu) {
   if (type == Microfacet::ggx || alpha < kSpecularAlpha) return 1;
   const V3 w(static_cast<float>(std::sqrt((1 - mu) * (1 + mu))), 0, static_cast<float>(mu));
@@ -55,13 +58,14 @@ CosineTable::CosineTable(const std::function<double(double)>& f, double toleranc
 void CosineTable::refine(const std::function<double(double)>& f, double x0, double y0, double x1, double y1,
                          double tolerance, int depth) {
   double y[3];
-  bool fine = depth > 0;  // never accept a whole octave as straight by its three points alone
+  // A whole octave is always halved: three points do not suffice to show that it is straight
+  bool fine = depth > 0;
   for (int i = 0; i < 3; ++i) {
     const double t = .25 * (i + 1);
     y[i] = f(x0 + (x1 - x0) * t);
     fine = fine && std::abs(y[i] - (y0 + (y1 - y0) * t)) <= tolerance;
   }
-  if (fine || depth == kDeepest) {
+  if (fine || depth == kDeepest || x_.size() >= kMostEntries) {
     x_.push_back(static_cast<float>(x1));
     y_.push_back(static_cast<float>(y1));
     return;

@@ -1,11 +1,11 @@
-// Multiple scattering between microfacets, which single-scattering models lose, restored by a factor (Turquin
-// 2019, "Practical multiple scattering compensation for microfacet models"). With E(mu) the share of light
-// that leaves after one bounce, seen at the cosine mu, without absorption,
+// Multiple scattering between microfacets, which single-scattering models lose. A factor restores its energy
+// (Turquin 2019, "Practical multiple scattering compensation for microfacet models"). Let E(mu) be the share
+// of light that leaves after one bounce in the absence of absorption, seen at the cosine mu:
 //
 //   f' = f (1 + F' (1 - E) / E),   F' = F E_mean / (1 - F (1 - E_mean)),   E_mean = 2 int E mu dmu,
 //
-// where F is the mean Fresnel reflectance (times the tint): light that is masked meets the surface again,
-// once for each factor F (1 - E_mean) (Kulla and Conty 2017). Without absorption, F = 1, exactly the missing
+// where F is the mean Fresnel reflectance (times the tint): light that is masked hits the surface again, once
+// for each factor F (1 - E_mean) (Kulla and Conty 2017). Without absorption, F = 1, exactly the missing
 // energy is restored. For a dielectric E includes reflection and refraction, and nothing is absorbed. The
 // factor depends only on the viewer, so sampling does not change, and the BSDF is not reciprocal.
 #pragma once
@@ -41,16 +41,18 @@ class CosineTable {
   std::vector<float> x_, y_;
 };
 
-// How far the reflected light may deviate from 1 if a surface without absorption is lit by 1 from everywhere
-// (a white furnace): the error of the tables and of the quadrature behind them.
+// The largest deviation from 1 of the light reflected by a surface without absorption that is lit by 1 from
+// everywhere (a white furnace). It covers the errors of the tables and of the quadrature behind them.
 inline constexpr double kEnergyTolerance = 5e-4;
 
 struct MicrofacetEnergy {
   CosineTable missing, missing_behind;  // (1 - E) / E seen from outside and, for dielectrics, from inside
-  CosineTable through;                  // plastics: light that the coat lets in, compensated likewise
-  float mean = 1;                       // conductors: E_mean
+  // For plastics: the share of light that enters through the coat, compensated in the same way
+  CosineTable through;
+  float mean = 1;  // for conductors: E_mean
 
-  // The factor f' / f of a conductor whose mean Fresnel reflectance is F, for the view cosine `cos`.
+  // Returns the factor f' / f of a conductor whose mean Fresnel reflectance is F, for a viewer at the cosine
+  // `cos`.
   C3 factor(float cos, const C3& F) const {
     const float lacking = missing.at(cos), lost = 1 - mean;
     const auto again = [&](float f) { return f * mean / (1 - f * lost); };
@@ -63,10 +65,10 @@ struct MicrofacetEnergy {
 MicrofacetEnergy conductor_energy(Microfacet type, double alpha);
 // eta is the index inside over the index outside.
 MicrofacetEnergy dielectric_energy(Microfacet type, double alpha, double eta);
-// The tables for the coat of a rough plastic. Sets `through`, and leaves `missing_behind` empty.
+// Makes the tables for the coat of a rough plastic. Sets `through`, and leaves `missing_behind` empty.
 MicrofacetEnergy coat_energy(Microfacet type, double alpha, double eta);
 
-// The mean Fresnel reflectance 2 int F mu dmu of a conductor, per channel.
+// Returns the mean Fresnel reflectance 2 int F mu dmu of a conductor, per channel.
 C3 mean_fresnel(const C3& eta, const C3& k);
 
 }  // namespace ls::render

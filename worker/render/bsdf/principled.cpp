@@ -2,27 +2,25 @@
 
 #include <cmath>
 
-#include "worker/render/bsdf/rough_dielectric.h"
-
 namespace ls::render {
 namespace {
 
 constexpr float kBelowOne = 0x1.fffffep-1f;
-constexpr float kCoatShadowing = .25f;  // roughness in the coat's masking, whatever its gloss
+constexpr float kCoatShadowing = .25f;  // roughness for the coat's masking, regardless of its gloss
 
 float mix(float a, float b, float t) { return a * (1 - t) + b * t; }
 float fifth(float x) { return sqr(sqr(x)) * x; }
 float schlick_weight(float cos) { return fifth(std::clamp(1 - cos, 0.f, 1.f)); }
 
-// Schlick's weight w in F = F0 + (1 - F0) w for light that comes, at the cosine `cos`, from outside of a
-// material whose relative index is eta. For eta below 1 the cosine of the refracted angle is used.
+// Schlick's weight w in F = F0 + (1 - F0) w for light that arrives at the cosine `cos` from outside of a
+// material with relative index eta. For eta below 1 the cosine of the refracted angle is used.
 float schlick(float cos, float eta) {
   return schlick_weight(eta > 1 ? cos : safe_sqrt(1 - (1 - cos) * (1 + cos) / (eta * eta)));
 }
 C3 schlick(const C3& f0, float w) { return f0 * (1 - w) + C3(w); }
 
 // The clear coat's facets (GTR with exponent 1), alpha from 0.1 to 0.001. Their normals m have the density
-// D(m) cos, with the cosine of m to the surface normal. D is written with the tangential part of m, to avoid
+// D(m) cos, with the cosine of m to the surface normal. D is computed from the tangential part of m, to avoid
 // cancellation near the normal.
 struct CoatFacets {
   float a2;
@@ -38,10 +36,10 @@ struct CoatFacets {
   }
 };
 
-// The material at one point, seen from wo. If wo is behind the surface, it is mirrored to the front and the
-// inverse index is used; so from here on the side of wo is always z > 0.
-struct Seen {
-  const BsdfTable::Principled& p;
+// The material at one point, as seen from wo. If wo is behind the surface, everything is mirrored to the
+// front and the inverse index is used, so that z > 0 is always the side of wo.
+struct SeenPrincipled {
+  const Principled& p;
   const Lookup& look;
   V3 wo;
   bool front;
@@ -49,7 +47,7 @@ struct Seen {
   Microfacets facets;
   float chance_facets, chance_coat, chance_diffuse;
 
-  Seen(const BsdfTable::Principled& material, const Lookup& lookup, const V3& w)
+  SeenPrincipled(const Principled& material, const Lookup& lookup, const V3& w)
       : p(material), look(lookup), wo(w.x, w.y, std::abs(w.z)), front(w.z > 0) {
     metallic = look.share(p.metallic);
     const float trans = look.share(p.spec_trans);
@@ -57,7 +55,8 @@ struct Seen {
     bsdf = (1 - metallic) * trans;
     clearcoat = front ? look.share(p.clearcoat) : 0;
     eta = front ? p.eta : 1 / p.eta;
-    const float a = sqr(look.share(p.roughness)), aspect = std::sqrt(1 - .9f * look.share(p.anisotropic));
+    const float a = sqr(look.share(p.roughness)),
+                aspect = std::sqrt(1 - .9f * look.share(p.anisotropic_slot));
     facets = {Microfacet::ggx, std::max(.001f, a / aspect), std::max(.001f, a * aspect)};
     const float coat = .25f * clearcoat, diffuse = front ? brdf : 0, sum = 1 + coat + diffuse;
     chance_facets = 1 / sum;
@@ -65,7 +64,7 @@ struct Seen {
     chance_diffuse = diffuse / sum;
   }
 
-  // False if wo is grazing, or inside of a surface that light does not enter.
+  // False if wo is grazing, or is inside of a surface that light does not enter.
   bool visible() const { return wo.z > 0 && (front || bsdf > 0); }
   float fresnel(float cos) const { return static_cast<float>(fresnel_dielectric(cos, eta).reflectance); }
   // The probability that light is reflected, not refracted, at a sampled visible normal with the Fresnel
@@ -87,7 +86,7 @@ struct Seen {
 
 // The value f |cos wi| of the diffuse lobe: diffuse reflection, retro-reflection, approximate subsurface
 // scattering, and sheen.
-C3 diffuse_f_cos(const Seen& s, const C3& base, const V3& wi, float cos_d) {
+C3 diffuse_f_cos(const SeenPrincipled& s, const C3& base, const V3& wi, float cos_d) {
   const float out = schlick_weight(wi.z), in = schlick_weight(s.wo.z);
   const float retro = 2 * s.look.share(s.p.roughness) * sqr(cos_d);
   const float diffuse = (1 - .5f * in) * (1 - .5f * out) + retro * (out + in + out * in * (retro - 1));
@@ -103,14 +102,14 @@ C3 diffuse_f_cos(const Seen& s, const C3& base, const V3& wi, float cos_d) {
   return f * wi.z;
 }
 
-BsdfEval eval_reflection(const Seen& s, const C3& base, const V3& wi) {
+BsdfEval eval_reflection(const SeenPrincipled& s, const C3& base, const V3& wi) {
   const V3 h = normalize(s.wo + wi);
   const float cos_d = dot(s.wo, h);
   if (!(cos_d > 0)) return {};
   const float F = s.fresnel(cos_d), D = s.facets.D(h);
   BsdfEval e;
   e.pdf = s.chance_facets * s.reflecting(F) * .25f * D * s.facets.visible_over_D(s.wo);
-  if (F > 0)  // as in Mitsuba: with equal indices nothing is reflected, not even by a metal
+  if (F > 0)  // as in Mitsuba: with equal indices nothing is reflected, even by a metal
     e.f_cos = s.reflectance(F, cos_d, base) *
               (.25f * D * s.facets.G1_over_cos(s.wo) * s.facets.G1_over_cos(wi) * wi.z);
   if (!s.front) return e;
@@ -129,8 +128,8 @@ BsdfEval eval_reflection(const Seen& s, const C3& base, const V3& wi) {
   return e;
 }
 
-// The value for a wi below the surface, by the formulas of RoughDielectric.
-BsdfEval eval_refraction(const Seen& s, const C3& base, const V3& wi) {
+// Returns the value for a wi below the surface, by the formulas of RoughDielectric.
+BsdfEval eval_refraction(const SeenPrincipled& s, const C3& base, const V3& wi) {
   if (!s.p.transmits || !(s.bsdf > 0)) return {};
   V3 h = s.wo + wi * s.eta;
   if (h.z < 0) h = -h;
@@ -147,24 +146,24 @@ BsdfEval eval_refraction(const Seen& s, const C3& base, const V3& wi) {
 
 }  // namespace
 
-BsdfEval eval_principled(const BsdfTable::Principled& p, const Lookup& look, const V3& wo, const V3& wi) {
-  const Seen s(p, look, wo);
+BsdfEval Principled::eval(const Lookup& look, const V3& wo, const V3& wi) const {
+  const SeenPrincipled s(*this, look, wo);
   if (!s.visible() || wi.z == 0) return {};
-  const C3 base = look.reflectance(p.base_color);
+  const C3 base = look.reflectance(base_color);
   const V3 in(wi.x, wi.y, s.front ? wi.z : -wi.z);
   return in.z > 0 ? eval_reflection(s, base, in) : eval_refraction(s, base, in);
 }
 
-std::optional<BsdfSample> sample_principled(const BsdfTable::Principled& p, const Lookup& look, const V3& wo,
-                                            float u_lobe, const V2& u) {
-  const Seen s(p, look, wo);
+std::optional<BsdfSample> Principled::sample(const Lookup& look, const V3& wo, float u_lobe,
+                                             const V2& u) const {
+  const SeenPrincipled s(*this, look, wo);
   if (!s.visible()) return std::nullopt;
   V3 wi;
   bool transmitted = false;
   if (u_lobe < s.chance_diffuse) {
     wi = cosine_hemisphere(u);
   } else if (u_lobe < s.chance_diffuse + s.chance_coat) {
-    wi = reflect(s.wo, CoatFacets(look.share(p.clearcoat_gloss)).sample(u));
+    wi = reflect(s.wo, CoatFacets(look.share(clearcoat_gloss)).sample(u));
   } else {
     const float rest = (u_lobe - s.chance_diffuse - s.chance_coat) / s.chance_facets;
     const V3 m = s.facets.sample_visible(s.wo, u);
@@ -177,7 +176,7 @@ std::optional<BsdfSample> sample_principled(const BsdfTable::Principled& p, cons
   }
   wi = normalize(wi);
   if (!(transmitted ? wi.z < 0 : wi.z > 0)) return std::nullopt;
-  const C3 base = look.reflectance(p.base_color);
+  const C3 base = look.reflectance(base_color);
   const BsdfEval e = transmitted ? eval_refraction(s, base, wi) : eval_reflection(s, base, wi);
   if (!(e.pdf > 0)) return std::nullopt;
   BsdfSample out;
@@ -187,6 +186,27 @@ std::optional<BsdfSample> sample_principled(const BsdfTable::Principled& p, cons
   out.transmitted = transmitted;
   out.eta = transmitted ? s.eta : 1;
   return out;
+}
+
+Principled make_material(const PrincipledBsdf& b, MaterialBuilder& builder) {
+  Principled p;
+  p.base_color = builder.reflectance(b.base_color);
+  p.roughness = builder.reflectance(b.roughness);
+  p.anisotropic_slot = builder.reflectance(b.anisotropic);
+  p.metallic = builder.reflectance(b.metallic);
+  p.spec_tint = builder.reflectance(b.spec_tint);
+  p.sheen = builder.reflectance(b.sheen);
+  p.sheen_tint = builder.reflectance(b.sheen_tint);
+  p.flatness = builder.reflectance(b.flatness);
+  p.clearcoat = builder.reflectance(b.clearcoat);
+  p.clearcoat_gloss = builder.reflectance(b.clearcoat_gloss);
+  p.transmits = b.spec_trans.has_value();
+  p.spec_trans = b.spec_trans ? builder.reflectance(*b.spec_trans) : Slot{C3(0), {}, true};
+  p.eta = static_cast<float>(builder.index(b.eta, 1));
+  // As in Mitsuba, the index is moved away from 1: without a contrast of indices the facets would neither
+  // reflect nor refract.
+  if (p.transmits && std::abs(p.eta - 1) < 1e-3f) p.eta = 1.001f;
+  return p;
 }
 
 }  // namespace ls::render

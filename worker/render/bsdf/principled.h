@@ -10,27 +10,30 @@
 // the facets, of which F reflect.
 #pragma once
 
-#include "worker/render/bsdf/lobes.h"
+#include "worker/render/bsdf/material_builder.h"
 
 namespace ls::render {
 
-struct BsdfTable::Principled {
-  Slot base_color, roughness, anisotropic, metallic, spec_trans, spec_tint, sheen, sheen_tint, flatness,
+struct Principled : MaterialKind {
+  static constexpr bool kFrontOnly = false;
+  static constexpr bool kSmooth = true;
+  Slot base_color, roughness, anisotropic_slot, metallic, spec_trans, spec_tint, sheen, sheen_tint, flatness,
       clearcoat, clearcoat_gloss;
   bool transmits = false;
   float eta = 1.5f;  // index of refraction inside over outside
 
   bool reads_uv() const {
-    for (const Slot* s : {&base_color, &roughness, &anisotropic, &metallic, &spec_trans, &spec_tint, &sheen,
-                          &sheen_tint, &flatness, &clearcoat, &clearcoat_gloss})
-      if (!s->constant) return true;
-    return false;
+    return any_texture(base_color, roughness, anisotropic_slot, metallic, spec_trans, spec_tint, sheen,
+                       sheen_tint, flatness, clearcoat, clearcoat_gloss);
   }
-  bool is_anisotropic() const { return !anisotropic.constant || anisotropic.value.x > 0; }
+  bool anisotropic() const { return !anisotropic_slot.constant || anisotropic_slot.value.x > 0; }
+
+  BsdfEval eval(const Lookup& look, const V3& wo, const V3& wi) const;
+  std::optional<BsdfSample> sample(const Lookup& look, const V3& wo, float u_lobe, const V2& u) const;
 };
 
-BsdfEval eval_principled(const BsdfTable::Principled& p, const Lookup& look, const V3& wo, const V3& wi);
-std::optional<BsdfSample> sample_principled(const BsdfTable::Principled& p, const Lookup& look, const V3& wo,
-                                            float u_lobe, const V2& u);
+using PrincipledKinds = Kinds<Principled>;
+
+Principled make_material(const PrincipledBsdf& b, MaterialBuilder& builder);
 
 }  // namespace ls::render

@@ -8,7 +8,8 @@ namespace ls::render {
 
 RoughPlasticTable make_rough_plastic_table(Microfacet type, double alpha, double eta) {
   static const Quadrature kOutside = gauss_legendre(48),
-                          kInside = gauss_legendre(96);  // a kink inside, at total reflection
+                          // More nodes inside: the integrand has a kink where total reflection begins
+      kInside = gauss_legendre(96);
   RoughPlasticTable t;
   double internal = 0;
   for (int i = 0; i < kPlasticNodes; ++i) {

@@ -13,7 +13,7 @@ struct RoughPlasticTable {
   // Entry i is the transmittance for light from outside at the cosine i / (kPlasticNodes - 1); between the
   // entries it is interpolated linearly.
   std::array<float, kPlasticNodes> transmittance{};
-  float internal_reflectance = 0;  // for diffuse light from inside
+  float internal_reflectance = 0;  // reflectance for diffuse light from inside
 
   float at(float cos_theta) const {
     const float x = cos_theta * (kPlasticNodes - 1);
@@ -23,9 +23,9 @@ struct RoughPlasticTable {
   }
 };
 
-// The nodes, the linear interpolation between them and the internal reflectance 2 mean(R(mu_i) mu_i) over the
-// nodes (a plain mean, not a quadrature: about 0.009 below the integral) are part of the dialect's definition
-// of the material. The values at the nodes are integrals over visible normals of (1 - F) G1(refracted) and F
+// Mitsuba's definition of the material includes the nodes, the linear interpolation between them and the
+// internal reflectance 2 mean(R(mu_i) mu_i) over the nodes (a plain mean, not a quadrature: about 0.009 below
+// the integral). The values at the nodes are integrals over visible normals of (1 - F) G1(refracted) and F
 // G1(reflected), by Gauss-Legendre quadrature in double. If alpha < kSpecularAlpha, the coat is smooth. eta
 // is the index inside over the index outside.
 RoughPlasticTable make_rough_plastic_table(Microfacet type, double alpha, double eta);

@@ -38,8 +38,8 @@ double masking(Microfacet type, double alpha, double x, double y, double z) {
   return a * (3.535 + 2.181 * a) / (1 + a * (2.276 + 2.577 * a));
 }
 
-// The share of the light from i = (sin, 0, cos) that a microfacet with the normal m = (mx, my, mz) reflects
-// or refracts as `way` says, times the masking of the new direction.
+// Returns the share of the light from i = (sin, 0, cos) that a microfacet with the normal m = (mx, my, mz)
+// reflects or refracts as `way` says, times the masking of the new direction.
 double sent_on(Way way, Microfacet type, double alpha, double eta, double sin, double cos, double mx,
                double my, double mz) {
   const double im = sin * mx + cos * mz;
@@ -61,7 +61,8 @@ double rough_share(Way way, Microfacet type, double alpha, double eta, double mu
     return way == Way::mirrored ? 1 : way == Way::reflected ? R : 1 - R;
   }
   const double sin = std::sqrt(1 - mu * mu), l = std::hypot(alpha * sin, mu);
-  const double is = alpha * sin / l, ic = mu / l;  // the viewer, stretched to roughness 1
+  // The direction of the viewer in the space where the roughness is 1
+  const double is = alpha * sin / l, ic = mu / l;
   double sum = 0;
   for (std::size_t a = 0; a < q.x.size(); ++a) {
     double x, y, z, row = 0;
@@ -71,8 +72,8 @@ double rough_share(Way way, Microfacet type, double alpha, double eta, double mu
       if (type == Microfacet::beckmann) {
         x = -alpha * slope, y = alpha * q.gauss[b], z = 1;
       } else {
-        // The visible normals of GGX are a cap of the sphere (Dupuy and Benyoub 2023); its two halves are
-        // equal, so one is enough.
+        // The visible normals of GGX are a cap of the sphere (Dupuy and Benyoub 2023). Its two halves are
+        // equal, so one of them suffices.
         x = alpha * (r * q.cos[b] + is), y = alpha * r * q.sin[b], z = cap + ic;
       }
       const double n = 1 / std::sqrt(x * x + y * y + z * z);

@@ -8,20 +8,20 @@
 namespace ls::render {
 
 struct Quadrature {
-  std::vector<double> x, w;             // on [0, 1]
-  std::vector<double> gauss, cos, sin;  // at the nodes: erf^-1(2 x - 1); cosine and sine of pi x
+  std::vector<double> x, w;             // nodes and weights on [0, 1]
+  std::vector<double> gauss, cos, sin;  // functions of the nodes: erf^-1(2 x - 1); cosine and sine of pi x
 };
-// The Gauss-Legendre quadrature with n nodes on [0, 1].
+// Returns the Gauss-Legendre quadrature with n nodes on [0, 1].
 Quadrature gauss_legendre(int n);
 
-// The way that light takes at a microfacet, which determines the facet's weight: F (reflected), 1 - F
-// (refracted), or 1 (mirrored, that is, reflected without loss). F is the Fresnel reflectance.
+// What happens to light at a microfacet. It determines the facet's weight: F (reflected), 1 - F (refracted),
+// or 1 (mirrored, that is, reflected without loss). F is the Fresnel reflectance.
 enum class Way { reflected, refracted, mirrored };
 
-// The share of light seen at the cosine mu that leaves this way without being masked: the mean over visible
-// normals of the weight times the masking of the new direction (for Beckmann the dialect's fit). eta is the
-// index on the other side over the index on the side that the light comes from. If alpha < kSpecularAlpha,
-// the surface is treated as a plane.
+// Returns the share of light at the cosine mu that leaves in this way without being masked: the mean over
+// visible normals of the weight times the masking of the new direction (for Beckmann by Mitsuba's fit). eta
+// is the index on the other side over the index on the side that the light comes from. If alpha <
+// kSpecularAlpha, the surface is treated as a plane.
 double rough_share(Way way, Microfacet type, double alpha, double eta, double mu, const Quadrature& q);
 
 }  // namespace ls::render

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "worker/render/base/built.h"
 #include "worker/render/base/work_counters.h"
 #include "worker/render/camera/fov.h"
 
@@ -41,8 +40,8 @@ Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale, const 
 }
 
 bool Camera::usable() const {
-  // Rays depend linearly on the positions on the film and on the lens, so it is enough to test the corners of
-  // both.
+  // Rays depend linearly on the positions on the film and on the lens, so testing the corners of both
+  // suffices.
   for (const double fx : {0., 1.})
     for (const double fy : {0., 1.})
       for (const V2& lens : {V2(0, 0), V2(0, 1), V2(1, 0), V2(1, 1)}) {
@@ -61,18 +60,19 @@ CameraRay Camera::ray(double fx, double fy, V2 lens) const {
   return lens_ray(x, y, textures_ ? aperture_at(fx * per_pixel_x_, fy * per_pixel_y_) : aperture_, lens);
 }
 
-// The aperture for the film position (u, v): the sensor's aperture times the mean of the aperture map's
-// channels there, clamped to [0, 1].
+// Returns the aperture for the film position (u, v): the sensor's aperture times the mean of the aperture
+// map's channels there, clamped to [0, 1].
 float Camera::aperture_at(double u, double v) const {
   const V2 uv(static_cast<float>(std::clamp(u, 0., 1.)), static_cast<float>(std::clamp(v, 0., 1.)));
   return aperture_ * std::clamp(mean_component(textures_->eval(aperture_scale_, uv)), 0.f, 1.f);
 }
 
 CameraRay Camera::lens_ray(double x, double y, float aperture, V2 lens) const {
-  if (!kBuilt.lenses || !(aperture > 0)) return perspective_ray(origin_, {x, y, 1});
+  if (!(aperture > 0)) return perspective_ray(origin_, {x, y, 1});
   LS_COUNT(lens);
   const V2 p = concentric_disk(lens) * aperture;
-  // All rays of a film position meet in its point in focus, which does not depend on the lens sample.
+  // All rays of a film position go through the same point of the focal plane, which does not depend on the
+  // lens sample.
   return perspective_ray(origin_ + lens_x_ * p.x + lens_y_ * p.y,
                          {x * focus_ - p.x, y * focus_ - p.y, focus_});
 }
@@ -81,7 +81,7 @@ CameraRay Camera::perspective_ray(const V3& o, const V3d& local) const {
   const V3d along = axis_x_ * local.x + axis_y_ * local.y + axis_z_ * local.z;
   const double length = along.length();
   const V3 d(along * (1 / length));
-  // The distances of clip planes are measured along the camera's axis; the ray starts at the near plane.
+  // Clip distances are measured along the camera's axis. The ray starts at the near plane.
   const auto per_depth = static_cast<float>(length / local.z);
   return {o + d * (near_ * per_depth), d, (far_ - near_) * per_depth};
 }
@@ -100,8 +100,8 @@ CameraRay Camera::orthographic_ray(double x, double y) const {
   return {V3(V3d(origin_) + at + axis_z_ * near_), V3(axis_z_.normalized()), far_ - near_};
 }
 
-// All rays start at the camera's position. u is the azimuth as a share of a full turn, from -z towards +x; v
-// is the angle from +y as a share of half a turn.
+// All rays start at the camera's position. u is the azimuth divided by a full turn, from -z towards +x; v is
+// the angle from +y divided by half a turn.
 CameraRay Camera::spherical_ray(double u, double v) const {
   const double phi = u * 2 * 3.14159265358979323846, theta = v * 3.14159265358979323846;
   const double x = std::sin(phi) * std::sin(theta), y = std::cos(theta), z = -std::cos(phi) * std::sin(theta);

@@ -23,18 +23,18 @@ class Camera {
   Camera(const Sensor& sensor, FrameSize size, V3d center, double scale,
          const TextureTable* textures = nullptr);
 
-  // The ray through the position (fx, fy) of the whole frame, in pixels from its top left corner. `lens`, in
-  // [0, 1)^2, chooses the point on the lens; a camera without a lens ignores it.
+  // Returns the ray through the position (fx, fy) of the whole frame, in pixels from its top left corner.
+  // `lens`, in [0, 1)^2, chooses the point on the lens; a camera without a lens ignores it.
   CameraRay ray(double fx, double fy, V2 lens) const;
   // True if the origins and directions of all rays of this camera are in the range of float32.
   bool usable() const;
-  // The distance from the camera, or from its lens, to the point at which a ray in direction d starts.
+  // Returns the distance from the camera, or from its lens, to the start of a ray in direction d.
   float near_distance(const V3& d) const;
   bool has_lens() const { return aperture_ > 0; }
   Projection projection() const { return projection_; }
 
  private:
-  // The ray from o in the direction `local`, which is in camera space.
+  // Returns the ray from o in the camera-space direction `local`.
   CameraRay perspective_ray(const V3& o, const V3d& local) const;
   CameraRay lens_ray(double x, double y, float aperture, V2 lens) const;
   CameraRay orthographic_ray(double x, double y) const;
@@ -42,17 +42,17 @@ class Camera {
   float aperture_at(double u, double v) const;
 
   Projection projection_ = Projection::perspective;
-  bool pinhole_ = true;           // perspective without a lens
+  bool pinhole_ = true;           // true for a perspective camera without a lens
   V3d axis_x_, axis_y_, axis_z_;  // columns of to_world: the camera's axes in the world, not normalised
   V3 origin_;
   V3 lens_x_, lens_y_;  // axes of the lens in world units
   // The film position fx, fy has the camera-space direction (x, y, 1) with x = x0_ + dx_ * fx, and y
   // likewise.
   double x0_ = 0, dx_ = 0, y0_ = 0, dy_ = 0;
-  float aperture_ = 0, focus_ = 1;            // scene units
-  float near_ = 0, far_ = 0;                  // world units
+  float aperture_ = 0, focus_ = 1;            // in scene units
+  float near_ = 0, far_ = 0;                  // in world units
   double per_pixel_x_ = 1, per_pixel_y_ = 1;  // size of a pixel as a share of the frame
-  const TextureTable* textures_ = nullptr;    // with an aperture_scale only
+  const TextureTable* textures_ = nullptr;    // set only with an aperture_scale
   TextureIndex aperture_scale_;
 };
 

@@ -1,4 +1,4 @@
-// Converts fields of view from the dialect's conventions.
+// Converts fields of view from the conventions of scene files.
 #pragma once
 
 #include <cmath>
@@ -7,8 +7,8 @@
 
 namespace ls::render {
 
-// The tangent of half the horizontal field of view. `fov` is the field of view in degrees along `axis`;
-// `aspect` is the width of the frame over its height.
+// Returns the tangent of half the horizontal field of view. `fov` is the field of view in degrees along
+// `axis`; `aspect` is the width of the frame over its height.
 inline double tan_half_fov_x(double fov, FovAxis axis, double aspect) {
   const double t = std::tan(fov * (3.14159265358979323846 / 360));
   switch (axis) {

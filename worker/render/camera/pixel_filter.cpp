@@ -17,7 +17,7 @@ PixelFilter::PixelFilter(const ReconstructionFilter& filter) {
                  [&](const GaussianFilter& f) {
                    kind_ = Kind::table;
                    radius_ = 4 * f.stddev;
-                   // With steps of radius / 512 the linear interpolation of the CDF is off by less than 4e-6.
+                   // With steps of radius / 512 the error of linear interpolation in the CDF is below 4e-6.
                    constexpr int kSteps = 1024;
                    const double a = -1 / (2 * f.stddev * f.stddev), edge = std::exp(a * radius_ * radius_);
                    const auto value = [&](double x) { return std::max(0., std::exp(a * x * x) - edge); };

@@ -14,8 +14,8 @@ class PixelFilter {
  public:
   PixelFilter() = default;
   explicit PixelFilter(const ReconstructionFilter& filter);
-  // The offset of a sample from the pixel's centre along one axis, in pixels, for the random number u in [0,
-  // 1).
+  // Returns the offset of a sample from the pixel's centre along one axis, in pixels, for the random number u
+  // in [0, 1).
   double offset(float u) const;
 
  private:

@@ -12,7 +12,6 @@
 #include <optional>
 #include <tuple>
 
-#include "worker/render/base/built.h"
 #include "worker/render/geometry/accel_shapes.h"
 #include "worker/render/geometry/primitive_side.h"
 
@@ -21,7 +20,7 @@ namespace {
 
 constexpr char kDeviceConfig[] = "isa=avx2,max_isa=avx2,frequency_level=simd256,set_affinity=0";
 
-// Rays are written in the 16-byte words in which Embree reads them, because a load that spans several smaller
+// A ray is written in 16-byte words, the units in which Embree reads it: a load that spans several smaller
 // stores has to wait for them.
 using F32x4 = float __attribute__((vector_size(16)));
 using U32x4 = std::uint32_t __attribute__((vector_size(16)));
@@ -35,9 +34,9 @@ void set_ray(RTCRay& r, const V3& o, const V3& d, float t_max) {
   std::memcpy(&r.tfar, &rest, sizeof rest);
 }
 
-// True if Embree can trace a ray from o. Embree's behaviour is undefined on NaN, and Debian's build of it
-// stops the program at rays from beyond 1.8e18. For rays transformed into instances, kLargestInverse ensures
-// the same.
+// True if Embree can trace a ray from o. Embree's behaviour is undefined for NaN, and Debian's build of it
+// aborts for rays whose origin is farther than 1.8e18. For rays transformed into instances, kLargestInverse
+// ensures the same.
 bool near_enough(const V3& o) { return dot(o, o) <= 1e18f; }  // within 1e9 times the world's size
 
 // The Embree scenes over one set of primitives: all of them, the opaque ones, and those that let light pass.
@@ -50,7 +49,7 @@ struct Scenes {
   ShapeSet<Cylinder> cylinders[2];
 
   Scenes() = default;
-  Scenes(const Scenes&) = delete;  // the BVH points at the shape sets
+  Scenes(const Scenes&) = delete;  // not copyable, since the BVH points at the shape sets
   Scenes& operator=(const Scenes&) = delete;
   ~Scenes() {
     for (RTCScene s : {all != opaque ? all : nullptr, opaque, boundary}) {
@@ -65,7 +64,7 @@ struct Accel::State {
   RTCDevice device = nullptr;
   std::optional<Scenes> own;
   std::deque<Scenes> groups;
-  std::vector<std::uint32_t> group_of;  // by instance
+  std::vector<std::uint32_t> group_of;  // group of each instance
   std::atomic<std::int64_t> bytes{0};
   bool coincident = false;
 
@@ -139,7 +138,7 @@ void attach(RTCDevice device, const Geometry& g, const PrimitiveSet& set, Scenes
 // Adds the primitives of `set` to the Embree scenes `to`. The caller then commits these scenes.
 void fill(const Accel::State& st, const Geometry& g, const PrimitiveSet& set, bool boundaries, Scenes& to) {
   const RTCDevice device = st.device;
-  // between() traces `all`, which is this scene only if there are no boundaries.
+  // between() traces `all`; if there are no boundaries, `opaque` is the same scene as `all`.
   to.opaque = new_scene(device, st.coincident && !boundaries);
   if (!boundaries) {
     to.all = to.opaque;
@@ -197,18 +196,18 @@ void attach_instances(const Geometry& g, Accel::State& st) {
 PrimitiveId primitive_in(const Scenes& in, unsigned geometry, unsigned primitive, std::uint32_t instance) {
   return {static_cast<PrimitiveId::Kind>(geometry % kKinds), in.base[geometry] + primitive, instance};
 }
-// The primitive of a hit in an instance. This function is not inlined, to keep it out of the code for
-// primitives outside of groups.
+// Returns the primitive of a hit in an instance. Not inlined, to keep it out of the code for primitives
+// outside of groups.
 [[gnu::noinline]] PrimitiveId instanced(const Accel::State& st, const RTCHit& hit) {
   const std::uint32_t instance = hit.instID[0] - kFirstInstance;
   return primitive_in(st.groups[st.group_of[instance]], hit.geomID - kInGroup, hit.primID, instance);
 }
-// The primitive that `hit` names; nullopt if the ray hit nothing.
+// Returns the primitive that `hit` names; nullopt if the ray hit nothing.
 [[gnu::always_inline]] inline std::optional<PrimitiveId> primitive_of(const Accel::State& st,
                                                                       const RTCHit& hit) {
   static_assert(RTC_INVALID_GEOMETRY_ID >= kInGroup);
   if (hit.geomID < kInGroup) return primitive_in(*st.own, hit.geomID, hit.primID, kNone);
-  if (!kBuilt.instances || hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  if (hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
   return instanced(st, hit);
 }
 
@@ -307,7 +306,7 @@ std::uint64_t Accel::bytes() const {
   return static_cast<std::uint64_t>(std::max<std::int64_t>(0, state_->bytes));
 }
 std::string Accel::describe() {
-  // The version is asked of the loaded library, because it may differ from that of the headers.
+  // The version is that of the loaded library, which may differ from the headers.
   const RTCDevice device = rtcNewDevice(fmt::format("threads=1,user_threads=0,{}", kDeviceConfig).c_str());
   const auto version = device ? rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION) : 0;
   if (device) rtcReleaseDevice(device);

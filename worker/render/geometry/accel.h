@@ -1,5 +1,5 @@
-// The interface to Embree. It finds only which primitive a ray meets; Geometry::complete then computes
-// distance and position, so that no approximate reciprocal of the processor reaches the image.
+// The interface to Embree. Embree is used only to find the primitive that a ray hits. Geometry::complete then
+// computes distance and position, so that the processor's approximate reciprocals never affect the image.
 #pragma once
 
 #include <array>
@@ -26,25 +26,26 @@ class Accel {
   Accel(Accel&&) noexcept;
   Accel& operator=(Accel&&) noexcept;
 
-  // `geometry` must not move during the lifetime of the result: the BVH reads its arrays in place.
-  // `coincident` enables between(); it costs a little at each triangle hit.
+  // `geometry` must not move during the lifetime of the result, since the BVH reads its arrays in place.
+  // `coincident` enables between(), at a small cost for each triangle hit.
   static Result<Accel> build(const Geometry& geometry, int threads, bool coincident = false);
 
-  // The nearest primitive that the ray o + t d meets at a t in (0, t_max). Here and below d need not be of
-  // unit length.
+  // Returns the nearest primitive that the ray o + t d hits at a t in (0, t_max). Here and below d need not
+  // be of unit length.
   std::optional<PrimitiveId> nearest(const V3& o, const V3& d, float t_max) const;
-  // The nearest primitive at a t in (0, t_max) that lets light pass straight through, all of it or a part.
+  // Returns the nearest primitive at a t in (0, t_max) that lets light pass straight through, completely or
+  // partly.
   std::optional<PrimitiveId> nearest_boundary(const V3& o, const V3& d, float t_max) const;
-  // All primitives met on the straight line from a to b, at most CoincidentHits::kMost. Requires that build()
-  // was called with `coincident`.
+  // Returns all primitives on the straight line from a to b, at most CoincidentHits::kMost. Requires that
+  // build() was called with `coincident`.
   CoincidentHits between(const V3& a, const V3& b) const;
-  // True if the ray o + t d meets an opaque primitive at a t in (0, t_max).
+  // True if the ray o + t d hits an opaque primitive at a t in (0, t_max).
   bool occluded(const V3& o, const V3& d, float t_max) const;
 
   bool has_boundaries() const;
   std::uint64_t bytes() const;  // memory of the BVH, as Embree reports it
   // Embree's version and the instruction set that it is configured to use. The text is part of the numeric
-  // class: the digest that identifies machines that render the same bits (numeric_class() in render.h).
+  // class, the digest that identifies machines that render the same bits (numeric_class() in render.h).
   static std::string describe();
 
   struct State;

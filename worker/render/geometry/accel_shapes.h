@@ -9,17 +9,16 @@
 #include <limits>
 #include <span>
 
-#include "worker/render/base/built.h"
 #include "worker/render/base/work_counters.h"
 #include "worker/render/geometry/accel.h"
 #include "worker/render/geometry/shape_boxes.h"
 
 namespace ls::render {
 
-// The Embree geometry ids of the primitives: kind + side * kKinds, where side 0 holds the opaque primitives
-// and side 1 those that let light pass. They are the same in every Embree scene. In the Embree scenes of
-// groups kInGroup is added, so that the id of a hit alone tells whether the primitive is in a group. In the
-// world's Embree scenes the instances follow in order from kFirstInstance on.
+// The Embree geometry ids of the primitives: kind + side * kKinds. Side 0 contains the opaque primitives and
+// side 1 those that let light pass. The ids are the same in every Embree scene. In the Embree scenes of
+// groups kInGroup is added, so that the id of a hit alone shows whether the primitive is in a group. In the
+// world's Embree scenes the instances have the ids from kFirstInstance on.
 enum : unsigned {
   kTriangles = 0,
   kSpheres = 1,
@@ -30,8 +29,8 @@ enum : unsigned {
   kFirstInstance = 2 * kKinds
 };
 
-// The shapes of one kind, as Embree's callbacks get them. All primitives but triangles are user geometries,
-// which our own double-precision code intersects.
+// The shapes of one kind, in the form that Embree passes to our callbacks. All primitives except triangles
+// are user geometries, which our own double-precision code intersects.
 template <class Shape>
 struct ShapeSet {
   std::span<const Shape> shapes;
@@ -49,9 +48,9 @@ void bounds_callback(const RTCBoundsFunctionArguments* args) {
   *args->bounds_o = {lo.x, lo.y, lo.z, 0, hi.x, hi.y, hi.z, 0};
 }
 
-// What a callback needs to know of the ray: Embree's context, and the ray's origin o and direction d in world
-// space. Inside an instance Embree passes to the callback only the ray as transformed, in float32, to the
-// group's space.
+// The data about the ray that a callback needs: Embree's context, and the ray's origin o and direction d in
+// world space. Inside an instance Embree passes to the callback only the ray as transformed, in float32, to
+// the group's space.
 struct Tracing {
   RTCIntersectContext context;
   const V3 *o, *d;
@@ -67,7 +66,7 @@ double shape_distance(const void* user, unsigned prim, const RTCIntersectContext
   LS_COUNT(user_geometry);
   const auto& set = *static_cast<const ShapeSet<Shape>*>(user);
   const Shape& s = set.shapes[prim];
-  if (kBuilt.instances && context->instID[0] != RTC_INVALID_GEOMETRY_ID) {
+  if (context->instID[0] != RTC_INVALID_GEOMETRY_ID) {
     // This is the same computation as in Geometry::complete_instanced, so that both find the same hits.
     const auto& tracing = *reinterpret_cast<const Tracing*>(context);
     const PlacedInstance& i = set.instances[context->instID[0] - kFirstInstance];
@@ -78,8 +77,8 @@ double shape_distance(const void* user, unsigned prim, const RTCIntersectContext
                    ray.tfar);
 }
 
-// The state of a trace that collects all hits along the ray: its filter accepts no hit, so that Embree goes
-// on.
+// The state of a trace that collects all hits along the ray. Its filter rejects every hit, so that Embree
+// continues.
 struct Collecting : Tracing {
   using Tracing::Tracing;
   std::array<RTCHit, CoincidentHits::kMost> met;  // only the ids are set
@@ -95,7 +94,7 @@ inline void collect_callback(const RTCFilterFunctionNArguments* args) {
   if (!args->valid[0]) return;
   const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);
   Collecting::keep(args->context, hit->geomID, hit->primID, hit->instID[0]);
-  args->valid[0] = 0;  // reject, so that the traversal continues
+  args->valid[0] = 0;  // the hit is rejected, so that the traversal continues
 }
 
 template <class Shape>

@@ -10,7 +10,7 @@
 namespace ls::render {
 namespace {
 
-// The largest number of pairs of shapes or flat pieces that are compared; that takes about half a second.
+// The largest number of pairs of shapes or flat pieces that are compared; this takes about half a second.
 constexpr std::uint64_t kMaxPairs = std::uint64_t{1} << 27;
 
 struct Piece {  // a triangle, or half of the square about a disk
@@ -92,7 +92,7 @@ class Finder {
     ++marks_;
     SurfaceInfo& s = g_.surfaces[surface];
     s.coincident_reach = std::max(s.coincident_reach, static_cast<float>(reach));
-    if (!own) return;  // hits in instances compute their reach themselves
+    if (!own) return;  // a hit in an instance computes its reach itself
     if (!(s.reach > 0)) {
       const Parts& p = shapes_[surface];
       for (std::uint32_t i = 0; i < p.triangles; ++i) s.reach = std::max(s.reach, g_.reach_of(p.first + i));
@@ -169,7 +169,7 @@ class Finder {
     }
   }
 
-  // Marks a mesh that contains a triangle twice, as cells of one file do that share a wall.
+  // Marks a mesh that contains the same triangle twice, as a mesh of cells does whose cells share a wall.
   void twice_in_itself(const SurfaceBox& n) {
     std::vector<std::array<double, 9>> keys;
     const Parts& mine = shapes_[n.surface];

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <limits>
 
-#include "worker/render/base/built.h"
 #include "worker/render/base/work_counters.h"
 
 namespace ls::render {
@@ -15,8 +14,8 @@ struct Barycentric {
   double t, u, v;  // p = v0 + u (v1 - v0) + v (v2 - v0)
 };
 
-// Intersects a triangle of corner v0 and edges e1 and e2. It divides in double and never uses the processor's
-// reciprocal estimates, whose bits differ between manufacturers.
+// Intersects a triangle with the corner v0 and the edges e1 and e2. It divides in double and never uses the
+// processor's reciprocal estimates, whose bits differ between manufacturers.
 bool meet_triangle(const V3d& v0, const V3d& e1, const V3d& e2, const V3d& o, const V3d& d, Barycentric& b) {
   const V3d p = d.cross(e2);
   const double det = e1.dot(p);
@@ -28,16 +27,17 @@ bool meet_triangle(const V3d& v0, const V3d& e1, const V3d& e2, const V3d& o, co
   return std::isfinite(b.t) && std::isfinite(b.u) && std::isfinite(b.v);
 }
 
-// The BVH decides in float32 which triangle is hit; near an edge exact arithmetic may place the point just
-// outside. And where another wall of a room begins at the edge, rounding must not put the point behind that
-// wall, where a ray would leak out: by at most sqrt(3) / 2 ulps, 2^-24, of the reach. So points keep a
-// distance of four ulps of the reach from every edge. `twice_area` is twice the area of the triangle.
+// Moves a hit away from the edges of its triangle. The BVH decides in float32 which triangle is hit; near an
+// edge exact arithmetic may place the point just outside. If another wall of a room begins at the edge,
+// rounding by at most sqrt(3) / 2 ulps, 2^-24, of the reach may put the point behind that wall, and light
+// would leak through there. So points keep a distance of four ulps of the reach from every edge. `twice_area`
+// is twice the area of the triangle.
 [[gnu::noinline]] void keep_from_edges(const V3d& e1, const V3d& e2, double twice_area, float reach,
                                        Barycentric& b) {
   const double w = 1 - b.u - b.v;
-  // The distance to keep from an edge, in barycentric units, is its share of the triangle's height over that
+  // The distance from an edge in barycentric units is the distance divided by the triangle's height over that
   // edge: four ulps of the reach (2^-22 reach) times the length of the edge over twice the area. `margin` is
-  // that without the length.
+  // this without the factor length.
   const double margin = 0x1p-22 * reach / twice_area;
   const auto least = [&](const V3d& edge) { return std::min(.25, margin * edge.length()); };
   const double lw = least(e2 - e1), lu = least(e2), lv = least(e1);
@@ -47,8 +47,8 @@ bool meet_triangle(const V3d& v0, const V3d& e1, const V3d& e2, const V3d& o, co
   b.v = lv + v * k;
 }
 
-// Completes the hit on triangle i. o and d are in the triangle's space: that of the world in single precision
-// (V = V3), or that of a group in double (V = V3d).
+// Completes the hit on triangle i. o and d are in the triangle's space: the world's space in single precision
+// (V = V3), or a group's in double (V = V3d).
 template <class V>
 [[gnu::always_inline]] inline bool complete_triangle(const Geometry& g, std::uint32_t i, const V& o,
                                                      const V& d, SurfaceHit& hit) {
@@ -78,7 +78,10 @@ template <class V>
     if (dot(m, m) > 0) ns = normalize(m) * s.orientation;
     // At silhouettes interpolated normals may face away from a viewer in front of the surface: taken alone
     // they would put the path behind it, and light from there would leak through.
-    if ((dot(ns, V3(d)) < 0) != (dot(hit.ng, V3(d)) < 0)) ns = hit.ng;
+    if ((dot(ns, V3(d)) < 0) != (dot(hit.ng, V3(d)) < 0)) {
+      ns = hit.ng;
+      hit.normal_replaced = true;
+    }
   }
   if (!s.wants_tangent) {
     hit.shading = Frame(ns);
@@ -96,7 +99,7 @@ template <class V>
   return true;
 }
 
-// The unit direction n from the sphere's centre in the sphere's own axes, whose z goes through the poles.
+// Returns the unit direction n from the sphere's centre in the sphere's own axes, whose z points to a pole.
 V3d local_direction(const Sphere& s, const V3d& n) {
   const auto* r = s.to_local;
   return {r[0] * n.x + r[1] * n.y + r[2] * n.z, r[3] * n.x + r[4] * n.y + r[5] * n.z,
@@ -136,7 +139,8 @@ bool complete_sphere(const Geometry& g, std::uint32_t i, const V3d& o, const V3d
   hit.shading = Frame::from_tangent(hit.ng, V3(dpdu));
   if (info.wants_slopes) {
     const double sine = std::hypot(q.x, q.y), c = sine > 0 ? q.x / sine : 1, d = sine > 0 ? q.y / sine : 0;
-    const V3d along(q.z * c, q.z * d, -sine);  // dp/dtheta, theta the polar angle, in the sphere's axes
+    // dp/dtheta, where theta is the polar angle, in the sphere's axes
+    const V3d along(q.z * c, q.z * d, -sine);
     const V3d dpdv(along.x * r[0] + along.y * r[3] + along.z * r[6],
                    along.x * r[1] + along.y * r[4] + along.z * r[7],
                    along.x * r[2] + along.y * r[5] + along.z * r[8]);
@@ -207,11 +211,10 @@ V2 sphere_uv(const Sphere& s, const V3d& n) { return uv_of(local_direction(s, n)
 
 namespace {
 
-// True for a triangle outside of groups, as most hits are. It takes one test.
+// True for a triangle outside of groups, the case of most hits. It takes one test.
 bool is_usual(const PrimitiveId& id) {
   static_assert(PrimitiveId::Kind::triangle == PrimitiveId::Kind{0} && kNone == ~0u);
-  const auto kind = static_cast<std::uint32_t>(id.kind);
-  return ((kBuilt.user_geometries ? kind : 0) | (kBuilt.instances ? ~id.instance : 0)) == 0;
+  return (static_cast<std::uint32_t>(id.kind) | ~id.instance) == 0;
 }
 
 }  // namespace
@@ -245,11 +248,11 @@ bool Geometry::complete_local(PrimitiveId id, const V3d& o, const V3d& d, Surfac
 
 namespace {
 
-// The reach of a hit p, with normal ng, in the instance i, where `local` is its reach in the group's space.
-// The BVH transforms the ray to the group's space in single precision: each component of its origin there is
-// a sum of four products, accurate to four ulps of the largest such sum. Across the surface, in the world,
-// the error is weighted by the mapped normal's components; the reach in the group's space is transformed to
-// the world likewise.
+// Returns the reach of a hit p, with normal ng, in the instance i, where `local` is its reach in the group's
+// space. The BVH transforms the ray to the group's space in single precision. Each component of its origin
+// there is a sum of four products, accurate to four ulps of the largest such sum. In the world, the error
+// perpendicular to the surface is weighted by the mapped normal's components; the reach in the group's space
+// is transformed to the world in the same way.
 float reach_of(const PlacedInstance& i, const V3& p, const V3& ng, float local) {
   const auto& a = i.to_world.a;
   const auto& b = i.to_local.a;
@@ -268,8 +271,8 @@ float reach_of(const PlacedInstance& i, const V3& p, const V3& ng, float local) 
 }  // namespace
 
 // The ray is transformed to the group's space without normalisation, so distances along it are the same in
-// both. Normals are transformed back by the inverse transpose, which keeps their side: the cofactors, negated
-// if the map mirrors.
+// both spaces. Normals are transformed back by the inverse transpose, which keeps their side: the cofactors,
+// negated if the map mirrors.
 bool Geometry::complete_instanced(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
   LS_COUNT(instances);
   const PlacedInstance& i = instances[id.instance];
@@ -318,7 +321,7 @@ double intersect(const Disk& s, const V3d& o, const V3d& d, double t_min, double
 }
 
 // Computed in the plane perpendicular to the axis, relative to the ray's point nearest to the axis, as for
-// spheres. Both intersections are tried, because the tube has no caps.
+// spheres. Both intersections are tried, because the cylinder has no caps.
 double intersect(const Cylinder& s, const V3d& o, const V3d& d, double t_min, double t_max) {
   const V3d f = o - s.p0;
   const double dx = d.dot(s.u), dy = d.dot(s.v), dz = d.dot(s.axis);

@@ -1,8 +1,8 @@
 // The shapes of a world: triangles, spheres, disks and cylinders in world space (recentred, scaled by a power
-// of two to unit size), and ray hits on them. Normals point as the dialect defines, flips included;
-// `interior` is the side they point away from. A group is a set of shapes that is placed in the world by
-// instances. Its shapes lie in the group's own space, also scaled to unit size; each instance maps that space
-// to the world.
+// of two to unit size), and ray hits on them. Normals point as the scene's file format defines, flips
+// included; they point away from the medium `interior`. A group is a set of shapes that is placed in the
+// world by instances. Its shapes are in the group's own space, also scaled to unit size; each instance maps
+// that space to the world.
 #pragma once
 
 #include <cstdint>
@@ -22,44 +22,48 @@ namespace ls::render {
 
 inline constexpr std::uint32_t kNone = 0xffffffffu;
 
-struct SurfaceInfo {  // one per scene shape
+struct SurfaceInfo {  // properties of a surface; a surface is one shape of the scene
   BsdfIndex bsdf;
   std::uint32_t light = kNone;                       // index into Lights
-  std::uint32_t interior = kNone, exterior = kNone;  // media
-  bool transition = false;                           // the medium changes across it
-  bool borders = false;                              // `transition`, or coincides with a surface that has one
-  bool plain = false;                                // neither emits nor lets light pass, as most surfaces
-  bool crossed = false;                              // some light reaches its other side
-  // A sheet is a surface that is not closed: it has an edge, or it bounds a body only together with other
+  std::uint32_t interior = kNone, exterior = kNone;  // indices of media
+  bool transition = false;                           // true if the media on its two sides differ
+  // True if `transition`, or if it coincides with a surface that has a transition
+  bool borders = false;
+  // True if it neither emits nor lets light pass, as most surfaces
+  bool plain = false;
+  bool crossed = false;  // true if some light reaches its other side
+  // True if the surface is not closed: it has an edge, or it encloses a volume only together with other
   // surfaces.
   bool sheet = false;
-  bool null = false;               // index-matched: rays pass straight through
-  bool null_transmission = false;  // part of the light passes straight through (BsdfTable::null_transmission)
-  bool normals = false, uvs = false;  // triangles: per-vertex data
-  // wants_uv: the material or the light of the surface, or an AOV, reads uv; if not, hits have uv = (0, 0).
-  // wants_tangent: the material depends on a direction along the surface (anisotropy); if not, hits have an
-  // arbitrary shading frame.
+  bool null = false;  // index-matched: rays pass straight through
+  // True if part of the light passes straight through (BsdfTable::null_transmission)
+  bool null_transmission = false;
+  bool normals = false, uvs = false;  // for triangles: true if there are per-vertex data
+  // wants_uv: true if the material or the light of the surface, or an AOV, reads uv; otherwise hits have uv =
+  // (0, 0). wants_tangent: true if the material depends on a direction along the surface (anisotropy);
+  // otherwise hits have an arbitrary shading frame.
   bool wants_uv = true, wants_tangent = true;
-  bool wants_slopes = false;      // hits have dp/du and dp/dv (bump maps); implies wants_tangent
-  bool wants_attributes = false;  // hits have a FacePoint (mesh_attribute textures)
-  bool smooth = true;             // the material has a lobe that is not a delta: use next-event estimation
-  float orientation = 1;          // -1: normals are flipped against winding or outward direction
+  bool wants_slopes = false;      // true if hits have dp/du and dp/dv (bump maps); implies wants_tangent
+  bool wants_attributes = false;  // true if hits have a FacePoint (mesh_attribute textures)
+  // True if the material has a lobe that is not a delta, so that next-event estimation is used
+  bool smooth = true;
+  float orientation = 1;  // -1: normals are flipped against winding or outward direction
   // For a surface that coincides somewhere with others, one of them null: the largest reach (see
-  // SurfaceHit::reach) of any of these surfaces, so that one step takes a ray over all of them. 0 if the
+  // SurfaceHit::reach) of all of these surfaces, so that one step moves a ray past all of them. 0 if the
   // surface coincides with no other.
   float coincident_reach = 0;
   // For triangles: the reach (see SurfaceHit::reach) of every hit, if the reaches of all triangles of the
   // surface are within a factor of 16; 0 if each triangle has its own. For other shapes: the smallest reach
   // of a hit.
   float reach = 0;
-  double edge = 0;  // if all barycentric coordinates of a hit exceed this, it is clear of all edges
+  double edge = 0;  // a hit whose barycentric coordinates all exceed this is far enough from all edges
 };
 
 struct Sphere {
   V3d center;
   double radius = 1;
   std::uint32_t surface = 0;
-  double to_local[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // rotation, for uv
+  double to_local[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // a rotation, used for uv
 };
 struct Disk {  // points center + a u + b v with a^2 + b^2 <= 1
   V3d center, u, v, n;
@@ -71,13 +75,13 @@ struct Cylinder {      // points p0 + z length + (u cos a + v sin a) radius, z i
   std::uint32_t surface = 0;
 };
 
-// The index range of the primitives of one kind in one PrimitiveSet. Those in [first, passing) are opaque;
-// those in [passing, last) let light pass straight through.
+// The index range of the primitives of one kind in one PrimitiveSet. The primitives in [first, passing) are
+// opaque; those in [passing, last) let light pass straight through.
 struct PrimitiveRange {
   std::uint32_t first = 0, passing = 0, last = 0;
   std::uint32_t count() const { return last - first; }
 };
-// The primitives of one space: the world's own, or those of a group.
+// The primitives of one space: the world's own, or a group's.
 struct PrimitiveSet {
   PrimitiveRange triangles, spheres, disks, cylinders;
   std::uint32_t count() const {
@@ -95,28 +99,30 @@ struct PrimitiveSet {
 struct PlacedInstance {
   std::uint32_t group = 0;
   float mirrored = 1;         // -1 if the map reverses orientations, else 1
-  Affine to_world, to_local;  // between the world's space and the group's
+  Affine to_world, to_local;  // maps between the world's space and the group's
 };
 
 // Identifies a primitive, as the BVH returns it.
 struct PrimitiveId {
   enum class Kind : std::uint32_t { triangle, sphere, disk, cylinder } kind = Kind::triangle;
   std::uint32_t index = 0;
-  std::uint32_t instance = kNone;  // of Geometry::instances, if the primitive is in a group
+  std::uint32_t instance = kNone;  // index into Geometry::instances, if the primitive is in a group
   bool operator==(const PrimitiveId&) const = default;
 };
 
 struct SurfaceHit {
   float t = 0;
-  V3 p;   // on the surface: computed from barycentrics or the sphere's centre, not as o + t d
+  V3 p;   // point on the surface, computed from barycentrics or the sphere's centre, not as o + t d
   V3 ng;  // geometric normal, unit
   Frame shading;
+  // True if `shading` is that of ng because the interpolated normal faces away from the ray
+  bool normal_replaced = false;
   V2 uv;
   V3 du{1, 0, 0}, dv{0, 1, 0};  // see UvPoint
   std::uint32_t surface = 0;
   PrimitiveId primitive;
-  // The largest coordinate that was used to compute the hit. The position p, and the distances that the BVH
-  // finds, measured perpendicular to the surface, are accurate to a few ulps of `reach` (see offset_point).
+  // The largest coordinate that was used to compute the hit. Perpendicular to the surface, the position p and
+  // the distances that the BVH finds are accurate to a few ulps of `reach` (see offset_point).
   float reach = 1;
   FacePoint face;  // set if SurfaceInfo::wants_attributes
 
@@ -134,9 +140,9 @@ class Geometry {
   // Reads the scene's shapes. Fails on files and transforms from which no surface can be made.
   static Result<Geometry> build(const Scene& scene, const AssetLoader& files);
 
-  // In each of the lists below the primitives are sorted. Those of the world itself come first, then those of
-  // each group, in the order of the groups. Within each of these sets the opaque primitives come before those
-  // that let light pass straight through.
+  // In each of the lists below the primitives are sorted. The first are those of the world itself, followed
+  // by those of each group, in the order of the groups. Within each of these sets the opaque primitives
+  // precede those that let light pass straight through.
   std::vector<V3> positions;
   std::vector<V3> normals;             // parallel to positions if any surface has normals, else empty
   std::vector<V2> uvs;                 // parallel to positions if any surface has uvs, else empty
@@ -146,15 +152,16 @@ class Geometry {
   std::vector<Disk> disks;
   std::vector<Cylinder> cylinders;
   PrimitiveSet own;                  // primitives outside of groups
-  std::vector<PrimitiveSet> groups;  // visible through instances only
+  std::vector<PrimitiveSet> groups;  // groups, which are visible through instances only
   std::vector<PlacedInstance> instances;
   std::vector<SurfaceInfo> surfaces;
   SurfaceAttributes attributes;  // mesh attributes that textures read
 
-  V3d center{0, 0, 0};                  // world = (scene - center) * scale
-  double scale = 1;                     // a power of two
-  float radius = 1;                     // of a sphere about the world's origin that encloses every shape
-  std::uint64_t dropped_triangles = 0;  // zero-area triangles
+  V3d center{0, 0, 0};  // world = (scene - center) * scale
+  double scale = 1;     // a power of two
+  // Radius of a sphere about the world's origin that encloses every shape
+  float radius = 1;
+  std::uint64_t dropped_triangles = 0;  // number of triangles without area, which are left out
 
   std::uint32_t triangle_count() const { return static_cast<std::uint32_t>(triangle_surface.size()); }
   std::uint64_t primitive_count() const {
@@ -164,9 +171,9 @@ class Geometry {
 
   V3 vertex(std::uint32_t triangle, int k) const { return positions[indices[3 * triangle + k]]; }
   // Computes the hit of the ray o + t d on the primitive `id` (t, position, normals, uv) from the shape's own
-  // data in plain arithmetic. Returns false if by this computation the ray misses the primitive.
+  // data in plain arithmetic. Returns false if the ray misses the primitive according to this computation.
   bool complete(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const;
-  // The largest absolute coordinate of the triangle's corners.
+  // Returns the largest absolute coordinate of the triangle's corners.
   float reach_of(std::uint32_t triangle) const;
 
  private:
@@ -175,33 +182,34 @@ class Geometry {
   bool complete_instanced(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const;
 };
 
-// The first t in (t_min, t_max) at which the ray o + t d meets the shape, or infinity. The BVH callbacks use
-// it too.
+// Return the first t in (t_min, t_max) at which the ray o + t d hits the shape, or infinity. The BVH
+// callbacks use them too.
 double intersect(const Sphere& s, const V3d& o, const V3d& d, double t_min, double t_max);
 double intersect(const Disk& s, const V3d& o, const V3d& d, double t_min, double t_max);
 double intersect(const Cylinder& s, const V3d& o, const V3d& d, double t_min, double t_max);
 
-// The uv of the point that lies in the direction n, a unit vector, from the sphere's centre. u is the azimuth
+// Returns the uv of the point in the direction n, a unit vector, from the sphere's centre. u is the azimuth
 // and v the polar angle, each divided by its range.
 V2 sphere_uv(const Sphere& s, const V3d& n);
 
 inline float largest(const V3& v) { return std::max(std::abs(v.x), std::max(std::abs(v.y), std::abs(v.z))); }
 
 // Moves the point p on a surface of geometric normal ng off the surface, to the side that `w` points to, by
-// 16 ulps of the reach. Rounding takes p at most one ulp off the surface (sqrt(3) / 2). The BVH takes a
-// triangle's corners relative to the ray's origin and finds the distance of its plane by products of these:
-// each component is accurate to half an ulp of the difference of two coordinates, at most twice the reach,
-// and so are the six rounded products and sums: together below 8 ulps. So 16 ulps leave a safety factor of
-// two.
+// 16 ulps of the reach. Rounding moves p at most one ulp off the surface (sqrt(3) / 2). The BVH subtracts the
+// ray's origin from a triangle's corners and finds the distance of the triangle's plane by products of these
+// differences: each component is accurate to half an ulp of the difference of two coordinates, at most twice
+// the reach, and so are the six rounded products and sums: together below 8 ulps. So 16 ulps leave a safety
+// factor of two.
 inline V3 offset_point(const V3& p, const V3& ng, float reach, const V3& w) {
   return p + ng * std::copysign(reach * 0x1p-20f, dot(ng, w));
 }
 inline V3 offset_point(const SurfaceHit& hit, const V3& w) {
   return offset_point(hit.p, hit.ng, hit.reach, w);
 }
-// The reach of a hit p on a shape that is intersected in double precision; `size` is the largest distance of
-// p from the shape's reference point. p itself is rounded to float32, so the largest coordinate of p counts
-// in full. `size` counts 2^-28 times, which turns 16 ulps of float32 into 16 ulps of double, times 2.
+// Returns the reach of a hit p on a shape that is intersected in double precision; `size` is the largest
+// distance of p from the shape's reference point. p itself is rounded to float32, so the largest coordinate
+// of p counts in full. `size` counts 2^-28 times, which turns 16 ulps of float32 into 16 ulps of double,
+// times 2.
 inline float reach_in_double(const V3& p, double size) {
   return std::max(largest(p), static_cast<float>(size * 0x1p-28));
 }

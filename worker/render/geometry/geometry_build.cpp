@@ -1,5 +1,5 @@
-// Converts scene shapes to arrays of primitives, in the spaces of the world and of the groups, opaque ones
-// first.
+// Converts scene shapes to arrays of primitives, in the spaces of the world and of the groups. Opaque
+// primitives come first.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,12 +14,13 @@
 namespace ls::render {
 namespace {
 
-// The sign, +1 or -1, that relates the winding normal of a mesh, or the outward normal of a sphere, to the
-// dialect's normal (checked against Mitsuba 3.9.1, where a mirrored sphere is inside out).
+// Returns the sign, +1 or -1, that relates the winding normal of a mesh, or the outward normal of a sphere,
+// to the normal that the scene's file format defines (checked against Mitsuba 3.9.1, where a mirrored sphere
+// is inside out).
 float orientation_of(const Shape& shape, bool vertex_normals) {
   float sign = shape.flip_normals ? -1.f : 1.f;
-  // A rectangle's normal is its transformed +z, and a mesh with normals follows them; mirroring reverses the
-  // winding.
+  // A rectangle's normal is its transformed +z axis, and a mesh with normals follows these. Mirroring
+  // reverses the winding.
   const bool follows = std::holds_alternative<RectangleShape>(shape.geometry) ||
                        std::holds_alternative<CubeShape>(shape.geometry) ||
                        std::holds_alternative<SphereShape>(shape.geometry) || vertex_normals;
@@ -27,8 +28,8 @@ float orientation_of(const Shape& shape, bool vertex_normals) {
   return sign;
 }
 
-// True if the normals of a mirrored body point inwards, as some do in Mitsuba. Its medium stays inside:
-// mirroring a glass of water should not fill the room around it with water.
+// True if the normals of a mirrored closed shape point inwards, as some do in Mitsuba. Its interior medium
+// stays inside: mirroring a glass of water should not fill the room around it with water.
 bool mirrored_inwards(const Shape& shape, float orientation) {
   if (!(Affine(shape.to_world).determinant() < 0)) return false;
   if (std::holds_alternative<SphereShape>(shape.geometry)) return orientation < 0;
@@ -37,7 +38,8 @@ bool mirrored_inwards(const Shape& shape, float orientation) {
   return mesh && orientation > 0;  // the orientation is relative to the winding, which mirroring reverses
 }
 
-// A space: p' = (p - center) * scale maps a box to unit size about a centre. The scale is a power of two.
+// The map from scene coordinates to a space: p' = (p - center) * scale maps a box to unit size about the
+// origin. The scale is a power of two.
 struct Space {
   V3d center{0, 0, 0};
   double scale = 1;
@@ -58,9 +60,9 @@ Space unit_space(const Bounds& b) {
   return s;
 }
 
-// The share of the resolution of float32 that is left for the shape of a mesh with the bounds b if
+// Returns the share of float32's resolution that remains for the shape of a mesh with the bounds b if
 // coordinates are relative to `origin`: 1 near the origin, and 2^-n if the mesh is so far away that n of the
-// 24 bits only tell where it lies.
+// 24 bits only encode its position.
 double bits_left(const Bounds& b, const V3d& origin) {
   const V3d half = (b.hi - b.lo) * .5, away = (b.hi + b.lo) * .5 - origin;
   const double size = std::max(half.x, std::max(half.y, half.z)),
@@ -68,9 +70,9 @@ double bits_left(const Bounds& b, const V3d& origin) {
   return size / std::max(size, far);
 }
 
-// The space of the world. Its centre is the middle of the box of all shapes. If that leaves some mesh less
-// than 8 of 24 bits (as in a small scene lit by a sphere of radius 1e5 at 1e7), the centre is that of the
-// mesh with the fewest bits, provided that every mesh then has more bits than that one had.
+// The space of the world. Its centre is the middle of the box of all shapes. If this leaves some mesh less
+// than 8 of 24 bits (as in a small scene lit by a sphere of radius 1e5 at 1e7), the centre of the mesh
+// with the fewest bits is used instead, provided that every mesh then has more bits than this one had before.
 Space world_space(const std::vector<Bounds>& meshes, const Bounds& all) {
   Space s = unit_space(all);
   constexpr double kFewBits = 0x1p-16;
@@ -103,9 +105,9 @@ bool is_sheet(const LocalMesh& mesh) {
   return sum.length() > 1e-6 * area;
 }
 
-// Normals from a file decide which side of a triangle emits and is lit, even against its winding; between
-// media the winding decides. So the winding is made to follow the normals, and the media swap sides with it;
-// a mesh between media that has both kinds of triangles stays as it is.
+// Normals from a file decide which side of a triangle emits and is lit, even against its winding; but the
+// winding decides on which side each medium is. So the winding is made to follow the normals, and the media
+// swap sides with it. A mesh between media that has triangles of both kinds stays as it is.
 void follow_normals(const LocalMesh& mesh, SurfaceInfo& info, std::vector<std::uint32_t>& indices) {
   const auto opposes = [&](std::size_t i) {
     const std::uint32_t a = indices[i], b = indices[i + 1], c = indices[i + 2];
@@ -139,7 +141,7 @@ void append_mesh(Geometry& g, LocalMesh mesh, bool normals_given, std::uint32_t 
     g.uvs.insert(g.uvs.end(), mesh.uvs.begin(), mesh.uvs.end());
   }
   const std::uint32_t first_triangle = g.triangle_count();
-  std::vector<std::uint32_t> kept;  // needed for attributes only
+  std::vector<std::uint32_t> kept;  // triangles that are kept; needed for attributes only
   for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
     const std::uint32_t a = base + mesh.indices[i], b = base + mesh.indices[i + 1],
                         c = base + mesh.indices[i + 2];
@@ -156,8 +158,8 @@ void append_mesh(Geometry& g, LocalMesh mesh, bool normals_given, std::uint32_t 
     add_channel(g.attributes, a, surface, a.name.starts_with("face_") ? first_triangle : base, kept);
 }
 
-// Precomputes SurfaceInfo::reach and edge for the triangles from `first` on, which completing a hit would
-// otherwise compute each time.
+// Precomputes SurfaceInfo::reach and edge for the triangles from `first` on. Otherwise they would be computed
+// for every hit.
 void note_reach(const Geometry& g, std::uint32_t first, SurfaceInfo& info) {
   float least = std::numeric_limits<float>::infinity(), most = 0;
   for (std::uint32_t i = first; i < g.triangle_count(); ++i) {
@@ -228,10 +230,10 @@ struct Parts {
   std::vector<Placed> shapes;
   Bounds world;
   std::vector<Bounds> groups;
-  std::vector<Bounds> meshes;  // of the world's own triangle meshes
+  std::vector<Bounds> meshes;  // bounds of the world's own triangle meshes
 };
 
-// The largest number of vertices: their indices have 32 bits, in the BVH too.
+// The largest number of vertices: their indices have 32 bits, also in the BVH.
 constexpr std::uint64_t kMaxVertices = std::uint64_t{1} << 31;
 
 Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
@@ -300,8 +302,8 @@ Result<PlacedInstance> place_instance(const Instance& instance, const Geometry& 
   out.to_world.b = (m.point(group.center) - g.center) * g.scale;
   if (!out.to_world.invertible()) return fail(Errc::invalid_argument, "its to_world has no inverse");
   out.to_local = out.to_world.inverse();
-  // The BVH inverts the map itself, in float32, and cannot trace rays from too far away (near_enough() in
-  // accel.cpp). So the inverse must not be too large.
+  // The largest element of an inverse map. The BVH inverts the map itself, in float32, and cannot trace rays
+  // from too far away (near_enough() in accel.cpp), so the inverse must not be too large.
   constexpr double kLargestInverse = 5e8;
   const auto in_range = [](double x) { return std::abs(x) <= kLargestInverse; };
   if (!std::isnormal(static_cast<float>(out.to_world.determinant())) ||
@@ -364,7 +366,8 @@ Result<Geometry> Geometry::build(const Scene& scene, const AssetLoader& files) {
     g.instances.push_back(*placed);
   }
   g.attributes.find_means();
-  // The BVH loads 16 bytes for a 12-byte vertex: the last one must not end at the end of its allocation.
+  // The BVH loads 16 bytes for a 12-byte vertex, so the allocation must not end directly behind the last
+  // vertex.
   g.positions.reserve(g.positions.size() + 2);
   if (!g.normals.empty()) g.normals.resize(g.positions.size());
   if (!g.uvs.empty()) g.uvs.resize(g.positions.size());

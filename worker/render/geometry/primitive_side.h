@@ -1,5 +1,5 @@
-// Splits a range of primitives into its two sides: side 0 holds the opaque ones, side 1 those that let light
-// pass.
+// Splits a range of primitives into its two sides: side 0 contains the opaque ones, side 1 those that let
+// light pass.
 #pragma once
 
 #include "worker/render/geometry/geometry.h"

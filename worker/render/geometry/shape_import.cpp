@@ -88,8 +88,8 @@ Result<Sphere> place_sphere(const SphereShape& s, const Affine& m) {
   return r;
 }
 
-// Places a cylinder. Where its azimuth starts follows from the direction of its axis as written in the scene,
-// by the frame of Duff et al. 2017, as in Mitsuba.
+// Places a cylinder. Its azimuth starts at an axis of the frame of Duff et al. 2017 about the direction from
+// p0 to p1 in the scene, as in Mitsuba.
 Result<Cylinder> place_cylinder(const CylinderShape& s, const Affine& m) {
   const V3d p0(s.p0[0], s.p0[1], s.p0[2]), d = V3d(s.p1[0], s.p1[1], s.p1[2]) - p0, n = d.normalized();
   const double sign = std::copysign(1., n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;
@@ -119,9 +119,8 @@ void transform(LocalMesh& m, const Affine& to_scene) {
   }
 }
 
-// For a mesh file without normals Mitsuba computes smooth ones, and so does this: at each vertex the
-// normalised sum of the normals of its triangles, weighted by their angles there (Thuermer and Wuethrich
-// 1998).
+// Computes smooth normals for a mesh file without normals, as Mitsuba does: at each vertex the normalised sum
+// of the normals of its triangles, weighted by their angles there (Thuermer and Wuethrich 1998).
 void smooth(LocalMesh& m) {
   m.normals.assign(m.positions.size(), V3d(0));
   for (std::size_t i = 0; i + 2 < m.indices.size(); i += 3) {
@@ -151,49 +150,49 @@ Result<Placed> place(const Shape& shape, const AssetLoader& files,
                 fmt::format("a texture reads its attribute \"{}\", but only meshes have attributes",
                             attribute_names(files.scene, uses).front()));
   Placed out;
-  auto ok = std::visit(
-      overloaded{
-          [&](const RectangleShape&) -> Result<void> {
-            out.mesh = rectangle();
-            return {};
-          },
-          [&](const CubeShape&) -> Result<void> {
-            out.mesh = cube();
-            return {};
-          },
-          [&](const SphereShape& s) -> Result<void> {
-            auto r = place_sphere(s, m);
-            if (!r) return tl::unexpected(r.error());
-            out.sphere = *r;
-            return {};
-          },
-          [&](const DiskShape&) -> Result<void> {
-            Disk d;
-            d.center = m.point({0, 0, 0});
-            d.u = m.vector({1, 0, 0});
-            d.v = m.vector({0, 1, 0});
-            d.n = m.normal({0, 0, 1}).normalized() * (m.determinant() < 0 ? -1. : 1.);  // +z, also mirrored
-            out.disk = d;
-            return {};
-          },
-          [&](const CylinderShape& s) -> Result<void> {
-            auto r = place_cylinder(s, m);
-            if (!r) return tl::unexpected(r.error());
-            out.cylinder = *r;
-            return {};
-          },
-          [&](const MeshShape& s) -> Result<void> {
-            auto r = load(s, files, uses);
-            if (!r) return tl::unexpected(r.error());
-            out.mesh = std::move(*r);
-            return {};
-          }},
-      shape.geometry);
+  auto ok = std::visit(overloaded{[&](const RectangleShape&) -> Result<void> {
+                                    out.mesh = rectangle();
+                                    return {};
+                                  },
+                                  [&](const CubeShape&) -> Result<void> {
+                                    out.mesh = cube();
+                                    return {};
+                                  },
+                                  [&](const SphereShape& s) -> Result<void> {
+                                    auto r = place_sphere(s, m);
+                                    if (!r) return tl::unexpected(r.error());
+                                    out.sphere = *r;
+                                    return {};
+                                  },
+                                  [&](const DiskShape&) -> Result<void> {
+                                    Disk d;
+                                    d.center = m.point({0, 0, 0});
+                                    d.u = m.vector({1, 0, 0});
+                                    d.v = m.vector({0, 1, 0});
+                                    // the +z axis, also for a mirrored disk
+                                    d.n = m.normal({0, 0, 1}).normalized() * (m.determinant() < 0 ? -1. : 1.);
+                                    out.disk = d;
+                                    return {};
+                                  },
+                                  [&](const CylinderShape& s) -> Result<void> {
+                                    auto r = place_cylinder(s, m);
+                                    if (!r) return tl::unexpected(r.error());
+                                    out.cylinder = *r;
+                                    return {};
+                                  },
+                                  [&](const MeshShape& s) -> Result<void> {
+                                    auto r = load(s, files, uses);
+                                    if (!r) return tl::unexpected(r.error());
+                                    out.mesh = std::move(*r);
+                                    return {};
+                                  }},
+                       shape.geometry);
   if (!ok) return tl::unexpected(ok.error());
   transform(out.mesh, m);
   out.normals_given = !out.mesh.normals.empty();
   const auto* mesh = std::get_if<MeshShape>(&shape.geometry);
-  if (mesh && !mesh->face_normals && !out.mesh.face_normals && !out.normals_given) smooth(out.mesh);
+  const bool flat = !mesh || mesh->face_normals || mesh->flat_without_normals || out.mesh.face_normals;
+  if (!flat && !out.normals_given) smooth(out.mesh);
   return out;
 }
 

@@ -16,13 +16,13 @@ struct LocalMesh {
   std::vector<V3d> normals;
   std::vector<V2> uvs;
   std::vector<std::uint32_t> indices;
-  bool face_normals = false;            // the file asks for flat triangles
-  std::uint64_t dropped_triangles = 0;  // zero-area triangles, dropped by the file's reader
+  bool face_normals = false;            // true if the file requests flat triangles
+  std::uint64_t dropped_triangles = 0;  // number of triangles without area, which the file's reader left out
   std::vector<MeshAttribute> attributes;
 };
 struct Placed {
   LocalMesh mesh;
-  bool normals_given = false;  // the file has normals
+  bool normals_given = false;  // true if the file has normals
   std::optional<Sphere> sphere;
   std::optional<Disk> disk;
   std::optional<Cylinder> cylinder;
@@ -39,8 +39,8 @@ struct Bounds {
   bool empty() const { return !(lo.x <= hi.x); }
 };
 
-// Reads one shape and places it by its to_world, with the attributes that textures use. Fails on files and
-// transforms from which no surface can be made, and on attributes that the mesh lacks or has in another form.
+// Reads one shape and places it by its to_world, with the attributes that textures use. Fails if the file or
+// the transform cannot give a surface, or if the mesh lacks an attribute or has it in another form.
 Result<Placed> place(const Shape& shape, const AssetLoader& files,
                      const std::vector<scene::AttributeUse>& uses = {});
 void add_bounds(const Placed& placed, Bounds& bounds);

@@ -7,7 +7,7 @@
 namespace ls::render {
 namespace {
 
-constexpr std::size_t kMaxBoxes = std::size_t{1} << 23;  // 300 MB
+constexpr std::size_t kMaxBoxes = std::size_t{1} << 23;  // these boxes take 300 MB
 
 struct Grown : Box {
   Grown()
@@ -25,7 +25,7 @@ struct Grown : Box {
   bool empty() const { return !(lo.x <= hi.x); }
 };
 
-// The box of each wanted surface, in the space of its primitives: the world's or that of its group.
+// Returns the box of each wanted surface, in the space of its primitives: the world's or that of its group.
 std::vector<Grown> own_boxes(const Geometry& g, const std::vector<bool>& wanted) {
   std::vector<Grown> boxes(g.surfaces.size());
   for (std::uint32_t i = 0; i < g.triangle_count(); ++i) {
@@ -45,7 +45,7 @@ Grown moved(const Grown& b, const Affine& m) {
   return r;
 }
 
-// The group that each surface belongs to, or kNone.
+// Returns the group that each surface belongs to, or kNone.
 std::vector<std::uint32_t> groups_of(const Geometry& g) {
   std::vector<std::uint32_t> group(g.surfaces.size(), kNone);
   for (std::uint32_t i = 0; i < g.groups.size(); ++i) {

@@ -23,8 +23,8 @@ struct SurfaceBox {
   }
 };
 
-// The bounding boxes, in the world, of the surfaces for which `wanted` is true and that have any primitives.
-// Returns nullopt if instances make the list too long to be useful.
+// Returns the bounding boxes, in the world, of the surfaces for which `wanted` is true and that have
+// primitives. Returns nullopt if instances make the list too long to be useful.
 std::optional<std::vector<SurfaceBox>> surface_boxes(const Geometry& g,
                                                      const std::function<bool(const SurfaceInfo&)>& wanted);
 

@@ -21,11 +21,11 @@ std::vector<std::string> attribute_names(const Scene& scene, const std::vector<s
 Result<void> check_attributes(const MeshData& mesh, std::string_view file, const Scene& scene,
                               const std::vector<scene::AttributeUse>& uses);
 
-// Storage, still empty, for the attributes that the scene's textures name.
+// Returns storage, still empty, for the attributes that the scene's textures name.
 SurfaceAttributes attributes_of(const Scene& scene);
-// Adds to `all` the values of one attribute of the mesh of `surface`. `base` is the index of the mesh's first
+// Adds the values of one attribute of the mesh of `surface` to `all`. `base` is the index of the mesh's first
 // vertex (for an attribute of faces: first triangle) in the world's lists. `kept` is used for attributes of
-// faces: it lists the triangles that were kept when those of zero area were dropped.
+// faces: it lists the triangles that were kept when those without area were left out.
 void add_channel(SurfaceAttributes& all, const MeshAttribute& attribute, std::uint32_t surface,
                  std::uint32_t base, const std::vector<std::uint32_t>& kept);
 

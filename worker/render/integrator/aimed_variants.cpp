@@ -1,4 +1,4 @@
-// A separate source file, because instantiating the path tracer takes long to compile.
+// The path tracers with Features::aimed. They take long to compile, so they have their own source file.
 #include "worker/render/integrator/camera_segment_nee.h"
 #include "worker/render/integrator/variant.h"
 

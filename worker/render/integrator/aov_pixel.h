@@ -14,21 +14,21 @@
 
 namespace ls::render {
 
-// The uv of a hit, computed even if the surface's material does not use it.
+// The uv of a hit, even if the surface's material does not need it.
 V2 uv_of(const Geometry& geometry, const SurfaceHit& hit);
 
 class AovPixel {
  public:
   explicit AovPixel(const World& world);
 
-  LightSplit* split() { return &split_; }  // of the current sample
+  LightSplit* split() { return &split_; }  // light components of the current sample
   void begin_pixel();
-  void begin_sample() { split_.fill(C3(0)); }  // C3{} is not initialised
-  // To be called after sample number `sample` of the image's pixel (x, y) has been rendered. `usable` is true
-  // if the radiance of the sample counts.
+  void begin_sample() { split_.fill(C3(0)); }  // explicit, since C3{} is not initialised
+  // Call after sample number `sample` of the image's pixel (x, y) has been rendered. `usable` is true if the
+  // radiance of the sample counts.
   void end_sample(int x, int y, std::uint64_t sample, bool usable);
-  // Writes the pixel's values to index i of each plane in `planes`: those of planes_of(world.aovs), one after
-  // another, of `pixels` floats each.
+  // Writes the pixel's values to index i of each plane in `planes`. The planes of `pixels` floats each follow
+  // one another in the order of planes_of(world.aovs).
   void store(float* planes, std::size_t pixels, std::size_t i) const;
 
  private:
@@ -43,7 +43,8 @@ class AovPixel {
   AovPlanes planes_;
   bool wants_surface_, wants_light_, wants_guide_;
   LightSplit split_;
-  // Sums of both halves of the samples. Of guides, [0] is half A and [1] is half B; of others, all is in [0].
+  // Sums over the samples. For guides, [0] is half A of the samples and [1] is half B; for other AOVs, [0] is
+  // the sum of both.
   std::array<std::array<Sums, kAovs>, 2> sums_{};
   double hits_ = 0;
   std::vector<IdSlot> shapes_, materials_;

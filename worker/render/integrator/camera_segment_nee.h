@@ -1,11 +1,11 @@
-// A strategy of path_tracer.h for light in media: on the camera's segments, before the first scattering,
-// light scattered once is found by next-event estimation at several points of the segment (segment_nee.h),
-// and not at the vertex where the path's own flight ends. On later segments it is found as by default
+// A strategy of path_tracer.h for light in media. On the camera's segments, before the first scattering, it
+// finds single-scattered light by next-event estimation at several points of the segment (segment_nee.h),
+// instead of at the vertex where the path's own flight ends. On later segments it is the default strategy
 // (vertex_nee.h).
 //
-// In a thin medium few flights end on the camera's segment, and each that does is the whole of the light
-// scattered there: this is most of the noise of light shafts. Points on the segment are there in each sample,
-// and share the camera ray and what it meets.
+// In a thin medium few flights end on the camera's segment, and the few that do carry all of its scattered
+// light: this is most of the noise of light shafts. Points on the segment exist in every sample, and share
+// the cost of the camera ray.
 #pragma once
 
 #include <optional>
@@ -22,7 +22,7 @@ class CameraSegmentNee {
 
  public:
   struct Plan {
-    std::optional<typename Points::Plan> points;  // nullopt: not on the camera's segment
+    std::optional<typename Points::Plan> points;  // nullopt: not a segment of the camera
     typename Single::Plan single;
 
     bool matters() const { return points || single.matters(); }

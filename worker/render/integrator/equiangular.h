@@ -1,8 +1,8 @@
 // Equi-angular distance sampling along a segment about a pivot (Kulla and Fajardo 2012): the density is
-// proportional to 1 / distance^2, where distance is that to the pivot. Positions are offsets x in [a, b],
-// along the segment, from the foot of the perpendicular that is dropped from the pivot. The textbook
-// difference of arctangents cancels when both ends are far from the foot on one side; the forms used here do
-// not (pdf accurate to 4e-7 in float32).
+// proportional to 1 / distance^2, where distance is the distance to the pivot. Positions are offsets x in [a,
+// b] along the segment, measured from the foot of the perpendicular from the pivot. The textbook difference
+// of arctangents cancels when both ends are far from the foot on one side; the forms used here do not (pdf
+// accurate to 4e-7 in float32).
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 
 namespace ls::render {
 
-// The largest ratio of densities: ratios are clamped to it, so that no product with one is 0 times infinity.
+// The largest ratio of densities. Ratios are clamped to it, so that no product with one is 0 times infinity.
 inline constexpr float kMaxRatio = 1e30f;
 
 class EquiAngular {
@@ -33,8 +33,8 @@ class EquiAngular {
 
   struct Sample {
     float t;    // from the segment's start
-    V3 p;       // computed from the foot: exact near the light
-    float pdf;  // per unit length
+    V3 p;       // computed from the foot of the perpendicular: accurate near the light
+    float pdf;  // density per unit length
   };
   Sample sample(float xi) const {
     float x;

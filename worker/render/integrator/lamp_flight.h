@@ -1,6 +1,6 @@
-// Free flights through homogeneous media with lamps (lights without extent): a share of them ends where
-// equi-angular sampling about a lamp says. Light that was scattered before it arrives near a lamp is as
-// bright as 1 / distance there, and flights of the medium alone rarely end so near.
+// Free flight through a homogeneous medium with lamps (lights without extent). A share of the flights ends at
+// a distance that is sampled equi-angularly about a lamp. Multiply scattered light grows as 1 / distance near
+// a lamp, and plain exponential flights rarely end that near.
 #pragma once
 
 #include <algorithm>
@@ -13,12 +13,13 @@
 
 namespace ls::render {
 
-// How many flights end near a lamp.
+// The share of flights whose distance is sampled about a lamp.
 inline constexpr float kLampFlightShare = .1f;
 
-// The flight from o along d, of length t_max at most (finite), by the numbers bits[0] (its depth), u(1)
-// (which distribution) and u(2) (the place near the lamp). There must be a lamp. Weights and densities are as
-// those of free_flight(); the density of a distance is that of the mixture, the balance heuristic.
+// Samples a flight from o along d, of length t_max at most (finite). bits[0] gives the exponential distance,
+// u(1) chooses the distribution, and u(2) gives the distance sampled about a lamp. There must be at least one
+// lamp. Weights and densities have the same meaning as in free_flight(). The density of a distance is the
+// mixture's, so the weights follow the balance heuristic.
 inline Flight fly_past_lamps(const Medium& medium, int hero, const Group& numbers, const V3& o, const V3& d,
                              float t_max, const Lamps& lamps) {
   const auto about = [&](std::size_t i) { return EquiAngular(o, d, t_max, lamps.position[i]); };
@@ -37,7 +38,7 @@ inline Flight fly_past_lamps(const Medium& medium, int hero, const Group& number
     for (std::size_t i = 0; i < lamps.count; ++i) near += about(i).pdf(length);
     near *= kLampFlightShare / static_cast<float>(lamps.count);
   }
-  // By channel: the transmittance, and the density of this flight with the channel as the hero
+  // For each channel: the transmittance, and the density of this flight if the channel were the hero
   C3 through, pdf;
   for (int c = 0; c < 3; ++c) {
     through[c] = std::exp(-medium.sigma_t[c] * length);
@@ -45,7 +46,7 @@ inline Flight fly_past_lamps(const Medium& medium, int hero, const Group& number
     pdf[c] = f.scattered ? medium.sigma_t[c] * alone + near : alone;
   }
   const float own = pdf[hero];
-  // Both densities underflow only where no light passes either
+  // The densities underflow only where the transmittance is 0, too
   if (!(own > 0)) {
     f.weight = C3(0);
     return f;

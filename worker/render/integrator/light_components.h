@@ -1,5 +1,5 @@
-// The components into which the radiance of a sample is split by the path that the light took. The light AOVs
-// (auxiliary images) are sums of them.
+// The components into which the radiance of a sample is split, by the scatterings on the light's path. The
+// light AOVs (auxiliary images) are sums of components.
 #pragma once
 
 #include <array>
@@ -9,8 +9,8 @@
 
 namespace ls::render {
 
-// A component is defined by the first scattering of the path, counted from the camera, and by whether that is
-// the only one.
+// A component is defined by the first scattering of the path, counted from the camera, and by whether more
+// scatterings follow.
 enum class LightPart : std::uint8_t {
   unscattered,    // directly visible: lights, environment, medium emission
   surface_once,   // one scattering, at a surface

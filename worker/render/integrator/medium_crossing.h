@@ -2,8 +2,8 @@
 // side of a surface.
 //
 // Where several media overlap, their particles are independent: a flight ends at the first collision in any
-// of them, and the transmittance is the product of theirs. The phase function at a vertex is that of the
-// medium in which the collision occurred; no mixture is needed.
+// of them, and the transmittance is the product of their transmittances. The phase function at a vertex is
+// that of the medium in which the collision occurred; no mixture is needed.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,7 @@ auto PathTracer<F, Light>::fly_through(const Medium& medium, const SurfaceHit* e
   if constexpr (F.emission) add_medium_emission(medium, t_max);
   const auto plan = Light<F>::ahead(*this, medium, segment);
   const Group numbers = stream_.group(segment_, Purpose::flight);
-  const bool past_lamps = F.aimed && world_.lamps.count > 0 && !medium.grid && std::isfinite(t_max);
+  const bool past_lamps = F.aimed && world_.lamp_flights && !medium.grid && std::isfinite(t_max);
   const Flight flight = past_lamps
                             ? fly_past_lamps(medium, hero_, numbers, ray_.start, ray_.d, t_max, world_.lamps)
                             : free_flight<F>(medium, hero_, numbers.bits[0], ray_.start, ray_.d, t_max,
@@ -41,12 +41,19 @@ auto PathTracer<F, Light>::fly_through(const Medium& medium, const SurfaceHit* e
     return {Collision::escaped};
   }
   if (!may_scatter()) return {Collision::absorbed};
+  [[maybe_unused]] Vertex previous;
+  if constexpr (F.connected) previous = last_;
   last_ = Vertex{};
   last_.delta = false;
   if (plan.matters()) last_.in_medium = Light<F>::vertex(*this, medium, plan, flight.t);
   begin_vertex(segment, flight);
   if constexpr (F.aimed) near_lamps_ = LampDirections(world_.lamps, last_.p);
+  if constexpr (F.connected) {
+    arrive(previous, last_.p, V3(0));
+    prefetch_light_vertices();
+  }
   Light<F>::at_vertex(*this, medium, last_.p, ray_.d);
+  if constexpr (F.connected) connect_in(medium, last_.p, ray_.d);
   return scatter_by_phase(medium);
 }
 
@@ -64,6 +71,7 @@ auto PathTracer<F, Light>::scatter_by_phase(const Medium& medium) -> Step {
   const Group direction = stream_.group(depth_, Purpose::direction);
   const V2 u(direction.u(0), direction.u(1));
   PhaseSample s = medium.phase.sample(ray_.d, u);
+  if constexpr (F.connected) last_.sum = densities_.sum(s.pdf);
   if constexpr (F.aimed) {
     if (near_lamps_.any()) {
       float choice = direction.u(2);
@@ -71,6 +79,7 @@ auto PathTracer<F, Light>::scatter_by_phase(const Medium& medium) -> Step {
       const float own = s.pdf;
       s.pdf = near_lamps_.pdf(own, s.w);
       beta_ *= own / s.pdf;
+      if constexpr (F.connected) last_.sum = densities_.sum(own);
     }
   }
   last_.pdf = s.pdf;
@@ -129,9 +138,9 @@ void PathTracer<F, Light>::light_vertex(const Medium& medium, const V3& p, const
   if (!is_black(arriving)) add(beta_ * arriving * (phase * weight / light->pdf));
 }
 
-// For each medium, adds its emission up to the point where a flight through the other media ends: the
-// probability that the flight reaches a point is the transmittance of the others up to there. A channel with
-// a different extinction gets its own flight, with the same random numbers.
+// For each medium, adds its emission up to the point where a flight through the other media ends. The
+// probability that this flight reaches a point is the transmittance of the other media up to there. A channel
+// with a different extinction gets its own flight, with the same random numbers.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_medium_emission_among(float t_max) {
   if (depth_ == 0 && world_.hide_emitters) return;
@@ -171,9 +180,8 @@ float PathTracer<F, Light>::others_end(std::size_t but, int hero, float t_max, R
   return t_max;
 }
 
-// Adds the medium's emission along the whole segment ahead, of length t_max, wherever the path's flight will
-// end; light found at the end of the flight comes in addition. Like a light that is hit, the emission counts
-// at the path's current depth.
+// Adds the medium's emission along the whole segment ahead, of length t_max, independently of where the
+// path's flight will end. Like a light that is hit, the emission counts at the path's current depth.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_medium_emission(const Medium& medium, float t_max) {
   if (medium.emission_kind == EmissionKind::none || (depth_ == 0 && world_.hide_emitters)) return;
@@ -220,9 +228,9 @@ void PathTracer<F, Light>::stand(const SurfaceInfo& s, bool outside, bool throug
   if (s.transition) in.only(outside ? s.exterior : s.interior);
 }
 
-// The primitives other than the hit one that coincide with it, for a ray that arrives along `from` and
-// continues along w. They are searched on a short line: it begins in front of everything that may coincide
-// with the surface, but not behind the ray's origin, and ends where the ray continues.
+// Returns the primitives that coincide with the hit one, for a ray that arrives along `from` and continues
+// along w. They are found by a short ray. It begins in front of everything that may coincide with the
+// surface, but not behind the original ray's origin, and ends where the path continues.
 template <Features F, template <Features> class Light>
 CoincidentHits PathTracer<F, Light>::others_at(const SurfaceHit& hit, const V3& from, const V3& w) const {
   const V3 back = offset_point(hit, -w) - hit.p;
@@ -254,10 +262,10 @@ auto PathTracer<F, Light>::through_all(const SurfaceHit& hit, const V3& w, const
   return in;
 }
 
-// If `hit` is on a null surface that coincides with one that scatters light, replaces it by the hit on the
-// latter, whichever of them the ray from o along d found first. Otherwise fog on a floor would let light
-// through the floor, and a pane of glass on a null boundary would not attenuate the light. Shadow rays end at
-// t_max, in front of the surface that their light is on.
+// If `hit` is on a null surface that coincides with a scattering surface, replaces it by the hit on the
+// scattering one; the ray from o along d may have found either of them first. Otherwise fog on a floor would
+// let light through the floor, and a pane of glass on a null boundary would not attenuate the light. Shadow
+// rays end at t_max, in front of the surface of their light.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max) const {
   const SurfaceInfo& s = world_.geometry.surfaces[hit.surface];
@@ -274,7 +282,7 @@ void PathTracer<F, Light>::prefer_scatterer(SurfaceHit& hit, const V3& o, const 
   }
 }
 
-// Adds the emission of all null surfaces that coincide with the hit one, whichever of them the ray found.
+// Adds the emission of all null surfaces that coincide with the hit one; the ray may have found any of them.
 // Next-event estimation, against which this light is weighted, finds all of them too.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_emission_of_others(const SurfaceHit& hit) {

@@ -1,6 +1,7 @@
 // Weights of two strategies that sample the same light, by their densities (multiple importance sampling:
-// Veach 1997, section 9.2). Any two weights that add up to 1 give the right mean: a wrong one shows only in
-// the variance, so the tests check weights and second moments (tests/unit/render/integrator/mis_test.cpp).
+// Veach 1997, section 9.2). Any two weights that add up to 1 give the correct mean, and a wrong weight only
+// increases the variance. So the tests check weights and second moments
+// (tests/unit/render/integrator/mis_test.cpp).
 #pragma once
 
 #include "common/scene/scene_camera.h"

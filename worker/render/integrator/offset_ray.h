@@ -1,8 +1,8 @@
-// A ray whose origin is moved off the surface it leaves, so that it does not meet that surface again.
+// A ray whose origin is moved off the surface that it leaves, so that it does not hit this surface again.
 //
-// `start` is the point on the path; `origin` is where the ray is traced from. A medium fills the gap between
-// the two as well: at an optical depth of 1e6 it may be longer than a mean free path. So lengths within media
-// are measured from `start`.
+// `start` is the point on the path; `origin` is where the ray is traced from. If the surface bounds a medium,
+// the medium also fills the gap between the two, which may be longer than a mean free path (at an optical
+// depth of 1e6). So lengths within media are measured from `start`.
 #pragma once
 
 #include <algorithm>
@@ -15,11 +15,11 @@ namespace ls::render {
 struct OffsetRay {
   V3 start{0, 0, 0}, origin{0, 0, 0}, d{0, 0, 1};
 
-  // How far `origin` is ahead of `start` along the ray. Negative if `origin` was moved backwards.
+  // Signed distance from `start` to `origin` along the ray; negative if `origin` was moved backwards.
   float lead() const { return dot(origin - start, d); }
 
-  // The length from `start` to the surface that the ray from `origin` met. If `origin` is farther from that
-  // surface than `start` (because a vertex in a medium was moved away from this very surface), the length is
+  // The length from `start` to the surface that the ray from `origin` hit. If `origin` is farther from that
+  // surface than `start` (because a vertex in a medium was moved away from this surface), the length is
   // measured to the surface's plane.
   float length_to(const SurfaceHit& hit) const {
     const float ahead = lead();
@@ -28,9 +28,9 @@ struct OffsetRay {
     return hit.t + ahead;
   }
 
-  // The point p, which lies at distance t on the segment s, moved off the surfaces at both ends of the
-  // segment. It is kept as far from them as the origin of a ray that leaves them, so that rounding cannot put
-  // it on their other side.
+  // The point p, which is at distance t on the segment s, moved off the surfaces at both ends of the segment.
+  // It is kept as far from them as the origin of a ray that leaves them, so that rounding cannot put it on
+  // their other side.
   V3 moved_off_ends(V3 p, Segment s, float t) const {
     const V3 from_end = s.end ? missing_offset(offset_point(*s.end, -d) - s.end->p, p - s.end->p) : V3(0);
     if (s.lead > 0) p += missing_offset(origin - start, d * t);
@@ -54,17 +54,17 @@ struct OffsetRay {
   }
 
  private:
-  // How much of a surface's offset (the vector by which rays that leave it are moved) is still missing at a
-  // point that is displaced by `from_surface` from the surface. Zero once the point is clear of the surface.
-  // For a point behind the surface more than the whole offset is missing: a line nearly parallel to a curved
-  // surface leaves the surface earlier than the line from the moved start does, along which the length was
-  // measured.
+  // Returns the part of a surface's offset (the vector by which rays that leave it are moved) that a point
+  // still needs if it is displaced by `from_surface` from the surface. Zero if the point is far enough from
+  // the surface; more than the whole offset if it is behind the surface. That happens near curved surfaces:
+  // the length was measured along the line from the moved start, and a grazing line from the unmoved start
+  // leaves the surface earlier.
   static V3 missing_offset(const V3& offset, const V3& from_surface) {
     const float share = dot(from_surface, offset) / dot(offset, offset);
     return share < 1 ? offset * (1 - share) : V3(0);
   }
-  // For a ray that goes towards the very surface from which its origin was moved away, but that ends before
-  // it: the part of that displacement that remains at distance t.
+  // For a ray that is directed at the surface from which its origin was moved away, but that ends before the
+  // surface: the part of that displacement that remains at distance t.
   V3 remaining_lead(float t) const {
     const V3 offset = origin - start;
     return offset * (1 - t * dot(offset, d) / dot(offset, offset));

@@ -36,7 +36,7 @@ namespace ls::render {
 
 struct SampleOutcome {
   C3 radiance{0, 0, 0};
-  // The first reason for rejecting the sample whatever its radiance is; none if there was no such reason.
+  // The first reason to reject the sample regardless of its radiance; none if there is no such reason.
   HealthCause cut_off = HealthCause::none;
   std::uint64_t majorant_violations = 0;
 
@@ -46,12 +46,13 @@ struct SampleOutcome {
 };
 struct FirstSurface {
   SurfaceHit hit;
-  // 1 / (1 - probability of passing straight through): the weight that makes up for the random decision not
-  // to pass.
+  // 1 / (1 - probability of passing straight through): the weight that compensates for the random decision to
+  // be scattered.
   float not_passed = 1;
 };
 
-// Albedo and normal that guide a denoiser: one sample of the AOVs denoising_albedo and denoising_normal.
+// Albedo and normal that guide a denoiser: one sample of each of the AOVs denoising_albedo and
+// denoising_normal.
 struct DenoisingGuide {
   C3 albedo{0, 0, 0};
   V3d normal{0, 0, 0};
@@ -66,20 +67,40 @@ enum class Collision : std::uint8_t {
 template <Features F>
 class SegmentNee;
 
+// Data for paths of a scene with Features::connected, in addition to the world.
+struct Connections {
+  const LightVertices* vertices = nullptr;  // null: paths are not connected
+  // Used while learning, else null: records where paths find light that connections could find, too.
+  struct Learner {
+    SunMap map;
+    double light = 0;     // the sum of the light found
+    double vertices = 0;  // number of vertices at which the sun could be found
+    double lit = 0;       // estimated number of those vertices at which the sun was found
+    // True if a ray towards the sun met other media than a ray from the sun would. The scene then declares
+    // different media on the two sides of a boundary, or the medium outside is not a vacuum.
+    bool media_differ = false;
+  };
+  Learner* learner = nullptr;
+};
+
 template <Features F, template <Features> class Light = VertexNee>
 class PathTracer {
  public:
   // The sample's radiance is added to the components in `split`. `split` is required with F.split and ignored
-  // otherwise.
-  PathTracer(const World& world, const SampleStream& stream, LightSplit* split = nullptr)
-      : world_(world), stream_(stream), split_(split) {}
+  // otherwise; in the same way F.connected requires `connections`.
+  PathTracer(const World& world, const SampleStream& stream, LightSplit* split = nullptr,
+             Connections connections = {})
+      : world_(world), stream_(stream), split_(split), connections_(connections) {}
 
   SampleOutcome trace(const CameraRay& ray);
   // The first surface at which the path would be scattered if there were no media. The AOVs describe this
   // surface.
   std::optional<FirstSurface> first_surface(const CameraRay& ray);
-  // Follows the ray through boundaries, mirrors and clear glass to the first surface that is neither.
+  // Follows the ray through boundaries, mirrors and clear glass to the first surface that is none of these.
   DenoisingGuide denoising_guide(const CameraRay& ray);
+  // With F.connected: follows a ray of the sun, and calls keep(vertex) for each light vertex on its way.
+  template <class Keep>
+  void follow_light(const SunMap::Ray& ray, const Keep& keep);
 
  private:
   friend class Light<F>;
@@ -87,9 +108,11 @@ class PathTracer {
   friend class SegmentNee<F>;
   struct Vertex {  // where the current ray was scattered
     V3 p{0, 0, 0};
-    V3 n{0, 0, 0};      // normal of its surface; 0 in a medium
+    V3 n{0, 0, 0};      // shading normal of its surface; 0 in a medium
+    V3 ng{0, 0, 0};     // with F.connected: the geometric normal
     float pdf = 0;      // of the sampled direction
     bool delta = true;  // sampled by a delta lobe or the camera: lights that are hit have full weight
+    float sum = 0;      // with F.connected: SubpathDensities::sum()
     typename Light<F>::Vertex in_medium;
   };
 
@@ -99,7 +122,7 @@ class PathTracer {
   };
   using Within = std::conditional_t<F.overlaps, MediaState, OneMedium>;
 
-  // Free flight up to the surface hit at `end`, or, if `end` is null, up to the distance `reach`.
+  // Samples a free flight up to the surface hit at `end`, or, if `end` is null, up to the distance `reach`.
   Step fly(const SurfaceHit* end, float reach);
   Step fly_through(const Medium& medium, const SurfaceHit* end, float reach);
   Step fly_through_several(const SurfaceHit* end, float reach);
@@ -119,7 +142,7 @@ class PathTracer {
   }
   void pass_boundary(const SurfaceHit& hit, const SurfaceInfo& surface);
   void light_surface(const SurfaceHit& hit, const V3& wo);
-  // The density with which a vertex in a medium at p samples the direction w, where `own` is that of the
+  // The density with which a vertex in a medium at p samples the direction w; `own` is the density of the
   // phase function.
   float direction_pdf([[maybe_unused]] const V3& p, float own, [[maybe_unused]] const V3& w) const {
     if constexpr (F.aimed) return LampDirections(world_.lamps, p).pdf(own, w);
@@ -144,9 +167,47 @@ class PathTracer {
   [[gnu::noinline]] void prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max) const;
   [[gnu::noinline]] void add_emission_of_others(const SurfaceHit& hit);
   bool survives(float u);
+  void prefetch_light_vertices() const {
+    if (connections_.vertices)
+      connections_.vertices->prefetch(stream_.group(depth_, Purpose::connect).bits[0]);
+  }
+  void connect_in(const Medium& medium, const V3& p, const V3& d);
+  void connect_on(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo);
+  template <class Scattering>
+  void connect(const Receiver& x, const V3& start, const Scattering& scattering);
+  // The density of the first vertex after the sun, where rays have the density `rays`.
+  float first_density(float rays, const V3& ng) const {
+    return world_.connections_per_ray * rays * (is_black(ng) ? 1 : std::abs(dot(ng, world_.sun.direction)));
+  }
+  void arrive(const Vertex& from, const V3& p, const V3& ng);
+  // The sum of densities_, with back() as `back`.
+  template <class Back>
+  float densities_sum(const Back& back) const {
+    return densities_.sum(densities_.needs_back() ? back() : 0);
+  }
 
-  // Adds light to the sample. `ahead` is true if the light was scattered once more than the path so far, in
-  // the medium ahead of it.
+  // Adds light that next-event estimation found at the current vertex p, on a surface of the geometric normal
+  // ng, or in a medium (0). back() is the density with which light from there is scattered back along the
+  // path.
+  template <class Back>
+  void add_found([[maybe_unused]] const LightChoice& choice, [[maybe_unused]] const V3& p,
+                 [[maybe_unused]] const V3& ng, C3 light, [[maybe_unused]] const Back& back) {
+    if constexpr (F.connected) {
+      if (choice.light == world_.sun.light && densities_.last > 0) {
+        if (connections_.vertices)
+          light /= 1 + first_density(world_.sun_map.density(p), ng) * densities_sum(back);
+        if (connections_.learner) {
+          connections_.learner->map.learn(p, std::sqrt(mean(light)));
+          connections_.learner->light += double{mean(light)};
+          connections_.learner->lit += 1 / double{choice.probability};
+        }
+      }
+    }
+    add(light);
+  }
+
+  // Adds light to the sample. If `ahead`, the light was scattered once more than the path so far: in the
+  // medium on the segment ahead.
   void add(const C3& weighted, bool ahead = false) {
     C3 light = weighted;
     if constexpr (F.chromatic) light = weighted / mean(density_);
@@ -171,13 +232,15 @@ class PathTracer {
   int hero_ = 0;
   int depth_ = 0;    // scatterings so far
   int passed_ = 0;   // null boundaries and null transmissions so far
-  int segment_ = 0;  // rays so far, null crossings included
+  int segment_ = 0;  // number of rays so far, including those after null crossings
   Within medium_;
-  bool first_in_medium_ = false;  // with F.split: the first scattering was in a medium
+  bool first_in_medium_ = false;  // with F.split: true if the first scattering was in a medium
   Vertex last_;
+  SubpathDensities densities_;  // with F.connected: of the path up to the current vertex
+  Connections connections_;
   SampleOutcome outcome_;
   MediumCounters counters_;
-  // With F.aimed: the directions near lamps at the current vertex
+  // With F.aimed: the distribution of directions near lamps at the current vertex
   LampDirections near_lamps_;
 };
 
@@ -207,29 +270,31 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
       }
     }
     if (!met) {
-      // A ray with a non-finite direction meets nothing; then the sample is rejected. A sample that was
+      // A ray with a non-finite direction hits nothing, and the sample is rejected. A sample that was
       // rejected before keeps its cause.
-      if (!F.health || is_finite(ray_.d))
+      if (is_finite(ray_.d))
         add_environment();
       else
         outcome_.reject(HealthCause::no_direction);
       break;
     }
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-    if constexpr (F.found_lights && F.overlaps) {
+    if constexpr (F.overlaps) {
       if (world_.lights_on_others && surface.coincident_reach > 0) add_emission_of_others(hit);
     }
     if (!surface.plain) {
-      if (F.found_lights && surface.light != kNone) add_emission(hit);
+      if (surface.light != kNone) add_emission(hit);
       if constexpr (F.passing) {
-        if ((F.boundaries && surface.null) ||
-            (F.null_transmission && surface.null_transmission && passes_null(hit))) {
+        if (surface.null || (surface.null_transmission && passes_null(hit))) {
           if (!may_go_on(depth_, ++passed_)) break;
           pass_boundary(hit, surface);
           if (is_black(beta_)) break;
           continue;
         }
       }
+    }
+    if constexpr (F.whitted) {
+      if (!last_.delta) break;
     }
     const Step step = scatter_on_surface(hit);
     if (step.collision == Collision::absorbed || !survives(step.roulette)) break;
@@ -242,7 +307,7 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
 }
 
 // Passes every index-matched surface, and each null-transmitting one with its probability. The random numbers
-// are those of the path itself as long as both meet the same surfaces.
+// are those of the path itself as long as both hit the same surfaces.
 template <Features F, template <Features> class Light>
 std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay& ray) {
   ray_ = {ray.o, ray.o, ray.d};
@@ -264,9 +329,10 @@ std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay&
   return std::nullopt;
 }
 
-// The media on the way count with the share of the ray that they scatter or absorb: their albedo instead of
-// that of the surface behind, and no normal. This share is a transmittance, exact in homogeneous media, and
-// not the random decision of a flight: noisy guides make a denoiser keep noise.
+// A medium on the way contributes in proportion to the light that it scatters or absorbs: its albedo replaces
+// that of the surface behind, and it has no normal. The proportion is 1 - transmittance, which is exact in
+// homogeneous media. Sampled flights would make the guides noisy, and a denoiser keeps the noise of its
+// guides.
 template <Features F, template <Features> class Light>
 DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
   constexpr int kGuideSegments = 16;
@@ -299,7 +365,8 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
     const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), hit.shading.to_local(-ray_.d), g.u(2),
                                        {g.u(0), g.u(1)});
     if (!s) break;
-    // Refraction brightens radiance by eta^2, which is no property of the surface behind.
+    // Refraction scales radiance by eta^2. This factor is removed, since it is no property of the surface
+    // behind.
     beta_ *= s->weight * (s->transmitted ? s->eta * s->eta : 1.f);
     if (!s->delta) {
       guide.albedo += beta_;
@@ -313,7 +380,7 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
   return guide;
 }
 
-// Next-event estimation at a surface; wo is the direction back along the path, in the local frame.
+// Next-event estimation at a surface. wo is the direction back along the path, in the local frame.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
@@ -330,11 +397,13 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   if (is_black(f.f_cos)) return;
   float sampled = f.pdf;
   if constexpr (F.aimed) sampled = near_lamps_.pdf(f.pdf, light->direction);
-  const float weight = !F.found_lights || light->delta ? 1 : balance_weight(light->pdf, sampled);
+  const float weight = light->delta ? 1 : balance_weight(light->pdf, sampled);
   const V3 p = offset_point(hit, light->direction);
   const Within medium = beyond(hit, surface, light->direction, ray_.d, medium_);
   const C3 arriving = unoccluded(hit.p, p, *light, medium, stream_.stream(depth_, Purpose::track_shadow));
-  if (!is_black(arriving)) add(beta_ * f.f_cos * arriving * (weight / light->pdf));
+  if (!is_black(arriving))
+    add_found(choice, hit.p, hit.ng, beta_ * f.f_cos * arriving * (weight / light->pdf),
+              [&] { return world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wi, wo).pdf; });
 }
 
 // Scatters the path at a surface. Returns Collision::absorbed if the surface absorbs the path, or if the path
@@ -347,7 +416,15 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   const V3 wo = hit.shading.to_local(-ray_.d);
   if constexpr (F.aimed)
     near_lamps_ = surface.smooth ? LampDirections(world_.lamps, hit.p) : LampDirections();
+  if constexpr (F.connected) {
+    arrive(last_, hit.p, hit.ng);
+    if (hit.normal_replaced) densities_ = {};
+    prefetch_light_vertices();
+  }
   light_surface(hit, wo);
+  if constexpr (F.connected) {
+    if (surface.smooth) connect_on(hit, surface, wo);
+  }
   const Group g = stream_.group(depth_, Purpose::direction);
   const auto s = sample_bsdf(hit, surface, wo, g);
   if (!s) return {Collision::absorbed};
@@ -362,6 +439,10 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   last_.n = hit.shading.n;
   last_.pdf = s->pdf;
   last_.delta = s->delta;
+  if constexpr (F.connected) {
+    last_.ng = hit.ng;
+    last_.sum = densities_sum([&] { return world_.bsdfs.eval(surface.bsdf, hit.uv_point(), s->wi, wo).pdf; });
+  }
   // The medium is set for reflected rays too: the media on the two sides are those that the scene declares,
   // as for next-event estimation.
   if constexpr (F.media) medium_ = beyond(hit, surface, w, ray_.d, medium_);
@@ -396,11 +477,11 @@ std::optional<BsdfSample> PathTracer<F, Light>::sample_bsdf(const SurfaceHit& hi
   return s;
 }
 
-// Decides whether the path passes straight through a null-transmitting surface. If so it is not scattered
-// there: it gets no vertex and no extra depth, and a light that it hits is weighted against next-event
-// estimation from the previous vertex, whose shadow rays pass the surface with the same transmission
-// (through_boundaries). The random numbers are keyed by segment: those of a vertex would be used again at the
-// next one.
+// Decides whether the path passes straight through a null-transmitting surface. If so, this is no scattering:
+// it makes no vertex and does not increase the depth. A light that is hit behind the surface is weighted
+// against next-event estimation from the previous vertex, whose shadow rays pass the surface with the same
+// transmission (through_boundaries). The random numbers are keyed by segment, since those of a vertex would
+// be used again at the next surface.
 template <Features F, template <Features> class Light>
 bool PathTracer<F, Light>::passes_null(const SurfaceHit& hit) {
   const BsdfIndex bsdf = world_.geometry.surfaces[hit.surface].bsdf;
@@ -436,12 +517,12 @@ void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
 
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_environment() {
-  if (!F.found_lights || !world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)) return;
+  if (!world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)) return;
   const float pdf = last_.pdf / last_.in_medium.found_as_light();
   add(beta_ * world_.lights.environment(ray_.d, last_.delta ? kInfinity : pdf));
 }
 
-// Russian roulette with the random number u: if it returns false, the path ends.
+// Russian roulette with the random number u. Returns false if the path ends.
 template <Features F, template <Features> class Light>
 bool PathTracer<F, Light>::survives(float u) {
   if (is_black(beta_)) return false;
@@ -457,5 +538,6 @@ bool PathTracer<F, Light>::survives(float u) {
 
 }  // namespace ls::render
 
+#include "worker/render/integrator/connection.h"
 #include "worker/render/integrator/medium_crossing.h"
 #include "worker/render/integrator/shadow_ray.h"

@@ -1,32 +1,21 @@
 #include "worker/render/render.h"
 
-#include <immintrin.h>
-
+#include <array>
 #include <bit>
 #include <cmath>
+#include <memory>
 
 #include "worker/render/integrator/aov_pixel.h"
+#include "worker/render/integrator/light_paths.h"
 #include "worker/render/integrator/variant.h"
+#include "worker/render/math/flush_denormals.h"
 #include "worker/render/math/rounded.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {
 namespace {
 
-// While an object of this class lives, the thread treats denormals as zero, as Embree requires for tracing
-// rays. Afterwards it does not: adding up results (folding) needs denormals.
-class FlushDenormals {
- public:
-  FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040); }
-  ~FlushDenormals() { _mm_setcsr(saved_); }
-  FlushDenormals(const FlushDenormals&) = delete;
-  FlushDenormals& operator=(const FlushDenormals&) = delete;
-
- private:
-  unsigned saved_;
-};
-
-// The variants of the integrators other than `volpath_distant_mis`, cheapest first. The last one has the
+// The variants of the integrators `volpath` and `path`, cheapest first. The last one has the
 // features of every scene.
 constexpr Variant kVariants[] = {
     variant<Features{}>("surfaces"),
@@ -40,11 +29,15 @@ constexpr Variant kVariants[] = {
 static_assert(std::end(kVariants)[-1].covers == kEveryScene);
 
 std::span<const Variant> variants_for(const World& w) {
+  if (w.need.connected) return connected_variants();
   if (w.need.aimed) return aimed_variants();
+  if (w.need.whitted) return whitted_variants();
   return w.distant_mis ? distant_variants() : std::span<const Variant>(kVariants);
 }
 const Variant& split_variant(const World& w) {
+  if (w.need.connected) return kConnectedSplitVariant;
   if (w.need.aimed) return kAimedSplitVariant;
+  if (w.need.whitted) return kWhittedSplitVariant;
   return w.distant_mis ? kDistantSplitVariant : kSplitVariant;
 }
 const Variant& choose(const World& w) {
@@ -54,8 +47,8 @@ const Variant& choose(const World& w) {
   return split_variant(w);
 }
 
-// The largest radiance of which 2^31 samples can be summed in float32. A larger sample is an error of the
-// scene. Adding it could make the sums of a whole unit (a tile and a range of samples) infinite, and
+// The largest usable radiance: 2^31 samples of it can be summed in float32. A larger sample is an error of
+// the scene: adding it could make the sums of a whole unit (a tile and a range of samples) infinite, and
 // rendering the unit again would not help. NaN fails the test too. The limit applies to single samples, so
 // that rejection does not depend on how samples are grouped.
 constexpr float kLargestRadiance = 0x1p96f;
@@ -64,9 +57,8 @@ bool usable(const SampleOutcome& s) {
   return std::abs(c.x) <= kLargestRadiance && std::abs(c.y) <= kLargestRadiance &&
          std::abs(c.z) <= kLargestRadiance && s.cut_off == HealthCause::none;
 }
-// True if the sample is usable and nothing about it needs to be counted, as for nearly every sample. Floats
-// from 0 up to the limit have the same order as their bit patterns; negative ones and NaN lie beyond the
-// limit.
+// True if the sample is usable and needs no counting, as nearly every sample. Floats from 0 up to the limit
+// have the same order as their bit patterns; negative floats and NaN have larger patterns.
 bool clean(const SampleOutcome& s) {
   const auto fine = [](float x) {
     return std::bit_cast<std::uint32_t>(x) <= std::bit_cast<std::uint32_t>(kLargestRadiance);
@@ -84,7 +76,7 @@ HealthCause rejected_for(const SampleOutcome& s) {
   return is_finite(c) ? HealthCause::too_large : HealthCause::infinite;
 }
 
-// Counts in `health` what is wrong with the sample at `spot`. Not inlined, to keep it out of the code for
+// Counts the problems of the sample at `spot` in `health`. Not inlined, to keep this code out of the path of
 // good samples.
 [[gnu::cold, gnu::noinline]] void count(const SampleOutcome& s, const HealthLocation& spot, Health& health) {
   health.add(HealthCause::majorant_violation, s.majorant_violations, spot);
@@ -93,11 +85,34 @@ HealthCause rejected_for(const SampleOutcome& s) {
   if (cause == HealthCause::none && negative(s)) health.add(HealthCause::negative, 1, spot);
 }
 
+// Provides the connections for samples of a world. It holds the light vertices of the last sample of each
+// half, so that the cache is asked only when the set changes.
+class SampleConnections {
+ public:
+  explicit SampleConnections(const World& w) : w_(w) {}
+  Connections of(std::uint64_t sample) {
+    if (!w_.need.connected) return {};
+    Kept& kept = kept_[sample & 1];
+    const std::uint64_t set = LightVertexCache::set_of(sample);
+    if (!kept.vertices || kept.set != set)
+      kept = {set, w_.light_vertices.get(set, [&](std::uint64_t s) { return trace_light_vertices(w_, s); })};
+    return {.vertices = kept.vertices.get()};
+  }
+
+ private:
+  struct Kept {
+    std::uint64_t set = 0;
+    std::shared_ptr<const LightVertices> vertices;
+  };
+  const World& w_;
+  std::array<Kept, 2> kept_;
+};
+
 struct PixelSums {
   double half[2][3] = {};
 };
 
-// What accumulates AOVs beside the colour sums: NoAovs, which does nothing, or an AovPixel.
+// What a pixel accumulates beside the colour sums: nothing (NoAovs), or AOVs (AovPixel).
 struct NoAovs {
   static LightSplit* split() { return nullptr; }
   static void begin_pixel() {}
@@ -107,17 +122,17 @@ struct NoAovs {
 };
 
 template <class Aovs>
-PixelSums render_pixel(const World& w, SampleFn sample, int x, int y, SampleRange range, Health& health,
-                       Breadcrumb* crumb, Aovs& aovs) {
+PixelSums render_pixel(const World& w, SampleFn sample, int x, int y, SampleRange range,
+                       SampleConnections& connections, Health& health, Breadcrumb* crumb, Aovs& aovs) {
   PixelSums sums;
   for (std::uint64_t s = range.s0; s < range.s1; ++s) {
     if (crumb) crumb->sample.store(s, std::memory_order_relaxed);
     aovs.begin_sample();
-    const SampleOutcome out = sample(w, x, y, s, aovs.split());
+    const SampleOutcome out = sample(w, x, y, s, aovs.split(), connections.of(s));
     aovs.end_sample(x, y, s, usable(out));
-    // A bad sample is counted and contributes zero, but still counts as one of the N samples of its pixel. It
-    // is never drawn again.
-    if (kBuilt.health && !clean(out)) [[unlikely]] {
+    // A bad sample is counted in the health and contributes zero to the pixel. It remains one of the pixel's
+    // N samples and is never replaced.
+    if (!clean(out)) [[unlikely]] {
       count(out, {x, y, s}, health);
       if (!usable(out)) continue;
     }
@@ -130,6 +145,7 @@ template <class Aovs>
 TileResult render_tile_with(const World& w, SampleFn sample, PixelRect tile, SampleRange range,
                             const std::atomic<bool>* stop, Breadcrumb* crumb, Aovs aovs) {
   const FlushDenormals mode;
+  SampleConnections connections(w);
   TileResult r;
   const auto pixels = static_cast<std::size_t>(tile.pixels());
   r.sums.assign((6 + planes_of(w.aovs).count()) * pixels, 0.f);
@@ -145,7 +161,7 @@ TileResult render_tile_with(const World& w, SampleFn sample, PixelRect tile, Sam
         crumb->y.store(y, std::memory_order_relaxed);
       }
       aovs.begin_pixel();
-      const PixelSums sums = render_pixel(w, sample, x, y, range, r.health, crumb, aovs);
+      const PixelSums sums = render_pixel(w, sample, x, y, range, connections, r.health, crumb, aovs);
       aovs.store(r.sums.data() + 6 * pixels, pixels, i);
       for (std::size_t h = 0; h < 2; ++h)
         for (std::size_t c = 0; c < 3; ++c) r.sums[(3 * h + c) * pixels + i] = rounded(sums.half[h][c]);
@@ -159,7 +175,7 @@ TileResult render_tile_with(const World& w, SampleFn sample, PixelRect tile, Sam
   return render_tile_with(w, sample, tile, range, stop, crumb, AovPixel(w));
 }
 
-// Renders with a variant that splits the light into components, whether or not the settings request that.
+// Renders with a variant that computes light components, whether or not the settings request them.
 TileResult render_split(const World& w, const Variant& v, PixelRect tile, SampleRange range) {
   return render_tile_with(w, v.sample, tile, range, nullptr, nullptr, AovPixel(w));
 }
@@ -200,7 +216,8 @@ SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample
   const FlushDenormals mode;
   LightSplit split;
   split.fill(C3(0));
-  const SampleOutcome out = choose(world).sample(world, x, y, sample, &split);
+  const SampleOutcome out =
+      choose(world).sample(world, x, y, sample, &split, SampleConnections(world).of(sample));
   SampleValue value{{out.radiance.x, out.radiance.y, out.radiance.z}, usable(out), {}};
   count(out, {x, y, sample}, value.health);
   return value;

@@ -1,11 +1,11 @@
-// The integrator `volpath_distant_mis` as a strategy of path_tracer.h: on every segment through a medium,
-// light scattered once on it is found by next-event estimation from points sampled for that purpose, not from
-// the vertices at which the path's own flights end. At those vertices no next-event estimation is done.
+// The integrator `volpath_distant_mis` as a strategy of path_tracer.h: single scattering on a segment through
+// a medium is estimated by next-event estimation at points that are sampled for this purpose. The vertices at
+// which the path's own flights end do no next-event estimation.
 //
 // Points are sampled by (D) depth: the truncated exponential, in grids that of the macro cells' means
 // (optical_depth.h) mixed with a uniform density; and by (A) angle: equi-angularly about the light. Each
-// yields a point of its own; `heuristic` weights their densities e_D and e_A against each other. For lights
-// without a position and segments without an end (A) is undefined, and (D) is used alone.
+// yields a separate point; `heuristic` weights their densities e_D and e_A against each other. (A) requires a
+// light with a position and a segment with an end; otherwise (D) is used alone.
 //
 // Phase-function sampling that hits a light is a third strategy. With f(t) the density of flights (in grids
 // that of the macro cells' means) and p_l, p_s the solid-angle densities of light and phase sampling,
@@ -33,18 +33,18 @@ class SegmentNee {
  public:
   struct Plan {
     OpticalDepthIn<F> depths;
-    int by_depth = 1;     // points sampled by depth
-    bool angles = false;  // the segment is finite, so points can be sampled by angle
+    int by_depth = 1;     // number of points sampled by depth
+    bool angles = false;  // true if the segment is finite, so that points can be sampled by angle
 
     static bool matters() { return true; }
   };
   struct Vertex {  // default-constructed for a vertex that is not in a medium
     bool by_depth = true, by_angle = false;
-    float depth_ratio = 1;  // e_D / f
+    float depth_ratio = 1;  // the ratio e_D / f at this vertex
     float flight_pdf = 0, t = 0;
     V3 o{0, 0, 0}, d{0, 0, 0};
     float length = 0;
-    float points = 1;  // that are sampled by depth; by angle, there is one
+    float points = 1;  // number of points sampled by depth; one more is sampled by angle
 
     float found_as_light() const { return std::min(points * depth_ratio, kMaxRatio); }
     float found_as_light(const V3& pivot) const {
@@ -88,23 +88,24 @@ class SegmentNee {
   }
 
   template <class Path>
-  static void at_vertex(Path&, const Medium&, const V3&, const V3&) {}  // all done in ahead()
+  // Nothing to do: ahead() has added all light
+  static void at_vertex(Path&, const Medium&, const V3&, const V3&) {}
 
  private:
-  // The random numbers of point i of several, from those of one point: places are stratified along the
-  // segment, and the numbers that choose a light and a point on it move on by constant steps, modulo 1.
+  // Derives the random numbers of point i of several from those of a single point. Positions are stratified
+  // along the segment; the numbers that choose a light and a point on it advance by constant steps, modulo 1.
   static Group point_of(const Group& g, int i, int points) {
     if (points == 1) return g;
     const auto k = static_cast<std::uint32_t>(i), n = static_cast<std::uint32_t>(points);
     const std::uint32_t step = static_cast<std::uint32_t>((std::uint64_t{1} << 32) / n);
     const std::uint64_t place = ((std::uint64_t{k} << 32) + g.bits[3]) / n;
-    // The steps of the point on the light are those of a two-dimensional lattice (Roberts 2018, R2)
+    // The steps for the point on the light form a two-dimensional lattice (Roberts 2018, R2)
     return {{g.bits[0] + k * step, g.bits[1] + k * 0xc13fa9a9u, g.bits[2] + k * 0x91e10da5u,
              static_cast<std::uint32_t>(place)}};
   }
 
-  // The mean over channels of density(sigma), where sigma is the channel's extinction; each channel is
-  // weighted by its density of the path so far.
+  // The mean over channels of density(sigma), where sigma is the channel's extinction. Each channel is
+  // weighted by its density of the path so far, relative to the hero's.
   template <class Path, class Fn>
   static float over_channels(const Path& path, const Medium& medium, Fn density) {
     if constexpr (F.chromatic) {
@@ -117,7 +118,7 @@ class SegmentNee {
     }
   }
 
-  // The density of strategy (D) at x, per unit of x, the density of the medium integrated along the ray
+  // The density of strategy (D) at x, per unit of x. x is the density of the medium integrated along the ray
   // (optical_depth.h).
   template <class Path>
   static float depth_pdf(const Path& path, const Medium& medium, const Plan& plan, float x) {
@@ -153,7 +154,7 @@ class SegmentNee {
     return v;
   }
 
-  // Samples one point of the segment, by angle or by depth, and adds the light that is scattered once, there,
+  // Samples one point of the segment, by angle or by depth, and adds the light that is scattered there
   // towards the path.
   template <class Path>
   static void propose(Path& path, const Medium& medium, const Segment& segment, const Plan& plan,
@@ -171,7 +172,7 @@ class SegmentNee {
       e_angle = a.pdf;
     } else {
       const float x = depth_sample(medium, plan, path.hero_, bits);
-      if (!std::isfinite(x)) return;  // the hero has no extinction, in a medium without end
+      if (!std::isfinite(x)) return;  // not finite if the hero has no extinction and the medium has no end
       at_point = s.after(x);
       p = path.ray_.start + path.ray_.d * at_point.t;
     }
@@ -186,7 +187,7 @@ class SegmentNee {
     const bool both = choice.has_place && v.by_angle && v.by_depth;
     const float e_depth = at_point.rate * depth_pdf(path, medium, plan, at_point.x);
     if (both && !by_angle) e_angle = v.angle_pdf(pivot);
-    // The expected number of points per unit of length, of each way to sample them
+    // For each of the two ways, the expected number of points per unit length
     const float by_depth = e_depth * v.points;
     const float own = by_angle ? e_angle : by_depth;
     if (!(own > 0)) return;

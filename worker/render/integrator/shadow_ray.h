@@ -10,7 +10,7 @@
 namespace ls::render {
 
 // The radiance that reaches `start` from the sampled light, attenuated by boundaries and media. p is `start`
-// moved off its surface, after the light was sampled: the ray is re-aimed from p, so that it ends just before
+// moved off its surface after the light was sampled. The ray is re-aimed from p, so that it ends just before
 // the light and not on it.
 template <Features F, template <Features> class Light>
 C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSample& light,
@@ -30,9 +30,9 @@ C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSam
   return walk ? through_boundaries(light.radiance, start, p, d, left, medium, stream) : light.radiance;
 }
 
-// Returns `value` attenuated by the null transmission of surfaces and the transmittance of media along the
-// ray from p in the direction d, of length `left`, which no opaque surface blocks. `medium` holds the media
-// at the start of the ray.
+// Returns `value` times the null transmission of surfaces and the transmittance of media along the ray from p
+// in the direction d, of length `left`. The ray must not be blocked by an opaque surface. `medium` contains
+// the media at the start of the ray.
 template <Features F, template <Features> class Light>
 C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left,
                                             Within medium, RandomStream stream) {
@@ -52,10 +52,17 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
         if (is_black(value)) return value;
       }
     }
+    if constexpr (F.connected && F.media) {
+      if (connections_.learner && !std::isfinite(left)) {
+        const Within behind =
+            met ? beyond(hit, world_.geometry.surfaces[hit.surface], -d, -d, medium) : Within{};
+        if (behind.one() != medium.one()) connections_.learner->media_differ = true;
+      }
+    }
     if (!met) return value;
     if (!may_go_on(depth_, passed_ + i + 1)) return {0, 0, 0};
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
-    if (F.null_transmission && surface.null_transmission) {
+    if (surface.null_transmission) {
       value *=
           world_.bsdfs.null_transmission(surface.bsdf, hit.uv_point(), hit.shading.to_local(-d)).transmission;
       if (is_black(value)) return value;

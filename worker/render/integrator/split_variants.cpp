@@ -1,4 +1,4 @@
-// A separate source file, because instantiating the path tracer takes long to compile.
+// The path tracer with Features::split. It takes long to compile, so it has its own source file.
 #include "worker/render/integrator/variant.h"
 
 namespace ls::render {

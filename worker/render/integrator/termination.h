@@ -3,21 +3,24 @@
 
 namespace ls::render {
 
-// The largest numbers of rays of one path and of surfaces that one shadow ray passes; a sample that exceeds
-// one of them is rejected and counted. Paths subject to forced roulette (below) reach the limit with
-// probability e^-60.
+// The largest numbers of rays of one path and of surfaces on one shadow ray. A sample that exceeds either is
+// rejected and counted. Paths subject to forced roulette (below) reach the limit with probability e^-60.
 inline constexpr int kMaxSegments = 1 << 20;
 inline constexpr int kMaxShadowSegments = 1 << 16;
-// From kForcedRouletteDepth scatterings on, roulette may end even paths that lose no energy: nothing else
-// ends a path in a closed white room. A share of 1024 / n of them reaches n scatterings, so weights grow
-// slower than any exponential: after n scatterings in a white slab of optical depth tau, a share exp(-n pi^2
-// / (3 (tau + 1.42)^2)) is still inside, and a constant survival probability q has finite variance only where
-// 1 - q is below that rate. Beyond kLastRouletteDepth q is constant, as otherwise the length of paths in a
-// white room would have no mean; the variance is then finite up to tau = 230, where a path has 5500 vertices
-// on average.
+// From kForcedRouletteDepth scatterings on, roulette may end even paths that lose no energy; otherwise
+// nothing would end a path in a closed white room. A share of 1024 / n of them reaches n scatterings, so
+// weights grow slower than any exponential. Compare a white slab of optical depth tau: after n scatterings a
+// share exp(-n pi^2 / (3 (tau + 1.42)^2)) is still inside, and a constant survival probability q has finite
+// variance only where 1 - q is below that rate. Beyond kLastRouletteDepth q is constant, as otherwise the
+// length of paths in a white room would have no mean; the variance is then finite up to tau = 230, where a
+// path has 5500 vertices on average.
 inline constexpr int kForcedRouletteDepth = 1024;
 inline constexpr int kLastRouletteDepth = 1 << 16;
 inline constexpr float kLastSurvival = 1 - 0x1p-14f;
+// Light subpaths of media that lose no light would fill the memory: from kMostUnforced scatterings on, at
+// least half of them end at each.
+inline constexpr int kMostUnforced = 8;
+inline constexpr float kForcedLight = .5f;
 constexpr float forced_survival(int depth) {
   if (depth < kForcedRouletteDepth) return 1;
   if (depth >= kLastRouletteDepth) return kLastSurvival;

@@ -15,7 +15,7 @@ namespace ls::render {
 // with it do not underflow.
 inline constexpr float kThinDepth = 1e-20f;
 
-// The density at x, for sigma >= 0, length > 0, which may be infinite, and x in [0, length]. Returns 0 if
+// The density at x. Requires sigma >= 0, length > 0 (may be infinite) and x in [0, length]. Returns 0 if
 // sigma is 0 and length infinite, where no such density exists.
 inline float truncated_pdf(float sigma, float length, float x) {
   const float depth = sigma * length;

@@ -1,5 +1,5 @@
-// The variants of the path tracer: the path tracer compiled for one set of features and one integrator each.
-// A scene is rendered with a variant that has the features it needs.
+// The variants of the path tracer: each is the path tracer compiled for one set of features and one
+// integrator. A scene is rendered with a variant that has all features that the scene needs.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,10 @@
 
 namespace ls::render {
 
-// Renders one sample: the parameters are the world, the pixel's x and y in the image, and the sample's index.
-// If the variant has Features::split, the last parameter receives the light components; otherwise it is
-// ignored.
-using SampleFn = SampleOutcome (*)(const World&, int, int, std::uint64_t, LightSplit*);
+// Renders one sample. The parameters are the world, the pixel's x and y in the image, the sample's index, the
+// light components and the connections. The last two are used only by variants with Features::split and
+// Features::connected.
+using SampleFn = SampleOutcome (*)(const World&, int, int, std::uint64_t, LightSplit*, Connections);
 struct Variant {
   Features covers;
   const char* name;
@@ -27,13 +27,12 @@ inline CameraRay camera_ray(const World& w, const SampleStream& stream, int x, i
   return w.camera.ray(fx, fy, {g.u(2), g.u(3)});
 }
 template <Features F, template <Features> class Light>
-SampleOutcome sample_with(const World& w, int x, int y, std::uint64_t sample, LightSplit* split) {
-  if constexpr (!kBuiltFeatures.covers(F))
-    return {.cut_off = HealthCause::unnamed};  // build_world refuses such scenes
+SampleOutcome sample_with(const World& w, int x, int y, std::uint64_t sample, LightSplit* split,
+                          Connections connections) {
   x += w.origin_x;
   y += w.origin_y;
   const SampleStream stream(w.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), sample);
-  return PathTracer<F, Light>(w, stream, split).trace(camera_ray(w, stream, x, y));
+  return PathTracer<F, Light>(w, stream, split, connections).trace(camera_ray(w, stream, x, y));
 }
 
 template <Features F, template <Features> class Light = VertexNee>
@@ -44,11 +43,17 @@ constexpr Variant variant(const char* name) {
 // The variants of the integrator `volpath` with Features::aimed, cheapest first; the last one has the
 // features of every scene.
 std::span<const Variant> aimed_variants();
+// The variants of the integrator `volpath` with Features::connected, cheapest first. They support only grey
+// media that neither overlap nor emit light.
+std::span<const Variant> connected_variants();
 // The variants of the integrator `volpath_distant_mis`, cheapest first; the last one has the features of
 // every scene.
 std::span<const Variant> distant_variants();
-// The variants of the integrators `volpath` (without and with Features::aimed) and `volpath_distant_mis` that
-// also compute light components. Each has all other features.
-extern const Variant kSplitVariant, kAimedSplitVariant, kDistantSplitVariant;
+// The variants of the integrator `whitted`, likewise. It leaves media out.
+std::span<const Variant> whitted_variants();
+// The variants of the integrators `volpath` (without and with Features::aimed) and `volpath_distant_mis`, and
+// of `whitted`, that also compute light components. Each has all other features.
+extern const Variant kSplitVariant, kAimedSplitVariant, kDistantSplitVariant, kConnectedSplitVariant,
+    kWhittedSplitVariant;
 
 }  // namespace ls::render

@@ -23,7 +23,7 @@
 
 namespace ls::render {
 
-// The density with which a free flight ends at this point, averaged over the channels as the hero (the
+// The density with which a free flight ends at this point: the mean over each channel as the hero (the
 // channel that decides distances: medium.h). `density` is each channel's density of the path so far, relative
 // to that of the hero.
 template <Features F>
@@ -48,7 +48,7 @@ class VertexNee {
   struct Plan {
     float length = 0;  // length of the segment if it is also sampled equi-angularly, else 0
 
-    bool matters() const { return F.equiangular && length > 0; }
+    bool matters() const { return length > 0; }
   };
   struct Vertex {  // o, length and t are relative to the part of the segment inside the medium
     bool equiangular = false, points_only = false;
@@ -56,15 +56,15 @@ class VertexNee {
     float length = 0, t = 0, flight_pdf = 0;
 
     bool uses_equiangular(bool is_point) const {
-      return F.equiangular && equiangular && (is_point || !(F.grids && points_only));
+      return equiangular && (is_point || !(F.grids && points_only));
     }
-    // The ratio e / f at this vertex for a light with this pivot. It has a meaning only if such lights are
-    // sampled equi-angularly (uses_equiangular).
+    // The ratio e / f at this vertex for a light with this pivot. Valid only for lights that are sampled
+    // equi-angularly (uses_equiangular).
     float equiangular_ratio(const V3& pivot) const {
       return ratio_to_flight(EquiAngular(o, d, length, pivot).pdf(t), flight_pdf);
     }
-    // The density of (1) and (3) together over that of the flight, for a light that was hit, which is never a
-    // point light.
+    // The density of (1) and (3) together over that of the flight, for a light that was hit. Such a light is
+    // never a point light.
     float found_as_light(const V3& pivot) const {
       return uses_equiangular(false) ? 1 + equiangular_ratio(pivot) : 1.f;
     }
@@ -73,7 +73,7 @@ class VertexNee {
 
   template <class Path>
   static Plan ahead(Path& path, const Medium& medium, Segment segment) {
-    if (!F.equiangular || medium.equiangular_mode == EquiangularMode::none) return {};
+    if (medium.equiangular_mode == EquiangularMode::none) return {};
     if (!path.may_scatter() || !(points_only(medium) || std::isfinite(segment.length))) return {};
     sample_equiangular(path, medium, segment);
     return {segment.length};
@@ -96,8 +96,8 @@ class VertexNee {
     return v;
   }
 
-  // Strategy (1): adds the light from a sampled light that is scattered at the vertex p. d is the direction
-  // of travel before the scattering.
+  // Strategy (1): samples a light and adds its light that is scattered at the vertex p. d is the direction of
+  // travel before the scattering.
   template <class Path>
   static void at_vertex(Path& path, const Medium& medium, const V3& p, const V3& d) {
     const Lights& lights = path.world_.lights;
@@ -112,12 +112,14 @@ class VertexNee {
                                        ? 1 + v.equiangular_ratio(lights.pivot(choice))
                                        : 1.f;
     const float weight =
-        !F.found_lights || light->delta
+        light->delta
             ? 1 / with_equiangular
             : light->pdf / (light->pdf * with_equiangular + path.direction_pdf(p, phase, light->direction));
     const C3 arriving = path.unoccluded(path.ray_.start, p, *light, path.medium_,
                                         path.stream_.stream(path.depth_, Purpose::track_shadow));
-    if (!is_black(arriving)) path.add(path.beta_ * arriving * (phase * weight / light->pdf));
+    if (!is_black(arriving))
+      path.add_found(choice, p, V3(0), path.beta_ * arriving * (phase * weight / light->pdf),
+                     [phase] { return phase; });
   }
 
  private:
@@ -125,8 +127,8 @@ class VertexNee {
     return F.grids && medium.equiangular_mode == EquiangularMode::points;
   }
 
-  // Strategy (3): adds light that is scattered once, at a point of the segment that is sampled equi-angularly
-  // about the light. Not inlined, to keep it out of the code for media that do not use it.
+  // Strategy (3): adds single-scattered light at a point of the segment that is sampled equi-angularly about
+  // the light. Not inlined, to keep it out of the code for media that do not use it.
   template <class Path>
   [[gnu::noinline]] static void sample_equiangular(Path& path, const Medium& medium, Segment segment) {
     const Lights& lights = path.world_.lights;
@@ -146,7 +148,7 @@ class VertexNee {
     if (!light || !(s.pdf > 0)) return;
     const float phase = medium.phase.value(path.ray_.d, light->direction);
     const float ratio = ratio_to_flight(s.pdf, flight_pdf<F>(medium, path.density_, at_point));
-    const bool delta = !F.found_lights || light->delta;
+    const bool delta = light->delta;
     const float weight =
         delta ? ratio / (1 + ratio)
               : light->pdf /

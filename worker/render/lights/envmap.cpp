@@ -15,11 +15,12 @@ namespace {
 
 constexpr double kPiD = 3.14159265358979323846;
 constexpr double kWords = 0x1p32;
-// The largest radiance of a texel, the same as that of a sample (render_tile.cpp): larger values cannot be
-// summed.
+// The largest radiance of a texel. It equals the largest radiance of a sample (render_tile.cpp), since larger
+// samples cannot be summed.
 constexpr float kLargestTexel = 0x1p96f;
 constexpr float kBelowOne = 0x1.fffffep-1f;
-// The tolerance for a to_world that is not exactly a rotation because it was written with six digits.
+// The tolerance for a to_world that is a rotation only up to rounding, because it was written with six
+// digits.
 constexpr double kSlack = 1e-4;
 
 // The orthogonal matrix nearest to t up to a uniform scale, by Newton's iteration X <- (X + X^-T) / 2 for the
@@ -30,8 +31,8 @@ std::optional<Affine> rotation_of(const Transform& t) {
   const double size = m.vector({1, 0, 0}).length();
   for (double& a : m.a) a /= size;
   Affine x = m;
-  // Each round of the loop doubles the number of correct digits, so that from six digits two rounds give all
-  // of them.
+  // Each iteration doubles the number of correct digits, so that two suffice for a matrix written with six
+  // digits.
   for (int round = 0; round < 8; ++round) {
     const Affine inverse = x.inverse();
     for (std::size_t i = 0; i < 3; ++i)
@@ -192,7 +193,7 @@ EnvironmentMap::Light EnvironmentMap::at(const V3& direction) const {
 V3 EnvironmentMap::sample(std::uint32_t x, std::uint32_t y) const {
   LS_COUNT(environment_map);
   // `row` is the last row whose words begin at or before the word y. The position of y among the row's words
-  // is used again to sample within the row.
+  // is reused to sample within the row.
   const auto row = std::upper_bound(rows_.begin(), rows_.begin() + used_rows_, y,
                                     [](std::uint32_t word, const Row& r) { return word < r.first; }) -
                    1;

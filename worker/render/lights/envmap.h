@@ -49,7 +49,7 @@ class EnvironmentMap {
 
   struct Light {
     C3 radiance;
-    float pdf;  // of sample(), per steradian
+    float pdf;  // density of sample(), per steradian
   };
   // The light that arrives from `direction`, a finite unit vector that points away from the scene.
   Light at(const V3& direction) const;
@@ -57,8 +57,8 @@ class EnvironmentMap {
   V3 sample(std::uint32_t x, std::uint32_t y) const;
 
   bool black() const { return used_rows_ == 0; }
-  // The luminance integrated over all directions, as the sampling table has it: for each cell the mean of the
-  // luminances at its corners times its solid angle.
+  // The luminance integrated over all directions, as approximated by the sampling table: the sum over cells
+  // of the mean luminance at a cell's corners times its solid angle.
   double flux() const { return flux_; }
   std::uint64_t clamped() const { return texels_.clamped; }
   std::uint64_t bytes() const;
@@ -66,13 +66,13 @@ class EnvironmentMap {
  private:
   struct Row {                // a row of cells
     double top = 1;           // cosine at its upper edge
-    double height = 0;        // difference of cosines
-    float density = 0;        // share of the words, over the solid angle of one cell
+    double height = 0;        // difference of the cosines at its edges
+    float density = 0;        // share of the words, divided by the solid angle of one cell
     std::uint32_t first = 0;  // first of the words that choose this row; they end where the next row's begin
-    std::uint32_t used = 0;   // number of cells up to the last one with a word
+    std::uint32_t used = 0;   // number of cells up to the last one that has a word
   };
   struct Corners {
-    float l00, l10, l01, l11;  // luminances: upper left, upper right, lower left, lower right
+    float l00, l10, l01, l11;  // luminances at the corners: upper left, upper right, lower left, lower right
   };
 
   void build_table();
@@ -83,7 +83,7 @@ class EnvironmentMap {
 
   Texels texels_;
   float scale_ = 1;
-  Frame frame_;  // axes of the map in the world: right-handed or mirrored
+  Frame frame_;  // axes of the map in the world: a rotation or a reflection
   std::vector<Row> rows_;
   std::vector<std::uint32_t> first_;  // for each cell, row by row, the first of the words that choose it
   std::uint32_t used_rows_ = 0;

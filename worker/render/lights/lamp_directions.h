@@ -1,11 +1,11 @@
-// The directions that a path may take from a vertex in a medium or on a surface. They are mixed from the
-// vertex's own distribution (the phase function or the BSDF) and from directions that pass close to a lamp, a
-// light without extent.
+// The directions that a path may take from a vertex in a medium or on a surface. They are a mixture of the
+// vertex's own distribution (the phase function or the BSDF) and of directions that pass close to a lamp (a
+// light without extent).
 //
-// Light that is scattered at the distance D from a lamp is as bright as 1 / D^2, and along a ray that passes
-// the lamp at the distance D, its integral is as 1 / D. From a vertex at the distance r, a ray at the angle
-// theta to the lamp passes it at D = r sin(theta): the second moment of 1 / sin(theta) over a bounded density
-// of directions is infinite, and shows as fireflies. Directions of density 1 / sin(theta) make it finite
+// Light that is scattered at the distance D from a lamp is as bright as 1 / D^2, and its integral along a ray
+// that passes the lamp at the distance D grows as 1 / D. From a vertex at the distance r, a ray at the angle
+// theta to the lamp passes it at D = r sin(theta). With a bounded density of directions, the second moment of
+// 1 / sin(theta) is infinite, which shows as fireflies. Directions of density 1 / sin(theta) make it finite
 // (Georgiev et al. 2013, "Joint Importance Sampling of Low-Order Volumetric Scattering", section 4).
 #pragma once
 
@@ -18,7 +18,7 @@
 namespace ls::render {
 
 inline constexpr std::size_t kMaxLamps = 4;
-// How often the directions near lamps are chosen.
+// The probability of sampling a direction near a lamp.
 inline constexpr float kLampShare = .25f;
 
 struct Lamps {
@@ -28,7 +28,7 @@ struct Lamps {
 
 class LampDirections {
  public:
-  LampDirections() = default;  // none: the vertex's own distribution alone
+  LampDirections() = default;  // without lamps: only the vertex's own distribution
   LampDirections(const Lamps& lamps, const V3& p) {
     for (std::size_t i = 0; i < lamps.count; ++i) {
       const V3 to = lamps.position[i] - p;
@@ -39,15 +39,15 @@ class LampDirections {
   bool any() const { return count_ > 0; }
   float own_share() const { return count_ > 0 ? 1 - kLampShare : 1.f; }
 
-  // The density of the mixture at w, per steradian. `own` is that of the vertex's own distribution.
+  // The density of the mixture at w, per steradian. `own` is the density of the vertex's own distribution.
   float pdf(float own, const V3& w) const {
     if (count_ == 0) return own;
     float sum = 0;
     for (std::size_t i = 0; i < count_; ++i) sum += near_pdf(to_lamp_[i], w);
     return (1 - kLampShare) * own + kLampShare / static_cast<float>(count_) * sum;
   }
-  // Chooses by `choice`, and samples a direction by u if it is to pass close to a lamp. nullopt: the vertex's
-  // own distribution was chosen; then `choice` is uniform again.
+  // Chooses one of the two distributions by `choice`. If it is that of the lamps, samples a direction by u.
+  // nullopt: the vertex's own distribution was chosen; `choice` is then rescaled to be uniform again.
   std::optional<V3> sample(float& choice, V2 u) const {
     if (count_ == 0) return std::nullopt;
     if (choice < kLampShare) {
@@ -59,8 +59,8 @@ class LampDirections {
   }
 
  private:
-  // sin(theta) is bounded from below: it is known to about 1e-7 only, and the density then is the same for
-  // both strategies, although not quite that of near().
+  // sin(theta) is bounded from below, since it is accurate only to about 1e-7. So very close to the lamp this
+  // is not quite the density of near(), but it is the same value for both strategies.
   static float near_pdf(const V3& to_lamp, const V3& w) {
     const V3 c = cross(to_lamp, w);
     return kInvTwoPi * kInvPi / std::max(std::sqrt(dot(c, c)), 1e-6f);

@@ -1,40 +1,42 @@
-// How a light is chosen: by the table of all lights or, for a known point, also by the tree.
+// The choice of a light: by the table of all lights or, if the shaded point is known, also by the tree.
 #include <algorithm>
 #include <cmath>
 
 #include "worker/render/lights/lights.h"
-#include "worker/render/media/medium.h"
 
 namespace ls::render {
 namespace {
 
-// The smallest number of lights with a position for which the tree is used; with fewer, only the table is
-// (docs/decisions/0008-many-lights.md).
+// The smallest number of lights with a position for which the tree is used
+// (docs/decisions/0008-many-lights.md). With fewer, the table is used alone.
 constexpr std::ptrdiff_t kTreeFrom = 32;
-// Of the words that choose lights in the tree, every kTableShare-th chooses by the table. So the tree cannot
-// make any light rarer than 1/16 of its share in the table.
+// Of the words that choose lights in the tree, every kTableShare-th one chooses by the table instead. So no
+// light gets less than 1/16 of its probability in the table.
 constexpr std::uint64_t kTableShare = 16;
 
 float probability(std::uint64_t words) { return static_cast<float>(static_cast<double>(words) * 0x1p-32); }
 
 }  // namespace
 
-// Moves the lights with a position to the front of the list. Area lights have a position and come first
-// already, so their order does not change.
+// Moves the lights with a position to the front of the list. Area lights have a position and are already
+// first, so their order does not change.
 void Lights::sort_places_first() {
-  const auto placed = [](const Light& l) { return has_place(l.kind); };
-  if (std::count_if(lights_.begin(), lights_.end(), placed) < kTreeFrom) return;
-  std::stable_partition(lights_.begin(), lights_.end(), placed);
-  suns_.clear();
-  for (std::uint32_t i = 0; i < lights_.size(); ++i)
-    if (lights_[i].kind == Kind::sun) suns_.push_back(i);
+  if (std::count_if(lights_.begin(), lights_.end(), has_place) < kTreeFrom) return;
+  std::stable_partition(lights_.begin(), lights_.end(), has_place);
 }
 
 void Lights::build_tree() {
   std::vector<LightBounds> all;
-  for (const Light& l : lights_) {
-    if (!has_place(l.kind)) break;
-    all.push_back(bounds(l));
+  for (const Light& light : lights_) {
+    if (!has_place(light)) break;
+    LightBounds b = with_kind(light.kind, [&](const auto& l) -> LightBounds {
+      if constexpr (std::decay_t<decltype(l)>::kHasPlace)
+        return l.bounds(world());
+      else
+        __builtin_unreachable();
+    });
+    b.intensity = std::isfinite(b.intensity) ? std::clamp(b.intensity, 1e-30, 1e30) : 1e30;
+    all.push_back(b);
   }
   if (static_cast<std::ptrdiff_t>(all.size()) < kTreeFrom || all.size() > LightTree::kMaxLights) return;
   tree_ = LightTree::build(all);
@@ -42,95 +44,36 @@ void Lights::build_tree() {
   table_words_ = (tree_words_ + kTableShare - 1) / kTableShare;
 }
 
-LightBounds Lights::mesh_bounds(const Light& l) const {
-  LightBounds b;
-  b.low = V3(kInfinity);
-  b.high = V3(-kInfinity);
-  const auto triangles = static_cast<std::uint32_t>(l.cdf.size());
-  const auto normal = [&](std::uint32_t k) {
-    const V3d v0(geometry_->vertex(l.primitive + k, 0));
-    return (V3d(geometry_->vertex(l.primitive + k, 1)) - v0)
-        .cross(V3d(geometry_->vertex(l.primitive + k, 2)) - v0);
-  };
-  V3d sum(0, 0, 0);
-  for (std::uint32_t k = 0; k < triangles; ++k) {
-    sum += normal(k);
-    for (int corner = 0; corner < 3; ++corner) {
-      const V3 p = geometry_->vertex(l.primitive + k, corner);
-      for (int c = 0; c < 3; ++c) b.low[c] = std::min(b.low[c], p[c]), b.high[c] = std::max(b.high[c], p[c]);
-    }
+// The probability of each of the n lights is half its share of the power plus half of 1/n, so none is below
+// 1/(2n). Probabilities are exact shares of the 2^32 random words.
+void Lights::set_probabilities() {
+  std::vector<double> p;
+  double sum = 0;
+  for (const Light& l : lights_) sum += p.emplace_back(std::max(0., power(l)));
+  alone_ = p.size() == 1;
+  const double uniform = .5 / static_cast<double>(p.size());
+  double acc = 0;
+  std::uint64_t before = 0;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    acc += (sum > 0 && std::isfinite(sum) ? .5 * p[i] / sum : uniform) + uniform;
+    const bool is_last = i + 1 == p.size();
+    // Each light gets at least one word, so last_ is strictly increasing.
+    const std::uint64_t edge =
+        is_last ? std::uint64_t{1} << 32
+                : std::max(before + 1, static_cast<std::uint64_t>(std::llround(acc * 0x1p32)));
+    lights_[i].probability = static_cast<float>(static_cast<double>(edge - before) * 0x1p-32);
+    last_.push_back(static_cast<std::uint32_t>(edge - 1));
+    before = edge;
+    any_with_place_ = any_with_place_ || has_place(lights_[i]);
+    if (std::holds_alternative<SunLight>(lights_[i].kind)) suns_.push_back(static_cast<std::uint32_t>(i));
+    if (std::holds_alternative<MapLight>(lights_[i].kind)) map_probability_ = lights_[i].probability;
   }
-  if (!(sum.length() > 0)) return b;
-  const V3d axis = sum.normalized();
-  double spread = 1;
-  for (std::uint32_t k = 0; k < triangles; ++k) spread = std::min(spread, axis.dot(normal(k).normalized()));
-  b.axis = V3(axis) * l.sign;
-  b.cos_spread = static_cast<float>(std::max(-1., spread));
-  return b;
-}
-
-// The bounds of a light's shape and of its emission directions. Without further information, axis and cone
-// are those of a point that emits in all directions.
-LightBounds Lights::shape_bounds(const Light& l) const {
-  LightBounds b;
-  const auto absolute = [](const V3& v) { return V3(std::abs(v.x), std::abs(v.y), std::abs(v.z)); };
-  const auto box = [&](const V3& middle, const V3& half) { b.low = middle - half, b.high = middle + half; };
-  switch (l.kind) {
-    case Kind::parallelogram:
-      box(l.position + (l.axis_u + l.axis_v) * .5f, (absolute(l.axis_u) + absolute(l.axis_v)) * .5f);
-      break;
-    case Kind::disk:
-      box(l.position, absolute(l.axis_u) + absolute(l.axis_v));
-      break;
-    case Kind::sphere: {
-      const Sphere& s = geometry_->spheres[l.primitive];
-      box(V3(s.center), V3(static_cast<float>(s.radius)));
-      break;
-    }
-    case Kind::cylinder: {
-      const Cylinder& c = geometry_->cylinders[l.primitive];
-      box(V3(c.p0 + c.axis * (c.length / 2)), absolute(V3(c.axis * (c.length / 2))) +
-                                                  absolute(V3(c.u * c.radius)) +
-                                                  absolute(V3(c.v * c.radius)));
-      break;
-    }
-    case Kind::mesh:
-      return mesh_bounds(l);
-    default:
-      box(l.position, V3(0));
-  }
-  if (l.kind == Kind::parallelogram || l.kind == Kind::disk) {
-    b.axis = l.normal;
-    b.cos_spread = 1;
-  }
-  return b;
-}
-
-LightBounds Lights::bounds(const Light& l) const {
-  LightBounds b = shape_bounds(l);
-  C3 colour = l.value;
-  if (l.kind == Kind::spot) {
-    const float sine = safe_sqrt(1 - l.cos_beam * l.cos_beam) * safe_sqrt(1 - l.cos_cutoff * l.cos_cutoff);
-    b.axis = l.normal;
-    b.cos_spread = l.cos_beam;
-    b.cos_reach = l.cos_beam * l.cos_cutoff + sine;
-  } else if (l.kind == Kind::projector) {
-    b.axis = l.normal;
-    b.cos_spread = 1 / std::sqrt(1 + l.tan_x * l.tan_x + l.tan_y * l.tan_y);
-    b.cos_reach = 1;
-    colour *= textures_->mean(l.radiance);
-  } else if (l.area > 0) {
-    colour = textures_->mean(l.radiance) * static_cast<float>(l.area);
-    if (l.beam) b.cos_reach = l.cos_cutoff;
-  }
-  const double intensity = luminance(colour);
-  b.intensity = std::isfinite(intensity) ? std::clamp(intensity, 1e-30, 1e30) : 1e30;
-  return b;
 }
 
 std::uint64_t Lights::table_bytes() const {
   std::uint64_t n = lights_.size() * sizeof(Light) + last_.size() * sizeof(last_[0]);
-  for (const Light& l : lights_) n += l.cdf.size() * sizeof(double);
+  for (const Light& light : lights_)
+    n += with_kind(light.kind, [](const auto& l) { return l.extra_bytes(); });
   return n;
 }
 
@@ -140,8 +83,8 @@ Lights::Drawn Lights::by_table(std::uint32_t word) const {
   return {i, lights_[i].probability};
 }
 
-// How many of the words below table_words_ choose the light i by the table. Of these words, w stands for the
-// table's word kTableShare * w.
+// How many of the words below table_words_ choose light i by the table. Of these, word number w is mapped to
+// the table's word kTableShare * w.
 std::uint64_t Lights::table_words(std::uint32_t i) const {
   const std::uint64_t first = i == 0 ? 0 : std::uint64_t{last_[i - 1]} + 1, end = std::uint64_t{last_[i]} + 1;
   return (end + kTableShare - 1) / kTableShare - (first + kTableShare - 1) / kTableShare;

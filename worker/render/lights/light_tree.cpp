@@ -8,20 +8,21 @@
 namespace ls::render {
 namespace {
 
-// The cosines cos(max(0, a - b)), here, and cos(min(pi, a + b)), below, for angles a and b from 0 to pi.
+// cos_less() returns cos(max(0, a - b)), and the next function cos(min(pi, a + b)), for angles a and b from 0
+// to pi.
 float cos_less(float sin_a, float cos_a, float sin_b, float cos_b) {
   return cos_a > cos_b ? 1 : cos_a * cos_b + sin_a * sin_b;
 }
 float cos_more(float sin_a, float cos_a, float sin_b, float cos_b) {
-  return cos_a < -cos_b ? -1 : cos_a * cos_b - sin_a * sin_b;  // -1 if they exceed pi
+  return cos_a < -cos_b ? -1 : cos_a * cos_b - sin_a * sin_b;  // -1 if a + b exceeds pi
 }
 float sine(float cosine) { return safe_sqrt((1 - cosine) * (1 + cosine)); }
 
 }  // namespace
 
-// Builds the tree. It splits the lights of a node in two, by bins along each axis, and minimises the sum over
-// both halves of intensity * surface area of the box * (2 - R), where R is 1 for lights that all face the
-// same way and 0 for lights that face everywhere.
+// Builds the tree. Each node's lights are split in two, by bins along each axis. The split minimises the sum
+// over both halves of intensity * surface area of the box * (2 - R), where R is 1 for lights that all face
+// the same way and 0 for lights that face everywhere.
 class LightTree::Builder {
  public:
   Builder(const std::vector<LightBounds>& lights, LightTree& tree) : lights_(lights), tree_(tree) {}
@@ -54,14 +55,14 @@ class LightTree::Builder {
  private:
   static constexpr std::uint32_t kNoParent = 0xffffffffu;
   static constexpr int kBins = 16;
-  // From depth kDeepest on, lights are halved by their order, without regard to cost. So 2^24 lights are all
-  // separated at depth 30 + 24, which fits the 64 bits of a trail.
+  // From depth kDeepest on, lights are halved by their order, regardless of cost. So 2^24 lights are all
+  // separated at depth 30 + 24, and the turns on a path fit the 64 bits of a trail.
   static constexpr int kDeepest = 30;
   struct Job {
     std::uint32_t begin, end;
     int depth;
     std::uint64_t trail;
-    std::uint32_t parent;  // this is its right child
+    std::uint32_t parent;  // node whose right child this is
   };
   struct Pile {
     V3 low{1e30f, 1e30f, 1e30f}, high{-1e30f, -1e30f, -1e30f};
@@ -115,8 +116,8 @@ class LightTree::Builder {
     return n;
   }
 
-  // Returns the position, in the order of lights, of the first one of the right half; each half has at least
-  // one.
+  // Returns the position, in the order of lights, of the first light of the right half; each half has at
+  // least one light.
   std::uint32_t split(const Job& job) {
     const std::uint32_t half = job.begin + (job.end - job.begin) / 2;
     if (job.depth >= kDeepest) return half;
@@ -182,14 +183,14 @@ float LightTree::importance(const Node& node, const V3& x, const V3& n) {
   const V3 f = x - node.center;
   const float d2 = dot(f, f);
   const float base = node.intensity / std::max(std::max(d2, node.radius2), 1e-20f);
-  if (!(d2 > node.radius2)) return base;  // inside the ball any orientation is possible
+  if (!(d2 > node.radius2)) return base;  // inside the ball the light may have any direction from x
   const V3 way = f * (1 / std::sqrt(d2));
   const float sin2_ball = node.radius2 / d2, sin_ball = std::sqrt(sin2_ball),
               cos_ball = safe_sqrt(1 - sin2_ball);
   const float cos_way = std::clamp(dot(node.axis, way), -1.f, 1.f);
   const float beyond = cos_less(sine(cos_way), cos_way, node.sin_spread, node.cos_spread);
   const float cos_a = cos_less(sine(beyond), beyond, sin_ball, cos_ball);
-  // Rounding must not exclude points on the rim of the emission range.
+  // The tolerance keeps rounding from excluding points on the rim of the emission range.
   if (cos_a < node.cos_reach - 1e-4f) return 0;
   float value = base * std::max(cos_a, 1.f / 16);
   if (dot(n, n) > 0) {
@@ -203,7 +204,7 @@ std::uint64_t LightTree::left_share(std::uint32_t node, std::uint64_t words, con
   const double a = importance(nodes_[node + 1], x, n), b = importance(nodes_[nodes_[node].right], x, n);
   if (!(a + b > 0) || !std::isfinite(a + b)) return words - words / 2;
   const auto share = static_cast<std::uint64_t>(std::floor(static_cast<double>(words) * (a / (a + b)) + .5));
-  // Every child whose importance is positive gets at least one word, if there are two or more.
+  // Every child with positive importance gets at least one word, if there are at least two words.
   const std::uint64_t at_least = a > 0 && words > 1 ? 1 : 0, at_most = b > 0 && words > 1 ? words - 1 : words;
   return std::clamp(share, at_least, at_most);
 }

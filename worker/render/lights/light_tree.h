@@ -26,10 +26,10 @@ namespace ls::render {
 
 struct LightBounds {
   V3 low, high;           // bounding box of the light
-  V3 axis{0, 0, 1};       // its emission directions lie within `cos_spread` of this,
-  float cos_spread = -1;  // -1: anywhere
-  float cos_reach = 0;    // and it emits up to this angle from them
-  double intensity = 0;   // per steradian, at its maximum; positive and finite
+  V3 axis{0, 0, 1};       // axis of a cone that contains its emission directions (normals),
+  float cos_spread = -1;  // cosine of the cone's half angle; -1: all directions
+  float cos_reach = 0;    // cosine of the largest angle between a normal and the emitted light
+  double intensity = 0;   // intensity per steradian, in the brightest direction; positive and finite
 };
 
 class LightTree {
@@ -41,10 +41,10 @@ class LightTree {
 
   struct Found {
     std::uint32_t light = 0;  // index into the vector that the tree was built from
-    std::uint64_t words = 0;  // how many of the words reach this light; at least 1
+    std::uint64_t words = 0;  // number of words that reach this light; at least 1
   };
-  // The light that word number `word` of `words` reaches when lights are sampled at the point x. `words` is
-  // at most 2^32. n is the surface normal at x, or zero if x is in a medium.
+  // Returns the light that word number `word` of `words` reaches when lights are sampled at the point x.
+  // `words` is at most 2^32. n is the surface normal at x, or zero if x is in a medium.
   Found find(std::uint64_t word, std::uint64_t words, const V3& x, const V3& n) const;
   std::uint64_t words_of(std::uint32_t light, std::uint64_t words, const V3& x, const V3& n) const;
 
@@ -60,12 +60,12 @@ class LightTree {
     V3 axis;
     float cos_spread = -1, sin_spread = 0, cos_reach = 0;
     float intensity = 0;
-    std::uint32_t right = 0;  // the left child directly follows its parent; 0: a leaf
+    std::uint32_t right = 0;  // index of the right child; the left one directly follows its parent; 0: a leaf
     std::uint32_t light = 0;
   };
   class Builder;
   static float importance(const Node& node, const V3& x, const V3& n);
-  // How many of the `words` that reach the inner node `node` its left child gets.
+  // Returns how many of the `words` that reach the inner node `node` go to its left child.
   std::uint64_t left_share(std::uint32_t node, std::uint64_t words, const V3& x, const V3& n) const;
 
   std::vector<Node> nodes_;

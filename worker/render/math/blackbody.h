@@ -5,10 +5,10 @@
 
 namespace ls::render {
 
-// The radiance of a black body of the temperature `kelvin`, in the scene's units for spectra of light: a body
-// whose spectral radiance is 1 W/(m^2 sr nm) at all wavelengths would have luminance 1. Negative components
-// (colours outside sRGB: blue below 1900 K) are clamped to 0. Interpolated from a table with an error below
-// 1e-4. 0 below 200 K and for NaN; proportional to the temperature above 1e6 K (Rayleigh-Jeans).
+// Returns the radiance of a black body of the temperature `kelvin`, in the scene's units for spectra of
+// light: a body whose spectral radiance is 1 W/(m^2 sr nm) at all wavelengths has luminance 1. Negative
+// components (colours outside sRGB: blue below 1900 K) are clamped to 0. Interpolated from a table with an
+// error below 1e-4. 0 below 200 K and for NaN; proportional to the temperature above 1e6 K (Rayleigh-Jeans).
 C3 black_body_radiance(float kelvin);
 
 // The temperature [K] below which black_body_radiance() is 0.

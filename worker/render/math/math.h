@@ -6,13 +6,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace ls::render {
 
 using V2 = Imath::V2f;
 using V3 = Imath::V3f;
 using V3d = Imath::V3d;
-using C3 = Imath::V3f;  // linear RGB
+using C3 = Imath::V3f;  // colours and other values per channel, in linear RGB
 
 inline constexpr float kPi = 3.14159265358979323846f;
 inline constexpr float kTwoPi = 6.28318530717958647692f;
@@ -20,6 +21,7 @@ inline constexpr float kFourPi = 12.5663706143591729539f;
 inline constexpr float kInvPi = .318309886183790671538f;
 inline constexpr float kInvTwoPi = .159154943091895335769f;
 inline constexpr float kInvFourPi = .0795774715459476678845f;
+inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 template <class T>
 constexpr T sqr(T x) {
@@ -32,7 +34,7 @@ inline float dot(const V3& a, const V3& b) { return a.x * b.x + a.y * b.y + a.z 
 inline V3 cross(const V3& a, const V3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-// Returns a zero or non-finite vector unchanged: callers that rely on the length must check.
+// Returns a zero or non-finite vector unchanged: callers that need unit length must check.
 inline V3 normalize(const V3& v) {
   const float l2 = dot(v, v);
   return l2 > 0 ? v * (1 / std::sqrt(l2)) : v;
@@ -59,8 +61,8 @@ struct Frame {
     s = {1 + sign * n.x * n.x * a, sign * b, -sign * n.x};
     t = {b, sign + n.y * n.y * a, -n.y};
   }
-  // The frame whose s is the projection of `tangent` onto the plane of n; an arbitrary frame if the tangent
-  // is parallel to n, zero or not finite.
+  // Returns the frame whose s is the projection of `tangent` onto the plane of n; an arbitrary frame if the
+  // tangent is parallel to n, zero or not finite.
   static Frame from_tangent(const V3& normal, const V3& tangent) {
     const V3 s = tangent - normal * dot(normal, tangent);
     const float l2 = dot(s, s);
@@ -72,7 +74,7 @@ struct Frame {
   V3 to_world(const V3& l) const { return s * l.x + t * l.y + n * l.z; }
 };
 
-// Sine and cosine for |x| <= pi / 4 by Taylor series: the first omitted terms are below 2e-9 and 1e-10, so
+// Sine and cosine for |x| <= pi / 4 by Taylor series. The first omitted terms are below 2e-9 and 1e-10, so
 // both are accurate to float32 rounding (about one ulp), and identical on every machine.
 struct SinCos {
   float sin, cos;
@@ -82,8 +84,8 @@ inline SinCos sin_cos_eighth(float x) {
   return {x + x * y * (-1.f / 6 + y * (1.f / 120 + y * (-1.f / 5040 + y * (1.f / 362880)))),
           1 + y * (-.5f + y * (1.f / 24 + y * (-1.f / 720 + y * (1.f / 40320 + y * (-1.f / 3628800)))))};
 }
-// The point of the unit circle at angle 2 pi u, u in [0, 1]. u is reduced exactly to the nearest quarter
-// turn.
+// Returns the point of the unit circle at angle 2 pi u, u in [0, 1]. u is reduced exactly to the nearest
+// quarter turn.
 inline V2 unit_circle(float u) {
   const float quarter = std::floor(4 * u + .5f);
   const SinCos a = sin_cos_eighth(kTwoPi * (u - .25f * quarter));
@@ -94,8 +96,8 @@ inline V2 unit_circle(float u) {
 
 // The functions below transform uniform random numbers u in [0, 1)^2 into samples.
 //
-// A point uniform on the unit disk. The map is continuous and of low distortion (Shirley and Chiu 1997); the
-// centre of the square maps to the origin.
+// concentric_disk() returns a point uniform on the unit disk. The map is continuous and of low distortion
+// (Shirley and Chiu 1997); it maps the centre of the square to the origin.
 inline V2 concentric_disk(const V2& u) {
   const float x = 2 * u.x - 1, y = 2 * u.y - 1;
   if (x == 0 && y == 0) return {0, 0};
@@ -103,7 +105,7 @@ inline V2 concentric_disk(const V2& u) {
   const SinCos a = sin_cos_eighth(kPi / 4 * (wide ? y / x : x / y));
   return wide ? V2(x * a.cos, x * a.sin) : V2(y * a.sin, y * a.cos);
 }
-// A direction distributed as the cosine to +z: its density is cos / pi per steradian.
+// Returns a direction whose density is cos / pi per steradian, with the cosine to +z.
 inline V3 cosine_hemisphere(const V2& u) {
   const V2 d = concentric_disk(u);
   return {d.x, d.y, safe_sqrt(1 - d.x * d.x - d.y * d.y)};

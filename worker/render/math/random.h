@@ -13,7 +13,7 @@ constexpr std::uint64_t mix64(std::uint64_t z) {
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
   return z ^ (z >> 31);
 }
-// The value of combine(a, b), where mixed_b is mix64(b).
+// Returns combine(a, b), where mixed_b is mix64(b).
 constexpr std::uint64_t combine_mixed(std::uint64_t a, std::uint64_t mixed_b) {
   return mix64(a + 0x9e3779b97f4a7c15ull + mixed_b);
 }
@@ -21,31 +21,33 @@ constexpr std::uint64_t combine(std::uint64_t a, std::uint64_t b) { return combi
 
 // Turns 32 random bits into a float in [0, 1). The upper 24 bits are kept, so the largest value is 1 - 2^-24.
 inline float unit_float(std::uint32_t bits) { return static_cast<float>(bits >> 8) * 0x1p-24f; }
-// The value -log y for a uniform number y whose complement x = 1 - y is given too, both to full relative
-// precision: depths below t then occur with probability 1 - e^-t however small t is. y alone does not
-// suffice, because it is rounded near 1. Rounding y changes log y and y - 1 alike (W. Kahan's log1p; Goldberg
-// 1991, theorem 4), so their ratio stays right without a branch that half of all calls would take.
+// Returns -log y for a uniform number y. Its complement x = 1 - y is given too; both are exact to full
+// relative precision. So optical depths below t occur with probability 1 - e^-t however small t is. y alone
+// does not suffice, because it is rounded near 1. Rounding changes log y and y - 1 in the same proportion, so
+// their ratio stays correct (W. Kahan's log1p; Goldberg 1991, theorem 4). This avoids a branch that half of
+// all calls would take.
 inline float minus_log(float y, float x) {
   const float rest = 1 - y;  // exact for y >= 1/2
   return rest > 0 ? -std::log(y) * (x / rest) : x;
 }
-// A random optical depth t with density e^-t: -log((bits + .5) 2^-32). All 32 bits count near 0 as well as at
-// large depths: t is never 0 and lies between 2^-33 and 22.9 mean free paths (docs/measurements/stability.md,
-// N02 and N05).
+// Returns a random optical depth t with density e^-t: -log((bits + .5) 2^-32). All 32 bits contribute at
+// small as well as at large depths: t is never 0 and is between 2^-33 and 22.9 mean free paths
+// (docs/measurements/stability.md, N02 and N05).
 inline float exponential(std::uint32_t bits) {
   return minus_log((static_cast<float>(bits) + .5f) * 0x1p-32f, (static_cast<float>(~bits) + .5f) * 0x1p-32f);
 }
 
 // A random stream of unbounded length, for trackers: word i is mix64(key + i * odd constant), a function of
-// the key alone. Each purpose of random numbers has its own key, so that drawing more numbers for one purpose
-// does not change those for another.
+// the key alone. Each purpose of random numbers has its own key, so drawing more numbers for one purpose does
+// not change those for another.
 class RandomStream {
  public:
   explicit RandomStream(std::uint64_t key) : state_(key) {}
   std::uint64_t next() { return mix64(state_ += 0x9e3779b97f4a7c15ull); }
   std::uint32_t bits() { return static_cast<std::uint32_t>(next() >> 32); }
   float uniform() { return unit_float(bits()); }
-  // A random optical depth with density e^-t, from 53 random bits: between 2^-54 and 37 mean free paths.
+  // Returns a random optical depth with density e^-t, from 53 random bits: between 2^-54 and 37 mean free
+  // paths.
   float exponential() {
     constexpr std::int64_t kTop = (std::int64_t{1} << 53) - 1;
     const auto bits = static_cast<std::int64_t>(next() >> 11);

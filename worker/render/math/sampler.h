@@ -11,7 +11,7 @@
 
 namespace ls::render {
 
-// What a group of random numbers is used for. The values determine the bits of the image, so existing values
+// The purpose of a group of random numbers. The values determine the bits of the image, so existing values
 // must not change: a new purpose gets a new value.
 enum class Purpose : std::uint32_t {
   camera,
@@ -32,7 +32,9 @@ enum class Purpose : std::uint32_t {
   albedo,
   guide,
   track_guide,
-  end  // not a purpose: their number
+  connect,
+  track_connect,
+  end  // not a purpose, but the number of purposes
 };
 
 // Four random numbers for one purpose at one vertex of a path.
@@ -58,7 +60,8 @@ class SampleStream {
                         kMixedSlots.value[static_cast<std::size_t>(vertex)][static_cast<int>(purpose)]))};
     return hashed(slot(vertex, purpose));
   }
-  // A stream of unbounded length, for a tracker, which does not know in advance how many numbers it needs.
+  // Returns a stream of unbounded length, for a tracker, which does not know in advance how many numbers it
+  // needs.
   RandomStream stream(int vertex, Purpose purpose) const {
     return RandomStream(combine(sample_, slot(vertex, purpose)));
   }
@@ -80,7 +83,7 @@ class SampleStream {
   static const MixedSlots kMixedSlots;
 
   // `sequence` is the key of the half, `index` the index of the sample in it. A Sobol sequence of 32-bit
-  // points has 2^32 members; samples beyond get hashed numbers.
+  // points has 2^32 members; later samples get hashed numbers.
   SampleStream(std::uint64_t sequence, std::uint64_t index)
       : sequence_(sequence),
         sample_(combine(sequence, index)),

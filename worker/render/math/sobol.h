@@ -57,7 +57,7 @@ using U32x4 = std::uint32_t __attribute__((vector_size(16)));
 using U64x2 = std::uint64_t __attribute__((vector_size(16)));
 using U8x16 = std::uint8_t __attribute__((vector_size(16)));
 
-// Reverses the bits of each of the four words, by lookup of half bytes.
+// Reverses the bits of each of the four words, by table lookup of half bytes.
 inline U32x4 reverse_bits(U32x4 x) {
   constexpr U8x16 kNibble = {0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15}, kUpper = kNibble << 4;
   constexpr U8x16 kBytes = {3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12};
@@ -66,8 +66,8 @@ inline U32x4 reverse_bits(U32x4 x) {
                                  __builtin_shuffle(kNibble, bytes >> 4));
 }
 
-// value[b][k] is what byte b of the bit-reversed index contributes, by XOR, to the four coordinates if that
-// byte has the value k. The coordinates are bit-reversed too, as scramble_reversed() needs them.
+// value[b][k] is the contribution, by XOR, of byte b of the bit-reversed index to the four coordinates if
+// that byte has the value k. The coordinates are bit-reversed too, as scramble_reversed() needs them.
 struct SobolTables {
   alignas(16) std::uint32_t value[4][256][4];
 };
@@ -93,7 +93,7 @@ inline constexpr SobolTables kSobol = sobol_tables();
 
 inline U32x4 sobol_reversed(std::uint32_t reversed_index) {
   const std::size_t index = reversed_index;
-  // Byte number `byte` of the index selects a row of 16 bytes.
+  // The value of byte number `byte` of the index selects a row of 16 bytes.
   const auto row = [&](int byte) {
     const std::size_t at = (byte == 0 ? index << 4 : index >> (8 * byte - 4)) & 0xff0;
     return *reinterpret_cast<const U32x4*>(reinterpret_cast<const char*>(kSobol.value[byte]) + at);
@@ -103,8 +103,8 @@ inline U32x4 sobol_reversed(std::uint32_t reversed_index) {
 
 }  // namespace detail
 
-// The four coordinates, as 32-bit fractions, of one point of the scrambled sequence that `key` identifies.
-// `reversed_index` is the index of the point with its bits reversed.
+// Returns the four coordinates, as 32-bit fractions, of one point of the scrambled sequence that `key`
+// identifies. `reversed_index` is the index of the point with its bits reversed.
 inline std::array<std::uint32_t, 4> sobol4_reversed(std::uint32_t reversed_index, std::uint64_t key) {
   const std::uint32_t i = scramble_reversed(reversed_index, static_cast<std::uint32_t>(key));
   const detail::U64x2 seeds = {mix64(key), mix64(key + 1)};

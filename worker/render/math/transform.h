@@ -1,5 +1,4 @@
-// Affine maps in double. The scene's transforms are applied by them, before coordinates are rounded to
-// float32.
+// Affine maps in double. They apply the scene's transforms before coordinates are rounded to float32.
 #pragma once
 
 #include <array>
@@ -24,8 +23,8 @@ struct Affine {
             a[6] * v.x + a[7] * v.y + a[8] * v.z};
   }
   V3d point(const V3d& p) const { return vector(p) + b; }
-  // Transforms a normal: multiplies n by the cofactor matrix (inverse transpose times determinant): correct
-  // for normals of mirroring maps too, up to sign.
+  // Transforms a normal: multiplies n by the cofactor matrix (inverse transpose times determinant). This is
+  // correct for normals of mirroring maps too, up to sign.
   V3d normal(const V3d& n) const {
     const V3d x(a[0], a[3], a[6]), y(a[1], a[4], a[7]), z(a[2], a[5], a[8]);
     return y.cross(z) * n.x + z.cross(x) * n.y + x.cross(y) * n.z;
@@ -42,7 +41,7 @@ struct Affine {
   // True if both the map and its inverse are finite. A subnormal determinant has no finite inverse; an
   // overflowing one no finite map.
   bool invertible() const { return finite() && std::isnormal(determinant()) && inverse().finite(); }
-  // The inverse map. This map must be invertible.
+  // Returns the inverse map. This map must be invertible.
   Affine inverse() const {
     const double d = 1 / determinant();
     Affine r;
@@ -52,7 +51,7 @@ struct Affine {
     r.b = -r.vector(b);
     return r;
   }
-  Affine operator*(const Affine& o) const {  // applies o first
+  Affine operator*(const Affine& o) const {  // the map that applies o first, then this one
     Affine r;
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {

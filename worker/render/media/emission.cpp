@@ -17,7 +17,8 @@ constexpr double kInf = std::numeric_limits<double>::infinity();
 // grid.
 constexpr double kOpticalDepthVoxels = 1;
 
-// A ray's position in a grid, by distance from the ray's origin: in a cell, in front of the grid, or past it.
+// Walks along a ray through the cells of a grid. Positions are distances from the ray's origin: inside a
+// cell, in front of the grid, or past it.
 class Steps {
  public:
   Steps(const Grid& grid, const V3& o, const V3& d, float t_max) : walk_(grid, o, d, 0, t_max) {
@@ -36,7 +37,7 @@ class Steps {
   double boundary(double at) const { return !more_ ? kInf : begin() <= at ? end() : begin(); }
   double longest() const { return longest_; }
   const MacroCell& cell() const { return walk_.cell(); }
-  // local() converts a distance from the ray's origin to one from the point of entry into the grid;
+  // local() converts a distance from the ray's origin to a distance from the point of entry into the grid;
   // distance() converts back.
   float local(double t) const { return static_cast<float>(t - walk_.entry()); }
   double distance(float local) const { return walk_.entry() + local; }
@@ -92,15 +93,16 @@ class EmissionWalk {
     if (m_.emission_kind != EmissionKind::per_length && !(cell && cell->hi > 0)) return false;
     if (!emitter_) return true;
     if (!emitter_->inside(at)) return false;
-    // If the emission grid has several channels, only the bound of the first one is available here.
+    // If the emission grid has several channels, only the bound of the first one is known here, so emission
+    // is assumed.
     if (m_.emitter[1] != m_.emitter[0]) return true;
     const float hi = emitter_->cell().hi;
     return m_.emission_kind == EmissionKind::black_body ? m_.kelvin_offset + m_.kelvin_scale * hi >= kColdest
                                                         : hi > 0;
   }
 
-  // The end of the interval that starts at `at`. `sampled` is the density grid's cell if the interval is to
-  // get an emission sample, else null.
+  // Returns the end of the interval that starts at `at`. `sampled` is the density grid's cell if the interval
+  // is to get an emission sample, else null.
   double end_of_constant_part(double at, const MacroCell* sampled) const {
     double to = std::min(end_, density_.boundary(at));
     if (emitter_) to = std::min(to, emitter_->boundary(at));
@@ -111,8 +113,8 @@ class EmissionWalk {
     return varies ? std::min(to, at + density_.longest()) : to;
   }
 
-  // The emission at distance t: radiance per length, or, for emission per absorption, the radiance of the
-  // source.
+  // Returns the emission at distance t: radiance per length or, for emission per absorption, the radiance of
+  // the source.
   V3d source(double t) const {
     V3d e(m_.emission);
     if (!emitter_) return e;
@@ -126,7 +128,7 @@ class EmissionWalk {
   double density_at(double t) const { return m_.density->value_anywhere(density_.index(t)); }
   double depth(double a, double b) const { return density_.pass(*m_.density, a, b).integral; }
 
-  // The share of the extinction at distance t that is absorption.
+  // Returns the share of the extinction at distance t that is absorption.
   C3 absorbing_at(double t) const {
     if (!m_.albedo[0]) return m_.absorbing;
     const C3 scattering = m_.scattering_at(o_ + d_ * static_cast<float>(t));
@@ -136,7 +138,7 @@ class EmissionWalk {
     return a;
   }
 
-  // Adds a share of the light e of channel c, or of all channels if they have the same extinction.
+  // Adds the emission e times `share` to channel c, or to all channels if they have the same extinction.
   void add(int c, const V3d& e, double share) {
     if (channels_ == 1) {
       sum_ = sum_ + e * (through_[0] * share);
@@ -145,7 +147,7 @@ class EmissionWalk {
     }
   }
 
-  // Adds the emission of an interval [a, b] without density, where there is only emission per length; its
+  // Adds the emission of an interval [a, b] without density. There is only emission per length, whose
   // integral over the grid is exact.
   void add_clear(double a, double b) {
     double field = b - a;
@@ -212,7 +214,7 @@ class EmissionWalk {
     }
   }
 
-  // Russian roulette, as for transmittance (medium.h): if it returns false, the integration ends.
+  // Russian roulette, as for transmittance (medium.h). Returns false if the integration ends.
   bool goes_on() {
     double largest = 0;
     for (int c = 0; c < channels_; ++c) largest = std::max(largest, through_[c]);
@@ -230,7 +232,7 @@ class EmissionWalk {
   RandomStream stream_;
   Steps density_;
   std::optional<Steps> emitter_;
-  const int channels_;  // 1: all channels have the same extinction
+  const int channels_;  // 1 if all channels have the same extinction, else 3
   const float s_max_;
   double through_[3] = {1, 1, 1};
   V3d sum_{0, 0, 0};
@@ -254,7 +256,7 @@ C3 emission_of_length(const Medium& m, float t_max) {
 
 C3 emission_of_grid(const Medium& m, const V3& o, const V3& d, float t_max, RandomStream stream) {
   if (m.by_channel[0]) {
-    // Each channel is computed as if all channels had its density.
+    // The emission of each channel is computed as if all channels had its density.
     C3 light;
     for (int c = 0; c < 3; ++c) {
       Medium one = m;

@@ -13,8 +13,8 @@ constexpr float kInf = std::numeric_limits<float>::infinity();
 // their maximum by a few ulps (docs/measurements/stability.md N09).
 constexpr float kInflate = 1 + 4 * 0x1p-23f;
 
-// The part of an interval of a ray that lies inside a box: [t0, t1], empty if t0 > t1. A ray parallel to a
-// face and outside of it has an empty part; if inside, that face does not limit it.
+// The part [t0, t1] of an interval of a ray that is inside a box; empty if t0 > t1. If the ray is parallel to
+// a face, the part is empty if the ray is outside of that face; otherwise the face does not limit it.
 struct Interval {
   double t0, t1;
 };
@@ -43,22 +43,23 @@ Grid::Grid(std::array<int, 3> size, std::vector<float> values, const Affine& wor
       exact_(world_to_index),
       filter_(filter),
       wrap_(wrap) {
-  // Within half a voxel of its ends a mirrored grid equals a clamped one, and without interpolation wrapping
-  // has no effect inside the domain.
+  // Within half a voxel of its ends a mirrored grid equals a clamped one; without interpolation, wrapping has
+  // no effect inside the domain. So only the case below needs the extra nodes.
   if (wrap == Wrap::repeat && filter == VolumeFilter::trilinear) repeat_ends();
   for (int k = 0; k < 3; ++k) {
     last_[k] = std::max(0, size_[k] - 2);
     top_[k] = static_cast<float>(size_[k] - 1);
   }
-  // On an axis with one node the step is 0, so that the neighbour is the node itself.
+  // On an axis with one node the step is 0, so that a node is its own neighbour.
   step_ = {size_[0] > 1 ? std::size_t{1} : 0, size_[1] > 1 ? static_cast<std::size_t>(size_[0]) : 0,
            size_[2] > 1 ? static_cast<std::size_t>(size_[0]) * size_[1] : 0};
   for (float v : values_) max_value_ = std::max(max_value_, v);
   use_cells(wanted_cell_size(density_to_sigma));
 }
 
-// Surrounds the grid by one layer of nodes copied from the opposite end, so that interpolation needs no test
-// for the end, and macro cells bound the values interpolated there too. All index coordinates grow by one.
+// Surrounds the grid by one layer of nodes copied from the opposite end. So interpolation needs no special
+// case at the ends, and macro cells also bound the values interpolated there. All index coordinates grow by
+// one.
 void Grid::repeat_ends() {
   const std::array<int, 3> n = size_;
   const std::vector<float> inner = std::move(values_);
@@ -79,7 +80,7 @@ void Grid::repeat_ends() {
   padded_ = true;
 }
 
-// Maps an index outside the domain to the point inside whose value continues the grid there.
+// Maps an index outside the domain to the index inside that has the same value.
 V3 Grid::wrapped(const V3& index) const {
   V3 q = index;
   for (int k = 0; k < 3; ++k) {
@@ -138,7 +139,7 @@ void Grid::use_cells(int cell_size) {
 }
 
 MacroCell Grid::bound_cell(int x, int y, int z) const {
-  // [a, b] are all the nodes that interpolation inside the cell can touch: one more on each side than the
+  // [a, b] is the range of nodes that interpolation inside the cell can use: one more on each side than the
   // cell covers, because the traversal's positions are rounded.
   int a[3], b[3];
   const int c[3] = {x, y, z};
@@ -175,13 +176,13 @@ Passage Grid::pass(const V3& origin, const V3& direction, float t0, float t1, do
     const V3 q(o + d * t);
     return static_cast<double>(filter_ == VolumeFilter::trilinear ? trilinear(q) : nearest(q));
   };
-  // Two-point Gauss-Legendre quadrature is exact for the cubic that a trilinear field is along a line.
+  // Along a line a trilinear field is a cubic, for which two-point Gauss-Legendre quadrature is exact.
   const auto integral = [&](double a, double length) {
     const double middle = a + length / 2, g = length * .28867513459481288;  // 1 / (2 sqrt 3)
     return length / 2 * (value_at(middle - g) + value_at(middle + g));
   };
-  // The planes that separate the field's patches go through the nodes, or, without interpolation, half way
-  // between them.
+  // The planes that separate the field's polynomial pieces go through the nodes or, without interpolation,
+  // half way between them.
   const double offset = filter_ == VolumeFilter::trilinear ? 0 : .5;
   double plane[3], exit[3];
   for (int k = 0; k < 3; ++k) {
@@ -223,8 +224,8 @@ double Grid::exact_integral(const V3d& o, const V3d& d, double t0, double t1) co
   const V3d oi = exact_.point(o), di = exact_.vector(d);
   const Interval part = clip(V3d(lo_), V3d(hi_), oi, di, t0, t1);
   if (!(part.t0 < part.t1)) return 0;
-  // `cuts` holds all crossings of the planes that separate the field's patches, in order; between two of them
-  // the field is one polynomial.
+  // `cuts` contains all crossings of the planes that separate the field's polynomial pieces, in order;
+  // between two of them the field is one polynomial.
   const double offset = filter_ == VolumeFilter::trilinear ? 0 : .5;
   std::vector<double> cuts{part.t0, part.t1};
   for (int k = 0; k < 3; ++k) {

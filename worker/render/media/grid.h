@@ -16,12 +16,12 @@
 
 namespace ls::render {
 
-// What is stored of one macro cell: bounds of the density in it, inflated so that values interpolated in
+// The stored data of one macro cell: bounds of the density in it, inflated so that values interpolated in
 // float32 stay within them, and the control value for ratio tracking.
 struct MacroCell {
-  float hi = 0;        // >= any interpolated value
+  float hi = 0;        // upper bound of all interpolated values
   float control = 0;   // near the mean
-  float residual = 0;  // >= |value - control|
+  float residual = 0;  // upper bound of |value - control|
 };
 
 // The result of integrating the field along an interval of a ray. Integration stops at the t where the
@@ -35,30 +35,30 @@ struct Passage {
 class Grid {
  public:
   Grid() = default;
-  // `values` are those at the nodes, the integer index coordinates, x fastest. `world_to_index` maps world
-  // points to index coordinates. The grid exists inside [domain_lo, domain_hi] (index coordinates, which may
-  // reach beyond the outermost nodes: there values are clamped) and is 0 outside. `density_to_sigma` is the
-  // largest extinction per unit of value, in world units; it determines the size of macro cells. `wrap` says
-  // how the nodes continue beyond the ends; unless it is `clamp`, the domain must be that of values at cell
-  // centres, [-1/2, n - 1/2] for n nodes.
+  // `values` are the values at the nodes, which are the integer index coordinates, x fastest.
+  // `world_to_index` maps world points to index coordinates. The grid is 0 outside of [domain_lo, domain_hi]
+  // (index coordinates; the domain may extend beyond the outermost nodes, where values are clamped).
+  // `density_to_sigma` is the largest extinction per unit of value, in world units; it determines the size of
+  // macro cells. `wrap` says how the nodes continue beyond the ends. Unless it is `clamp`, values must be at
+  // cell centres: n nodes then have the domain [-1/2, n - 1/2].
   Grid(std::array<int, 3> size, std::vector<float> values, const Affine& world_to_index, V3d domain_lo,
        V3d domain_hi, double density_to_sigma, VolumeFilter filter = VolumeFilter::trilinear,
        Wrap wrap = Wrap::clamp);
 
-  // The index coordinates of the world point p. They are computed in double, because for a grid that is small
-  // in its world their terms are large and nearly cancel.
+  // Returns the index coordinates of the world point p. They are computed in double: if the grid is small in
+  // its world, the terms are large and nearly cancel.
   V3 to_index(const V3& p) const { return V3(exact_.point(V3d(p))); }
   VolumeFilter filter() const { return filter_; }
-  // The value at index coordinates inside the domain. kFilter must equal filter(); it is a template parameter
-  // so that callers decide once for many values.
+  // Returns the value at index coordinates inside the domain. kFilter must equal filter(); it is a template
+  // parameter so that callers decide once for many values.
   template <VolumeFilter kFilter>
   float value(const V3& index) const {
     LS_COUNT(density);
     if constexpr (kFilter == VolumeFilter::trilinear) return trilinear(index);
     return nearest(index);
   }
-  // The value at any index coordinates, with the grid's own filter. Beyond the domain the grid continues as
-  // `wrap` says.
+  // Returns the value at any index coordinates, with the grid's own filter. Beyond the domain the grid
+  // continues as `wrap` says.
   float value_anywhere(const V3& index) const {
     LS_COUNT(density);
     const V3 q = wrap_ == Wrap::clamp ? index : wrapped(index);
@@ -82,8 +82,8 @@ class Grid {
     const float c0 = c00 + f[1] * (c10 - c00), c1 = c01 + f[1] * (c11 - c01);
     return std::max(0.f, c0 + f[2] * (c1 - c0));
   }
-  // The value of the node whose cell contains the point. On a face between two cells it is that of the cell
-  // with the higher index.
+  // Returns the value of the node whose cell contains the point. A point on a face between two cells belongs
+  // to the cell with the higher index.
   float nearest(const V3& index) const {
     std::size_t i[3];
     const float q[3] = {index.x, index.y, index.z};
@@ -104,25 +104,25 @@ class Grid {
   std::uint64_t majorant_bytes() const { return macro_.size() * sizeof(MacroCell); }
   std::uint64_t bytes() const { return values_.size() * sizeof(float) + macro_.size() * sizeof(MacroCell); }
 
-  // Makes the macro cells `size` voxels wide along each axis, whatever the density. Grids that are traversed
-  // together need cells of the same size.
+  // Sets the width of the macro cells to `size` voxels along each axis, regardless of the density. Grids that
+  // are traversed together need cells of the same size.
   void use_cells(int size);
   bool same_values(const Grid& other) const { return values_ == other.values_; }
-  // The grid whose values are the means of those of a, b and c, which must have the same shape.
+  // Returns the grid whose values are the means of those of a, b and c, which must have the same shape.
   static Grid mean(const Grid& a, const Grid& b, const Grid& c);
 
-  // The number of values above `limit`.
+  // Returns the number of values above `limit`.
   std::uint64_t count_above(float limit) const;
 
   // Integrates the field voxel by voxel along origin + t direction, in index coordinates, over the finite
   // interval [t0, t1]. It stops early where the integral reaches `wanted`. Exact up to float32 rounding. Used
-  // in place of tracking where a tracker would have more collisions than the ray crosses voxels.
+  // instead of tracking where a tracker would have more collisions than the ray crosses voxels.
   Passage pass(const V3& origin, const V3& direction, float t0, float t1,
                double wanted = std::numeric_limits<double>::infinity()) const;
 
-  // Integral of the field along o + t d, t in [t0, t1]: exact up to rounding (within a voxel the field is a
-  // cubic in t, or constant, and two-point Gauss-Legendre integrates cubics exactly). It has no variance, so
-  // the tests of the trackers use it as the reference.
+  // Returns the integral of the field along o + t d, t in [t0, t1]. It is exact up to rounding: within a
+  // voxel the field is a cubic in t, or constant, and two-point Gauss-Legendre integrates cubics exactly.
+  // Since it has no variance, it is the reference in tests of the trackers.
   double exact_integral(const V3d& o, const V3d& d, double t0, double t1) const;
 
  private:
@@ -140,7 +140,8 @@ class Grid {
   Affine exact_;  // world to index, not rounded to float32
   VolumeFilter filter_ = VolumeFilter::trilinear;
   Wrap wrap_ = Wrap::clamp;
-  bool padded_ = false;  // a layer of nodes copied from the opposite end surrounds the given ones
+  // True if the given nodes are surrounded by a layer of nodes copied from the opposite end
+  bool padded_ = false;
   float max_value_ = 0;
   int cell_size_ = 8;
   std::array<int, 3> cells_{};
@@ -171,14 +172,14 @@ class CellWalk {
     return true;
   }
   const MacroCell& cell() const { return *cell_; }
-  // The index of the current cell in the cell table of `walked`, which must be the traversed grid.
+  // Returns the index of the current cell in the cell table of `walked`, which must be the traversed grid.
   std::size_t number(const Grid& walked) const {
     return static_cast<std::size_t>(cell_ - walked.macro_.data());
   }
-  // The interval of the ray in the current cell, as distances from the point of entry.
+  // The ends of the current cell on the ray, as distances from the point of entry.
   float begin() const { return begin_; }
   float end() const { return end_; }
-  // The distance from the ray's origin to the point where it enters the grid.
+  // The distance from the ray's origin to the point of entry into the grid.
   double entry() const { return entry_; }
   // The index coordinates at distance t from the point of entry: origin() + t * direction().
   V3 index(float t) const { return origin_ + direction_ * t; }
@@ -191,8 +192,8 @@ class CellWalk {
   const MacroCell* cell_ = nullptr;
   double entry_ = 0;
   V3 origin_, direction_;
-  // Per axis: boundary i between cells lies at the distance first_ + i * spacing_; left_ is the number of
-  // cells ahead, and stride_ the step in the cell table to the next one.
+  // Per axis: boundary i between cells is at the distance first_ + i * spacing_; left_ is the number of cells
+  // ahead, and stride_ the step in the cell table to the next one.
   float plane_[3], step_[3], first_[3], spacing_[3], exit_[3];
   int left_[3];
   std::ptrdiff_t stride_[3];
@@ -203,8 +204,9 @@ class CellWalk {
 inline CellWalk::CellWalk(const Grid& grid, const V3& o, const V3& d, float t0, float t1) {
   const V3d p = grid.exact_.point(V3d(o)), v = grid.exact_.vector(V3d(d));
   if (!std::isfinite(p.x + p.y + p.z + v.x + v.y + v.z)) return;
-  // If a component of the direction is too small for the ray to cross a cell along that axis, the ray counts
-  // as parallel to that axis's faces of the domain; if it starts outside of them, it meets nothing.
+  // If a component of the direction is so small that the ray cannot cross a cell along that axis, the ray
+  // counts as parallel to that axis's faces of the domain. If it also starts outside of them, it misses the
+  // grid.
   constexpr double kParallel = 1e-20;
   double from = t0, to = t1, inverse[3];
   for (int k = 0; k < 3; ++k) {
@@ -225,7 +227,8 @@ inline CellWalk::CellWalk(const Grid& grid, const V3& o, const V3& d, float t0, 
   stop_ = static_cast<float>(length);
   origin_ = V3(p + v * from);
   direction_ = V3(v);
-  const auto size = static_cast<float>(grid.cell_size_), per_size = 1 / size;  // a power of two
+  // the size is a power of two, so that its reciprocal is exact
+  const auto size = static_cast<float>(grid.cell_size_), per_size = 1 / size;
   const std::ptrdiff_t strides[3] = {1, grid.cells_[0], std::ptrdiff_t{grid.cells_[0]} * grid.cells_[1]};
   cell_ = grid.macro_.data();
   for (int k = 0; k < 3; ++k) {

@@ -16,13 +16,13 @@ namespace {
 bool is_vdb(std::string_view name) { return name.ends_with(".vdb") || name.ends_with(".nvdb"); }
 bool is_raw(std::string_view name) { return name.ends_with(".bin"); }
 
-// The map from world to index coordinates, given that from scene to index coordinates.
+// Returns the map from world to index coordinates for a given map from scene to index coordinates.
 Affine from_world(const Affine& scene_to_index, V3d center, double scale) {
   return scene_to_index * Affine::scale_translate(1 / scale, center);
 }
 
 Result<LoadedVolume> constant_volume(const ConstVolume& v, V3d center, double scale, double to_sigma) {
-  // As in Mitsuba, a volume without a file fills the unit cube transformed by to_world.
+  // A volume without a file fills the unit cube transformed by to_world, as in Mitsuba.
   LoadedVolume out;
   for (int c = 0; c < 3; ++c) {
     out.channels.emplace_back(std::array<int, 3>{1, 1, 1}, std::vector<float>{static_cast<float>(v.value[c])},
@@ -39,7 +39,8 @@ std::vector<float> channel(std::span<const float> interleaved, std::size_t c, st
   return values;
 }
 
-// Loads a .vol file, or a raw grid, whose values are at nodes that span its own box from face to face.
+// Loads a .vol file or a raw grid. Its values are at nodes, the outermost of which are on the faces of its
+// own box.
 Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d center, double scale,
                               double to_sigma) {
   auto path = files.path(v.file);
@@ -48,8 +49,8 @@ Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d
   auto data = raw ? load_raw_grid(*path, files.name(v.file), v.order) : load_vol(*path, files.name(v.file));
   if (!data) return tl::unexpected(data.error());
   const bool node_centred = v.node_centred || raw;
-  // Values are at cell centres of the unit cube, or at nodes from face to face; the cube is first mapped to
-  // the file's box, if requested, then transformed by to_world.
+  // Values are at cell centres of the unit cube, or at nodes from face to face. The cube is first mapped to
+  // the file's box, if this is requested, and then transformed by to_world.
   Affine unit_to_scene(v.to_world);
   if (v.use_grid_bbox || raw) {
     const V3d lo(data->bbox_min[0], data->bbox_min[1], data->bbox_min[2]),
@@ -106,8 +107,8 @@ Result<LoadedVolume> vdb_file(const GridVolume& v, const AssetLoader& files, V3d
   const std::span values(raw.values, of * static_cast<std::size_t>(size[0]) * size[1] * size[2]);
   LoadedVolume out;
   out.clamped = raw.negatives;
-  // Values are at nodes. Within one voxel of the active voxels they fall to the background value; there the
-  // grid ends, so wrapping has no effect.
+  // Values are at nodes. Within one voxel of the active voxels they fall to the background value; the grid
+  // ends there, so wrapping has no effect.
   for (std::size_t c = 0; c < of; ++c)
     out.channels.emplace_back(size, channel(values, c, of),
                               from_world(nodes_to_scene.inverse(), center, scale), V3d(0),

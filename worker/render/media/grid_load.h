@@ -11,8 +11,8 @@
 namespace ls::render {
 
 struct LoadedVolume {
-  std::vector<Grid> channels;  // 1 or 3
-  std::uint64_t clamped = 0;   // negative values set to 0
+  std::vector<Grid> channels;  // 1 or 3 grids
+  std::uint64_t clamped = 0;   // number of negative values that were set to 0
 };
 
 // Loads the grids of the volume's channels. `center` and `scale` map scene to world coordinates: p' = (p -

@@ -1,12 +1,12 @@
-// Participating media: free flight and transmittance. In homogeneous media both have a closed form. In grids
-// they are found by delta tracking with local majorants and residual ratio tracking (Novak et al. 2014) with
-// one control value per macro cell.
+// Participating media: free flight and transmittance. In homogeneous media both have a closed form. Grids use
+// delta tracking with local majorants, and residual ratio tracking (Novak et al. 2014) with one control value
+// per macro cell.
 //
 // Chromatic extinction: one channel, the hero, drawn once per path, decides every distance. A flight returns
-// the path weight relative to the hero (`weight`) and each channel's density of what was sampled, relative to
-// the hero's (`density`). Dividing by the mean over channels of the accumulated densities is the balance
-// heuristic over channels (Miller, Georgiev, Jarosz 2019). With equal channels every ratio is exactly 1, so
-// achromatic code may omit them.
+// the path weight relative to the hero (`weight`), and for each channel the density of the sampled flight
+// relative to the hero's (`density`). Dividing by the mean over channels of the accumulated densities is the
+// balance heuristic over channels (Miller, Georgiev, Jarosz 2019). With equal channels every ratio is exactly
+// 1, so achromatic code may omit them.
 #pragma once
 
 #include <array>
@@ -14,7 +14,6 @@
 #include <limits>
 #include <vector>
 
-#include "worker/render/base/built.h"
 #include "worker/render/base/features.h"
 #include "worker/render/base/work_counters.h"
 #include "worker/render/math/math.h"
@@ -25,9 +24,7 @@
 
 namespace ls::render {
 
-inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-// What a medium's emission is proportional to: length, or absorption. For black_body it is proportional to
+// A medium's emission is proportional to length or to absorption. For black_body it is proportional to
 // absorption, and the factor is the radiance of a black body.
 enum class EmissionKind : std::uint8_t { none, per_length, per_absorption, black_body };
 
@@ -42,27 +39,27 @@ struct Medium {
   // is the extinction per unit of density, and sigma_s is the albedo times sigma_t.
   C3 sigma_t{0, 0, 0}, sigma_s{0, 0, 0};
   const Grid* density = nullptr;
-  // Null, or, if the density differs between channels, one density grid per channel: three grids of the same
-  // shape with macro cells of the same size. Then `density` is the mean of the three, which is used to place
-  // points, and sigma_t is the same for all channels (spectral_grids.h).
+  // Set if the density differs between channels: one density grid per channel, all of the same shape and with
+  // macro cells of the same size. Then `density` is the mean of the three, which is used to place points, and
+  // sigma_t is the same for all channels (spectral_grids.h).
   std::array<const Grid*, 3> by_channel{};
-  std::array<const Grid*, 3> albedo{};  // null: constant, already in sigma_s
+  std::array<const Grid*, 3> albedo{};  // null: the albedo is constant and already in sigma_s
   // For a grid with constant albedo, this is 1 - albedo, the share of extinction that is absorption. It is
   // stored separately because 1 - (1 - 1e-7) in float32 is off by a fifth.
   C3 absorbing{1, 1, 1};
   HenyeyGreenstein phase;
   // The emission (emission.h). A homogeneous medium emits `emission` [radiance per world unit]. A grid emits
   // `emission` times the value of the grid `emitter`; for black_body, `emission` times the radiance of a
-  // black body at kelvin_offset + kelvin_scale times that value [K]. Unless the kind is per_length, this is
-  // also multiplied by the absorption coefficient.
+  // black body at kelvin_offset + kelvin_scale times that value [K]. Unless the kind is per_length, the
+  // emission is also multiplied by the absorption coefficient.
   EmissionKind emission_kind = EmissionKind::none;
   C3 emission{0, 0, 0};
-  std::array<const Grid*, 3> emitter{};  // null: 1 everywhere
+  std::array<const Grid*, 3> emitter{};  // null: the value is 1 everywhere
   float kelvin_scale = 1, kelvin_offset = 0;
-  int priority = 0;  // of overlapping media, those of the highest priority are in effect
+  int priority = 0;  // where media overlap, only those of the highest priority are in effect
   bool chromatic() const { return sigma_t.x != sigma_t.y || sigma_t.y != sigma_t.z || by_channel[0]; }
 
-  // The scattering coefficients per unit of density at the world point p of a grid.
+  // Returns the scattering coefficients per unit of density at the world point p of a grid.
   C3 scattering_at(const V3& p) const {
     if (!albedo[0]) return sigma_s;
     C3 s;
@@ -72,7 +69,7 @@ struct Medium {
     }
     return s;
   }
-  // The single-scattering albedo at the world point p; 0 in a channel without extinction.
+  // Returns the single-scattering albedo at the world point p; 0 in a channel without extinction.
   C3 albedo_at(const V3& p) const {
     const C3 s = grid ? scattering_at(p) : sigma_s;
     C3 a(0);
@@ -86,11 +83,11 @@ struct Flight {
   bool scattered = false;
   float t = 0;
   C3 weight{1, 1, 1};
-  C3 density{1, 1, 1};  // only meaningful in chromatic code
+  C3 density{1, 1, 1};  // used in chromatic code only
 };
 
-// Counts how often a density above the bound of its macro cell was found. Such a density biases the result
-// without any other sign.
+// Counts densities that exceed the bound of their macro cell. Such a density biases the result, and nothing
+// else would reveal it.
 struct MediumCounters {
   std::uint64_t majorant_violations = 0;
 };
@@ -103,7 +100,7 @@ C3 transmittance_channels(const Medium& m, const V3& o, const V3& d, float t0, f
 
 namespace detail {
 
-// The transmittance of channel c over that of the hero along `length`. It is one exponential of the
+// Returns the transmittance of channel c over that of the hero along `length`. It is one exponential of the
 // difference, because a quotient of two exponentials could be 0 / 0; exactly 1 if the extinctions are equal.
 inline float transmittance_ratio(float sigma_c, float sigma_hero, float length) {
   const float diff = sigma_c - sigma_hero;
@@ -131,26 +128,26 @@ Flight fly_homogeneous(const Medium& m, int hero, float depth, float t_max) {
   return f;
 }
 
-// Where a tracker would expect more tentative collisions than this in a macro cell, the field is integrated
-// exactly through its voxels instead: a cell of 4 voxels costs about as much as 16 collisions, and no tracker
-// gets stuck in it however dense it is (1e9 collisions and more: docs/measurements/stability.md N10).
+// If a tracker would expect more tentative collisions than this in a macro cell, the field is integrated
+// exactly through the cell's voxels instead. A cell of 4 voxels costs about as much as 16 collisions, and no
+// tracker gets stuck in it however dense it is (1e9 collisions and more: docs/measurements/stability.md N10).
 inline constexpr float kExactDepth = 16;
 
-// The free flight through a grid. `depth` is the optical depth up to the first tentative collision; the
+// Samples a free flight through a grid. `depth` is the optical depth up to the first tentative collision; the
 // random numbers of the others come from `stream`.
 template <bool kChromatic, VolumeFilter kFilter>
 Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d, float t_max,
                 RandomStream stream, MediumCounters& counters) {
   Flight f;
   const float s = m.sigma_t[hero];
-  // Which cells are integrated exactly must not depend on the hero, because the densities of all channels
-  // must refer to the same way of sampling.
+  // Which cells are integrated exactly must not depend on the hero: the densities of all channels must refer
+  // to the same sampling method.
   const float s_max = kChromatic ? max_component(m.sigma_t) : s;
-  // The integral, so far, of the majorant or, in cells that are integrated exactly, of the density.
+  // The integral so far. Its integrand is the majorant or, in cells that are integrated exactly, the density.
   [[maybe_unused]] double passed = 0;
   [[maybe_unused]] int nulls = 0;
-  // The ratio of the transmittances of channel c and the hero, times sigma_c / s for each null collision.
-  // Both are combined because each factor alone may overflow float32.
+  // The ratio of the transmittances of channel c and the hero, times sigma_c / s for each null collision. The
+  // two are combined because each factor alone may overflow float32.
   [[maybe_unused]] const auto ratio = [&](int c, double integral) {
     const float sigma = m.sigma_t[c];
     if (nulls == 0) return transmittance_ratio(sigma, s, static_cast<float>(integral));
@@ -184,13 +181,13 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
       continue;
     }
     if (rate > 0) {
-      // `gone` is the optical depth measured from the beginning of this cell, so that small distances in it
-      // stay exact.
+      // `gone` is the optical depth measured from the beginning of this cell, so that small distances within
+      // the cell stay exact.
       float gone = depth;
       for (; gone < room; gone += stream.exponential()) {
         const float t = std::min(w.begin() + gone / rate, w.end());
         const float rho = m.density->value<kFilter>(w.index(t));
-        if (kBuilt.health && rho > hi) ++counters.majorant_violations;
+        if (rho > hi) ++counters.majorant_violations;
         if (stream.uniform() * hi < rho) return scatter(w.entry() + t, passed + double{gone} / s);
         if constexpr (kChromatic) ++nulls;
       }
@@ -206,10 +203,11 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
 }
 
 // Russian roulette of transmittance: once its estimate is below e^-4, a tracker survives with probability
-// estimate / e^-4 and continues with the estimate e^-4. The estimate so far decides, not the control's depth
-// alone: a ray that misses the dense voxel of an otherwise empty cell has a deep control there, compensated
-// by its factors to a transmittance of 1 (docs/measurements/stability.md N10). Roulette is played only in
-// cells with a residual to track: constant densities cost nothing, and their tails are exact (N05).
+// estimate / e^-4 and continues with the estimate e^-4. This is decided by the whole estimate so far, not by
+// the control's optical depth alone: a ray that misses the dense voxel of an otherwise empty cell has a large
+// control depth there, which its factors compensate to a transmittance of 1 (docs/measurements/stability.md
+// N10). Roulette is played only in cells with a residual to track: constant densities cost nothing, and their
+// tails are exact (N05).
 inline constexpr float kRouletteDepth = 4;
 inline constexpr float kRouletteTransmittance = .018315639f;
 
@@ -222,8 +220,7 @@ C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float
   // deep, so that both stay within float32.
   float control = 0, foldable = kRouletteDepth, factor[kChannels];
   for (float& x : factor) x = 1;
-  // The optical depth of the residual that remains up to the next collision; it carries over from cell to
-  // cell.
+  // The optical depth of the residual up to the next collision; it carries over from cell to cell.
   float left = stream.exponential();
   for (CellWalk w(*m.density, o, d, t0, t1); w.next();) {
     const MacroCell& cell = w.cell();
@@ -276,7 +273,8 @@ C3 transmittance_homogeneous(const Medium& m, float length) {
   }
 }
 
-// Grids without interpolation are rare: not inlined, so that they do not burden the code of the others.
+// Grids without interpolation are rare. This is not inlined, so that it does not slow down the code for other
+// grids.
 template <bool kChromatic>
 [[gnu::noinline]] Flight fly_nearest(const Medium& m, int hero, float depth, const V3& o, const V3& d,
                                      float t_max, RandomStream stream, MediumCounters& counters) {
@@ -310,13 +308,13 @@ Flight free_flight(const Medium& m, int hero, std::uint32_t bits, const V3& o, c
   return detail::fly_homogeneous<F.chromatic>(m, hero, depth, t_max);
 }
 
-// The Flight (weight and density) through the medium m if it is known that the path was not scattered by m up
-// to t, because another medium at the same place ended the flight there. In grids the exact optical depth is
-// used, so that the result does not depend on how this is known.
+// Returns the Flight (weight and density) through the medium m for a path that was not scattered by m up to
+// t, because another medium at the same place ended the flight there. In grids the exact optical depth is
+// used, so that the result does not depend on how that flight was sampled.
 Flight passed(const Medium& m, int hero, const V3& o, const V3& d, float t);
 
-// An unbiased estimate of the transmittance along o + t d between t0 and t1; in homogeneous media the exact
-// value.
+// Returns an unbiased estimate of the transmittance along o + t d between t0 and t1; in homogeneous media the
+// exact value.
 template <Features F>
 C3 transmittance(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream) {
   if constexpr (F.grids) {

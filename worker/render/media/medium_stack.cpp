@@ -18,9 +18,9 @@ void MediaState::stand(const SurfaceInfo& s, bool outside, bool through, const s
   settle(media);
 }
 
-// Adds a body to those that the path is in. A sheet is a surface that is not closed: it bounds a body only
-// together with others, or none at all. A path may have come around its edge; then it is inside already, and
-// nothing is added.
+// Adds a boundary's interior to those that the path is in. A sheet is a surface that is not closed: it
+// encloses a volume only together with others, or none at all. A path may have come around its edge; then the
+// path is inside already, and nothing is added.
 void MediaState::enter(const Body& b, bool sheet) {
   if (sheet && std::find(body_.begin(), body_.begin() + bodies_, b) != body_.begin() + bodies_) return;
   if (bodies_ == kCapacity) {
@@ -30,9 +30,10 @@ void MediaState::enter(const Body& b, bool sheet) {
   body_[static_cast<std::size_t>(bodies_++)] = b;
 }
 
-// Removes a body from those that the path is in. A path that leaves a body without having entered it began
-// inside of it, with the body's interior counted as its background. The boundary's exterior becomes the
-// background if nothing else accounts for it, but not if the body was entered from a place that has a medium.
+// Removes a boundary's interior from those that the path is in. A path that leaves an interior without having
+// entered it began inside, with the interior counted as its background. The boundary's exterior becomes the
+// background, unless the path is inside other boundaries that account for it, or entered from a place that
+// has a medium.
 void MediaState::leave(const Body& b, bool through) {
   const auto end = body_.begin() + bodies_;
   bool known = false;

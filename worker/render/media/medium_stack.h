@@ -2,8 +2,8 @@
 //
 // A boundary has an interior and an exterior medium, either of which may be none. For nested or intersecting
 // boundaries, the media at a point are the background's, plus the interior and minus the exterior of every
-// boundary around the point, so the result does not depend on the order in which a path crosses them. Of
-// these, the media of the highest priority are in effect, all of them together.
+// boundary around the point. So the result does not depend on the order in which a path crosses them. Of
+// these media, those of the highest priority are in effect, all of them together.
 #pragma once
 
 #include <algorithm>
@@ -17,8 +17,8 @@
 
 namespace ls::render {
 
-// The medium of a path in scenes without overlaps: the one that the last boundary crossed has on the side
-// where the path is (Mitsuba's rule).
+// The medium of a path in scenes without overlaps: the medium of the last boundary crossed, on the side where
+// the path is (Mitsuba's rule).
 struct OneMedium {
   std::uint32_t medium = kNone;
 
@@ -30,8 +30,8 @@ struct OneMedium {
 
 class MediaState {
  public:
-  // The largest number of boundaries that a path may be inside of at the same time. If it enters one more,
-  // the sample is rejected and counted.
+  // The largest number of boundaries that a path may be inside of at the same time. If there would be one
+  // more, the sample is rejected and counted.
   static constexpr int kCapacity = 32;
 
   // The state is copied for every shadow ray; to save time, only the used parts of the arrays are copied.
@@ -61,8 +61,8 @@ class MediaState {
   }
   // Sets the state of a path that starts outside of all boundaries, in the medium `background`.
   void start(std::uint32_t background, const std::vector<Medium>& media);
-  // Updates the state of a path that now is on one side of the boundary s: outside, or else inside. `through`
-  // is true if it came from the other side.
+  // Updates the state of a path that is now outside of the boundary s (if `outside`) or inside. `through` is
+  // true if it came from the other side.
   void stand(const SurfaceInfo& s, bool outside, bool through, const std::vector<Medium>& media);
 
  private:

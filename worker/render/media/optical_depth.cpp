@@ -7,8 +7,8 @@
 namespace ls::render {
 namespace {
 
-// The rate dx / dt in a macro cell, its mean density. It is kept positive wherever the density is, because
-// the mean of a cell with one dense voxel may round to 0.
+// Returns the rate dx / dt in a macro cell, its mean density. The result is positive wherever the density is,
+// even in a cell with one dense voxel whose mean may round to 0.
 float rate_of(const MacroCell& cell) { return std::max(cell.control, cell.hi * 0x1p-10f); }
 
 }  // namespace
@@ -39,8 +39,8 @@ OpticalDepth::Point OpticalDepth::grid_at(float t) const {
     passed += double{rate} * (w.end() - w.begin());
     last = {t, static_cast<float>(passed), rate, w.index(w.end())};
   }
-  // A distance from a far origin may be rounded to the very end of the medium; then the last non-empty cell
-  // is used.
+  // Rounding may place a distance from a far origin at the very end of the medium; then the last non-empty
+  // cell is used.
   return t <= to_ ? last : Point{t, total_, 0, {0, 0, 0}};
 }
 
@@ -55,7 +55,7 @@ OpticalDepth::Point OpticalDepth::grid_after(float x) const {
     }
     passed += here;
   }
-  return {to_, total_, 0, {0, 0, 0}};  // x lies beyond the end by rounding only
+  return {to_, total_, 0, {0, 0, 0}};  // only rounding can place x beyond the end
 }
 
 C3 OpticalDepth::grid_scattering(const Point& at_point, const V3& p) const {

@@ -1,7 +1,8 @@
-// Optical depth along a ray, parametrised so that the medium looks homogeneous: the parameter x is the
-// density integrated along the ray up to a point, and light of channel c fades by about exp(-sigma_t[c] x).
-// In a homogeneous medium x is the length and this is exact. In a grid x integrates the macro cells' mean
-// densities; the cells are traversed again for each query (a few nanoseconds per cell), nothing is stored.
+// Optical depth along a ray, parametrised so that the medium looks homogeneous. The parameter x is the
+// density integrated along the ray up to a point, and light of channel c is attenuated by about
+// exp(-sigma_t[c] x). In a homogeneous medium x is the length and the attenuation is exact. In a grid x
+// integrates the macro cells' mean densities. Nothing is stored: each query traverses the cells again (a few
+// nanoseconds per cell).
 #pragma once
 
 #include <type_traits>
@@ -14,23 +15,23 @@ namespace ls::render {
 class OpticalDepth {
  public:
   struct Point {
-    float t = 0;     // along the ray
-    float x = 0;     // density integrated up to t
+    float t = 0;     // distance along the ray
+    float x = 0;     // density integrated from the origin to t
     float rate = 0;  // dx / dt; 0 where the medium is absent
     V3 index{0, 0, 0};
   };
 
-  // Prepares the ray o + t d, d of unit length, from t = 0 to t_max, which may be infinite.
+  // Prepares the ray o + t d from t = 0 to t_max, which may be infinite. d has unit length.
   OpticalDepth(const Medium& m, const V3& o, const V3& d, float t_max)
       : medium_(&m), o_(o), d_(d), t_max_(t_max), to_(t_max), total_(t_max) {
     if (m.grid) measure();
   }
 
-  // Nothing scatters outside of the part [from(), to()] of the ray. to() is infinite if the medium has no
+  // The medium is empty outside of the part [from(), to()] of the ray. to() is infinite if the medium has no
   // end.
   float from() const { return from_; }
   float to() const { return to_; }
-  // The value of x at to(). It is 0 if the ray does not meet the medium.
+  // The value of x at to(). It is 0 if the ray misses the medium.
   float total() const { return total_; }
 
   Point at(float t) const { return medium_->grid ? grid_at(t) : Point{t, t, 1, {0, 0, 0}}; }
@@ -52,8 +53,7 @@ class OpticalDepth {
   float t_max_, from_ = 0, to_, total_;
 };
 
-// The same interface as OpticalDepth for a medium known to be homogeneous, where nothing needs to be
-// measured.
+// OpticalDepth for a medium known to be homogeneous: the same interface, without any traversal.
 class HomogeneousOpticalDepth {
  public:
   HomogeneousOpticalDepth(const Medium& m, const V3&, const V3&, float t_max)

@@ -1,6 +1,6 @@
-// The Henyey-Greenstein phase function in a form without division by g and without 1 - cos of a rounded
-// cosine: exact for g = 0 and stable up to |g| = 0.99999 (derivation: with x = 1 - cos, y = 1 + cos the
-// sampled quantities are rational in xi).
+// The Henyey-Greenstein phase function. This form has no division by g and does not compute 1 - cos from a
+// rounded cosine, so it is exact for g = 0 and stable up to |g| = 0.99999. (Derivation: with x = 1 - cos, y =
+// 1 + cos the sampled quantities are rational in xi.)
 #pragma once
 
 #include "worker/render/base/work_counters.h"
@@ -16,8 +16,8 @@ struct PhaseSample {
 struct HenyeyGreenstein {
   float g = 0;
 
-  // The phase function [1/sr] for the direction of travel w before and w1 after the scattering. It integrates
-  // to 1 over w1.
+  // Returns the phase function [1/sr] for the directions of travel w before and w1 after the scattering. It
+  // integrates to 1 over w1.
   float value(const V3& w, const V3& w1) const {
     LS_COUNT(phase);
     const V3 diff = g >= 0 ? w - w1 : w + w1;  // x measured from the peak

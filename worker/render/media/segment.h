@@ -6,9 +6,10 @@
 namespace ls::render {
 
 struct Segment {
-  float length;           // infinite if no surface is met
-  float lead;             // how much of the length lies between the path's position and the offset ray origin
-  const SurfaceHit* end;  // nullptr: none
+  float length;  // infinite if the ray hits no surface
+  // The part of the length between the path's position and the offset origin of the ray
+  float lead;
+  const SurfaceHit* end;  // hit on the surface at the end; nullptr: there is none
 };
 
 }  // namespace ls::render

@@ -25,8 +25,8 @@ class ChannelFlight {
   ChannelFlight(const Medium& m, int hero, const V3& o, const V3& d) : m_(m), hero_(hero), o_(o), d_(d) {}
 
   void pass(int c, double depth) { log_[c] -= depth; }
-  // Accounts for null collisions. `product` is, for each channel, the product over these collisions of
-  // (majorant - density), relative to that of the hero.
+  // Adds null collisions. `product` is, for each channel, the product over these collisions of (majorant -
+  // density), relative to that of the hero.
   void add_nulls(const double (&product)[3]) {
     // A product of 0 gives the logarithm -infinity: such a flight is impossible in that channel.
     for (int c = 0; c < 3; ++c) log_[c] += std::log(product[c]);

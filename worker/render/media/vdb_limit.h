@@ -1,5 +1,5 @@
 // The memory limit (RLIMIT_DATA) of a process that loads OpenVDB files. The child process that reads the
-// files may use no more than what this process has left of it. The child's reply, a mapped file, counts
+// files gets the memory that this process has not used of its limit. The child's reply, a mapped file, counts
 // towards the limit too, although the kernel does not count it.
 #pragma once
 
@@ -16,8 +16,8 @@ namespace ls::render {
 
 inline constexpr std::uint64_t kNoDataLimit = ~std::uint64_t{0};
 
-// The number of bytes that this process may still allocate, as the limit counts them; kNoDataLimit if there
-// is no limit.
+// Returns the number of bytes that this process may still allocate under the limit; kNoDataLimit if there is
+// no limit.
 inline std::uint64_t data_left() {
   rlimit limit{};
   if (::getrlimit(RLIMIT_DATA, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kNoDataLimit;
@@ -27,8 +27,8 @@ inline std::uint64_t data_left() {
   return limit.rlim_cur - std::min<std::uint64_t>(bytes, limit.rlim_cur);
 }
 
-// An object of this class lowers the limit by `bytes` as long as it lives. This accounts for a mapped file of
-// that size, which the kernel does not count.
+// Lowers the limit by `bytes` while the object lives, to account for a mapped file of that size, which the
+// kernel does not count.
 class DataTaken {
  public:
   DataTaken() = default;

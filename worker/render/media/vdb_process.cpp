@@ -65,8 +65,8 @@ Result<VdbFile> VdbFile::read(const std::filesystem::path& path, const std::stri
   if (!status) return no_program(status.error().message);
   if (!WIFEXITED(*status) || WEXITSTATUS(*status) != 0) return how_it_ended(*status);
 
-  // Processes that the program left behind may still have the reply open. So it is sealed against changes
-  // before it is read, and rejected if that fails.
+  // Processes started by the program may still have the reply open. So the reply is sealed against changes
+  // before it is read, and rejected if sealing fails.
   if (::fcntl(reply.fd, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE) != 0) return vdb_nonsense();
   struct stat written {};
   if (::fstat(reply.fd, &written) != 0) return no_program("fstat", errno);

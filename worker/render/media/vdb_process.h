@@ -1,6 +1,6 @@
 // Reads grids of .vdb and .nvdb files in a separate program, lightshaft-vdb, installed beside the executable.
 // OpenVDB trusts its input: a damaged or malicious file may crash it, keep it busy or make it write out of
-// bounds. In a separate process, which holds nothing of value, that merely gives an error message; its memory
+// bounds. In a separate process without secrets this merely leads to an error message; the process's memory
 // and its reply count towards the caller's limit. It also keeps OpenVDB from being mapped into the renderer
 // (30 ms, 29 MB).
 #pragma once
@@ -28,8 +28,7 @@ class VdbFile {
   VdbFile& operator=(VdbFile&&) = delete;
   ~VdbFile();
 
-  // The grid that was read. Its sizes are at least 1, its values finite and not negative, and its transform
-  // is finite.
+  // The grid. Its sizes are at least 1, its values finite and not negative, and its transform is finite.
   const LsVdbGrid& grid() const { return grid_; }
 
  private:

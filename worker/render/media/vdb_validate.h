@@ -1,4 +1,4 @@
-// Validates a reply of lightshaft-vdb (vdb_reply.h), which a malicious file may have written.
+// Validates a reply of lightshaft-vdb (vdb_reply.h), whose content a malicious file may have determined.
 #pragma once
 
 #include <cstddef>
@@ -10,9 +10,9 @@
 
 namespace ls::render {
 
-// Checks the grid of a reply and returns it: it has at most max_values values, finite and not negative, sizes
-// of at least 1 and a finite transform. Its values stay where they are in `reply`, which must be
-// page-aligned, as mapped memory is. Fails with invalid_argument if the file is at fault or the reply is
+// Checks the grid of a reply and returns it. A valid grid has at most max_values values, all finite and not
+// negative, sizes of at least 1 and a finite transform. Its values stay where they are in `reply`, which must
+// be page-aligned, as mapped memory is. Fails with invalid_argument if the file is at fault or the reply is
 // malformed, and with resource_exhausted if a limit is exceeded.
 Result<LsVdbGrid> validated_grid(std::span<const std::byte> reply, std::uint64_t max_values);
 

@@ -1,5 +1,5 @@
-// Computes the numeric class: machines that have the same build and the same bits in the battery of
-// computations below render the same bits. Each add_ function adds results to the digest.
+// Computes the numeric class. Machines of the same class render the same bits: they have the same build, and
+// the computations below give the same bits on them. Each add_ function adds results to the digest.
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -15,7 +15,6 @@
 #include "common/assets/image.h"
 #include "common/base/digest.h"
 #include "worker/render/base/build_id.h"
-#include "worker/render/base/built.h"
 #include "worker/render/bsdf/bsdf.h"
 #include "worker/render/geometry/accel.h"
 #include "worker/render/geometry/geometry.h"
@@ -33,7 +32,7 @@ void add(Sha256& h, const std::vector<T>& values) {
 }
 
 // Adds values of the math library: those of every function that the renderer calls, at 4096 arguments each.
-// Square roots and divisions are exact everywhere.
+// Square roots and divisions are exact on every machine.
 void add_math(Sha256& h) {
   std::vector<float> v;
   RandomStream r(1);
@@ -52,8 +51,8 @@ void add_math_in_double(Sha256& h) {
   RandomStream r(3);
   for (int i = 0; i < 4096; ++i) {
     const double u = static_cast<double>(r.next() >> 11) * 0x1p-53, x = 40 * u - 20;
-    // Sine and cosine are taken of different numbers, as in the renderer: if both are of the same number, the
-    // compiler calls another function for the two.
+    // Sine and cosine have different arguments, as in the renderer: with equal arguments, the compiler calls
+    // another function that computes both.
     for (double y : {std::exp(x), std::log(u + 0x1p-60), std::sin(x), std::cos(x + 1), std::tan(1.5 * u),
                      std::atan2(u, x), std::acos(2 * u - 1), std::pow(u, 2.4), std::erfc(x / 4),
                      std::hypot(u, x), std::expm1(x), std::log1p(u)}) {
@@ -74,7 +73,7 @@ void add_reciprocals(Sha256& h) {
   add(h, v);
 }
 
-// Adds which triangle of a fixed bumpy mesh each of 100,000 rays hits.
+// Adds the index of the triangle that each of 100,000 rays hits on a fixed bumpy mesh.
 void add_hits(Sha256& h) {
   constexpr int kSide = 48;
   Geometry g;
@@ -113,7 +112,7 @@ void add_hits(Sha256& h) {
 
 void push(std::vector<float>& v, const V3& w) { v.insert(v.end(), {w.x, w.y, w.z}); }
 
-// Adds ray hits on spheres, which the BVH leaves to our own code: which sphere is hit, where, and the
+// Adds ray hits on spheres, which our own code intersects, not the BVH: which sphere is hit, where, and the
 // parametrisation there.
 void add_sphere_hits(Sha256& h) {
   Geometry g;
@@ -143,6 +142,17 @@ void add_sphere_hits(Sha256& h) {
   add(h, v);
 }
 
+// Adds one of each kind that the list lacks, with its default parameters.
+template <class... Kind>
+void add_missing_kinds(std::vector<std::variant<Kind...>>& list) {
+  const auto add = [&](auto kind) {
+    for (const auto& other : list)
+      if (std::holds_alternative<decltype(kind)>(other)) return;
+    list.emplace_back(kind);
+  };
+  (add(Kind{}), ...);
+}
+
 // Adds samples of every kind of material.
 void add_bsdf_samples(Sha256& h) {
   Scene scene;
@@ -159,6 +169,7 @@ void add_bsdf_samples(Sha256& h) {
   scene.bsdfs.push_back(ThinDielectricBsdf{1.5, 1, colour, colour});
   scene.bsdfs.push_back(PlasticBsdf{1.5, 1, true, colour, colour});
   scene.bsdfs.push_back(NormalMapBsdf{colour, {0}});
+  add_missing_kinds(scene.bsdfs);
   const auto textures = TextureTable::build(scene, {});
   if (!textures) return;
   const auto bsdfs = BsdfTable::build(scene, *textures);
@@ -192,8 +203,8 @@ std::vector<std::byte> bytes_of(std::string_view hex) {
   return bytes;
 }
 
-// Adds the results of lossy image decoders, whose transforms round differently by library version and
-// instruction set.
+// Adds the results of lossy image decoders. Their transforms round differently depending on the version of
+// the library and the instruction set.
 void add_decoded_images(Sha256& h) {
   for (const std::string_view picture : {battery::kJpeg, battery::kDwa, battery::kB44, battery::kPxr24}) {
     const auto image = decode_image("battery", bytes_of(picture));
@@ -214,7 +225,7 @@ Digest compute() {
   add_math_in_double(h);
   add_reciprocals(h);
   add_hits(h);
-  if (kBuilt.user_geometries) add_sphere_hits(h);
+  add_sphere_hits(h);
   add_bsdf_samples(h);
   add_decoded_images(h);
   return h.finish();

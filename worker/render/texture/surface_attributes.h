@@ -17,26 +17,26 @@ namespace ls::render {
 struct SurfaceAttributes {
   static constexpr std::uint32_t kNoChannel = 0xffffffffu;
 
-  struct Channel {  // one attribute of one mesh
+  struct Channel {  // the place of one attribute of one mesh in `values`
     bool per_face = false;
     std::uint32_t base = 0;  // index of the mesh's first vertex, or triangle, in the world's lists
     std::uint32_t count = 0;
     std::size_t first = 0;                      // index into values
-    std::uint32_t name = 0, next = kNoChannel;  // next: next channel of the same surface
+    std::uint32_t name = 0, next = kNoChannel;  // `next` is the next channel of the same surface
   };
   // The names of the attributes that the scene's textures read, each with its number.
   std::map<std::string, std::uint32_t, std::less<>> names;
   std::vector<std::uint32_t> first_of;  // first channel of each surface
   std::vector<Channel> channels;
-  std::vector<C3> values;     // scalars are stored three times
-  std::vector<C3> means;      // by name, over all values
-  std::uint64_t clamped = 0;  // negative values set to 0
+  std::vector<C3> values;     // values of all attributes; a scalar is stored as three equal components
+  std::vector<C3> means;      // mean of each attribute over all its values, by its number in `names`
+  std::uint64_t clamped = 0;  // number of negative values that were set to 0
 
   bool empty() const { return channels.empty(); }
   std::uint64_t bytes() const { return values.size() * sizeof(C3); }
   void find_means();
-  // The value at the point `at` of the attribute whose number in `names` is `name`. `corners` holds three
-  // vertex indices per triangle. The value is black if the surface has no such attribute.
+  // Returns the value at the point `at` of the attribute whose number in `names` is `name`. `corners`
+  // contains three vertex indices per triangle. The value is black if the surface has no such attribute.
   C3 value(std::uint32_t name, const FacePoint& at, std::span<const std::uint32_t> corners) const {
     std::uint32_t i = first_of[at.surface];
     while (i != kNoChannel && channels[i].name != name) i = channels[i].next;

@@ -18,7 +18,7 @@ float fold(float u, Wrap wrap) {
     case Wrap::repeat:
       return u - std::floor(u);
     case Wrap::mirror: {
-      const float t = u - 2 * std::floor(u * .5f);  // in [0, 2]
+      const float t = u - 2 * std::floor(u * .5f);  // in [0, 2], the period of mirroring
       return t > 1 ? 2 - t : t;
     }
     case Wrap::clamp:
@@ -35,10 +35,10 @@ float fold_slope(float u, Wrap wrap) {
 
 struct Span2 {
   std::uint32_t lo, hi;
-  float t;  // weight of hi
+  float t;  // weight of `hi`
 };
-// The two texels around u in [0, 1]. The neighbour beyond the edge is at the opposite edge when repeating,
-// else the edge itself (also when mirroring: texel -1 mirrors to texel 0).
+// Returns the two texels around u in [0, 1]. Beyond the edge, the neighbour is at the opposite edge when
+// repeating, else the edge texel itself (also when mirroring: texel -1 mirrors to texel 0).
 Span2 neighbours(float u, std::uint32_t n, Wrap wrap) {
   const float x = u * static_cast<float>(n) - .5f, f = std::floor(x);
   const std::int64_t lo = static_cast<std::int64_t>(f), last = n - 1;
@@ -64,7 +64,7 @@ C3 mean_of(const Texels& t) {
   return {static_cast<float>(sum[0] / n), static_cast<float>(sum[1] / n), static_cast<float>(sum[2] / n)};
 }
 
-// Reduces v, which has `have` interleaved channels, to `keep` of them, from number `first` on.
+// Keeps `keep` channels of v, from number `first` on; v has `have` interleaved channels.
 template <class T>
 void drop_channels(std::vector<T>& v, std::uint32_t have, std::uint32_t first, std::uint32_t keep) {
   if (have == keep) return;
@@ -73,6 +73,23 @@ void drop_channels(std::vector<T>& v, std::uint32_t have, std::uint32_t first, s
     for (std::uint32_t k = 0; k < keep; ++k) v[i * keep + k] = v[i * have + first + k];
   v.resize(n * keep);
   v.shrink_to_fit();
+}
+
+// Reduces an image to one of its channels.
+void keep_channel(ImageData& image, Channel channel) {
+  const bool has_alpha = image.channels % 2 == 0, is_grey = image.channels < 3;
+  if (channel == Channel::alpha && !has_alpha) {
+    image = ImageData{.width = 1, .height = 1, .channels = 1, .u8 = {}, .f32 = {1}};
+    return;
+  }
+  const std::uint32_t first = channel == Channel::alpha   ? image.channels - 1
+                              : is_grey                   ? 0
+                              : channel == Channel::green ? 1
+                              : channel == Channel::blue  ? 2
+                                                          : 0;
+  drop_channels(image.u8, image.channels, first, 1);
+  drop_channels(image.f32, image.channels, first, 1);
+  image.channels = 1;
 }
 
 // True if the last channel is an alpha channel that masks, that is, falls below 1/2 somewhere. Some images
@@ -128,10 +145,14 @@ V2 Texels::slope(const V2& uv, Wrap wrap) const {
           down * static_cast<float>(height) * fold_slope(uv.y, wrap)};
 }
 
-Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, bool alpha) {
+Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, bool alpha, Channel channel) {
   const std::uint64_t values = std::uint64_t{image.width} * image.height * image.channels;
   if (values == 0 || image.channels > 4 || (image.u8.empty() ? image.f32.size() : image.u8.size()) != values)
     return fail(Errc::invalid_argument, fmt::format("texture '{}' has no pixels", name));
+  if (channel != Channel::all) {
+    keep_channel(image, channel);
+    raw = true;
+  }
   alpha = alpha && has_alpha(image);
   const std::uint32_t keep = image.channels < 3 || alpha ? 1 : 3, first = alpha ? image.channels - 1 : 0;
   Texels t;

@@ -1,5 +1,5 @@
-// The texels of one image, ready for lookup: 8-bit codes stay 8 bits (a table decodes them before filtering),
-// everything else is linear float32. Grey images keep one channel.
+// The texels of one image in the form used for lookup. 8-bit codes stay 8 bits (a table decodes them before
+// filtering); all other formats become linear float32. Grey images keep one channel.
 #pragma once
 
 #include <array>
@@ -17,12 +17,12 @@ namespace ls::render {
 double srgb_to_linear(double v);
 
 struct Texels {
-  std::uint32_t width = 0, height = 0, channels = 3;  // 1 or 3
-  std::vector<std::uint8_t> u8;                       // either u8 or f32 is used
+  std::uint32_t width = 0, height = 0, channels = 3;  // 1 or 3 channels
+  std::vector<std::uint8_t> u8;                       // only one of u8 and f32 is used
   std::vector<float> f32;
   std::array<float, 256> decode{};  // the linear value of each 8-bit code
   C3 mean{0, 0, 0};
-  std::uint64_t clamped = 0;  // negative values set to 0
+  std::uint64_t clamped = 0;  // number of negative values that were set to 0
 
   C3 texel(std::uint32_t x, std::uint32_t y) const {
     const std::size_t i = (static_cast<std::size_t>(y) * width + x) * channels;
@@ -33,15 +33,17 @@ struct Texels {
     if (channels == 1) return C3(f32[i]);
     return {f32[i], f32[i + 1], f32[i + 2]};
   }
-  // The filtered value at uv, which must be finite; (0, 0) is the upper left corner of the image.
+  // Returns the filtered value at uv, which must be finite; (0, 0) is the upper left corner of the image.
   C3 lookup(const V2& uv, TextureFilter filter, Wrap wrap) const;
-  // The derivatives by u and v of the luminance of a bilinear lookup().
+  // Returns the derivatives by u and v of the luminance of a bilinear lookup().
   V2 slope(const V2& uv, Wrap wrap) const;
 };
 
 // Makes texels of `image`; `name` is for messages. Drops the alpha channel, decodes sRGB unless `raw` is set,
 // and fails on NaN and infinity with a message that names the texel. If `alpha` is set and the image has an
-// alpha channel that is below 1/2 somewhere, that channel is kept and the colour dropped.
-Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, bool alpha = false);
+// alpha channel that is below 1/2 somewhere, that channel is kept and the colour dropped. Of a `channel` only
+// that is kept, and not decoded; an image that lacks it is 1 everywhere.
+Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, bool alpha = false,
+                           Channel channel = Channel::all);
 
 }  // namespace ls::render

@@ -11,7 +11,6 @@
 
 #include "common/base/overloaded.h"
 #include "common/scene/limits.h"
-#include "worker/render/base/built.h"
 #include "worker/render/texture/texels.h"
 
 namespace ls::render {
@@ -35,18 +34,18 @@ Result<UvAffine> affine(const UvTransform& t) {
   return UvAffine{m(0), m(1), m(2), m(3), m(4), m(5)};
 }
 
-enum class Kind : std::uint8_t { constant, bitmap, checkerboard, peak, hue, attribute };
+enum class Kind : std::uint8_t { constant, bitmap, checkerboard, peak, hue, attribute, product };
 
 struct Entry {
   Kind kind = Kind::constant;
   TextureFilter filter = TextureFilter::bilinear;
   Wrap wrap = Wrap::repeat;
-  // Indices whose meaning depends on the kind: of a bitmap's texels, of the two textures of a checkerboard,
-  // of the texture of a peak, or of an attribute's name.
+  // Indices whose meaning depends on the kind: of a bitmap's texels, of the two textures of a checkerboard or
+  // a product, of the texture of a peak, or of an attribute's name.
   std::uint32_t first = 0, second = 0;
-  C3 value{0, 0, 0};  // of a constant; otherwise the mean
+  C3 value{0, 0, 0};  // the value of a constant; for other textures the mean
   UvAffine to_uv;
-  float scale = 1;  // of an attribute
+  float scale = 1;  // of an attribute; of a product its threshold
 };
 
 }  // namespace
@@ -60,27 +59,27 @@ struct TextureTable::Data {
 
 namespace {
 
-using TexelsKey = std::tuple<std::uint32_t, bool, bool>;  // asset, raw, alpha
+using TexelsKey = std::tuple<std::uint32_t, bool, bool, Channel>;  // asset, raw, alpha
 
 Result<std::uint32_t> load_texels(const Scene& scene, const BitmapTexture& b, const ImageLoader& load,
                                   TextureTable::Data& data, std::map<TexelsKey, std::uint32_t>& loaded) {
   if (b.file.value >= scene.assets.size())
     return fail(Errc::invalid_argument,
                 fmt::format("a bitmap names file {} of {}", b.file.value, scene.assets.size()));
-  const TexelsKey key{b.file.value, b.raw, b.alpha};
+  const TexelsKey key{b.file.value, b.raw, b.alpha, b.channel};
   if (const auto it = loaded.find(key); it != loaded.end()) return it->second;
   const Asset& asset = scene.assets[b.file.value];
   auto image = load(asset);
   if (!image) return tl::unexpected(image.error());
-  auto texels = make_texels(asset.name, std::move(*image), b.raw, b.alpha);
+  auto texels = make_texels(asset.name, std::move(*image), b.raw, b.alpha, b.channel);
   if (!texels) return tl::unexpected(texels.error());
   data.clamped += texels->clamped;
   data.texels.push_back(std::move(*texels));
   return loaded[key] = static_cast<std::uint32_t>(data.texels.size() - 1);
 }
 
-// The entry of a mesh_attribute texture. If no mesh has the attribute, the texture is never evaluated,
-// because Geometry::build rejects meshes that use it and lack it.
+// Makes the entry of a mesh_attribute texture. If no mesh has the attribute, the texture is never evaluated:
+// Geometry::build rejects meshes that use the texture but lack the attribute.
 Result<Entry> attribute_entry(const MeshAttributeTexture& t, const SurfaceAttributes* attributes) {
   Entry e;
   e.kind = Kind::attribute;
@@ -96,6 +95,9 @@ Result<Entry> attribute_entry(const MeshAttributeTexture& t, const SurfaceAttrib
   return e;
 }
 
+C3 cut(const C3& product, float threshold) {
+  return threshold > 0 ? C3(luminance(product) >= threshold ? 1.f : 0.f) : product;
+}
 C3 peak_of(const C3& c) {
   const float peak = std::max({c.x, c.y, c.z});
   return {peak, peak, peak};
@@ -105,8 +107,8 @@ C3 hue_of(const C3& c) {
   return peak > 0 ? C3(c.x / peak, c.y / peak, c.z / peak) : C3(1, 1, 1);
 }
 
-// Computes the means of textures that contain others, those of the contained ones first. A chain of n
-// textures takes n passes; a chain that is never finished is a cycle.
+// Computes the means of textures that contain others, after those of the contained ones. A chain of n
+// textures takes n passes; if some mean can never be computed, there is a cycle.
 Result<void> resolve_nested(TextureTable::Data& data) {
   std::vector<int> depth(data.entries.size(), 0);
   for (int pass = 0; pass <= scene::kMaxReferenceDepth; ++pass) {
@@ -121,6 +123,9 @@ Result<void> resolve_nested(TextureTable::Data& data) {
         const C3& inner = data.entries[e.first].value;
         e.value = e.kind == Kind::peak ? peak_of(inner) : hue_of(inner);
         d += depth[e.first];
+      } else if (e.kind == Kind::product) {
+        e.value = cut(data.entries[e.first].value * data.entries[e.second].value, e.scale);
+        d += std::max(depth[e.first], depth[e.second]);
       } else {
         continue;
       }
@@ -145,11 +150,13 @@ const Entry& leaf(const TextureTable::Data& data, const Entry* e, const V2& uv, 
   return *e;
 }
 
-// The value of a texture of any kind but checkerboards. It recurses as deep as textures are nested, at most
-// kMaxReferenceDepth.
+// Returns the value of a texture of any kind but checkerboards. It recurses as deep as textures are nested,
+// at most kMaxReferenceDepth levels.
 C3 value_of(const TextureTable& table, const Entry& t, const V2& uv, const FacePoint* face) {
   if (t.kind == Kind::peak) return peak_of(table.eval({t.first}, uv, face));
   if (t.kind == Kind::hue) return hue_of(table.eval({t.first}, uv, face));
+  if (t.kind == Kind::product)
+    return cut(table.eval({t.first}, uv, face) * table.eval({t.second}, uv, face), t.scale);
   if (t.kind == Kind::attribute) {
     const TextureTable::MeshData& meshes = table.data().meshes;
     return face && meshes.attributes ? meshes.attributes->value(t.first, *face, meshes.corners) * t.scale
@@ -198,9 +205,18 @@ Result<TextureTable> TextureTable::build(const Scene& scene, const ImageLoader& 
       return fail(Errc::invalid_argument, "a texture \"peak\" names a texture that does not exist");
     return Entry{t.hue ? Kind::hue : Kind::peak, {}, {}, t.texture.value, 0, {0, 0, 0}, {}};
   };
+  const auto product = [&](const ProductTexture& t) -> Result<Entry> {
+    if (std::max(t.first.value, t.second.value) >= scene.textures.size())
+      return fail(Errc::invalid_argument, "a texture \"product\" names a texture that does not exist");
+    const auto threshold = static_cast<float>(t.threshold);
+    if (!(threshold >= 0) || !std::isfinite(threshold))
+      return fail(Errc::invalid_argument,
+                  fmt::format("the threshold {} of a product is not a number >= 0", t.threshold));
+    return Entry{Kind::product, {}, {}, t.first.value, t.second.value, {0, 0, 0}, {}, threshold};
+  };
   const auto attribute = [&](const MeshAttributeTexture& t) { return attribute_entry(t, meshes.attributes); };
   for (const Texture& t : scene.textures) {
-    auto entry = std::visit(overloaded{constant, bitmap, checkerboard, peak, attribute}, t);
+    auto entry = std::visit(overloaded{constant, bitmap, checkerboard, peak, attribute, product}, t);
     if (!entry) return tl::unexpected(entry.error());
     data.entries.push_back(*entry);
   }
@@ -210,7 +226,7 @@ Result<TextureTable> TextureTable::build(const Scene& scene, const ImageLoader& 
 
 C3 TextureTable::eval(TextureIndex i, V2 uv, const FacePoint* face) const {
   const Entry* e = &data_->entries[i.value];
-  if (!kBuilt.textures || e->kind == Kind::constant) return e->value;
+  if (e->kind == Kind::constant) return e->value;
   return value_of(*this, leaf(*data_, e, uv, Read::colour), uv, face);
 }
 

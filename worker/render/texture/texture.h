@@ -25,39 +25,39 @@ class TextureTable {
   TextureTable(TextureTable&&) noexcept;
   TextureTable& operator=(TextureTable&&) noexcept;
 
-  // The mesh attributes, needed if any texture of the scene reads them. What the two members refer to must
-  // outlive the table.
+  // The mesh attributes. Needed if any texture of the scene reads them. The data that the two members refer
+  // to must outlive the table.
   struct MeshData {
     const SurfaceAttributes* attributes = nullptr;
     std::span<const std::uint32_t> corners;  // three vertex indices per triangle
   };
   // Builds the table of the scene's textures; `load` is called once for each file. Fails with
-  // invalid_argument on an index out of range, on textures that refer to each other in a cycle or deeper than
-  // kMaxReferenceDepth, and on a texel that is NaN or infinite (the message names the file and the texel).
+  // invalid_argument if an index is out of range, if textures refer to each other in a cycle or deeper than
+  // kMaxReferenceDepth, or if a texel is NaN or infinite (the message names the file and the texel).
   static Result<TextureTable> build(const Scene& scene, const ImageLoader& load) {
     return build(scene, load, MeshData{});
   }
   static Result<TextureTable> build(const Scene& scene, const ImageLoader& load, MeshData meshes);
 
-  // The value of texture i at uv. `face` is the point on a triangle at which mesh attributes are read;
-  // without it they are black.
+  // Returns the value of texture i at uv. `face` is the point on a triangle at which mesh attributes are
+  // read; without it they are black.
   C3 eval(TextureIndex i, V2 uv, const FacePoint* face = nullptr) const;
-  // The value of texture i at uv as a scalar: its luminance. In a checkerboard read as a scalar the two
-  // colours are swapped, as in Mitsuba (see CheckerboardTexture in scene.h).
+  // Returns the value of texture i at uv as a scalar: its luminance. In a checkerboard read as a scalar the
+  // two colours are swapped, as in Mitsuba (see CheckerboardTexture in scene.h).
   float number(TextureIndex i, V2 uv, const FacePoint* face = nullptr) const;
-  // The derivatives by u and v of the luminance of texture i at uv if it is a bilinear bitmap; 0 for other
-  // textures.
+  // Returns the derivatives by u and v of the luminance of texture i at uv if it is a bilinear bitmap; 0 for
+  // other textures.
   V2 slope(TextureIndex i, V2 uv) const;
   double aspect(TextureIndex i) const;  // width over height of a bitmap; 1 for other textures
   bool is_constant(TextureIndex i) const;
   C3 constant(TextureIndex i) const;  // the texture's value if is_constant(i), else its mean
-  C3 mean(TextureIndex i) const;      // over the unit square, unfiltered; for sampling weights
+  C3 mean(TextureIndex i) const;      // mean over the unit square, unfiltered; used for sampling weights
   std::size_t size() const;
-  std::uint64_t bytes() const;           // memory of the texels
-  std::uint64_t clamped_texels() const;  // negative texels set to 0
+  std::uint64_t bytes() const;           // bytes of memory of the texels
+  std::uint64_t clamped_texels() const;  // number of negative texels that were set to 0
 
   struct Data;
-  const Data& data() const { return *data_; }  // does not move with the table
+  const Data& data() const { return *data_; }  // the reference stays valid when the table moves
 
  private:
   std::unique_ptr<Data> data_;

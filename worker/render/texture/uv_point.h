@@ -1,4 +1,4 @@
-// A point on a surface as textures see it, with the derivatives of position by (u, v).
+// The data of a point on a surface that textures use.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct FacePoint {
 struct UvPoint {
   V2 uv;
   // The derivatives dp/du and dp/dv of the position p, in scene units, in the local shading frame. They are
-  // set only where something on the surface needs them (SurfaceInfo::wants_slopes).
+  // set only if the surface's material needs them (SurfaceInfo::wants_slopes).
   V3 du{1, 0, 0}, dv{0, 1, 0};
 
   // The point on a triangle, for surfaces whose textures read mesh attributes

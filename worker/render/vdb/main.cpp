@@ -17,10 +17,10 @@
 
 namespace {
 
-constexpr rlim_t kMostCpuSeconds = 900;  // the largest grids take seconds
+constexpr rlim_t kMostCpuSeconds = 900;  // far more than the few seconds that the largest grids take
 
-// Makes this process end when its parent ends, and limits its resources to what a file can need and what its
-// parent has left.
+// Makes this process end when its parent ends, and limits its resources: to the needs of any valid file, and
+// to the memory that its parent has left.
 void confine(std::uint64_t most_values, std::uint64_t most_bytes) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
@@ -36,7 +36,7 @@ void confine(std::uint64_t most_values, std::uint64_t most_bytes) {
   if (most_bytes != ls::render::kNoDataLimit) ::setrlimit(RLIMIT_DATA, &data);
 }
 
-// The peak memory of this process so far, in bytes.
+// Returns the peak memory of this process so far, in bytes.
 std::uint64_t taken() {
   rusage used{};
   ::getrusage(RUSAGE_SELF, &used);
@@ -75,7 +75,7 @@ int main(int argc, char** argv) {
   reply.grid = grid;
   reply.grid.values = nullptr;
   bool written = write_all(&reply, sizeof reply, 0);
-  // The reply is padded, so that its file always extends to where the values begin.
+  // The reply is padded, so that its file always extends to the offset of the values.
   written = written && ::ftruncate(ls::kHelperFd, ls::render::kVdbValuesAt) == 0;
   if (reply.code == 0) written = written && write_all(grid.values, values, ls::render::kVdbValuesAt);
   ls_vdb_free(&grid);

@@ -1,4 +1,4 @@
-// Access to an untrusted buffer, with every offset checked; an access beyond its end throws Refused.
+// Access to an untrusted buffer. Every offset is checked; an access beyond the end throws Refused.
 #pragma once
 
 #include <bit>
@@ -19,7 +19,7 @@ class NvdbBytes {
   NvdbBytes(std::span<const std::byte> data, const char* what) : data_(data), what_(what) {}
 
   std::uint64_t size() const { return data_.size(); }
-  // The n bytes of the buffer from the offset `at` on.
+  // Returns the n bytes of the buffer from the offset `at` on.
   std::span<const std::byte> part(std::uint64_t at, std::uint64_t n) const {
     if (at > data_.size() || n > data_.size() - at)
       throw Refused{1, "not a readable NanoVDB file: damaged, or cut short: " + std::string(what_) + " of " +

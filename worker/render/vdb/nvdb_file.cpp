@@ -16,10 +16,10 @@ constexpr std::uint64_t kFileBytes = std::uint64_t{8} << 30;
 constexpr std::size_t kMaxGrids = 4096;
 constexpr std::uint32_t kMaxName = 1 << 16;
 constexpr std::uint32_t kAbi = 32;
-// The largest number of bytes that one compressed byte can expand to: neither zlib (at most 1032) nor Blosc's
-// codecs exceed it.
+// The largest number of bytes to which one compressed byte can expand: an upper bound for zlib (at most 1032)
+// and Blosc's codecs.
 constexpr std::uint64_t kMaxExpansion = 1100;
-// A buffer compressed with Blosc is split into pieces of kBloscPiece bytes.
+// Blosc compresses a buffer in pieces of kBloscPiece bytes.
 constexpr std::uint64_t kBloscPiece = std::uint64_t{1} << 30;
 
 enum Codec : std::uint16_t { kPlain, kZip, kBlosc };
@@ -45,8 +45,8 @@ struct Entry {
   std::uint16_t codec = kPlain;
 };
 
-// The table of all grids in the file, which is a sequence of segments: 16 bytes of header, then for each grid
-// 176 bytes of metadata and its name, then the grids themselves.
+// Returns the table of all grids in the file. A file is a sequence of segments: 16 bytes of header, then for
+// each grid 176 bytes of metadata and its name, then the grids themselves.
 std::vector<Entry> table_of(const NvdbBytes& file) {
   std::vector<Entry> all;
   for (std::uint64_t at = 0; at < file.size();) {
@@ -90,7 +90,8 @@ std::string names_of(const std::vector<Entry>& all) {
   return names;
 }
 
-// The grid called `wanted`. If `wanted` is empty, the only grid, or the grid "density" if there are several.
+// Returns the grid called `wanted`. If `wanted` is empty, returns the only grid, or the grid "density" if
+// there are several.
 const Entry& choose(const std::vector<Entry>& all, const std::string& wanted) {
   if (all.empty()) throw Refused{1, "the file holds no grid"};
   if (wanted.empty() && all.size() == 1) return all.front();

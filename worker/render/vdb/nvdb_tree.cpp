@@ -13,8 +13,8 @@ namespace {
 
 using Coord = std::array<std::int64_t, 3>;
 
-// Byte offsets of fields in the grid's header (672 bytes) and in the tree that follows it. Those that depend
-// on the type of values are in Layout.
+// Byte offsets of fields in the grid's header (672 bytes) and in the tree that follows it. Offsets that
+// depend on the type of values are in Layout.
 constexpr std::uint64_t kGrid = 672, kGridSize = 32, kMap = 296, kMatrix = 88, kOffset = 232, kClass = 632,
                         kType = 636, kRootOffset = 24;
 constexpr std::uint64_t kUpperChildMask = 4128, kLowerChildMask = 544;
@@ -41,7 +41,7 @@ Layout layout_of(Type type) {
   if (type == kVec3d) return {32, 192, 24, 64, 8288, 1120, 24, 160};
   return {28, 64, 20, 32, 8256, 1088, 8, 96};
 }
-// The value of a voxel: only the first component is used if the grid has one channel.
+// The value of a voxel. If the grid has one channel, only the first component is used.
 using Value = std::array<float, 3>;
 
 std::string type_name(std::uint32_t type) {
@@ -154,8 +154,8 @@ class Tree {
     return v;
   }
 
-  // The value of voxel number n of the leaf at the offset `leaf`. Quantised leaves store codes of 1 to 16
-  // bits, with the leaf's minimum and step.
+  // Returns the value of voxel number n of the leaf at the offset `leaf`. Quantised leaves store codes of 1
+  // to 16 bits, and the leaf's minimum and step.
   Value voxel(std::uint64_t leaf, std::uint32_t n) const {
     const std::uint64_t table = leaf + layout_.leaf_table;
     if (type_ == kDouble || type_ == kVec3d) return value(table + 8 * channels() * n);

@@ -8,7 +8,7 @@
 namespace ls::render {
 
 struct Refused {
-  int code;  // the return value of ls_vdb_read: 1 the file is at fault, 2 a limit
+  int code;  // the return value of ls_vdb_read: 1 if the file is at fault, 2 if a limit is exceeded
   std::string text;
 };
 

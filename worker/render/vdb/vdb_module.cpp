@@ -33,8 +33,8 @@ std::string names_of(const openvdb::io::File& file) {
   return names.empty() ? "none" : names;
 }
 
-// The name of the grid to read: `wanted` or, if that is empty, the only grid, or "density" if there are
-// several.
+// Returns the name of the grid to read: `wanted` or, if that is empty, the only grid, or "density" if there
+// are several.
 std::string choose(const openvdb::io::File& file, const std::string& wanted) {
   std::vector<std::string> names;
   for (auto it = file.beginName(); it != file.endName(); ++it) names.push_back(it.gridName());
@@ -134,8 +134,10 @@ void convert(const openvdb::GridBase::Ptr& base, std::uint64_t max_values, LsVdb
 void read(const char* path, const std::string& wanted, std::uint64_t max_values, LsVdbGrid& out) {
   initialize_once();
   openvdb::io::File file(path);
-  file.open(false);                                        // no delayed loading, so that errors occur here
-  if (file.fileVersion() > openvdb::OPENVDB_FILE_VERSION)  // OpenVDB would only warn
+  // Delayed loading is disabled, so that errors occur here
+  file.open(false);
+  // A newer version is an error, although OpenVDB would only warn
+  if (file.fileVersion() > openvdb::OPENVDB_FILE_VERSION)
     throw Refused{1, "it is of version " + std::to_string(file.fileVersion()) +
                          " of the OpenVDB format; versions up to " +
                          std::to_string(openvdb::OPENVDB_FILE_VERSION) + " can be read"};

@@ -9,14 +9,15 @@
 namespace ls::render {
 namespace {
 
-// How many points a camera segment gets where they pay
+// The number of points on a camera segment, where points pay
 // (docs/decisions/0027-light-along-camera-segments.md).
 constexpr int kPointsThatPay = 2;
 // They pay where camera rays are scattered in media with a mean probability below this. In denser media the
-// flights that end on the segment find the light often enough.
+// flights that end on the segment find the light often enough, unless connections have taken away most of the
+// other noise.
 constexpr float kThin = .35f;
 
-// The probability that a camera ray is scattered or absorbed in media before it meets a surface.
+// Returns the probability that media scatter or absorb a camera ray before it hits a surface.
 float met_by(const World& w, const CameraRay& ray) {
   V3 start = ray.o, origin = ray.o;
   std::uint32_t medium = w.camera_medium;
@@ -29,7 +30,7 @@ float met_by(const World& w, const CameraRay& ray) {
     if (medium != kNone) {
       const Medium& m = w.media[medium];
       const OpticalDepth depths(m, start, ray.d, met ? dot(hit.p - start, ray.d) : left);
-      // A ray without end through a medium without end has an infinite depth, or 0 times infinity
+      // A ray without end through a medium without end has an infinite optical depth, or 0 times infinity
       const float depth = mean_component(m.sigma_t) * depths.total();
       passes *= depth > 0 ? std::exp(-depth) : 1.f;
     }
@@ -43,7 +44,7 @@ float met_by(const World& w, const CameraRay& ray) {
   return 1 - passes;
 }
 
-// The mean of met_by() over a lattice of camera rays, leaving out rays that meet next to nothing.
+// Returns the mean of met_by() over a lattice of camera rays. Rays with a probability near 0 are left out.
 float mean_met(const World& w, FrameSize frame) {
   constexpr int kLattice = 16;
   constexpr float kNothing = 1e-3f;
@@ -62,11 +63,11 @@ float mean_met(const World& w, FrameSize frame) {
 
 int points_for(const IntegratorSettings& settings, FrameSize frame, const World& w) {
   if (settings.camera_points != 0) return std::max(0, settings.camera_points);
-  // Light with a position is found by equi-angular sampling on every segment already, and where media overlap
-  // no segment is sampled
+  // Lights with a position are already found by equi-angular sampling on every segment; and where media
+  // overlap, points on segments are not supported
   if (!w.lights.any_without_place() || w.overlaps) return 0;
   const float met = mean_met(w, frame);
-  return met > 0 && met < kThin ? kPointsThatPay : 0;
+  return met > 0 && (met < kThin || w.need.connected) ? kPointsThatPay : 0;
 }
 
 }  // namespace
@@ -76,9 +77,13 @@ void aim(const IntegratorSettings& settings, FrameSize frame, World& w) {
   const bool in_medium = std::any_of(w.media.begin(), w.media.end(), [](const Medium& m) {
     return m.equiangular_mode != EquiangularMode::none;
   });
+  w.lamps = {};
   if (in_medium && !settings.phase_only)
     for (const V3& p : w.lights.points())
       if (w.lamps.count < kMaxLamps) w.lamps.position[w.lamps.count++] = p;
+  const bool homogeneous = std::any_of(w.media.begin(), w.media.end(),
+                                       [](const Medium& m) { return !m.grid && !is_black(m.sigma_t); });
+  w.lamp_flights = settings.lamp_flights == 0 && w.lamps.count > 0 && homogeneous;
   w.camera_points = points_for(settings, frame, w);
   w.need.aimed = w.lamps.count > 0 || w.camera_points > 0;
 }

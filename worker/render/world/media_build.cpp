@@ -16,14 +16,15 @@ namespace {
 Rgb times(const Rgb& c, double k) { return {c[0] * k, c[1] * k, c[2] * k}; }
 Rgb times(const Rgb& a, const Rgb& b) { return {a[0] * b[0], a[1] * b[1], a[2] * b[2]}; }
 
-// The largest extinction [1/world unit]: beyond it, its products with a density and a length leave the range
-// of float32.
+// The largest extinction [1/world unit]. The products of larger values with a density and a length would
+// leave the range of float32.
 constexpr double kMaxExtinction = 1e30;
-// The largest emission: beyond it, its sum along a ray exceeds the largest radiance of a sample.
+// The largest emission. The integral of larger values along a ray would exceed the largest radiance of a
+// sample.
 constexpr double kMaxEmission = 1e25;
 
-// The phase function i of the scene. Rejects a g that rounds to 1 in float32, like 0.99999999, because for g
-// = 1 the phase function does not exist.
+// Returns the phase function i of the scene. Rejects a g that rounds to 1 in float32, like 0.99999999,
+// because for g = 1 the phase function does not exist.
 Result<HenyeyGreenstein> phase_of(const Scene& scene, PhaseIndex i) {
   const auto* hg = std::get_if<HgPhase>(&scene.phases.at(i.value));
   if (!hg) return HenyeyGreenstein{0};
@@ -83,9 +84,9 @@ struct HeteroBuilder {
   const HeterogeneousMedium& m;
   const AssetLoader& files;
   World& w;
-  double per_unit;  // of the density, per world unit
+  double per_unit;  // factor of the density, per world unit
   Medium out;
-  Rgb sigma{};  // out.sigma_t, not rounded to float32
+  Rgb sigma{};  // out.sigma_t before rounding to float32
 
   Result<LoadedVolume> load(const Volume& volume, double to_sigma) const {
     return load_volume(volume, files, w.geometry.center, w.geometry.scale, to_sigma);
@@ -145,8 +146,8 @@ Result<void> HeteroBuilder::albedo() {
   }
   auto loaded = load(volume, per_unit);
   if (!loaded) return tl::unexpected(loaded.error());
-  // The albedo is clamped to 1 where it is read, because no medium scatters more light than it extinguishes;
-  // larger values are counted.
+  // An albedo above 1 is clamped when it is read, because no medium scatters more light than it extinguishes.
+  // Such values are counted here.
   for (const Grid& g : loaded->channels) w.inputs.add(HealthCause::bright_albedo, g.count_above(1));
   out.albedo = keep(*loaded);
   return {};
@@ -204,7 +205,7 @@ Result<Medium> heterogeneous(const Scene& scene, const HeterogeneousMedium& m, c
   return b.out;
 }
 
-// The media that the camera or some surface refers to.
+// Returns which media the camera or some surface refers to.
 std::vector<bool> named_media(const Scene& scene) {
   std::vector<bool> named(scene.media.size(), false);
   if (scene.sensor.medium) named[scene.sensor.medium->value] = true;

@@ -10,7 +10,7 @@ namespace ls::render {
 
 // Fills w.media, with one medium per medium of the scene, and w.grids, and counts corrected values in
 // w.inputs. Media that neither the camera nor a surface refers to keep their index, but nothing is loaded for
-// them. w.geometry must be built, because it gives the world's scale. Fails with invalid_argument; the
+// them. w.geometry must be built already, since it gives the world's scale. Fails with invalid_argument; the
 // message names the file or medium and its fault.
 Result<void> build_media(const Scene& scene, const AssetLoader& files, World& w);
 

@@ -12,9 +12,9 @@
 namespace ls::render {
 namespace {
 
-// The largest number of pairs of boxes to examine. Boxes are sorted by their start along x, and pairs that
+// The largest number of pairs of boxes to examine. Boxes are sorted by their start along x. Pairs that
 // overlap along x are examined until one touches, which takes n log n time unless many boxes overlap along x.
-// If more than kMaxPairs pairs overlap along x, some are assumed to touch.
+// If there are more than kMaxPairs such pairs, some are assumed to touch.
 constexpr std::size_t kMaxPairs = std::size_t{1} << 24;
 
 bool any_touch(std::vector<SurfaceBox> boxes) {
@@ -38,11 +38,11 @@ bool stands_in_ambience(const Geometry& g, std::uint32_t ambience) {
   });
 }
 
-constexpr int kMaxCrossings = 1 << 12;  // per ray that determines the camera's media
+constexpr int kMaxCrossings = 1 << 12;  // most surfaces crossed by a ray that determines the camera's media
 
-// Counts in `left` each boundary that the ray leaves before it enters it: these are the boundaries around the
+// Counts in `left` each boundary that the ray leaves without having entered it: these boundaries enclose the
 // ray's origin.
-using Left = std::map<std::pair<std::uint32_t, std::uint32_t>, int>;  // surface, instance
+using Left = std::map<std::pair<std::uint32_t, std::uint32_t>, int>;  // key: surface and instance
 void note_left(const World& w, V3 o, const V3& d, Left& left) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, bool> seen;
   for (int i = 0; i < kMaxCrossings; ++i) {
@@ -75,7 +75,7 @@ MediaState camera_media(const World& w) {
   const CameraRay ray =
       w.camera.ray(w.origin_x + w.size.width / 2., w.origin_y + w.size.height / 2., {.5f, .5f});
   Left left;
-  // The directions are neither along axes nor along diagonals, where hits are often grazing.
+  // The directions avoid axes and diagonals, along which hits are often grazing.
   for (const V3d& d : {V3d(.31, .82, .48), V3d(-.72, .24, .65), V3d(.17, -.44, -.88)})
     note_left(w, ray.o, V3(d.normalized()), left);
   const auto around = [&](const auto& entry) { return entry.second >= 2; };

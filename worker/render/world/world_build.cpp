@@ -1,3 +1,5 @@
+#include "worker/render/world/world_build.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -6,7 +8,6 @@
 #include "common/assets/image.h"
 #include "common/image/aov/cryptomatte.h"
 #include "common/scene/schema/integrators.h"
-#include "worker/render/base/built.h"
 #include "worker/render/geometry/coincident.h"
 #include "worker/render/world/aim.h"
 #include "worker/render/world/media_build.h"
@@ -16,7 +17,7 @@
 namespace ls::render {
 namespace {
 
-// The features that a scene with the needs n requires of the integrator.
+// Returns the features that a scene with the needs n requires of the integrator.
 Features features_of(const scene::Needs& n) {
   return {.media = n.media,
           .grids = n.grids,
@@ -25,7 +26,8 @@ Features features_of(const scene::Needs& n) {
           .passing = n.boundaries || n.null_transmission};
 }
 
-// The features that the finished world requires: never more than features_of() gives for the scene's needs.
+// Returns the features that the finished world requires: never more than features_of() gives for the scene's
+// needs.
 Features found_in(const World& w) {
   Features f;
   const auto& surfaces = w.geometry.surfaces;
@@ -52,14 +54,14 @@ Features found_in(const World& w) {
   return f;
 }
 
-// Sets the data that hits on each surface must carry.
+// Sets the data that hits on each surface must contain.
 void note_surface_needs(const Scene& scene, World& w) {
   for (std::size_t i = 0; i < w.geometry.surfaces.size(); ++i) {
     SurfaceInfo& s = w.geometry.surfaces[i];
     const auto& emitter = scene.shapes[i].emitter;
     s.wants_uv = w.bsdfs.reads_uv(s.bsdf) || (emitter && !w.textures.is_constant(emitter->radiance));
-    // The uv AOV requests uv only of meshes with uv, where uv changes nothing else. The frames of other
-    // shapes would rotate, and with them the samples.
+    // The uv AOV computes uv only for meshes with uv, where computing it changes nothing else. For other
+    // shapes it would rotate the shading frame, and so change the samples.
     s.wants_uv = s.wants_uv || (w.aovs.has(Aov::uv) && s.uvs);
     s.wants_tangent = w.bsdfs.anisotropic(s.bsdf);
     s.wants_slopes = w.bsdfs.reads_slopes(s.bsdf);
@@ -68,8 +70,8 @@ void note_surface_needs(const Scene& scene, World& w) {
   }
 }
 
-// Sets the Cryptomatte identifiers of surfaces from the names of shapes and materials, or from their index in
-// the list if the scene has no names.
+// Sets the Cryptomatte identifiers of surfaces from the names of shapes and materials, or from their index if
+// the scene has no names.
 void name_surfaces(const Scene& scene, World& w) {
   const auto id = [](const std::vector<Label>& labels, std::size_t i, auto member,
                      std::string_view else_named) {
@@ -83,7 +85,7 @@ void name_surfaces(const Scene& scene, World& w) {
     w.instance_ids.push_back(id(scene.instance_labels, i, &Label::name, "instance"));
 }
 
-// True if a point light lies in a grid, or within a tenth of its size: close to the light the scattered light
+// True if a point light is in a grid, or within a tenth of its size: close to the light the scattered light
 // grows as 1 / distance^2, and free flights rarely end there.
 bool a_point_shines_in_a_grid(const World& w) {
   const std::vector<V3> points = w.lights.points();
@@ -100,9 +102,9 @@ bool a_point_shines_in_a_grid(const World& w) {
   });
 }
 
-// A crop renders the pixels of the full frame: the same samples give the same bits. If the image is rendered
-// at a size other than that of the crop, it is the same part of a correspondingly scaled frame. Returns the
-// size of the full frame.
+// Sets the camera and the position of the image in the full frame; returns the size of the full frame. A crop
+// renders the pixels of the full frame: the same samples give the same bits. If the image has
+// another size than the crop, the frame is scaled, and the image is the same part of it.
 FrameSize place_camera(const Scene& scene, const RenderSettings& settings, World& w) {
   const FilmSettings& film = scene.film;
   FrameSize frame = settings.size;
@@ -116,23 +118,6 @@ FrameSize place_camera(const Scene& scene, const RenderSettings& settings, World
   }
   w.camera = Camera(scene.sensor, frame, w.geometry.center, w.geometry.scale, &w.textures);
   return frame;
-}
-
-// Fails if the world needs a part of the renderer that this build leaves out (built.h).
-Result<void> check_built(const World& w) {
-  const bool has = kBuiltFeatures.covers(w.need) && (kBuilt.boundaries || !w.needs.boundaries) &&
-                   (kBuilt.null_transmission || !w.null_transmission) &&
-                   (kBuilt.instances || w.geometry.instances.empty()) &&
-                   (kBuilt.environment_maps || !w.lights.map()) &&
-                   (kBuilt.light_trees || !w.lights.has_tree()) && (kBuilt.lenses || !w.camera.has_lens()) &&
-                   (kBuilt.found_lights || w.needs.only_delta_lights ||
-                    (w.needs.lights.empty() && w.needs.area_lights == 0)) &&
-                   (kBuilt.textures || w.needs.textures.size() <= w.needs.textures.count("constant")) &&
-                   (kBuilt.user_geometries || w.geometry.triangle_count() == w.geometry.primitive_count());
-  if (has) return {};
-  return fail(Errc::failed_precondition,
-              "the scene needs a part of the renderer that this build was made without (" LIGHTSHAFT_WITHOUT
-              ")");
 }
 
 Result<void> check_indices(const Scene& scene) {
@@ -155,8 +140,8 @@ Result<void> check_indices(const Scene& scene) {
 
 }  // namespace
 
-Result<std::shared_ptr<const World>> build_world(const Scene& scene, const RenderSettings& settings,
-                                                 const AssetFiles& files, int threads) {
+Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettings& settings,
+                                          const AssetFiles& files, int threads) {
   if (auto ok = check_indices(scene); !ok) return tl::unexpected(ok.error());
   if (settings.size.width < 1 || settings.size.height < 1)
     return fail(Errc::invalid_argument, "the film has no pixels");
@@ -168,8 +153,8 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   w.size = settings.size;
   w.max_depth = settings.max_depth;
   w.rr_depth = settings.rr_depth;
-  w.passing_counts = settings.integrator == "path" && settings.max_depth >= 0;
   w.use_media = scene::sees_media(settings.integrator);
+  w.passing_counts = !w.use_media && settings.max_depth >= 0;
   w.distant_mis = settings.integrator == "volpath_distant_mis";
   if (w.distant_mis) {
     w.distance = scene.integrator.distance;
@@ -223,7 +208,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   auto accel = Accel::build(w.geometry, threads, w.coincident);
   if (!accel) return tl::unexpected(accel.error());
   w.accel = std::move(*accel);
-  const FrameSize frame = place_camera(scene, settings, w);
+  w.frame = place_camera(scene, settings, w);
   if (!w.camera.usable())
     return fail(Errc::invalid_argument,
                 "the rays of the sensor leave the range of single precision: check its to_world, fov, "
@@ -232,9 +217,9 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   const Features found = found_in(w);
   w.needs = scene::needs_of(scene, w.use_media);
   w.need = features_of(w.needs);
+  w.need.whitted = settings.integrator == scene::kWhitted;
   w.need.overlaps = found.overlaps || w.coincident;        // known only once the shapes are read
   w.need.chromatic = w.need.chromatic || found.chromatic;  // a grid's file may have three channels
-  if (auto ok = check_built(w); !ok) return tl::unexpected(ok.error());
   if (!w.need.covers(found))
     return fail(Errc::internal, "the scene's analysis left out something that the scene has: this is a bug");
   w.overlaps = found.overlaps;
@@ -244,9 +229,10 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   bool homogeneous_media = false;
   for (const Medium& m : w.media) homogeneous_media = homogeneous_media || (!m.grid && !is_black(m.sigma_t));
   w.shadows_walk = w.null_transmission || (w.need.media && w.accel.has_boundaries());
-  w.equiangular = kBuilt.equiangular && w.need.media && homogeneous_media && w.lights.any_with_place();
-  w.equiangular_points = kBuilt.equiangular && w.need.grids && (w.equiangular || !w.lights.has_tree()) &&
-                         a_point_shines_in_a_grid(w);
+  const bool segments = w.distant_mis || scene.integrator.equiangular == 0;
+  w.equiangular = segments && w.need.media && homogeneous_media && w.lights.any_with_place();
+  w.equiangular_points =
+      segments && w.need.grids && (w.equiangular || !w.lights.has_tree()) && a_point_shines_in_a_grid(w);
   for (Medium& m : w.media) {
     if (m.grid ? w.equiangular_points : w.equiangular)
       m.equiangular_mode = m.grid ? EquiangularMode::points : EquiangularMode::places;
@@ -256,8 +242,8 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   // segments are sampled.
   if (!w.equiangular && !w.equiangular_points && settings.integrator != "volpath_distant_mis")
     w.lights.use_tree_in_media();
-  aim(scene.integrator, frame, w);
-  return std::shared_ptr<const World>(world);
+  aim(scene.integrator, w.frame, w);
+  return world;
 }
 
 }  // namespace ls::render

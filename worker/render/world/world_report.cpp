@@ -54,6 +54,24 @@ std::vector<WorldReport::Structure> structures_of(const World& w) {
 
 }  // namespace
 
+TechniqueSet techniques_of(const World& w) {
+  TechniqueSet set;
+  const auto put = [&](bool used, Technique t) {
+    if (used) set.add(t);
+  };
+  const bool segments = w.distant_mis && w.need.media && w.lights.can_sample();
+  const bool angles = w.lights.any_with_place() && w.distance != DistanceSampling::exponential;
+  put(segments ? angles : w.equiangular || w.equiangular_points, Technique::equiangular);
+  put(segments && (w.distance != DistanceSampling::equiangular || w.lights.any_without_place()),
+      Technique::exponential);
+  put(w.camera_points > 0, Technique::camera_points);
+  put(w.lamps.count > 0, Technique::lamp_directions);
+  put(w.lamp_flights, Technique::lamp_flights);
+  put(w.need.connected, Technique::light_vertices);
+  put(w.lights.has_tree(), Technique::light_tree);
+  return set;
+}
+
 WorldReport describe(const World& w) {
   WorldReport r;
   r.variant = covering_variants(w).front();
@@ -68,16 +86,17 @@ WorldReport describe(const World& w) {
   feature(w.overlaps, "media within or across each other");
   feature(w.coincident, "a search for surfaces that lie on null ones");
   feature(w.need.split, "AOVs of light");
-  const bool angles =
-      w.need.media && w.lights.any_with_place() && w.distance != DistanceSampling::exponential;
-  feature(w.distant_mis ? angles : w.equiangular || w.equiangular_points,
-          "equi-angular sampling about lights");
-  feature(w.camera_points > 0, "points on camera segments at which light is sampled");
-  feature(w.lamps.count > 0, "directions near lights without extent");
+  const TechniqueSet techniques = techniques_of(w);
+  feature(techniques.has(Technique::equiangular), "equi-angular sampling about lights");
+  feature(techniques.has(Technique::exponential), "points along segments, as light fades");
+  feature(techniques.has(Technique::camera_points), "points on camera segments at which light is sampled");
+  feature(techniques.has(Technique::lamp_directions), "directions near lights without extent");
+  feature(techniques.has(Technique::lamp_flights), "flights that end near lights without extent");
+  feature(techniques.has(Technique::light_vertices), "connections to points that the sun lights");
   feature(w.accel.has_boundaries(), "boundary BVH for index-matched surfaces");
   feature(w.lights.can_sample(), "next-event estimation");
   feature(w.lights.count() > 1, "choice among lights");
-  feature(w.lights.has_tree(), "tree of lights");
+  feature(techniques.has(Technique::light_tree), "tree of lights");
   feature(w.camera.has_lens(), "thin lens");
   feature(!w.geometry.instances.empty(), "instances of groups");
   feature(w.geometry.primitive_count() > w.geometry.triangle_count(), "user geometries in the BVH");

@@ -7,9 +7,9 @@
 #include <cstring>
 
 #include "common/image/exr/final_image.h"
-#include "common/image/film/fake_pixels.h"
 #include "common/image/film/merge.h"
 #include "tests/unit/image/support.h"
+#include "worker/fake/fake_pixels.h"
 
 namespace ls::test {
 namespace {

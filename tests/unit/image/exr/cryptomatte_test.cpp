@@ -9,8 +9,8 @@
 #include "common/image/aov/id_slots.h"
 #include "common/image/exr/aov_layers.h"
 #include "common/image/exr/final_image.h"
-#include "common/image/film/fake_pixels.h"
 #include "tests/unit/image/support.h"
+#include "worker/fake/fake_pixels.h"
 
 namespace ls::test {
 namespace {

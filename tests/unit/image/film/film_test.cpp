@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "common/image/exr/final_image.h"
-#include "common/image/film/fake_pixels.h"
 #include "tests/unit/image/support.h"
+#include "worker/fake/fake_pixels.h"
 
 namespace ls {
 namespace {

@@ -29,9 +29,7 @@ std::uint64_t lit_from_below(const Transform& turn, double floor, bool light_is_
                 m[8] * p[0] + m[9] * p[1] + m[10] * p[2]};
   };
   if (light_is_a_plane) {
-    const TextureIndex light = builder.texture({1, 1, 1});
-    builder.shape(RectangleShape{}, turn * translate({0, 0, -50}) * test::scale(40), builder.diffuse(0))
-        .emitter = AreaEmitter{light};
+    builder.lamp(RectangleShape{}, turn * translate({0, 0, -50}) * test::scale(40));
   } else {
     builder.scene.emitters.push_back(DirectionalEmitter{turned({0, 0, 1}), {1, 1, 1}});
   }

@@ -217,15 +217,11 @@ TEST(Shapes, ShineToTheSideThatMitsubaSays) {
 
 // A square in z = 0 by an OBJ file with or without vertex normals along +z or -z.
 SurfaceHit square_hit(bool normals, bool mirror, int z = 1) {
-  static const test::ScratchFolder folder;
   std::string text = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn 0 0 " + std::to_string(z) + "\n";
   text += normals ? "f 1//1 2//1 3//1\nf 1//1 3//1 4//1\n" : "f 1 2 3\nf 1 3 4\n";
   SceneBuilder builder;
-  const Asset asset{"square.obj", sha256(text), text.size()};
-  builder.files[asset.digest] = folder.path() / asset.digest.hex();
-  std::ofstream(builder.files[asset.digest], std::ios::binary) << text;
   MeshShape mesh;
-  mesh.file = SceneBuilder::push<AssetTag>(builder.scene.assets, asset);
+  mesh.file = builder.asset("square.obj", text);
   mesh.face_normals = !normals;
   builder.shape(mesh, test::scale(mirror ? -1 : 1, 1, 1), builder.diffuse(.5));
   return geometry_hit(*test::world_of(builder), {.3, .2, 5}, {.3, .2, 0});
@@ -249,21 +245,15 @@ TEST(Meshes, FollowTheirNormalsEvenAgainstTheirWinding) {
 // Light in a closed room whose normals point inwards, against its winding; the medium lies where the winding
 // has the inside.
 TEST(Meshes, ShineToTheSideOfTheirNormalsAndKeepTheirMediaInside) {
-  static const test::ScratchFolder folder;
   std::string text =
       "v -1 -1 -1\nv 1 -1 1\nv -1 1 1\nv 1 1 -1\nvn 1 1 1\nvn -1 1 -1\nvn 1 -1 -1\nvn -1 -1 1\n";
   text += "f 1//1 4//4 2//2\nf 1//1 3//3 4//4\nf 1//1 2//2 3//3\nf 2//2 4//4 3//3\n";
   for (const bool filled : {false, true}) {
     SceneBuilder builder;
-    const Asset asset{"room.obj", sha256(text), text.size()};
-    builder.files[asset.digest] = folder.path() / asset.digest.hex();
-    std::ofstream(builder.files[asset.digest], std::ios::binary) << text;
     MeshShape mesh;
-    mesh.file = SceneBuilder::push<AssetTag>(builder.scene.assets, asset);
+    mesh.file = builder.asset("room.obj", text);
     const MediumIndex dark = builder.homogeneous({3, 3, 3}, {0, 0, 0});
-    const TextureIndex light = builder.texture({1, 1, 1});
-    Shape& room = builder.shape(mesh, {}, builder.diffuse(0));
-    room.emitter = AreaEmitter{light};
+    Shape& room = builder.lamp(mesh, {});
     if (filled) {
       room.interior = dark;
       room.is_medium_transition = true;
@@ -284,13 +274,9 @@ TEST(Meshes, WithoutNormalsAreSmooth) {
   // A roof without normals, hit near its ridge; Mitsuba 3.9.1: shading normal (.0358577, 0, .999357).
   const std::string text =
       "v -1 -1 0\nv 0 -1 1\nv 0 1 1\nv -1 1 0\nv 1 -1 0\nv 1 1 0\nf 1 2 3\nf 1 3 4\nf 2 5 6\nf 2 6 3\n";
-  const test::ScratchFolder folder;
   SceneBuilder builder;
-  const Asset asset{"roof.obj", sha256(text), text.size()};
-  builder.files[asset.digest] = folder.path() / "roof.obj";
-  std::ofstream(builder.files[asset.digest], std::ios::binary) << text;
   MeshShape mesh;
-  mesh.file = SceneBuilder::push<AssetTag>(builder.scene.assets, asset);
+  mesh.file = builder.asset("roof.obj", text);
   builder.shape(mesh, {}, builder.diffuse(.5));
 
   const SurfaceHit h = geometry_hit(*test::world_of(builder), {.05, .2, 5}, {.05, .2, 0});

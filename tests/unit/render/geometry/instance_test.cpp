@@ -28,7 +28,6 @@ BsdfIndex brushed_instance(SceneBuilder& builder) {
 
 // A bumpy sheet with normals of its own, as an OBJ file.
 MeshShape sheet(SceneBuilder& builder) {
-  static const test::ScratchFolder folder;
   std::string text;
   constexpr int kSide = 6;
   for (int y = 0; y <= kSide; ++y)
@@ -49,11 +48,8 @@ MeshShape sheet(SceneBuilder& builder) {
         text += "\n";
       }
     }
-  const Asset asset{"sheet.obj", sha256(text), text.size()};
-  builder.files[asset.digest] = folder.path() / "sheet.obj";
-  std::ofstream(builder.files[asset.digest], std::ios::binary) << text;
   MeshShape mesh;
-  mesh.file = SceneBuilder::push<AssetTag>(builder.scene.assets, asset);
+  mesh.file = builder.asset("sheet.obj", text);
   return mesh;
 }
 

@@ -2,8 +2,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
-
 #include "tests/unit/render/light_bench.h"
 
 namespace ls::render {
@@ -33,12 +31,8 @@ const std::string kSquare =
 
 Shape& add_mesh(SceneBuilder& builder, const std::string& text, BsdfIndex bsdf,
                 const Transform& to_world = {}) {
-  static const test::ScratchFolder folder;
-  const Asset asset{"square.ply", sha256(text), text.size()};
-  builder.files[asset.digest] = folder.path() / asset.digest.hex();
-  std::ofstream(builder.files[asset.digest], std::ios::binary) << text;
   MeshShape mesh;
-  mesh.file = SceneBuilder::push<AssetTag>(builder.scene.assets, asset);
+  mesh.file = builder.asset("square.ply", text);
   mesh.format = MeshFormat::ply;
   return builder.shape(mesh, to_world, bsdf);
 }

@@ -4,8 +4,6 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
 
-#include <fstream>
-
 #include "tests/unit/render/light_bench.h"
 
 namespace ls::render {
@@ -77,18 +75,15 @@ std::string serialized(const Polygon& polygon) {
 }
 
 struct Flags {
-  bool face_normals = false, flip_normals = false, flip_tex_coords = false;
+  bool face_normals = false, flip_normals = false, flip_tex_coords = false, flat_without_normals = false;
 };
 LightBench bench_of(const std::string& file, MeshFormat format, const Flags& flags) {
-  static const test::ScratchFolder folder;
   SceneBuilder builder;
-  const Asset asset{"mesh", sha256(file), file.size()};
-  builder.files[asset.digest] = folder.path() / asset.digest.hex();
-  std::ofstream(builder.files[asset.digest], std::ios::binary) << file;
   MeshShape mesh;
-  mesh.file = SceneBuilder::push<AssetTag>(builder.scene.assets, asset);
+  mesh.file = builder.asset("mesh", file);
   mesh.format = format;
   mesh.face_normals = flags.face_normals;
+  mesh.flat_without_normals = flags.flat_without_normals;
   mesh.flip_tex_coords = flags.flip_tex_coords;
   // A texture, so that hits carry uv.
   const TextureIndex dark = builder.texture({.1, .1, .1}), light = builder.texture({.9, .9, .9});
@@ -130,6 +125,25 @@ TEST(MeshFlags, TurnNormalsAndCoordinatesAsInMitsuba) {
       EXPECT_NEAR(hit.uv.x, .32f, 1e-5f) << f.name << " " << k;
       EXPECT_NEAR(hit.uv.y, flags.flip_tex_coords ? .495f : .505f, 1e-5f) << f.name << " " << k;
     }
+}
+
+// A roof of two triangles without normals. Its ridge is x = 0; the left side has the normal (-1, 0, 1) / sqrt
+// 2.
+TEST(MeshFlags, AMeshWithoutNormalsIsSmoothUnlessItIsToBeFlat) {
+  const std::string roof = "v 0 0 1\nv 0 2 1\nv -1 1 0\nv 1 1 0\nf 1 2 3\nf 2 1 4\n";
+  const float side = std::sqrt(.5f);
+  for (const bool flat : {false, true}) {
+    Flags flags;
+    flags.flat_without_normals = flat;
+    const SurfaceHit hit = hit_at(bench_of(roof, MeshFormat::obj, flags), -1e-3, 1);
+    EXPECT_LT((hit.ng - V3(-side, 0, side)).length(), 1e-6f);
+    EXPECT_LT((hit.shading.n - (flat ? V3(-side, 0, side) : V3(0, 0, 1))).length(), 2e-3f) << flat;
+  }
+  // A file's own normals are shown all the same.
+  Flags flags;
+  flags.flat_without_normals = true;
+  EXPECT_EQ(hit_at(bench_of(obj(kQuad), MeshFormat::obj, flags), .5, .7).shading.n,
+            hit_at(bench_of(obj(kQuad), MeshFormat::obj, {}), .5, .7).shading.n);
 }
 
 // A polygon of seven corners, bent, is the fan of triangles from its first one, in every format to the last

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
 #include <numbers>
 
 #include "tests/support/render_check.h"
@@ -15,7 +14,6 @@ using test::SceneBuilder;
 
 // A ball of 8 x 5 corners, as an OBJ file, with a ball's normals.
 MeshShape coarse_ball(SceneBuilder& builder) {
-  static const test::ScratchFolder folder;
   constexpr int kAround = 8, kDown = 5;
   std::string text;
   for (int j = 0; j <= kDown; ++j)
@@ -34,11 +32,8 @@ MeshShape coarse_ball(SceneBuilder& builder) {
       if (j > 0) face(a, a + kAround, b);
       if (j < kDown - 1) face(b, a + kAround, b + kAround);
     }
-  const Asset asset{"ball.obj", sha256(text), text.size()};
-  builder.files[asset.digest] = folder.path() / "ball.obj";
-  std::ofstream(builder.files[asset.digest], std::ios::binary) << text;
   MeshShape mesh;
-  mesh.file = SceneBuilder::push<AssetTag>(builder.scene.assets, asset);
+  mesh.file = builder.asset("ball.obj", text);
   return mesh;
 }
 

@@ -66,9 +66,7 @@ void expect_moments(const TwoMoments& m, double mean, double square) {
 TEST(MisWeight, AtSurfacesIsTheBalanceHeuristic) {
   constexpr double kAlbedo = .5;
   SceneBuilder builder({kSide, kSide});
-  Shape& ball = builder.shape(SphereShape{}, {}, builder.diffuse(0));
-  ball.flip_normals = true;
-  ball.emitter = AreaEmitter{builder.texture({1, 1, 1})};
+  builder.lamp(SphereShape{}, {}).flip_normals = true;
   builder.shape(RectangleShape{}, test::scale(.01), builder.diffuse(kAlbedo));
   builder.look({0, 0, .5}, {0, 0, 0}, 1e-3, {0, 1, 0});
   builder.scene.integrator.max_depth = 2;

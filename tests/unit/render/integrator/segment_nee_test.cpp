@@ -161,8 +161,7 @@ TEST(DistantMis, FindsTheLightOfADenseCloudWithoutNonFiniteSamples) {
   SceneBuilder builder = cloud_builder();
   std::get<HeterogeneousMedium>(builder.scene.media[0]).scale = 1e6;
   builder.scene.integrator.name = "volpath_distant_mis";
-  builder.shape(SphereShape{}, translate({0, 0, .5}) * test::scale(.01), builder.diffuse(0)).emitter =
-      AreaEmitter{builder.texture({1, 2, 3})};
+  builder.lamp(SphereShape{}, translate({0, 0, .5}) * test::scale(.01), {1, 2, 3});
   const auto out = render_tile(*test::world_of(builder), {0, 0, 6, 4}, {0, 64}, nullptr, nullptr);
   EXPECT_EQ(out.health.nonfinite, 0u);
   EXPECT_EQ(out.health.negative, 0u);

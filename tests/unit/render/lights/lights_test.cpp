@@ -255,7 +255,7 @@ TEST(Lights, AreSeenFromTheirFrontAlone) {
 
 TEST(Lights, LightsWithoutPowerAreLeftOut) {
   SceneBuilder builder = area(RectangleShape{}, {});
-  builder.scene.textures[0] = ConstantTexture{{0, 0, 0}};
+  for (auto& texture : builder.scene.textures) texture = ConstantTexture{{0, 0, 0}};
   builder.scene.emitters.push_back(PointEmitter{{0, 0, 1}, {0, 0, 0}});
   const LightBench b(builder);
   EXPECT_FALSE(b.world->lights.can_sample());

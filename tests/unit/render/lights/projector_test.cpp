@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "tests/support/sky_builder.h"
+#include "tests/support/scene_builder.h"
 #include "tests/unit/render/light_bench.h"
 
 namespace ls::render {

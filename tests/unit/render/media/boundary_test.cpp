@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
 
 #include "common/base/digest.h"
 #include "tests/support/render_check.h"
@@ -47,11 +46,7 @@ TEST(Boundaries, GiveReflectedRaysTheMediumOfTheirSide) {
   Shape& mirror = builder.shape(RectangleShape{}, {}, builder.mirror());
   mirror.exterior = fog;
   mirror.is_medium_transition = true;
-  const TextureIndex light = builder.texture({1, 1, 1});
-  builder
-      .shape(RectangleShape{}, translate({0, 2, 1}) * test::rotate_x(180) * test::scale(1),
-             builder.diffuse(0))
-      .emitter = AreaEmitter{light};
+  builder.lamp(RectangleShape{}, translate({0, 2, 1}) * test::rotate_x(180));
   builder.look({0, -1, .5}, {0, 0, 0});
   // From the mirror at the origin the light's plane z = 1 is met at (0, 2, 1).
   const auto e = test::estimate(builder, 256);
@@ -79,7 +74,6 @@ TEST(Boundaries, KeepPathsInsideOfABallThatTheyGraze) {
 // More null sheets than a ray may cross between a floor and its sun: a column over the little that the camera
 // sees of the floor, so that most paths leave the scene beside it after their shadow ray was cut off.
 TEST(Boundaries, RejectSamplesWhoseShadowRaysAreCutOff) {
-  static const test::ScratchFolder folder;
   std::string text;
   constexpr int kSheets = (1 << 16) + 1;
   for (int i = 0; i < kSheets; ++i) {
@@ -89,11 +83,8 @@ TEST(Boundaries, RejectSamplesWhoseShadowRaysAreCutOff) {
     text += "f -4 -3 -2 -1\n";
   }
   SceneBuilder builder({1, 1});
-  const Asset asset{"sheets.obj", sha256(text), text.size()};
-  builder.files[asset.digest] = folder.path() / asset.digest.hex();
-  std::ofstream(builder.files[asset.digest], std::ios::binary) << text;
   MeshShape mesh;
-  mesh.file = SceneBuilder::push<AssetTag>(builder.scene.assets, asset);
+  mesh.file = builder.asset("sheets.obj", text);
   const MediumIndex thin =
       builder.homogeneous({.01, .01, .01}, {0, 0, 0});  // of none, nothing would be walked
   const BsdfIndex null = builder.null();

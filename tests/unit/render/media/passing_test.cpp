@@ -28,8 +28,7 @@ TEST(PassedSurfaces, EndSegmentsOfPathButNotOfVolpath) {
     SceneBuilder builder;
     for (const double z : {1., 2.})
       builder.shape(RectangleShape{}, test::translate({0, 0, z}), pane(builder, null));
-    builder.shape(RectangleShape{}, test::translate({0, 0, 3}) * test::rotate_x(180), builder.diffuse(0))
-        .emitter = AreaEmitter{builder.texture({1, 1, 1})};
+    builder.lamp(RectangleShape{}, test::translate({0, 0, 3}) * test::rotate_x(180));
     builder.look({0, 0, 0}, {0, 0, 3}, 1e-3, {0, 1, 0});
     const double seen = null ? 1 : .25;
 

@@ -64,8 +64,7 @@ TEST(Aim, AimsDirectionsAtLampsInMedia) {
 
 TEST(Aim, LeavesOutWhatASceneDoesNotNeed) {
   SceneBuilder area = fog(.1);
-  area.shape(RectangleShape{}, translate({0, 2, 0}), area.diffuse(0)).emitter =
-      AreaEmitter{area.texture({1, 1, 1})};
+  area.lamp(RectangleShape{}, translate({0, 2, 0}));
   SceneBuilder no_medium({24, 16});
   add_sun(no_medium);
   add_lamp(no_medium);

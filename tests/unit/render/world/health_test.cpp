@@ -38,13 +38,10 @@ TEST(Health, SamplesTooLargeToBeAddedUpAreCountedAndContributeNothing) {
 // its tile.
 TEST(Health, RejectedSamplesAreLocatedByPixelAndReplayed) {
   SceneBuilder builder({4, 4});
-  const TextureIndex light = builder.texture({1e30, 0, 0});
   // Seen 1 wide and high from a distance of 2: a quarter of the picture a side, its second column and third
   // row.
-  builder
-      .shape(RectangleShape{}, test::translate({-.5, 0, -.5}) * test::rotate_x(90) * test::scale(.25),
-             builder.diffuse(0))
-      .emitter = AreaEmitter{light};
+  builder.lamp(RectangleShape{}, test::translate({-.5, 0, -.5}) * test::rotate_x(90) * test::scale(.25),
+               {1e30, 0, 0});
   builder.look({0, -2, 0}, {0, 0, 0}, 2 * std::atan(.5) * 180 / test::kPi);
   const auto world = test::world_of(builder);
   const TileResult all = render_tile(*world, {0, 0, 4, 4}, {0, 6}, nullptr, nullptr);

@@ -4,7 +4,6 @@
 
 #include "common/scene/analysis/prune.h"
 #include "tests/support/render_check.h"
-#include "worker/render/base/built.h"
 #include "worker/render/base/work_counters.h"
 #include "worker/render/world/world.h"
 
@@ -159,11 +158,6 @@ TEST(LeaveOut, OneLightNeedsNoChoiceAndNoTree) {
   EXPECT_FALSE(world->lights.has_tree());
   EXPECT_EQ(world->lights.choose({~0u, 1, 2}, V3(0), V3(0, 0, 1)).probability, 1.f);
 }
-
-// A build without parts names what it was made without; this one has them all.
-static_assert(built_without("").overlaps && kBuiltFeatures.covers(kEverything));
-static_assert(!built_without("grids,textures").grids && !built_without("grids,textures").textures);
-static_assert(built_without("grids,textures").media && built_without("grids").instances);
 
 #ifdef LIGHTSHAFT_COUNT
 

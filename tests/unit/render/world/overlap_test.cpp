@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <random>
 
 #include "common/base/digest.h"
@@ -306,7 +305,6 @@ TEST(Overlaps, AreNeededByScenesThatHaveThemOnly) {
 
 // ---- mirrored bodies
 MeshShape cube_file(SceneBuilder& builder, bool normals) {
-  static const test::ScratchFolder folder;
   std::string text;
   for (const char* v : {"-1 -1 -1", "1 -1 -1", "1 1 -1", "-1 1 -1", "-1 -1 1", "1 -1 1", "1 1 1", "-1 1 1"})
     text += std::string("v ") + v + "\n" + (normals ? std::string("vn ") + v + "\n" : "");
@@ -317,11 +315,8 @@ MeshShape cube_file(SceneBuilder& builder, bool normals) {
       text += " " + std::to_string(i) + (normals ? "//" + std::to_string(i) : std::string());
     text += "\n";
   }
-  const Asset asset{"cube.obj", sha256(text), text.size()};
-  builder.files[asset.digest] = folder.path() / asset.digest.hex();
-  std::ofstream(builder.files[asset.digest], std::ios::binary) << text;
   MeshShape mesh;
-  mesh.file = SceneBuilder::push<AssetTag>(builder.scene.assets, asset);
+  mesh.file = builder.asset("cube.obj", text);
   mesh.face_normals = !normals;
   return mesh;
 }

@@ -56,16 +56,16 @@ TEST(NoriScene, OfOneOfEverythingIsTheSameInMitsuba) {
     <film type="hdrfilm"><integer name="width" value="64"/><integer name="height" value="48"/>
       <rfilter type="gaussian"><float name="stddev" value="0.4"/></rfilter></film>
   </sensor>
-  <shape type="obj"><string name="filename" value="mesh.obj"/>
+  <shape type="obj"><string name="filename" value="mesh.obj"/><boolean name="flat_without_normals" value="true"/>
     <transform name="to_world"><scale value="2"/><rotate y="1" angle="90"/><translate x="0.5"/></transform>
     <bsdf type="diffuse"><texture type="checkerboard" name="reflectance">
       <rgb name="color0" value="0.1 0.2 0.3"/><rgb name="color1" value="0.8 0.7 0.6"/>
       <transform name="to_uv"><matrix value="1 0 0 -0.25  0 -2 0 2  0 0 1 0  0 0 0 1"/></transform></texture></bsdf></shape>
-  <shape type="obj"><string name="filename" value="mesh.obj"/>
+  <shape type="obj"><string name="filename" value="mesh.obj"/><boolean name="flat_without_normals" value="true"/>
     <bsdf type="blendbsdf"><float name="weight" value="0.4"/>
       <bsdf type="roughconductor"><float name="alpha" value="0.2"/><float name="eta" value="1.5"/><float name="k" value="0"/></bsdf>
       <bsdf type="diffuse"><rgb name="reflectance" value="0.5 1 0.25"/></bsdf></bsdf></shape>
-  <shape type="obj"><string name="filename" value="mesh.obj"/>
+  <shape type="obj"><string name="filename" value="mesh.obj"/><boolean name="flat_without_normals" value="true"/>
     <bsdf type="blendbsdf">
       <texture type="peak" name="weight"><ref name="texture" id="wood"/></texture>
       <bsdf type="roughconductor"><float name="alpha" value="0.1"/><float name="eta" value="{}"/><float name="k" value="0"/></bsdf>
@@ -74,7 +74,7 @@ TEST(NoriScene, OfOneOfEverythingIsTheSameInMitsuba) {
     <string name="wrap_mode" value="mirror"/><string name="filter_type" value="nearest"/></texture>
   <texture type="bitmap" id="wood2"><string name="filename" value="wood.png"/><boolean name="raw" value="true"/>
     <string name="wrap_mode" value="mirror"/><string name="filter_type" value="nearest"/></texture>
-  <shape type="obj"><string name="filename" value="mesh.obj"/>
+  <shape type="obj"><string name="filename" value="mesh.obj"/><boolean name="flat_without_normals" value="true"/>
     <bsdf type="roughconductor"><rgb name="eta" value="0.2 0.9 1.1"/><rgb name="k" value="3.9 2.5 2.1"/>
       <float name="alpha" value="0.3"/><string name="distribution" value="ggx"/></bsdf></shape>
   <shape type="sphere"><point name="center" x="1" y="2" z="3"/><float name="radius" value="0.5"/><bsdf type="null"/>
@@ -84,7 +84,7 @@ TEST(NoriScene, OfOneOfEverythingIsTheSameInMitsuba) {
   <shape type="sphere"><bsdf type="conductor"/>
     <emitter type="area"><rgb name="radiance" value="5 4 3"/><float name="cutoff_angle" value="30"/>
       <float name="beam_width" value="10"/><float name="falloff" value="4"/></emitter></shape>
-  <shape type="obj"><string name="filename" value="mesh.obj"/><bsdf type="diffuse"/>
+  <shape type="obj"><string name="filename" value="mesh.obj"/><boolean name="flat_without_normals" value="true"/><bsdf type="diffuse"/>
     <emitter type="area"><rgb name="radiance" value="15"/></emitter></shape>
   <shape type="sphere"><bsdf type="null"/>
     <medium type="heterogeneous" name="interior">
@@ -180,7 +180,7 @@ TEST(NoriScene, ReadsGridsOfDensities) {
       R"(<mesh type="obj"><string name="filename" value="mesh.obj"/>
          <medium type="heterogeneous"><string name="filename" value="steam.vdb"/><color name="sigma_a" value="1 2 3"/>
          <color name="sigma_s" value="3 2 1"/><float name="density_scale" value="0.5"/><float name="phase_g" value="0.2"/></medium></mesh>)",
-      R"(<shape type="obj"><string name="filename" value="mesh.obj"/><bsdf type="null"/>
+      R"(<shape type="obj"><string name="filename" value="mesh.obj"/><boolean name="flat_without_normals" value="true"/><bsdf type="null"/>
          <medium type="heterogeneous" name="interior"><volume type="gridvolume" name="sigma_t"><string name="filename" value="steam.vdb"/></volume>
          <rgb name="albedo" value="0.75 0.5 0.25"/><float name="scale" value="2"/><phase type="hg"><float name="g" value="0.2"/></phase></medium></shape>)");
   expect_same_objects(
@@ -248,7 +248,7 @@ TEST(NoriScene, TakesIntegratorsByTheirNames) {
   EXPECT_EQ(of("direct_ems"), "path 2 0");
   EXPECT_EQ(of("vol_path_mis"), "volpath -1 0");
   EXPECT_EQ(of("volpath_distant_mis"), "volpath_distant_mis -1 0");
-  EXPECT_EQ(of("whitted"), "path -1 1");
+  EXPECT_EQ(of("whitted"), "whitted -1 0");
   EXPECT_EQ(of("photonmapper"), "path -1 1");
   EXPECT_THAT(of("normals"), ::testing::HasSubstr("what it draws is not light"));
   EXPECT_THAT(of("path_miss"), ::testing::HasSubstr("did you mean 'path_mis'?"));

@@ -55,7 +55,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"UnknownPlugin", "<shape type=\"sphre\"/>", 14,
              "there is no shape \"sphre\"; did you mean 'sphere'?"},
         Case{"UnsupportedPlugin", "<shape type=\"hair\"/>", 14,
-             "the shape \"hair\" is not supported; supported: cube"},
+             "the shape \"hair\" is not supported: curves are not rendered"},
         Case{"UnknownParameter", shape_xml("<float name=\"raduis\" value=\"1\"/>"), 35,
              "shape \"sphere\" has no parameter 'raduis'; did you mean 'radius'?"},
         Case{"UnknownAttribute", "<shape typ=\"cube\"/>", 8,

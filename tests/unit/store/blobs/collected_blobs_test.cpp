@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "coordinator/store/blobs/disk_blobs.h"
+#include "tests/support/fake_clock.h"
 #include "tests/unit/store/temp_folder.h"
 
 namespace ls::coordinator {

@@ -1,6 +1,6 @@
-#include "coordinator/store/blobs/local_copies.h"
-
 #include <gtest/gtest.h>
+
+#include "coordinator/store/blobs/s3_blobs.h"
 
 namespace ls::coordinator {
 namespace {

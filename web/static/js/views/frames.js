@@ -1,20 +1,25 @@
-// The frames of a sequence: one small link each, and which of them is shown.
+// The frames of a sequence: a strip with a small picture of each, and the means to scrub and play through those
+// that are done and to have a video made of them.
 import { h } from "../dom.js";
-import { count, percent } from "../format.js";
+import { doneFrames, mayChange } from "../state.js";
+import { downloads } from "../api.js";
+import { bytes, count, percent } from "../format.js";
 import { frameHref } from "../route.js";
 import { safeClass, stateWord } from "./pieces.js";
 
-const kMost = 400; // links at once; of more those around the one that is shown
+const kMost = 400; // most links; if there are more frames, those around the shown one
+const kRates = [6, 12, 24, 25, 30, 60]; // pictures per second
 
-export function framesStrip(state, job) {
+export function framesStrip(state, job, actions) {
   const frames = job.frames;
   if (!frames) return null;
+  const { film } = state.open;
   const list = frames.list ?? [];
-  const at = Math.max(0, list.findIndex((frame) => frame.id === state.open.shown));
+  const at = Math.max(0, list.findIndex((frame) => (film ? frame.id === film.id : frame.id === state.open.shown)));
   const first = Math.max(0, Math.min(at - kMost / 2, list.length - kMost));
   const some = list.slice(first, first + kMost);
   const shown = list[at];
-  return h("nav", { key: "frames", class: "panel frames", "aria-label": "Frames" },
+  return h("nav", { key: "frames", class: "panel frames", "aria-label": "Frames", onkeydown: (event) => onKey(event, job, list, at, actions) },
     h("p", { class: "frames-head" },
       h("b", null, shown ? `Frame ${shown.frame}` : "Frames"),
       h("span", { class: "dim" }, tally(frames)),
@@ -24,7 +29,9 @@ export function framesStrip(state, job) {
         ? h("span", { key: "following", class: "dim" }, "following what is rendered")
         : h("a", { key: "follow", class: "follow", href: frameHref(job.id, null) }, "Follow what is rendered")),
     some.length < list.length ? h("p", { key: "part", class: "help" }, `${count(some.length)} of them, around the one that is shown`) : null,
-    h("ul", null, some.map((frame) => h("li", { key: frame.id }, cell(job, frame, frame === shown)))));
+    h("film-strip", { key: "strip", ".current": shown?.id }, h("ul", null, some.map((frame) => h("li", { key: frame.id }, cell(job, frame, frame === shown))))),
+    player(state, job, list, at, actions),
+    videoTools(state, job, actions));
 }
 
 function tally(frames) {
@@ -39,4 +46,61 @@ const cell = (job, frame, here) => h("a", {
   class: `frame is-${safeClass(frame.state)}`, href: frameHref(job.id, frame.frame), "data-frame": frame.frame,
   "aria-current": here ? "true" : null, "aria-label": `Frame ${frame.frame}, ${stateWord(frame)}, ${percent(frame.progress)}`,
   title: frame.error || null, style: { "--part": frame.progress },
-}, String(frame.frame));
+},
+h("span", { class: "frame-picture" }, frame.progress > 0 ? h("img", { key: "small", src: downloads.thumbnail(frame.id, `${frame.state}${Math.floor(5 * frame.progress)}`), "data-small": frame.id, loading: "lazy", decoding: "async", alt: "" }) : null),
+h("span", { class: "frame-number" }, String(frame.frame)));
+
+/** The index among the done frames that lies nearest to the frame that is shown. */
+function nearest(done, frame) {
+  let best = 0;
+  done.forEach((one, i) => {
+    if (Math.abs(one.frame - frame) < Math.abs(done[best].frame - frame)) best = i;
+  });
+  return best;
+}
+
+function player(state, job, list, at, actions) {
+  const done = doneFrames(job);
+  if (done.length < 2) return null;
+  const { film, fps } = state.open;
+  const index = nearest(done, list[at]?.frame ?? done[0].frame);
+  const playing = Boolean(film?.playing);
+  return h("div", { key: "player", class: "player" },
+    h("button", { key: "play", type: "button", class: "small play", "aria-pressed": String(playing), onclick: actions.playFilm }, playing ? "Pause" : "Play"),
+    h("input", {
+      key: "scrub", id: "scrub", type: "range", min: 0, max: done.length - 1, step: 1, ".value": String(index), "aria-label": "Finished frames", "aria-valuetext": `Frame ${done[index].frame}`,
+      oninput: (event) => actions.scrubFilm(done[Number(event.currentTarget.value)].id), onchange: actions.settleFilm,
+    }),
+    h("output", { key: "of", for: "scrub", class: "number" }, `${done[index].frame}`),
+    h("label", { key: "rate", class: "rate" }, h("select", { "aria-label": "Pictures per second", ".value": String(fps), onchange: (event) => actions.setFps(Number(event.currentTarget.value)) }, kRates.map((rate) => h("option", { key: rate, value: rate, selected: rate === fps }, String(rate)))), "per second"));
+}
+
+/** Space plays, the arrows step; a slider and a list of choices have their own use of arrows. */
+function onKey(event, job, list, at, actions) {
+  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  const { localName } = event.target;
+  const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+  if (event.key === " " && localName !== "button" && localName !== "select" && doneFrames(job).length > 1) actions.playFilm();
+  else if (by && localName !== "input" && localName !== "select" && list[at + by]) actions.showFrameOf(job.id, list[at + by].frame);
+  else return;
+  event.preventDefault();
+}
+
+function videoTools(state, job, actions) {
+  const { video } = state.open;
+  const wanted = mayChange(state) && doneFrames(job).length > 1;
+  const busy = video?.state === "waiting" || video?.state === "making";
+  if (!wanted && video?.state !== "ready") return null;
+  return h("p", { key: "video", class: "video" },
+    wanted ? h("button", { key: "make", type: "button", class: "small", disabled: busy, onclick: () => actions.makeVideo(job.id) }, "Make a video") : null,
+    h("span", { key: "state", class: "dim", role: "status" }, videoText(video)),
+    video?.state === "ready" ? h("a", { key: "file", class: "button small", href: downloads.video(job.id), download: `${job.name.replace(/\.xml$/i, "")}.mp4` }, `Video, ${bytes(video.bytes)}`) : null);
+}
+
+function videoText(video) {
+  if (!video || video.state === "none") return "of the finished frames, at this exposure and rate";
+  if (video.state === "waiting") return "waits for another video";
+  if (video.state === "making") return `${count(video.frames_done)} of ${count(video.frames)} frames are in it`;
+  if (video.state === "failed") return video.error;
+  return `${count(video.frames)} frames, ${video.fps} per second`;
+}

@@ -1,17 +1,20 @@
-// One job: its image as it fills in, how wrong that image still is, and who is at work on it.
+// The page of one job: its image, the image's error, and the workers that render it.
 import { h } from "../dom.js";
 import { healthComplaints, isOver, ownerOf, seesOthers } from "../state.js";
 import { duration, jobName, moment, percent, plural } from "../format.js";
 import { downloads } from "../api.js";
+import { againButton, againForm } from "./again.js";
 import { jobActions, notice, progressBar, statePill, stateWord } from "./pieces.js";
 import { imagePanel } from "./job_image.js";
 import { timeSplit } from "./time_split.js";
 import { figures, inFlight } from "./job_figures.js";
 import { framesStrip } from "./frames.js";
 import { errorPlot } from "./plot.js";
-import { doubtful, kDoubt, timeLeft } from "../verdict.js";
+import { phrases } from "../phrases.js";
+import { doubtful, timeLeft } from "../verdict.js";
 
-const kStopped = { spp: "all its samples are in", error: "the target error is reached", time: "its time was up", user: "someone stopped it" };
+const kStopped = { spp: phrases.stoppedSpp, error: phrases.stoppedError, time: phrases.stoppedTime, user: phrases.stoppedUser };
+const whyStopped = (job) => (job.stopped === "error" && doubtful(job.verdict) ? phrases.stoppedErrorInDoubt : kStopped[job.stopped]);
 
 export function jobView(state, actions) {
   const job = state.jobs?.get(state.route.id);
@@ -19,8 +22,9 @@ export function jobView(state, actions) {
   if (!job || !state.open) return h("p", { class: "waiting", key: "waiting" }, "Fetching the job …");
   return h("article", { key: job.id, class: "job" },
     heading(state, job, actions),
+    againForm(state, job, actions),
     alerts(job),
-    framesStrip(state, job),
+    framesStrip(state, job, actions),
     shownJob(state, state.jobs.get(state.open.shown), actions));
 }
 
@@ -38,27 +42,28 @@ function shownJob(state, job, actions) {
 function heading(state, job, actions) {
   return h("div", { class: "job-head" },
     h("p", { class: "crumb" }, h("a", { href: "#/jobs" }, "Jobs"), " / ", h("code", null, job.id), seesOthers(state) ? h("span", { key: "owner", class: "owner" }, ` of ${ownerOf(job)}`) : null),
-    h("div", { class: "heading" }, h("h1", null, jobName(job)), statePill(job), jobActions(state, job, actions, true)),
+    h("div", { class: "heading" }, h("h1", null, jobName(job)), statePill(job), againButton(state, job, actions), jobActions(state, job, actions, true)),
     progressBar(job.progress, `Progress of ${jobName(job)}`, `wide in-${job.state}`),
-    h("p", { class: "unseen", role: "status" }, stateWord(job)), // said aloud when it changes, unlike the figures
+    // Screen readers announce it when it changes, unlike the numbers
+    h("p", { class: "unseen", role: "status" }, stateWord(job)),
     h("p", { class: "sub" }, sentence(job)));
 }
 
 function sentence(job) {
-  if (job.state === "done") return `Done after ${duration(job.elapsed_seconds)}: ${kStopped[job.stopped] ?? "finished"}${job.stopped === "error" && doubtful(job.verdict) ? ` by its own estimate: ${kDoubt}` : ""}.`;
+  if (job.state === "done") return `Done after ${duration(job.elapsed_seconds)}: ${whyStopped(job) ?? "finished"}.`;
   if (job.state === "running") return `${percent(job.progress)} · ${job.eta_seconds === null ? "time left not known yet" : `${timeLeft(job)} left`} · handed in ${moment(job.submitted_unix)}`;
   if (job.state === "queued") return "Waiting for a worker that may take it.";
-  return `${stateWord(job)[0].toUpperCase()}${stateWord(job).slice(1)} at ${percent(job.progress)}, after ${duration(job.elapsed_seconds)}${isOver(job) && kStopped[job.stopped] ? `: ${kStopped[job.stopped]}` : ""}.`;
+  return `${stateWord(job)[0].toUpperCase()}${stateWord(job).slice(1)} at ${percent(job.progress)}, after ${duration(job.elapsed_seconds)}${isOver(job) && whyStopped(job) ? `: ${whyStopped(job)}` : ""}.`;
 }
 
 function alerts(job) {
   const complaints = healthComplaints(job);
   const warnings = job.warnings ?? [];
   return [
-    job.error ? h("div", { key: "error" }, notice("bad", job.state === "failed" ? "The job failed" : "Something is wrong", h("pre", null, job.error))) : null,
+    job.error ? h("div", { key: "error" }, notice("bad", job.state === "failed" ? phrases.failed : phrases.unwell, h("pre", null, job.error))) : null,
     job.fake === true ? h("p", { key: "fake", class: "notice warn" }, "Fake workers (--fake) make up the pixels of this job: it is no picture of the scene.") : null,
     job.few_hits > 0 ? h("p", { key: "few", class: "notice mild" }, `${plural(job.few_hits, "pixel")} got too few hits for the error to be known there; the error map flags them.`) : null,
-    job.reference_same_seed === true ? h("p", { key: "seed", class: "notice mild" }, "The reference shares this job's seed: its noise is the same noise, and the true figures say nothing. Render it with another --seed.") : null,
+    job.reference_same_seed === true ? h("p", { key: "seed", class: "notice mild" }, phrases.sameSeed) : null,
     complaints.length ? h("div", { key: "health" }, notice("warn", "The numbers of this image are not clean", h("ul", null, complaints.map(complaint)))) : null,
     warnings.length ? h("div", { key: "warnings" }, h("details", { class: "notice mild" }, h("summary", null, warnings.length === 1 ? "1 warning about the scene" : `${warnings.length} warnings about the scene`), h("pre", null, warnings.join("\n")))) : null,
   ];

@@ -1,8 +1,9 @@
-// The figures of one job, and its tiles in flight.
+// The numbers of one job, and its tiles being rendered.
 import { h } from "../dom.js";
 import { colourOf, healthComplaints, isOver } from "../state.js";
 import { count, duration, figure, given, plural, spp } from "../format.js";
-import { atLeast, confidence, doubtful, kDoubt, trueFigure } from "../verdict.js";
+import { phrases } from "../phrases.js";
+import { atLeast, confidence, denoisedTarget, doubtful, trueFigure } from "../verdict.js";
 import { workerMark } from "./pieces.js";
 
 const kListed = 12;
@@ -11,7 +12,8 @@ const kListed = 12;
 export function figures(job) {
   const clean = healthComplaints(job).length === 0;
   return h("dl", { class: "panel figures" },
-    fact("relMSE", figure(job.relmse), [confidence(job, job.relmse_ci95) ?? "not known yet", job.target_error > 0 ? `target ${given(job.target_error)}` : null], "key"),
+    fact("relMSE", figure(job.relmse), [confidence(job, job.relmse_ci95) ?? "not known yet", job.target_error > 0 && !denoisedTarget(job) ? target(job) : null], "key"),
+    job.target_error > 0 && denoisedTarget(job) ? fact("relMSE, denoised", figure(job.denoised_check?.relmse), [denoisedNote(job.denoised_check), target(job)], "key") : null,
     isOver(job) ? fact("Took", duration(job.elapsed_seconds), ["wall clock"], "key") : fact(atLeast(job) ? "Time left, at least" : "Time left", duration(job.eta_seconds), timeNotes(job), "key"),
     fact("Samples per pixel", spp(job.spp_done), samplesAsked(job)),
     fact("RMSE", figure(job.rmse), [confidence(job, job.rmse_ci95)]),
@@ -20,6 +22,14 @@ export function figures(job) {
     job.reference ? trueFigures(job.reference, job.reference_same_seed === true) : null,
     fact("Units", count(job.units_done), [`of ${count(job.units_total)}`]),
     fact("Numeric health", clean ? "clean" : "see above", [], clean ? "good" : "bad"));
+}
+
+const target = (job) => `target ${given(job.target_error)}`;
+
+/** Of the last comparison with the target. */
+function denoisedNote(check) {
+  if (!check) return "not known yet";
+  return check.at_most === null ? "no interval" : `95 %: at most ${figure(check.at_most)}`;
 }
 
 /** Of a job that only a target error or a time ends, `spp` is a limit that nobody asked for. */
@@ -40,12 +50,12 @@ function timeNotes(job) {
 }
 
 const trueFigures = ({ relmse, rmse, flip, below_noise: below, rmse_below_noise: rmseBelow }, sameSeed) => [
-  fact("True relMSE", trueFigure(relmse, below), [sameSeed ? "not to be trusted: one seed" : "against the reference"], "true"),
+  fact("True relMSE", trueFigure(relmse, below), [sameSeed ? phrases.oneSeed : phrases.againstReference], "true"),
   fact("True RMSE", trueFigure(rmse, rmseBelow), [], "true"),
   flip === null || flip === undefined ? null : fact("FLIP", figure(flip), [], "true")];
 
 const fact = (name, value, notes = [], className = "") => h("div", { key: name, class: `fact ${className}` }, h("dt", null, name),
-  h("dd", null, h("b", null, value), notes.filter(Boolean).map((note, i) => h("small", { key: i, class: note === kDoubt ? "doubt" : null }, note))));
+  h("dd", null, h("b", null, value), notes.filter(Boolean).map((note, i) => h("small", { key: i, class: note === phrases.doubt ? "doubt" : null }, note))));
 
 export function inFlight(state, job) {
   if (isOver(job)) return null;

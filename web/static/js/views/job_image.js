@@ -1,33 +1,50 @@
-// The live image or a map over it, the tiles in flight, and the exposure slider or the map's legend.
+// The live image or a map over it, the tiles being rendered, and the exposure slider or the map's legend.
 import { h } from "../dom.js";
-import { colourOf } from "../state.js";
+import { colourOf, doneFrames } from "../state.js";
 import { exposure as exposureText, jobName } from "../format.js";
+import { viewHref } from "../route.js";
 import { choice, safeClass } from "./pieces.js";
 
 const kLayers = [["picture", "Picture"], ["error", "Error"], ["samples", "Samples"]];
-const kDenoised = [kLayers[0], ["denoised", "Denoised"], ...kLayers.slice(1)]; // of a job that is to be denoised
+const kDenoised = [kLayers[0], ["denoised", "Denoised"], ...kLayers.slice(1)]; // layers of a job with denoising
 const isPicture = (layer) => layer === "picture" || layer === "denoised";
 const kNames = { picture: "as it is now", denoised: "denoised as it is now", error: "error of each pixel", samples: "samples of each pixel" };
-// The ends of the maps' colours (common/image/exr/maps.h), with equal factors between.
+// The values at the ends of the maps' colour scale (common/image/exr/maps.h); the values between are spaced
+// by equal factors.
 const kLegends = { error: ["0.1 %", "100 % or more", "relative standard error of a pixel"], samples: ["2", "16,384 or more", "samples of a pixel"] };
-const kMarks = 512; // drawn at most; a thousand workers are not legible anyway
+// Further legends for the viewer (js/viewer/tone.js).
+const kFurther = { spp: kLegends.samples, false: ["1/256", "256", "brightness after exposure"], relmse: ["10⁻⁶", "1 or more", "relMSE of a pixel"], flip: ["0", "1", "FLIP, visible difference"] };
+const kMarks = 512; // most marks drawn; a thousand workers would not be legible anyway
 
 export function imagePanel(state, job, actions) {
   const { open } = state;
   const [width, height] = job.size ?? [16, 9];
   return h("figure", { class: "panel image" },
-    h("div", { class: "stage", style: { "--ratio": `${width} / ${height}` } },
+    h("div", { class: open.film ? "stage films" : "stage", style: { "--ratio": `${width} / ${height}` } },
+      job.sequence ? h("frame-film", { key: "film", "aria-hidden": "true", ".model": filmOf(state, job, actions), onturned: (event) => actions.turnFilm(event.detail) }) : null,
       h("live-image", {
         key: job.id, "aria-label": `${jobName(job)}, ${kNames[open.layer]}`, role: "img",
         ".size": width * 65536 + height, ".source": actions.image, ".exposure": isPicture(open.layer) ? open.exposure : 0, ".version": `${open.layer} ${open.folds}`,
       }),
-      open.showTiles ? overlay(state, width, height) : null,
+      open.showTiles && !open.film ? overlay(state, width, height) : null,
       job.units_done ? null : h("p", { class: "stage-text" }, stageText(job))),
     h("figcaption", { class: "image-tools" },
       choice("layer", "What is shown", job.denoise ? kDenoised : kLayers, open.layer, actions.setLayer),
       isPicture(open.layer) ? exposureTool(open, actions) : legend(open.layer, job.few_hits),
+      h("a", { key: "viewer", class: "to-viewer", href: viewHref(job.id) }, "Open in the viewer"),
       h("label", { class: "check" }, h("input", { type: "checkbox", ".checked": open.showTiles, onchange: actions.toggleTiles }), "Tiles in flight")));
 }
+
+/** What <frame-film> shows; the picture of the frame before stays below an image that has not come yet. */
+function filmOf(state, job, actions) {
+  const { film, fps, shown, exposure, layer } = state.open;
+  return {
+    ids: doneFrames(state.jobs.get(job.sequence)).map((frame) => frame.id), at: film?.id ?? null, playing: Boolean(film?.playing), fps, shown,
+    version: `${layer} ${isPicture(layer) ? exposure : 0}`, load: actions.filmPicture, small: smallPicture,
+  };
+}
+
+const smallPicture = (id) => [...document.querySelectorAll("img[data-small]")].find((img) => img.dataset.small === id && img.complete && img.naturalWidth > 0) ?? null;
 
 const exposureTool = (open, actions) => h("span", { key: "exposure", class: "image-tool" },
   h("label", { for: "exposure" }, "Exposure"),
@@ -37,8 +54,8 @@ const exposureTool = (open, actions) => h("span", { key: "exposure", class: "ima
   }),
   h("output", { for: "exposure", class: "number" }, exposureText(open.exposure)));
 
-function legend(layer, fewHits) {
-  const [least, most, meaning] = kLegends[layer];
+export function legend(layer, fewHits = 0) {
+  const [least, most, meaning] = kLegends[layer] ?? kFurther[layer];
   return h("span", { key: "legend", class: "image-tool legend", title: meaning },
     h("span", { class: "unseen" }, `${meaning}, from `), least, h("i", { "aria-hidden": "true" }), h("span", { class: "unseen" }, " to "), most,
     layer === "error" && fewHits > 0 ? h("span", { key: "few", class: "few-hits" }, "too few hits") : null);

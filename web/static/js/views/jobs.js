@@ -1,29 +1,90 @@
-// All jobs.
+// The list of all jobs.
 import { h } from "../dom.js";
+import { isNarrowed, kAges, kPageSize, kSorts, kStates } from "../job_list.js";
 import { isOver, jobsInOrder, mayChange, ownerOf, seesOthers } from "../state.js";
 import { count, duration, figure, jobName, kAbsent, moment, percent, plural, spp } from "../format.js";
-import { atLeast, doubtful, kDoubt } from "../verdict.js";
+import { phrases } from "../phrases.js";
+import { atLeast, doubtful } from "../verdict.js";
 import { jobActions, progressBar, safeClass, statePill, stateWord } from "./pieces.js";
 
 export function jobsView(state, actions) {
   if (state.jobs === null) return h("p", { class: "waiting", key: "waiting" }, "Fetching the jobs …");
   const jobs = jobsInOrder(state);
-  if (jobs.length === 0) return mayChange(state) ? firstSteps() : h("section", { key: "empty", class: "empty" }, h("h1", null, "Nothing is rendering yet"), h("p", null, "Your token lets you look; jobs are handed in with another one."));
+  const { list } = state;
+  const none = list.ids ? list.total === 0 && !isNarrowed(list.asked) : jobs.length === 0;
+  if (none && jobs.length === 0) return mayChange(state) ? firstSteps() : h("section", { key: "empty", class: "empty" }, h("h1", null, "Nothing is rendering yet"), h("p", null, "Your token lets you look; jobs are handed in with another one."));
   return h("section", { key: "jobs", class: "jobs" },
-    h("div", { class: "heading" }, h("h1", null, "Jobs"), h("p", { class: "sub" }, tally(jobs)), mayChange(state) ? h("a", { class: "button primary", href: "#/submit" }, "New job") : null),
-    h("table", { class: "list" },
-      h("thead", null, h("tr", null, ["Scene", seesOthers(state) ? "Owner" : null, "State", "Progress", "Samples", "relMSE", "Time left"].filter(Boolean).map((name) => h("th", { scope: "col", key: name }, name)), h("th", { key: "actions", scope: "col" }, h("span", { class: "unseen" }, "Actions")))),
-      h("tbody", null, jobs.map((job) => row(state, job, actions)))));
+    h("div", { class: "heading" }, h("h1", null, "Jobs"), h("p", { class: "sub" }, tally(state, jobs)), mayChange(state) ? h("a", { class: "button primary", href: "#/submit" }, "New job") : null),
+    narrowing(state, actions),
+    mayChange(state) ? picked(state, jobs, actions) : null,
+    jobs.length === 0 ? h("p", { key: "nothing", class: "waiting" }, "No job is like this.") : h("table", { key: "list", class: "list" },
+      h("thead", null, h("tr", null,
+        h("th", { key: "pick", scope: "col" }, mayChange(state) ? h("input", { type: "checkbox", "aria-label": "All jobs of this page", ".checked": jobs.every((job) => list.picked.has(job.id)), onchange: (event) => actions.pickPage(event.currentTarget.checked) }) : h("span", { class: "unseen" }, "Picture")),
+        ["Scene", seesOthers(state) ? "Owner" : null, "State", "Progress", "Samples", "relMSE", "Time left"].filter(Boolean).map((name) => h("th", { scope: "col", key: name }, name)), h("th", { key: "actions", scope: "col" }, h("span", { class: "unseen" }, "Actions")))),
+      h("tbody", null, jobs.map((job) => row(state, job, actions)))),
+    pager(list, actions));
 }
 
-function tally(jobs) {
-  const n = (state) => jobs.filter((job) => job.state === state).length;
-  const parts = [["running", "rendering"], ["queued", "waiting"], ["paused", "paused"], ["failed", "failed"]].map(([state, word]) => (n(state) ? `${n(state)} ${word}` : null));
-  return [plural(jobs.length, "job"), ...parts].filter(Boolean).join(" · ");
+/** How many jobs there are in which states: of all that this token may see. */
+function tally(state, jobs) {
+  const counts = state.list.ids ? state.list.states : {};
+  const n = (name) => (state.list.ids ? counts[name] ?? 0 : jobs.filter((job) => job.state === name).length);
+  const all = kStates.reduce((sum, name) => sum + n(name), 0);
+  const parts = [["running", "rendering"], ["queued", "waiting"], ["paused", "paused"], ["failed", "failed"]].map(([name, word]) => (n(name) ? `${count(n(name))} ${word}` : null));
+  return [plural(all, "job"), ...parts].filter(Boolean).join(" · ");
 }
+
+function narrowing(state, actions) {
+  const { asked, owners, states } = state.list;
+  const select = (id, label, options, chosen, onChoose) => h("span", { key: id, class: "list-tool" }, h("label", { for: `list-${id}` }, label),
+    h("select", { id: `list-${id}`, onchange: (event) => onChoose(event.currentTarget.value) }, options.map(([value, text]) => h("option", { key: value, value, selected: value === chosen, ".selected": value === chosen }, text))));
+  return h("search", { key: "narrow", class: "list-tools" },
+    h("input", { key: "search", id: "list-search", type: "search", placeholder: "Search names and ids", "aria-label": "Search names and ids", ".value": asked.search, oninput: actions.typeSearch }),
+    h("fieldset", { key: "states", class: "choice many" }, h("legend", { class: "unseen" }, "States"), kStates.map((name) => h("label", { key: name },
+      h("input", { type: "checkbox", name: "state", value: name, ".checked": asked.states.includes(name), onchange: () => actions.toggleState(name) }),
+      h("span", null, stateWord({ state: name }), states[name] ? h("i", { class: "of" }, ` ${count(states[name])}`) : null)))),
+    seesOthers(state) && (owners.length > 1 || asked.owner !== null) ? select("owner", "Owner", [["*", "everybody"], ...owners.map((owner) => [`=${owner}`, ownerOf({ owner })])], asked.owner === null ? "*" : `=${asked.owner}`, (value) => actions.narrow({ owner: value === "*" ? null : value.slice(1) })) : null,
+    select("days", "Handed in", kAges, asked.days, (days) => actions.narrow({ days })),
+    select("sort", "Order", kSorts, asked.sort, (sort) => actions.narrow({ sort })));
+}
+
+/** What can be done to all jobs that are picked. */
+function picked(state, jobs, actions) {
+  const n = state.list.picked.size;
+  const busy = state.ui.busy === "picked";
+  const confirming = state.ui.confirming;
+  const asks = confirming === "cancel picked" ? ["Really cancel", actions.cancelPicked] : confirming === "remove picked" ? ["Really remove, with images", actions.removePicked] : null;
+  const button = (key, label, onclick, className = "quiet") => h("button", { key, type: "button", class: `small ${className}`, disabled: busy, onclick }, label);
+  // an empty element keeps its space, so that rows do not move
+  if (n === 0) return h("div", { key: "picked", class: "list-picked none" }, jobs.length > 1 ? "Pick jobs to cancel or remove several at once." : null);
+  return h("div", { key: "picked", class: "list-picked", role: "status" },
+    h("b", null, `${plural(n, "job")} picked`),
+    asks ? [button("yes", asks[0], asks[1], "danger"), button("no", "Keep", () => actions.confirm(null))]
+      : [button("cancel", "Cancel", () => actions.confirm("cancel picked")), button("remove", "Remove", () => actions.confirm("remove picked"))],
+    button("none", "Pick none", () => actions.pickPage(false)));
+}
+
+function pager({ ids, total, asked: { page } }, actions) {
+  if (!ids || (total <= kPageSize && page === 0)) return null;
+  const last = Math.max(0, Math.ceil(total / kPageSize) - 1);
+  const button = (label, to, off) => h("button", { key: label, type: "button", class: "small", disabled: off, onclick: () => actions.turnPage(to) }, label);
+  return h("nav", { key: "pager", class: "pager", "aria-label": "Pages" },
+    button("First", 0, page === 0), button("Previous", page - 1, page === 0),
+    h("span", { class: "number dim" }, `${count(Math.min(total, page * kPageSize + 1))} – ${count(Math.min(total, page * kPageSize + ids.length))} of ${count(total)}`),
+    button("Next", page + 1, page >= last), button("Last", last, page >= last));
+}
+
+/** A small picture; again when a twentieth more of the job is there. */
+const thumbnail = (state, job, actions) => h("live-image", {
+  key: "picture", class: "thumbnail", role: "presentation",
+  ".source": job.units_done > 0 ? actions.thumbnail(job.frames?.current !== undefined && job.frames ? `${job.id}-frame${job.frames.current}` : job.id) : null, ".version": `${job.state} ${Math.floor(20 * job.progress)}`,
+});
 
 function row(state, job, actions) {
   return h("tr", { key: job.id, class: `is-${safeClass(job.state)}`, "data-job": job.id },
+    h("td", { class: "pick" },
+      mayChange(state) ? h("input", { key: "pick", type: "checkbox", "aria-label": `Pick ${jobName(job)}`, ".checked": state.list.picked.has(job.id), onchange: () => actions.pickJob(job.id) }) : null,
+      thumbnail(state, job, actions)),
     h("td", { class: "name" },
       h("a", { href: `#/jobs/${encodeURIComponent(job.id)}` }, jobName(job)),
       h("small", null, job.frames ? `${count(job.frames.done)} of ${count(job.frames.total)} frames · ` : null, job.size ? `${job.size[0]} × ${job.size[1]}` : null, " · ", moment(job.submitted_unix))),
@@ -31,7 +92,7 @@ function row(state, job, actions) {
     h("td", { "data-label": "State" }, statePill(job)),
     h("td", { class: "progress" }, progressBar(job.progress, `${jobName(job)}, ${stateWord(job)}`, `in-${safeClass(job.state)}`), h("span", { class: "number" }, percent(job.progress))),
     h("td", { class: "number", "data-label": "Samples" }, spp(job.spp_done), job.spp_asked === null ? goal(job) : h("span", { key: "of", class: "of" }, ` / ${count(job.spp)}`)),
-    figureCell("relMSE", figure(job.relmse), doubtful(job.verdict) ? h("small", { key: "doubt", class: "doubt" }, kDoubt) : null),
+    figureCell("relMSE", figure(job.relmse), doubtful(job.verdict) ? h("small", { key: "doubt", class: "doubt" }, phrases.doubt) : null),
     figureCell("Time left", duration(job.state === "running" ? job.eta_seconds : null), null, job.state === "running" && atLeast(job) ? h("small", { key: "least" }, "at least ") : null),
     h("td", { class: "acts" }, jobActions(state, job, actions)));
 }

@@ -1,8 +1,10 @@
-// Error against time: the choice of clock, the drawing, what it says at the point that was chosen, and all of it as a table.
+// Error against time: the choice of the axis, the drawing, the values at the chosen point, and all values as
+// a table.
 import { h } from "../dom.js";
 import { aheadOf, drawable } from "../plot_scale.js";
 import { duration, figure, given, interval, spp } from "../format.js";
-import { doubtful, kDoubt, trueFigure, verdictOf } from "../verdict.js";
+import { phrases } from "../phrases.js";
+import { denoisedTarget, doubtful, trueFigure, verdictOf } from "../verdict.js";
 import { choice } from "./pieces.js";
 import { boxOf, drawing, frameOf } from "./plot_drawing.js";
 
@@ -12,7 +14,7 @@ const kSince = { seconds: "after the first ray", core_seconds: "of core time" };
 /** open: {clock, picked, report}; actions: pick(index or null), setClock(key). narrow: the page is as wide as a phone. */
 export function errorPlot(job, { clock, picked, report }, actions, narrow) {
   const points = drawable(report?.convergence, clock);
-  const plot = { points, key: clock, target: job.target_error ?? report?.target_error ?? null, ahead: aheadOf(job, report, clock), narrow };
+  const plot = { points, key: clock, target: denoisedTarget(job) ? null : job.target_error ?? report?.target_error ?? null, ahead: aheadOf(job, report, clock), narrow };
   const verdict = verdictOf(job, report);
   plot.doubt = doubtful(verdict);
   if (plot.doubt) withoutIntervals(plot);
@@ -32,10 +34,10 @@ function withoutIntervals(plot) {
 
 function empty(narrow) {
   const box = boxOf(narrow);
-  const row = (text, line) => h("text", { key: line, x: box.width / 2, y: box.height / 2 + 18 * line, "text-anchor": "middle" }, text);
+  const rows = phrases.noPointYet.split(/ (?=has )/); // half of the sentence each, for narrow pages
   return h("figure", { key: "empty" },
     h("svg", { class: "plot-empty", viewBox: `0 0 ${box.width} ${box.height}`, role: "img", "aria-label": "No point yet" },
-      row("The first point appears when every tile", 0), row("has finished two rounds of samples.", 1)),
+      rows.map((text, line) => h("text", { key: line, x: box.width / 2, y: box.height / 2 + 18 * line, "text-anchor": "middle" }, text))),
     h("figcaption", { class: "plot-reading" }));
 }
 
@@ -71,11 +73,11 @@ const spoken = (point, key) => `relMSE ${figure(point.relmse)} after ${duration(
 
 function reading(point, { key, doubt }) {
   const ci = interval(point.relmse_ci95);
-  const within = doubt ? ` (${kDoubt})` : ci ? ` (95 %: ${ci})` : null;
+  const within = doubt ? ` (${phrases.doubt})` : ci ? ` (95 %: ${ci})` : null;
   return [
     h("span", { key: "t" }, h("b", null, duration(point[key])), ` ${kSince[key]}`),
     h("span", { key: "e" }, "relMSE ", h("b", null, figure(point.relmse)), within),
-    Number.isFinite(point.true_relmse) ? h("span", { key: "r", class: "true" }, point.true_relmse_below_noise === true ? "true error " : "against the reference ", h("b", null, trueFigure(point.true_relmse, point.true_relmse_below_noise)), point.true_flip >= 0 ? `, FLIP ${figure(point.true_flip)}` : null) : null,
+    Number.isFinite(point.true_relmse) ? h("span", { key: "r", class: "true" }, point.true_relmse_below_noise === true ? "true error " : `${phrases.againstReference} `, h("b", null, trueFigure(point.true_relmse, point.true_relmse_below_noise)), point.true_flip >= 0 ? `, FLIP ${figure(point.true_flip)}` : null) : null,
     h("span", { key: "s" }, h("b", null, spp(point.spp)), " samples per pixel")];
 }
 
@@ -92,9 +94,9 @@ function verdictWords(report, verdict) {
   const signed = (x) => x.toFixed(2).replace("-", "−");
   const ci = Array.isArray(report.slope_ci95) && !doubtful(verdict) ? ` (${report.slope_ci95.map(signed).join(" to ")})` : "";
   return [
-    typeof report.slope === "number" ? h("span", { key: "slope", title: "Of log error over log time; independent samples give −1" }, "slope ", h("b", null, signed(report.slope)), ci) : null,
+    typeof report.slope === "number" ? h("span", { key: "slope", title: `Of log error over log time; ${phrases.independentSamples}` }, "slope ", h("b", null, signed(report.slope)), ci) : null,
     doubtful(verdict)
-      ? h("span", { key: "words", class: "doubt" }, verdict.words || "This error estimate can't be trusted yet.")
+      ? h("span", { key: "words", class: "doubt" }, verdict.words || phrases.estimateInDoubt)
       : h("span", { key: "words" }, verdict.words)];
 }
 
@@ -106,7 +108,7 @@ function table({ points, doubt }) {
   const truth = points.some((p) => p.true_relmse > 0);
   const columns = kColumns.filter(([name]) => (name === "95 % interval" ? !doubt : name === "True relMSE" ? truth : true));
   return h("details", { key: "table", class: "plot-table" }, h("summary", null, "As a table"),
-    doubt ? h("p", { key: "why", class: "help" }, "No intervals are shown: the estimate can't be trusted yet.") : null,
+    doubt ? h("p", { key: "why", class: "help" }, phrases.noIntervals) : null,
     h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Error at each checkpoint" }, h("table", null,
       h("thead", null, h("tr", null, columns.map(([name]) => h("th", { key: name, scope: "col" }, name)))),
       h("tbody", null, points.map((p, i) => h("tr", { key: i }, columns.map(([name, text]) => h("td", { key: name }, text(p)))))))));

@@ -1,11 +1,11 @@
-// The drawing of error against time: measured points with their 95 % band, the true error where there is a reference, the
-// target, and where the error is expected to meet it.
+// The drawing of error against time: measured points with their 95 % band, the true error if there is a
+// reference, the target, and the predicted time at which it will be reached.
 import { h } from "../dom.js";
 import { errorTicks, logAxis, timeTicks } from "../plot_scale.js";
 import { given } from "../format.js";
 
-const kFarthest = 100; // times the last point: a forecast beyond it is not drawn
-const kHalfLabel = 22; // of the widest label of time, which must not leave the drawing
+const kFarthest = 100; // multiple of the last time: a forecast beyond it is not drawn
+const kHalfLabel = 22; // half the width of the widest label of time, which must fit into the drawing
 const kWide = { width: 680, height: 350, left: 52, right: 668, top: 12, bottom: 316 };
 const kNarrow = { width: 330, height: 270, left: 44, right: 324, top: 12, bottom: 230 };
 

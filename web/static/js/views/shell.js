@@ -1,14 +1,15 @@
-// The frame around every view: name, navigation, and whether the page is live.
+// The frame around every view: name, navigation, and the state of the connection.
 import { h } from "../dom.js";
 import { signInView } from "./signin.js";
 import { jobsView } from "./jobs.js";
 import { jobView } from "./job.js";
 import { workersView } from "./workers.js";
 import { submitView } from "./submit.js";
+import { viewerView } from "./viewer.js";
 import { mark } from "./pieces.js";
 import { mayChange } from "../state.js";
 
-const kViews = { jobs: jobsView, job: jobView, workers: workersView, submit: submitView };
+const kViews = { jobs: jobsView, job: jobView, workers: workersView, submit: submitView, view: viewerView };
 const kLinkWords = { connecting: "connecting …", live: "live", lost: "connection lost, trying again …" };
 
 /** The whole page as a function of state. */
@@ -26,12 +27,12 @@ export function page(state, actions) {
 const skipLink = () => h("a", { key: "skip", class: "skip", href: "#main", onclick: toMain }, "Skip to the content");
 
 function toMain(event) {
-  event.preventDefault(); // the fragment is the route
+  event.preventDefault(); // the default would change the fragment, which is the route
   document.getElementById("main").focus();
 }
 
 function header(state, actions) {
-  const here = state.route.view === "job" ? "jobs" : state.route.view;
+  const here = ["job", "view"].includes(state.route.view) ? "jobs" : state.route.view;
   const link = (view, label) => h("a", { key: view, href: `#/${view}`, "aria-current": here === view ? "page" : null }, label);
   return h("header", { key: "header", class: "top" },
     h("a", { class: "brand", href: "#/jobs", "aria-label": "Lightshaft, all jobs" }, mark(), h("span", null, "Lightshaft")),

@@ -1,4 +1,4 @@
-// Who has no session sees only this.
+// The page for users without a session.
 import { h } from "../dom.js";
 import { mark } from "./pieces.js";
 

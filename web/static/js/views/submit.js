@@ -1,4 +1,4 @@
-// A new job: drop a scene with its files, choose settings, send.
+// The page for a new job: drop a scene with its files, choose settings, send.
 import { h } from "../dom.js";
 import { bytes, plural } from "../format.js";
 import { scenesAmong } from "../bundle.js";
@@ -27,7 +27,7 @@ function dropZone(submit, actions, busy) {
     submit.files.length ? null : h("p", { key: "help", class: "help" }, "Mitsuba XML. Only the files that the scene names are sent, and none that the farm has already."));
 }
 
-// The input lies over its button, unseen, so that keyboard and screen reader meet a real file input.
+// A file input on top of its button, but invisible, so that keyboard and screen reader use a real file input.
 const chooser = (id, label, attributes, actions, disabled) =>
   h("label", { class: "button chooser", for: id }, label, h("input", { id, type: "file", class: "over", disabled, onchange: actions.onFiles, ...attributes }));
 
@@ -35,7 +35,8 @@ function bundle(submit, actions, busy) {
   const scenes = scenesAmong(submit.files);
   const { plan } = submit;
   return h("section", { key: "bundle", class: "panel bundle" },
-    // At the top, and with the name that is known at once: what comes later must not push it under the pointer.
+    // The name is known immediately and is at the top, so that later content does not move it under the
+    // pointer.
     h("div", { key: "head", class: "bundle-head" },
       h("h2", null, plan ? plan.main.name : submit.main?.split("/").at(-1) ?? "No scene yet"),
       h("button", { type: "button", class: "small quiet", disabled: busy, onclick: actions.clearFiles }, "Start over")),

@@ -1,4 +1,4 @@
-// The machines that render.
+// The list of workers.
 import { h } from "../dom.js";
 import { colourOf } from "../state.js";
 import { bytes, count, duration, jobName, plural } from "../format.js";

@@ -1,0 +1,71 @@
+"""The camera, the film and the integrator."""
+
+import math
+
+from .document import element, reference
+from .problems import ExportError
+
+TURNED = ((-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1))  # looks along +z with +x to the left
+
+
+def add_camera(document, problems, camera, scene, size, medium, matrix_class):
+    """`medium`: the id of what the camera is in, or None. `matrix_class`: Blender's Matrix."""
+    data, name = camera.data, camera.name
+    render = scene.render
+    if abs(render.pixel_aspect_x - render.pixel_aspect_y) > 1e-6:
+        raise ExportError("Output > Format: Aspect X and Y must be equal; Lightshaft's pixels are square")
+    if render.use_border:
+        raise ExportError("Output > Format: Render Region is not supported. Switch it off (Ctrl Alt B)")
+    if data.type == "PANO":
+        raise ExportError(
+            f"camera '{name}': panoramas are not supported. Choose Lens > Type: Perspective or Orthographic"
+        )
+    width, height = size
+    location, rotation, _ = camera.matrix_world.decompose()
+    to_world = matrix_class.Translation(location) @ rotation.to_matrix().to_4x4() @ matrix_class(TURNED)
+    fit = data.sensor_fit if data.sensor_fit != "AUTO" else ("HORIZONTAL" if width >= height else "VERTICAL")
+    frame = width if fit == "HORIZONTAL" else height
+    values = {"near_clip": float(data.clip_start), "far_clip": float(data.clip_end)}
+    plugin = "perspective"
+    if data.type == "ORTHO":
+        plugin = "orthographic"
+        half = data.ortho_scale / 2 * width / frame
+        step = data.ortho_scale
+        to_world = to_world @ matrix_class.Translation((-data.shift_x * step, data.shift_y * step, 0))
+        to_world = to_world @ matrix_class.Diagonal((half, half, 1, 1))
+    else:
+        # Where the fit is automatic the sensor's width is along the longer side.
+        sensor = data.sensor_height if data.sensor_fit == "VERTICAL" else data.sensor_width
+        values["fov"] = math.degrees(2 * math.atan(sensor / 2 / data.lens))
+        values["fov_axis"] = "x" if fit == "HORIZONTAL" else "y"
+        values["principal_point_offset_x"] = data.shift_x * frame / width
+        values["principal_point_offset_y"] = -data.shift_y * frame / height
+        dof = data.dof
+        if dof.use_dof:
+            plugin = "thinlens"
+            values["aperture_radius"] = data.lens * 1e-3 / (2 * dof.aperture_fstop)
+            values["focus_distance"] = focus_distance(camera)
+            if dof.aperture_blades >= 3 or abs(dof.aperture_ratio - 1) > 1e-6:
+                problems.unsupported(
+                    f"camera '{name}': Aperture > Blades and Ratio. Lightshaft's lens is round: set them to 0 and 1"
+                )
+    if render.use_motion_blur:
+        problems.unsupported("Render Properties: Motion Blur. Lightshaft renders an instant: switch it off")
+    if render.film_transparent:
+        problems.unsupported(
+            "Render Properties > Film: Transparent. Lightshaft's images have no alpha: switch it off"
+        )
+    film = element("film", "hdrfilm", None, element("rfilter", "gaussian"), width=width, height=height)
+    sampler = element("sampler", "independent", None, sample_count=int(scene.lightshaft.samples))
+    inside = reference(medium, "medium") if medium else None
+    document.add(element("sensor", plugin, None, film, sampler, inside, to_world=to_world, **values))
+    document.add(element("integrator", "volpath", None, max_depth=int(scene.lightshaft.max_depth)))
+
+
+def focus_distance(camera):
+    """Along the view axis, as Blender measures it, to the object or as given."""
+    dof = camera.data.dof
+    if dof.focus_object is None:
+        return float(dof.focus_distance)
+    rigid = camera.matrix_world.normalized()
+    return max(1e-3, -(rigid.inverted() @ dof.focus_object.matrix_world.translation).z)

@@ -1,0 +1,140 @@
+"""Lights and the world. Blender's watts are of a light that radiates to all sides alike."""
+
+import math
+
+import numpy as np
+
+from . import exr
+from .document import element
+
+FLIP = ((1, 0, 0, 0), (0, -1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1))  # Blender's lights look along -z
+PROFILE = 512  # pixels of the image that a spot light throws
+
+
+def add_light(document, problems, item, matrix, matrix_class):
+    """A light object at `matrix`; what it casts is in W, as in the Light properties."""
+    data, name = item.data, item.name
+    colour = light_colour(data)
+    if (
+        data.use_nodes
+        and data.node_tree
+        and any(
+            node.type not in ("EMISSION", "OUTPUT_LIGHT")
+            or any(socket.is_linked for socket in node.inputs if node.type == "EMISSION")
+            for node in data.node_tree.nodes
+        )
+    ):
+        problems.unsupported(
+            f"light '{name}': nodes. Set its Color and Power in Light properties, and switch Use Nodes off"
+        )
+    if not data.normalize:
+        problems.unsupported(f"light '{name}': Normalize off. Switch it on in Light properties")
+    if not data.use_shadow:
+        problems.unsupported(
+            f"light '{name}': Shadow off. Lightshaft's lights all cast shadows: switch it on"
+        )
+    if not any(colour) or data.cycles.is_portal:
+        return
+    rigid = matrix.normalized()
+    if data.type == "SUN":
+        direction = -rigid.col[2].xyz
+        sun = element(
+            "emitter", "directional", None, irradiance=colour, angular_radius=math.degrees(data.angle / 2)
+        )
+        sun.append(vector("direction", direction))
+        document.add(sun)
+    elif data.type == "POINT":
+        radius = data.shadow_soft_size
+        if radius > 0:
+            ball = matrix_class.Translation(matrix.translation) @ matrix_class.Scale(radius, 4)
+            radiance = [c / (4 * math.pi**2 * radius**2) for c in colour]
+            document.add(lamp("sphere", ball, radiance))
+        else:
+            point = element("emitter", "point", None, intensity=[c / (4 * math.pi) for c in colour])
+            point.append(vector("position", matrix.translation, "point"))
+            document.add(point)
+    elif data.type == "SPOT":
+        add_spot(document, problems, data, name, colour, rigid @ matrix_class(FLIP))
+    else:
+        add_area(document, problems, data, name, colour, matrix @ matrix_class(FLIP), matrix_class)
+
+
+def light_colour(data):
+    colour = [data.energy * 2.0**data.exposure * c for c in data.color]
+    if data.use_temperature:
+        colour = [c * t for c, t in zip(colour, data.temperature_color)]
+    return colour
+
+
+def vector(name, values, kind="vector"):
+    import xml.etree.ElementTree as ElementTree
+
+    return ElementTree.Element(
+        kind, {"name": name, **{axis: repr(float(v)) for axis, v in zip("xyz", values)}}
+    )
+
+
+def lamp(shape, to_world, radiance):
+    """A shape that gives off light and lets light of others pass, as Blender's lamps do."""
+    emitter = element("emitter", "area", None, radiance=radiance)
+    return element("shape", shape, None, element("bsdf", "null"), emitter, to_world=to_world)
+
+
+def add_spot(document, problems, data, name, colour, to_world):
+    if data.shadow_soft_size > 0:
+        problems.unsupported(f"light '{name}': a spot's Radius. Lightshaft's spots are points: set it to 0")
+    half = data.spot_size / 2
+    if half > math.radians(85):
+        problems.error(f"light '{name}': a Spot Size above 170 degrees. Use a point light")
+        return
+    image = np.repeat(spot_profile(half, data.spot_blend)[:, :, None], 3, axis=2)
+    # An image whose middle is the axis and whose edge is the cone: the falloff in it is Blender's to the last pixel.
+    texture = element(
+        "texture",
+        "bitmap",
+        None,
+        filename=document.write(exr.write(image), ".exr"),
+        raw=True,
+        wrap_mode="clamp",
+    )
+    angle = math.degrees(half)
+    intensity = [c / (4 * math.pi) for c in colour]
+    document.add(
+        element(
+            "emitter",
+            "spot",
+            None,
+            to_world=to_world,
+            intensity=intensity,
+            cutoff_angle=angle,
+            beam_width=angle * 0.9999,
+            texture=texture,
+        )
+    )
+
+
+def spot_profile(half, blend):
+    """Blender's falloff over the square around the cone: a smooth step of the cosine between the edge and the blend."""
+    across = (np.arange(PROFILE) + 0.5) / PROFILE * 2 - 1
+    tangent = np.hypot(across[None, :], across[:, None]) * math.tan(half)
+    cosine = 1 / np.sqrt(1 + tangent**2)
+    edge = math.cos(half)
+    step = np.clip((cosine - edge) / max((1 - edge) * blend, 1e-6), 0, 1)
+    return step * step * (3 - 2 * step)
+
+
+def add_area(document, problems, data, name, colour, to_world, matrix_class):
+    if data.spread < math.pi - 1e-4:
+        problems.unsupported(
+            f"light '{name}': Beam Shape > Spread. Lightshaft's area lights shine to all sides: set it to 180 degrees"
+        )
+    long = data.size
+    short = data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size
+    round_one = data.shape in ("DISK", "ELLIPSE")
+    placed = to_world @ matrix_class.Diagonal((long / 2, short / 2, 1, 1))
+    across, up = placed.col[0].xyz, placed.col[1].xyz
+    area = across.cross(up).length * (math.pi if round_one else 4)
+    if area <= 0:
+        problems.error(f"light '{name}': its size is 0. Give it a size, or make it a point light")
+        return
+    document.add(lamp("disk" if round_one else "rectangle", placed, [c / (math.pi * area) for c in colour]))

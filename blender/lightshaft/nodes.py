@@ -1,0 +1,92 @@
+"""Walks node trees: through reroutes and groups to the node that a socket's value comes from."""
+
+
+class Place:
+    """A node within the groups that were entered to reach it."""
+
+    def __init__(self, node, groups=()):
+        self.node, self.groups = node, groups
+
+    def input(self, name):
+        return next(
+            (socket for socket in self.node.inputs if socket.identifier == name or socket.name == name), None
+        )
+
+    def source(self, socket):
+        """What feeds an input: (Place, output socket); (None, socket) with the socket that holds the value if nothing does."""
+        groups = self.groups
+        while True:
+            if (
+                socket is None
+                or not socket.is_linked
+                or not socket.links[0].is_valid
+                or socket.links[0].is_muted
+            ):
+                return None, socket
+            output = socket.links[0].from_socket
+            node = output.node
+            if node.type == "REROUTE" or node.mute:
+                socket = next((s for s in node.inputs if s.type == output.type), None)
+            elif node.type == "GROUP" and node.node_tree:
+                inner = output_node(node.node_tree, "GROUP_OUTPUT")
+                groups = (*groups, node)
+                socket = inner and next((s for s in inner.inputs if s.identifier == output.identifier), None)
+            elif node.type == "GROUP_INPUT" and groups:
+                socket = next((s for s in groups[-1].inputs if s.identifier == output.identifier), None)
+                groups = groups[:-1]
+            else:
+                return Place(node, groups), output
+
+    @property
+    def title(self):
+        return self.node.label or self.node.name
+
+
+def output_node(tree, kind):
+    """The active output of a tree; of materials and worlds not one that is only for EEVEE."""
+    found = [
+        node
+        for node in tree.nodes
+        if node.type == kind and getattr(node, "target", "ALL") in ("ALL", "CYCLES")
+    ]
+    return next((node for node in found if node.is_active_output), found[0] if found else None)
+
+
+def plain(socket):
+    """The value of an input that nothing feeds: a number, or three."""
+    value = socket.default_value
+    return [float(v) for v in value][:3] if hasattr(value, "__len__") else float(value)
+
+
+def constant(place, socket):
+    """The value of an input if it is the same everywhere, else None."""
+    source, output = place.source(socket)
+    if source is None:
+        return plain(output) if output is not None and hasattr(output, "default_value") else None
+    node = source.node
+    if node.type in ("RGB", "VALUE"):
+        return plain(output)
+    if node.type == "BLACKBODY":
+        return None
+    if node.type == "MATH" and not node.use_clamp and node.operation in ARITHMETIC:
+        values = [constant(source, s) for s in node.inputs[:2]]
+        return ARITHMETIC[node.operation](*values) if all(isinstance(v, float) for v in values) else None
+    if (
+        node.type == "MIX"
+        and node.data_type == "RGBA"
+        and node.blend_type == "MIX"
+        and node.factor_mode == "UNIFORM"
+    ):
+        share = constant(source, source.input("Factor_Float"))
+        ends = [constant(source, source.input(name)) for name in ("A_Color", "B_Color")]
+        if isinstance(share, float) and all(isinstance(end, list) for end in ends):
+            return [a + (b - a) * share for a, b in zip(*ends)]
+    return None
+
+
+ARITHMETIC = {
+    "ADD": lambda a, b: a + b,
+    "SUBTRACT": lambda a, b: a - b,
+    "MULTIPLY": lambda a, b: a * b,
+    "DIVIDE": lambda a, b: a / b if b else 0.0,
+}

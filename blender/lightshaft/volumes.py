@@ -1,0 +1,236 @@
+"""Volume shaders as media: fog in closed meshes, and OpenVDB grids of volume objects."""
+
+import math
+import xml.etree.ElementTree as ElementTree
+
+from .document import element
+from .nodes import Place, constant, output_node
+
+
+class Coefficients:
+    """Scattering, absorption (1/m) and emission (radiance/m) in three channels, and the phase function's mean cosine.
+
+    `grid`: the name of the grid that multiplies scattering and absorption, None without one.
+    """
+
+    def __init__(self, scattering=(0, 0, 0), absorption=(0, 0, 0), emission=(0, 0, 0), g=0.0, grid=None):
+        self.scattering, self.absorption, self.emission, self.g, self.grid = (
+            scattering,
+            absorption,
+            emission,
+            g,
+            grid,
+        )
+
+
+class Volumes:
+    def __init__(self, document, problems):
+        self.document, self.problems = document, problems
+
+    def coefficients(self, owner, of_grid):
+        """What the material's Volume input says; None if there is nothing, or an error was told."""
+        material = owner.material
+        node = output_node(material.node_tree, "OUTPUT_MATERIAL") if material and material.node_tree else None
+        output = Place(node) if node else None
+        source = output.source(output.input("Volume"))[0] if output else None
+        if source is None:
+            if of_grid:
+                self.problems.error(
+                    f"{owner}: a volume object needs a material with a Principled Volume. Add one in Material properties"
+                )
+            return None
+        return self.shader(source, owner, of_grid)
+
+    def shader(self, place, owner, of_grid):
+        where = f"{owner}, node '{place.title}'"
+        kind = place.node.type
+        if kind == "ADD_SHADER":
+            return self.sum_of(place, owner, of_grid)
+        names = INPUTS.get(kind)
+        if names is None:
+            self.problems.error(
+                f"{where}: Lightshaft has no {place.node.bl_label} shader for volumes. Use a Principled Volume"
+            )
+            return None
+        values = {}
+        for name in names:
+            values[name] = constant(place, place.input(name))
+            if (
+                values[name] is None
+                and name in ("Density", "Emission Strength")
+                and self.is_grid(place, name, of_grid)
+            ):
+                continue
+            if values[name] is None:
+                self.problems.error(
+                    f"{where}: {name} varies by nodes. Lightshaft takes numbers, and the grids of OpenVDB files: "
+                    "unlink it, or bake the volume to an OpenVDB file (Geometry Nodes: Mesh to Volume; Physics: Fluid)"
+                )
+                return None
+        if kind in ("VOLUME_SCATTER", "VOLUME_COEFFICIENTS") and place.node.phase != "HENYEY_GREENSTEIN":
+            self.problems.error(
+                f"{where}: phase function {place.node.phase.replace('_', ' ').title()}. Choose Henyey-Greenstein"
+            )
+            return None
+        found = BUILD[kind](values)
+        if kind == "PRINCIPLED_VOLUME":
+            if values["Blackbody Intensity"] != 0.0:
+                self.problems.unsupported(
+                    f"{where}: Blackbody Intensity. Set it to 0, and use Emission Strength"
+                )
+            if place.input("Color Attribute").default_value:
+                self.problems.unsupported(f"{where}: Color Attribute. Clear it, and set Color")
+        if of_grid:
+            found.grid = self.grid_name(place, values)
+            if any(found.emission):
+                self.problems.unsupported(
+                    f"{where}: emission of a grid's volume, which Blender gives off everywhere in its box. Set it to 0"
+                )
+                found.emission = (0, 0, 0)
+        return found
+
+    def is_grid(self, place, name, of_grid):
+        source, _ = place.source(place.input(name))
+        return (
+            of_grid
+            and name == "Density"
+            and source is not None
+            and source.node.type in ("ATTRIBUTE", "VOLUME_INFO")
+        )
+
+    def grid_name(self, place, values):
+        """The grid that multiplies the density: of a Principled Volume its attribute, else what is linked to Density."""
+        if values.get("Density") is None:
+            node = place.source(place.input("Density"))[0].node
+            return node.attribute_name if node.type == "ATTRIBUTE" else "density"
+        if place.node.type == "PRINCIPLED_VOLUME":
+            return place.input("Density Attribute").default_value or "density"
+        return None
+
+    def sum_of(self, place, owner, of_grid):
+        parts = [
+            self.shader(source, owner, of_grid) if (source := place.source(s)[0]) else None
+            for s in place.node.inputs[:2]
+        ]
+        parts = [part for part in parts if part is not None]
+        if len(parts) < 2:
+            return parts[0] if parts else None
+        one, two = parts
+        scattering = [part for part in parts if any(part.scattering)]
+        if len(scattering) == 2 and one.g != two.g or one.grid != two.grid:
+            self.problems.error(
+                f"{owner}, node '{place.title}': the sum of two volumes of different Anisotropy or grid. Give both the same, or put them into two objects"
+            )
+            return None
+        add = lambda a, b: tuple(x + y for x, y in zip(a, b))  # noqa: E731
+        g = scattering[0].g if scattering else 0.0
+        return Coefficients(
+            add(one.scattering, two.scattering),
+            add(one.absorption, two.absorption),
+            add(one.emission, two.emission),
+            g,
+            one.grid,
+        )
+
+    def homogeneous(self, name, found):
+        return self.document.define(name, medium("homogeneous", found, total(found), any(found.emission)))
+
+    def grid(self, item, owner, found, path, matrix, box):
+        """A medium in the box (of the object's space) of a grid's file: its id, and where the box [-1, 1]^3 of it stands.
+
+        None if it is empty, or an error was told.
+        """
+        data = item.data
+        if found.grid is None:
+            self.problems.error(
+                f"{owner}: Density is the same everywhere in the box of its grids. Link an Attribute node 'density' to it"
+            )
+            return None
+        if data.render.space == "OBJECT":  # thickness as the object's own space has it, however it is scaled
+            size = (matrix.to_3x3() @ type(matrix.translation)((1, 1, 1))).length / math.sqrt(3)
+            found.scattering, found.absorption = (
+                [c / size for c in part] for part in (found.scattering, found.absorption)
+            )
+        sigma_t = total(found)
+        peak = max(sigma_t)
+        if peak <= 0:
+            return None
+        if max(sigma_t) - min(sigma_t) > 1e-6 * peak:
+            self.problems.error(
+                f"{owner}: the three channels of extinction differ. Set Absorption Color to black, or Color to grey"
+            )
+            return None
+        filename = self.document.take(path, str(owner))
+        grid = element(
+            "volume", "gridvolume", "sigma_t", filename=filename, grid_name=found.grid, to_world=matrix
+        )
+        fog = medium("heterogeneous", found, None, False)
+        fog.append(ElementTree.Element("float", name="scale", value=repr(float(peak))))
+        fog.append(grid)
+        identifier = self.document.define(item.name, fog)
+        low, high = ([f(corner[axis] for corner in box) for axis in range(3)] for f in (min, max))
+        middle = [(a + b) / 2 for a, b in zip(low, high)]
+        half = [(b - a) / 2 * 1.001 for a, b in zip(low, high)]
+        cls = type(matrix)
+        place = matrix @ cls.Translation(middle) @ cls.Diagonal((*half, 1))
+        inside = ElementTree.Element("ref", {"name": "interior", "id": identifier})
+        self.document.add(element("shape", "cube", None, element("bsdf", "null"), inside, to_world=place))
+        return identifier, place
+
+
+def total(found):
+    return [s + a for s, a in zip(found.scattering, found.absorption)]
+
+
+def medium(plugin, found, sigma_t, glows):
+    albedo = [s / (s + a) if s + a > 0 else 0.0 for s, a in zip(found.scattering, found.absorption)]
+    phase = element("phase", "hg", None, g=found.g) if found.g else element("phase", "isotropic")
+    return element(
+        "medium",
+        plugin,
+        None,
+        phase,
+        sigma_t=sigma_t,
+        albedo=albedo,
+        emission=list(found.emission) if glows else None,
+    )
+
+
+INPUTS = {
+    "PRINCIPLED_VOLUME": (
+        "Color", "Density", "Anisotropy", "Absorption Color", "Emission Strength", "Emission Color", "Blackbody Intensity",
+    ),
+    "VOLUME_SCATTER": ("Color", "Density", "Anisotropy"),
+    "VOLUME_ABSORPTION": ("Color", "Density"),
+    "VOLUME_COEFFICIENTS": ("Absorption Coefficients", "Scatter Coefficients", "Anisotropy", "Emission Coefficients"),
+    "EMISSION": ("Color", "Strength"),
+}  # fmt: skip
+
+
+def principled(v):
+    density = density_of(v)
+    scattering = [density * c for c in v["Color"]]
+    # Blender's rule: absorption = density * (1 - Color) * (1 - sqrt(Absorption Color)).
+    absorption = [
+        density * max(1 - c, 0) * max(1 - math.sqrt(max(a, 0)), 0)
+        for c, a in zip(v["Color"], v["Absorption Color"])
+    ]
+    emission = [v["Emission Strength"] * c for c in v["Emission Color"]]
+    return Coefficients(scattering, absorption, emission, v["Anisotropy"])
+
+
+def density_of(v):
+    return 1.0 if v["Density"] is None else max(v["Density"], 0)
+
+
+BUILD = {
+    "PRINCIPLED_VOLUME": principled,
+    "VOLUME_SCATTER": lambda v: Coefficients([density_of(v) * c for c in v["Color"]], g=v["Anisotropy"]),
+    "VOLUME_ABSORPTION": lambda v: Coefficients(
+        absorption=[density_of(v) * max(1 - c, 0) for c in v["Color"]]
+    ),
+    "VOLUME_COEFFICIENTS": lambda v: Coefficients(
+        v["Scatter Coefficients"], v["Absorption Coefficients"], v["Emission Coefficients"], v["Anisotropy"]
+    ),
+    "EMISSION": lambda v: Coefficients(emission=[v["Strength"] * c for c in v["Color"]]),
+}

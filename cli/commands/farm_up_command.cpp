@@ -1,0 +1,281 @@
+// `lightshaft farm up --on ENGINE`: starts and stops workers as a farm's jobs need them.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+
+#include "cli/commands/commands.h"
+#include "cli/farm/farm_api.h"
+#include "cli/output/console.h"
+#include "cli/output/job_options.h"
+#include "cli/output/output_file.h"
+#include "cli/scale/docker_engine.h"
+#include "cli/scale/farm_up.h"
+#include "cli/scale/kubernetes_engine.h"
+#include "cli/scale/slurm_engine.h"
+#include "cli/scale/ssh_engine.h"
+#include "common/base/helper_program.h"
+#include "common/base/secret.h"
+
+namespace ls::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMostSeconds = 1e7, kMostHours = 1e9;
+
+// Numbers are kept as text until they are parsed, so that error messages can name the option.
+struct FarmUpFlags {
+  FarmOptions farm;
+  std::string engine, name = "farm", coordinator, join_token, worker, machines, ssh_config, logs = ".",
+                      report, image = "lightshaft-worker:local", like = "deployment/worker", job_budget;
+  std::string workers = "1", threads = "1", finish_in = "600", idle = "60", drain = "120", poll = "5", budget,
+              minutes = "60";
+  std::vector<std::string> user_budgets, sbatch, docker, kubectl, worker_options;
+  bool until_done = false;
+};
+
+// Checks the name, which is part of jobs' and workers' names, and of file names.
+Result<void> check_name(const std::string& name) {
+  const bool plain = !name.empty() && name.size() <= 40 && std::all_of(name.begin(), name.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+  });
+  if (plain) return {};
+  return bad_argument(fmt::format("--name '{}': letters, digits and _, at most 40 of them", name));
+}
+
+// Reads the join token from a file, which must not be readable by everybody.
+Result<std::string> read_join_token(const std::string& file) {
+  if (file.empty()) return bad_argument("--join-token FILE is needed: DATA/join-token of the coordinator");
+  std::error_code unknown;
+  const auto mode = fs::status(file, unknown).permissions();
+  if (!unknown && (mode & fs::perms::others_read) != fs::perms::none)
+    return bad_argument(
+        fmt::format("--join-token: everybody on this machine may read {}: chmod 600 it", file));
+  auto token = read_secret(file);
+  if (!token) return bad_argument("--join-token: " + token.error().message);
+  return token;
+}
+
+// HOURS for every user, or USER=HOURS.
+Result<void> read_user_budget(const std::string& text, Budgets& budgets) {
+  const auto sign = text.rfind('=');
+  const auto hours =
+      parse_positive("--user-budget", sign == std::string::npos ? text : text.substr(sign + 1), kMostHours);
+  if (!hours) return tl::unexpected(hours.error());
+  if (sign == std::string::npos)
+    budgets.user = *hours * kCoreHour;
+  else
+    budgets.users[text.substr(0, sign)] = *hours * kCoreHour;
+  return {};
+}
+
+Result<Budgets> parse_budgets(const FarmUpFlags& f) {
+  Budgets budgets;
+  if (!f.job_budget.empty()) {
+    const auto hours = parse_positive("--job-budget", f.job_budget, kMostHours);
+    if (!hours) return tl::unexpected(hours.error());
+    budgets.job = *hours * kCoreHour;
+  }
+  for (const std::string& text : f.user_budgets)
+    if (const auto read = read_user_budget(text, budgets); !read) return tl::unexpected(read.error());
+  return budgets;
+}
+
+Result<FarmUpOptions> parse_options(const FarmUpFlags& f) {
+  FarmUpOptions o;
+  if (const auto good = check_name(f.name); !good) return tl::unexpected(good.error());
+  const auto workers = parse_whole("--workers", f.workers, 1, 10'000);
+  const auto threads = parse_whole("--threads", f.threads, 1, 1024);
+  if (!workers) return tl::unexpected(workers.error());
+  if (!threads) return tl::unexpected(threads.error());
+  o.limits.farm = f.name;
+  o.limits.most_workers = static_cast<int>(*workers);
+  o.limits.threads = static_cast<int>(*threads);
+  struct Row {
+    const char* option;
+    const std::string& text;
+    double& value;
+  };
+  for (const Row& row :
+       {Row{"--finish-in", f.finish_in, o.limits.finish_in}, Row{"--idle", f.idle, o.limits.idle_seconds},
+        Row{"--drain", f.drain, o.limits.drain_seconds}, Row{"--poll", f.poll, o.limits.poll_seconds}}) {
+    const auto value = parse_positive(row.option, row.text, kMostSeconds);
+    if (!value) return tl::unexpected(value.error());
+    row.value = *value;
+  }
+  if (!f.budget.empty()) {
+    const auto hours = parse_positive("--budget", f.budget, kMostHours);
+    if (!hours) return tl::unexpected(hours.error());
+    o.limits.budget_core_seconds = *hours * kCoreHour;
+  }
+  auto budgets = parse_budgets(f);
+  if (!budgets) return tl::unexpected(budgets.error());
+  o.budgets = std::move(*budgets);
+  o.until_done = f.until_done;
+  o.json = f.farm.json;
+  o.report = f.report.empty() ? fmt::format("lightshaft-{}.json", f.name) : f.report;
+  return o;
+}
+
+Result<int> parse_minutes(const FarmUpFlags& f) {
+  const auto minutes = parse_whole("--minutes", f.minutes, 1, 60 * 24 * 365);
+  if (!minutes) return tl::unexpected(minutes.error());
+  return static_cast<int>(*minutes);
+}
+
+// Engines say by the wall clock when they started a worker.
+double unix_time() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+Result<std::unique_ptr<Engine>> open_engine_of_pods(const FarmUpFlags& f, const FarmUpOptions& o) {
+  const auto minutes = parse_minutes(f);
+  if (!minutes) return tl::unexpected(minutes.error());
+  return open_kubernetes({.farm = f.name,
+                          .like = f.like,
+                          .threads = o.limits.threads,
+                          .drain_seconds = static_cast<int>(o.limits.drain_seconds),
+                          .minutes = *minutes,
+                          .logs = f.logs,
+                          .kubectl = f.kubectl,
+                          .worker_options = f.worker_options},
+                         unix_time);
+}
+
+Result<std::unique_ptr<Engine>> open_engine(const FarmUpFlags& f, const FarmUpOptions& o,
+                                            const Clock& clock) {
+  const auto logs = check_folder("--logs", f.logs);
+  if (!logs) return tl::unexpected(logs.error());
+  if (f.engine == "kubernetes") return open_engine_of_pods(f, o);
+  const auto token = read_join_token(f.join_token);
+  if (!token) return tl::unexpected(token.error());
+  if (f.coordinator.empty()) return bad_argument("--coordinator HOST:PORT is needed: as workers reach it");
+  const auto program = [&](const std::string& usual) { return f.worker.empty() ? usual : f.worker; };
+  const WorkerCommand worker{
+      .farm = f.name,
+      .program = program(f.engine == "docker" ? "lightshaft-worker"
+                                              : program_beside_us("lightshaft-worker").string()),
+      .coordinator = f.coordinator,
+      .token_file = fs::absolute(f.join_token).string(),
+      .threads = o.limits.threads,
+      .options = f.worker_options};
+  const std::string log_folder = fs::absolute(f.logs).string();
+  const int drain_seconds = static_cast<int>(o.limits.drain_seconds);
+  if (f.engine == "slurm") {
+    const auto minutes = parse_minutes(f);
+    if (!minutes) return tl::unexpected(minutes.error());
+    return open_slurm({.worker = worker,
+                       .minutes = *minutes,
+                       .drain_seconds = drain_seconds,
+                       .logs = log_folder,
+                       .sbatch = f.sbatch});
+  }
+  if (f.engine == "docker")
+    return open_docker({.worker = worker,
+                        .join_token = *token,
+                        .image = f.image,
+                        .drain_seconds = drain_seconds,
+                        .logs = log_folder,
+                        .run = f.docker},
+                       unix_time);
+  if (f.machines.empty()) return bad_argument("--machines FILE is needed with --on ssh: one machine a line");
+  auto machines = read_machines(f.machines);
+  if (!machines) return tl::unexpected(machines.error());
+  return open_ssh({.worker = worker,
+                   .join_token = *token,
+                   .machines = std::move(*machines),
+                   .config = f.ssh_config,
+                   .logs = log_folder},
+                  clock);
+}
+
+int farm_up(const FarmUpFlags& flags) {
+  Interrupt interrupt;
+  const SystemClock clock;
+  const auto options = parse_options(flags);
+  if (!options) return print_error(options.error());
+  auto engine = open_engine(flags, *options, clock);
+  if (!engine) return print_error(engine.error());
+  auto api = FarmApi::open(flags.farm);
+  return api ? run_farm_up(*api, **engine, *options, interrupt, clock) : print_error(api.error());
+}
+
+void describe(CLI::App& app, FarmUpFlags& f) {
+  f.farm.add_to(app);
+  app.add_option("--on", f.engine,
+                 "what runs the workers: slurm, docker, kubernetes, or ssh for a list of machines")
+      ->required()
+      ->check(CLI::IsMember({"slurm", "ssh", "docker", "kubernetes"}));
+  app.add_option("--coordinator", f.coordinator,
+                 "HOST:PORT where workers reach the coordinator; with kubernetes its manifests say it")
+      ->type_name("HOST:PORT");
+  app.add_option(
+         "--join-token", f.join_token,
+         "file with the farm's join token; with slurm the workers' machines read it under this path, with "
+         "kubernetes a Secret has it")
+      ->type_name("FILE");
+  app.add_option("--workers", f.workers, "the most workers at once; default: 1")->type_name("N");
+  app.add_option("--threads", f.threads, "of each worker; default: 1")->type_name("N");
+  app.add_option("--finish-in", f.finish_in,
+                 "as many workers as finish the queued work in this time; default: 600")
+      ->type_name("SECONDS");
+  app.add_option("--idle", f.idle, "drain a worker that has had no work for this time; default: 60")
+      ->type_name("SECONDS");
+  app.add_option("--drain", f.drain, "end a worker that has not drained after this time; default: 120")
+      ->type_name("SECONDS");
+  app.add_option("--budget", f.budget, "the most to spend, over all runs with the same report")
+      ->type_name("COREHOURS");
+  app.add_option("--job-budget", f.job_budget, "the most to render of each job, by whichever workers")
+      ->type_name("COREHOURS");
+  app.add_option("--user-budget", f.user_budgets,
+                 "the most to render for each user, or with USER= for one; may be repeated")
+      ->type_name("[USER=]COREHOURS")
+      ->allow_extra_args(false);
+  app.add_option("--report", f.report, "what was spent; default: lightshaft-NAME.json")
+      ->type_name("REPORT.json");
+  app.add_option("--name", f.name, "tells several farm-ups apart; default: farm")->type_name("NAME");
+  app.add_flag("--until-done", f.until_done, "end when no job is queued or running");
+  app.add_option("--poll", f.poll, "time between two looks; default: 5")->type_name("SECONDS");
+  app.add_option("--logs", f.logs, "folder for the workers' logs; default: this one")->type_name("DIR");
+  app.add_option("--worker", f.worker, "lightshaft-worker on the workers' machines; default: the path here")
+      ->type_name("PROGRAM");
+  app.add_option("--worker-option", f.worker_options,
+                 "one more word of the worker's command; may be repeated")
+      ->type_name("WORD")
+      ->allow_extra_args(false);
+  app.add_option("--minutes", f.minutes, "slurm, kubernetes: time limit of a worker; default: 60")
+      ->type_name("N");
+  app.add_option("--sbatch", f.sbatch, "slurm: one more option of sbatch, --sbatch=--partition=low say")
+      ->type_name("OPTION")
+      ->allow_extra_args(false);
+  app.add_option("--image", f.image, "docker: image of the workers; default: lightshaft-worker:local")
+      ->type_name("IMAGE");
+  app.add_option("--docker", f.docker, "docker: one more option of docker run, --docker=--network=host say")
+      ->type_name("OPTION")
+      ->allow_extra_args(false);
+  app.add_option("--like", f.like,
+                 "kubernetes: what has the template of a worker's pod; default: deployment/worker")
+      ->type_name("KIND/NAME");
+  app.add_option("--kubectl", f.kubectl,
+                 "kubernetes: one more option of kubectl, --kubectl=--namespace=lightshaft say")
+      ->type_name("OPTION")
+      ->allow_extra_args(false);
+  app.add_option("--machines", f.machines, "ssh: the machines, one a line")->type_name("FILE");
+  app.add_option("--ssh-config", f.ssh_config, "ssh: configuration file to use instead of the usual one")
+      ->type_name("FILE");
+}
+
+}  // namespace
+
+void add_farm_up(CLI::App& app, Action& action) {
+  CLI::App* farm = app.add_subcommand("farm", "workers that come and go with the jobs of a farm");
+  farm->require_subcommand(1);
+  CLI::App* up = farm->add_subcommand("up", "starts workers while jobs need them, until Ctrl-C");
+  auto flags = std::make_shared<FarmUpFlags>();
+  describe(*up, *flags);
+  up->callback([flags, &action] { action = [flags] { return farm_up(*flags); }; });
+}
+
+}  // namespace ls::cli

@@ -1,0 +1,344 @@
+#include "cli/doctor/findings.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "cli/output/console.h"
+#include "coordinator/http/message/limits.h"
+#include "worker/machine.h"
+
+namespace ls::cli {
+namespace {
+
+// Memory below this causes a warning: denoising an image takes up to 2 GiB (lightshaft-denoise limits itself
+// to that).
+constexpr std::uint64_t kLittleMemory = std::uint64_t{2} << 30;
+// Free disk space below kNoRoom is a problem, and below kLittleRoom causes a warning. A coordinator keeps the
+// largest scene in XML and its canonical form, so with less than twice its size a disk cannot store even a
+// scene without files. The OpenVDB file of a cloud has hundreds of MiB, so 1 GiB is full after a few.
+constexpr std::uint64_t kNoRoom = 2 * http::kMaxSceneXml, kLittleRoom = std::uint64_t{1} << 30;
+// Differences between clocks, in seconds. Receivers of webhooks reject signatures that are minutes old
+// (docs/guide/operations.md), so a difference of a minute is still allowed. S3 rejects requests whose time
+// differs by more than 15 minutes.
+constexpr double kClockWarning = 60, kClockProblem = 900;
+constexpr std::size_t kNamesShown = 5;
+
+Finding ok(std::string name, std::string what) {
+  return {std::move(name), {}, Status::ok, std::move(what), {}};
+}
+
+Finding of_memory(const MachineFacts& facts) {
+  Finding found = ok("memory", fmt::format("{} for this process", show_bytes(facts.memory_bytes)));
+  if (facts.memory_bytes < kLittleMemory) {
+    found.status = Status::warning;
+    found.what += ": large scenes and denoising need more than " + show_bytes(kLittleMemory);
+    found.advice = "raise the limit of the control group or container, or use a machine with more memory";
+  }
+  return found;
+}
+
+Finding of_cores(const MachineFacts& facts) {
+  Finding found = ok("cores", fmt::format("{} usable", facts.cpus));
+  if (facts.cpu_quota > 0 && facts.cpu_quota < facts.cpus) {
+    found.status = Status::warning;
+    found.what += fmt::format(", but the control group grants the time of {:.3g}", facts.cpu_quota);
+    found.advice = fmt::format("start renders and workers with --threads {}",
+                               std::max(1, static_cast<int>(std::lround(facts.cpu_quota))));
+  }
+  return found;
+}
+
+Finding of_file_limit(const MachineFacts& facts) {
+  Finding found = ok("open-files", fmt::format("up to {}", facts.file_limit));
+  if (facts.file_limit < worker::kWantedFiles) {
+    found.status = Status::warning;
+    found.what += fmt::format(": a worker wants {}, one for each file in use", worker::kWantedFiles);
+    found.advice = fmt::format("raise the hard limit: ulimit -Hn {0}, or LimitNOFILE={0} in the unit",
+                               worker::kWantedFiles);
+  }
+  return found;
+}
+
+Finding of_sandbox(const MachineFacts& facts) {
+  if (!facts.sandbox)
+    return {"sandbox",
+            {},
+            Status::warning,
+            "it could not be tried: this program cannot start itself",
+            "check that /proc is mounted"};
+  std::vector<std::string> missing;
+  if (!facts.sandbox->calls) missing.emplace_back("opening sockets (seccomp)");
+  if (!facts.sandbox->files) missing.emplace_back("files that are not a scene's (Landlock)");
+  if (facts.sandbox->files && !facts.sandbox->sizes)
+    missing.emplace_back("cutting cached files short (Landlock of Linux 6.2)");
+  if (missing.empty()) return ok("sandbox", "the kernel confines the rendering process of a worker");
+  return {"sandbox",
+          {},
+          Status::warning,
+          fmt::format("the kernel cannot keep a worker's rendering process from {}",
+                      fmt::join(missing, ", nor from ")),
+          "use Linux 6.2 or later with Landlock, or render trusted scenes only"};
+}
+
+Finding of_folder(const FolderFacts& folder) {
+  Finding found{folder.name,
+                folder.path.string(),
+                Status::ok,
+                fmt::format("may be written, {} free", show_bytes(folder.free_bytes)),
+                {}};
+  if (!folder.usable) {
+    found.status = Status::problem;
+    found.what = "is no folder that this user may write to";
+    found.advice = "change its owner or permissions, or choose another folder";
+  } else if (folder.free_bytes < kLittleRoom) {
+    found.status = folder.free_bytes < kNoRoom ? Status::problem : Status::warning;
+    found.what = fmt::format("has only {} free", show_bytes(folder.free_bytes));
+    found.advice = "make room on its disk, or choose another folder";
+  }
+  return found;
+}
+
+}  // namespace
+
+std::string to_string(Status status) {
+  return status == Status::ok ? "ok" : status == Status::warning ? "warning" : "problem";
+}
+
+Status worst(const std::vector<Finding>& findings) {
+  Status status = Status::ok;
+  for (const Finding& each : findings) status = std::max(status, each.status);
+  return status;
+}
+
+std::vector<Finding> judge_machine(const MachineFacts& facts) {
+  std::vector<Finding> all;
+  all.push_back(
+      facts.processor_fits
+          ? ok("processor", fmt::format("has what this build needs ({}); numeric class {:.12}",
+                                        facts.processor_target, facts.numeric_class))
+          : Finding{"processor",
+                    {},
+                    Status::problem,
+                    fmt::format("lacks instructions that this build needs ({})", facts.processor_target),
+                    "use a newer machine, or build with another LIGHTSHAFT_ARCH on all machines"});
+  all.push_back(of_memory(facts));
+  all.push_back(of_cores(facts));
+  all.push_back(of_file_limit(facts));
+  all.push_back(of_sandbox(facts));
+  all.push_back(facts.vdb_found
+                    ? ok("openvdb", facts.vdb_program.string())
+                    : Finding{"openvdb",
+                              {},
+                              Status::problem,
+                              fmt::format("{} is missing: .vdb and .nvdb files cannot be read",
+                                          facts.vdb_program.string()),
+                              "install the package lightshaft-vdb, or build the target lightshaft-vdb"});
+  all.push_back(!facts.denoiser.empty() ? ok("denoiser", facts.denoiser)
+                                        : Finding{"denoiser",
+                                                  {},
+                                                  Status::warning,
+                                                  facts.denoiser_trouble,
+                                                  "only --denoise needs it: run deploy/install-denoiser.sh"});
+  all.push_back(ok("redis", facts.redis_server.empty()
+                                ? "no redis-server in PATH; only a coordinator with --store redis:// needs "
+                                  "one, on any machine"
+                                : facts.redis_server.string()));
+  for (const FolderFacts& folder : facts.folders) all.push_back(of_folder(folder));
+  return all;
+}
+
+double clock_lead(double asked_at, double answered_at, std::int64_t date) {
+  // The coordinator's clock was in [date, date + 1), this machine's in [asked_at, answered_at].
+  const double least = static_cast<double>(date) - answered_at;
+  const double most = static_cast<double>(date) + 1 - asked_at;
+  return least > 0 ? least : most < 0 ? most : 0;
+}
+
+namespace {
+
+std::string host_of(const std::string& url) {
+  const std::size_t host = url.find("://") + 3;
+  if (url.compare(host, 1, "[") == 0) return url.substr(host, url.find(']', host) - host + 1);
+  return url.substr(host, url.find_first_of(":/", host) - host);
+}
+
+bool on_this_machine(const std::string& url) {
+  const std::string host = host_of(url);
+  return host == "localhost" || host == "[::1]" || host.starts_with("127.");
+}
+
+Finding of_reachability(const FarmFacts& facts) {
+  if (!facts.trouble.empty()) {
+    const bool tls = facts.trouble.find("SSL") != std::string::npos ||
+                     facts.trouble.find("certificate") != std::string::npos;
+    return {"farm",
+            {},
+            Status::problem,
+            facts.trouble,
+            tls ? "name the file of the farm's authority with --ca or LIGHTSHAFT_CA (ca.pem, in the "
+                  "coordinator's DATA/tls), and check that the address is one that its certificate names"
+                : "check the address, that the coordinator runs, and that no firewall is between"};
+  }
+  if (!facts.is_coordinator)
+    return {"farm",
+            {},
+            Status::problem,
+            "something else than a coordinator answers there",
+            "check the address and port: it is the coordinator's --http"};
+  if (!facts.not_ready.empty())
+    return {"farm", {}, Status::problem, facts.not_ready, "see the coordinator's log; its disk may be full"};
+  if (!facts.remark.empty()) return {"farm", {}, Status::warning, facts.remark, "see the coordinator's log"};
+  return ok("farm", "reachable and ready");
+}
+
+Finding of_tls(const FarmFacts& facts) {
+  if (facts.url.starts_with("https:")) return ok("tls", "encrypted, and its certificate is trusted");
+  if (on_this_machine(facts.url)) return ok("tls", "not encrypted, but on this machine");
+  return {"tls",
+          {},
+          Status::warning,
+          "not encrypted: others on the way can read the token",
+          "start the coordinator with --tls, and use its https address"};
+}
+
+Finding of_clock(const FarmFacts& facts) {
+  if (!facts.date)
+    return {"clock",
+            {},
+            Status::warning,
+            "the answer has no header Date, so the clocks were not compared",
+            "check whether a proxy removes it"};
+  const double lead = clock_lead(facts.asked_at, facts.answered_at, *facts.date);
+  if (std::abs(lead) <= kClockWarning)
+    return ok("clock", lead == 0 ? std::string("agrees with this machine's")
+                                 : fmt::format("differs from this machine's by {}, within {}",
+                                               show_seconds(std::abs(lead)), show_seconds(kClockWarning)));
+  return {"clock",
+          {},
+          std::abs(lead) > kClockProblem ? Status::problem : Status::warning,
+          fmt::format("the coordinator's is at least {} {} this machine's: webhooks and requests to S3 may "
+                      "be refused",
+                      show_seconds(std::abs(lead)), lead > 0 ? "ahead of" : "behind"),
+          "set both machines' clocks by NTP (timedatectl set-ntp true)"};
+}
+
+Finding of_token(const FarmFacts& facts) {
+  if (!facts.has_token)
+    return {"token",
+            {},
+            Status::problem,
+            "none is given, so that the farm answers no questions",
+            "give --token-file FILE or LIGHTSHAFT_TOKEN; `lightshaft token add` makes one"};
+  if (!facts.role.empty())
+    return ok("token", facts.user.empty() ? fmt::format("valid, role {}", facts.role)
+                                          : fmt::format("valid, role {}, user {}", facts.role, facts.user));
+  if (facts.session_status == 401)
+    return {"token",
+            {},
+            Status::problem,
+            "the farm does not know it",
+            "check the file or LIGHTSHAFT_TOKEN; the farm's admin can make another: lightshaft token add"};
+  return {"token",
+          {},
+          Status::problem,
+          facts.session_trouble.empty() ? "no answer" : facts.session_trouble,
+          facts.session_status == 403 ? "use a token of the role submit, read or admin"
+                                      : "try again, and see the coordinator's log"};
+}
+
+Finding of_version(const FarmFacts& facts, const std::string& program_version) {
+  if (facts.version == program_version)
+    return ok("version", fmt::format("coordinator and this command are {}", program_version));
+  const std::string coordinator = facts.version.empty() ? "does not tell its version" : "is " + facts.version;
+  return {"version",
+          {},
+          Status::warning,
+          fmt::format("the coordinator {}, this command is {}", coordinator, program_version),
+          "install the same version everywhere"};
+}
+
+std::string list(const std::set<std::string>& names) {
+  std::vector<std::string> shown(names.begin(), names.end());
+  const std::size_t more = shown.size() > kNamesShown ? shown.size() - kNamesShown : 0;
+  shown.resize(shown.size() - more);
+  return more ? fmt::format("{} and {} more", fmt::join(shown, ", "), more)
+              : fmt::format("{}", fmt::join(shown, ", "));
+}
+
+// Adds a finding about the workers for which `wrong` is true, if there are any.
+template <class Wrong>
+void add_if_any(std::vector<Finding>& all, const std::vector<WorkerFacts>& workers, Wrong wrong,
+                const std::string& name, const std::string& what, const std::string& advice) {
+  std::set<std::string> names;
+  for (const WorkerFacts& worker : workers)
+    if (wrong(worker)) names.insert(worker.name);
+  if (!names.empty()) all.push_back({name, {}, Status::warning, what + ": " + list(names), advice});
+}
+
+void add_workers(std::vector<Finding>& all, const FarmFacts& facts, const std::string& numeric_class) {
+  std::vector<WorkerFacts> present;
+  for (const WorkerFacts& worker : *facts.workers)
+    if (worker.state != "lost" && worker.state != "gone") present.push_back(worker);
+  if (present.empty()) {
+    all.push_back({"workers",
+                   {},
+                   Status::warning,
+                   "none is connected, so that no job goes on",
+                   "start lightshaft-worker with this coordinator's address for workers (--grpc)"});
+    return;
+  }
+  const std::size_t before = all.size();
+  add_if_any(
+      all, present, [](const WorkerFacts& w) { return w.state == "sick"; }, "workers",
+      "unhealthy or quarantined", "see their activity: lightshaft workers");
+  add_if_any(
+      all, present, [](const WorkerFacts& w) { return w.fake; }, "workers",
+      "they make pixels up (--fake) instead of rendering", "stop them on a farm that renders");
+  if (before == all.size()) all.push_back(ok("workers", fmt::format("{} connected", present.size())));
+  if (!facts.version.empty())
+    add_if_any(
+        all, present, [&](const WorkerFacts& w) { return w.version != facts.version; }, "worker-versions",
+        "of another version than the coordinator, " + facts.version,
+        "install the coordinator's version on them");
+  std::set<std::string> classes;
+  for (const WorkerFacts& worker : present)
+    if (!worker.fake) classes.insert(worker.numeric_class);
+  if (classes.size() > 1)
+    all.push_back(
+        {"numeric-class",
+         {},
+         Status::warning,
+         fmt::format("the workers are of {} numeric classes, and each job uses one of them", classes.size()),
+         "give all workers the same build"});
+  else if (!classes.empty() && !classes.contains(numeric_class))
+    all.push_back({"numeric-class",
+                   {},
+                   Status::warning,
+                   "the workers are of another numeric class than this machine: `lightshaft render` gives "
+                   "other bits than the farm",
+                   "install the workers' build here, if equal bits matter"});
+  else if (!classes.empty())
+    all.push_back(ok("numeric-class", "the workers render the same bits as this machine"));
+}
+
+}  // namespace
+
+std::vector<Finding> judge_farm(const FarmFacts& facts, const std::string& program_version,
+                                const std::string& numeric_class) {
+  std::vector<Finding> all{of_reachability(facts)};
+  if (facts.is_coordinator) {
+    all.push_back(of_tls(facts));
+    all.push_back(of_clock(facts));
+    all.push_back(of_token(facts));
+    if (!facts.role.empty()) all.push_back(of_version(facts, program_version));
+    if (facts.workers) add_workers(all, facts, numeric_class);
+  }
+  for (Finding& each : all) each.subject = facts.url;
+  return all;
+}
+
+}  // namespace ls::cli

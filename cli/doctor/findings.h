@@ -1,0 +1,36 @@
+// Judges the facts that `lightshaft doctor` has observed, by pure functions with one finding for each check.
+// Names and statuses are part of the JSON (docs/guide/command-line.md).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cli/doctor/farm_facts.h"
+#include "cli/doctor/machine_facts.h"
+
+namespace ls::cli {
+
+enum class Status { ok, warning, problem };
+std::string to_string(Status status);
+
+struct Finding {
+  std::string name;     // name of the check: "memory"
+  std::string subject;  // the object of a check that may occur several times: an address, a folder
+  Status status = Status::ok;
+  std::string what;
+  std::string advice;  // what the user should do; empty: nothing
+};
+
+std::vector<Finding> judge_machine(const MachineFacts& facts);
+// Judges the farm. `program_version` is this command's version, `numeric_class` this machine's class.
+std::vector<Finding> judge_farm(const FarmFacts& facts, const std::string& program_version,
+                                const std::string& numeric_class);
+
+Status worst(const std::vector<Finding>& findings);
+
+// Returns how many seconds the coordinator's clock is ahead of this machine's, at least; negative: behind; 0:
+// the clocks may agree. The header Date has whole seconds, rounded down, and was written at some time between
+// request and answer.
+double clock_lead(double asked_at, double answered_at, std::int64_t date);
+
+}  // namespace ls::cli

@@ -1,0 +1,45 @@
+// Runs other programs, such as sbatch and ssh. Arguments are passed directly, without a shell. The programs
+// inherit the environment without our own variables (LIGHTSHAFT_...), which may contain tokens.
+#pragma once
+
+#include <sys/types.h>
+
+#include <string>
+#include <vector>
+
+#include "common/base/error.h"
+
+namespace ls::cli {
+
+using Words = std::vector<std::string>;
+
+struct CommandOutput {
+  int code = 0;  // exit code, or 128 + number of the signal
+  std::string out, err;
+};
+
+// Runs a program to its end. unavailable: it did not end in time, and was killed; resource_exhausted: it
+// printed too much, and was killed; not_found: there is no such program.
+Result<CommandOutput> run_command(const Words& words, const std::string& input, double most_seconds);
+
+// A program that runs in the background. Its output goes to a file.
+class LongCommand {
+ public:
+  // Starts the program, writes `input` to its standard input, and keeps that open until close_input() or the
+  // destructor.
+  static Result<LongCommand> start(const Words& words, const std::string& input, const std::string& log);
+  LongCommand(LongCommand&& other) noexcept;
+  LongCommand& operator=(LongCommand&&) = delete;
+  ~LongCommand();  // kills the program
+
+  bool ended();  // true once the program has ended
+  void close_input();
+  void kill();
+
+ private:
+  LongCommand(pid_t pid, int input) : pid_(pid), input_(input) {}
+  pid_t pid_;
+  int input_;
+};
+
+}  // namespace ls::cli

@@ -1,0 +1,182 @@
+#include "cli/scale/docker_engine.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "cli/scale/child_command.h"
+#include "cli/scale/container_worker.h"
+#include "common/base/parse_number.h"
+
+namespace ls::cli {
+namespace {
+
+using State = EngineWorker::State;
+
+constexpr double kDockerLimit = 60;      // seconds for one command of Docker
+constexpr double kDockerRunLimit = 600;  // and for one that may fetch the image first
+
+// The container's command waits for the token at a named pipe in its /tmp, which is in memory. So the token
+// is in no argument, no file, and not in the environment that `docker inspect` shows, but only in the
+// worker's own, which its user and root may read. Both ends make the pipe: whichever comes first.
+constexpr const char* kTakeToken =
+    "mkfifo -m 600 /tmp/join-token 2>/dev/null; IFS= read -r LIGHTSHAFT_JOIN_TOKEN </tmp/join-token; "
+    "export LIGHTSHAFT_JOIN_TOKEN; exec \"$@\"";
+constexpr const char* kGiveToken = "mkfifo -m 600 /tmp/join-token 2>/dev/null; exec cat >/tmp/join-token";
+
+class Docker final : public Engine {
+ public:
+  Docker(DockerOptions options, std::string version, std::function<double()> unix_time)
+      : options_(std::move(options)), version_(std::move(version)), unix_time_(std::move(unix_time)) {}
+
+  std::string version() override { return version_; }
+
+  Result<std::vector<EngineWorker>> list() override {
+    const auto lines =
+        run({"docker", "ps", "--all", "--filter", "label=lightshaft.farm=" + options_.worker.farm, "--format",
+             "{{.Label \"lightshaft.worker\"}}|{{.State}}|{{.Label \"lightshaft.started\"}}|"
+             "{{.Label \"lightshaft.cores\"}}"});
+    if (!lines) return tl::unexpected(lines.error());
+    auto found = parse_docker_ps(*lines, unix_time_());
+    if (!found) return tl::unexpected(found.error());
+    for (const std::string& id : found->ended) remove(id);
+    return std::move(found->workers);
+  }
+
+  Result<void> start(int count) override {
+    for (; count > 0; --count) {
+      const std::string id = new_worker_id();
+      auto started = run(run_command_of(id), "", kDockerRunLimit);
+      if (started)
+        started = run({"docker", "exec", "--interactive", container(id), "sh", "-c", kGiveToken},
+                      options_.join_token + "\n");
+      if (started) continue;
+      remove(id);
+      return tl::unexpected(started.error());
+    }
+    return {};
+  }
+
+  Result<void> drain(std::span<const EngineWorker> workers) override {
+    std::vector<std::string> running, others;
+    for (const auto& w : workers) (w.state == State::running ? running : others).push_back(w.id);
+    const auto drained = for_all({"docker", "kill", "--signal=TERM"}, running);
+    const auto withdrawn = for_all({"docker", "rm", "--force"}, others);
+    return drained ? withdrawn : drained;
+  }
+
+  Result<void> kill(std::span<const EngineWorker> workers) override {
+    std::vector<std::string> all;
+    for (const auto& w : workers) all.push_back(w.id);
+    return for_all({"docker", "kill"}, all);
+  }
+
+ private:
+  std::string container(const std::string& id) const {
+    return "lightshaft-" + worker_name(options_.worker.farm, id);
+  }
+
+  Words run_command_of(const std::string& id) const {
+    const WorkerCommand& w = options_.worker;
+    Words words{"docker",
+                "run",
+                "--detach",
+                "--init",
+                "--read-only",
+                "--cap-drop=ALL",
+                "--security-opt=no-new-privileges",
+                "--tmpfs=/tmp:mode=1777,size=256m",
+                "--volume=lightshaft-cache:/cache",
+                "--name=" + container(id),
+                "--label=lightshaft.farm=" + w.farm,
+                "--label=lightshaft.worker=" + id,
+                fmt::format("--label=lightshaft.started={:.0f}", unix_time_()),
+                fmt::format("--label=lightshaft.cores={}", w.threads),
+                fmt::format("--cpus={}", w.threads),
+                fmt::format("--stop-timeout={}", options_.drain_seconds)};
+    words.insert(words.end(), options_.run.begin(), options_.run.end());
+    words.insert(words.end(), {"--entrypoint=sh", options_.image, "-c", kTakeToken, "sh", w.program,
+                               "--coordinator", w.coordinator, "--threads", std::to_string(w.threads),
+                               "--cache", "/cache", "--name", worker_name(w.farm, id)});
+    words.insert(words.end(), w.options.begin(), w.options.end());
+    return words;
+  }
+
+  // Keeps its log.
+  void remove(const std::string& id) const {
+    const auto log = run_command({"docker", "logs", container(id)}, "", kDockerLimit);
+    if (log && log->code == 0)
+      keep_log(options_.logs, worker_name(options_.worker.farm, id), log->out + log->err);
+    run_command({"docker", "rm", "--force", container(id)}, "", kDockerLimit);
+  }
+
+  static Result<std::string> run(const Words& words, const std::string& input = "",
+                                 double limit = kDockerLimit) {
+    auto output = run_command(words, input, limit);
+    if (!output) return tl::unexpected(output.error());
+    if (output->code != 0)
+      return fail(Errc::unavailable,
+                  fmt::format("docker {}: {}", words[1],
+                              output->err.empty() ? "the container has ended" : first_line(output->err)));
+    return std::move(output->out);
+  }
+
+  // Containers that have ended since they were listed are no error: the others have got their signal, and
+  // must not get it twice, as the second SIGTERM ends a worker at once.
+  Result<void> for_all(Words words, const std::vector<std::string>& ids) const {
+    if (ids.empty()) return {};
+    for (const std::string& id : ids) words.push_back(container(id));
+    const auto done = run_command(words, "", kDockerLimit);
+    if (!done) return tl::unexpected(done.error());
+    std::istringstream in(done->err);
+    for (std::string line; std::getline(in, line);)
+      if (line.find("No such container") == std::string::npos &&
+          line.find("is not running") == std::string::npos)
+        return fail(Errc::unavailable, fmt::format("docker {}: {}", words[1], line));
+    return {};
+  }
+
+  DockerOptions options_;
+  std::string version_;
+  std::function<double()> unix_time_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Engine>> open_docker(DockerOptions options, std::function<double()> unix_time) {
+  const auto version = run_command({"docker", "version", "--format={{.Server.Version}}"}, "", kDockerLimit);
+  if (!version)
+    return fail(Errc::failed_precondition, "docker does not run here: " + version.error().message);
+  if (version->code != 0)
+    return fail(Errc::failed_precondition, "no Docker engine answers: " + first_line(version->err));
+  return std::make_unique<Docker>(std::move(options), "docker " + first_line(version->out),
+                                  std::move(unix_time));
+}
+
+Result<DockerContainers> parse_docker_ps(const std::string& lines, double unix_time) {
+  DockerContainers found;
+  std::istringstream in(lines);
+  for (std::string line; std::getline(in, line);) {
+    if (line.empty()) continue;
+    std::vector<std::string> fields;
+    std::istringstream row(line);
+    for (std::string field; std::getline(row, field, '|');) fields.push_back(field);
+    const auto started = fields.size() == 4 ? parse_number<double>(fields[2]) : std::nullopt;
+    const auto cores = fields.size() == 4 ? parse_number<int>(fields[3]) : std::nullopt;
+    if (!started || cores.value_or(0) < 1 || fields[0].empty())
+      return bad_argument(fmt::format("docker ps answered '{}'", line));
+    const std::string& state = fields[1];
+    if (state == "exited" || state == "dead") {
+      found.ended.push_back(fields[0]);
+      continue;
+    }
+    // A container that was created and not started is what a failed `docker run` leaves.
+    const bool stuck = state == "created";
+    found.workers.push_back({fields[0], stuck ? State::stuck : State::running,
+                             stuck ? 0 : std::max(0.0, unix_time - *started), *cores});
+  }
+  return found;
+}
+
+}  // namespace ls::cli

@@ -1,0 +1,56 @@
+// The interface of `lightshaft farm up` to an engine that runs workers (Slurm, ssh, Docker, Kubernetes). Its
+// calls fit any engine that can list, start and end instances of one program.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/error.h"
+
+namespace ls::cli {
+
+// A worker from the engine's point of view. A worker that has ended is not listed.
+struct EngineWorker {
+  enum class State {
+    waiting,  // the engine has accepted it and will start it, or start it again
+    running,
+    stuck,  // the engine will not start it, or not soon
+  };
+  std::string id;  // the engine's id; unique among the workers that it lists
+  State state = State::waiting;
+  double seconds = 0;  // time since its last start
+  int cores = 1;       // cores that the engine has reserved for it
+};
+
+class Engine {
+ public:
+  virtual ~Engine() = default;
+  virtual std::string version() = 0;  // returns the engine's version, such as "slurm-wlm 22.05.8"
+  // Returns the workers that this farm-up started, now or in an earlier run under the same name. An error
+  // means that they are unknown, not that there are none.
+  virtual Result<std::vector<EngineWorker>> list() = 0;
+  virtual Result<void> start(int count) = 0;
+  // Asks workers to deliver their results and end. Workers that have not started yet are withdrawn.
+  virtual Result<void> drain(std::span<const EngineWorker> workers) = 0;
+  virtual Result<void> kill(std::span<const EngineWorker> workers) = 0;
+};
+
+// How a worker is started, by any engine.
+struct WorkerCommand {
+  std::string farm;         // name of this farm-up; a worker's name is FARM-ID, where ID is the engine's id
+  std::string program;      // path of lightshaft-worker on the workers' machines
+  std::string coordinator;  // address HOST:PORT under which these machines reach the coordinator
+  std::string token_file;   // file that contains the join token
+  int threads = 1;
+  std::vector<std::string> options;  // more options of the worker, one word each
+};
+
+// Returns the name under which the coordinator shows the worker.
+inline std::string worker_name(const std::string& farm, const std::string& id) { return farm + "-" + id; }
+
+// Returns the first line of a command's output, which names its version or the reason why it failed.
+inline std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
+}  // namespace ls::cli

@@ -1,0 +1,84 @@
+// Decides how many workers an engine should run. It reads no clock and starts nothing: its inputs are demand,
+// workers and time, its outputs are actions.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cli/scale/engine.h"
+#include "common/base/clock.h"
+
+namespace ls::cli {
+
+// The state of the coordinator's jobs and workers, as its HTTP interface reports it.
+struct Demand {
+  int open_jobs = 0;    // queued or running, with something left of their budgets
+  int unpaid_jobs = 0;  // queued or running, with nothing left
+  // Predicted for work that no worker holds, as far as budgets pay for it; 0 also if nothing was measured yet
+  double queued_core_seconds = 0;
+  bool more_helps = true;        // false: the coordinator predicts that more workers would not end it earlier
+  int other_threads = 0;         // of connected workers that this farm-up did not start
+  std::set<std::string> joined;  // names of connected workers
+  std::set<std::string> idle;    // names of the connected workers that hold no work
+};
+
+struct ScaleLimits {
+  std::string farm;
+  int most_workers = 1;
+  int threads = 1;             // threads of each worker
+  double finish_in = 600;      // seconds in which the queued work should be rendered
+  double idle_seconds = 60;    // a worker without work is drained after this time
+  double drain_seconds = 120;  // a draining worker that has not ended after this time is killed
+  double poll_seconds = 5;     // seconds between two checks
+  std::optional<double> budget_core_seconds;
+};
+
+struct ScaleActions {
+  int start = 0;
+  std::vector<EngineWorker> drain, kill;
+  std::string why;  // reason for the user; empty: there is nothing to report
+};
+
+class Scaler {
+ public:
+  explicit Scaler(ScaleLimits limits) : limits_(std::move(limits)) {}
+
+  // `spent`: core seconds used so far. `workers`: all workers that the engine lists.
+  ScaleActions decide(const Demand& demand, std::span<const EngineWorker> workers, double spent,
+                      TimePoint now);
+  // Drains all workers and starts none, since farm-up is ending.
+  ScaleActions end(std::span<const EngineWorker> workers, TimePoint now);
+  // Notes that the engine could not start workers: the next attempt waits, longer with each failure.
+  void start_failed(TimePoint now);
+  // Notes that the engine could not drain these workers: the request will be repeated.
+  void drain_failed(std::span<const EngineWorker> workers);
+
+  // A worker is started only if it can run for at least this many seconds within the budget.
+  static constexpr double kWorthStarting = 60;
+  // Seconds until the next attempt to start workers
+  static constexpr double kFirstPause = 5, kLongestPause = 600;
+
+ private:
+  struct Seen {
+    bool joined = false;
+    std::optional<TimePoint> idle_since;
+    std::optional<TimePoint> draining_since;
+  };
+  void observe(const Demand& demand, std::span<const EngineWorker> workers, TimePoint now);
+  int wanted(const Demand& demand) const;
+  double seconds_to_end() const;
+  int affordable(std::span<const EngineWorker> workers, double spent) const;
+  void drain(const EngineWorker& worker, ScaleActions& out, TimePoint now);
+  void kill_overdue(std::span<const EngineWorker> workers, ScaleActions& out, TimePoint now);
+
+  ScaleLimits limits_;
+  std::map<std::string, Seen> seen_;
+  int failures_ = 0;
+  std::optional<TimePoint> no_start_before_;
+};
+
+}  // namespace ls::cli

@@ -1,0 +1,47 @@
+// A value that can be reached only while its mutex is held, so that the compiler enforces locking.
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+#include <utility>
+
+#include "common/base/check.h"
+
+namespace ls {
+
+template <class T>
+class Guarded {
+ public:
+  template <class... Args>
+  explicit Guarded(Args&&... args) : value_(std::forward<Args>(args)...) {}
+
+  // Holds the mutex until it is destroyed, except between unlock() and lock().
+  class Lock {
+   public:
+    T& operator*() const {
+      CHECK(lock_.owns_lock());
+      return value_;
+    }
+    T* operator->() const { return &**this; }
+    void unlock() { lock_.unlock(); }
+    void lock() { lock_.lock(); }
+    // Waits until `done` returns true. It is called whenever `changed` is notified.
+    template <class Done>
+    void wait(std::condition_variable& changed, Done&& done) {
+      changed.wait(lock_, std::forward<Done>(done));
+    }
+
+   private:
+    friend class Guarded;
+    Lock(std::mutex& mutex, T& value) : lock_(mutex), value_(value) {}
+    std::unique_lock<std::mutex> lock_;
+    T& value_;
+  };
+  Lock lock() { return {mutex_, value_}; }
+
+ private:
+  std::mutex mutex_;
+  T value_;
+};
+
+}  // namespace ls

@@ -1,0 +1,112 @@
+#include "common/base/spawn.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+
+extern char** environ;
+
+namespace ls {
+namespace {
+
+// The files to be inherited, under descriptors above those that they get in the program: no dup2 into place
+// overwrites a file that is still to be moved.
+class HighFiles {
+ public:
+  ~HighFiles() {
+    for (const int fd : fds_) ::close(fd);
+  }
+  // Returns an error number, 0 for success.
+  int add(int fd, int lowest) {
+    const int high = ::fcntl(fd, F_DUPFD_CLOEXEC, lowest);
+    if (high < 0) return errno == EINVAL ? EMFILE : errno;  // EINVAL: the limit is below `lowest`
+    fds_.push_back(high);
+    return 0;
+  }
+  int last() const { return fds_.back(); }
+
+ private:
+  std::vector<int> fds_;
+};
+
+std::vector<char*> pointers(std::vector<std::string>& words) {
+  std::vector<char*> result;
+  for (std::string& word : words) result.push_back(word.data());
+  result.push_back(nullptr);
+  return result;
+}
+
+std::vector<char*> environment(const std::function<bool(std::string_view)>& inherits) {
+  std::vector<char*> kept;
+  for (char** e = environ; *e; ++e)
+    if (inherits(*e)) kept.push_back(*e);
+  kept.push_back(nullptr);
+  return kept;
+}
+
+int wait_with(pid_t pid, int flags, int& status) {
+  int got = -1;
+  while ((got = ::waitpid(pid, &status, flags)) < 0 && errno == EINTR) {
+  }
+  return got;
+}
+
+}  // namespace
+
+Result<pid_t> spawn(Program program) {
+  const int count = static_cast<int>(program.files.size());
+  HighFiles high;
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  int error = 0;
+  for (int i = 0; i < count && error == 0; ++i) {
+    const int fd = program.files[static_cast<std::size_t>(i)];
+    if (fd == kDevNull) {
+      error = posix_spawn_file_actions_addopen(&actions, i, "/dev/null", O_RDWR, 0);
+    } else if (error = high.add(fd, count); error == 0) {
+      error = posix_spawn_file_actions_adddup2(&actions, high.last(), i);
+    }
+  }
+  if (error == 0) error = posix_spawn_file_actions_addclosefrom_np(&actions, count);
+
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t none, all;
+  sigemptyset(&none), sigfillset(&all);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setsigdefault(&attributes, &all);
+  posix_spawnattr_setpgroup(&attributes, 0);
+  const int group = program.own_group ? POSIX_SPAWN_SETPGROUP : 0;
+  posix_spawnattr_setflags(&attributes,
+                           static_cast<short>(POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | group));
+  pid_t pid = -1;
+  if (error == 0)
+    error = ::posix_spawnp(&pid, program.path.c_str(), &actions, &attributes,
+                           pointers(program.arguments).data(), environment(program.inherits).data());
+  posix_spawn_file_actions_destroy(&actions);
+  posix_spawnattr_destroy(&attributes);
+  if (error == 0) return pid;
+  return fail(error == ENOENT ? Errc::not_found : Errc::internal,
+              fmt::format("{}: {}{}", program.path, std::strerror(error),
+                          error == EMFILE ? "; raise the limit of open files (ulimit -n)" : ""));
+}
+
+int wait_for_end(pid_t pid) {
+  int status = 0;
+  wait_with(pid, 0, status);
+  return status;
+}
+
+std::optional<int> poll_end(pid_t pid) {
+  int status = 0;
+  if (wait_with(pid, WNOHANG, status) == 0) return std::nullopt;
+  return status;
+}
+
+}  // namespace ls

@@ -1,0 +1,39 @@
+// Starts another program with an explicit list of what it inherits.
+#pragma once
+
+#include <sys/types.h>
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/error.h"
+
+namespace ls {
+
+inline constexpr int kDevNull = -1;
+
+struct Program {
+  std::string path;                    // looked up in PATH if it has no slash
+  std::vector<std::string> arguments;  // argv: begins with the program's name
+  // files[i] becomes descriptor i of the program; kDevNull: /dev/null. No other descriptor is inherited.
+  std::vector<int> files = {0, 1, 2};
+  // Returns true if the program inherits the environment variable, given as NAME=VALUE.
+  std::function<bool(std::string_view)> inherits;
+  // A process group of its own does not get the signals of the terminal, such as Ctrl-C.
+  bool own_group = false;
+};
+
+// Starts the program with no signal blocked or ignored, and returns its process id. Errors: not_found if
+// there is no such program, else internal; the text names the program and the system's reason.
+Result<pid_t> spawn(Program program);
+
+// Waits until the process has ended, and returns its wait status as waitpid() gives it.
+int wait_for_end(pid_t pid);
+
+// As wait_for_end(), but returns at once: nullopt while the process runs.
+std::optional<int> poll_end(pid_t pid);
+
+}  // namespace ls

@@ -1,0 +1,48 @@
+// A program's command line as plain data: its commands and options with their help. Completion scripts and
+// manual pages are written from it, so that they list exactly what the program accepts.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+}
+
+namespace ls {
+
+struct CommandOption {
+  std::vector<std::string> names;  // for example "-o", "--output"; empty: an argument without a name
+  // Placeholder of its value, such as "FILE" or "N"; empty: it takes no value
+  std::string value;
+  std::vector<std::string> choices;  // the allowed values; empty: any
+  std::string help;
+  std::string default_value;  // empty: there is no default, or the help contains it
+  bool required = false, repeated = false;
+
+  bool takes_file() const;  // true if the value is the name of a file or a folder
+};
+
+struct Command {
+  std::string name, help, footer;
+  std::vector<CommandOption> options;
+  std::vector<Command> commands;
+};
+
+// Describes a program without its hidden commands and options.
+Command describe_command(const CLI::App& app);
+
+// Adds the hidden option --man-page DATE, with which the program prints its manual page and ends. Call it
+// after all other options were added.
+void add_man_page_option(CLI::App& app, const std::string& version);
+
+// Returns scripts by which shells complete the program's commands, options, values and file names.
+std::string bash_completion(const Command& program);
+std::string zsh_completion(const Command& program);
+std::string fish_completion(const Command& program);
+
+// Returns a manual page in troff with the macros of man(7): the page of section 1 for a program with all of
+// its commands. `date`: of the page, as YYYY-MM-DD.
+std::string man_page(const Command& program, const std::string& version, const std::string& date);
+
+}  // namespace ls

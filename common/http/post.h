@@ -1,0 +1,40 @@
+// Sends one HTTP POST to an address that the operator named: a receiver of notifications, a collector of
+// traces. It follows no redirects, ignores proxies named in the environment and speaks only http and https,
+// so that the answering side cannot make this program send requests to other addresses.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "common/base/error.h"
+
+namespace ls {
+
+struct HttpPost {
+  std::string url;
+  std::vector<std::pair<std::string, std::string>> headers;
+  std::string body;
+  double seconds = 15;                // most seconds until the answer has arrived
+  std::size_t most_answer_bytes = 0;  // of the answer's body; the rest is dropped
+  std::string ca_file;                // certificates of the authorities to trust; empty: the system's
+  // Called about once a second while the request runs; true ends it with an error. May be empty.
+  std::function<bool()> give_up = {};
+};
+
+struct HttpAnswer {
+  int status = 0;
+  std::string body;
+};
+
+// Returns the answer, whatever its status. Error unavailable: no connection, or no answer in time.
+Result<HttpAnswer> post(const HttpPost& request);
+
+// Returns invalid_argument unless requests can be sent to this address. `setting` names it in the message: a
+// flag or a variable.
+Result<void> check_http_url(const std::string& url, std::string_view setting);
+
+}  // namespace ls

@@ -1,0 +1,26 @@
+// Which tiles of a frame a rectangle of pixels touches.
+#pragma once
+
+#include <vector>
+
+#include "common/image/frame/frame.h"
+
+namespace ls {
+
+// True if the rectangle has pixels, and all of them are in the frame.
+inline bool lies_in(FrameSize frame, const PixelRect& rect) {
+  return 0 <= rect.x0 && rect.x0 < rect.x1 && rect.x1 <= frame.width && 0 <= rect.y0 && rect.y0 < rect.y1 &&
+         rect.y1 <= frame.height;
+}
+
+// Returns the tiles that have pixels in a rectangle, which lies in the frame, row by row.
+inline std::vector<TileIndex> tiles_over(const TileGrid& grid, const PixelRect& rect) {
+  std::vector<TileIndex> out;
+  for (int row = rect.y0 / grid.tile; row * grid.tile < rect.y1; ++row)
+    for (int column = rect.x0 / grid.tile; column * grid.tile < rect.x1; ++column)
+      out.push_back(static_cast<TileIndex>(row) * static_cast<TileIndex>(grid.columns()) +
+                    static_cast<TileIndex>(column));
+  return out;
+}
+
+}  // namespace ls

@@ -1,0 +1,73 @@
+#include "common/job/techniques.h"
+
+#include <array>
+#include <nlohmann/json.hpp>
+
+namespace ls {
+namespace {
+
+constexpr std::array kRows{
+    TechniqueRow{Technique::equiangular, "equiangular",
+                 "looks for light near lamps along whole ways through media"},
+    TechniqueRow{Technique::exponential, "exponential",
+                 "looks for light along whole ways through media, as it fades"},
+    TechniqueRow{Technique::camera_points, "camera_points",
+                 "looks for light at several points of the camera rays' ways through media"},
+    TechniqueRow{Technique::lamp_directions, "lamp_directions",
+                 "sends a share of all directions close to lights without extent"},
+    TechniqueRow{Technique::lamp_flights, "lamp_flights",
+                 "ends a share of all flights through media close to lights without extent"},
+    TechniqueRow{Technique::light_vertices, "light_vertices", "connects paths to points that the sun lights"},
+    TechniqueRow{Technique::light_tree, "light_tree", "chooses among many lights by a tree"}};
+
+constexpr bool in_order() {
+  for (std::size_t i = 0; i < kRows.size(); ++i)
+    if (static_cast<std::size_t>(kRows[i].technique) != i) return false;
+  return true;
+}
+static_assert(in_order());
+
+}  // namespace
+
+std::span<const TechniqueRow> techniques() { return kRows; }
+
+TechniqueSwitch off_switch(Technique technique, std::string_view integrator) {
+  const bool by_segments = integrator == "volpath_distant_mis";
+  switch (technique) {
+    case Technique::equiangular:
+      return by_segments ? TechniqueSwitch{"distance", "exponential"} : TechniqueSwitch{"equiangular", "-1"};
+    case Technique::exponential:
+      return {"distance", "equiangular"};
+    case Technique::camera_points:
+      return {"camera_points", "-1"};
+    case Technique::lamp_directions:
+      return {"phase_only", "true"};
+    case Technique::lamp_flights:
+      return {"lamp_flights", "-1"};
+    case Technique::light_vertices:
+      return {"light_vertices", "-1"};
+    case Technique::light_tree:
+      return {"light_tree", "-1"};
+  }
+  return {};
+}
+
+TechniqueSet TechniqueSet::of_bits(std::uint32_t bits) {
+  TechniqueSet set;
+  set.bits_ = bits & ((1u << kRows.size()) - 1);
+  return set;
+}
+
+std::string techniques_json(TechniqueSet set, std::string_view integrator) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const TechniqueRow& row : kRows) {
+    if (!set.has(row.technique)) continue;
+    const TechniqueSwitch off = off_switch(row.technique, integrator);
+    list.push_back({{"name", row.name},
+                    {"what", row.what},
+                    {"off", {{"parameter", off.parameter}, {"value", off.value}}}});
+  }
+  return list.dump();
+}
+
+}  // namespace ls

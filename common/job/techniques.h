@@ -1,0 +1,56 @@
+// The techniques by which the integrators find light that directions of the material or the medium and
+// next-event estimation at vertices find too rarely. Which of them a job uses depends on its scene and its
+// files: the workers find out when they build the world, and say so with each result. A parameter of the
+// scene's integrator switches each off (docs/reference/scene-format.md, Integrators).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace ls {
+
+enum class Technique : std::uint8_t {
+  equiangular,      // points on segments, near lights with a place
+  exponential,      // points on segments, as light fades along them
+  camera_points,    // several points on camera segments
+  lamp_directions,  // directions near lights without extent
+  lamp_flights,     // flights that end near these
+  light_vertices,   // connections to points that a directional emitter lights
+  light_tree,       // one of many lights chosen by a tree
+};
+
+struct TechniqueRow {
+  Technique technique;
+  std::string_view name;  // in reports
+  std::string_view what;  // for people
+};
+std::span<const TechniqueRow> techniques();  // all, in the order of the enumeration
+
+// The parameter of the integrator that switches the technique off, and the value that does.
+struct TechniqueSwitch {
+  std::string_view parameter, value;
+};
+TechniqueSwitch off_switch(Technique technique, std::string_view integrator);
+
+class TechniqueSet {
+ public:
+  constexpr TechniqueSet() = default;
+  // Unknown bits are dropped: they may come from a worker of another version.
+  static TechniqueSet of_bits(std::uint32_t bits);
+  void add(Technique t) { bits_ |= bit(t); }
+  void add(TechniqueSet other) { bits_ |= other.bits_; }
+  bool has(Technique t) const { return (bits_ & bit(t)) != 0; }
+  std::uint32_t bits() const { return bits_; }
+  bool operator==(const TechniqueSet&) const = default;
+
+ private:
+  static constexpr std::uint32_t bit(Technique t) { return 1u << static_cast<unsigned>(t); }
+  std::uint32_t bits_ = 0;
+};
+
+// A JSON list of the techniques of the set, each {name, what, off: {parameter, value}}.
+std::string techniques_json(TechniqueSet set, std::string_view integrator);
+
+}  // namespace ls

@@ -1,0 +1,55 @@
+// Phrases that the report of a job, the terminal and the dashboard have in common. The dashboard reads them
+// from web/static/js/phrases.js, which phrases_test.cpp writes from this table.
+#pragma once
+
+#include <array>
+#include <string_view>
+
+namespace ls::report {
+
+struct Phrase {
+  std::string_view key;  // a name in JavaScript
+  const char* text;
+};
+inline constexpr std::array kPhrases{
+    // How far figures of the error can be trusted
+    Phrase{"doubt", "don't trust yet"},
+    Phrase{"estimateInDoubt", "This error estimate can't be trusted yet."},
+    Phrase{"noIntervals", "No intervals are shown: the estimate can't be trusted yet."},
+    Phrase{"noPointYet", "The first point appears when every tile has finished a round of samples."},
+    Phrase{"independentSamples", "independent samples give −1"},
+    // References
+    Phrase{"againstReference", "against the reference"},
+    Phrase{"belowNoise", "below the reference's noise"},
+    Phrase{"oneSeed", "not to be trusted: one seed"},
+    Phrase{"sameSeed",
+           "The reference shares this job's seed: its noise is the same noise, and the true figures say "
+           "nothing. "
+           "Render it with another --seed."},
+    // The reason why a job ended, for each value of the field `stopped`
+    Phrase{"stoppedSpp", "all its samples are in"},
+    Phrase{"stoppedError", "the target error is reached"},
+    Phrase{"stoppedErrorDenoised", "the target error of the denoised layers is reached"},
+    Phrase{"stoppedErrorInDoubt", "the target error is reached by its own estimate: don't trust yet"},
+    Phrase{"stoppedTime", "its time was up"},
+    Phrase{"stoppedUser", "someone stopped it"},
+    Phrase{"failed", "The job failed"},
+    Phrase{"unwell", "Something is wrong"},
+    // Where the time went, by the members of the field `time`
+    Phrase{"timeUnit", "Seconds of threads: of render their CPU time, of the others by the clock."},
+    Phrase{"timeLoad", "getting the files that the scene names"},
+    Phrase{"timeBuild", "reading them and building the world"},
+    Phrase{"timeRender", "tracing"},
+    Phrase{"timeTransfer", "packing results to be sent"},
+    Phrase{"timeMerge", "folding and measuring, in the coordinator"},
+    Phrase{"timeIdle", "threads between two units of the job"},
+};
+
+// Returns the phrase with this key; a key that the table lacks does not compile.
+consteval const char* phrase(std::string_view key) {
+  for (const Phrase& p : kPhrases)
+    if (p.key == key) return p.text;
+  throw "the table of phrases has no such key";
+}
+
+}  // namespace ls::report

@@ -1,0 +1,262 @@
+#include "common/scene/gltf/buffers.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <type_traits>
+#include <utility>
+
+#include "common/scene/gltf/uri.h"
+#include "common/scene/limits.h"
+#include "common/scene/xml/document.h"
+
+namespace ls::scene::gltf {
+namespace {
+
+// glTF itself allows no larger file.
+constexpr std::size_t kMost = (std::size_t{1} << 32) - 1;
+
+struct Component {
+  std::size_t code, bytes;
+};
+constexpr Component kComponents[] = {{5120, 1}, {5121, 1}, {5122, 2}, {5123, 2}, {5125, 4}, {5126, 4}};
+constexpr std::size_t kFloat = 5126;
+
+constexpr std::pair<std::string_view, std::size_t> kTypes[] = {
+    {"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT2", 4}, {"MAT3", 9}, {"MAT4", 16}};
+
+template <class Stored>
+Stored stored(const char* at) {
+  Stored x;
+  std::memcpy(&x, at, sizeof x);
+  return x;
+}
+
+// The value of a component; whole numbers that are normalised are shares of the largest.
+double component(const char* at, std::size_t code, bool normalised) {
+  const auto scaled = [&](double x, double most) { return normalised ? std::max(x / most, -1.) : x; };
+  switch (code) {
+    case 5120:
+      return scaled(stored<std::int8_t>(at), 127);
+    case 5121:
+      return scaled(stored<std::uint8_t>(at), 255);
+    case 5122:
+      return scaled(stored<std::int16_t>(at), 32767);
+    case 5123:
+      return scaled(stored<std::uint16_t>(at), 65535);
+    case 5125:
+      return scaled(stored<std::uint32_t>(at), 4294967295.);
+    default:
+      return double{stored<float>(at)};
+  }
+}
+
+}  // namespace
+
+// Where the elements of an accessor stand.
+struct Buffers::Layout {
+  std::size_t code = kFloat, bytes = 4, width = 1, count = 0, stride = 0;
+  bool normalised = false;
+  std::string_view data;  // empty: all elements are 0
+  std::size_t element() const { return bytes * width; }
+};
+
+std::optional<std::string_view> Buffers::buffer(const Item& index) {
+  const Item buffer = index.in(root_["buffers"]);
+  if (!buffer.given()) return std::nullopt;
+  const auto known = read_.find(buffer.identity());
+  if (known != read_.end())
+    return known->second ? std::optional<std::string_view>(*known->second) : std::nullopt;
+  std::optional<std::string>& bytes = read_[buffer.identity()];
+  const auto length = buffer["byteLength"].whole(1, kMost);
+  if (!length) {
+    buffer.error("a buffer needs its byteLength");
+    return std::nullopt;
+  }
+  const Item uri = buffer["uri"];
+  if (uri.given()) {
+    auto read = read_uri(uri);
+    if (!read) return std::nullopt;
+    if (read->is_data) {
+      bytes = std::move(read->text);
+    } else {
+      auto file = assets_.text(join_path("", read->text));
+      if (!file) {
+        uri.error(file.error().message);
+        return std::nullopt;
+      }
+      bytes = std::move(*file);
+    }
+  } else if (chunk_) {
+    bytes = std::string(*chunk_);
+  } else {
+    buffer.error(
+        "this buffer has no uri: only the first of a .glb may have none, whose bytes follow its JSON");
+    return std::nullopt;
+  }
+  total_bytes_ += bytes->size();
+  if (bytes->size() < *length)
+    buffer["byteLength"].error(
+        fmt::format("{} bytes are announced, but there are {}: the file is cut off, or it is another one",
+                    *length, bytes->size()));
+  else if (total_bytes_ > kMaxTotalTextBytes)
+    buffer.error(
+        fmt::format("the buffers have more than {} MiB together: split the scene", kMaxTotalTextBytes >> 20));
+  else
+    return std::string_view(*bytes).substr(0, *length);
+  bytes.reset();
+  return std::nullopt;
+}
+
+std::optional<std::string_view> Buffers::view(const Item& index) {
+  const Item view = index.in(root_["bufferViews"]);
+  if (!view.given()) return std::nullopt;
+  if (!view["buffer"].given()) {
+    view.error("a buffer view needs its buffer");
+    return std::nullopt;
+  }
+  const auto bytes = buffer(view["buffer"]);
+  if (!bytes) return std::nullopt;
+  const std::size_t offset = view["byteOffset"].whole(0, kMost).value_or(0);
+  const std::size_t length = view["byteLength"].whole(0, kMost).value_or(0);
+  if (offset + length <= bytes->size()) return bytes->substr(offset, length);
+  view.error(fmt::format("bytes {} to {} are beyond its buffer, which has {}", offset, offset + length,
+                         bytes->size()));
+  return std::nullopt;
+}
+
+// Returns where the elements of `owner` (an accessor, or a part of a sparse one) lie in its buffer view.
+// There are `count` elements, each with the layout `like`.
+std::optional<Buffers::Layout> Buffers::layout_in(const Item& owner, Layout like, std::size_t count,
+                                                  bool strided) {
+  const auto bytes = view(owner["bufferView"]);
+  if (!bytes) return std::nullopt;
+  like.count = count;
+  like.stride = like.element();
+  const Item stride = owner["bufferView"].in(root_["bufferViews"])["byteStride"];
+  if (strided && stride.given()) {
+    const auto given = stride.whole(like.element(), 252);
+    if (!given) return std::nullopt;
+    like.stride = *given;
+  }
+  const std::size_t offset = owner["byteOffset"].whole(0, kMost).value_or(0);
+  const std::size_t end = offset + (count - 1) * like.stride + like.element();
+  if (end > bytes->size()) {
+    owner.error(fmt::format("{} elements end at byte {}, beyond the buffer view, which has {}", count, end,
+                            bytes->size()));
+    return std::nullopt;
+  }
+  like.data = bytes->substr(offset);
+  return like;
+}
+
+std::optional<Buffers::Layout> Buffers::layout(const Item& accessor) {
+  Layout out;
+  const auto code = accessor["componentType"].whole(5120, kFloat);
+  const auto* component = std::find_if(std::begin(kComponents), std::end(kComponents),
+                                       [&](const Component& c) { return code == c.code; });
+  const std::string name = accessor["type"].text("");
+  const auto* type =
+      std::find_if(std::begin(kTypes), std::end(kTypes), [&](const auto& t) { return t.first == name; });
+  const auto count = accessor["count"].whole(1, kMost);
+  if (component == std::end(kComponents) || type == std::end(kTypes) || !count) {
+    accessor.error("an accessor needs a componentType of 5120 to 5126, a type such as \"VEC3\", and a count");
+    return std::nullopt;
+  }
+  out.code = component->code;
+  out.bytes = component->bytes;
+  out.width = type->second;
+  out.normalised = accessor["normalized"].is_true(false);
+  if (accessor["bufferView"].given()) return layout_in(accessor, out, *count, true);
+  out.count = *count;
+  empty_elements_ += *count;
+  if (empty_elements_ <= kMaxGltfEmptyCount) return out;
+  accessor.error(fmt::format("elements without a buffer view, which are all 0: at most {} of a file are read",
+                             kMaxGltfEmptyCount));
+  return std::nullopt;
+}
+
+template <class T>
+std::optional<std::vector<T>> Buffers::read(const Item& accessor, const Layout& from) {
+  read_numbers_ += from.count * from.width;
+  if (read_numbers_ > kMaxGltfNumbers) {
+    accessor.error(
+        fmt::format("accessors of more than {} numbers in all are read: split the scene", kMaxGltfNumbers));
+    return std::nullopt;
+  }
+  std::vector<T> out(from.count * from.width);
+  for (std::size_t i = 0; i < from.count && !from.data.empty(); ++i)
+    for (std::size_t k = 0; k < from.width; ++k)
+      out[i * from.width + k] = static_cast<T>(
+          component(from.data.data() + i * from.stride + k * from.bytes, from.code, from.normalised));
+  const Item sparse = accessor["sparse"];
+  if (sparse.given() && !read_sparse(sparse, from, out)) return std::nullopt;
+  return out;
+}
+
+template <class T>
+bool Buffers::read_sparse(const Item& sparse, const Layout& like, std::vector<T>& out) {
+  const auto count = sparse["count"].whole(1, like.count);
+  const Item where = sparse["indices"];
+  const auto code = where["componentType"].whole(5121, 5125);
+  if (!count || !code || *code == 5122 || *code == 5124) {
+    sparse.error("a sparse accessor needs a count, and indices whose componentType is 5121, 5123 or 5125");
+    return false;
+  }
+  Layout index;
+  index.code = *code;
+  index.bytes = *code == 5121 ? 1 : *code == 5123 ? 2 : 4;
+  const auto places = layout_in(where, index, *count, false);
+  const auto values = layout_in(sparse["values"], like, *count, false);
+  if (!places || !values) return false;
+  for (std::size_t i = 0; i < *count; ++i) {
+    const auto at =
+        static_cast<std::size_t>(component(places->data.data() + i * places->stride, places->code, false));
+    if (at >= like.count) {
+      where.error(fmt::format("number {} is {}, but the accessor has {} elements", i, at, like.count));
+      return false;
+    }
+    for (std::size_t k = 0; k < like.width; ++k)
+      out[at * like.width + k] = static_cast<T>(component(
+          values->data.data() + i * values->stride + k * values->bytes, values->code, values->normalised));
+  }
+  return true;
+}
+
+std::optional<Numbers<float>> Buffers::floats(const Item& index,
+                                              std::initializer_list<std::string_view> types) {
+  const Item accessor = index.in(root_["accessors"]);
+  if (!accessor.given()) return std::nullopt;
+  const auto from = layout(accessor);
+  if (!from) return std::nullopt;
+  if (std::find(types.begin(), types.end(), accessor["type"].text("")) == types.end()) {
+    accessor["type"].error(fmt::format("{} is wanted for this use", fmt::join(types, " or ")));
+    return std::nullopt;
+  }
+  auto values = read<float>(accessor, *from);
+  if (!values) return std::nullopt;
+  const auto bad = std::find_if(values->begin(), values->end(), [](float x) { return !std::isfinite(x); });
+  if (bad != values->end()) {
+    accessor.error(fmt::format("element {} is not a finite number",
+                               static_cast<std::size_t>(bad - values->begin()) / from->width));
+    return std::nullopt;
+  }
+  return Numbers<float>{from->width, std::move(*values)};
+}
+
+std::optional<std::vector<std::uint32_t>> Buffers::indices(const Item& index) {
+  const Item accessor = index.in(root_["accessors"]);
+  if (!accessor.given()) return std::nullopt;
+  const auto from = layout(accessor);
+  if (!from) return std::nullopt;
+  if (from->width == 1 && (from->code == 5121 || from->code == 5123 || from->code == 5125) &&
+      !from->normalised)
+    return read<std::uint32_t>(accessor, *from);
+  accessor.error("indices are of type SCALAR and of componentType 5121, 5123 or 5125");
+  return std::nullopt;
+}
+
+}  // namespace ls::scene::gltf

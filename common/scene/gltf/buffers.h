@@ -1,0 +1,54 @@
+// The bytes of a glTF file: its buffers, and the numbers that accessors find in them.
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/scene/gltf/value.h"
+#include "common/scene/read.h"
+
+namespace ls::scene::gltf {
+
+// Numbers of one accessor, `width` an element.
+template <class T>
+struct Numbers {
+  std::size_t width = 1;
+  std::vector<T> values;
+  std::size_t count() const { return values.size() / width; }
+};
+
+class Buffers {
+ public:
+  // `chunk`: the bytes behind the JSON of a .glb, which must outlive this.
+  Buffers(const Item& root, AssetSource& assets, std::optional<std::string_view> chunk)
+      : root_(root), assets_(assets), chunk_(chunk) {}
+
+  // Each returns nullopt if the bytes are not there or are no such numbers, which has been reported. `view`
+  // is an index of a buffer view, `accessor` of an accessor; `types` are those that are wanted, as "VEC3".
+  std::optional<std::string_view> view(const Item& view);
+  std::optional<Numbers<float>> floats(const Item& accessor, std::initializer_list<std::string_view> types);
+  std::optional<std::vector<std::uint32_t>> indices(const Item& accessor);
+
+ private:
+  struct Layout;
+  std::optional<std::string_view> buffer(const Item& index);
+  std::optional<Layout> layout(const Item& accessor);
+  std::optional<Layout> layout_in(const Item& owner, Layout like, std::size_t count, bool strided);
+  template <class T>
+  std::optional<std::vector<T>> read(const Item& accessor, const Layout& from);
+  template <class T>
+  bool read_sparse(const Item& sparse, const Layout& like, std::vector<T>& out);
+
+  Item root_;
+  AssetSource& assets_;
+  std::optional<std::string_view> chunk_;
+  std::map<const Value*, std::optional<std::string>> read_;  // the buffers that are read, by their values
+  std::size_t total_bytes_ = 0, empty_elements_ = 0, read_numbers_ = 0;
+};
+
+}  // namespace ls::scene::gltf

@@ -1,0 +1,10 @@
+// The page docs/reference/gltf.md, written from the reader's table.
+#pragma once
+
+#include <string>
+
+namespace ls {
+
+std::string gltf_markdown();
+
+}  // namespace ls

@@ -1,0 +1,69 @@
+// Lights that have no surface (KHR_lights_punctual).
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "common/scene/gltf/parts.h"
+#include "common/scene/xml/transform_element.h"
+
+namespace ls::scene::gltf {
+namespace {
+
+std::string text_of(const Vec3& v) { return fmt::format("{} {} {}", v[0], v[1], v[2]); }
+
+// The cone is dark beyond outerConeAngle and full within innerConeAngle, both from the axis.
+void add_cone(Translation& t, const Item& spot, Element& out) {
+  const double outer = spot["outerConeAngle"].number(std::numbers::pi / 4);
+  const double inner = spot["innerConeAngle"].number(0);
+  if (!(outer > 0 && outer <= std::numbers::pi / 2 && inner >= 0 && inner < outer))
+    return spot.error("a cone is wanted with 0 <= innerConeAngle < outerConeAngle <= pi/2");
+  add(out, "cutoff_angle", outer * kDegrees, out.at);
+  add(out, "beam_width", inner * kDegrees, out.at);
+  t.warn_once(spot,
+              "between its two angles a spot falls off linearly in the angle here, and in glTF by the square "
+              "of its cosine's share");
+}
+
+}  // namespace
+
+// A directional light has lux (irradiance), the others candela (intensity): our numbers are the same.
+void add_light(Translation& t, const Standing& light) {
+  const Item index = light.node.extension("KHR_lights_punctual")["light"];
+  if (!index.given()) return light.node.error("KHR_lights_punctual needs the index of a light");
+  const Item given = index.in(t.root.extension("KHR_lights_punctual")["lights"]);
+  if (!given.given()) return;
+  auto colour = given["color"].numbers<3>({1, 1, 1});
+  const double intensity = given["intensity"].number(1);
+  for (double& x : colour) x *= intensity;
+  if (colour == std::array<double, 3>{0, 0, 0}) return;
+  const auto& m = light.to_world.m;
+  const std::string type = given["type"].text("");
+  const Span at = given.at();
+  const auto facing_world = facing(light.to_world);
+  if (!facing_world && type != "point")
+    return light.node.error("the transform of this light leaves it no direction");
+  Element out;
+  if (type == "directional") {
+    out = made("emitter", "directional", at);
+    scene::add(out, "vector", "direction",
+               text_of(Vec3{{facing_world->m[2], facing_world->m[6], facing_world->m[10]}}), at);
+    scene::add(out, "irradiance", Rgb{colour}, at);
+  } else if (type == "point") {
+    out = made("emitter", "point", at);
+    scene::add(out, "point", "position", text_of(Vec3{{m[3], m[7], m[11]}}), at);
+    scene::add(out, "intensity", Rgb{colour}, at);
+  } else if (type == "spot") {
+    out = made("emitter", "spot", at);
+    place(out, *facing_world, at);
+    scene::add(out, "intensity", Rgb{colour}, at);
+    add_cone(t, given["spot"], out);
+  } else {
+    return given["type"].error("a light is \"directional\", \"point\" or \"spot\"");
+  }
+  t.has_light = true;
+  t.add(std::move(out));
+}
+
+}  // namespace ls::scene::gltf

@@ -1,0 +1,305 @@
+// Materials. The choice of bsdfs is that of the Blender add-on for a Principled BSDF (blender/lightshaft/
+// materials.py), so that a file renders alike on both ways.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/scene/gltf/parts.h"
+
+namespace ls::scene::gltf {
+namespace {
+
+// Below this alpha a surface is smooth, as in the add-on.
+constexpr double kSmooth = 1e-3;
+// Light that a medium lets through is never less than this, so that its extinction is finite.
+constexpr double kLeastPassed = 1e-6;
+
+Element two_sided(Element inner, const Span& at) {
+  Element out = made("bsdf", "twosided", at);
+  add(out, std::move(inner));
+  return out;
+}
+
+class MaterialTranslator {
+ public:
+  MaterialTranslator(Translation& t, const Item& material, const MeshKind& kind)
+      : t_(t), m_(material), at_(material.at()), pbr_(material["pbrMetallicRoughness"]), kind_(kind) {
+    read();
+  }
+
+  Element bsdf(Material& out) {
+    if (m_.extension("KHR_materials_unlit").given()) return unlit(out);
+    if (transmission_.is(0) || metallic_.is(1)) return masked(mapped_opaque(out));
+    return masked(is_body() ? mapped(body(out), out) : sheet(out));
+  }
+
+  std::optional<Element> light() {
+    const double strength = m_.extension("KHR_materials_emissive_strength")["emissiveStrength"].number(1);
+    auto factor = m_["emissiveFactor"].numbers<3>({0, 0, 0});
+    for (double& x : factor) x *= strength;
+    return shining(colour_source(t_, factor, m_["emissiveTexture"]));
+  }
+
+ private:
+  void read() {
+    const auto factor = pbr_["baseColorFactor"].numbers<4>({1, 1, 1, 1});
+    base_ = colour_source(t_, {factor[0], factor[1], factor[2]}, pbr_["baseColorTexture"]);
+    if (kind_.colours) base_.images.push_back(vertex_attribute("vertex_color", at_));
+    alpha_ = Source{{factor[3], factor[3], factor[3]}, {}};
+    const Item both = pbr_["metallicRoughnessTexture"];
+    metallic_ = number_source(t_, pbr_["metallicFactor"], 1, both, Part::blue);
+    roughness_ = number_source(t_, pbr_["roughnessFactor"], 1, both, Part::green);
+    const Item transmission = m_.extension("KHR_materials_transmission");
+    transmission_ = number_source(t_, transmission["transmissionFactor"], 0,
+                                  transmission["transmissionTexture"], Part::red);
+    const Item coat = m_.extension("KHR_materials_clearcoat");
+    coat_ = number_source(t_, coat["clearcoatFactor"], 0, coat["clearcoatTexture"], Part::red);
+    const Item ior = m_.extension("KHR_materials_ior")["ior"];
+    ior_ = ior.number(1.5);
+    if (ior_ < 1) ior.error("an index of refraction of at least 1 is read");
+    read_specular();
+  }
+
+  // The index whose reflection straight on is `specularFactor` times that of `ior`.
+  void read_specular() {
+    const Item specular = m_.extension("KHR_materials_specular");
+    for (const char* name : {"specularTexture", "specularColorTexture"})
+      if (specular[name].given()) t_.warn_once(specular[name], fmt::format("{} has no effect here", name));
+    const auto tint = specular["specularColorFactor"].numbers<3>({1, 1, 1});
+    const double brightest = std::max({tint[0], tint[1], tint[2]});
+    if (tint != std::array<double, 3>{brightest, brightest, brightest})
+      t_.warn_once(specular["specularColorFactor"],
+                   "reflections are not tinted here: the factor counts as grey");
+    const double factor = specular["specularFactor"].number(1) * brightest;
+    const double root = (ior_ - 1) / (ior_ + 1), f0 = std::min(root * root * factor, .99);
+    seen_ior_ = factor == 1 ? ior_ : std::max((1 + std::sqrt(f0)) / (1 - std::sqrt(f0)), 1.001);
+  }
+
+  // What is rough blurs what is seen through it, which a sheet does not.
+  bool is_body() const {
+    const double alpha = roughness_.factor[0] * roughness_.factor[0];
+    return !roughness_.is_constant() || alpha >= kSmooth || has_volume();
+  }
+  bool has_volume() const { return m_.extension("KHR_materials_volume")["thicknessFactor"].number(0) > 0; }
+
+  // Unlit is what shines by itself and reflects nothing.
+  Element unlit(Material& out) {
+    out.light = shining(base_);
+    Element black = made("bsdf", "diffuse", at_);
+    add(black, "reflectance", 0., at_);
+    return masked(two_sided(std::move(black), at_));
+  }
+
+  std::optional<Element> shining(const Source& radiance) {
+    if (radiance.factor == std::array<double, 3>{0, 0, 0}) return std::nullopt;
+    t_.has_light = true;
+    if (m_["doubleSided"].is_true(false))
+      t_.warn_once(m_, "a surface that gives light does so on its front only, though it is doubleSided");
+    Element out = made("emitter", "area", at_);
+    give(out, "radiance", radiance, at_);
+    return out;
+  }
+
+  Element mapped_opaque(Material& out) { return two_sided(mapped(opaque(), out), at_); }
+
+  Element opaque() {
+    if (!roughness_.is_constant() || !coat_.is(0)) return burley(metallic_, Source{{0, 0, 0}, {}});
+    if (metallic_.is(1)) return burley(metallic_, Source{{0, 0, 0}, {}});
+    Element coated = made("bsdf", "roughplastic", at_);
+    const double alpha = std::clamp(roughness_.factor[0], 0., 1.);
+    add(coated, "string", "distribution", "ggx", at_);
+    add(coated, "alpha", std::max(alpha * alpha, kSmooth), at_);
+    add(coated, "int_ior", seen_ior_, at_);
+    add(coated, "ext_ior", 1., at_);
+    give(coated, "diffuse_reflectance", base_, at_);
+    add(coated, "boolean", "multiple_scattering", "true", at_);
+    if (metallic_.is(0)) return coated;
+    Element blend = made("bsdf", "blendbsdf", at_);
+    give(blend, "weight", metallic_, at_);
+    add(blend, std::move(coated));
+    add(blend, burley(Source{}, Source{{0, 0, 0}, {}}));
+    return blend;
+  }
+
+  Element burley(const Source& metallic, const Source& transmission) {
+    Element out = made("bsdf", "principled", at_);
+    give(out, "base_color", base_, at_);
+    give(out, "metallic", metallic, at_);
+    give(out, "roughness", roughness_, at_);
+    if (!transmission.is(0)) give(out, "spec_trans", transmission, at_);
+    add(out, "eta", std::max(seen_ior_, 1.001), at_);
+    if (!coat_.is(0)) add_coat(out);
+    return out;
+  }
+
+  // Burley's coat has an alpha from 0.1 (gloss 0) to 0.001 (gloss 1).
+  void add_coat(Element& out) {
+    const Item coat = m_.extension("KHR_materials_clearcoat");
+    const double roughness = coat["clearcoatRoughnessFactor"].number(0), alpha = roughness * roughness;
+    give(out, "clearcoat", coat_, at_);
+    add(out, "clearcoat_gloss", std::clamp((.1 - alpha) / (.1 - .001), 0., 1.), at_);
+    t_.warn_once(
+        coat, "a clear coat is Burley's here: a quarter as bright as glTF's, and at most of roughness 0.32");
+    for (const char* name : {"clearcoatRoughnessTexture", "clearcoatNormalTexture"})
+      if (coat[name].given()) t_.warn_once(coat[name], fmt::format("{} has no effect here", name));
+  }
+
+  // A body of glass, with what is in it.
+  Element body(Material& out) {
+    if (has_volume())
+      out.interior = interior();
+    else
+      t_.warn_once(
+          m_.extension("KHR_materials_transmission"),
+          "a rough thin surface (one without KHR_materials_volume) is read as the boundary of a body: "
+          "light is bent there, and what is behind its front is seen 1 / ior^2 as bright");
+    const bool plain =
+        transmission_.is(1) && metallic_.is(0) && roughness_.is_constant() && base_.is_constant();
+    if (!plain) return burley(metallic_, transmission_);
+    const double alpha = roughness_.factor[0] * roughness_.factor[0];
+    const bool smooth = alpha < kSmooth;
+    Element glass = made("bsdf", smooth ? "dielectric" : "roughdielectric", at_);
+    add(glass, "int_ior", ior_, at_);
+    add(glass, "ext_ior", 1., at_);
+    // Light passes two surfaces of a body, so that each gives it the root of the colour.
+    Rgb passed{};
+    for (std::size_t i = 0; i < 3; ++i) passed[i] = std::sqrt(std::max(base_.factor[i], 0.));
+    add(glass, "specular_transmittance", passed, at_);
+    if (!smooth) {
+      add(glass, "string", "distribution", "ggx", at_);
+      add(glass, "alpha", std::min(alpha, 1.), at_);
+      add(glass, "boolean", "multiple_scattering", "true", at_);
+    }
+    return glass;
+  }
+
+  // Of white light the share attenuationColor is left after attenuationDistance.
+  std::string interior() {
+    const Item volume = m_.extension("KHR_materials_volume");
+    const auto colour = volume["attenuationColor"].numbers<3>({1, 1, 1});
+    const Item distance = volume["attenuationDistance"];
+    if (!distance.given() || colour == std::array<double, 3>{1, 1, 1}) return {};
+    if (!(distance.number(1) > 0)) {
+      distance.error("a distance above 0 is wanted here");
+      return {};
+    }
+    Element medium = made("medium", "homogeneous", at_);
+    Rgb sigma{};
+    for (std::size_t i = 0; i < 3; ++i)
+      sigma[i] = -std::log(std::clamp(colour[i], kLeastPassed, 1.)) / distance.number(1);
+    std::string id = t_.fresh_id("within " + m_["name"].text("material"));
+    set(medium, "id", id, at_);
+    add(medium, "sigma_t", sigma, at_);
+    add(medium, "albedo", 0., at_);
+    t_.add(std::move(medium));
+    return id;
+  }
+
+  // A smooth surface that transmits without a volume is a sheet: light passes straight on.
+  Element sheet(Material& out) {
+    Element glass = made("bsdf", "thindielectric", at_);
+    add(glass, "int_ior", ior_, at_);
+    add(glass, "ext_ior", 1., at_);
+    give(glass, "specular_transmittance", base_, at_);
+    if (transmission_.is(1) && metallic_.is(0)) return glass;
+    Element blend = made("bsdf", "blendbsdf", at_);
+    give(blend, "weight", transmission_, at_);
+    add(blend, mapped_opaque(out));
+    add(blend, std::move(glass));
+    return blend;
+  }
+
+  Element mapped(Element inner, Material& out) {
+    const Item info = m_["normalTexture"];
+    auto normals = texture(t_, info, Part::normal);
+    if (!normals) return inner;
+    if (info["scale"].number(1) != 1)
+      t_.warn_once(info["scale"], "the strength of a normal map counts as 1 here");
+    out.has_normal_map = true;
+    Element map = made("bsdf", "normalmap", at_);
+    set(*normals, "name", "normalmap", at_);
+    add(map, std::move(*normals));
+    add(map, std::move(inner));
+    return map;
+  }
+
+  Element masked(Element inner) {
+    const std::string mode = m_["alphaMode"].text("OPAQUE");
+    if (mode == "OPAQUE") return inner;
+    if (mode != "MASK" && mode != "BLEND") {
+      m_["alphaMode"].error("alphaMode is OPAQUE, MASK or BLEND");
+      return inner;
+    }
+    if (auto image = texture(t_, pbr_["baseColorTexture"], Part::alpha))
+      alpha_.images.push_back(std::move(*image));
+    if (kind_.opacities) alpha_.images.push_back(vertex_attribute("vertex_opacity", at_));
+    double cutoff = mode == "MASK" ? m_["alphaCutoff"].number(.5) : 0;
+    if (alpha_.is_constant() && mode == "MASK") {
+      alpha_.factor.fill(alpha_.factor[0] >= cutoff ? 1 : 0);
+      cutoff = 0;
+    }
+    if (alpha_.is(1)) return inner;
+    Element mask = made("bsdf", "mask", at_);
+    give(mask, "opacity", alpha_, at_, std::max(cutoff, 0.));
+    add(mask, std::move(inner));
+    return mask;
+  }
+
+  Translation& t_;
+  const Item m_;
+  const Span at_;
+  const Item pbr_;
+  const MeshKind kind_;
+  Source base_, alpha_, metallic_, roughness_, transmission_, coat_;
+  double ior_ = 1.5, seen_ior_ = 1.5;
+};
+
+// Every texture that is read of a material.
+std::vector<Item> textures_of(const Item& m) {
+  const Item pbr = m["pbrMetallicRoughness"];
+  return {pbr["baseColorTexture"],
+          pbr["metallicRoughnessTexture"],
+          m["normalTexture"],
+          m["emissiveTexture"],
+          m.extension("KHR_materials_transmission")["transmissionTexture"],
+          m.extension("KHR_materials_clearcoat")["clearcoatTexture"]};
+}
+
+}  // namespace
+
+std::size_t Materials::uv_set(const Item& index) {
+  const Item material = index.in(t_.root["materials"]);
+  std::optional<std::size_t> set;
+  for (const Item& info : textures_of(material)) {
+    if (!info.given()) continue;
+    const std::size_t own = gltf::uv_set(info);
+    if (set && own != *set)
+      t_.warn_once(
+          info, fmt::format("this texture asks for TEXCOORD_{}, but a mesh has one set here, and others of "
+                            "this material ask for TEXCOORD_{}",
+                            own, *set));
+    set = set.value_or(own);
+  }
+  return set.value_or(0);
+}
+
+bool Materials::uses_opacity(const Item& index) const {
+  return index.in(t_.root["materials"])["alphaMode"].text("OPAQUE") != "OPAQUE";
+}
+
+const Material& Materials::of(const Item& index, const MeshKind& kind) {
+  const Item material = index.in(t_.root["materials"]);
+  const auto [known, is_new] = known_.try_emplace({material.identity(), kind});
+  Material& out = known->second;
+  if (!is_new) return out;
+  out.id = t_.fresh_id(material["name"].text("material"));
+  MaterialTranslator translator(t_, material, kind);
+  Element bsdf = translator.bsdf(out);
+  if (!out.light) out.light = translator.light();
+  set(bsdf, "id", out.id, material.at());
+  t_.add(std::move(bsdf));
+  return out;
+}
+
+}  // namespace ls::scene::gltf

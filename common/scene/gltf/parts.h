@@ -1,0 +1,180 @@
+// Translates the objects of a glTF file to elements of Mitsuba's dialect, one .cpp per kind.
+#pragma once
+
+#include <array>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/scene/gltf/buffers.h"
+#include "common/scene/made_files.h"
+#include "common/scene/read.h"
+#include "common/scene/xml/make_element.h"
+
+namespace ls::scene::gltf {
+
+inline constexpr double kDegrees = 180 / std::numbers::pi;  // of a radian
+
+// The translated scene as far as it is read.
+struct Translation {
+  AssetSource& assets;
+  Report& report;
+  Item root;
+  Buffers buffers;
+  Element scene;
+  std::size_t elements = 0;  // in `scene`
+  bool has_light = false;
+  std::vector<std::string> warned;             // what is warned of once a file
+  std::map<const Value*, std::string> images;  // names of the files of images that are read
+
+  std::set<std::string> ids;
+
+  std::string fresh_id(std::string name);  // that name, or with a number behind it
+  void add(Element e);                     // to the scene, which may have kMaxElements
+  void warn_once(const Item& at, std::string text);
+};
+
+// animation.cpp: what animations give nodes at one moment.
+struct Moment {
+  std::optional<double> seconds;  // nullopt: nodes stand as they say themselves
+  std::string animation;          // name of the one that is seen; empty: the first; "*": all
+};
+struct Pose {
+  std::optional<std::array<double, 3>> translation, scale;
+  std::optional<std::array<double, 4>> rotation;
+  std::shared_ptr<const std::vector<double>> weights;  // of morph targets; nullptr: the node's own
+};
+using Poses = std::map<const Value*, Pose>;  // by the node
+Poses read_poses(Translation& t, const Moment& moment);
+
+// deform.cpp: each changes positions and normals of `mesh`, which are those of `primitive`. False: something
+// is wrong, which has been reported.
+// Adds the morph targets, each times its weight.
+bool add_targets(Translation& t, const Item& primitive, const std::vector<double>& weights, MadeMesh& mesh);
+// Moves corners with their joints, and turns the order of a triangle's corners round if they mirror most of
+// it. `joints`: the matrix of each, from the mesh as it is stored to the world.
+bool add_skin(Translation& t, const Item& primitive, const std::vector<Transform>& joints, MadeMesh& mesh);
+
+// placing.cpp: matrices.
+Transform composed(const Vec3& move, const std::array<double, 4>& rotation, const Vec3& scale);
+Transform matrix_of(const std::array<double, 16>& by_columns);
+Transform local_transform(const Item& node, const Pose& pose);
+// Something at the origin of `to_world` that looks along its -z with +y up, without its scale and shear, as
+// ours look along +z. nullopt: it has no direction.
+std::optional<Transform> facing(const Transform& to_world);
+Transform looking(const Vec3& eye, const Vec3& target);
+void place(Element& parent, const Transform& to_world, const Span& at);
+
+struct Box {
+  Vec3 low{{1e300, 1e300, 1e300}}, high{{-1e300, -1e300, -1e300}};
+  void include(const Vec3& p);
+  void include(const Box& other, const Transform& to_world);
+  bool is_empty() const { return low[0] > high[0]; }
+};
+
+// textures.cpp: a value that may be an image, or a product with one.
+struct Source {
+  std::array<double, 3> factor{1, 1, 1};
+  std::vector<Element> images;  // by which the factor is multiplied
+  bool is_constant() const { return images.empty(); }
+  bool is_factor_one() const { return factor == std::array<double, 3>{1, 1, 1}; }
+  bool is(double x) const { return is_constant() && factor == std::array<double, 3>{x, x, x}; }
+};
+enum class Part { colour, red, green, blue, alpha, normal };
+// The texture at `info`, a member such as "baseColorTexture"; nullopt: it is not given, or wrong and
+// reported.
+std::optional<Element> texture(Translation& t, const Item& info, Part part);
+// The set of texture coordinates that `info` names.
+std::size_t uv_set(const Item& info);
+// A factor (one number, or a colour) times a texture, either of which may be missing.
+Source number_source(Translation& t, const Item& factor, double fallback, const Item& info, Part part);
+Source colour_source(Translation& t, const std::array<double, 3>& factor, const Item& info);
+// Gives `parent` the parameter. With a threshold above 0 it is 1 where the value is at least that, else 0.
+void give(Element& parent, std::string_view name, const Source& source, const Span& at, double threshold = 0);
+Element vertex_attribute(std::string_view name, const Span& at);
+
+// materials.cpp: what a material becomes for meshes of one kind.
+struct Material {
+  std::string id;        // of its bsdf
+  std::string interior;  // id of the medium within; empty: none
+  std::optional<Element> light;
+  std::size_t uv_set = 0;
+  bool has_normal_map = false;
+};
+struct MeshKind {
+  bool colours = false, opacities = false;  // what its corners have
+  auto operator<=>(const MeshKind&) const = default;
+};
+class Materials {
+ public:
+  explicit Materials(Translation& t) : t_(t) {}
+  // `index`: of a primitive, which may have none. The set of texture coordinates does not depend on `kind`.
+  const Material& of(const Item& index, const MeshKind& kind);
+  bool uses_opacity(const Item& index) const;
+  std::size_t uv_set(const Item& index);
+
+ private:
+  Translation& t_;
+  std::map<std::pair<const Value*, MeshKind>, Material> known_;
+};
+
+// meshes.cpp
+class Meshes {
+ public:
+  Meshes(Translation& t, Materials& materials) : t_(t), materials_(materials) {}
+  struct Use {
+    Item mesh, node;
+    Transform to_world;
+    const std::vector<double>* weights = nullptr;    // of morph targets, see Stage; nullptr: there are none
+    const std::vector<Transform>* joints = nullptr;  // of its skin, see add_skin(); then to_world is 1
+  };
+  // Adds all uses of meshes to the scene, those of one mesh as instances where they can be.
+  void add(const std::vector<Use>& uses);
+  const Box& box() const { return box_; }
+
+ private:
+  struct Surface {
+    std::string file;
+    Material material;
+    Box box;
+    bool flat = false;  // it has no normals
+    std::string label;
+    Span at;
+  };
+  std::vector<Surface> read(const Use& use);
+  std::optional<Surface> read_primitive(const Item& primitive, const Use& use);
+  Element shape(const Surface& s);
+
+  Translation& t_;
+  Materials& materials_;
+  std::size_t bytes_ = 0;  // of the files of all meshes
+  std::size_t parts_ = 0;  // primitives and their morph targets, those of each form of a mesh
+  Box box_;
+};
+
+// nodes.cpp: what stands in the scene, placed.
+struct Standing {
+  Item node;
+  Transform to_world;
+};
+struct Stage {
+  std::vector<Meshes::Use> meshes;
+  std::vector<Standing> lights, cameras;
+  // To these meshes point. Equal weights stand here once, however many nodes and instances have them.
+  std::map<const Value*, std::vector<Transform>> skins;
+  std::set<std::vector<double>> weights;
+};
+Stage read_nodes(Translation& t, const Poses& poses);
+
+// lights.cpp
+void add_light(Translation& t, const Standing& light);
+
+// camera.cpp: the camera of that name (empty: the first), or one that sees `box`.
+void add_camera(Translation& t, const std::vector<Standing>& cameras, const std::string& name,
+                const Box& box);
+
+}  // namespace ls::scene::gltf

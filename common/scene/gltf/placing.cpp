@@ -1,0 +1,103 @@
+// Where nodes, cameras and lights stand.
+#include <algorithm>
+#include <cmath>
+
+#include "common/scene/gltf/parts.h"
+#include "common/scene/xml/transform_element.h"
+
+namespace ls::scene::gltf {
+namespace {
+
+std::optional<Vec3> unit(const Vec3& v) {
+  const double length = std::sqrt(dot(v, v));
+  if (!std::isnormal(length)) return std::nullopt;
+  return Vec3{{v[0] / length, v[1] / length, v[2] / length}};
+}
+
+Vec3 column(const Transform& t, std::size_t i) { return Vec3{{t.m[i], t.m[4 + i], t.m[8 + i]}}; }
+
+// With +x on the left, as our cameras have it.
+std::optional<Transform> upright(const Vec3& at, const Vec3& along, const Vec3& up) {
+  const auto ahead = unit(along);
+  const auto left = ahead ? unit(cross(up, *ahead)) : std::nullopt;
+  if (!left) return std::nullopt;
+  const Vec3 above = cross(*ahead, *left);
+  Transform out;
+  for (std::size_t i = 0; i < 3; ++i) {
+    out.m[4 * i] = (*left)[i];
+    out.m[4 * i + 1] = above[i];
+    out.m[4 * i + 2] = (*ahead)[i];
+    out.m[4 * i + 3] = at[i];
+  }
+  return out;
+}
+
+}  // namespace
+
+// The rotation is a quaternion x, y, z, w of any length but 0.
+Transform composed(const Vec3& move, const std::array<double, 4>& rotation, const Vec3& scale) {
+  auto [x, y, z, w] = rotation;
+  const double length = std::sqrt(x * x + y * y + z * z + w * w);
+  Transform out;
+  x /= length, y /= length, z /= length, w /= length;
+  const double r[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - z * w),     2 * (x * z + y * w),
+                       2 * (x * y + z * w),     1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
+                       2 * (x * z - y * w),     2 * (y * z + x * w),     1 - 2 * (x * x + y * y)};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t k = 0; k < 3; ++k) out.m[4 * i + k] = r[3 * i + k] * scale[k];
+    out.m[4 * i + 3] = move[i];
+  }
+  return out;
+}
+
+Transform matrix_of(const std::array<double, 16>& by_columns) {
+  Transform out;
+  for (std::size_t i = 0; i < 16; ++i) out.m[4 * (i % 4) + i / 4] = by_columns[i];
+  return out;
+}
+
+// A matrix, or a translation, a rotation and a scale.
+Transform local_transform(const Item& node, const Pose& pose) {
+  if (node["matrix"].given())
+    return matrix_of(node["matrix"].numbers<16>({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}));
+  const auto move = pose.translation.value_or(node["translation"].numbers<3>({0, 0, 0}));
+  const auto scale = pose.scale.value_or(node["scale"].numbers<3>({1, 1, 1}));
+  const auto turn = pose.rotation.value_or(node["rotation"].numbers<4>({0, 0, 0, 1}));
+  if (std::isnormal(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3]))
+    return composed(Vec3{move}, turn, Vec3{scale});
+  (pose.rotation ? node : node["rotation"])
+      .error("a rotation is a quaternion of length 1, and this one has no length");
+  return {};
+}
+
+std::optional<Transform> facing(const Transform& to_world) {
+  const Vec3 back = column(to_world, 2);
+  return upright(column(to_world, 3), Vec3{{-back[0], -back[1], -back[2]}}, column(to_world, 1));
+}
+
+Transform looking(const Vec3& eye, const Vec3& target) {
+  const Vec3 along{{target[0] - eye[0], target[1] - eye[1], target[2] - eye[2]}};
+  return upright(eye, along, Vec3{{0, 1, 0}}).value_or(Transform{});
+}
+
+void place(Element& parent, const Transform& to_world, const Span& at) {
+  if (to_world != Transform{}) add_transform(parent, nullptr, "to_world", {matrix_step(to_world.m, at)});
+}
+
+void Box::include(const Vec3& p) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    low[i] = std::min(low[i], p[i]);
+    high[i] = std::max(high[i], p[i]);
+  }
+}
+
+void Box::include(const Box& other, const Transform& to_world) {
+  if (other.is_empty()) return;
+  for (int corner = 0; corner < 8; ++corner) {
+    Vec3 p;
+    for (std::size_t i = 0; i < 3; ++i) p[i] = corner >> i & 1 ? other.high[i] : other.low[i];
+    include(transform_point(to_world, p));
+  }
+}
+
+}  // namespace ls::scene::gltf

@@ -1,0 +1,35 @@
+// Files that readers make of the numbers in a scene's text.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/scene/read.h"
+
+namespace ls::scene {
+
+// Triangles for a PLY file. Each list but positions and indices may be empty.
+struct MadeMesh {
+  std::vector<float> positions, normals, uvs;  // three, three, two numbers a corner
+  std::vector<float> colours, opacities;       // the attributes "vertex_color", "vertex_opacity": three, one
+  std::vector<std::uint32_t> indices;          // three a triangle, in range
+  std::size_t corners() const { return positions.size() / 3; }
+  std::size_t bytes() const;  // of the file
+};
+
+struct MadeGrid {
+  std::array<int, 3> sides;
+  int channels = 1;
+  std::vector<float> values;  // x fastest, channels within a voxel
+};
+
+// Each gives `assets` the file to keep and returns its name, which is that of its bytes.
+Result<std::string> keep_made(AssetSource& assets, const MadeMesh& mesh);
+Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid);
+// The bytes of a file of this kind ("image") whose name has this ending (".png").
+Result<std::string> keep_made(AssetSource& assets, std::string_view kind, std::string_view ending,
+                              const std::string& bytes);
+
+}  // namespace ls::scene

@@ -1,0 +1,194 @@
+// Translates the directives before WorldBegin: film, camera, filter, sampler, integrator.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/scene/pbrt/parts.h"
+#include "common/scene/xml/transform_element.h"
+
+namespace ls::scene::pbrt {
+namespace {
+
+// The clip planes of the camera. pbrt has none: its camera sees everything from the pinhole to infinity.
+constexpr double kNearest = 1e-4, kFarthest = 1e7;
+
+class SettingsTranslator {
+ public:
+  SettingsTranslator(Translation& t, Settings& s, const Span& file) : t_(t), s_(s), file_(file) {}
+
+  void run() {
+    Element film = made("film", "hdrfilm", s_.film ? s_.film->at() : file_);
+    if (s_.film)
+      fill(film);
+    else
+      add_size(film, 1280, 720);
+    add(film, filter());
+    Element sensor = camera();
+    add(sensor, sampler());
+    add(sensor, std::move(film));
+    add(t_.scene, integrator());
+    add(t_.scene, std::move(sensor));
+  }
+
+ private:
+  static void whole(Element& parent, std::string name, int x) {
+    add(parent, "integer", std::move(name), fmt::format("{}", x), parent.at);
+  }
+
+  void add_size(Element& film, int width, int height) {
+    width_ = width;
+    height_ = height;
+    whole(film, "width", width);
+    whole(film, "height", height);
+  }
+
+  void fill(Element& film) {
+    Params& p = *s_.film;
+    add_size(film, p.integer("xresolution", 1280), p.integer("yresolution", 720));
+    crop(film, p);
+    if (const std::string sensor = p.text("sensor", "cie1931"); sensor != "cie1931")
+      t_.report.warning(p.at(),
+                        fmt::format("the sensor \"{}\" is not known here: colours are those that the CIE "
+                                    "1931 observer sees",
+                                    sensor));
+    p.finish();
+  }
+
+  void crop(Element& film, Params& p) {
+    const Param* share = p.take("cropwindow");
+    const Param* pixels = p.take("pixelbounds");
+    const Param* given = pixels ? pixels : share;
+    if (!given) return;
+    if (given->numbers.size() != 4)
+      return p.error(given->at, fmt::format("'{}' wants four numbers: x0 x1 y0 y1", given->name));
+    std::array<double, 4> at{};
+    for (std::size_t i = 0; i < 4; ++i)
+      at[i] = pixels ? given->numbers[i] : std::ceil(given->numbers[i] * (i < 2 ? width_ : height_));
+    if (std::any_of(at.begin(), at.end(), [](double x) { return !(x >= 0 && x <= 1e6); }) || at[0] >= at[1] ||
+        at[2] >= at[3])
+      return p.error(given->at, fmt::format("'{}' leaves no part of the frame", given->name));
+    whole(film, "crop_offset_x", static_cast<int>(at[0]));
+    whole(film, "crop_offset_y", static_cast<int>(at[2]));
+    whole(film, "crop_width", static_cast<int>(at[1] - at[0]));
+    whole(film, "crop_height", static_cast<int>(at[3] - at[2]));
+  }
+
+  Element filter() {
+    if (!s_.filter) return made("rfilter", "gaussian", file_);
+    Params& p = *s_.filter;
+    const std::string_view type = p.row().type;
+    Element out = made("rfilter", type == "triangle" ? "tent" : type, p.at());
+    if (type == "gaussian") {
+      add(out, "stddev", p.number("sigma", .5), p.at());
+    } else {
+      const double x = p.number("xradius", type == "box" ? .5 : 2), y = p.number("yradius", x);
+      add(out, "radius", x, p.at());
+      if (x != y) p.error(p.at(), fmt::format("{} has two radii: give one", p.title()));
+    }
+    p.finish();
+    return out;
+  }
+
+  Element sampler() {
+    Element out = made("sampler", "independent", s_.sampler ? s_.sampler->at() : file_);
+    int count = 16;
+    if (s_.sampler) {
+      Params& p = *s_.sampler;
+      if (p.row().type == "stratified") {
+        const int x = p.integer("xsamples", 4), y = p.integer("ysamples", 4);
+        if (x < 1 || y < 1 || x > 32768 || y > 32768)
+          p.error(p.at(), fmt::format("{} wants 1 to 32768 samples each way", p.title()));
+        else
+          count = x * y;
+      } else {
+        count = p.integer("pixelsamples", 16);
+      }
+      p.finish();
+    }
+    whole(out, "sample_count", count);
+    return out;
+  }
+
+  // pbrt's maxdepth counts scatterings, our max_depth the segments of a path.
+  Element integrator() {
+    if (!s_.integrator) {
+      Element out = made("integrator", "volpath", file_);
+      whole(out, "max_depth", 6);
+      return out;
+    }
+    Params& p = *s_.integrator;
+    const std::string_view type = p.row().type;
+    if (type != "path" && type != "volpath")
+      t_.report.warning(p.at(),
+                        fmt::format("{} is read as \"volpath\", which gives the same picture by other "
+                                    "means",
+                                    p.title()));
+    Element out = made("integrator", type == "path" ? "path" : "volpath", p.at());
+    const int depth = p.integer("maxdepth", 5);
+    if (depth < 0 || depth > 1'000'000)
+      p.error(p.at(), fmt::format("{} has a maxdepth of {}: 0 to 1000000 are read", p.title(), depth));
+    else
+      whole(out, "max_depth", depth + 1);
+    p.finish();
+    return out;
+  }
+
+  Element camera() {
+    if (!s_.camera) {
+      t_.report.error(file_, "the scene has no Camera: nothing to see it with");
+      return made("sensor", "perspective", file_);
+    }
+    Params& p = *s_.camera;
+    Element out = p.row().type == "orthographic" ? orthographic(p) : perspective(p);
+    add(out, "near_clip", kNearest, p.at());
+    add(out, "far_clip", kFarthest, p.at());
+    if (!s_.camera_medium.empty()) refer(out, "medium", medium_id(s_.camera_medium), p.at());
+    p.finish();
+    return out;
+  }
+
+  // Mirrors the camera: pbrt's has +x on the right, ours on the left.
+  static Transform facing(const Transform& world) { return multiply(world, scaled(Vec3{{-1, 1, 1}}).to); }
+
+  Element orthographic(Params& p) {
+    Element out = made("sensor", "orthographic", p.at());
+    const double wider = std::max(1., static_cast<double>(width_) / std::max(1, height_));
+    place(out, multiply(facing(s_.camera_ctm.from), scaled(Vec3{{wider, wider, 1}}).to), p.at());
+    return out;
+  }
+
+  Element perspective(Params& p) {
+    const double radius = p.number("lensradius", 0);
+    Element out = made("sensor", radius > 0 ? "thinlens" : "perspective", p.at());
+    add(out, "fov", p.number("fov", 90), p.at());
+    add(out, "string", "fov_axis", "smaller", p.at());
+    Transform world = s_.camera_ctm.from;
+    // A uniform scale only changes the size of the lens.
+    double scale = std::cbrt(std::abs(determinant3(world)));
+    if (!std::isnormal(scale) || !is_similarity(world) || std::abs(scale - 1) < 1e-9) scale = 1;
+    if (scale != 1)
+      for (std::size_t i = 0; i < 12; ++i)
+        if (i % 4 != 3) world.m[i] /= scale;
+    const double focus = p.number("focaldistance", 1e6);
+    if (radius > 0) {
+      add(out, "aperture_radius", radius * scale, p.at());
+      add(out, "focus_distance", focus * scale, p.at());
+    }
+    place(out, facing(world), p.at());
+    return out;
+  }
+
+  Translation& t_;
+  Settings& s_;
+  const Span& file_;
+  int width_ = 1280, height_ = 720;
+};
+
+}  // namespace
+
+double exposure_of(Params& film) { return film.number("exposuretime", 1) * film.number("iso", 100) / 100; }
+
+void add_settings(Translation& t, Settings& s, const Span& file) { SettingsTranslator(t, s, file).run(); }
+
+}  // namespace ls::scene::pbrt

@@ -1,0 +1,127 @@
+// Translates lights.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "common/scene/pbrt/parts.h"
+#include "common/scene/xml/transform_element.h"
+
+namespace ls::scene::pbrt {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+Rgb times(const Rgb& c, double x) { return {c[0] * x, c[1] * x, c[2] * x}; }
+
+std::string text_of(const Vec3& v) { return fmt::format("{} {} {}", v[0], v[1], v[2]); }
+
+class LightTranslator {
+ public:
+  LightTranslator(Translation& t, Params& p, const Placed& ctm) : t_(t), p_(p), ctm_(ctm) {}
+
+  Element run() {
+    const std::string_view type = p_.row().type;
+    if (type == "point") return point();
+    if (type == "spot") return spot();
+    if (type == "distant") return distant();
+    return infinite();
+  }
+
+ private:
+  Rgb colour(std::string_view name) {
+    return times(light_colour(t_, p_, name), p_.number("scale", 1) * t_.exposure);
+  }
+
+  // Returns the intensity. `emitted` is the power of a light of intensity 1.
+  Rgb intensity(double emitted) {
+    const Rgb c = colour("I");
+    return p_.has("power") ? times(c, p_.number("power", 0) / emitted) : c;
+  }
+
+  Element point() {
+    Element out = made("emitter", "point", p_.at());
+    const Vec3 at = transform_point(ctm_.to, p_.triple("from", Vec3{{0, 0, 0}}));
+    add(out, "point", "position", text_of(at), p_.at());
+    add(out, "intensity", intensity(4 * kPi), p_.at());
+    return out;
+  }
+
+  Element spot() {
+    Element out = made("emitter", "spot", p_.at());
+    const Vec3 from = p_.triple("from", Vec3{{0, 0, 0}}), to = p_.triple("to", Vec3{{0, 0, 1}});
+    const Vec3 ahead{{to[0] - from[0], to[1] - from[1], to[2] - from[2]}};
+    const bool is_upright =
+        std::abs(ahead[2]) > std::abs(ahead[0]) && std::abs(ahead[2]) > std::abs(ahead[1]);
+    if (const auto aimed = looking(from, to, is_upright ? Vec3{{0, 1, 0}} : Vec3{{0, 0, 1}}))
+      place(out, multiply(ctm_.to, aimed->from), p_.at());
+    else
+      p_.error(p_.at(), fmt::format("{} has from and to in one point", p_.title()));
+    const double cutoff = p_.number("coneangle", 30), edge = p_.number("conedeltaangle", 5);
+    if (edge < 0 || edge > cutoff)
+      p_.error(p_.at(),
+               fmt::format("{} has a conedeltaangle of {}, beyond 0 to coneangle", p_.title(), edge));
+    else if (edge > 0)
+      t_.warn_once(p_.at(),
+                   "between coneangle - conedeltaangle and coneangle a spot falls off linearly in the "
+                   "angle here, in pbrt as a smooth step of its cosine");
+    add(out, "cutoff_angle", cutoff, p_.at());
+    add(out, "beam_width", cutoff - edge, p_.at());
+    const double end = std::cos(cutoff * kPi / 180), start = std::cos((cutoff - edge) * kPi / 180);
+    add(out, "intensity", intensity(2 * kPi * ((1 - start) + (start - end) / 2)), p_.at());
+    return out;
+  }
+
+  Element distant() {
+    Element out = made("emitter", "directional", p_.at());
+    const Vec3 from = p_.triple("from", Vec3{{0, 0, 0}}), to = p_.triple("to", Vec3{{0, 0, 1}});
+    const Vec3 way = transform_vector(ctm_.to, Vec3{{to[0] - from[0], to[1] - from[1], to[2] - from[2]}});
+    add(out, "vector", "direction", text_of(way), p_.at());
+    add(out, "irradiance", times(colour("L"), p_.number("illuminance", 1)), p_.at());
+    return out;
+  }
+
+  Element infinite() {
+    const bool is_image = p_.has("mapname");
+    Element out = made("emitter", is_image ? "envmap" : "constant", p_.at());
+    // The power of an image would depend on its pixels, so finish() rejects this parameter for images.
+    const Rgb c =
+        times(colour("L"), !is_image && p_.has("illuminance") ? p_.number("illuminance", kPi) / kPi : 1);
+    if (!is_image) {
+      add(out, "radiance", c, p_.at());
+      return out;
+    }
+    add(out, "string", "filename", p_.text("mapname", ""), p_.at());
+    add(out, "scale", c[0], p_.at());
+    if (c[0] != c[1] || c[1] != c[2])
+      p_.error(p_.at(), fmt::format("{} tints its image by L: do that to the image itself", p_.title()));
+    // Maps pbrt's axes to ours. In pbrt the top row is +z, the left edge +x, and a quarter further is +y; in
+    // our maps these are +y, -z and +x.
+    const Transform axes{{0, 0, -1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1}};
+    place(out, multiply(ctm_.to, axes), p_.at());
+    return out;
+  }
+
+  Translation& t_;
+  Params& p_;
+  const Placed& ctm_;
+};
+
+}  // namespace
+
+void add_light(Translation& t, Params& p, const Placed& ctm) {
+  Element light = LightTranslator(t, p, ctm).run();
+  p.finish();
+  add(t.scene, std::move(light));
+}
+
+AreaLight area_light(Translation& t, Params& p) {
+  const Rgb c = times(light_colour(t, p, "L"), p.number("scale", 1) * t.exposure);
+  if (p.boolean("twosided", false))
+    p.error(p.at(), fmt::format("{} shines from both sides, which no light does here: {}", p.title(),
+                                p.row().find("twosided")->meaning));
+  p.finish();
+  return {c, p.at()};
+}
+
+}  // namespace ls::scene::pbrt

@@ -1,0 +1,115 @@
+// Translates the objects of a pbrt file to elements in Mitsuba's format, with one .cpp file for each kind of
+// object.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/scene/made_files.h"
+#include "common/scene/pbrt/params.h"
+#include "common/scene/read.h"
+#include "common/scene/xml/make_element.h"
+
+namespace ls::scene::pbrt {
+
+// A transform and its inverse. Both are updated by each step, so the inverse is as exact as the inverses of
+// the steps.
+struct Placed {
+  Transform to, from;
+};
+Placed then(const Placed& outer, const Placed& inner);  // returns the product that applies `inner` first
+Placed moved(const Vec3& by);
+Placed scaled(const Vec3& by);
+Placed turned(double degrees, const Vec3& axis);
+std::optional<Placed> looking(const Vec3& eye, const Vec3& target, const Vec3& up);
+std::optional<Placed> of_columns(const std::vector<double>& m);  // from 16 numbers, column by column
+
+// A named texture: a constant, or a reference to the element with that id.
+struct Texture {
+  std::optional<Rgb> value;
+  std::string id;
+};
+struct Material {
+  std::string id;
+  bool transmits = false, null = false;
+};
+struct AreaLight {
+  Rgb radiance;
+  Span at;
+};
+
+// The state that AttributeBegin saves and AttributeEnd restores.
+struct Attributes {
+  Placed ctm;
+  bool reversed = false;
+  Material material;
+  std::optional<AreaLight> light;
+  std::string inside, outside;  // names of media; empty: none
+};
+
+// The scene as translated so far.
+struct Translation {
+  AssetSource& assets;
+  Report& report;
+  Element scene;
+  double exposure = 1;  // factor on all light
+  std::map<std::string, Texture> textures;
+  std::map<std::string, Material> materials;
+  std::vector<std::string> warned;  // warnings that are given only once per file
+
+  void warn_once(const Span& at, std::string text);
+};
+
+// These functions are in colours.cpp. nullopt: the value was reported as wrong. Light of one colour has the
+// same luminance as in pbrt: an rgb is relative to the white of sRGB, all other values are scaled to
+// luminance 1.
+std::optional<Rgb> light_colour(Translation& t, const Param& p);
+std::optional<Rgb> surface_colour(Translation& t, const Param& p);
+// Returns white if there is no such parameter
+Rgb light_colour(Translation& t, Params& params, std::string_view name);
+
+// textures.cpp
+void add_texture(Translation& t, const std::string& name, Params& p);
+struct Names {
+  std::string_view theirs, ours;
+};
+// Adds the parameter to `parent`, as a value or as a reference to a texture.
+void add_value(Translation& t, Element& parent, Params& p, Names names, const Rgb& fallback);
+void refer(Element& parent, std::string_view name, std::string id, const Span& at);
+void place(Element& parent, const Transform& to_world, const Span& at);
+
+// In materials.cpp. Adds the material under this id.
+std::optional<Material> add_material(Translation& t, const std::string& id, Params& p);
+
+// lights.cpp
+void add_light(Translation& t, Params& p, const Placed& ctm);
+AreaLight area_light(Translation& t, Params& p);
+
+// media.cpp
+void add_medium(Translation& t, const std::string& name, Params& p, const Placed& ctm);
+std::string medium_id(const std::string& name);
+
+// In shapes.cpp. nullopt: the shape was reported as wrong.
+std::optional<Element> shape(Translation& t, Params& p, const Attributes& attributes);
+
+// In camera.cpp: the directives before WorldBegin, each at most once.
+struct Settings {
+  std::optional<Params> film, camera, filter, sampler, integrator;
+  Placed camera_ctm;
+  std::string camera_medium;
+};
+double exposure_of(Params& film);  // returns the factor on all light
+void add_settings(Translation& t, Settings& s, const Span& file);
+
+// In made_files.cpp: files made of numbers in the scene's text. The returned name is derived from the file's
+// bytes; empty: the file could not be kept, which was reported.
+struct Mesh {
+  std::vector<double> positions, normals, uvs;  // per corner: three, three and two numbers
+  std::vector<double> indices;                  // three per triangle; integers in range
+};
+std::string keep_mesh(Translation& t, const Span& at, const Mesh& mesh);
+std::string keep_grid(Translation& t, const Span& at, const MadeGrid& grid);
+
+}  // namespace ls::scene::pbrt

@@ -1,0 +1,222 @@
+// Translates shapes, with the current material, light and media.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/scene/pbrt/parts.h"
+#include "common/scene/xml/transform_element.h"
+
+namespace ls::scene::pbrt {
+namespace {
+
+class ShapeTranslator {
+ public:
+  ShapeTranslator(Translation& t, Params& p, const Attributes& a) : t_(t), p_(p), a_(a) {}
+
+  std::optional<Element> run() {
+    auto out = geometry();
+    if (out) {
+      place(*out, to_world_.to, p_.at());
+      orient(*out);
+      surface(*out);
+    }
+    p_.finish();
+    return out;
+  }
+
+ private:
+  std::optional<Element> geometry() {
+    const std::string_view type = p_.row().type;
+    to_world_ = a_.ctm;
+    if (type == "sphere") return sphere();
+    if (type == "disk") return disk();
+    if (type == "cylinder") return cylinder();
+    if (type == "plymesh") return ply_file();
+    return type == "trianglemesh" ? triangles() : patches();
+  }
+
+  void need_whole() {
+    if (p_.number("phimax", 360) != 360)
+      p_.error(p_.at(),
+               fmt::format("{} is cut off by phimax: {}", p_.title(), p_.row().find("phimax")->meaning));
+  }
+
+  Element sphere() {
+    need_whole();
+    Element out = made("shape", "sphere", p_.at());
+    add(out, "radius", p_.number("radius", 1), p_.at());
+    return out;
+  }
+
+  Element disk() {
+    need_whole();
+    if (p_.number("innerradius", 0) != 0)
+      p_.error(p_.at(), fmt::format("{} has a hole: {}", p_.title(), p_.row().find("innerradius")->meaning));
+    const double radius = p_.number("radius", 1);
+    to_world_ =
+        then(then(a_.ctm, moved(Vec3{{0, 0, p_.number("height", 0)}})), scaled(Vec3{{radius, radius, 1}}));
+    return made("shape", "disk", p_.at());
+  }
+
+  Element cylinder() {
+    need_whole();
+    Element out = made("shape", "cylinder", p_.at());
+    add(out, "point", "p0", fmt::format("0 0 {}", p_.number("zmin", -1)), p_.at());
+    add(out, "point", "p1", fmt::format("0 0 {}", p_.number("zmax", 1)), p_.at());
+    add(out, "radius", p_.number("radius", 1), p_.at());
+    return out;
+  }
+
+  std::optional<Element> ply_file() {
+    const std::string file = p_.text("filename", "");
+    if (file.empty()) {
+      p_.missing("filename");
+      return std::nullopt;
+    }
+    if (file.ends_with(".gz")) {
+      p_.error(p_.at(), fmt::format("\"{}\" is packed: unpack it by gunzip, and name it without .gz", file));
+      return std::nullopt;
+    }
+    return ply(file);
+  }
+
+  Element ply(const std::string& file) {
+    Element out = made("shape", "ply", p_.at());
+    add(out, "string", "filename", file, p_.at());
+    add(out, "boolean", "flat_without_normals", "true", p_.at());
+    return out;
+  }
+
+  std::optional<Element> wrong(const Span& at, std::string text) {
+    p_.error(at, std::move(text));
+    return std::nullopt;
+  }
+
+  // Returns the parameter `indices`. Returns an empty list if it is wrong, which is reported.
+  std::vector<double> indices(std::size_t corners, std::size_t each) {
+    const Param* p = p_.take("indices");
+    if (!p) {
+      std::vector<double> all;
+      for (std::size_t i = 0; i < each; ++i) all.push_back(static_cast<double>(i));
+      if (corners == each) return all;
+      p_.missing("indices");
+      return {};
+    }
+    const auto is_wrong = [&](double x) {
+      return x != std::floor(x) || x < 0 || x >= static_cast<double>(corners);
+    };
+    const auto bad = std::find_if(p->numbers.begin(), p->numbers.end(), is_wrong);
+    if (bad != p->numbers.end())
+      return wrong(p->at, fmt::format("there is no corner {}: P has {}, counted from 0", *bad, corners)),
+             std::vector<double>{};
+    if (!p->numbers.empty() && p->numbers.size() % each == 0) return p->numbers;
+    return wrong(p->at, fmt::format("{} indices are no multiple of {}", p->numbers.size(), each)),
+           std::vector<double>{};
+  }
+
+  std::optional<Element> kept(const Mesh& mesh) {
+    const std::string file = keep_mesh(t_, p_.at(), mesh);
+    return file.empty() ? std::nullopt : std::optional(ply(file));
+  }
+
+  std::optional<Element> triangles() {
+    const Param* corners = p_.take("P");
+    if (!corners || corners->numbers.empty()) {
+      if (!corners) p_.missing("P");
+      return corners ? wrong(corners->at, "P has no corners") : std::nullopt;
+    }
+    const std::size_t n = corners->numbers.size() / 3;
+    Mesh mesh{corners->numbers, {}, {}, indices(n, 3)};
+    for (const auto& [name, size, list] : {std::tuple{"N", std::size_t{3}, &mesh.normals},
+                                           {"uv", std::size_t{2}, &mesh.uvs},
+                                           {"st", std::size_t{2}, &mesh.uvs}}) {
+      if (!p_.has(name)) continue;
+      const Param* p = p_.take(name);
+      if (!p) return std::nullopt;
+      if (p->numbers.size() != size * n)
+        return wrong(p->at,
+                     fmt::format("'{}' has {} numbers, but P has {} corners", name, p->numbers.size(), n));
+      *list = p->numbers;
+    }
+    has_normals_ = !mesh.normals.empty();
+    return mesh.indices.empty() ? std::nullopt : kept(mesh);
+  }
+
+  std::optional<Element> patches() {
+    const Param* corners = p_.take("P");
+    if (!corners || corners->numbers.empty()) {
+      if (!corners) p_.missing("P");
+      return corners ? wrong(corners->at, "P has no corners") : std::nullopt;
+    }
+    const std::vector<double>& x = corners->numbers;
+    const std::vector<double> four = indices(x.size() / 3, 4);
+    if (four.empty()) return std::nullopt;
+    Mesh mesh{x, {}, {}, {}};
+    for (std::size_t i = 0; i < four.size(); i += 4) {
+      std::array<Vec3, 3> side;  // vectors from corner 0 to the corners 1, 2 and 3
+      for (std::size_t k = 0; k < 3; ++k)
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          side[k][axis] = x[3 * std::size_t(four[i + k + 1]) + axis] - x[3 * std::size_t(four[i]) + axis];
+      const Vec3 normal = cross(side[0], side[1]);
+      const double size = std::sqrt(dot(normal, normal)) * std::sqrt(dot(side[2], side[2]));
+      // The tolerance allows for corners in single precision, which are rounded to 2^-24 of their distance.
+      if (std::abs(dot(normal, side[2])) > 1e-5 * size)
+        return wrong(p_.at(),
+                     fmt::format("{} is bent, and only flat patches are read: give a plymesh", p_.title()));
+      for (const std::size_t k : {0, 1, 3, 0, 3, 2}) mesh.indices.push_back(four[i + k]);
+    }
+    return kept(mesh);
+  }
+
+  // In pbrt ReverseOrientation flips the normal, and mirroring a mesh leaves its normal on the original side.
+  // Our meshes without normals follow the order of corners, which mirroring reverses.
+  void orient(Element& out) {
+    const bool mirrored = determinant3(to_world_.to) < 0;
+    const std::string_view type = p_.row().type;
+    const bool by_corners = (type == "trianglemesh" && !has_normals_) || type == "bilinearmesh";
+    const bool has_sides = a_.light || a_.inside != a_.outside || a_.material.transmits;
+    if (mirrored && has_sides && (!by_corners || a_.reversed))
+      p_.error(p_.at(),
+               fmt::format("{} is mirrored by its transform, and its sides matter, as it gives light, "
+                           "bounds a medium or lets light through: leave the mirror out (and turn "
+                           "ReverseOrientation round if it is on)",
+                           p_.title()));
+    if (a_.reversed != (mirrored && by_corners)) add(out, "boolean", "flip_normals", "true", p_.at());
+  }
+
+  void surface(Element& out) {
+    const bool is_masked = p_.has("alpha") && !a_.material.null;
+    if (p_.has("alpha") && a_.material.null) p_.take("alpha");
+    if (is_masked) {
+      Element mask = made("bsdf", "mask", p_.at());
+      add_value(t_, mask, p_, {"alpha", "opacity"}, {1, 1, 1});
+      refer(mask, "", a_.material.id, p_.at());
+      add(out, std::move(mask));
+    } else {
+      refer(out, "", a_.material.id, p_.at());
+    }
+    if (a_.light) {
+      Element area = made("emitter", "area", a_.light->at);
+      add(area, "radiance", a_.light->radiance, a_.light->at);
+      add(out, std::move(area));
+    }
+    if (a_.inside == a_.outside) return;
+    if (!a_.inside.empty()) refer(out, "interior", medium_id(a_.inside), p_.at());
+    if (!a_.outside.empty()) refer(out, "exterior", medium_id(a_.outside), p_.at());
+  }
+
+  Translation& t_;
+  Params& p_;
+  const Attributes& a_;
+  Placed to_world_;
+  bool has_normals_ = false;
+};
+
+}  // namespace
+
+std::optional<Element> shape(Translation& t, Params& p, const Attributes& attributes) {
+  return ShapeTranslator(t, p, attributes).run();
+}
+
+}  // namespace ls::scene::pbrt

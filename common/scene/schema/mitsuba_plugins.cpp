@@ -1,0 +1,259 @@
+#include "common/scene/schema/mitsuba_plugins.h"
+
+#include <algorithm>
+
+namespace ls::scene {
+namespace {
+
+constexpr Standing kRead = Standing::read, kInPart = Standing::in_part, kRefused = Standing::refused;
+constexpr Origin kOlder = Origin::older, kOurs = Origin::ours;
+
+constexpr std::string_view kPolarised =
+    "polarisation is not followed; leave it out, or write the unpolarised surface";
+constexpr std::string_view kNotLight =
+    "what it draws is not light: ask for an AOV (`--aov`, or the integrator \"aov\")";
+constexpr std::string_view kOneMethod = "with a warning: the same picture by other means";
+constexpr std::string_view kCountOnly =
+    "only `sample_count`: which samples are taken is this program's own matter";
+constexpr std::string_view kNegativeLobes =
+    "it has negative lobes, which samples that each belong to one pixel can't follow; use box, tent or "
+    "gaussian";
+constexpr std::string_view kCurves = "curves are not rendered; write them as meshes in a \"ply\"";
+constexpr std::string_view kSplats = "volumetric splats are not rendered; write the surface as a mesh";
+constexpr std::string_view kSky =
+    "there is no model of the sky here; save its image in Mitsuba and read that as an \"envmap\", with a "
+    "\"directional\" of an `angular_radius` for the sun";
+constexpr std::string_view kMeter =
+    "it measures one number, not a picture; look through a \"perspective\" or \"orthographic\" instead";
+constexpr std::string_view kPhase =
+    "phase functions are \"isotropic\" and \"hg\"; use an \"hg\" of the same mean cosine";
+constexpr std::string_view kMeasured =
+    "measured materials are not read; fit a \"roughconductor\" or a \"principled\" to it";
+constexpr std::string_view kBakeTexture = "bake it into a \"bitmap\"";
+constexpr std::string_view kAsHdrfilm = "with a warning, as hdrfilm: what is written are linear colours";
+constexpr std::string_view kConvertMesh = "write it as a mesh in a \"ply\"";
+
+constexpr PluginRow kPlugins[] = {
+    {"shape", "bsplinecurve", kRefused, kCurves},
+    {"shape", "cube", kRead, ""},
+    {"shape", "cylinder", kInPart, "`to_world` may stretch it along its axis only"},
+    {"shape", "disk", kRead, ""},
+    {"shape", "ellipsoids", kRefused, kSplats},
+    {"shape", "ellipsoidsmesh", kRefused, kSplats},
+    {"shape", "instance", kRead, ""},
+    {"shape", "linearcurve", kRefused, kCurves},
+    {"shape", "merge", kRead, "its shapes one by one, which look the same"},
+    {"shape", "obj", kRead, ""},
+    {"shape", "ply", kRead, ""},
+    {"shape", "rectangle", kRead, ""},
+    {"shape", "sdfgrid", kRefused,
+     "surfaces of distance fields are not rendered; write them as a mesh in a \"ply\""},
+    {"shape", "serialized", kRead, ""},
+    {"shape", "shapegroup", kRead, ""},
+    {"shape", "sphere", kRead, ""},
+    {"shape", "blender", kRefused, "it stands for memory of Blender; use Lightshaft's add-on for Blender"},
+    {"shape", "deformable", kRefused, "motion is not rendered; write one mesh a frame", kOlder},
+    {"shape", "hair", kRefused, kCurves, kOlder},
+    {"shape", "heightfield", kRefused, kConvertMesh, kOlder},
+
+    {"bsdf", "blendbsdf", kRead, ""},
+    {"bsdf", "bumpmap", kInPart, "its texture must be a \"bitmap\": others have no slopes"},
+    {"bsdf", "circular", kRefused, kPolarised},
+    {"bsdf", "conductor", kInPart,
+     "`eta` and `k` are colours, the same everywhere; not every metal by its name"},
+    {"bsdf", "dielectric", kRead, ""},
+    {"bsdf", "diffuse", kRead, ""},
+    {"bsdf", "hair", kRefused, "hair is not rendered; meshes of strands may be \"roughplastic\""},
+    {"bsdf", "mask", kRead, ""},
+    {"bsdf", "measured", kRefused, kMeasured},
+    {"bsdf", "measured_polarized", kRefused, kMeasured},
+    {"bsdf", "normalmap", kRead, ""},
+    {"bsdf", "null", kRead, ""},
+    {"bsdf", "plastic", kRead, ""},
+    {"bsdf", "polarizer", kRefused, kPolarised},
+    {"bsdf", "pplastic", kRefused, "polarisation is not followed; use \"plastic\" or \"roughplastic\""},
+    {"bsdf", "principled", kRead, ""},
+    {"bsdf", "principledthin", kRefused,
+     "light through thin sheets is that of \"thindielectric\" and of a \"blendbsdf\" with it"},
+    {"bsdf", "retarder", kRefused, kPolarised},
+    {"bsdf", "roughconductor", kInPart,
+     "`eta` and `k` are colours, the same everywhere; not every metal by its name"},
+    {"bsdf", "roughdielectric", kRead, ""},
+    {"bsdf", "roughplastic", kRead, ""},
+    {"bsdf", "thindielectric", kRead, ""},
+    {"bsdf", "twosided", kInPart,
+     "not with `allow_transmission`: what light passes has two sides of its own"},
+    {"bsdf", "coating", kRefused, "use \"plastic\", or a \"principled\" with a clearcoat", kOlder},
+    {"bsdf", "difftrans", kRefused, "diffuse transmission is not rendered; use a \"mask\" of a \"diffuse\"",
+     kOlder},
+    {"bsdf", "hk", kRefused, "put a medium into the shape instead", kOlder},
+    {"bsdf", "irawan", kRefused, "woven cloth is not rendered; use a \"principled\" with sheen", kOlder},
+    {"bsdf", "mixturebsdf", kRefused, "write it as \"blendbsdf\" within each other", kOlder},
+    {"bsdf", "phong", kRefused, "write it as a \"blendbsdf\" of a \"diffuse\" and a \"roughconductor\"",
+     kOlder},
+    {"bsdf", "roughcoating", kRefused, "use \"roughplastic\", or a \"principled\" with a clearcoat", kOlder},
+    {"bsdf", "roughdiffuse", kRefused, "use \"diffuse\"", kOlder},
+    {"bsdf", "ward", kRefused, "use a \"roughconductor\" with alpha_u and alpha_v", kOlder},
+
+    {"texture", "bitmap", kInPart, "from files; arrays of Python by the package `lightshaft`"},
+    {"texture", "checkerboard", kRead, ""},
+    {"texture", "mesh_attribute", kInPart, "of \"ply\" meshes only"},
+    {"texture", "rawconstant", kInPart, "not below 0"},
+    {"texture", "srgb", kRead, ""},
+    {"texture", "uniform", kRead, ""},
+    {"texture", "volume", kRefused,
+     "surfaces have textures in u and v only; bake it into a \"bitmap\" or into colours of a \"ply\"'s "
+     "vertices"},
+    {"texture", "curvature", kRefused, kBakeTexture, kOlder},
+    {"texture", "gridtexture", kRefused, kBakeTexture, kOlder},
+    {"texture", "sampledspectrum", kRefused, "write it as a \"regular\" spectrum", kOlder},
+    {"texture", "scale", kRefused, "multiply the image, or the colours, beforehand", kOlder},
+    {"texture", "vertexcolors", kRefused, "write it as a \"mesh_attribute\" of a \"ply\"", kOlder},
+    {"texture", "wireframe", kRefused, kBakeTexture, kOlder},
+    {"texture", "peak", kRead, "", kOurs},
+    {"texture", "product", kRead, "", kOurs},
+
+    {"spectrum", "blackbody", kInPart,
+     "of lights: the radiance that Mitsuba's spectral modes show, cut off at 0 outside of sRGB; its RGB "
+     "modes refuse it"},
+    {"spectrum", "d65", kRead, "`color` (1 if not given) times `scale`, as in Mitsuba's RGB modes"},
+    {"spectrum", "irregular", kRead,
+     "as the `<spectrum value=...>` of these pairs, which is how Mitsuba's RGB modes take them"},
+    {"spectrum", "rawconstant", kInPart, "not below 0"},
+    {"spectrum", "regular", kRead,
+     "as the `<spectrum value=...>` of these pairs, which is how Mitsuba's RGB modes take them"},
+    {"spectrum", "srgb", kRead, ""},
+    {"spectrum", "uniform", kRead, ""},
+
+    {"emitter", "area", kRead, ""},
+    {"emitter", "constant", kRead, ""},
+    {"emitter", "directional", kRead, ""},
+    {"emitter", "directionalarea", kRefused,
+     "no beam of one direction alone leaves a surface here; give an \"area\" a small `cutoff_angle`, or use "
+     "a "
+     "\"directional\""},
+    {"emitter", "envmap", kInPart, "from files; arrays of Python by the package `lightshaft`"},
+    {"emitter", "point", kRead, ""},
+    {"emitter", "projector", kRead, ""},
+    {"emitter", "spot", kRead, ""},
+    {"emitter", "sunsky", kRefused, kSky},
+    {"emitter", "timed_sunsky", kRefused, kSky},
+    {"emitter", "avg_sunsky", kRefused, kSky, kOlder},
+    {"emitter", "collimated", kRefused, "use a \"spot\" of a small cutoff_angle, or a \"directional\"",
+     kOlder},
+    {"emitter", "sky", kRefused, kSky, kOlder},
+    {"emitter", "sun", kRefused, "use a \"directional\" of an `angular_radius`", kOlder},
+
+    {"medium", "heterogeneous", kRead, ""},
+    {"medium", "homogeneous", kRead, ""},
+
+    {"phase", "blendphase", kRefused, kPhase},
+    {"phase", "hg", kRead, ""},
+    {"phase", "isotropic", kRead, ""},
+    {"phase", "rayleigh", kRefused, "use \"isotropic\", which has the same mean cosine, 0"},
+    {"phase", "sggx", kRefused, kPhase},
+    {"phase", "tabphase", kRefused, kPhase},
+    {"phase", "kkay", kRefused, kPhase, kOlder},
+    {"phase", "microflake", kRefused, kPhase, kOlder},
+    {"phase", "mixturephase", kRefused, kPhase, kOlder},
+
+    {"volume", "constvolume", kRead, ""},
+    {"volume", "gridvolume", kInPart, "from files; arrays of Python by the package `lightshaft`"},
+    {"volume", "hgridvolume", kRefused, "write it as one \"gridvolume\"; a `.vdb` may be sparse", kOlder},
+    {"volume", "volcache", kRefused, "leave it out: put the volume in its place", kOlder},
+
+    {"integrator", "aov", kInPart,
+     "its integrator, and the channels that are AOVs here; others are refused by name"},
+    {"integrator", "depth", kRefused, kNotLight},
+    {"integrator", "direct", kRead, "`path` with max_depth 2"},
+    {"integrator", "direct_projective", kRead, "`path` with max_depth 2, with a warning"},
+    {"integrator", "moment", kInPart, "its integrator, with a warning: the variances are not written"},
+    {"integrator", "path", kRead, ""},
+    {"integrator", "prb", kRead, "`path`, with a warning; max_depth is 6 unless given"},
+    {"integrator", "prb_basic", kRead, "`path`, with a warning; max_depth is 6 unless given"},
+    {"integrator", "prb_projective", kRead, "`path`, with a warning; max_depth is 6 unless given"},
+    {"integrator", "prbvolpath", kRead, "`volpath`, with a warning; max_depth is 6 unless given"},
+    {"integrator", "ptracer", kRead, "`path`"},
+    {"integrator", "stokes", kRefused, "polarisation is not followed; use the integrator within it"},
+    {"integrator", "volpath", kRead, ""},
+    {"integrator", "volpathmis", kRead, "`volpath`"},
+    {"integrator", "volprim_rf_basic", kRefused, kSplats},
+    {"integrator", "adaptive", kInPart, "its integrator, with a warning: --target-error decides the samples",
+     kOlder},
+    {"integrator", "ao", kRefused, kNotLight, kOlder},
+    {"integrator", "bdpt", kRead, kOneMethod, kOlder},
+    {"integrator", "erpt", kRead, kOneMethod, kOlder},
+    {"integrator", "field", kRefused, kNotLight, kOlder},
+    {"integrator", "irrcache", kInPart, "its integrator, with a warning: nothing is interpolated", kOlder},
+    {"integrator", "mlt", kRead, kOneMethod, kOlder},
+    {"integrator", "multichannel", kRefused, "use the integrator \"aov\"", kOlder},
+    {"integrator", "photonmapper", kRead, kOneMethod, kOlder},
+    {"integrator", "ppm", kRead, kOneMethod, kOlder},
+    {"integrator", "prb_reparam", kRefused, "write \"prb\" or \"path\"", kOlder},
+    {"integrator", "pssmlt", kRead, kOneMethod, kOlder},
+    {"integrator", "sppm", kRead, kOneMethod, kOlder},
+    {"integrator", "volpath_simple", kRead, "`volpath`", kOlder},
+    {"integrator", "vpl", kRead, kOneMethod, kOlder},
+    {"integrator", "volpath_distant_mis", kRead, "", kOurs},
+    {"integrator", "whitted", kRead, "Nori's", kOurs},
+
+    {"sensor", "batch", kRefused, "a job has one picture; submit the scene once for each of its sensors"},
+    {"sensor", "distant", kRefused, kMeter},
+    {"sensor", "flat_sensor", kRefused,
+     "it is a helper of Mitsuba's training of scenes; use a \"perspective\""},
+    {"sensor", "irradiancemeter", kRefused, kMeter},
+    {"sensor", "orthographic", kRead, ""},
+    {"sensor", "perspective", kRead, ""},
+    {"sensor", "radiancemeter", kRefused, kMeter},
+    {"sensor", "thinlens", kRead, ""},
+    {"sensor", "fluencemeter", kRefused, kMeter, kOlder},
+    {"sensor", "perspective_rdist", kRefused, "lenses do not distort here; use a \"perspective\"", kOlder},
+    {"sensor", "spherical", kRead, "", kOlder},
+    {"sensor", "telecentric", kRefused, "use an \"orthographic\"", kOlder},
+
+    {"film", "hdrfilm", kInPart, "size, crop and filter; formats are chosen by the command line or the job"},
+    {"film", "specfilm", kRefused, "spectra are not followed; use \"hdrfilm\""},
+    {"film", "ldrfilm", kInPart, kAsHdrfilm, kOlder},
+    {"film", "mfilm", kInPart, kAsHdrfilm, kOlder},
+    {"film", "tiledhdrfilm", kInPart, kAsHdrfilm, kOlder},
+
+    {"sampler", "independent", kInPart, kCountOnly},
+    {"sampler", "ldsampler", kInPart, kCountOnly},
+    {"sampler", "multijitter", kInPart, kCountOnly},
+    {"sampler", "orthogonal", kInPart, kCountOnly},
+    {"sampler", "stratified", kInPart, kCountOnly},
+    {"sampler", "halton", kInPart, kCountOnly, kOlder},
+    {"sampler", "hammersley", kInPart, kCountOnly, kOlder},
+    {"sampler", "sobol", kInPart, kCountOnly, kOlder},
+
+    {"rfilter", "box", kRead, ""},
+    {"rfilter", "catmullrom", kRefused, kNegativeLobes},
+    {"rfilter", "gaussian", kRead, ""},
+    {"rfilter", "lanczos", kRefused, kNegativeLobes},
+    {"rfilter", "mitchell", kRefused, kNegativeLobes},
+    {"rfilter", "tent", kRead, ""},
+};
+
+}  // namespace
+
+std::span<const PluginRow> mitsuba_plugins() { return kPlugins; }
+
+const PluginRow* plugin_row(std::string_view tag, std::string_view name) {
+  const auto row =
+      std::ranges::find_if(kPlugins, [&](const PluginRow& r) { return r.tag == tag && r.name == name; });
+  return row == std::end(kPlugins) ? nullptr : &*row;
+}
+
+bool is_read_plugin(std::string_view tag, std::string_view name) {
+  const PluginRow* row = plugin_row(tag, name);
+  return row && row->standing != Standing::refused;
+}
+
+std::vector<std::string> read_plugins(std::string_view tag) {
+  std::vector<std::string> names;
+  for (const PluginRow& row : kPlugins)
+    if (row.tag == tag && row.standing != Standing::refused) names.emplace_back(row.name);
+  return names;
+}
+
+}  // namespace ls::scene

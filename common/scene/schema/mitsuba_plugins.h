@@ -1,0 +1,36 @@
+// Every plugin of Mitsuba's scene language by its name: what is read here, and why the others are not. One
+// table for the messages, the suggestions and docs/reference/mitsuba.md.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace ls::scene {
+
+enum class Standing { read, in_part, refused };
+enum class Origin {
+  mitsuba3,  // of version 3.9
+  older,     // of an earlier version only
+  ours
+};
+
+struct PluginRow {
+  std::string_view tag, name;
+  Standing standing;
+  // What it becomes if its name does not say so, what is left out if it is read in part, or why it is refused
+  // and what to use instead.
+  std::string_view note;
+  Origin origin = Origin::mitsuba3;
+};
+
+std::span<const PluginRow> mitsuba_plugins();
+const PluginRow* plugin_row(std::string_view tag, std::string_view name);  // nullptr: unknown
+bool is_read_plugin(std::string_view tag, std::string_view name);
+std::vector<std::string> read_plugins(std::string_view tag);  // names
+
+// Generates docs/reference/mitsuba.md.
+std::string mitsuba_markdown();
+
+}  // namespace ls::scene

@@ -1,0 +1,25 @@
+// The bodies of OTLP over HTTP in JSON (https://opentelemetry.io/docs/specs/otlp/): the request
+// ExportTraceServiceRequest and the part of its answer that says how many spans were rejected.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "common/trace/span.h"
+
+namespace ls::trace {
+
+// Bytes in texts that are not UTF-8 are replaced.
+std::string otlp_request(const Resource& resource, std::span<const Span> spans);
+
+struct PartialSuccess {
+  std::uint64_t rejected = 0;  // number of spans
+  std::string message;         // for the operator, of at most 200 characters; empty: none
+};
+// Reads the body of an answer of status 2xx. Whatever is not understood counts as a full success: an answer
+// may be empty or of another encoding.
+PartialSuccess otlp_partial_success(std::string_view answer);
+
+}  // namespace ls::trace

@@ -1,0 +1,45 @@
+// Where traces go and which are recorded, as the operator says by OpenTelemetry's standard variables
+// (https://opentelemetry.io/docs/specs/otel/configuration/sdk-environment-variables/).
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/base/error.h"
+#include "common/trace/context.h"
+
+namespace ls::trace {
+
+// Decides which traces are recorded. The same trace id always gets the same decision, in every process.
+struct Sampler {
+  double ratio = 1;            // fraction of the traces that are recorded, 0 to 1
+  bool parent_decides = true;  // for a trace that another program began, its flag decides instead
+
+  bool takes(const TraceId& trace, std::optional<bool> parent_sampled) const;
+};
+
+struct Settings {
+  std::string url;  // for POST requests with spans
+  std::vector<std::pair<std::string, std::string>> headers;
+  std::string ca_file;  // certificates of authorities; empty: the system's
+  double seconds = 10;  // most seconds until an answer
+  std::string service;  // OTEL_SERVICE_NAME, or service.name of the attributes, or the name of the program
+  std::vector<std::pair<std::string, std::string>> resource;  // OTEL_RESOURCE_ATTRIBUTES but service.name
+  Sampler sampler;
+};
+
+// Returns the value of a variable; null: it is not set
+using Environment = std::function<const char*(const char* name)>;
+
+// Reads OTEL_SDK_DISABLED, OTEL_TRACES_EXPORTER, OTEL_SERVICE_NAME, OTEL_RESOURCE_ATTRIBUTES,
+// OTEL_TRACES_SAMPLER with _ARG, and OTEL_EXPORTER_OTLP_ENDPOINT, _HEADERS, _TIMEOUT, _CERTIFICATE and
+// _PROTOCOL, each of which OTEL_EXPORTER_OTLP_TRACES_... overrides. nullopt: nothing is traced, as without an
+// endpoint. Error invalid_argument: a variable has a value that is not understood; the message names it, but
+// not the value of a header. Spans are always sent as JSON: the protocol http/protobuf is only warned about
+// in the log, and others are errors.
+Result<std::optional<Settings>> settings_from(const Environment& environment, const std::string& program);
+
+}  // namespace ls::trace

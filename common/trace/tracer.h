@@ -1,0 +1,74 @@
+// Records spans and sends them to a collector, on a thread of its own. Recording takes a short lock and never
+// waits for the collector: if the collector refuses, hangs or is gone, spans are dropped and counted. A
+// program that is not traced has no Tracer; its callers hold a null pointer and do nothing more than look at
+// it.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "common/base/clock.h"
+#include "common/base/guarded.h"
+#include "common/http/post.h"
+#include "common/trace/settings.h"
+#include "common/trace/span.h"
+#include "common/trace/span_queue.h"
+
+namespace ls::trace {
+
+class Tracer {
+ public:
+  struct Options {
+    Settings settings;
+    std::string version;  // of this program
+    std::string
+        instance;  // which of the programs of this kind it is, such as a worker's name; empty: not told
+    std::shared_ptr<const Clock> clock;
+    std::function<std::int64_t()> unix_ns;  // nanoseconds since 1970
+    // Sends a request; ls::post by default
+    std::function<Result<HttpAnswer>(const HttpPost&)> send = {};
+  };
+  explicit Tracer(Options options);
+  // Sends what waits, if the collector takes it within kLastSeconds.
+  ~Tracer();
+
+  // Adds the span to those that wait to be sent. Thread-safe. The span must be of a sampled trace.
+  void record(Span span);
+  SpanId new_span_id();
+  // A time of the injected clock as nanoseconds since 1970. Times of one process keep their order, except
+  // over a moment at which the wall clock was set or the machine slept.
+  std::int64_t unix_ns(TimePoint at) const;
+  const Sampler& sampler() const { return options_.settings.sampler; }
+  Figures figures() const;
+
+ private:
+  void send_loop(const std::stop_token& token);
+  void send(const std::vector<Span>& batch);
+  void settle(const Result<HttpAnswer>& answer);
+  void complain(const std::string& why);
+  void set_clock();
+
+  Options options_;
+  Resource resource_;
+  std::atomic<std::int64_t> offset_ns_{0};  // from the clock's time to nanoseconds since 1970
+  std::atomic<std::uint64_t> ids_;
+  mutable Guarded<SpanQueue> queue_;
+  std::condition_variable_any came_;
+  std::atomic<bool> ending_{false};
+  // Used by the sending thread only
+  std::optional<TimePoint> last_complaint_, ending_since_;
+  std::jthread thread_;
+};
+
+// Returns a tracer if the environment names a collector (settings.h), else null. `program` and `version`: of
+// this program.
+Result<std::shared_ptr<Tracer>> tracer_from_environment(const std::string& program,
+                                                        const std::string& version,
+                                                        const std::string& instance);
+
+}  // namespace ls::trace

@@ -1,0 +1,58 @@
+// Decides when a job ends whose target error is that of its denoised layers
+// (common/denoise/denoised_image.h). Where samples go is still the decision of the stop rule
+// (adaptive_stop.h), which reads the errors of the image itself: its levels do not depend on the denoiser.
+// This class only says at which level the job ends.
+//
+// The denoised error is checked at some levels: at the first one, and then whenever the samples have grown by
+// kDenoisedCheckGrowth. Which levels these are depends neither on the target nor on earlier checks, so a job
+// that is given a smaller target continues as if it had had it from the start.
+//
+// The job ends when at two checks in succession the upper end of the interval is at most the target. An
+// estimate that happens to be low at one check is so likely not low at the next one, which has other samples
+// too. A check without an interval meets no target. An image without noise ends at the first check that meets
+// the target: its pixels will not change any more.
+//
+// What a denoiser computes may differ between machines. So each check is made once, by the coordinator, and
+// stored with the job: after a restart, or at another coordinator, the stored values decide.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+namespace ls::coordinator {
+
+// The error of the denoised layers at one level of the stop rule.
+struct DenoisedCheck {
+  double spp = 0;     // samples per pixel at this level, mean over all pixels; identifies the level
+  double relmse = 0;  // estimated; noise can bring it below 0
+  // The largest relMSE that the 95 % interval allows; nullopt: the interval is not known
+  std::optional<double> at_most;
+  bool operator==(const DenoisedCheck&) const = default;
+};
+
+class DenoisedTarget {
+ public:
+  // `made` are the checks that are stored with the job.
+  explicit DenoisedTarget(std::vector<DenoisedCheck> made = {}) : made_(std::move(made)) {}
+
+  // Says whether the job ends at the level with `spp` samples per pixel. Levels come in order, and the last
+  // one may come again, with another target. `check`: the error of the denoised layers must be known first.
+  enum class Answer { go_on, check, end };
+  Answer judge(double spp, double target);
+  void add(const DenoisedCheck& check);
+  // True if the last check meets the target.
+  bool met(double target) const;
+  // True if the last level that judge() was asked about is checked, or is to be.
+  bool due(double spp) const { return spp == due_; }
+
+  // Predicts by which factor the image's own error is still to fall before the job ends. Affects no pixel.
+  double error_left(double target) const;
+
+ private:
+  const DenoisedCheck* find(double spp) const;
+
+  std::vector<DenoisedCheck> made_;
+  double due_ = 0, before_ = 0;  // samples of the last level that is checked, and of the one before; 0: none
+};
+
+}  // namespace ls::coordinator

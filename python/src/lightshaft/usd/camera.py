@@ -1,0 +1,152 @@
+"""The camera of a stage, and the frame that it fills."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from pxr import Usd, UsdGeom
+
+from ..errors import StageRejected
+from .document import Document
+from .problems import Problems
+from .shading import plain
+from .transforms import Matrix, column_matrix, rigid, scale, translation
+
+TURNED = scale(-1, 1, -1)  # looks along +z with +x to the left
+NEAR, FAR = 1e-4, 1e7  # of the depths that are seen: clipping is not read
+WIDTH = 960  # pixels of a frame whose size nobody gives
+FRAMED = 50.0  # degrees of the view of a stage without a camera
+TENTH = 0.1  # apertures and focal lengths are in tenths of a scene unit
+
+
+def chosen(stage: Usd.Stage, wanted: str | None) -> UsdGeom.Camera | None:
+    """The camera by its path; else that of the render settings, or the only one. None: there is none."""
+    if wanted is None:
+        settings = render_settings(stage)
+        relationship = settings.GetRelationship("camera") if settings else None
+        targets = relationship.GetForwardedTargets() if relationship else []
+        wanted = str(targets[0]) if targets else None
+    if wanted is not None:
+        prim = stage.GetPrimAtPath(wanted) if wanted.startswith("/") else None
+        if not prim or not prim.IsA(UsdGeom.Camera):
+            raise StageRejected(f"there is no camera {wanted}; {_known(stage)}")
+        return UsdGeom.Camera(prim)
+    found = _cameras(stage)
+    if len(found) > 1:
+        raise StageRejected(f"give camera=, the path of one: {_known(stage)}")
+    return found[0] if found else None
+
+
+def _cameras(stage: Usd.Stage) -> list[UsdGeom.Camera]:
+    prims = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies())
+    return [UsdGeom.Camera(prim) for prim in prims if prim.IsA(UsdGeom.Camera)]
+
+
+def _known(stage: Usd.Stage) -> str:
+    paths = [str(camera.GetPath()) for camera in _cameras(stage)]
+    return f"the stage has {', '.join(paths)}" if paths else "the stage has none"
+
+
+def render_settings(stage: Usd.Stage) -> Usd.Prim | None:
+    path = stage.GetMetadata("renderSettingsPrimPath")
+    prim = stage.GetPrimAtPath(path) if path else None
+    return prim if prim else None
+
+
+def frame_size(stage: Usd.Stage, given: tuple[int, int] | None, aspect: float) -> tuple[int, int]:
+    if given:
+        return given
+    settings = render_settings(stage)
+    resolution = settings.GetAttribute("resolution").Get() if settings else None
+    if resolution is not None:
+        return int(resolution[0]), int(resolution[1])
+    return WIDTH, max(round(WIDTH / aspect), 1)
+
+
+def add_camera(
+    document: Document,
+    problems: Problems,
+    camera: UsdGeom.Camera,
+    time: Usd.TimeCode,
+    size: tuple[int, int] | None,
+    medium: str | None,
+) -> None:
+    prim = camera.GetPrim()
+
+    def get(name: str, default: float) -> float:
+        value = prim.GetAttribute(name).Get(time)
+        return default if value is None else float(value)
+
+    across, along = get("horizontalAperture", 20.955), get("verticalAperture", 15.2908)
+    focal = get("focalLength", 50.0)
+    if not (across > 0 and along > 0 and focal > 0):
+        raise StageRejected(f"{camera.GetPath()}: apertures and focal length must be above 0")
+    if get("exposure", 0.0) != 0:
+        problems.warn(prim, "exposure has no effect: images are linear, and --exposure shows them brighter")
+    if plain(prim.GetAttribute("clippingPlanes").Get(time)):
+        problems.warn(prim, "clippingPlanes are left out")
+    width, height = frame_size(camera.GetPrim().GetStage(), size, across / along)
+    # The frame holds all of the aperture: where its shape differs it shows more.
+    wide = width / height >= across / along
+    shown = (along * width / height, along) if wide else (across, across * height / width)
+    matrix = rigid(column_matrix(camera.ComputeLocalToWorldTransform(time)))
+    shift = get("horizontalApertureOffset", 0.0), get("verticalApertureOffset", 0.0)
+    sensor: dict[str, Any] = {"type": "perspective"}
+    if str(prim.GetAttribute("projection").Get(time)) == "orthographic":
+        sensor["type"] = "orthographic"
+        matrix = matrix @ translation(shift[0] * TENTH, shift[1] * TENTH, 0)
+        half = shown[0] * TENTH / 2
+        sensor["to_world"] = matrix @ TURNED @ scale(half, half, 1)
+    else:
+        sensor["to_world"] = matrix @ TURNED
+        axis = 1 if wide else 0
+        sensor["fov_axis"] = "xy"[axis]
+        sensor["fov"] = 2 * math.degrees(math.atan(shown[axis] / (2 * focal)))
+        sensor["principal_point_offset_x"] = shift[0] / shown[0]
+        sensor["principal_point_offset_y"] = -shift[1] / shown[1]
+        stop, distance = get("fStop", 0.0), get("focusDistance", 0.0)
+        if stop > 0 and distance > 0:
+            sensor["type"] = "thinlens"
+            sensor["aperture_radius"] = focal * TENTH / (2 * stop)
+            sensor["focus_distance"] = distance
+    _add(document, str(camera.GetPath()), sensor, (width, height), medium)
+
+
+def add_framing_camera(
+    document: Document, problems: Problems, stage: Usd.Stage, time: Usd.TimeCode, size: tuple[int, int] | None
+) -> None:
+    """All of the stage, seen from its front: +z, or -y where z is up."""
+    problems.warn("the stage", "it has no camera: all of it is seen, from its front")
+    cache = UsdGeom.BBoxCache(time, [UsdGeom.Tokens.default_, UsdGeom.Tokens.render])
+    box = cache.ComputeWorldBound(stage.GetPseudoRoot()).ComputeAlignedRange()
+    if box.IsEmpty():
+        raise StageRejected("the stage shows nothing: no mesh, shape or volume with an extent")
+    middle, extent = np.array(box.GetMidpoint()), np.array(box.GetSize())
+    stands = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
+    width, height = frame_size(stage, size, 4 / 3)
+    across, depth, along = (extent[0], extent[1], extent[2]) if stands else (extent[0], extent[2], extent[1])
+    reach = max(across, along * width / height, 1e-6) / 2 / math.tan(math.radians(FRAMED / 2))
+    to_world = np.eye(4)
+    if stands:
+        to_world[:3, :3] = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)
+        to_world[:3, 3] = middle - [0, depth / 2 + reach, 0]
+    else:
+        to_world[:3, 3] = middle + [0, 0, depth / 2 + reach]
+    sensor = {"type": "perspective", "to_world": to_world @ TURNED, "fov": FRAMED, "fov_axis": "x"}
+    _add(document, "camera", sensor, (width, height), None)
+
+
+def eye(camera: UsdGeom.Camera, time: Usd.TimeCode) -> Matrix:
+    return column_matrix(camera.ComputeLocalToWorldTransform(time))[:3, 3]
+
+
+def _add(
+    document: Document, name: str, sensor: dict[str, Any], size: tuple[int, int], medium: str | None
+) -> None:
+    film = {"type": "hdrfilm", "width": size[0], "height": size[1], "rfilter": {"type": "gaussian"}}
+    sensor.update(near_clip=NEAR, far_clip=FAR, film=film)
+    if medium:
+        sensor["medium"] = {"type": "ref", "id": medium}
+    document.define(name, sensor)

@@ -1,0 +1,157 @@
+"""Images of textures: sent as they are where they can be, else computed and written anew."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import pathlib
+import tempfile
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import OpenEXR
+from PIL import Image
+
+from ..errors import FileRefused
+from .files import Asset, Files
+
+READ_AS_THEY_ARE = (".png", ".jpg", ".jpeg", ".bmp", ".exr", ".hdr")
+CHANNELS = {"r": (0,), "g": (1,), "b": (2,), "a": (3,), "rgb": (0, 1, 2)}
+Pixels = npt.NDArray[np.float32]
+
+
+@dataclasses.dataclass(frozen=True)
+class Look:
+    """What a shader makes of a file's texels: values = texel * scale + bias of some channels."""
+
+    channels: str = "rgb"
+    scale: tuple[float, ...] = (1, 1, 1, 1)
+    bias: tuple[float, ...] = (0, 0, 0, 0)
+    space: str = "auto"  # auto, raw, sRGB
+    threshold: float = 0  # above 0: what is below becomes 0, all else 1
+    bounded: bool = True  # values beyond 0 and 1 are cut off
+
+    def changes(self) -> bool:
+        chosen = CHANNELS[self.channels]
+        same = all(self.scale[k] == 1 and self.bias[k] == 0 for k in chosen)
+        return not same or self.threshold > 0
+
+
+class Images:
+    def __init__(self, files: Files) -> None:
+        self._files = files
+        self._written: dict[tuple[tuple[str, str], Look], tuple[str, bool]] = {}
+
+    def name(self, asset: Asset, look: Look) -> tuple[str, bool]:
+        """(the name of the file, whether its values are linear as they are)."""
+        key = asset.key, look
+        if key not in self._written:
+            self._written[key] = self._name(asset, look)
+        return self._written[key]
+
+    def _name(self, asset: Asset, look: Look) -> tuple[str, bool]:
+        picture = None if asset.suffix in (".exr", ".hdr") else _open(asset)
+        grey = picture is not None and picture.mode in ("L", "1")
+        raw = _is_raw(picture, look.space)
+        plain = look.channels == "rgb" or (grey and look.channels == "r" and raw)
+        # Of EXR and HDR, texels are linear whatever is said of them here.
+        fits = picture.format is not None if picture is not None else look.space != "sRGB"
+        if plain and fits and not look.changes() and asset.suffix in READ_AS_THEY_ARE:
+            return self._files.take(asset), raw
+        texels = _exr_texels(asset) if picture is None else _texels(picture, raw)
+        if look.channels == "a" and texels.shape[2] < 4:
+            texels = np.ones_like(texels[:, :, :1])
+            channels: tuple[int, ...] = (0,)
+        else:
+            channels = CHANNELS[look.channels]
+        scale, bias = (np.array([x[k] for k in CHANNELS[look.channels]]) for x in (look.scale, look.bias))
+        values = texels[:, :, list(channels)] * scale + bias
+        if look.threshold > 0:
+            values = (values >= look.threshold).astype(np.float32)
+        values = np.clip(values, 0, 1) if look.bounded else np.maximum(values, 0)
+        if look.channels != "rgb" and picture is not None and raw and not look.changes():
+            return self._files.write(_png(values[:, :, 0]), ".png"), True
+        return self._files.write(exr(np.repeat(values, 3 // values.shape[2], axis=2)), ".exr"), True
+
+
+def _open(asset: Asset) -> Image.Image:
+    """Without its `format`, if it was converted: the scene format reads no such file (palettes, CMYK)."""
+    try:
+        picture: Image.Image = Image.open(io.BytesIO(asset.read()))
+        picture.load()
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise FileRefused(f"{asset.prim}: the image {asset.path.name} cannot be read: {error}") from None
+    if picture.mode not in ("L", "1", "LA", "RGB", "RGBA", "I;16", "I", "F"):
+        picture = picture.convert("RGBA" if "transparency" in picture.info else "RGB")
+    return picture
+
+
+def _is_raw(picture: Image.Image | None, space: str) -> bool:
+    """By USD's rule for `auto`: 8-bit images of three or four channels are sRGB."""
+    if space != "auto":
+        return space == "raw"
+    return picture is None or picture.mode not in ("RGB", "RGBA")
+
+
+def _texels(picture: Image.Image, raw: bool) -> Pixels:
+    """(height, width, 3 or 4), linear."""
+    if picture.mode in ("I;16", "I", "F"):
+        top = 1.0 if picture.mode == "F" else 65535.0
+        values = np.asarray(picture, np.float32)[:, :, None] / np.float32(top)
+    else:
+        mode = "RGBA" if picture.mode in ("RGBA", "LA") else "RGB"
+        values = np.asarray(picture.convert(mode), np.float32) / np.float32(255)
+    if values.shape[2] == 1:
+        values = np.repeat(values, 3, axis=2)
+    if not raw:
+        colour = values[:, :, :3]
+        low = colour <= 0.04045
+        values[:, :, :3] = np.where(low, colour / 12.92, ((np.maximum(colour, 0) + 0.055) / 1.055) ** 2.4)
+    return values
+
+
+def _exr_texels(asset: Asset) -> Pixels:
+    if asset.suffix != ".exr":
+        raise FileRefused(
+            f"{asset.prim}: one channel, a scale or a colour of {asset.path.name} is asked for, which is no "
+            "image that can be computed with. Write it as EXR"
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "image.exr"
+        path.write_bytes(asset.read())
+        try:
+            with OpenEXR.File(str(path), separate_channels=True) as file:
+                channels = {name: np.asarray(c.pixels, np.float32) for name, c in file.channels().items()}
+        except Exception as error:  # the reader's own kind, of no class in common
+            raise FileRefused(f"{asset.prim}: the image {asset.path.name} cannot be read: {error}") from None
+    if not {"R", "G", "B"} <= set(channels):
+        grey = next((channels[name] for name in ("Y", "R", *channels) if name in channels), None)
+        if grey is None:
+            raise FileRefused(f"{asset.prim}: the image {asset.path.name} has no channels")
+        channels.update(R=grey, G=grey, B=grey)
+    return np.stack([channels[name] for name in "RGBA" if name in channels], axis=2)
+
+
+def scaled(asset: Asset, colour: list[float]) -> bytes:
+    """An image of light times a colour, as EXR."""
+    picture = None if asset.suffix in (".exr", ".hdr") else _open(asset)
+    texels = _exr_texels(asset) if picture is None else _texels(picture, raw=False)
+    return exr(np.maximum(texels[:, :, :3], 0) * np.array(colour, np.float32))
+
+
+def exr(values: npt.NDArray[Any]) -> bytes:
+    """(height, width, 3) as a half-float EXR file: what a half cannot hold is cut off."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "image.exr"
+        pixels = np.ascontiguousarray(np.clip(values, -65504, 65504).astype(np.float16))
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        with OpenEXR.File(header, {"RGB": pixels}) as file:
+            file.write(str(path))
+        return path.read_bytes()
+
+
+def _png(values: Pixels) -> bytes:
+    stream = io.BytesIO()
+    Image.fromarray(np.round(values * 255).astype(np.uint8)).save(stream, "PNG")
+    return stream.getvalue()

@@ -1,0 +1,178 @@
+"""A stage as a scene: the XML of its frame, or of each of its frames, and the files that these name."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import pathlib
+import re
+from collections.abc import Iterable, Mapping
+
+from pxr import Gf, Tf, Usd, UsdGeom, UsdSkel
+
+from ..errors import FileRefused, StageRejected
+from ..scene_dict import SceneText, scene_of_dict
+from ..scene_files import PathLike, Source, frame_numbers
+from . import camera as cameras
+from .document import Document, colour
+from .files import Files
+from .geometry import Geometry
+from .images import Images
+from .lights import Lights
+from .materials import Materials
+from .problems import Problems
+from .volumes import Volumes
+from .walk import Walk
+
+FRAME_NAME = "frame.####.xml"
+
+
+@dataclasses.dataclass(frozen=True)
+class StageScene:
+    main: SceneText
+    included: Mapping[str, SceneText]
+    """Of a sequence: the scene of each frame, by its name."""
+    files: Mapping[str, Source]
+    """What the scene names, the scenes of frames included."""
+    warnings: tuple[str, ...]
+
+    def text_of(self, file: str) -> SceneText:
+        """The scene in which the farm found something."""
+        return self.included.get(file, self.main)
+
+    def write(self, folder: PathLike) -> pathlib.Path:
+        """Writes scene.xml and its files into a folder, and returns the path of scene.xml."""
+        place = pathlib.Path(folder)
+        place.mkdir(parents=True, exist_ok=True)
+        for name, source in self.files.items():
+            with open(place / name, "wb") as file:
+                for begin in range(0, source.size, 1 << 24):
+                    file.write(source.read(begin, min(1 << 24, source.size - begin)))
+        (place / "scene.xml").write_text(self.main.xml, encoding="utf-8")
+        return place / "scene.xml"
+
+
+def read(
+    path: PathLike,
+    *,
+    camera: str | None = None,
+    frames: str | None = None,
+    size: tuple[int, int] | None = None,
+    folder: PathLike | None = None,
+    allow: Iterable[PathLike] = (),
+) -> StageScene:
+    """The scene of a .usd, .usda, .usdc or .usdz.
+
+    `camera`: the path of the camera's prim, which is needed if the stage has several. `frames` ("1-10"): a
+    sequence, one image for each of these time codes; without it, the stage is read at its start. `size`:
+    of the image, in pixels. Nothing is read that lies outside of `folder` (default: that of the stage) and
+    the folders `allow`. StageRejected has everything that is wrong, by the paths of prims.
+    """
+    place = pathlib.Path(path)
+    problems = Problems()
+    files = Files(place.parent if folder is None else folder, allow, problems)
+    stage = _open(place)
+    files.check_layers(stage)
+    _check_composition(stage, problems)
+    times = _times(stage, frames)
+    _bake_skinning(stage, times)
+    reader = _Reader(stage, files, Images(files), problems, camera, size)
+    texts = []
+    for time in times:
+        texts.append(reader.at(time))
+        problems.raise_errors()
+    if frames is None:
+        return StageScene(texts[0], {}, files.sources, tuple(problems.warnings))
+    included: dict[str, SceneText] = {}
+    for time, text in zip(times, texts):
+        name = FRAME_NAME.replace("####", str(int(time.GetValue())).zfill(4))
+        included[name] = text
+        files.sources[name] = Source.of_bytes(text.xml.encode())
+    xml = f'<scene version="3.0.0"><include filename="{FRAME_NAME}"/></scene>\n'
+    return StageScene(SceneText(xml, ("",)), included, files.sources, tuple(problems.warnings))
+
+
+def _times(stage: Usd.Stage, frames: str | None) -> list[Usd.TimeCode]:
+    if frames is None:
+        known = stage.HasAuthoredTimeCodeRange()
+        return [Usd.TimeCode(stage.GetStartTimeCode()) if known else Usd.TimeCode.EarliestTime()]
+    numbers = [number for number in frame_numbers(frames) if number is not None]
+    if not numbers:
+        raise StageRejected(f"frames {frames!r} is neither one time code nor a range such as 1-10")
+    return [Usd.TimeCode(number) for number in numbers]
+
+
+def _bake_skinning(stage: Usd.Stage, times: list[Usd.TimeCode]) -> None:
+    """Writes the points of skinned meshes into the session, which no file keeps."""
+    roots = [prim for prim in stage.Traverse() if prim.IsA(UsdSkel.Root)]
+    if times[0].IsEarliestTime():
+        interval = Gf.Interval.GetFullInterval()
+    else:
+        interval = Gf.Interval(times[0].GetValue(), times[-1].GetValue())
+    stage.SetEditTarget(stage.GetSessionLayer())
+    for root in roots:
+        UsdSkel.BakeSkinning(UsdSkel.Root(root), interval)
+
+
+def _open(path: pathlib.Path) -> Usd.Stage:
+    if not path.is_file():
+        raise FileRefused(f"there is no file {path}")
+    try:
+        with Tf.DiagnosticTrap() as told:  # USD prints a line for each; _check_composition tells them
+            stage = Usd.Stage.Open(os.path.abspath(path), Usd.Stage.LoadAll)
+            told.ClearWarnings()
+    except Tf.ErrorException as error:
+        reasons = dict.fromkeys(" ".join(part.commentary.split()) for part in error.args)
+        raise StageRejected(f"{path} is no stage: {'; '.join(reasons)}") from None
+    if not stage:
+        raise StageRejected(f"{path} is no stage")
+    return stage
+
+
+def _check_composition(stage: Usd.Stage, problems: Problems) -> None:
+    """Layers that are referenced and not found, or cannot be read."""
+    for error in stage.GetCompositionErrors():
+        prim, told = error.rootSite.path, " ".join(str(error).split())
+        material = re.search(r"@([^@]+\.mtlx)@", told)
+        if material and os.path.isfile(material[1]):
+            problems.warn(prim, f"MaterialX is not read: {os.path.basename(material[1])} is left out")
+        else:
+            problems.error(prim, told)
+    problems.raise_errors()
+
+
+class _Reader:
+    def __init__(
+        self,
+        stage: Usd.Stage,
+        files: Files,
+        images: Images,
+        problems: Problems,
+        camera: str | None,
+        size: tuple[int, int] | None,
+    ) -> None:
+        self._stage, self._files, self._images, self._problems = stage, files, images, problems
+        self._camera, self._size = cameras.chosen(stage, camera), size
+
+    def at(self, time: Usd.TimeCode) -> SceneText:
+        document = Document(self._files)
+        document.scene["integrator"] = {"type": "volpath"}
+        problems = self._problems
+        up_axis = str(UsdGeom.GetStageUpAxis(self._stage))
+        materials = Materials(document, self._images, problems, time)
+        geometry = Geometry(document, materials, problems, time)
+        lights = Lights(document, self._images, problems, time, up_axis)
+        volumes = Volumes(document, problems, time)
+        Walk(document, problems, time, geometry, lights, volumes).run(self._stage)
+        lights.finish()
+        shines = any("emitter" in value or "temperature" in value for value in document.scene.values())
+        if not lights.count and not shines:
+            problems.warn("the stage", "it has no light: a white sky is put around it")
+            document.define("sky", {"type": "constant", "radiance": colour([1, 1, 1])})
+        if self._camera is None:
+            cameras.add_framing_camera(document, problems, self._stage, time, self._size)
+        else:
+            with problems.reading(self._camera):
+                inside = volumes.around(cameras.eye(self._camera, time))
+                cameras.add_camera(document, problems, self._camera, time, self._size, inside)
+        return scene_of_dict(document.scene)

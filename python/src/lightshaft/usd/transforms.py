@@ -1,0 +1,51 @@
+"""Transforms as 4 x 4 matrices that stand before a column: USD's stand after a row."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Matrix = npt.NDArray[np.float64]
+EXACT = 1e-6  # shares by which the columns of a matrix of single-precision numbers may differ
+
+
+def column_matrix(row_matrix: Any) -> Matrix:
+    return np.array(row_matrix, dtype=np.float64).T
+
+
+def translation(x: float, y: float, z: float) -> Matrix:
+    matrix = np.eye(4)
+    matrix[:3, 3] = x, y, z
+    return matrix
+
+
+def scale(x: float, y: float, z: float) -> Matrix:
+    return np.diag([x, y, z, 1.0])
+
+
+def is_similarity(matrix: Matrix) -> bool:
+    """Whether it turns, moves, mirrors, and scales alike in all directions."""
+    product = matrix[:3, :3].T @ matrix[:3, :3]
+    return bool(np.allclose(product, np.eye(3) * product[0, 0], atol=EXACT * product[0, 0], rtol=0))
+
+
+def mean_scale(matrix: Matrix) -> float:
+    return math.cbrt(abs(np.linalg.det(matrix[:3, :3])))
+
+
+def rigid(matrix: Matrix) -> Matrix:
+    """The nearest transform that turns and moves alone."""
+    left, _, right = np.linalg.svd(matrix[:3, :3])
+    turn = left @ right
+    if np.linalg.det(turn) < 0:
+        turn = left @ np.diag([1, 1, -1]) @ right
+    result = np.eye(4)
+    result[:3, :3], result[:3, 3] = turn, matrix[:3, 3]
+    return result
+
+
+def is_usable(matrix: Matrix) -> bool:
+    return bool(np.isfinite(matrix).all() and abs(np.linalg.det(matrix[:3, :3])) > 1e-30)

@@ -1,0 +1,232 @@
+"""Goes through a stage: what stands where, with everything that is instanced kept once.
+
+A content is what a stage, or a prototype, holds: leaves (shapes), things that are placed by themselves
+(lights and volumes), and instances of other contents. The scene format has groups of shapes, and no groups
+in groups: so each content with shapes becomes one group, and instances within instances become instances
+of the innermost.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from pxr import Usd, UsdGeom, UsdLux, UsdShade
+
+from ..errors import StageRejected
+from .document import Document, reference
+from .geometry import Geometry, Leaf
+from .lights import Lights, is_light
+from .problems import Problems
+from .transforms import Matrix, column_matrix, is_usable
+from .volumes import Volumes
+
+SHOWN = ("default", "render")  # purposes
+UNSEEN = ("", "Xform", "Scope", "Camera", "Material", "Shader", "NodeGraph", "GeomSubset", "SkelRoot")
+MAX_PLACED = 120_000  # shapes and instances, each four elements or more of the 500 000 that a scene can have
+MAX_NESTING = 32  # of instances in instances
+
+
+@dataclasses.dataclass
+class Content:
+    name: str
+    leaves: list[Leaf] = dataclasses.field(default_factory=list)
+    others: list[tuple[Usd.Prim, Matrix, Callable[[Usd.Prim, Matrix], None]]] = dataclasses.field(
+        default_factory=list
+    )
+    instances: list[tuple[Content, Matrix]] = dataclasses.field(default_factory=list)
+    group: str | None = None
+    uses: int = 0
+    placed: int = 0
+    """How much is placed for one of it, up to one more than may be."""
+
+    def measure(self) -> None:
+        """Once the contents that it has instances of are measured."""
+        shining = sum(leaf.shines for leaf in self.leaves)
+        own = shining + (len(self.leaves) > shining) + len(self.others)
+        self.placed = min(own + sum(inner.placed for inner, _ in self.instances), MAX_PLACED + 1)
+
+    def share_uses(self) -> None:
+        for inner, _ in self.instances:
+            inner.uses = min(inner.uses + self.uses, MAX_PLACED)
+
+
+class Walk:
+    def __init__(
+        self,
+        document: Document,
+        problems: Problems,
+        time: Usd.TimeCode,
+        geometry: Geometry,
+        lights: Lights,
+        volumes: Volumes,
+    ) -> None:
+        self._document, self._problems, self._time = document, problems, time
+        self._geometry, self._lights, self._volumes = geometry, lights, volumes
+        self._prototypes: dict[Any, Content] = {}
+        self._building: list[Any] = []
+
+    def run(self, stage: Usd.Stage) -> None:
+        root = Content("the stage")
+        for prim in stage.GetPseudoRoot().GetChildren():
+            self._visit(prim, np.eye(4), root)
+        root.measure()
+        if root.placed > MAX_PLACED:
+            raise StageRejected(f"the stage shows more than {MAX_PLACED} shapes and instances")
+        root.uses = 1
+        root.share_uses()
+        for content in reversed(self._prototypes.values()):  # each before those within it
+            content.share_uses()
+        self._place(root, np.eye(4), whole=True)
+
+    def _visit(self, first: Usd.Prim, around: Matrix, content: Content) -> None:
+        """A prim and what is below it, without recursion: hierarchies may be deep."""
+        waiting = [(first, around)]
+        while waiting:
+            prim, parent = waiting.pop()
+            with self._problems.reading(prim):
+                matrix = self._matrix(prim, parent)
+                if matrix is None or not self._seen(prim):
+                    continue
+                if prim.IsInstance():
+                    self._instance(prim, matrix, content)
+                elif prim.IsA(UsdGeom.PointInstancer):
+                    self._point_instances(prim, matrix, content)
+                else:
+                    self._add(prim, matrix, content)
+                    waiting += [(child, matrix) for child in reversed(_children(prim))]
+
+    def _matrix(self, prim: Usd.Prim, parent: Matrix) -> Matrix | None:
+        if not prim.IsA(UsdGeom.Xformable):
+            return parent
+        xformable = UsdGeom.Xformable(prim)
+        own = column_matrix(xformable.GetLocalTransformation(self._time))
+        matrix = own if xformable.GetResetXformStack() else parent @ own
+        if not np.isfinite(matrix).all():
+            self._problems.error(prim, "its transform is not finite")
+            return None
+        return matrix if is_usable(matrix) else None  # what is flattened is not seen
+
+    def _seen(self, prim: Usd.Prim) -> bool:
+        if not prim.IsA(UsdGeom.Imageable):
+            return not prim.IsA(UsdShade.Material)
+        visibility = UsdGeom.Imageable(prim).GetVisibilityAttr().Get(self._time)
+        return bool(visibility != UsdGeom.Tokens.invisible)
+
+    def _add(self, prim: Usd.Prim, matrix: Matrix, content: Content) -> None:
+        kind = str(prim.GetTypeName())
+        if kind == "SkelRoot" and prim.IsInstanceProxy():
+            self._problems.warn(prim, "skinning of an instance is left out: its meshes stand as bound")
+        if kind in UNSEEN or not prim.IsA(UsdGeom.Imageable):
+            return
+        if str(UsdGeom.Imageable(prim).ComputePurpose()) not in SHOWN:
+            return
+        if is_light(prim):
+            content.others.append((prim, matrix, self._lights.add))
+        elif kind == "Volume":
+            content.others.append((prim, matrix, self._volumes.add))
+        elif prim.IsA(UsdGeom.Gprim):
+            if prim.HasAPI(UsdLux.LightAPI):
+                self._problems.warn(prim, "the light of a mesh is left out: give it an emissiveColor")
+            content.leaves += self._geometry.leaves(prim, matrix)
+
+    def _instance(self, prim: Usd.Prim, matrix: Matrix, content: Content) -> None:
+        """What looks different by what it inherits (material, colour, purpose) is a content of its own."""
+        material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial(UsdShade.Tokens.full)[0]
+        primvars = UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance()
+        inherited = tuple((str(p.GetPrimvarName()), str(p.Get(self._time))) for p in primvars)
+        purpose = str(UsdGeom.Imageable(prim).ComputePurpose()) if prim.IsA(UsdGeom.Imageable) else ""
+        path = material.GetPath() if material else ""
+        key = (str(prim.GetPrototype().GetPath()), str(path), purpose, inherited)
+
+        def fill(own: Content) -> None:
+            self._add(prim, np.eye(4), own)
+            for child in _children(prim):
+                self._visit(child, np.eye(4), own)
+
+        content.instances.append((self._prototype(key, prim, fill), matrix))
+
+    def _point_instances(self, prim: Usd.Prim, matrix: Matrix, content: Content) -> None:
+        instancer = UsdGeom.PointInstancer(prim)
+        if str(instancer.ComputePurpose()) not in SHOWN:
+            return
+        targets = instancer.GetPrototypesRel().GetForwardedTargets()
+        indices = np.asarray(instancer.GetProtoIndicesAttr().Get(self._time) or [], np.int64)
+        if indices.size and not 0 <= indices.min() <= indices.max() < len(targets):
+            self._problems.error(prim, f"protoIndices name prototypes that it does not have ({len(targets)})")
+            return
+        places = instancer.ComputeInstanceTransformsAtTime(
+            self._time,
+            self._time,
+            UsdGeom.PointInstancer.IncludeProtoXform,
+            UsdGeom.PointInstancer.IgnoreMask,
+        )
+        if len(places) != indices.size:
+            self._problems.error(prim, "positions, orientations or scales are not as many as protoIndices")
+            return
+        mask = instancer.ComputeMaskAtTime(self._time)
+        prototypes: dict[int, Content] = {}
+        for i, index in enumerate(indices):
+            if len(mask) and not mask[i]:
+                continue
+            placed = matrix @ column_matrix(places[i])
+            if not is_usable(placed):
+                continue
+            if index not in prototypes:
+                root = prim.GetStage().GetPrimAtPath(targets[index])
+                if not root:
+                    self._problems.error(prim, f"its prototype {targets[index]} does not exist")
+                    return
+                prototypes[index] = self._point_prototype(root)
+            content.instances.append((prototypes[index], placed))
+
+    def _point_prototype(self, root: Usd.Prim) -> Content:
+        def fill(own: Content) -> None:
+            xformable = UsdGeom.Xformable(root) if root.IsA(UsdGeom.Xformable) else None
+            local = column_matrix(xformable.GetLocalTransformation(self._time)) if xformable else np.eye(4)
+            if is_usable(local):  # instances have it in their own transforms
+                self._visit(root, np.linalg.inv(local), own)
+
+        return self._prototype(str(root.GetPath()), root, fill)
+
+    def _prototype(self, key: Any, prim: Usd.Prim, fill: Callable[[Content], None]) -> Content:
+        if key not in self._prototypes:
+            if key in self._building or len(self._building) >= MAX_NESTING:
+                raise StageRejected(
+                    f"{prim.GetPath()}: instances stand within each other more than {MAX_NESTING} deep, or "
+                    "within themselves"
+                )
+            self._building.append(key)
+            content = Content(str(prim.GetPath()))
+            fill(content)
+            self._building.pop()
+            content.measure()
+            self._prototypes[key] = content
+        return self._prototypes[key]
+
+    def _place(self, content: Content, matrix: Matrix, whole: bool = False) -> None:
+        single = whole or content.uses == 1
+        grouped = [leaf for leaf in content.leaves if not single and not leaf.shines]
+        if grouped:
+            if content.group is None:
+                parts = {
+                    f"part{i}": self._geometry.placed(leaf, leaf.matrix) for i, leaf in enumerate(grouped)
+                }
+                content.group = self._document.define(content.name, {"type": "shapegroup", **parts})
+            instance = {"type": "instance", "group": reference(content.group), "to_world": matrix}
+            self._document.define(f"{content.name} instance", instance)
+        for leaf in content.leaves:
+            if single or leaf.shines:
+                self._document.define(leaf.name, self._geometry.placed(leaf, matrix @ leaf.matrix))
+        for prim, own, place in content.others:
+            with self._problems.reading(prim):
+                place(prim, matrix @ own)
+        for inner, own in content.instances:
+            self._place(inner, matrix @ own)
+
+
+def _children(prim: Usd.Prim) -> list[Usd.Prim]:
+    found: list[Usd.Prim] = prim.GetFilteredChildren(Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate))
+    return found

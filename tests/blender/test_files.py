@@ -1,0 +1,89 @@
+"""What the add-on writes and reads, without Blender."""
+
+import io
+import struct
+import zlib
+
+import numpy as np
+import pytest
+from lightshaft import document, exr, lights, meshes, textures, world
+
+
+def test_an_image_is_read_as_it_was_written():
+    pixels = np.random.default_rng(1).random((7, 5, 3), np.float32)
+
+    layers = exr.read(exr.write(pixels))
+
+    assert all(np.array_equal(layers[name], pixels[:, :, i]) for i, name in enumerate("RGB"))
+
+
+@pytest.mark.parametrize("cut", [0, 3, 20, 200, 400, -1])
+def test_a_cut_off_image_is_an_error(cut):
+    whole = exr.write(np.ones((7, 5, 3)))
+
+    with pytest.raises(ValueError):
+        exr.read(whole[:cut])
+
+
+def test_zipped_lines_are_unpacked():
+    values = np.arange(200, dtype=np.uint8)
+    apart = np.concatenate([values[0::2], values[1::2]]).astype(np.int64)
+    coded = np.diff(apart, prepend=0)
+    coded[1:] += 128
+
+    assert exr.unpacked(zlib.compress(coded.astype(np.uint8).tobytes())) == values.tobytes()
+
+
+def test_a_png_has_its_size_and_sums():
+    data = exr.write_png(np.zeros((3, 4, 1), np.uint8))
+
+    assert struct.unpack(">II", data[16:24]) == (4, 3)
+    assert struct.unpack(">I", data[29:33])[0] == zlib.crc32(data[12:29])
+
+
+def test_a_ply_shares_equal_corners():
+    square = np.array([[0, 0, 0, 0, 0, 1], [1, 0, 0, 0, 0, 1], [1, 1, 0, 0, 0, 1], [0, 1, 0, 0, 0, 1]], "<f4")
+
+    data = meshes.ply(square, np.array([[0, 1, 2], [0, 2, 3]]))
+
+    header = io.BytesIO(data)
+    lines = [header.readline().decode().strip() for _ in range(12)]
+    assert "element vertex 4" in lines and "element face 2" in lines
+
+
+def test_a_body_is_closed_and_a_sheet_is_not():
+    body = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+
+    assert meshes.is_closed(body)
+    assert not meshes.is_closed(body[:3])
+
+
+def test_equal_content_is_one_file(tmp_path):
+    written = document.Document(tmp_path)
+
+    assert written.write(b"mesh", ".ply") == written.write(b"mesh", ".ply")
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_ids_are_not_taken_twice(tmp_path):
+    written = document.Document(tmp_path)
+
+    names = [written.define("Cube.001 ä", document.element("bsdf", "null")) for _ in range(2)]
+
+    assert names == ["Cube.001_ä", "Cube.001_ä_2"]
+
+
+def test_a_spot_is_bright_within_and_dark_beyond():
+    profile = lights.spot_profile(0.5, 0.3)
+
+    assert profile[lights.PROFILE // 2, lights.PROFILE // 2] == 1
+    assert profile[0, 0] == 0 and np.all(np.diff(profile[lights.PROFILE // 2, lights.PROFILE // 2 :]) <= 0)
+
+
+def test_the_middle_of_the_worlds_image_is_plus_x():
+    assert np.array_equal(world.AXES @ [0, 0, 1, 0], [1, 0, 0, 0])
+    assert np.array_equal(world.AXES @ [1, 0, 0, 0], [0, 1, 0, 0])
+
+
+def test_turning_upside_down_twice_is_nothing():
+    assert np.array_equal(textures.UPSIDE_DOWN @ textures.UPSIDE_DOWN, np.eye(4))

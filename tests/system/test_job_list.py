@@ -1,0 +1,65 @@
+"""The list of jobs in pages, small pictures and the same scene once more, of a real coordinator."""
+
+import json
+
+import pytest
+from local_farm import SCENE, HttpError
+
+
+def png_size(data):
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
+
+
+def test_pages_of_hundreds_of_jobs_follow_one_another_without_gaps(farm):
+    ids = [farm.submit(SCENE, spp=2, name=f"scene-{n}.xml") for n in range(120)]
+    farm.request("PATCH", f"/api/v1/jobs/{ids[7]}", b'{"state": "cancelled"}')
+
+    pages = [farm.get(f"/api/v1/jobs?sort=-submitted&limit=50&offset={offset}") for offset in (0, 50, 100)]
+
+    assert [len(page["jobs"]) for page in pages] == [50, 50, 20]
+    assert all(page["total"] == 120 for page in pages)
+    listed = [job["id"] for page in pages for job in page["jobs"]]
+    assert sorted(listed) == sorted(ids)
+    times = [job["submitted_unix"] for page in pages for job in page["jobs"]]
+    assert times == sorted(times, reverse=True)
+    assert farm.get("/api/v1/jobs?state=cancelled")["jobs"][0]["id"] == ids[7]
+    assert {job["id"] for job in farm.get("/api/v1/jobs")["jobs"]} == set(ids), "without parameters all, as ever"
+
+
+def test_a_scene_is_rendered_again_with_more_samples_also_after_a_restart(farm):
+    farm.add_worker()
+    first = farm.submit(SCENE, spp=4)
+    pixels = farm.pixels(first)
+    farm.restart_coordinator()
+
+    same = json.loads(farm.request("POST", f"/api/v1/jobs/{first}/again", b"{}"))["id"]
+    more = json.loads(farm.request("POST", f"/api/v1/jobs/{first}/again", b'{"spp": 16}'))["id"]
+
+    assert farm.pixels(same) == pixels, "the same scene, seed and samples"
+    assert farm.pixels(more) != pixels and farm.job(more)["spp"] == 16
+    farm.request("DELETE", f"/api/v1/jobs/{first}")
+    with pytest.raises(HttpError) as gone:
+        farm.request("POST", f"/api/v1/jobs/{first}/again", b"{}")
+    assert gone.value.status == 404
+
+
+def test_a_sequence_is_rendered_again_frame_by_frame(farm):
+    sequence = json.loads(farm.request("POST", "/api/v1/jobs?spp=2&frames=1-2", SCENE.encode(), "application/xml"))["id"]
+    with pytest.raises(HttpError) as refused:
+        farm.request("POST", f"/api/v1/jobs/{sequence}/again", b"{}")
+    assert refused.value.status in (400, 409)
+    one = json.loads(farm.request("POST", f"/api/v1/jobs/{sequence}/again?frame=2", b"{}"))["id"]
+    assert farm.job(one)["frames"] is None
+
+
+def test_small_pictures_are_those_of_the_image_in_memory_and_on_the_disk(farm):
+    job = farm.submit(SCENE, spp=4, size="1000x600")
+    assert png_size(farm.request("GET", f"/api/v1/jobs/{job}/thumbnail.png")) == (125, 75)
+    farm.add_worker()
+    farm.wait_for_job(job)
+    made = farm.request("GET", f"/api/v1/jobs/{job}/thumbnail.png")
+    assert png_size(made) == (125, 75)
+    farm.restart_coordinator()
+    assert farm.request("GET", f"/api/v1/jobs/{job}/thumbnail.png") == made
+    assert [file.read_bytes() for file in (farm.data / "jobs" / job).glob("thumbnail-*.png")] == [made]

@@ -1,0 +1,58 @@
+"""Techniques by which light is looked for: named by inspect and by the report, which say how to switch each off."""
+
+import json
+import pathlib
+
+import pytest
+from cli_kit import lightshaft
+from local_farm import LocalFarm
+
+SCENE = """<scene version="3.0.0">
+  <integrator type="volpath"><integer name="max_depth" value="4"/></integrator>
+  <sensor type="perspective"><float name="fov" value="40"/>
+    <transform name="to_world"><lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="16"/></film>
+    <sampler type="independent"><integer name="sample_count" value="4"/></sampler></sensor>
+  <shape type="cube"><bsdf type="null"/>
+    <medium name="interior" type="homogeneous"><rgb name="sigma_t" value="0.3"/><rgb name="albedo" value="0.9"/></medium></shape>
+  <shape type="rectangle"><transform name="to_world"><scale value="4"/><translate z="-2"/></transform></shape>
+  <emitter type="point"><point name="position" x="0.3" y="0.2" z="0.1"/></emitter>
+</scene>
+"""
+USED = ["equiangular", "lamp_directions", "lamp_flights"]
+
+
+@pytest.fixture
+def scene(tmp_path):
+    file = tmp_path / "lamp.xml"
+    file.write_text(SCENE)
+    return file
+
+
+def names(told):
+    return [one["name"] for one in told["techniques"]]
+
+
+def test_inspect_foretells_what_the_reports_of_a_render_and_of_a_farm_name(scene, tmp_path):
+    inspected = json.loads(lightshaft("inspect", scene, "--json").stdout)
+    lightshaft("render", scene, "-o", tmp_path / "a.exr", "--report", tmp_path / "a.json", "--html", tmp_path / "a.html")
+    lightshaft("render", scene, "-o", tmp_path / "b.exr", "--report", tmp_path / "b.json", "--isolate")
+    with LocalFarm(tmp_path / "farm") as farm:
+        farm.add_workers(1, fake=False)
+        job = farm.submit(SCENE)
+        farm.wait_for_job(job)
+        on_farm = farm.report(job)
+
+    assert names(inspected) == USED
+    for report in (json.loads((tmp_path / "a.json").read_text()), json.loads((tmp_path / "b.json").read_text()), on_farm):
+        assert report["techniques"] == inspected["techniques"]
+    assert 'phase_only="true"' in lightshaft("inspect", scene).stdout
+    assert "lamp_flights=&quot;-1&quot;" in (tmp_path / "a.html").read_text()
+
+
+def test_a_scene_that_uses_none_names_none(scene, tmp_path):
+    scene.write_text(SCENE.replace('value="4"/></integrator>', 'value="4"/><integer name="equiangular" value="-1"/></integrator>'))
+    lightshaft("render", scene, "-o", tmp_path / "a.exr", "--report", tmp_path / "a.json", "--html", tmp_path / "a.html")
+
+    assert names(json.loads((tmp_path / "a.json").read_text())) == []
+    assert "How it looked for light" not in (tmp_path / "a.html").read_text()

@@ -1,0 +1,150 @@
+// Which scenes connect paths to light vertices, what that brings, and that it depends on nothing that it
+// should not depend on. That the image stays the same is tested in tests/property/connections_test.cpp.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/render_check.h"
+#include "tests/support/sunny_room.h"
+#include "worker/render/integrator/light_paths.h"
+#include "worker/render/lights/light_vertices.h"
+
+namespace ls::render {
+namespace {
+
+using test::SceneBuilder;
+using test::SunnyRoom;
+using testing::HasSubstr;
+
+std::string variant(const SceneBuilder& b) { return describe(*test::world_of(b)).variant; }
+bool connects(const SceneBuilder& b) { return variant(b).find("connected") != std::string::npos; }
+
+TEST(LightPaths, ConnectWhereTheSunIsRarelyFound) {
+  EXPECT_TRUE(connects(SunnyRoom{}.builder()));
+  EXPECT_TRUE(connects(SunnyRoom{.glossy = true, .fog = .3, .grid = true}.builder()));
+  SceneBuilder open({16, 16});  // two walls in full sun
+  open.look({0, 3, 3}, {0, 0, 0}, 40, {0, 1, 0});
+  open.shape(RectangleShape{}, test::rotate_x(-90), open.diffuse(.8));
+  open.shape(RectangleShape{}, test::translate({0, 1, -1}), open.diffuse(.8));
+  open.scene.emitters.push_back(DirectionalEmitter{{0, -1, -1}, {1, 1, 1}});
+  EXPECT_FALSE(connects(open));
+}
+
+TEST(LightPaths, LeaveOutWhatASceneDoesNotNeed) {
+  const auto changed = [](auto&& change, SunnyRoom room = {}) {
+    SceneBuilder b = room.builder();
+    change(b.scene);
+    return b;
+  };
+  const auto depth = [](int max) { return [max](Scene& s) { s.integrator.max_depth = max; }; };
+  EXPECT_TRUE(connects(changed(depth(3))));
+  EXPECT_FALSE(connects(changed(depth(2)))) << "direct light alone";
+  EXPECT_FALSE(connects(SunnyRoom{.light_vertices = -1}.builder()));
+  EXPECT_FALSE(connects(changed([](Scene& s) { s.emitters.clear(); })));
+  EXPECT_FALSE(connects(changed([](Scene& s) {
+    std::get<DirectionalEmitter>(s.emitters[0]).angular_radius = 1;
+  }))) << "a sun with an extent can be hit";
+  EXPECT_FALSE(connects(changed([](Scene& s) { s.integrator.name = "volpath_distant_mis"; }, {.fog = .3})));
+  for (const int max_depth : {-1, 5})
+    EXPECT_FALSE(connects(changed([](Scene& s) { s.integrator.name = "path"; },
+                                  {.light_vertices = 1, .max_depth = max_depth})));
+}
+
+// Rays of the sun start in a vacuum, and find the media that the boundaries on their way declare. Where a
+// path would find others, it is not connected.
+TEST(LightPaths, AreNotThereIfMediaDifferByTheWay) {
+  const SunnyRoom room{.light_vertices = 1};
+  SceneBuilder fog_everywhere = room.builder();  // without end, if it were not for the walls
+  fog_everywhere.scene.sensor.medium = fog_everywhere.homogeneous({.1, .1, .1}, {.9, .9, .9});
+  EXPECT_FALSE(connects(fog_everywhere));
+  SceneBuilder fog_around = room.builder();  // but the camera says that it stands in no medium
+  fog_around.container(CubeShape{}, test::scale(3), fog_around.null(),
+                       fog_around.homogeneous({.1, .1, .1}, {.9, .9, .9}));
+  EXPECT_FALSE(connects(fog_around));
+  fog_around.scene.sensor.medium = MediumIndex{0};
+  EXPECT_TRUE(connects(fog_around));
+  SceneBuilder open = room.builder();  // fog behind a sheet in the slit
+  open.container(RectangleShape{}, test::translate({.9, .25, 0}) * test::rotate_y(90), open.null(),
+                 open.homogeneous({.1, .1, .1}, {.9, .9, .9}));
+  EXPECT_FALSE(connects(open));
+}
+
+// A room whose slit is closed: the sun is found nowhere, whatever is asked for.
+TEST(LightPaths, AreNotThereIfTheSunIsNot) {
+  SceneBuilder dark = SunnyRoom{.light_vertices = 1}.builder();
+  dark.shape(RectangleShape{}, test::translate({1.1, 0, 0}) * test::rotate_y(90) * test::scale(2),
+             dark.diffuse(0));
+  EXPECT_FALSE(connects(dark));
+}
+
+// The test prints the ratios: 0.15 without fog and 0.25 with it. Half leaves room for other sequences of
+// random numbers.
+TEST(LightPaths, TakeTheNoiseFromIndirectLight) {
+  for (const double fog : {0., .5}) {
+    const auto squared_error = [&](int light_vertices) {
+      const auto e =
+          test::estimate(SunnyRoom{.fog = fog, .light_vertices = light_vertices}.builder({32, 32}), 16);
+      return e.standard_error[1] * e.standard_error[1];
+    };
+    const double with = squared_error(1), without = squared_error(-1);
+    std::printf("fog %g: %.3f\n", fog, with / without);
+    EXPECT_LT(with, .5 * without) << fog;
+  }
+}
+
+TEST(LightPaths, GiveTheSameSumsHoweverSamplesAreSplit) {
+  constexpr std::uint64_t kAt = LightVertexCache::kEpoch;
+  const auto world = test::world_of(SunnyRoom{.fog = .3, .light_vertices = 1}.builder());
+  const PixelRect tile{3, 2, 7, 5};
+  const auto whole = render_tile(*world, tile, {kAt - 4, kAt + 4}, nullptr, nullptr);
+  const auto again = render_tile(*test::world_of(SunnyRoom{.fog = .3, .light_vertices = 1}.builder()), tile,
+                                 {kAt - 4, kAt + 4}, nullptr, nullptr);
+  EXPECT_EQ(whole.sums, again.sums);
+  std::vector<float> one_by_one(whole.sums.size(), 0.f);
+  for (int y = tile.y0; y < tile.y1; ++y)
+    for (int x = tile.x0; x < tile.x1; ++x) {
+      const auto one = render_tile(*world, {x, y, x + 1, y + 1}, {kAt - 4, kAt + 4}, nullptr, nullptr);
+      const auto i = static_cast<std::size_t>((y - tile.y0) * (tile.x1 - tile.x0) + x - tile.x0);
+      for (std::size_t p = 0; p < one.sums.size(); ++p)
+        one_by_one[p * static_cast<std::size_t>(tile.pixels()) + i] = one.sums[p];
+    }
+  EXPECT_EQ(whole.sums, one_by_one);
+  double sum = 0;
+  for (std::uint64_t s = kAt - 4; s < kAt + 4; s += 2) sum += render_sample(*world, 3, 2, s).rgb[1];
+  EXPECT_FLOAT_EQ(static_cast<float>(sum), whole.sums[static_cast<std::size_t>(tile.pixels())]);
+}
+
+// Deep white fog, in which light is scattered a hundred times and more before it leaves.
+TEST(LightPaths, OfLightThatIsNeverLostAreBounded) {
+  SceneBuilder room = SunnyRoom{.fog = 100, .light_vertices = 1, .max_depth = -1}.builder();
+  for (auto& medium : room.scene.media) std::get<HomogeneousMedium>(medium).albedo = {1, 1, 1};
+  const auto world = test::world_of(room);
+  ASSERT_TRUE(connects(room));
+  const std::size_t count = trace_light_vertices(*world, 0).count();
+  EXPECT_GT(count, 4u << 14) << "the test would say nothing";
+  EXPECT_LT(count, 10u << 14) << "ten for each of the 2^14 rays";
+}
+
+TEST(LightPaths, OfACropAreThoseOfTheWholeFrame) {
+  SceneBuilder whole = SunnyRoom{}.builder(), crop = whole;
+  crop.scene.film.crop_offset = {12, 12};
+  crop.scene.film.crop_size = {4, 4};
+  const auto a = render_tile(*test::world_of(whole), {12, 12, 16, 16}, {0, 8}, nullptr, nullptr);
+  const auto b = render_tile(*test::world_of(crop), {0, 0, 4, 4}, {0, 8}, nullptr, nullptr);
+  EXPECT_EQ(a.sums, b.sums);
+}
+
+// The variants of a scene differ in what they leave out, not in the image.
+TEST(LightPaths, GiveTheSameBitsByEveryVariant) {
+  const auto world = test::world_of(SunnyRoom{.light_vertices = 1}.builder());
+  const auto expected = render_tile(*world, {0, 0, 8, 8}, {0, 4}, nullptr, nullptr).sums;
+  const auto names = covering_variants(*world);
+  EXPECT_GE(names.size(), 4u);
+  for (const std::string& name : names) {
+    auto sums = render_tile_as(*world, name, {0, 0, 8, 8}, {0, 4}).sums;
+    sums.resize(expected.size());
+    EXPECT_EQ(sums, expected) << name;
+  }
+}
+
+}  // namespace
+}  // namespace ls::render

@@ -1,0 +1,342 @@
+// pbrt's files: what each directive becomes.
+#include "tests/unit/scene/pbrt/pbrt_testing.h"
+
+#include <cmath>
+#include <cstring>
+#include <numbers>
+
+namespace ls {
+namespace {
+
+using ::testing::Test;
+
+bool says(const std::string& text, std::string_view part) { return text.find(part) != std::string::npos; }
+
+TEST(Pbrt, IsTheSameSceneAsItsTranslation) {
+  const std::string pbrt = R"(
+LookAt 0 0 -4  0 0 0  0 1 0
+Camera "perspective" "float fov" 40
+Film "rgb" "integer xresolution" 16 "integer yresolution" 8
+Sampler "independent" "integer pixelsamples" 32
+Integrator "volpath" "integer maxdepth" 7
+WorldBegin
+MakeNamedMedium "fog" "string type" "homogeneous" "rgb sigma_a" [ 0.5 0.5 0.5 ] "rgb sigma_s" [ 1.5 1.5 1.5 ] "float g" 0.5
+LightSource "infinite" "rgb L" [ 0.25 0.5 1 ]
+AttributeBegin
+  MediumInterface "fog" ""
+  Material "interface"
+  Shape "sphere" "float radius" 2
+AttributeEnd
+Translate 1 2 3
+Material "diffuse" "rgb reflectance" [ 0.1 0.2 0.3 ]
+Shape "plymesh" "string filename" "mesh.ply"
+)";
+  const std::string xml = R"(<scene version="3.0.0">
+<integrator type="volpath"><integer name="max_depth" value="8"/></integrator>
+<medium type="homogeneous" id="fog"><float name="sigma_t" value="2"/><float name="albedo" value="0.75"/>
+  <phase type="hg"><float name="g" value="0.5"/></phase></medium>
+<emitter type="constant"><rgb name="radiance" value="0.25 0.5 1"/></emitter>
+<shape type="sphere"><float name="radius" value="2"/><bsdf type="null"/><ref name="interior" id="fog"/></shape>
+<shape type="ply"><string name="filename" value="mesh.ply"/><boolean name="flat_without_normals" value="true"/><transform name="to_world"><translate x="1" y="2" z="3"/></transform>
+  <bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="0.1 0.2 0.3"/></bsdf></bsdf></shape>
+<sensor type="perspective"><float name="fov" value="40"/><string name="fov_axis" value="smaller"/>
+  <float name="near_clip" value="0.0001"/><float name="far_clip" value="1e7"/>
+  <transform name="to_world"><scale x="-1"/><translate z="-4"/></transform>
+  <sampler type="independent"><integer name="sample_count" value="32"/></sampler>
+  <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="8"/></film></sensor></scene>)";
+
+  const ReadResult one = read_pbrt(pbrt), other = read(xml);
+
+  ASSERT_TRUE(one.scene) << messages(one);
+  ASSERT_TRUE(other.scene) << messages(other);
+  EXPECT_TRUE(one.diagnostics.empty()) << messages(one);
+  EXPECT_EQ(one.scene->sensor, other.scene->sensor);
+  EXPECT_EQ(digest_of(*one.scene), digest_of(*other.scene))
+      << serialize(*one.scene) << serialize(*other.scene);
+}
+
+TEST(Pbrt, TurnsAsTheXmlTurns) {
+  const Scene s = pbrt("Rotate 90 0 1 0\nScale 2 3 4\nShape \"plymesh\" \"string filename\" \"mesh.ply\"");
+  const ReadResult other = read(with_sensor(
+      R"(<shape type="ply"><string name="filename" value="mesh.ply"/><boolean name="flat_without_normals" value="true"/><transform name="to_world"><scale x="2" y="3" z="4"/><rotate y="1" angle="90"/></transform></shape>)"));
+
+  ASSERT_TRUE(other.scene);
+  for (std::size_t i = 0; i < 16; ++i)  // a few roundings of double of numbers up to 4
+    EXPECT_NEAR(s.shapes.at(0).to_world.m[i], other.scene->shapes.at(0).to_world.m[i], 16 * 2.3e-16);
+}
+
+TEST(Pbrt, MatricesGoColumnByColumn) {
+  const Scene s = pbrt("Transform [ 1 0 0 0  0 1 0 0  0 0 1 0  5 6 7 1 ]\nShape \"sphere\"");
+
+  EXPECT_EQ(s.shapes.at(0).to_world.m[3], 5);
+  EXPECT_EQ(s.shapes.at(0).to_world.m[11], 7);
+}
+
+TEST(Pbrt, CameraLooksAlongZWithXOnTheRight) {
+  const Scene s = pbrt("Shape \"sphere\"", "LookAt 1 2 3  1 2 8  0 1 0\nCamera \"perspective\"");
+
+  const Transform want{{-1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1}};
+  EXPECT_EQ(s.sensor.to_world, want);
+  EXPECT_EQ(s.sensor.fov_axis, FovAxis::smaller);
+  EXPECT_EQ(s.sensor.fov, 90);
+}
+
+TEST(Pbrt, ScaleBeforeTheCameraMirrorsIt) {
+  const Scene s = pbrt("Shape \"sphere\"", "Scale -1 1 1\nCamera \"perspective\"");
+
+  EXPECT_EQ(s.sensor.to_world, Transform{});
+}
+
+TEST(Pbrt, LensesGrowWithTheirCamera) {
+  const Scene s =
+      pbrt("Shape \"sphere\"",
+           "Scale 0.5 0.5 0.5\nCamera \"perspective\" \"float lensradius\" 0.25 \"float focaldistance\" 3");
+
+  EXPECT_DOUBLE_EQ(s.sensor.aperture_radius, .5);
+  EXPECT_DOUBLE_EQ(s.sensor.focus_distance, 6);
+}
+
+TEST(Pbrt, OrthographicShorterSideSeesTwo) {
+  const Scene s = [] {
+    const ReadResult r = read_pbrt(
+        "Camera \"orthographic\" Film \"rgb\" \"integer xresolution\" 30 \"integer yresolution\" "
+        "10\nWorldBegin\n"
+        "Shape \"sphere\"");
+    EXPECT_TRUE(r.scene) << messages(r);
+    return r.scene.value_or(Scene{});
+  }();
+
+  EXPECT_EQ(s.sensor.projection, Projection::orthographic);
+  EXPECT_EQ(s.sensor.to_world.m[0], -3);
+  EXPECT_EQ(s.sensor.to_world.m[5], 3);
+}
+
+TEST(Pbrt, CropsRoundUp) {
+  const ReadResult r = read_pbrt(
+      R"(Film "rgb" "integer xresolution" 10 "integer yresolution" 10 "float cropwindow" [ 0.11 0.5 0.3 1 ]
+Camera "perspective" WorldBegin Shape "sphere")");
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  EXPECT_EQ(r.scene->film.crop_offset, (std::array<int, 2>{2, 3}));
+  EXPECT_EQ(r.scene->film.crop_size, (FrameSize{3, 7}));
+}
+
+TEST(Pbrt, ExposureMultipliesAllLight) {
+  const ReadResult r = read_pbrt(
+      R"(Film "rgb" "float iso" 200 "float exposuretime" 3
+Camera "perspective" WorldBegin
+LightSource "infinite" "rgb L" [ 1 2 4 ] "float scale" 0.5
+AreaLightSource "diffuse" "rgb L" [ 1 1 1 ] Shape "sphere")");
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  EXPECT_EQ(std::get<ConstantEmitter>(r.scene->emitters.at(0)).radiance, (Rgb{3, 6, 12}));
+  const auto& area = r.scene->shapes.at(0).emitter;
+  ASSERT_TRUE(area);
+  EXPECT_EQ(std::get<ConstantTexture>(r.scene->textures.at(area->radiance.value)).value, (Rgb{6, 6, 6}));
+}
+
+TEST(Pbrt, BlackBodiesHaveLuminanceOne) {
+  const Scene s = pbrt("LightSource \"infinite\" \"blackbody L\" 3000 Shape \"sphere\"");
+
+  const Rgb c = std::get<ConstantEmitter>(s.emitters.at(0)).radiance;
+  // The weights of ITU-R BT.709 and those of the observer's table differ by less than 1e-4 of each.
+  EXPECT_NEAR(.2126 * c[0] + .7152 * c[1] + .0722 * c[2], 1, 1e-4 * (c[0] + c[1] + c[2]));
+  EXPECT_GT(c[0], c[1]);
+  EXPECT_GT(c[1], c[2]);
+}
+
+TEST(Pbrt, PowerOfAPointIsFourPiTimesItsIntensity) {
+  const Scene s = pbrt(
+      "Translate 0 0 1\nLightSource \"point\" \"point3 from\" [ 1 2 3 ] \"float power\" 8 Shape \"sphere\"");
+
+  const auto& point = std::get<PointEmitter>(s.emitters.at(0));
+  EXPECT_EQ(point.position, (Vec3{{1, 2, 4}}));
+  EXPECT_DOUBLE_EQ(point.intensity[0], 8 / (4 * std::numbers::pi));
+}
+
+TEST(Pbrt, DistantLightTravelsFromItsFirstPoint) {
+  const Scene s = pbrt(
+      "LightSource \"distant\" \"point3 from\" [ 0 5 0 ] \"point3 to\" [ 0 0 0 ] \"rgb L\" [ 2 2 2 ] Shape "
+      "\"sphere\"");
+
+  const auto& light = std::get<DirectionalEmitter>(s.emitters.at(0));
+  EXPECT_LT(light.direction[1], 0);
+  EXPECT_EQ(light.irradiance, (Rgb{2, 2, 2}));
+}
+
+TEST(Pbrt, SpotsAimAtTheirTarget) {
+  const Scene s = pbrt(
+      "LightSource \"spot\" \"point3 from\" [ 1 5 0 ] \"point3 to\" [ 1 0 0 ] \"float conedeltaangle\" 0 "
+      "Shape \"sphere\"");
+
+  const auto& spot = std::get<SpotEmitter>(s.emitters.at(0));
+  EXPECT_EQ(spot.cutoff_angle, 30);
+  EXPECT_EQ(spot.beam_width, 30);
+  EXPECT_NEAR(spot.to_world.m[6], -1, 1e-12);  // its +z points down
+  EXPECT_NEAR(spot.to_world.m[7], 5, 1e-12);
+}
+
+TEST(Pbrt, RoughnessIsRemappedByItsRoot) {
+  const Scene s = pbrt(R"(
+Material "conductor" "float roughness" 0.25 "spectrum eta" "metal-Au-eta" "spectrum k" "metal-Au-k" Shape "sphere"
+Material "dielectric" "float roughness" 0.25 "bool remaproughness" false Shape "sphere"
+Material "conductor" Shape "sphere")");
+
+  const auto of = [&](TextureIndex t) { return std::get<ConstantTexture>(s.textures.at(t.value)).value[0]; };
+  const auto& gold = std::get<RoughConductorBsdf>(
+      s.bsdfs.at(std::get<TwoSidedBsdf>(s.bsdfs.at(s.shapes.at(0).bsdf.value)).front.value));
+  EXPECT_EQ(of(gold.alpha_u), .5);
+  EXPECT_EQ(gold.distribution, Microfacet::ggx);
+  EXPECT_EQ(gold.eta[0], .14304);
+  const auto& glass = std::get<RoughDielectricBsdf>(s.bsdfs.at(s.shapes.at(1).bsdf.value));
+  EXPECT_EQ(of(glass.alpha_u), .25);
+  EXPECT_EQ(glass.int_ior, 1.5);
+  EXPECT_EQ(glass.ext_ior, 1);
+  const auto& copper = std::get<ConductorBsdf>(
+      s.bsdfs.at(std::get<TwoSidedBsdf>(s.bsdfs.at(s.shapes.at(2).bsdf.value)).front.value));
+  EXPECT_EQ(copper.eta[0], .20101);
+}
+
+// Fresnel at right angles of eta = 1 and k: k^2 / (4 + k^2).
+TEST(Pbrt, ReflectanceOfAConductorIsThatAtRightAngles) {
+  const Scene s = pbrt("Material \"conductor\" \"rgb reflectance\" [ 0.2 0.5 0.8 ] Shape \"sphere\"");
+
+  const auto& metal = std::get<ConductorBsdf>(
+      s.bsdfs.at(std::get<TwoSidedBsdf>(s.bsdfs.at(s.shapes.at(0).bsdf.value)).front.value));
+  const Rgb want{.2, .5, .8};
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_NEAR(metal.k[i] * metal.k[i] / (4 + metal.k[i] * metal.k[i]), want[i], 1e-12);
+}
+
+TEST(Pbrt, MixTakesTheAmountOfTheSecond) {
+  const Scene s = pbrt(R"(MakeNamedMaterial "a" "string type" "diffuse"
+MakeNamedMaterial "b" "string type" "conductor"
+Material "mix" "string materials" [ "a" "b" ] "float amount" 0.25 Shape "sphere")");
+
+  const auto& blend = std::get<BlendBsdf>(s.bsdfs.at(s.shapes.at(0).bsdf.value));
+  EXPECT_EQ(std::get<ConstantTexture>(s.textures.at(blend.weight.value)).value[0], .25);
+}
+
+TEST(Pbrt, ImagesStandUpright) {
+  const Scene s = pbrt(R"(Texture "t" "spectrum" "imagemap" "string filename" "wood.png" "float uscale" 2
+Material "diffuse" "texture reflectance" "t" Shape "sphere")");
+
+  const auto found = std::find_if(s.textures.begin(), s.textures.end(),
+                                  [](const Texture& t) { return std::holds_alternative<BitmapTexture>(t); });
+  ASSERT_NE(found, s.textures.end());
+  const UvTransform want{{2, 0, 0, 0, -1, 1, 0, 0, 1}};
+  EXPECT_EQ(std::get<BitmapTexture>(*found).to_uv, want);
+  EXPECT_FALSE(std::get<BitmapTexture>(*found).raw);
+}
+
+TEST(Pbrt, NamedObjectsAreInstanced) {
+  const Scene s = pbrt(R"(ObjectBegin "ball" Translate 1 0 0 Shape "sphere" ObjectEnd
+Translate 0 5 0 ObjectInstance "ball" ObjectInstance "ball")");
+
+  ASSERT_EQ(s.instances.size(), 2u);
+  EXPECT_EQ(s.instances[0].to_world.m[7], 5);
+  EXPECT_EQ(s.shapes.at(0).to_world.m[3], 1);
+}
+
+TEST(Pbrt, AttributesEndWhereTheySay) {
+  const Scene s = pbrt(R"(AttributeBegin Translate 1 0 0 ReverseOrientation
+TransformBegin Translate 0 1 0 Shape "sphere" TransformEnd Shape "sphere" AttributeEnd Shape "sphere")");
+
+  EXPECT_EQ(s.shapes.at(0).to_world.m[7], 1);
+  EXPECT_EQ(s.shapes.at(1).to_world.m[7], 0);
+  EXPECT_TRUE(s.shapes.at(1).flip_normals);
+  EXPECT_EQ(s.shapes.at(2).to_world, Transform{});
+  EXPECT_FALSE(s.shapes.at(2).flip_normals);
+}
+
+TEST(Pbrt, CameraMediumIsTheOneOutside) {
+  const Scene s = pbrt(R"(Shape "sphere")", R"(MakeNamedMedium "fog" "string type" "homogeneous"
+MediumInterface "" "fog" Camera "perspective")");
+
+  ASSERT_TRUE(s.sensor.medium);
+  const auto& fog = std::get<HomogeneousMedium>(s.media.at(s.sensor.medium->value));
+  EXPECT_EQ(fog.sigma_t, (Rgb{2, 2, 2}));
+  EXPECT_EQ(fog.albedo, (Rgb{.5, .5, .5}));
+}
+
+TEST(Pbrt, LightOfAMediumIsPerAbsorption) {
+  const Scene s =
+      pbrt(R"(MakeNamedMedium "glow" "string type" "homogeneous" "rgb Le" [ 1 2 3 ] "float Lescale" 2
+MediumInterface "glow" "" Material "interface" Shape "sphere")");
+
+  EXPECT_EQ(std::get<HomogeneousMedium>(s.media.at(0)).source_radiance, (Rgb{2, 4, 6}));
+}
+
+float float_at(const std::string& bytes, std::size_t at) {
+  float x = 0;
+  std::memcpy(&x, bytes.data() + at, sizeof x);
+  return x;
+}
+
+TEST(Pbrt, GridsGetALayerOfZeros) {
+  KeepingAssets assets;
+  const ReadResult r = read_scene("t.pbrt", pbrt_scene(R"(MakeNamedMedium "smoke" "string type" "uniformgrid"
+"integer nx" 2 "integer ny" 1 "integer nz" 1 "float density" [ 3 4 ] "point3 p0" [ 0 0 0 ] "point3 p1" [ 2 1 1 ]
+MediumInterface "smoke" "" Material "interface" Shape "sphere")"),
+                                  assets);
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  const auto& medium = std::get<HeterogeneousMedium>(r.scene->media.at(0));
+  EXPECT_EQ(medium.scale, 2);
+  const auto& grid = std::get<GridVolume>(r.scene->volumes.at(medium.sigma_t.value));
+  const Transform want{{4, 0, 0, -1, 0, 3, 0, -1, 0, 0, 3, -1, 0, 0, 0, 1}};
+  EXPECT_EQ(grid.to_world, want);
+  const std::string bytes = assets.memory.files.at(r.scene->assets.at(grid.file.value).name);
+  ASSERT_EQ(bytes.size(), 48u + 4 * 4 * 3 * 3);
+  const auto value = [&](int x, int y, int z) {
+    return float_at(bytes, std::size_t(48 + 4 * (x + 4 * (y + 3 * z))));
+  };
+  EXPECT_EQ(value(1, 1, 1), 3);
+  EXPECT_EQ(value(2, 1, 1), 4);
+  EXPECT_EQ(value(0, 1, 1) + value(3, 1, 1) + value(1, 0, 1) + value(2, 1, 2), 0);
+}
+
+TEST(Pbrt, MeshesInTheTextBecomeFiles) {
+  KeepingAssets assets;
+  const ReadResult r = read_scene("t.pbrt", pbrt_scene(R"(Scale -1 1 1 AreaLightSource "diffuse"
+Shape "trianglemesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 ] "integer indices" [ 0 1 2 ])"),
+                                  assets);
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  EXPECT_TRUE(r.scene->shapes.at(0).flip_normals);  // a mirror reverses its corners, and pbrt turns it back
+  const std::string bytes = assets.memory.files.at(r.scene->assets.at(0).name);
+  EXPECT_TRUE(bytes.starts_with("ply\nformat binary_little_endian 1.0\nelement vertex 3\n"));
+  EXPECT_TRUE(bytes.ends_with(std::string("\3\0\0\0\0\1\0\0\0\2\0\0\0", 13)));
+}
+
+TEST(Pbrt, FlatPatchesAreTriangles) {
+  const std::string flat = R"(Shape "bilinearmesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 1 1 0 ])";
+  EXPECT_EQ(pbrt(flat).shapes.size(), 1u);
+  EXPECT_TRUE(says(refusal(R"(Shape "bilinearmesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 1 1 1 ])"), "is bent"));
+}
+
+TEST(Pbrt, IncludesAreReadInPlace) {
+  KeepingAssets assets;
+  assets.memory.files["part.pbrt"] = "Translate 1 0 0 Shape \"sphere\"";
+  const ReadResult r = read_scene(
+      "t.pbrt", pbrt_scene("Import \"part.pbrt\" Shape \"sphere\" Include \"part.pbrt\" Shape \"sphere\""),
+      assets);
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  EXPECT_EQ(r.scene->shapes.at(0).to_world.m[3], 1);
+  EXPECT_EQ(r.scene->shapes.at(1).to_world.m[3], 0);
+  EXPECT_EQ(r.scene->shapes.at(3).to_world.m[3], 1);
+}
+
+TEST(Pbrt, FilesThatIncludeThemselvesAreRefused) {
+  KeepingAssets assets;
+  assets.memory.files["a.pbrt"] = "Include \"b.pbrt\"";
+  assets.memory.files["b.pbrt"] = "Include \"a.pbrt\"";
+  const ReadResult r = read_scene("t.pbrt", pbrt_scene("Include \"a.pbrt\""), assets);
+
+  EXPECT_FALSE(r.scene);
+  EXPECT_TRUE(says(messages(r), "b.pbrt:1:10: error: \"a.pbrt\" includes itself")) << messages(r);
+}
+
+}  // namespace
+}  // namespace ls

@@ -1,0 +1,130 @@
+// The program that makes videos is a stranger: whatever it does, the coordinator goes on. Scripts play it.
+#include "coordinator/service/video/video_encoder.h"
+
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+namespace ls::coordinator {
+namespace {
+
+using testing::HasSubstr;
+
+class VideoEncoding : public testing::Test {
+ protected:
+  VideoEncoding() { std::filesystem::create_directories(folder); }
+  ~VideoEncoding() override { std::filesystem::remove_all(folder); }
+
+  // A program that runs this script. It also notes its process id.
+  VideoEncoder::Asked program(const std::string& script) {
+    const std::filesystem::path file = folder / "ffmpeg";
+    std::ofstream(file) << "#!/bin/sh\necho $$ > " << (folder / "pid").string() << "\n" << script << "\n";
+    ::chmod(file.c_str(), 0700);
+    return {.ffmpeg = file.string(),
+            .file = folder / "out.mp4",
+            .size = {64, 64},
+            .fps = 24,
+            .most_bytes = 1000,
+            .until = clock.now() + std::chrono::hours(1),
+            .stall_limit = std::chrono::hours(1)};
+  }
+  Result<void> make(const VideoEncoder::Asked& asked, std::stop_token stop = {}) {
+    auto encoder = VideoEncoder::start(asked, clock, std::move(stop));
+    if (!encoder) return tl::unexpected(encoder.error());
+    // Far more than a socket takes without a reader
+    const std::vector<std::uint8_t> picture(64 * 64 * 3, 7);
+    for (int i = 0; i < 200; ++i)
+      if (auto added = (*encoder)->add(picture); !added) return added;
+    return (*encoder)->finish();
+  }
+  bool program_runs() const {
+    pid_t pid = 0;
+    std::ifstream(folder / "pid") >> pid;
+    return pid > 0 && ::kill(pid, 0) == 0;
+  }
+
+  const SystemClock clock;
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("video-" + std::to_string(::getpid()));
+};
+
+TEST_F(VideoEncoding, GetsEveryByteOfEveryPicture) {
+  const auto asked = program("cat > " + (folder / "got").string());
+  ASSERT_TRUE(make(asked));
+  EXPECT_EQ(std::filesystem::file_size(folder / "got"), 200u * 64 * 64 * 3);
+  EXPECT_FALSE(program_runs());
+}
+
+TEST_F(VideoEncoding, WhatTheProgramSaysIsTheError) {
+  const auto made = make(program("cat > /dev/null; echo 'Unknown encoder' >&2; exit 3"));
+  ASSERT_FALSE(made);
+  EXPECT_THAT(made.error().message, HasSubstr("Unknown encoder"));
+}
+
+TEST_F(VideoEncoding, AProgramThatDiesInTheMiddleIsAnError) {
+  const auto made = make(program("head -c 1000 > /dev/null; kill -9 $$"));
+  ASSERT_FALSE(made);
+  EXPECT_THAT(made.error().message, HasSubstr("signal 9"));
+}
+
+TEST_F(VideoEncoding, AProgramThatStopsAtItsLimitSaysThatTheVideoIsTooLarge) {
+  const auto made = make(program("head -c 1000 > /dev/null"));
+  ASSERT_FALSE(made);
+  EXPECT_THAT(made.error().message, HasSubstr("more than 1000 bytes"));
+}
+
+// With so much text that it would fill a pipe that nobody reads
+TEST_F(VideoEncoding, AProgramThatTalksWithoutEndIsHeard) {
+  const auto made =
+      make(program("i=0; while [ $i -lt 3000 ]; do echo 'a line of forty characters or so, again' >&2; "
+                   "i=$((i+1)); done; cat > /dev/null; exit 1"));
+  ASSERT_FALSE(made);
+  EXPECT_LT(made.error().message.size(), 3000u);
+  EXPECT_THAT(made.error().message, HasSubstr("a line of forty"));
+}
+
+TEST_F(VideoEncoding, AProgramThatTakesNothingIsKilled) {
+  auto asked = program("exec sleep 3600");
+  asked.stall_limit = std::chrono::milliseconds(50);
+  const auto made = make(asked);
+  ASSERT_FALSE(made);
+  EXPECT_THAT(made.error().message, HasSubstr("does not go on"));
+  EXPECT_FALSE(program_runs());
+}
+
+TEST_F(VideoEncoding, AProgramThatDoesNotEndIsKilled) {
+  auto asked = program("cat > /dev/null; exec sleep 3600");
+  asked.stall_limit = std::chrono::milliseconds(500);
+  ASSERT_FALSE(make(asked));
+  EXPECT_FALSE(program_runs());
+}
+
+TEST_F(VideoEncoding, AProgramIsKilledWhenTheTimeOfTheVideoIsUp) {
+  auto asked = program("exec sleep 3600");
+  asked.until = clock.now();
+  const auto made = make(asked);
+  ASSERT_FALSE(made);
+  EXPECT_THAT(made.error().message, HasSubstr("time for one video is up"));
+  EXPECT_FALSE(program_runs());
+}
+
+TEST_F(VideoEncoding, AProgramIsKilledWhenTheCoordinatorStops) {
+  std::stop_source source;
+  const auto asked = program("exec sleep 3600");
+  std::jthread stops([&source] { source.request_stop(); });
+  ASSERT_FALSE(make(asked, source.get_token()));
+  EXPECT_FALSE(program_runs());
+}
+
+TEST_F(VideoEncoding, AProgramThatIsNotThereIsAnError) {
+  VideoEncoder::Asked asked = program("");
+  asked.ffmpeg = (folder / "nowhere").string();
+  EXPECT_FALSE(make(asked));
+}
+
+}  // namespace
+}  // namespace ls::coordinator

@@ -1,0 +1,148 @@
+"""The list of jobs: pages, what narrows it, and what is done to several jobs at once."""
+import json
+
+import pytest
+
+from stub_farm import job
+
+NAMES = "[...document.querySelectorAll('[data-job]')].map(row => row.dataset.job)"
+
+
+@pytest.fixture
+def many(farm):
+    """3,214 jobs: every tenth renders, one failed; the newest has the highest number."""
+    for n in range(3214):
+        state = "failed" if n == 7 else "running" if n % 10 == 0 else "done"
+        farm.jobs[f"j-{n:04}"] = job(f"j-{n:04}", f"scene-{n}.xml", state, submitted_unix=1765000000 + n, owner="anna" if n % 2 else "bert")
+    return farm
+
+
+def shows(page, ids):
+    page.wait(f"JSON.stringify({NAMES}) === {json.dumps(json.dumps(ids, separators=(',', ':')))}")
+
+
+def test_of_thousands_of_jobs_one_page_is_fetched_and_drawn(many, dashboard):
+    page = dashboard()
+    page.wait("document.querySelectorAll('[data-job]').length === 50")
+
+    assert page.text(".heading .sub") == "3,214 jobs · 322 rendering · 1 failed"
+    assert page.text(".pager .number") == "1 – 50 of 3,214"
+    assert all("limit=50" in path for method, path in many.requests if path.startswith("/api/v1/jobs?"))
+    page.click(".pager button:nth-of-type(3)")
+    page.wait("document.querySelector('.pager .number').innerText === '51 – 100 of 3,214'")
+    assert page.evaluate("location.hash") == "#/jobs?page=2"
+    page.click(".pager button:nth-of-type(4)")
+    page.wait("document.querySelectorAll('[data-job]').length === 14")
+
+
+def test_search_state_owner_age_and_order_narrow_the_list_and_stand_in_the_address(many, dashboard):
+    page = dashboard()
+    page.wait("document.querySelector('#list-search')")
+    page.click("#list-search")
+    page.type("scene-320")
+    page.wait("document.querySelectorAll('[data-job]').length === 11")
+    page.click("[name=state][value=done]")
+    page.wait("document.querySelectorAll('[data-job]').length === 9")
+
+    page.evaluate("(() => { const s = document.getElementById('list-owner'); s.value = '=anna'; s.dispatchEvent(new Event('change')); })()")
+    page.wait("document.querySelectorAll('[data-job]').length === 5")
+    page.evaluate("(() => { const s = document.getElementById('list-sort'); s.value = 'submitted'; s.dispatchEvent(new Event('change')); })()")
+    shows(page, ["j-3201", "j-3203", "j-3205", "j-3207", "j-3209"])
+
+    assert page.evaluate("location.hash") == "#/jobs?search=scene-320&state=done&owner=anna&sort=submitted"
+    page.evaluate("(() => { const s = document.getElementById('list-days'); s.value = '1'; s.dispatchEvent(new Event('change')); })()")
+    page.wait("document.querySelector('main').innerText.includes('No job is like this.')")
+
+
+def test_a_link_opens_the_same_list(many, dashboard):
+    page = dashboard("#/jobs?search=scene-7&state=failed")
+    shows(page, ["j-0007"])
+    assert page.evaluate("document.getElementById('list-search').value") == "scene-7"
+    assert page.evaluate("document.querySelector('[name=state][value=failed]').checked")
+
+
+def test_jobs_that_come_go_and_change_are_fetched_in_their_place(farm, dashboard):
+    farm.jobs = {f"j-{n}": job(f"j-{n}", state="done", submitted_unix=1765000000 + n) for n in range(3)}
+    page = dashboard()
+    shows(page, ["j-2", "j-1", "j-0"])
+
+    farm.jobs["j-9"] = job("j-9", state="queued", submitted_unix=1765000009, units_done=0)
+    farm.emit("job", farm.jobs["j-9"])
+    shows(page, ["j-9", "j-2", "j-1", "j-0"])
+    farm.change("j-0", state="running")
+    shows(page, ["j-0", "j-9", "j-2", "j-1"])
+    farm.remove("j-2")
+    shows(page, ["j-0", "j-9", "j-1"])
+
+
+def test_several_jobs_are_cancelled_at_once_after_one_more_question(farm, dashboard):
+    farm.jobs = {f"j-{n}": job(f"j-{n}", state="running", submitted_unix=1765000000 + n) for n in range(3)}
+    page = dashboard()
+    shows(page, ["j-2", "j-1", "j-0"])
+    page.evaluate("document.querySelector('[data-job=j-2] input').focus()")
+    page.key(" ", "Space", 32, " ")
+    page.click("[data-job=j-1] input")
+    page.wait("document.querySelector('.list-picked b')?.innerText === '2 jobs picked'")
+
+    page.click(".list-picked button:nth-of-type(1)")
+    page.wait("document.querySelector('.list-picked .danger')?.innerText === 'Really cancel'")
+    page.click(".list-picked .danger")
+
+    page.wait("document.querySelectorAll('.is-cancelled').length === 2 && document.querySelector('.list-picked.none')")
+    assert farm.jobs["j-0"]["state"] == "running"
+
+
+def test_what_cannot_be_removed_stays_picked_and_says_why(farm, dashboard):
+    farm.jobs = {"j-0": job("j-0", state="running"), "j-1": job("j-1", state="done", submitted_unix=1)}
+    page = dashboard()
+    page.wait("document.querySelector('thead input')")
+    page.click("thead input")
+    page.click(".list-picked button:nth-of-type(2)")
+    page.click(".list-picked .danger")
+
+    page.wait("document.querySelector('.toast')?.innerText.includes('A job that renders is cancelled first.')")
+    shows(page, ["j-0"])
+    page.wait("document.querySelector('.list-picked b')?.innerText === '1 job picked'")
+
+
+def test_every_row_has_a_small_picture_of_its_job(farm, dashboard):
+    farm.jobs = {"j-0": job("j-0"), "j-1": job("j-1", state="queued", units_done=0)}
+    page = dashboard()
+
+    page.wait("document.querySelector('[data-job=j-0] live-image').dataset.painted === '1'")
+
+    assert page.evaluate("(() => { const c = document.querySelector('[data-job=j-0] live-image canvas'); return [...c.getContext('2d').getImageData(3, 3, 1, 1).data]; })()") == [40, 160, 90, 255]
+    assert farm.asked("GET", "/api/v1/jobs/j-1/thumbnail.png") == 0, "nothing is rendered yet"
+
+
+def test_who_may_only_look_is_offered_no_picking(farm, dashboard):
+    farm.role = "read"
+    farm.jobs = {"j-0": job("j-0")}
+    page = dashboard()
+    page.wait("document.querySelector('[data-job]')")
+    assert page.count("[data-job] input") == 0 and page.count("thead input") == 0
+
+
+def test_the_same_scene_is_rendered_again_with_more_samples(farm, dashboard):
+    farm.jobs["j-1"] = job(state="done", spp=64)
+    page = dashboard("#/jobs/j-1")
+    page.wait("[...document.querySelectorAll('button')].some(b => b.innerText === 'Render again …')")
+    page.evaluate("[...document.querySelectorAll('button')].find(b => b.innerText === 'Render again …').click()")
+    assert page.wait("document.getElementById('again-spp').value") == "128"
+    page.click("#again-seed")
+    page.type("x")
+    page.click(".again button[type=submit]")
+    assert "“x” is no whole number" in page.text(".again .field-error")
+    page.evaluate("document.getElementById('again-seed').select()")
+    page.type("5")
+    page.key("Enter", virtual=13, text="\r")
+
+    page.wait("location.hash === '#/jobs/j-again'")
+    assert farm.submitted == [("j-1", {"spp": 128, "seed": 5})]
+
+
+@pytest.mark.parametrize("width", [1280, 375])
+def test_the_list_fits_the_screen(many, dashboard, width):
+    page = dashboard(width=width, height=800, phone=width < 500)
+    page.wait("document.querySelectorAll('[data-job]').length === 50")
+    assert page.evaluate("document.documentElement.scrollWidth") <= width

@@ -1,0 +1,186 @@
+// Surfaces that let light pass or that lie on others: masks, thin sheets, plates, plastic, blends, and normal
+// maps.
+#include <cmath>
+
+#include "validation/fixtures/case.h"
+#include "validation/fixtures/closed_forms.h"
+#include "validation/fixtures/fixtures.h"
+
+namespace ls::cases {
+namespace {
+
+constexpr double kSheet = 2 * .04 / 1.04;  // what a sheet of index 1.5 reflects along its normal
+
+BsdfIndex two_sided(SceneBuilder& builder, double reflectance) {
+  const BsdfIndex one = builder.diffuse(reflectance);
+  return builder.bsdf(TwoSidedBsdf{one, one});
+}
+BsdfIndex mask(SceneBuilder& builder, double opacity, BsdfIndex inner) {
+  return builder.bsdf(MaskBsdf{builder.texture(rgb(opacity)), inner});
+}
+BsdfIndex thin_sheet(SceneBuilder& builder) {
+  const TextureIndex white = builder.texture(rgb(1));
+  return builder.bsdf(ThinDielectricBsdf{1.5, 1, white, white});
+}
+BsdfIndex third(SceneBuilder& builder) { return mask(builder, .3, two_sided(builder, 0)); }
+BsdfIndex half(SceneBuilder& builder) { return mask(builder, .5, two_sided(builder, 0)); }
+BsdfIndex plastic(SceneBuilder& builder, const Rgb& base) {
+  const TextureIndex b = builder.texture(base), white = builder.texture(rgb(1));
+  return builder.bsdf(PlasticBsdf{1.5, 1, true, b, white});
+}
+// Facets this flat mask less than alpha^2 of the light.
+BsdfIndex nearly_smooth(SceneBuilder& builder, Microfacet facets) {
+  const TextureIndex white = builder.texture(rgb(1)), alpha = builder.texture(rgb(2e-3));
+  return builder.bsdf(RoughDielectricBsdf{facets, alpha, alpha, 1.5, 1, white, white});
+}
+
+// The floor below a sheet of something.
+SceneBuilder floor_below(auto material) {
+  SceneBuilder builder = floor_point();
+  builder.shape(RectangleShape{}, translate({0, 0, 1}) * scale(3), material(builder));
+  return builder;
+}
+// The sky behind something, along its normal.
+SceneBuilder through(const Geometry& g, const Transform& to_world, BsdfIndex (*material)(SceneBuilder&)) {
+  SceneBuilder builder;
+  builder.shape(g, to_world, material(builder));
+  builder.environment();
+  builder.look({0, 0, 3}, {0, 0, 0}, 1e-3, {0, 1, 0});
+  return builder;
+}
+
+void null_transmission(Table& t) {
+  t.mean("7.6g-mask-before-the-sky", "7.6g", "A mask of .3 lets .7 of a white sky pass.",
+         through(RectangleShape{}, scale(3), third), grey(.7), {.channels = true});
+  const auto direct = [&](const char* name, SceneBuilder builder, double irradiance) {
+    t.mean(std::string("7.6g-") + name, "7.6g",
+           "Light on a floor below a mask or a sheet: what they let pass.", std::move(builder),
+           reflected(irradiance), {.channels = true});
+  };
+  {
+    // Only shadow rays get there: no path finds a point or a direction.
+    SceneBuilder builder = floor_below(third);
+    builder.scene.emitters.push_back(PointEmitter{{.5, 0, 2}, rgb(3)});
+    direct("mask-below-a-point", builder, .7 * 3 * 2 / std::pow(4.25, 1.5));
+  }
+  {
+    SceneBuilder builder = floor_below(thin_sheet);
+    builder.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(2)});
+    direct("sheet-below-the-sun", builder, 2 * (1 - kSheet));
+  }
+  {
+    // Shadow rays and paths both find the light through the mask.
+    SceneBuilder builder = floor_below(third);
+    builder.lamp(SphereShape{}, translate({0, 0, 3}) * scale(1.5));
+    direct("mask-below-a-sphere", builder, .7 * kPi * 2.25 / 9);
+  }
+  // Two masks and an absorbing medium between them.
+  const Rgb sigma{1, .5, .25};
+  Channels passed, lit;
+  for (std::size_t c = 0; c < 3; ++c) {
+    passed[c] = .25 * std::exp(-2 * sigma[c]);
+    lit[c] = reflected(passed[c])[0];
+  }
+  SceneBuilder seen = through(CubeShape{}, {}, half);
+  const MediumIndex m = seen.homogeneous(sigma, rgb(0));
+  seen.scene.shapes[0].interior = m;
+  seen.scene.shapes[0].is_medium_transition = true;
+  t.mean("7.6g-mask-around-a-medium/homogeneous/volpath", "7.6g 7.6a",
+         "The sky through two masks of a half and the absorber between them.", seen, passed,
+         {.band = .03, .why_band = "a thirtieth of the light gets through, by chance"});
+  SceneBuilder shadow = floor_point();
+  shadow.container(CubeShape{}, translate({0, 0, 2.5}), half(shadow), shadow.homogeneous(sigma, rgb(0)));
+  shadow.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(1)});
+  t.mean("7.6g-mask-around-a-medium/homogeneous/shadow", "7.6g 7.6a",
+         "The sun on a floor below two masks of a half and the absorber between them.", shadow, lit);
+}
+
+void coated(Table& t) {
+  const auto add = [&](const char* name, const Geometry& g, auto material, double slack = 0) {
+    SceneBuilder builder;
+    builder.shape(g, rotate_x(30) * rotate_y(20), material(builder));
+    builder.environment();
+    builder.look({.4, -6, .7}, {0, 0, 0}, 10);
+    t.mean(std::string("7.6c-") + name, "7.6c N64", "What absorbs nothing is as bright as the sky.", builder,
+           grey(1), {.slack = slack, .channels = true});
+  };
+  add("sheet-cube", CubeShape{}, thin_sheet);
+  add("masked-cube", CubeShape{}, [](SceneBuilder& k) { return mask(k, .4, two_sided(k, 1)); });
+  add("white-plastic", SphereShape{}, [](SceneBuilder& k) { return plastic(k, rgb(1)); });
+  add("blend-of-mirror-and-white", CubeShape{}, [](SceneBuilder& k) {
+    return k.bsdf(BlendBsdf{k.texture(rgb(.3)), k.mirror(), two_sided(k, 1)});
+  });
+  add("blend-with-a-mask", CubeShape{}, [](SceneBuilder& k) {
+    return k.bsdf(BlendBsdf{k.texture(rgb(.3)), mask(k, .2, k.mirror()), two_sided(k, 1)});
+  });
+  add(
+      "nearly-smooth-glass", SphereShape{}, [](SceneBuilder& k) { return nearly_smooth(k, Microfacet::ggx); },
+      2e-4);
+}
+
+// A thin sheet, and a plate of two rough faces as flat as these, before a black wall: light turns by 2e-3 at
+// the plate, and Fresnel's terms change by the square of that.
+void sheets(Table& t) {
+  const auto add = [&](const char* name, SceneBuilder builder, double slack) {
+    builder.shape(RectangleShape{}, translate({0, 0, -2}) * scale(20), builder.diffuse(0));
+    t.mean(std::string("7.6g-") + name, "7.6g N36", "What a sheet of two faces reflects of a white sky.",
+           builder, grey(kSheet),
+           {.band = .02,
+            .why_band = "a thirteenth of the light is reflected, by chance",
+            .slack = slack,
+            .channels = true});
+  };
+  add("sheet-before-black", through(RectangleShape{}, scale(3), thin_sheet), 0);
+  add("nearly-smooth-plate",
+      through(CubeShape{}, scale(9, 9, .25),
+              [](SceneBuilder& k) { return nearly_smooth(k, Microfacet::beckmann); }),
+      1e-4);
+}
+
+// Lit along the normal, seen at 60 degrees from it, where r_s = (cos i - n cos t) / (cos i + n cos t) and so
+// on.
+void plastic_by_the_sun(Table& t) {
+  const double n = 1.5, ci = .5, ct = std::sqrt(1 - .75 / (n * n));
+  const double rs = (ci - n * ct) / (ci + n * ct), rp = (n * ci - ct) / (n * ci + ct);
+  const double through = .96 * (1 - (rs * rs + rp * rp) / 2) / (n * n), r = 1 - (1 - walsh(n)) / (n * n);
+  SceneBuilder builder;
+  builder.shape(RectangleShape{}, scale(3), plastic(builder, {.2, .5, .8}));
+  builder.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(1)});
+  builder.scene.integrator.max_depth = kOnce;
+  builder.look({-std::sqrt(3.), 0, 1}, {0, 0, 0}, 1e-3);
+  const auto f = [&](double d) { return d / (1 - d * r) * through / kPi; };
+  t.mean("7.6g-plastic-by-the-sun", "7.6g", "Plastic of three colours: light reflected within it included.",
+         builder, {f(.2), f(.5), f(.8)});
+}
+
+// A grey floor whose normal leans to the light by 36.87 degrees, lit from above: the cosine is .8. Bumps cast
+// no shadows on each other.
+void normal_map(Table& t) {
+  SceneBuilder builder;
+  const BsdfIndex floor = builder.diffuse(.5);
+  builder.shape(RectangleShape{}, scale(3),
+                builder.bsdf(NormalMapBsdf{builder.texture({.8, .5, .9}), floor, true, false}));
+  builder.scene.integrator.max_depth = kOnce;
+  builder.look({2, 1, 1}, {0, 0, 0}, 1e-3);
+  SceneBuilder sun = builder;
+  sun.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(1)});
+  t.mean("7.6g-normal-map-by-the-sun", "7.6g N37", "A floor whose normals lean: the cosine is theirs.", sun,
+         reflected(.8), {.channels = true});
+  // The sphere lies in the normal's direction, all of it above the surface and above the leaning plane: E =
+  // pi r^2 / d^2.
+  builder.lamp(SphereShape{}, translate({1.8, 0, 2.4}));
+  t.mean("7.6g-normal-map-by-a-sphere", "7.6g N37", "A floor whose normals lean towards a shining sphere.",
+         builder, reflected(kPi / 9), {.channels = true});
+}
+
+}  // namespace
+
+void add_coatings(Table& t) {
+  null_transmission(t);
+  coated(t);
+  sheets(t);
+  plastic_by_the_sun(t);
+  normal_map(t);
+}
+
+}  // namespace ls::cases

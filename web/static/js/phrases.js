@@ -1,0 +1,28 @@
+// Phrases that the dashboard has in common with reports and the terminal: written from common/report/phrases.h
+// by LIGHTSHAFT_UPDATE_DOCS=1 report_test --gtest_filter='Phrases.*'.
+export const phrases = {
+  doubt: "don't trust yet",
+  estimateInDoubt: "This error estimate can't be trusted yet.",
+  noIntervals: "No intervals are shown: the estimate can't be trusted yet.",
+  noPointYet: "The first point appears when every tile has finished a round of samples.",
+  independentSamples: "independent samples give −1",
+  againstReference: "against the reference",
+  belowNoise: "below the reference's noise",
+  oneSeed: "not to be trusted: one seed",
+  sameSeed: "The reference shares this job's seed: its noise is the same noise, and the true figures say nothing. Render it with another --seed.",
+  stoppedSpp: "all its samples are in",
+  stoppedError: "the target error is reached",
+  stoppedErrorDenoised: "the target error of the denoised layers is reached",
+  stoppedErrorInDoubt: "the target error is reached by its own estimate: don't trust yet",
+  stoppedTime: "its time was up",
+  stoppedUser: "someone stopped it",
+  failed: "The job failed",
+  unwell: "Something is wrong",
+  timeUnit: "Seconds of threads: of render their CPU time, of the others by the clock.",
+  timeLoad: "getting the files that the scene names",
+  timeBuild: "reading them and building the world",
+  timeRender: "tracing",
+  timeTransfer: "packing results to be sent",
+  timeMerge: "folding and measuring, in the coordinator",
+  timeIdle: "threads between two units of the job",
+};

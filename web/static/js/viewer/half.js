@@ -1,0 +1,36 @@
+// Half floats in the coordinator's format: 1 bit sign, 5 bits exponent, 10 bits fraction.
+
+let table = null;
+
+/** The value of each of the 65,536 bit patterns. */
+export function halfValues() {
+  if (table) return table;
+  table = new Float32Array(65536);
+  for (let bits = 0; bits < 65536; bits += 1) {
+    const exponent = (bits >> 10) & 31;
+    const fraction = bits & 1023;
+    const size = exponent === 31 ? (fraction ? NaN : Infinity) : exponent === 0 ? fraction * 2 ** -24 : (1 + fraction / 1024) * 2 ** (exponent - 15);
+    table[bits] = bits & 0x8000 ? -size : size;
+  }
+  return table;
+}
+
+/** Floats of what came: format "half" or "float". */
+export function floatsOf(buffer, format) {
+  if (format === "float") return new Float32Array(buffer);
+  const values = halfValues();
+  return Float32Array.from(new Uint16Array(buffer), (bits) => values[bits]);
+}
+
+const scratch = new DataView(new ArrayBuffer(4));
+
+/** The half float nearest to a value; beyond 65504 that. */
+export function halfBits(value) {
+  if (Number.isNaN(value)) return 0x7e00;
+  const sign = value < 0 ? 0x8000 : 0;
+  const size = Math.min(Math.abs(value), 65504);
+  if (size < 2 ** -14) return sign | Math.round(size * 2 ** 24);
+  scratch.setFloat32(0, size);
+  const bits = scratch.getUint32(0) - 0x38000000;
+  return sign | ((bits + 0xfff + ((bits >> 13) & 1)) >> 13);
+}

@@ -1,0 +1,150 @@
+// Fetches blocks of a picture's layers when they are needed, and keeps them while there is room. All views of
+// a picture share one source. If the job still renders, the source is told which areas have changed, and
+// fetches these again.
+import { blockRect } from "./place.js";
+import { floatsOf } from "./half.js";
+
+const kAtOnce = 4; // most requests in progress
+const kMostBytes = 192 * 2 ** 20;
+const kFreshPauseMs = 800; // a changing block is not requested more often
+const kFirstRetryMs = 500;
+const kLongestRetryMs = 15_000;
+const kProbeSide = 16;
+const kMostProbes = 256;
+
+export class PixelSource {
+  #fetch;
+  #blocks = new Map(); // key -> block; the least recently used first
+  #bytes = 0;
+  #wanted = [];
+  #running = 0;
+  #failures = 0;
+  #retryAt = 0;
+  #timer = 0;
+  #probes = new Map();
+
+  /** fetch(layer, level, rect) -> ArrayBuffer. meta: as `layers` says. onChange(problem): something came, or why nothing does. */
+  constructor(meta, fetch, onChange) {
+    this.size = meta.size;
+    this.maxLevel = meta.max_level;
+    this.layers = meta.layers;
+    this.onChange = onChange;
+    this.#fetch = fetch;
+  }
+
+  layer(name) {
+    return this.layers.find((layer) => layer.name === name) ?? this.layers[0];
+  }
+
+  /** {buffer, rect, level, version}, or undefined if it has not come yet. */
+  block(layer, level, bx, by) {
+    const key = `${layer} ${level} ${bx} ${by}`;
+    const block = this.#blocks.get(key);
+    if (!block?.buffer) return undefined;
+    this.#blocks.delete(key); // inserted again at the end: used most recently
+    this.#blocks.set(key, block);
+    return block;
+  }
+
+  /** What is needed now, the most urgent first: [[layer, level, bx, by], ...]. What was wanted before is not fetched any more. */
+  want(list) {
+    this.#wanted = list;
+    this.#pump();
+  }
+
+  /** The image has changed within a rectangle of it; null: anywhere. */
+  touch(rect) {
+    for (const block of this.#blocks.values()) {
+      const side = 2 ** block.level;
+      const [x0, y0, x1, y1] = block.rect;
+      if (!rect || (rect[0] < x1 * side && rect[2] > x0 * side && rect[1] < y1 * side && rect[3] > y0 * side)) block.stale = true;
+    }
+    this.#probes.clear();
+    this.#pump();
+  }
+
+  #pump() {
+    clearTimeout(this.#timer);
+    const now = performance.now();
+    let later = Infinity;
+    for (const [layer, level, bx, by] of this.#wanted) {
+      if (this.#running >= kAtOnce) return;
+      const key = `${layer} ${level} ${bx} ${by}`;
+      const block = this.#blocks.get(key) ?? { buffer: null, rect: blockRect(this.size, level, bx, by), level, version: 0, stale: true, running: false, notBefore: 0 };
+      if (!block.stale || block.running) continue;
+      const when = Math.max(block.notBefore, this.#retryAt);
+      if (when > now) later = Math.min(later, when);
+      else this.#load(key, layer, block);
+    }
+    if (later < Infinity) this.#timer = setTimeout(() => this.#pump(), later - now);
+  }
+
+  async #load(key, layer, block) {
+    this.#running += 1;
+    this.#blocks.set(key, block);
+    block.running = true;
+    block.stale = false;
+    let problem = null;
+    try {
+      const buffer = await this.#fetch(layer, block.level, block.rect);
+      this.#bytes += buffer.byteLength - (block.buffer?.byteLength ?? 0);
+      block.buffer = buffer;
+      block.version += 1;
+      block.notBefore = performance.now() + kFreshPauseMs;
+      this.#failures = 0;
+      this.#forget();
+    } catch (error) {
+      block.stale = true;
+      this.#retryAt = performance.now() + Math.min(kFirstRetryMs * 2 ** this.#failures, kLongestRetryMs);
+      this.#failures += 1;
+      problem = error;
+    }
+    block.running = false;
+    this.#running -= 1;
+    this.onChange(problem);
+    this.#pump();
+  }
+
+  #forget() {
+    for (const [key, block] of this.#blocks) {
+      if (this.#bytes <= kMostBytes) return;
+      if (block.running) continue;
+      this.#bytes -= block.buffer?.byteLength ?? 0;
+      this.#blocks.delete(key);
+    }
+  }
+
+  /** The values of one pixel of the image, one for each channel; identifiers as their bits. */
+  async pixel(layer, x, y) {
+    const [bx, by] = [Math.floor(x / kProbeSide), Math.floor(y / kProbeSide)];
+    const key = `${layer.name} ${bx} ${by}`;
+    const rect = [bx * kProbeSide, by * kProbeSide, Math.min((bx + 1) * kProbeSide, this.size[0]), Math.min((by + 1) * kProbeSide, this.size[1])];
+    if (!this.#probes.has(key)) {
+      if (this.#probes.size >= kMostProbes) this.#probes.clear();
+      const asked = this.#fetch(layer.name, 0, rect);
+      asked.catch(() => this.#probes.delete(key));
+      this.#probes.set(key, asked);
+    }
+    const buffer = await this.#probes.get(key);
+    const from = ((y - rect[1]) * (rect[2] - rect[0]) + x - rect[0]) * layer.channels.length;
+    const values = layer.blocks === "first" ? alternating(buffer) : floatsOf(buffer, layer.format);
+    return [...values.slice(from, from + layer.channels.length)];
+  }
+
+  /** All values of a rectangle of a level. */
+  async values(name, level, rect) {
+    return floatsOf(await this.#fetch(name, level, rect), this.layer(name).format);
+  }
+
+  close() {
+    clearTimeout(this.#timer);
+    this.#wanted = [];
+    this.onChange = () => {};
+  }
+}
+
+/** Identifiers as whole numbers, coverages as they are. */
+function alternating(buffer) {
+  const bits = new Uint32Array(buffer);
+  return Array.from(new Float32Array(buffer), (value, i) => (i % 2 === 0 ? bits[i] : value));
+}

@@ -1,0 +1,67 @@
+// The tools that the make_material() functions use to turn the description of a material in a scene into a
+// kind for the inner loop.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <map>
+#include <memory>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "common/scene/schema/bsdf_traits.h"
+#include "worker/render/bsdf/lobes.h"
+#include "worker/render/bsdf/microfacet_energy.h"
+#include "worker/render/bsdf/rough_plastic_table.h"
+
+namespace ls::render {
+
+// Collects errors: only the first one is recorded, and building continues. So make_material() needs no error
+// handling of its own and reads as a table.
+class MaterialBuilder {
+ public:
+  MaterialBuilder(const Scene& scene, const TextureTable& textures,
+                  const std::vector<scene::BsdfTraits>& traits)
+      : scene_(scene), textures_(textures), traits_(traits) {}
+
+  void refuse(std::string text);
+  bool refused() const { return error_.has_value(); }
+  const std::optional<Error>& error() const { return error_; }
+
+  Slot slot(TextureIndex t);
+  // Values outside [0, 1] are clamped, so that surfaces conserve energy, and counted.
+  Slot reflectance(TextureIndex t);
+  Roughness roughness(Microfacet distribution, TextureIndex u, TextureIndex v);
+  Roughness roughness(Microfacet distribution, double alpha);
+  // Returns the index of refraction inside over outside.
+  double index(double inside, double outside);
+  float mean(const Slot& s) const;
+  // Returns the material for one side of a two-sided material, where b is the material of that side. If b is
+  // itself two-sided, its front is used for both sides.
+  BsdfIndex side(BsdfIndex b);
+  bool passes(BsdfIndex b) const { return traits_[b.value].passes; }
+
+  // The tables below take 30 ms to integrate. Materials with equal parameters share one, since scenes give
+  // many objects the same coat.
+  const RoughPlasticTable& coat(Microfacet type, double alpha, double eta);
+  // Returns the table of multiple scattering between microfacets.
+  enum class EnergyOf { conductor, dielectric, coat };
+  const MicrofacetEnergy* energy(EnergyOf of, const Roughness& roughness, double eta);
+  const MicrofacetEnergy* energy(EnergyOf of, Microfacet type, double alpha, double eta);
+
+  std::uint64_t clamped() const { return clamped_; }
+  std::vector<std::unique_ptr<const MicrofacetEnergy>> take_energies() { return std::move(energies_); }
+
+ private:
+  const Scene& scene_;
+  const TextureTable& textures_;
+  const std::vector<scene::BsdfTraits>& traits_;
+  std::optional<Error> error_;
+  std::uint64_t clamped_ = 0;
+  std::map<std::tuple<Microfacet, double, double>, RoughPlasticTable> coats_;
+  std::map<std::tuple<EnergyOf, Microfacet, double, double>, const MicrofacetEnergy*> known_energies_;
+  std::vector<std::unique_ptr<const MicrofacetEnergy>> energies_;
+};
+
+}  // namespace ls::render

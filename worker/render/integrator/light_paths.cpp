@@ -1,0 +1,181 @@
+#include "worker/render/integrator/light_paths.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "worker/render/integrator/camera_segment_nee.h"
+#include "worker/render/integrator/variant.h"
+#include "worker/render/math/flush_denormals.h"
+#include "worker/render/world/aim.h"
+#include "worker/render/world/world_build.h"
+
+namespace ls::render {
+namespace {
+
+// Number of camera paths from which the sun map is learned: at most kLearningPaths, and at most
+// kLearningPathsPerPixel for each pixel of the full frame. Learning may stop after kFirstPaths if connections
+// clearly do not pay.
+constexpr std::uint64_t kLearningPaths = 1 << 16;
+constexpr std::uint64_t kLearningPathsPerPixel = 16;
+constexpr std::uint64_t kFirstPaths = 1 << 12;
+// Learning stops after this many vertices in total, since paths may be long.
+constexpr double kLearningVertices = 1 << 21;
+constexpr std::uint64_t kSunRays = 1 << 14;  // of one set of light vertices
+// Rays that tell how many light vertices a ray of the sun has.
+constexpr std::uint64_t kLearningRays = 1 << 12;
+// From this many scatterings on, connected paths are subject to Russian roulette: what deep paths bring,
+// connections of their first vertices bring too.
+constexpr int kConnectedRoulette = 2;
+// Connections pay where paths find the sun at less than this share of the vertices, and where more than this
+// share of the image's light comes from there.
+constexpr double kLitThatPays = .15;
+constexpr double kLightThatPays = .1;
+// Lower bound for the light that a surface vertex reflects, per unit cosine of the sun [1/sr]. A glossy
+// surface may reflect little in the four directions that are evaluated, but much in others.
+constexpr float kLeastReflected = .01f;
+// A shading normal counts as tilted if its cosine to the geometric normal is smaller.
+constexpr float kUntilted = .999999f;
+// Connections that would add less than this share of the image's mean are subject to Russian roulette.
+constexpr float kFaint = .5f;
+
+constexpr std::uint64_t kLearningSeed = 0x5eed0f1ea2;
+constexpr std::uint64_t kSunRaySeed = 0x5eed0f5a1;
+
+struct Learned {
+  Connections::Learner learner;
+  double radiance = 0;  // sum of the radiances of all paths
+  std::uint64_t paths = 0;
+
+  bool pays() const {
+    return learner.lit < kLitThatPays * learner.vertices && learner.light > kLightThatPays * radiance;
+  }
+};
+
+template <Features F, template <Features> class Light>
+void learn(const World& w, bool in_any_case, Learned& learned) {
+  const auto pixels = static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
+  const std::uint64_t most = std::min(kLearningPaths, kLearningPathsPerPixel * pixels);
+  while (learned.paths < most) {
+    const SampleStream stream(kLearningSeed, 0, 0, 2 * learned.paths++);
+    const Group at = stream.group(0, Purpose::guide), lens = stream.group(0, Purpose::camera);
+    const CameraRay ray =
+        w.camera.ray(at.u(0) * w.frame.width, at.u(1) * w.frame.height, {lens.u(2), lens.u(3)});
+    const SampleOutcome out =
+        PathTracer<F, Light>(w, stream, nullptr, {.learner = &learned.learner}).trace(ray);
+    const double radiance = double{mean_component(out.radiance)};
+    if (out.cut_off == HealthCause::none && std::isfinite(radiance)) learned.radiance += radiance;
+    if (learned.learner.vertices > kLearningVertices) return;
+    // If the sun is found often, few paths suffice to decide against connections
+    if (learned.paths == kFirstPaths && !in_any_case &&
+        learned.learner.lit > 2 * kLitThatPays * learned.learner.vertices)
+      return;
+  }
+}
+
+// How a light vertex looks from elsewhere.
+LightVertices::Look look_of(const World& w, const LightVertex& y) {
+  const float light = mean_component(y.light) / mean_component(w.sun.irradiance);
+  LightVertices::Look look;
+  look.density = 1 / y.densities.sum(kInvFourPi);
+  if (y.medium == kNone) {
+    const SurfaceInfo& surface = w.geometry.surfaces[y.hit.surface];
+    look.n = dot(y.to_light, y.hit.ng) > 0 ? y.hit.ng : -y.hit.ng;
+    look.both_sides =
+        surface.crossed || std::abs(dot(y.hit.shading.n, y.hit.ng)) < kUntilted || surface.wants_slopes;
+    // Towards four directions at 45 degrees to the normal, on the side that is lit
+    const V3 to_light = y.hit.shading.to_local(y.to_light);
+    const float z = std::copysign(.70710678f, to_light.z);
+    float reflected = 0;
+    for (const V3& to : {V3(.5f, .5f, z), V3(-.5f, .5f, z), V3(.5f, -.5f, z), V3(-.5f, -.5f, z)})
+      reflected += mean_component(w.bsdfs.eval(surface.bsdf, y.hit.uv_point(), to, to_light).f_cos) / 4;
+    look.strength = light * std::max(reflected, kLeastReflected * std::abs(to_light.z));
+  } else {
+    look.g = w.media[y.medium].phase.g;
+    look.strength = light * kInvFourPi;
+  }
+  return look;
+}
+
+template <Features F>
+LightVertices trace_with(const World& w, std::uint64_t seed, std::uint32_t set, std::uint64_t rays) {
+  LightVertices all;
+  for (std::uint64_t i = 0; i < rays; ++i) {
+    const SampleStream stream(combine(seed, kSunRaySeed), set, 0, 2 * i);
+    const SunMap::Ray ray = w.sun_map.sample(stream.group(0, Purpose::connect).bits);
+    PathTracer<F>(w, stream).follow_light(ray, [&](LightVertex y) {
+      y.light *= 1.f / static_cast<float>(rays);
+      const LightVertices::Look look = look_of(w, y);
+      const auto usable = [](float x) { return x > 0 && std::isfinite(x); };
+      if (usable(look.strength) && usable(look.density)) all.add(y, look);
+    });
+  }
+  all.finish();
+  return all;
+}
+
+constexpr Features kSurfaces{.passing = true, .connected = true};
+constexpr Features kMedia{.media = true, .grids = true, .passing = true, .connected = true};
+constexpr Features kAimed = [] {
+  Features f = kMedia;
+  f.aimed = true;
+  return f;
+}();
+
+// The features must be those of the camera's paths: weights depend on how directions are sampled.
+LightVertices trace(const World& w, std::uint64_t seed, std::uint32_t set, std::uint64_t rays) {
+  if (w.need.aimed) return trace_with<kAimed>(w, seed, set, rays);
+  return w.need.media ? trace_with<kMedia>(w, seed, set, rays) : trace_with<kSurfaces>(w, seed, set, rays);
+}
+
+}  // namespace
+
+void learn_connections(const IntegratorSettings& settings, World& w) {
+  if (settings.light_vertices < 0 || !w.depth_allows(2)) return;
+  // An open boundary encloses no volume, so a ray from the sun may find another medium behind it than a
+  // camera path does
+  if (std::any_of(w.geometry.surfaces.begin(), w.geometry.surfaces.end(),
+                  [](const SurfaceInfo& s) { return s.transition && s.sheet; }))
+    return;
+  Features need = w.need;
+  need.split = false;
+  need.connected = true;
+  if (!kAimed.covers(need)) return;
+  w.sun = w.lights.strongest_directional();
+  if (w.sun.light == kNone) return;
+  const FlushDenormals mode;
+  Learned learned;
+  learned.learner.map = SunMap(w.sun.direction, w.geometry.radius);
+  const bool in_any_case = settings.light_vertices > 0;
+  if (w.need.aimed)
+    learn<kAimed, CameraSegmentNee>(w, in_any_case, learned);
+  else if (w.need.media)
+    learn<kMedia, VertexNee>(w, in_any_case, learned);
+  else
+    learn<kSurfaces, VertexNee>(w, in_any_case, learned);
+  if (learned.learner.media_differ || (!in_any_case && !learned.pays())) return;
+  learned.learner.map.finish();
+  if (learned.learner.map.empty()) return;
+  w.sun_map = std::move(learned.learner.map);
+  w.faint = kFaint * static_cast<float>(learned.radiance / static_cast<double>(learned.paths));
+  w.need.connected = true;
+  aim(settings, w.frame, w);  // anew: points on camera segments pay more often
+  w.rr_depth = std::min(w.rr_depth, kConnectedRoulette);
+  const std::size_t count = trace(w, kLearningSeed, 0, kLearningRays).count();
+  w.connections_per_ray =
+      float{LightVertices::kCandidates * kLearningRays} / static_cast<float>(std::max<std::size_t>(count, 1));
+}
+
+LightVertices trace_light_vertices(const World& w, std::uint64_t set) {
+  const FlushDenormals mode;
+  return trace(w, w.seed, static_cast<std::uint32_t>(set), kSunRays);
+}
+
+Result<std::shared_ptr<const World>> build_world(const Scene& scene, const RenderSettings& settings,
+                                                 const AssetFiles& files, int threads) {
+  auto world = make_world(scene, settings, files, threads);
+  if (!world) return tl::unexpected(world.error());
+  if (settings.integrator == "volpath") learn_connections(scene.integrator, **world);
+  return std::shared_ptr<const World>(std::move(*world));
+}
+
+}  // namespace ls::render

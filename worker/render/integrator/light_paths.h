@@ -1,0 +1,21 @@
+// Decides whether the paths of a world are connected to light vertices (lights/light_vertices.h), learns
+// which part of the sun's light they need, and traces the light vertices.
+#pragma once
+
+#include <cstdint>
+
+#include "common/scene/scene.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+// Sets `sun`, `sun_map`, `faint` and Features::connected of a world that is otherwise complete. The result
+// depends only on the scene, the depth limits and the size of the full frame: not on the seed, the number of
+// samples or a crop. The integrator must be `volpath`.
+void learn_connections(const IntegratorSettings& settings, World& w);
+
+// Traces the light vertices of one set (LightVertexCache). They depend only on the world, its seed and the
+// number of the set.
+LightVertices trace_light_vertices(const World& w, std::uint64_t set);
+
+}  // namespace ls::render

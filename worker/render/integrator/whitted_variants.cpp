@@ -1,0 +1,19 @@
+// A separate source file, because instantiating the path tracer takes long to compile.
+#include "worker/render/integrator/variant.h"
+
+namespace ls::render {
+
+std::span<const Variant> whitted_variants() {
+  // Overlaps: where surfaces lie on each other, all are looked at.
+  static constexpr Variant kVariants[] = {
+      variant<Features{.passing = true, .whitted = true}>("surfaces, whitted"),
+      variant<Features{.overlaps = true, .passing = true, .whitted = true}>("coincident surfaces, whitted"),
+  };
+  return kVariants;
+}
+
+const Variant kWhittedSplitVariant =
+    variant<Features{.overlaps = true, .passing = true, .split = true, .whitted = true}>(
+        "coincident surfaces, whitted, and light in parts");
+
+}  // namespace ls::render

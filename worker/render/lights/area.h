@@ -1,0 +1,159 @@
+// Area lights: shapes that emit light.
+#pragma once
+
+#include <variant>
+#include <vector>
+
+#include "worker/render/lights/light_kind.h"
+
+namespace ls::render {
+
+struct AreaPoint {  // a point on an area light
+  V3 p, n;
+  V2 uv{0, 0};  // only for textured lights
+  FacePoint face;
+};
+
+// The emission of an area light, for any shape.
+struct AreaLight : LightKind {
+  static constexpr bool kHasPlace = true, kIsArea = true;
+  TextureIndex radiance;
+  bool textured = false;
+  bool beam = false;     // true if the radiance depends on the angle
+  bool uniform = false;  // true if the light is neither textured nor a beam
+  C3 value;              // its radiance if it is uniform
+  // For a beam; the transition is linear in the cosine
+  float cos_cutoff = 0, cos_beam = 0, inv_transition = 0, falloff = 1;
+  float sign = 1;   // orientation of the emitting side
+  float reach = 1;  // the largest coordinate of its points: bounds the rounding error
+  double area = 0;
+
+  void set_emission(const AreaEmitter& emitter, float orientation, const LightWorld& world);
+  bool dark(const LightWorld& world) const { return !(area > 0) || is_black(world.textures.mean(radiance)); }
+  double power(const LightWorld& world) const {
+    return luminance(world.textures.mean(radiance)) * beam_flux() * area;
+  }
+  // The radiance at `uv` and `face` towards a viewer whose direction has the cosine `cosine` > 0 to the
+  // normal.
+  C3 emitted(const LightWorld& world, V2 uv, const FacePoint* face, float cosine) const {
+    if (uniform) return value;
+    const C3 varying = world.textures.eval(radiance, uv, face);
+    return beam ? varying * beam_share(cosine) : varying;
+  }
+  // Returns the light that arrives at x from the point y. Its target is just in front of the light, so that
+  // the shadow ray ends before the light.
+  std::optional<LightSample> from_point(const LightWorld& world, const AreaPoint& y, const V3& x,
+                                        float p) const;
+  // The density, per steradian at x, with which sample() finds the point `hit` in this direction.
+  float pdf(const LightWorld&, const SurfaceHit& hit, const V3& x, const V3& direction, float p) const {
+    const V3 f = hit.p - x;
+    const float cosine = std::abs(dot(direction, hit.ng));
+    if (!(cosine > 0)) return 0;
+    return static_cast<float>(dot(f, f) / (cosine * area)) * p;
+  }
+  static V3 pivot_of(const LightWorld&, const SurfaceHit& hit) { return hit.p; }
+
+ protected:
+  // Returns bounds with the box middle +- half and emission in all directions.
+  LightBounds bounds_of(const LightWorld& world, const V3& middle, const V3& half) const;
+  // Sets the members of the bounds that follow from the emission.
+  void set_emission_bounds(const LightWorld& world, LightBounds& b) const;
+  float beam_share(float cosine) const {
+    if (cosine >= cos_beam) return 1;
+    if (!(cosine > cos_cutoff)) return 0;
+    return std::pow((cosine - cos_cutoff) * inv_transition, falloff);
+  }
+  double beam_flux() const;  // flux per unit radiance and area; pi without a beam
+};
+
+// An area light that can sample a point on itself (Light::point) before the shaded point is known.
+template <class Light>
+struct SampledByPoint : AreaLight {
+  V3 pivot(const LightWorld& world, const LightNumbers& numbers) const {
+    return static_cast<const Light&>(*this).point(world, numbers).p;
+  }
+  std::optional<LightSample> sample(const LightWorld& world, const LightNumbers& numbers, const V3& x,
+                                    float p) const {
+    return from_point(world, static_cast<const Light&>(*this).point(world, numbers), x, p);
+  }
+};
+
+struct ParallelogramLight : SampledByPoint<ParallelogramLight> {
+  V3 corner, axis_u, axis_v, normal;  // uv is (0, 0) at the corner and 1 at the ends of the axes
+
+  AreaPoint point(const LightWorld&, const LightNumbers& numbers) const {
+    const V2 u = numbers.unit();
+    AreaPoint y{corner + axis_u * u.x + axis_v * u.y, normal, {0, 0}, {}};
+    if (textured) y.uv = u;
+    return y;
+  }
+  LightBounds bounds(const LightWorld& world) const;
+};
+
+struct DiskLight : SampledByPoint<DiskLight> {
+  V3 center, axis_u, axis_v, normal;
+
+  AreaPoint point(const LightWorld&, const LightNumbers& numbers) const {
+    const V2 q = concentric_disk(numbers.unit());
+    float angle = std::atan2(q.y, q.x);
+    if (angle < 0) angle += kTwoPi;
+    return {center + axis_u * q.x + axis_v * q.y,
+            normal,
+            {std::sqrt(q.x * q.x + q.y * q.y), angle * kInvTwoPi},
+            {}};
+  }
+  LightBounds bounds(const LightWorld& world) const;
+};
+
+struct CylinderLight : SampledByPoint<CylinderLight> {
+  std::uint32_t primitive = 0;
+
+  AreaPoint point(const LightWorld& world, const LightNumbers& numbers) const {
+    const V2 u = numbers.unit();
+    const Cylinder& c = world.geometry.cylinders[primitive];
+    const V2 q = unit_circle(u.y);
+    const V3d n = c.u * double{q.x} + c.v * double{q.y};
+    return {V3(c.p0 + c.axis * (u.x * c.length) + n * c.radius), V3(n) * sign, {u.y, u.x}, {}};
+  }
+  LightBounds bounds(const LightWorld& world) const;
+};
+
+struct MeshLight : SampledByPoint<MeshLight> {
+  std::uint32_t first = 0;  // index of the first triangle
+  std::vector<double> cdf;  // cumulative areas of the triangles
+
+  AreaPoint point(const LightWorld& world, const LightNumbers& numbers) const;
+  LightBounds bounds(const LightWorld& world) const;
+  std::uint64_t extra_bytes() const { return cdf.size() * sizeof(double); }
+};
+
+// A sphere is sampled by directions to it. Its point is known only then, so the pivot is the centre.
+struct SphereLight : AreaLight {
+  std::uint32_t primitive = 0;
+
+  V3 pivot(const LightWorld& world, const LightNumbers&) const {
+    return V3(world.geometry.spheres[primitive].center);
+  }
+  V3 pivot_of(const LightWorld& world, const SurfaceHit&) const { return pivot(world, {}); }
+  std::optional<LightSample> sample(const LightWorld& world, const LightNumbers& numbers, const V3& x,
+                                    float p) const;
+  float pdf(const LightWorld& world, const SurfaceHit& hit, const V3& x, const V3& direction, float p) const;
+  LightBounds bounds(const LightWorld& world) const;
+};
+
+using AreaKinds = Kinds<ParallelogramLight, MeshLight, SphereLight, DiskLight, CylinderLight>;
+
+// The index ranges, in Geometry's lists, of the primitives of each surface, which are contiguous there.
+struct SurfacePrimitives {
+  struct Range {
+    std::uint32_t first = kNone, count = 0;
+  };
+  std::vector<Range> triangles, spheres, disks, cylinders;  // indexed by surface
+
+  explicit SurfacePrimitives(const Geometry& geometry);
+};
+
+std::variant<ParallelogramLight, MeshLight, SphereLight, DiskLight, CylinderLight> make_area_light(
+    const Shape& shape, std::uint32_t surface, const SurfacePrimitives& primitives, const LightWorld& world);
+
+}  // namespace ls::render

@@ -1,0 +1,98 @@
+// Lights at infinite distance.
+#pragma once
+
+#include <variant>
+
+#include "worker/render/lights/envmap.h"
+#include "worker/render/lights/light_kind.h"
+
+namespace ls::render {
+
+struct DirectionalLight : LightKind {
+  V3 travel;  // the direction in which the light travels
+  C3 irradiance;
+
+  bool dark(const LightWorld&) const { return is_black(irradiance); }
+  double power(const LightWorld& world) const {
+    const float radius = world.geometry.radius;
+    return luminance(irradiance) * kPiD * radius * radius;
+  }
+  std::optional<LightSample> sample(const LightWorld&, const LightNumbers&, const V3&, float p) const {
+    return LightSample{-travel, kInfinity, V3(0), irradiance, p, true};
+  }
+};
+
+// The sun: a disk of constant radiance in the sky.
+struct SunLight : LightKind {
+  V3 travel;
+  C3 radiance;
+  float cone = 0;     // 1 - cos of its angular radius
+  float density = 0;  // 1 / solid angle
+
+  bool dark(const LightWorld&) const { return is_black(radiance); }
+  double power(const LightWorld& world) const {  // irradiance times area, as for directional lights
+    const float radius = world.geometry.radius;
+    return luminance(radiance) * kPiD * double{cone} * (2 - double{cone}) * kPiD * radius * radius;
+  }
+  // Samples a direction uniformly over the sun's solid angle. It uses 1 - cos to avoid cancellation.
+  std::optional<LightSample> sample(const LightWorld&, const LightNumbers& numbers, const V3&,
+                                    float p) const {
+    const V2 u = numbers.unit();
+    const float one_minus = cone * u.x, sine = std::sqrt(one_minus * (2 - one_minus));
+    const V2 circle = unit_circle(u.y) * sine;
+    LightSample s;
+    s.direction = normalize(Frame(-travel).to_world({circle.x, circle.y, 1 - one_minus}));
+    s.distance = kInfinity;
+    s.radiance = radiance;
+    s.pdf = density * p;
+    return s;
+  }
+  // The radiance that a path finds if it leaves in this direction, weighted as Lights::environment says; p is
+  // the probability of choosing this light. Whether a direction d hits a sun with the axis a is decided by
+  // the chord, |d - a|^2 = 2 (1 - cos), which keeps the digits that the cosine of a small angle loses.
+  C3 found(const V3& direction, float pdf, float p) const {
+    const V3 chord = direction + travel;
+    return dot(chord, chord) <= 2 * cone ? radiance * (1 / (1 + density * p / pdf)) : C3(0);
+  }
+};
+
+struct MapLight : LightKind {
+  const EnvironmentMap* map = nullptr;
+
+  bool dark(const LightWorld&) const { return map->black(); }
+  double power(const LightWorld& world) const {
+    const float radius = world.geometry.radius;
+    return map->flux() * kPiD * radius * radius;
+  }
+  // Radiance and density are evaluated in the sampled direction itself. Paths that leave the scene do the
+  // same, so that both use the same density.
+  std::optional<LightSample> sample(const LightWorld&, const LightNumbers& numbers, const V3&,
+                                    float p) const {
+    const V3 direction = map->sample(numbers.x, numbers.y);
+    const EnvironmentMap::Light light = map->at(direction);
+    const float pdf = light.pdf * p;
+    if (!(pdf > 0) || !std::isfinite(pdf)) return std::nullopt;
+    return LightSample{direction, kInfinity, V3(0), light.radiance, pdf, false};
+  }
+};
+
+using DistantKinds = Kinds<DirectionalLight, SunLight, MapLight>;
+
+// A disk of uniform radiance L and angular radius a gives a plane facing its centre the irradiance integral
+// of L cos = L 2 pi integral_0^a cos sin = L pi sin^2 a.
+inline std::variant<DirectionalLight, SunLight> make_light(const DirectionalEmitter& e, const LightWorld&) {
+  // The smallest sun [degrees]. Directions in float32 are accurate to 4e-6 degrees. A smaller disk becomes a
+  // light of a single direction.
+  constexpr double kSmallestSun = 1e-3;
+  const V3 travel(V3d(e.direction[0], e.direction[1], e.direction[2]).normalized());
+  if (!(e.angular_radius >= kSmallestSun)) return DirectionalLight{{}, travel, color(e.irradiance)};
+  const double a = e.angular_radius * (kPiD / 180), half = std::sin(a / 2), sine = std::sin(a);
+  SunLight l;
+  l.travel = travel;
+  l.radiance = color(e.irradiance) * static_cast<float>(1 / (kPiD * sine * sine));
+  l.cone = static_cast<float>(2 * half * half);
+  l.density = static_cast<float>(1 / (4 * kPiD * half * half));
+  return l;
+}
+
+}  // namespace ls::render

@@ -1,0 +1,72 @@
+// The common part of all kinds of lights. Each kind is a struct in the file of its family (area.h,
+// punctual.h, distant.h) with these members:
+//
+//   bool dark(world)                        true if it emits no light; it is then left out
+//   double power(world)                     determines the probability of choosing it
+//   LightBounds bounds(world)               bounds for the tree; only for lights with a position
+//   V3 pivot(world, numbers)                see lights.h; only for lights with a position
+//   optional<LightSample> sample(world, numbers, x, p)
+//                                           samples the light that arrives at x; p is the probability with
+//                                           which this light was chosen
+//
+// Kinds that have a description in scenes (describe()) also have a make_light(), which makes them from it.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+#include "common/scene/scene.h"
+#include "worker/render/base/kinds.h"
+#include "worker/render/geometry/geometry.h"
+#include "worker/render/lights/light_tree.h"
+#include "worker/render/math/color.h"
+#include "worker/render/math/math.h"
+#include "worker/render/math/random.h"
+#include "worker/render/math/transform.h"
+#include "worker/render/texture/texture.h"
+
+namespace ls::render {
+
+struct LightSample {
+  V3 direction;        // unit, from the shaded point towards the light
+  float distance = 0;  // distance to the light in that direction; infinity for distant lights
+  // The point sampled on the light, moved off its surface: shadow rays end there. Not set for distant lights.
+  V3 target{0, 0, 0};
+  // Arriving radiance if unobstructed; for delta lights the irradiance on a plane that faces the light
+  C3 radiance;
+  // The density of `direction` per steradian, including the probability of choosing the light. For delta
+  // lights it is the probability of choosing the light alone.
+  float pdf = 0;
+  bool delta = false;
+};
+
+// Random words for choosing a light and a point on it. All 32 bits of each are used, because among many
+// lights or triangles the last bits decide.
+struct LightNumbers {
+  std::uint32_t light = 0, x = 0, y = 0;
+  V2 unit() const { return {unit_float(x), unit_float(y)}; }
+};
+
+// Data that lights refer to, and the units of the world. Lengths are multiplied by its scale, so intensities
+// (power per solid angle) by the square of the scale; radiance and irradiance do not change.
+struct LightWorld {
+  const Geometry& geometry;
+  const TextureTable& textures;
+
+  V3 place(const V3d& p) const { return V3((p - geometry.center) * geometry.scale); }
+  double scale2() const { return geometry.scale * geometry.scale; }
+};
+
+struct LightKind {
+  static constexpr bool kHasPlace = false;  // true if it has a position, that is, is not infinitely far
+  static constexpr bool kIsPoint = false;   // true if it has a position but no extent
+  static constexpr bool kIsArea = false;    // true if it is an emitting surface
+
+  static std::uint64_t extra_bytes() { return 0; }  // bytes of memory besides the struct itself
+};
+
+inline constexpr double kPiD = 3.14159265358979323846;
+
+}  // namespace ls::render

@@ -1,0 +1,204 @@
+#include "worker/render/lights/light_vertices.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/check.h"
+#include "worker/render/math/random.h"
+
+namespace ls::render {
+namespace {
+
+// The shares of rays that are uniform over the rectangle and over the whole scene, so that light which paths
+// found seldom or never while learning is connected too.
+constexpr double kRectangleShare = .2;
+constexpr double kSceneShare = .05;
+constexpr float kSmallestMargin = 1e-4f;  // of the rectangle, over the scene's radius
+// The estimate takes media to scatter no more sharply: beyond, rounding would rule it.
+constexpr float kSharpest = .98f;
+constexpr float kTiny = 1e-30f;
+// A glossy surface may reflect much light that arrives at a grazing angle, so the estimate adds this constant
+// to its cosines.
+constexpr float kGrazing = .1f;
+// The share of choices among all vertices that can be seen alike. It bounds the weight of those that
+// contribute more than the estimate says.
+constexpr float kAnyShare = .1f;
+
+}  // namespace
+
+SunMap::SunMap(const V3& direction, float radius) : direction_(direction), radius_(radius) {
+  const Frame frame(direction);
+  u_ = frame.to_world({1, 0, 0});
+  v_ = frame.to_world({0, 1, 0});
+}
+
+void SunMap::learn(const V3& p, float weight) {
+  if (weight > 0 && std::isfinite(weight)) found_.push_back({{dot(p, u_), dot(p, v_)}, weight});
+}
+
+std::size_t SunMap::cell_of(V2 at) const {
+  const auto index = [](float x, float lo, float hi) {
+    return static_cast<std::size_t>(std::clamp((x - lo) / (hi - lo) * kSide, 0.f, kSide - 1.f));
+  };
+  return index(at.x, lo_.x, hi_.x) * kSide + index(at.y, lo_.y, hi_.y);
+}
+
+float SunMap::density_at(V2 at) const {
+  const bool inside = at.x >= lo_.x && at.x < hi_.x && at.y >= lo_.y && at.y < hi_.y;
+  return everywhere_ + (inside ? density_[cell_of(at)] : 0);
+}
+
+void SunMap::finish() {
+  if (found_.empty()) return;
+  lo_ = hi_ = found_.front().at;
+  for (const Found& f : found_) {
+    lo_ = {std::min(lo_.x, f.at.x), std::min(lo_.y, f.at.y)};
+    hi_ = {std::max(hi_.x, f.at.x), std::max(hi_.y, f.at.y)};
+  }
+  const V2 margin = (hi_ - lo_) * (1.f / kSide) + V2(radius_ * kSmallestMargin);
+  lo_ -= margin;
+  hi_ += margin;
+  constexpr std::size_t n = kSide * kSide;
+  std::vector<double> weight(n, 0.);
+  double sum = 0;
+  for (const Found& f : found_) {
+    weight[cell_of(f.at)] += double{f.weight};
+    sum += double{f.weight};
+  }
+  const double cell = double{hi_.x - lo_.x} * double{hi_.y - lo_.y} / n;
+  last_.resize(n + 1);
+  density_.resize(n);
+  double up_to = 0;
+  std::uint64_t words = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    up_to += (1 - kRectangleShare - kSceneShare) * weight[i] / sum + kRectangleShare / n;
+    const auto end = static_cast<std::uint64_t>(std::ldexp(up_to, 32));
+    last_[i] = static_cast<std::uint32_t>(end - 1);
+    density_[i] = static_cast<float>(std::ldexp(static_cast<double>(end - words), -32) / cell);
+    words = end;
+  }
+  last_[n] = ~std::uint32_t{0};
+  const double left = std::ldexp(static_cast<double>((std::uint64_t{1} << 32) - words), -32);
+  everywhere_ = static_cast<float>(left / (4 * double{radius_} * double{radius_}));
+  found_ = {};
+}
+
+SunMap::Ray SunMap::sample(const std::array<std::uint32_t, 4>& bits) const {
+  const auto i =
+      static_cast<std::size_t>(std::lower_bound(last_.begin(), last_.end(), bits[0]) - last_.begin());
+  const V2 u(unit_float(bits[1]), unit_float(bits[2]));
+  V2 at = (u * 2 - V2(1)) * radius_;
+  if (i < density_.size()) {
+    const V2 cell(static_cast<float>(i / kSide), static_cast<float>(i % kSide));
+    at = lo_ + (cell + u) * (hi_ - lo_) * (1.f / kSide);
+  }
+  return {u_ * at.x + v_ * at.y - direction_ * (2 * radius_), density_at(at)};
+}
+
+void LightVertices::add(const LightVertex& vertex, const Look& look) {
+  const std::size_t lane = vertices_.size() % kCandidates;
+  if (lane == 0) blocks_.emplace_back();
+  vertices_.push_back(vertex);
+  Block& b = blocks_.back();
+  b.x[lane] = vertex.p.x, b.y[lane] = vertex.p.y, b.z[lane] = vertex.p.z;
+  b.nx[lane] = look.n.x, b.ny[lane] = look.n.y, b.nz[lane] = look.n.z;
+  b.lx[lane] = vertex.to_light.x, b.ly[lane] = vertex.to_light.y, b.lz[lane] = vertex.to_light.z;
+  b.other_side[lane] = look.both_sides ? 1.f : 0.f;
+  b.round[lane] = vertex.medium == kNone ? 0.f : 1.f;
+  b.g[lane] = std::clamp(look.g, -kSharpest, kSharpest);
+  b.strength[lane] = look.strength;
+  b.density[lane] = look.density;
+}
+
+void LightVertices::finish() {
+  vertices_.shrink_to_fit();
+  blocks_.shrink_to_fit();
+}
+
+// The estimated contributions of a block's vertices, without visibility and transmittance: up to a common
+// factor strength * phase_y * cos_y * f_x * c / (c r^2 + p_x cos_y), with f_x and p_x those of a diffuse
+// surface or of the medium. Lanes that are not filled have a strength of 0.
+void LightVertices::towards(const Block& b, const Receiver& x, Lane& target) {
+  const float other_side = x.both_sides ? 1.f : 0.f;
+  const auto phase = [](float g, float cosine) {
+    const float q = std::max(1 + g * g - 2 * g * cosine, kTiny);
+    return (1 - g * g) / (q * std::sqrt(q));
+  };
+  Lane cos_y, scale, wx, wy, wz, r2;
+  for (std::size_t k = 0; k < kCandidates; ++k) {
+    const float fx = b.x[k] - x.p.x, fy = b.y[k] - x.p.y, fz = b.z[k] - x.p.z;
+    r2[k] = fx * fx + fy * fy + fz * fz + kTiny;
+    const float inverse = 1 / std::sqrt(r2[k]);
+    wx[k] = fx * inverse, wy[k] = fy * inverse, wz[k] = fz * inverse;
+    const float cosine = -(b.nx[k] * wx[k] + b.ny[k] * wy[k] + b.nz[k] * wz[k]);
+    cos_y[k] = std::max(std::max(cosine, -cosine * b.other_side[k]), b.round[k]);
+    scale[k] = b.strength[k] * b.density[k] * cos_y[k] *
+               phase(b.g[k], wx[k] * b.lx[k] + wy[k] * b.ly[k] + wz[k] * b.lz[k]);
+  }
+  if (x.in_medium) {
+    for (std::size_t k = 0; k < kCandidates; ++k) {
+      const float p_x =
+          phase(std::clamp(x.g, -kSharpest, kSharpest), wx[k] * x.d.x + wy[k] * x.d.y + wz[k] * x.d.z) *
+          kInvFourPi;
+      target[k] = scale[k] * p_x / (b.density[k] * r2[k] + p_x * cos_y[k] + kTiny);
+    }
+  } else {
+    for (std::size_t k = 0; k < kCandidates; ++k) {
+      const float cosine = wx[k] * x.n.x + wy[k] * x.n.y + wz[k] * x.n.z;
+      const float cos_x = std::max(cosine, -cosine * other_side);
+      const float f_x = cos_x > 0 ? (cos_x + kGrazing) * kInvPi : 0.f;
+      target[k] = scale[k] * f_x / (b.density[k] * r2[k] + f_x * cos_y[k] + kTiny);
+    }
+  }
+}
+
+void LightVertices::prefetch(std::uint32_t block) const {
+  constexpr std::size_t kLine = 64;
+  if (blocks_.empty()) return;
+  const auto* at = reinterpret_cast<const char*>(&blocks_[index_of(block)]);
+  for (std::size_t i = 0; i < sizeof(Block); i += kLine) __builtin_prefetch(at + i);
+}
+
+LightVertices::Choice LightVertices::choose(const Receiver& x, std::uint32_t block, float u) const {
+  if (blocks_.empty()) return {};
+  const std::size_t i = index_of(block);
+  Lane target;
+  towards(blocks_[i], x, target);
+  float sum = 0;
+  for (const float t : target) sum += t;
+  if (!(sum > 0) || !std::isfinite(sum)) return {};
+  const float any = kAnyShare * sum / kCandidates;
+  sum = 0;
+  for (float& t : target) {
+    if (t > 0) t += any;
+    sum += t;
+  }
+  float left = u * sum;
+  std::size_t k = kCandidates;
+  for (std::size_t j = 0; j < kCandidates; ++j) {
+    if (!(target[j] > 0)) continue;
+    k = j;
+    left -= target[j];
+    if (left < 0) break;
+  }
+  CHECK(k < kCandidates, "a sum of nothing is positive");
+  return {&vertices_[i * kCandidates + k], sum / target[k] * static_cast<float>(blocks_.size())};
+}
+
+std::shared_ptr<const LightVertices> LightVertexCache::get(std::uint64_t set, const Build& build) {
+  std::shared_ptr<Slot> slot;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto it = std::find_if(kept_.begin(), kept_.end(), [&](const auto& k) { return k.first == set; });
+    if (it != kept_.end())
+      kept_.splice(kept_.begin(), kept_, it);
+    else
+      kept_.emplace_front(set, std::make_shared<Slot>());
+    if (kept_.size() > kKept) kept_.pop_back();
+    slot = kept_.front().second;
+  }
+  std::call_once(slot->once, [&] { slot->vertices = std::make_shared<const LightVertices>(build(set)); });
+  return slot->vertices;
+}
+
+}  // namespace ls::render

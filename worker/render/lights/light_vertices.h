@@ -1,0 +1,193 @@
+// Light vertices: the points at which the light of a directional emitter is scattered.
+//
+// A path that looks for the sun at its own vertices finds it only where a vertex happens to be lit. In a room
+// with a window few are, and nearly all light that is scattered twice or more comes from there. So paths are
+// traced from the sun, their vertices are kept, and every vertex of a camera path is connected to one of
+// them: bidirectional path tracing (Veach 1997, ch. 10) with light subpaths that are kept and used again by
+// many paths (Keller 1997, "Instant radiosity"; Davidovic et al. 2014, "Progressive light transport
+// simulation on the GPU").
+//
+// A path of several vertices can be found in several ways: the first k of its vertices are sampled from the
+// camera, and the others from the sun; without others, by next-event estimation. All ways are weighted by the
+// balance heuristic. A way that connects has the density of a vertex that it samples from the sun
+//   first after the sun: kCandidates / (vertices per ray) * (rays per area of the sun's plane) * |cos_sun|,
+//   others: pdf |cos| / r^2, with the density `pdf` of the direction in which light was scattered,
+// and of those that it samples from the camera pdf |cos| / r^2 each. In a medium the cosines are 1.
+// Transmittances and Russian roulette are left out of all densities, which is right: weights need not use the
+// true densities, only the same functions of the path for all ways to find it.
+//
+// The sum over all light vertices is estimated by resampled importance sampling (Talbot et al. 2005): a block
+// of kCandidates vertices is chosen uniformly, and one of them in proportion to a cheap estimate of its
+// contribution.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "worker/render/geometry/geometry.h"
+#include "worker/render/math/math.h"
+
+namespace ls::render {
+
+// The distribution of the rays from the sun, over a plane normal to the sun's direction. It is learned: it
+// has one density for each cell of a rectangle around the points at which paths found the sun. A small share
+// is uniform over the whole scene.
+class SunMap {
+ public:
+  SunMap() = default;
+  // `direction` is the light's direction of travel, a unit vector; `radius` that of a sphere about the origin
+  // that encloses the scene.
+  SunMap(const V3& direction, float radius);
+
+  // Adds a point at which a path found the sun; a weight that is not finite is ignored
+  void learn(const V3& p, float weight);
+  void finish();  // call once, after the last learn(): makes the map a density
+
+  bool empty() const { return last_.empty(); }
+  const V3& direction() const { return direction_; }
+  // The density of the rays through p, per area of the plane; its integral is 1. Positive for every p in the
+  // scene.
+  float density(const V3& p) const { return density_at({dot(p, u_), dot(p, v_)}); }
+
+  struct Ray {
+    V3 o;           // origin, outside of the scene
+    float density;  // density of this ray, as by density()
+  };
+  // Samples a ray by four uniform random words.
+  Ray sample(const std::array<std::uint32_t, 4>& bits) const;
+
+ private:
+  static constexpr std::size_t kSide = 64;
+  struct Found {
+    V2 at;
+    float weight;
+  };
+  std::size_t cell_of(V2 at) const;
+  float density_at(V2 at) const;
+
+  V3 direction_{0, 0, 1}, u_{1, 0, 0}, v_{0, 1, 0};
+  float radius_ = 1;
+  std::vector<Found> found_;  // used while learning
+  V2 lo_{0, 0}, hi_{0, 0};    // corners of the rectangle
+  std::vector<float> density_;
+  float everywhere_ = 0;  // density of the uniform share over the whole scene
+  // The last word that chooses each cell; the last entry is for the whole scene
+  std::vector<std::uint32_t> last_;
+};
+
+// What the weights need to know of a subpath, from the camera or from the sun: the sum, over all shorter
+// subpaths of the same path, of their densities over that of this one. It is computed vertex by vertex, as by
+// Georgiev 2012, "Implementing vertex connection and merging", eqs. 31 to 36.
+struct SubpathDensities {
+  float last = 0;    // 1 / density of the last vertex
+  float before = 0;  // of the vertices before it, but for the density `back` below
+
+  // The sum, but for the density of the last vertex when sampled from the other end. `back`: density per
+  // steradian with which the other end, at the last vertex, samples the direction to the one before.
+  float sum(float back) const { return last * (1 + before * back); }
+  bool needs_back() const { return before > 0; }
+
+  // The densities of the subpath that is one segment longer: `f` is this segment, `pdf` the density with
+  // which its direction was sampled, `sum` that of the shorter subpath, and the normals are the geometric
+  // ones at its end and at its start, 0 in media.
+  static SubpathDensities extended(const V3& f, float pdf, float sum, const V3& ng, const V3& ng_before) {
+    const float r2 = dot(f, f), r = std::sqrt(r2);
+    const auto cosine = [&](const V3& n) { return is_black(n) ? 1.f : std::abs(dot(n, f)) / r; };
+    return {r2 / (pdf * cosine(ng)), sum * cosine(ng_before) / r2};
+  }
+};
+
+struct LightVertex {
+  SurfaceHit hit;  // valid if the vertex is on a surface
+  V3 p{0, 0, 0};
+  std::uint32_t medium = kNone;  // index of the medium in which it is; kNone: it is on a surface
+  // The light that arrives there, divided by the expected number of vertices per area of the surface or per
+  // volume. In a medium it includes the albedo.
+  C3 light{0, 0, 0};
+  V3 to_light{0, 0, 1};  // the direction from which it arrives
+  int scatterings = 0;   // of the light, this one included
+  SubpathDensities densities;
+};
+
+// A vertex of a path that is to be connected to a light vertex.
+struct Receiver {
+  V3 p{0, 0, 0};
+  V3 n{0, 0, 0};            // on surfaces: the normal on the side of the path
+  bool both_sides = false;  // on surfaces: light may also arrive at the other side
+  V3 d{0, 0, 0};            // in media: the direction of travel before the scattering
+  float g = 0;              // in media: the asymmetry parameter of the phase function
+  bool in_medium = false;
+};
+
+class LightVertices {
+ public:
+  static constexpr std::size_t kCandidates = 32;
+
+  // The appearance of a light vertex from elsewhere, by which choose() estimates its contribution.
+  struct Look {
+    V3 n{0, 0, 0};  // surfaces: the geometric normal, on the side that is lit
+    // Surfaces: light may leave on the other side too, as through glass or where the shading normal is tilted
+    bool both_sides = false;
+    float g = 0;         // media: the parameter of the phase function
+    float strength = 0;  // in proportion to the radiance that leaves it in a typical direction, > 0
+    // The inverse of its densities' sum: the larger, the better connections are than what else finds its
+    // light
+    float density = 0;
+  };
+  void add(const LightVertex& vertex, const Look& look);
+  void finish();  // call once, after the last add()
+
+  struct Choice {
+    const LightVertex* vertex = nullptr;  // null: no vertex can be seen from x
+    float weight = 0;                     // 1 / (expected number of times that this vertex is chosen)
+  };
+  // Loads the block of vertices from which choose() will choose into the processor's caches.
+  void prefetch(std::uint32_t block) const;
+  // Chooses a light vertex for x. `block` is 32 uniform random bits; u is uniform in [0, 1).
+  Choice choose(const Receiver& x, std::uint32_t block, float u) const;
+
+  std::size_t count() const { return vertices_.size(); }
+
+ private:
+  using Lane = std::array<float, kCandidates>;
+  struct Block {
+    Lane x{}, y{}, z{}, nx{}, ny{}, nz{}, lx{}, ly{}, lz{}, other_side{}, round{}, g{}, strength{}, density{};
+  };
+  std::size_t index_of(std::uint32_t block) const { return (std::uint64_t{block} * blocks_.size()) >> 32; }
+  static void towards(const Block& block, const Receiver& x, Lane& target);
+
+  std::vector<LightVertex> vertices_;
+  std::vector<Block> blocks_;
+};
+
+// Caches the sets of light vertices of a world. A pixel's samples belong to two halves in turn. In each half
+// kEpoch / 2 successive samples use the same set. So the halves are independent, and more samples also
+// average over more sets.
+class LightVertexCache {
+ public:
+  static constexpr std::uint64_t kEpoch = 128;
+  using Build = std::function<LightVertices(std::uint64_t set)>;
+
+  static std::uint64_t set_of(std::uint64_t sample) { return 2 * (sample / kEpoch) + (sample & 1); }
+  // Returns the set, and builds it if it is not cached. Thread-safe; threads wait only for the set that they
+  // need.
+  std::shared_ptr<const LightVertices> get(std::uint64_t set, const Build& build);
+
+ private:
+  static constexpr std::size_t kKept = 8;
+  struct Slot {
+    std::once_flag once;
+    std::shared_ptr<const LightVertices> vertices;
+  };
+  std::mutex mutex_;
+  std::list<std::pair<std::uint64_t, std::shared_ptr<Slot>>> kept_;  // most recently used first
+};
+
+}  // namespace ls::render
