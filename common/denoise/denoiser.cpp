@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cmath>
 #include <csignal>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
@@ -24,6 +25,7 @@ using denoise::Header;
 using denoise::Outcome;
 
 constexpr const char* kSoname = "libOpenImageDenoise.so.2";
+constexpr int kSecondsToLoad = 600;
 
 std::string library_path() {
   const char* given = std::getenv("LIGHTSHAFT_OIDN");
@@ -78,10 +80,15 @@ class Shared {
   std::unique_ptr<std::byte[], Unmap> mapped_{nullptr, Unmap{0}};
 };
 
-Result<void> run(const std::filesystem::path& program, const std::string& library, int threads,
+Result<void> run(const std::filesystem::path& program, const std::string& library, int threads, int seconds,
                  Shared& shared) {
-  const auto status = run_helper(program, {library, std::to_string(threads)}, shared.fd());
+  const auto status =
+      run_helper(program, {library, std::to_string(threads), std::to_string(seconds)}, shared.fd());
   if (!status) return broken(status.error().message);
+  if (WIFSIGNALED(*status) && WTERMSIG(*status) == SIGALRM)
+    return broken(fmt::format("{} was ended after {} s: the library hangs, or this machine is overloaded",
+                              program.filename().string(), seconds),
+                  Errc::resource_exhausted);
   if (WIFSIGNALED(*status))
     return broken(
         fmt::format("{} was killed ({}){}", program.filename().string(), ::strsignal(WTERMSIG(*status)),
@@ -97,15 +104,16 @@ Result<void> run(const std::filesystem::path& program, const std::string& librar
 
 }  // namespace
 
-Result<Denoiser> Denoiser::find(int threads, const std::string& library,
-                                const std::filesystem::path& program) {
+Result<Denoiser> Denoiser::find(int threads, const std::string& library, const std::filesystem::path& program,
+                                int least_seconds) {
   Denoiser out;
   out.program_ = program;
   out.library_ = library.empty() ? library_path() : library;
   out.threads_ = std::max(1, threads);
+  out.least_seconds_ = least_seconds;
   auto shared = Shared::of({0, 0}, 0);
   if (!shared) return tl::unexpected(shared.error());
-  if (const auto ran = run(program, out.library_, out.threads_, *shared); !ran) {
+  if (const auto ran = run(program, out.library_, out.threads_, kSecondsToLoad, *shared); !ran) {
     if (ran.error().code != Errc::internal || shared->header().version != 0)
       return tl::unexpected(ran.error());
     return fail(Errc::failed_precondition,
@@ -116,6 +124,13 @@ Result<Denoiser> Denoiser::find(int threads, const std::string& library,
   const int version = shared->header().version;
   out.name_ = fmt::format("Open Image Denoise {}.{}.{}", version / 10000, version / 100 % 100, version % 100);
   return out;
+}
+
+int Denoiser::most_seconds(FrameSize size, std::size_t images) const {
+  constexpr std::uint64_t kPixelsPerSecond = 10'000;
+  const std::uint64_t pixels =
+      static_cast<std::uint64_t>(size.width) * static_cast<std::uint64_t>(size.height);
+  return static_cast<int>(static_cast<std::uint64_t>(least_seconds_) + pixels * images / kPixelsPerSecond);
 }
 
 Result<std::vector<std::vector<float>>> Denoiser::denoise(FrameSize size,
@@ -131,7 +146,9 @@ Result<std::vector<std::vector<float>>> Denoiser::denoise(FrameSize size,
       std::copy(planes[p]->begin(), planes[p]->end(), shared->plane(i, p, floats));
     }
   }
-  if (const auto ran = run(program_, library_, threads_, *shared); !ran) return tl::unexpected(ran.error());
+  const int seconds = most_seconds(size, images.size());
+  if (const auto ran = run(program_, library_, threads_, seconds, *shared); !ran)
+    return tl::unexpected(ran.error());
   std::vector<std::vector<float>> out;
   for (std::size_t i = 0; i < images.size(); ++i) {
     const float* from = shared->plane(i, 0, floats);

@@ -7,6 +7,7 @@
 //   FAKE_OIDN_COPIES  colours stay as they are
 //   FAKE_OIDN_FAILS   every execution reports an error
 //   FAKE_OIDN_CRASHES every execution aborts
+//   FAKE_OIDN_HANGS   every execution waits for ever
 //   FAKE_OIDN_NAN     colours become NaN
 //   FAKE_OIDN_OLD     it is version 1.4.3
 #include <cstddef>
@@ -16,6 +17,9 @@
 #include <map>
 #include <string>
 #include <vector>
+#ifdef FAKE_OIDN_HANGS
+#include <unistd.h>
+#endif
 
 namespace {
 
@@ -92,6 +96,9 @@ void oidnExecuteFilter(Filter* f) {
 #endif
 #ifdef FAKE_OIDN_CRASHES
   std::abort();
+#endif
+#ifdef FAKE_OIDN_HANGS
+  for (;;) ::pause();
 #endif
   const Image output = f->images.at("output");
   const std::size_t floats = 3 * output.width * output.height;

@@ -1,12 +1,13 @@
-// lightshaft-denoise LIBRARY THREADS: denoises the images in the inherited file kHelperFd (exchange.h) with
-// Intel Open Image Denoise 2 and exits. LIBRARY is passed to dlopen(). The library is found at run time and
-// not needed to build: the functions of its C API are declared here according to its documentation
-// (https://www.openimagedenoise.org/documentation.html).
+// lightshaft-denoise LIBRARY THREADS SECONDS: denoises the images in the inherited file kHelperFd
+// (exchange.h) with Intel Open Image Denoise 2 and exits; after SECONDS it is ended by SIGALRM. LIBRARY is
+// passed to dlopen(). The library is found at run time and not needed to build: the functions of its C API
+// are declared here according to its documentation (https://www.openimagedenoise.org/documentation.html).
 #include <dlfcn.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
@@ -23,16 +24,17 @@ namespace {
 using ls::denoise::Header;
 using ls::denoise::Outcome;
 
-constexpr rlim_t kMostCpuSeconds = 7200;  // enough for an image of 100 megapixels, which takes minutes
 // Most memory of the library itself: larger images are denoised in parts
 constexpr int kMaxMemoryMegabytes = 2048;
 
-void confine() {
+// Limits this process: its end is the parent's at the latest, and threads of the library that wait for each
+// other for ever use no CPU time, so the limit is on the time that passes.
+void confine(unsigned most_seconds) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-  const rlimit no_core{0, 0}, cpu{kMostCpuSeconds, kMostCpuSeconds + 10};
+  const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
-  ::setrlimit(RLIMIT_CPU, &cpu);
+  ::alarm(most_seconds);
 }
 
 void set_error(Header& header, const char* what, const char* why) {
@@ -166,8 +168,8 @@ class Run {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3) return 2;
-  confine();
+  if (argc != 4) return 2;
+  confine(static_cast<unsigned>(std::max(1, std::atoi(argv[3]))));
   struct stat file {};
   if (::fstat(ls::kHelperFd, &file) != 0) return 3;
   const auto bytes = static_cast<std::size_t>(file.st_size);

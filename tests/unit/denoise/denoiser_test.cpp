@@ -69,6 +69,19 @@ TEST(Denoiser, SaysThatItsOwnProgramIsMissing) {
   EXPECT_THAT(denoiser.error().message, HasSubstr("/no/such/lightshaft-denoise: No such file"));
 }
 
+TEST(Denoiser, EndsALibraryThatHangs) {
+  const auto denoiser =
+      Denoiser::find(1, fake("hangs"), program_beside_us("lightshaft-denoise"), /*least_seconds=*/1);
+  ASSERT_TRUE(denoiser) << denoiser.error().message;
+  const std::vector<NoisyImage> images = {image(0)};
+
+  const auto denoised = denoiser->denoise(kSize, images);
+
+  ASSERT_FALSE(denoised);
+  EXPECT_EQ(denoised.error().code, Errc::resource_exhausted);
+  EXPECT_THAT(denoised.error().message, HasSubstr("ended after 1 s"));
+}
+
 struct Fault {
   const char* library;
   const char* told;
