@@ -16,7 +16,7 @@ import urllib.error
 import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PATIENCE = 120.0  # seconds after which a condition that should become true counts as failed
+PATIENCE = 300.0  # seconds after which a condition that should become true counts as failed
 
 
 def bin_dir():
@@ -188,7 +188,7 @@ class LocalFarm:
         if body is not None:
             request.add_header("Content-Type", content_type)
         try:
-            with urllib.request.urlopen(request, timeout=60, context=self.trust()) as reply:
+            with urllib.request.urlopen(request, timeout=PATIENCE, context=self.trust()) as reply:
                 return reply.read()
         except urllib.error.HTTPError as error:
             raise HttpError(error.code, error.read().decode(errors="replace")) from None
@@ -198,7 +198,7 @@ class LocalFarm:
 
     def ask(self, path):
         """(status, Location), redirects not followed; of a coordinator without TLS."""
-        connection = http.client.HTTPConnection("127.0.0.1", self.http, timeout=30)
+        connection = http.client.HTTPConnection("127.0.0.1", self.http, timeout=PATIENCE)
         connection.request("GET", path, headers={"Authorization": f"Bearer {self.token}"})
         answer = connection.getresponse()
         answer.read()

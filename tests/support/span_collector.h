@@ -70,7 +70,7 @@ class SpanCollector {
   // False: so many requests did not come within 20 s.
   bool wait_for_requests(std::size_t count) {
     std::unique_lock lock(mutex_);
-    return came_.wait_for(lock, std::chrono::seconds(20), [&] { return requests.size() >= count; });
+    return came_.wait_for(lock, std::chrono::minutes(2), [&] { return requests.size() >= count; });
   }
 
   Result<HttpAnswer> answer = HttpAnswer{200, "{}"};

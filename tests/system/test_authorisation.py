@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from authorisation import CALLERS, ROUTES, RPC_CALLERS, RPCS, page
-from local_farm import ROOT, LocalFarm
+from local_farm import PATIENCE, ROOT, LocalFarm
 
 SCENE = """<scene version="3.0.0"><integrator type="volpath"/>
 <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/></film></sensor>
@@ -37,7 +37,7 @@ class Door:
 
     def ask(self, method, path, caller, body=None, kind="application/json", session=False, headers=None):
         """Status, headers and, unless it is an event stream, the body."""
-        connection = http.client.HTTPConnection("127.0.0.1", self.farm.http, timeout=30)
+        connection = http.client.HTTPConnection("127.0.0.1", self.farm.http, timeout=PATIENCE)
         sent = {"Host": "farm", **(headers or {})}
         if body is not None:
             sent["Content-Type"] = kind
@@ -157,7 +157,7 @@ def test_a_submit_token_lists_its_own_jobs_alone(door):
 def test_an_event_stream_tells_a_submit_token_of_its_own_jobs_alone(door):
     last = json.loads(door.ask("get", f"/api/v1/jobs/{door.done}", "admin")[2])
     assert last["owner"] == "anna"
-    connection = http.client.HTTPConnection("127.0.0.1", door.farm.http, timeout=30)
+    connection = http.client.HTTPConnection("127.0.0.1", door.farm.http, timeout=PATIENCE)
     connection.request("GET", "/api/v1/events?last_event_id=0", headers={"Authorization": f"Bearer {door.tokens['other']}"})
     stream = connection.getresponse()
     mine = door.submit("other")
@@ -186,7 +186,7 @@ def test_a_revoked_token_ends_its_sessions_and_its_event_streams(door):
     made = json.loads(door.ask("post", "/api/v1/tokens", "admin", b'{"role": "read", "user": "gone"}')[2])
     door.tokens["gone"] = made["token"]
     door.sessions["gone"] = door.open_session("gone")
-    connection = http.client.HTTPConnection("127.0.0.1", door.farm.http, timeout=30)
+    connection = http.client.HTTPConnection("127.0.0.1", door.farm.http, timeout=PATIENCE)
     connection.request("GET", "/api/v1/events", headers={"Authorization": f"Bearer {made['token']}"})
     stream = connection.getresponse()
     assert stream.status == 200
@@ -211,7 +211,7 @@ def test_only_digests_of_tokens_are_on_the_disk(door):
 def test_the_command_line_makes_lists_and_revokes_tokens(door):
     def run(*args, caller="admin"):
         env = dict(os.environ, LIGHTSHAFT_URL=f"http://127.0.0.1:{door.farm.http}", LIGHTSHAFT_TOKEN=door.tokens[caller])
-        return subprocess.run([door.farm.bin / "lightshaft", "token", *args], env=env, capture_output=True, text=True, timeout=60)
+        return subprocess.run([door.farm.bin / "lightshaft", "token", *args], env=env, capture_output=True, text=True, timeout=PATIENCE)
 
     made = run("add", "--role", "submit", "--user", "dora")
     assert made.returncode == 0, made.stderr

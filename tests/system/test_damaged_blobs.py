@@ -10,7 +10,7 @@ import sys
 import farm_rpc
 import pytest
 import steam
-from local_farm import ROOT, HttpError, LocalFarm, bin_dir, wait_until
+from local_farm import PATIENCE, ROOT, HttpError, LocalFarm, bin_dir, wait_until
 from s3_server import ENVIRONMENT, S3Server
 
 sys.path.insert(0, str(ROOT / "tests" / "chaos"))
@@ -113,7 +113,7 @@ def test_submitting_the_same_scene_again_repairs_what_the_job_waits_for(farm, da
 
     def submit_by_cli():
         return subprocess.run([bin_dir() / "lightshaft", "submit", tmp_path / "bath.xml", "--to", farm.url()],
-                              env=dict(os.environ, LIGHTSHAFT_TOKEN=farm.token), capture_output=True, text=True, timeout=120)
+                              env=dict(os.environ, LIGHTSHAFT_TOKEN=farm.token), capture_output=True, text=True, timeout=PATIENCE)
 
     job = submit_by_cli().stdout.strip()
     for blob in (farm.data / "blobs").glob("??/*"):

@@ -12,7 +12,7 @@ import sys
 import threading
 
 import pytest
-from local_farm import ROOT, SCENE, HttpError, LocalFarm, refused_coordinator, wait_until
+from local_farm import PATIENCE, ROOT, SCENE, HttpError, LocalFarm, refused_coordinator, wait_until
 from redis_server import RedisServer
 
 SPEC = dict(spp=24, seed=5)
@@ -212,7 +212,7 @@ class Receiver(http.server.ThreadingHTTPServer):
         super().__exit__(*error)
 
     def next(self):
-        return self.came.get(timeout=60)
+        return self.came.get(timeout=PATIENCE)
 
     def until(self, event):
         """All that comes, up to the first delivery of this event that was taken."""

@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 from cli_kit import digest, lightshaft, load
-from local_farm import bin_dir, wait_until
+from local_farm import PATIENCE, bin_dir, wait_until
 
 CONTRACT = {"spp", "samples", "load_seconds", "render_seconds", "core_seconds", "peak_rss_bytes", "rmse", "relmse",
             "relmse_ci95", "nonfinite_samples", "pixels_sha256", "features_used", "features_left_out", "numeric_class",
@@ -178,7 +178,7 @@ def test_ctrl_c_writes_what_there_is(fog, tmp_path, flags):
     try:
         wait_until(lambda: partials_kept.is_dir() and len(list(partials_kept.iterdir())) > 10, "ten units are rendered")
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to its child, too
-        _, said = process.communicate(timeout=60)
+        _, said = process.communicate(timeout=PATIENCE)
     finally:
         process.kill()
 
@@ -200,7 +200,7 @@ def test_progress_is_shown_on_a_terminal_only(fog, tmp_path):
             assert shown.wait(60) == 0
     finally:
         os.close(terminal)
-    plain = subprocess.run(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, timeout=60, check=True)
+    plain = subprocess.run(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, timeout=PATIENCE, check=True)
 
     assert b" % [" in seen and b"relMSE" in seen.split(b"out.exr: ")[0]
     assert b"[" not in plain.stderr and plain.stderr.count(b"\n") == 1

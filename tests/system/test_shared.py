@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import s3_server
-from local_farm import SCENE, HttpError, LocalFarm, bin_dir, refused_coordinator, wait_until
+from local_farm import PATIENCE, SCENE, HttpError, LocalFarm, bin_dir, refused_coordinator, wait_until
 
 pytestmark = pytest.mark.slow
 
@@ -168,7 +168,7 @@ def test_the_cli_waits_through_the_death_of_the_coordinator_it_asked(pair, expec
     a.wait_for_progress(job, 5)
 
     a.coordinator.kill()
-    out, err = waiting.communicate(timeout=120)
+    out, err = waiting.communicate(timeout=PATIENCE)
 
     assert waiting.returncode == 0, err
     assert (tmp_path / "out.exr").stat().st_size > 0

@@ -8,7 +8,7 @@ import time
 import urllib.request
 
 import pytest
-from local_farm import SCENE, LocalFarm, refused_coordinator, wait_until
+from local_farm import PATIENCE, SCENE, LocalFarm, refused_coordinator, wait_until
 from trace_collector import TraceCollector
 
 SPEC = dict(spp=24, seed=5)
@@ -33,7 +33,7 @@ def end(farm):
 def submit_below(farm, traceparent):
     request = urllib.request.Request(f"{farm.url()}/api/v1/jobs?spp=24&seed=5", data=SCENE.encode(), method="POST", headers={
         "Authorization": f"Bearer {farm.token}", "Content-Type": "application/xml", "traceparent": traceparent})
-    return json.loads(urllib.request.urlopen(request, timeout=60).read())["id"]
+    return json.loads(urllib.request.urlopen(request, timeout=PATIENCE).read())["id"]
 
 
 def check_tree(spans, outside=""):

@@ -9,7 +9,7 @@ import subprocess
 import pytest
 import steam
 from breaking_proxy import BreakingProxy
-from local_farm import bin_dir, wait_until
+from local_farm import PATIENCE, bin_dir, wait_until
 
 SCENE = steam.scene(samples=2)
 SIDE = 112  # 5.4 MiB of grid
@@ -65,7 +65,7 @@ def test_the_cli_goes_on_where_its_connections_broke(farm, tmp_path):
     size = (tmp_path / "steam.vol").stat().st_size
     with BreakingProxy(farm.http, breaks=[1_500_000, 1_000_000, 70_000]) as proxy:
         done = subprocess.run([bin_dir() / "lightshaft", "submit", tmp_path / "scene.xml", "--to", proxy.url],
-                              env=dict(os.environ, LIGHTSHAFT_TOKEN=farm.token), capture_output=True, text=True, timeout=120)
+                              env=dict(os.environ, LIGHTSHAFT_TOKEN=farm.token), capture_output=True, text=True, timeout=PATIENCE)
 
     assert done.returncode == 0, done.stderr
     assert len(proxy.sent) >= 4, "the first three connections were broken"

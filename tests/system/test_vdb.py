@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 from cli_kit import FOG, digest, fog_values, lightshaft, load, write_fog
-from local_farm import bin_dir
+from local_farm import PATIENCE, bin_dir
 
 vdb = pytest.importorskip("pyopenvdb", reason="python3-openvdb is not installed")
 numpy = pytest.importorskip("numpy")
@@ -113,7 +113,7 @@ def test_every_truncation_of_a_vdb_is_an_error_and_no_crash(tmp_path):
     scene = write_scene(tmp_path)
     for part in range(1, 16):
         path.write_bytes(whole[: len(whole) * part // 16])
-        ended = subprocess.run([bin_dir() / "lightshaft", "inspect", scene], capture_output=True, text=True, timeout=60)
+        ended = subprocess.run([bin_dir() / "lightshaft", "inspect", scene], capture_output=True, text=True, timeout=PATIENCE)
         assert ended.returncode == 2 and "fog.vdb" in ended.stderr, (part, ended.stderr)
 
 

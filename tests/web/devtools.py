@@ -14,7 +14,7 @@ FLAGS = [
     "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--no-first-run", "--hide-scrollbars",
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--remote-debugging-pipe",
 ]
-ANSWER_S = 60
+ANSWER_S = 180  # far more than a busy machine needs
 
 
 def chromium_path():
@@ -56,11 +56,11 @@ class Browser:
     def close(self):
         os.close(self._to)  # Chromium ends itself when its pipe is closed
         try:
-            self._process.wait(timeout=20)
+            self._process.wait(timeout=ANSWER_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        self._reader.join(timeout=20)
+        self._reader.join(timeout=ANSWER_S)
         os.close(self._from)
         shutil.rmtree(self._profile, ignore_errors=True)
 
@@ -149,7 +149,7 @@ class Page:
             raise DevToolsError(details.get("exception", {}).get("description") or details["text"])
         return answer["result"].get("value")
 
-    def wait(self, condition, timeout=15):
+    def wait(self, condition, timeout=ANSWER_S):
         """Until the JavaScript expression is truthy; its value then."""
         script = f"""new Promise((resolve, reject) => {{
           const end = performance.now() + {timeout * 1000};

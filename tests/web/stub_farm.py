@@ -282,7 +282,7 @@ def _handler(farm):
             return self._send(200, {"missing": [digest for digest in json.loads(body)["digests"] if digest not in farm.blobs]})
 
         def _put_blobs(self, parts, body):
-            farm.put_gate.wait(timeout=60)
+            farm.put_gate.wait(timeout=180)
             if hashlib.sha256(body).hexdigest() != parts[0]:
                 return self._problem(400, "These bytes have another SHA-256 than their name says.")
             farm.blobs[parts[0]] = body

@@ -26,7 +26,7 @@ def test_own_sha256_agrees_with_a_known_one(modules, size):
       const {{ sha256Streaming }} = await import("/js/sha256.js");
       const bytes = Uint8Array.from({{length: {size}}}, (_, i) => i % 251 * 7 % 251);
       return sha256Streaming(new File([bytes], "x"));
-    }})()""", timeout=60)
+    }})()""")
 
     assert text == hashlib.sha256(data[:size]).hexdigest()
 
@@ -140,7 +140,7 @@ def test_a_picture_that_failed_is_asked_for_again_without_a_new_version(modules)
       while (!image.dataset.painted && performance.now() < end) await new Promise(requestAnimationFrame);
       image.remove();
       return [image.dataset.painted, asked];
-    })()""", timeout=30)
+    })()""")
 
     assert painted == ["1", 3]
 

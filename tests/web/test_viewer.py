@@ -17,7 +17,7 @@ def viewer(farm, dashboard):
     def open(query="", **more):
         farm.jobs.setdefault("j-1", job(size=farm.size))
         page = dashboard(f"#/view/j-1{'?' + query if query else ''}", **more)
-        page.wait(f"{VIEW}?.dataset.painted", timeout=60)  # FLIP of a whole window is work
+        page.wait(f"{VIEW}?.dataset.painted")  # FLIP of a whole window is work
         return page
     return open
 
@@ -273,7 +273,7 @@ def test_a_wipe_follows_the_mouse_and_the_keys(compared):
 
 def test_flip_of_what_is_seen_marks_the_difference(compared):
     page = compared("with=j-2&by=flip")
-    page.wait(f"{VIEW}.dataset.painted === 'rgb flip'", timeout=60)
+    page.wait(f"{VIEW}.dataset.painted === 'rgb flip'")
 
     dark, bright = colour(page, 10, 20), colour(page, 56, 20)
     page.wait("/FLIP 0[.]\\d+ of what is seen/.test(document.querySelector('.viewer-reading').innerText)")

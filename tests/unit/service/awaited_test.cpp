@@ -53,7 +53,7 @@ struct Awaited : ::testing::Test {
   }
   JobState state() const { return coordinator->job(job)->state; }
   bool goes_on() const {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(2);
     while (state() == JobState::paused && std::chrono::steady_clock::now() < end) {
       coordinator->tick();
       std::this_thread::yield();

@@ -24,7 +24,7 @@ class Listener {
   }
   std::vector<StreamEvent> first(std::size_t n) {
     std::unique_lock lock(mutex_);
-    EXPECT_TRUE(heard_.wait_for(lock, std::chrono::seconds(20), [&] { return events_.size() >= n; }));
+    EXPECT_TRUE(heard_.wait_for(lock, std::chrono::minutes(2), [&] { return events_.size() >= n; }));
     return events_;
   }
   std::vector<StreamEvent> until_state(const std::string& state) {
@@ -33,7 +33,7 @@ class Listener {
       return !events_.empty() && events_.back().type == "job" &&
              nlohmann::json::parse(events_.back().data)["state"] == state;
     };
-    EXPECT_TRUE(heard_.wait_for(lock, std::chrono::seconds(20), seen));
+    EXPECT_TRUE(heard_.wait_for(lock, std::chrono::minutes(2), seen));
     return events_;
   }
 

@@ -20,7 +20,7 @@ std::unique_ptr<Coordinator> open_with(std::shared_ptr<JobStore> store) {
 
 template <class Condition>
 bool eventually(Condition condition) {
-  const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  const auto patience = std::chrono::steady_clock::now() + std::chrono::minutes(2);
   while (!condition()) {
     if (std::chrono::steady_clock::now() > patience) return false;
     std::this_thread::yield();

@@ -64,7 +64,7 @@ TEST(Pressure, ResultsThatFindNoRoomWaitAndTheirLeasesDoNotPass) {
   EXPECT_EQ(coordinator->figures().units_freed[FreedCause::deadline_passed], 0u);
 
   clock->shut(false);
-  const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  const auto patience = std::chrono::steady_clock::now() + std::chrono::minutes(2);
   while (room < sent && std::chrono::steady_clock::now() < patience) std::this_thread::yield();
   EXPECT_EQ(room, sent);
   EXPECT_EQ(coordinator->job(job)->units_done, 1u);

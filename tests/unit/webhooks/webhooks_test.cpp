@@ -35,7 +35,7 @@ class Receiver {
   }
   std::vector<HttpPost> wait_for(std::size_t count) {
     std::unique_lock lock(mutex_);
-    EXPECT_TRUE(came_.wait_for(lock, std::chrono::seconds(60), [&] { return posts_.size() >= count; }));
+    EXPECT_TRUE(came_.wait_for(lock, std::chrono::minutes(2), [&] { return posts_.size() >= count; }));
     return posts_;
   }
   std::atomic<int> answer{200};
