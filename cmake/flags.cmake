@@ -92,7 +92,7 @@ function(ls_test name)
       target_compile_options(${name} PRIVATE -fno-sanitize=undefined)  # of the tests' own code; a third of its compile time
     endif()
     add_test(NAME ${name} COMMAND ${name})
-    set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT 1200)
+    set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT 3600)
     foreach(label ${ARG_LABELS})
       if(NOT TARGET tests-${label})
         add_custom_target(tests-${label})
