@@ -8,12 +8,31 @@
 #include <vector>
 
 #include "tests/support/render_check.h"
-#include "tests/support/seed_means.h"
 #include "tests/support/significance.h"
 #include "tests/support/sunny_room.h"
 
 namespace ls::test {
 namespace {
+
+struct Means {
+  std::array<double, 3> mean{}, variance{};  // of the mean
+};
+// All pixels of an image share its light vertices, so its pixels tell too little of the error of its mean.
+// Images of different seeds are independent.
+Means means_of(const SceneBuilder& builder, std::uint64_t spp, int seeds, std::uint64_t first) {
+  Means all;
+  std::array<double, 3> squares{};
+  for (int i = 0; i < seeds; ++i) {
+    const Estimate e = estimate(builder, spp, first + static_cast<std::uint64_t>(i));
+    for (std::size_t c = 0; c < 3; ++c) {
+      all.mean[c] += e.mean[c] / seeds;
+      squares[c] += e.mean[c] * e.mean[c] / seeds;
+    }
+  }
+  for (std::size_t c = 0; c < 3; ++c)
+    all.variance[c] = (squares[c] - all.mean[c] * all.mean[c]) / (seeds - 1);
+  return all;
+}
 
 // A disk of radius R and reflectance a in the sun, and a small plate at the height h above its middle that
 // faces it: the light that the disk sends to the plate has the irradiance a E cos(sun) R^2 / (R^2 + h^2), the
