@@ -18,7 +18,9 @@ constexpr std::array kRows{
     TechniqueRow{Technique::lamp_flights, "lamp_flights",
                  "ends a share of all flights through media close to lights without extent"},
     TechniqueRow{Technique::light_vertices, "light_vertices", "connects paths to points that the sun lights"},
-    TechniqueRow{Technique::light_tree, "light_tree", "chooses among many lights by a tree"}};
+    TechniqueRow{Technique::light_tree, "light_tree", "chooses among many lights by a tree"},
+    TechniqueRow{Technique::path_reuse, "path_reuse",
+                 "lets paths serve several pixels from their second scattering on"}};
 
 constexpr bool in_order() {
   for (std::size_t i = 0; i < kRows.size(); ++i)
@@ -48,6 +50,8 @@ TechniqueSwitch off_switch(Technique technique, std::string_view integrator) {
       return {"light_vertices", "-1"};
     case Technique::light_tree:
       return {"light_tree", "-1"};
+    case Technique::path_reuse:
+      return {"path_reuse", "0"};
   }
   return {};
 }

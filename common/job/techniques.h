@@ -19,6 +19,7 @@ enum class Technique : std::uint8_t {
   lamp_flights,     // flights that end near these
   light_vertices,   // connections to points that a directional emitter lights
   light_tree,       // one of many lights chosen by a tree
+  path_reuse,       // paths that serve several pixels from their second vertices on
 };
 
 struct TechniqueRow {

@@ -3,6 +3,7 @@
 // each pixel's squared error without bias.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
@@ -48,13 +49,14 @@ inline Estimate estimate(const SceneBuilder& builder, std::uint64_t spp, std::ui
                          int threads = 2) {
   const auto world = world_of(builder, seed, threads);
   const FrameSize size = builder.scene.film.image_size();
-  const auto rows = static_cast<std::size_t>(size.height);
-  std::vector<render::TileResult> results(rows);
+  const int rows = render::tile_alignment(*world);
+  std::vector<render::TileResult> results(static_cast<std::size_t>((size.height + rows - 1) / rows));
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
-    for (std::size_t y; (y = next++) < rows;) {
-      const int top = static_cast<int>(y);
-      results[y] = render::render_tile(*world, {0, top, size.width, top + 1}, {0, spp}, nullptr, nullptr);
+    for (std::size_t i; (i = next++) < results.size();) {
+      const int top = static_cast<int>(i) * rows;
+      results[i] = render::render_tile(*world, {0, top, size.width, std::min(top + rows, size.height)},
+                                       {0, spp}, nullptr, nullptr);
     }
   };
   {
@@ -65,12 +67,12 @@ inline Estimate estimate(const SceneBuilder& builder, std::uint64_t spp, std::ui
   e.variant = render::describe(*world).variant;
   const double per_half = static_cast<double>(spp) / 2,
                pixels = static_cast<double>(size.width) * size.height;
-  const auto width = static_cast<std::size_t>(size.width);
   for (std::size_t c = 0; c < 3; ++c) {
     double sum = 0, square = 0, fourth = 0;
     for (const auto& r : results) {
-      for (std::size_t x = 0; x < width; ++x) {
-        const double a = r.sums[c * width + x] / per_half, b = r.sums[(3 + c) * width + x] / per_half;
+      const std::size_t count = r.sums.size() / 6;
+      for (std::size_t i = 0; i < count; ++i) {
+        const double a = r.sums[c * count + i] / per_half, b = r.sums[(3 + c) * count + i] / per_half;
         const double v = (a - b) * (a - b) / 4;
         sum += (a + b) / 2;
         square += v;

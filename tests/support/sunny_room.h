@@ -10,6 +10,7 @@ namespace ls::test {
 struct SunnyRoom {
   // true: rough metal, plastic and glass are in the room, and a half-transparent sheet is in the slit
   bool glossy = false;
+  bool sheet = true;  // false: no sheet in any case
   // The extinction of the air, as a constant or as a grid
   double fog = 0;
   bool grid = false;
@@ -31,9 +32,10 @@ struct SunnyRoom {
     // The wall at x = 1, with an opening from y = 0.1 to 0.4
     b.shape(RectangleShape{}, translate({1, -.45, 0}) * rotate_y(90) * scale(1, .55, 1), walls);
     b.shape(RectangleShape{}, translate({1, .7, 0}) * rotate_y(90) * scale(1, .3, 1), walls);
-    if (glossy) {
+    if (glossy && sheet)
       b.shape(RectangleShape{}, translate({1, .25, 0}) * rotate_y(90) * scale(1, .15, 1),
               b.bsdf(MaskBsdf{b.texture({.5, .6, .7}), walls}));
+    if (glossy) {
       b.shape(SphereShape{{.2, -.7, -.2}, .3}, {}, metal(b));
       b.shape(SphereShape{{-.3, -.6, .3}, .3}, {}, glass(b));
     }

@@ -100,12 +100,14 @@ render::TileResult render_frame(const render::World& world, FrameSize size, Samp
                                 int threads) {
   const auto width = static_cast<std::size_t>(size.width),
              count = width * static_cast<std::size_t>(size.height);
-  std::vector<render::TileResult> rows(static_cast<std::size_t>(size.height));
+  const int rows = render::tile_alignment(world);
+  std::vector<render::TileResult> bands(static_cast<std::size_t>((size.height + rows - 1) / rows));
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
-    for (std::size_t y; (y = next++) < rows.size();) {
-      const int top = static_cast<int>(y);
-      rows[y] = render::render_tile(world, {0, top, size.width, top + 1}, samples, nullptr, nullptr);
+    for (std::size_t b; (b = next++) < bands.size();) {
+      const int top = static_cast<int>(b) * rows;
+      bands[b] = render::render_tile(world, {0, top, size.width, std::min(top + rows, size.height)}, samples,
+                                     nullptr, nullptr);
     }
   };
   {
@@ -114,11 +116,14 @@ render::TileResult render_frame(const render::World& world, FrameSize size, Samp
   }
   render::TileResult frame;
   frame.sums.resize(kPlanes * count);
-  for (std::size_t y = 0; y < rows.size(); ++y) {
-    add(frame.health, rows[y].health);
+  std::size_t done = 0;
+  for (const render::TileResult& band : bands) {
+    add(frame.health, band.health);
+    const std::size_t pixels = band.sums.size() / kPlanes;
     for (std::size_t plane = 0; plane < kPlanes; ++plane)
-      std::copy_n(rows[y].sums.begin() + static_cast<std::ptrdiff_t>(plane * width), width,
-                  frame.sums.begin() + static_cast<std::ptrdiff_t>(plane * count + y * width));
+      std::copy_n(band.sums.begin() + static_cast<std::ptrdiff_t>(plane * pixels), pixels,
+                  frame.sums.begin() + static_cast<std::ptrdiff_t>(plane * count + done));
+    done += pixels;
   }
   return frame;
 }

@@ -52,6 +52,9 @@ struct TileResult {
 TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, const std::atomic<bool>* stop,
                        Breadcrumb* breadcrumb);
 
+// Tiles whose sides are multiples of this number render no path that belongs to another tile.
+int tile_alignment(const World& world);
+
 // Returns the names of the integrator variants that can render this world, cheapest first. A variant is the
 // integrator compiled for one set of features (features.h). render_tile_as() renders with one of them; all
 // give the same bits.

@@ -347,6 +347,13 @@ void describe(V& v, T& i) {
        .range = {-1, 0},
        .elided = true},
       i.light_tree);
+  v.field(
+      {.name = "path_reuse",
+       .doc = "`volpath` alone: how many pixels share what their paths find from the second scattering on, "
+              "where lights have a place and media are homogeneous; 0: none",
+       .range = {0, 64},
+       .elided = true},
+      i.path_reuse);
 }
 
 template <class V, Of<Asset> T>

@@ -26,13 +26,15 @@ struct Features {
   // The integrator is `whitted`: a path goes on after mirrors and clear glass alone, and ends with the light
   // that reaches the first other surface straight from a lamp.
   bool whitted = false;
+  // Pixels share what their paths find from the second vertices on (path_reuse.h).
+  bool reuse = false;
   bool operator==(const Features&) const = default;
 
   constexpr bool covers(const Features& need) const {
     return (media || !need.media) && (grids || !need.grids) && (chromatic || !need.chromatic) &&
            (emission || !need.emission) && (overlaps || !need.overlaps) && (passing || !need.passing) &&
            (aimed || !need.aimed) && (connected || !need.connected) && (whitted || !need.whitted) &&
-           (split || !need.split);
+           (reuse || !need.reuse) && (split || !need.split);
   }
 };
 inline constexpr Features kEveryScene{

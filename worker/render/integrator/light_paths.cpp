@@ -1,4 +1,5 @@
 #include "worker/render/integrator/light_paths.h"
+#include "worker/render/integrator/sharing_block.h"
 
 #include <algorithm>
 #include <cmath>
@@ -174,7 +175,10 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
                                                  const AssetFiles& files, int threads) {
   auto world = make_world(scene, settings, files, threads);
   if (!world) return tl::unexpected(world.error());
-  if (settings.integrator == "volpath") learn_connections(scene.integrator, **world);
+  if (settings.integrator == "volpath") {
+    learn_connections(scene.integrator, **world);
+    share_tails(scene.integrator, **world);
+  }
   return std::shared_ptr<const World>(std::move(*world));
 }
 

@@ -36,6 +36,9 @@ auto PathTracer<F, Light>::fly_through(const Medium& medium, const SurfaceHit* e
                             ? fly_past_lamps(medium, hero_, numbers, ray_.start, ray_.d, t_max, world_.lamps)
                             : free_flight<F>(medium, hero_, numbers.bits[0], ray_.start, ray_.d, t_max,
                                              stream_.stream(segment_, Purpose::track_flight), counters_);
+  if constexpr (F.reuse) {
+    if (looks_for_second()) sharing_.tail.depth += medium.sigma_t * (flight.scattered ? flight.t : t_max);
+  }
   if (!flight.scattered) {
     apply(flight);
     return {Collision::escaped};
@@ -52,7 +55,15 @@ auto PathTracer<F, Light>::fly_through(const Medium& medium, const SurfaceHit* e
     arrive(previous, last_.p, V3(0));
     prefetch_light_vertices();
   }
-  Light<F>::at_vertex(*this, medium, last_.p, ray_.d);
+  if constexpr (F.reuse) {
+    begin_sharing(nullptr, &medium);
+    if (looks_for_second())
+      begin_tail({last_.p, &medium, {}}, V3(0), ray_.start, [](const V3&) { return true; });
+    else
+      Light<F>::at_vertex(*this, medium, last_.p, ray_.d);
+  } else {
+    Light<F>::at_vertex(*this, medium, last_.p, ray_.d);
+  }
   if constexpr (F.connected) connect_in(medium, last_.p, ray_.d);
   return scatter_by_phase(medium);
 }
@@ -84,6 +95,12 @@ auto PathTracer<F, Light>::scatter_by_phase(const Medium& medium) -> Step {
   }
   last_.pdf = s.pdf;
   ray_.d = s.w;
+  if constexpr (F.reuse) {
+    if (looks_for_second())
+      go_on_as_tail(s.w, C3(1));
+    else if (depth_ == 1)
+      look_for_second();
+  }
   return {Collision::scattered, direction.u(3)};
 }
 

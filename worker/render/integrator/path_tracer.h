@@ -17,14 +17,17 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <type_traits>
 
 #include "worker/render/base/features.h"
 #include "worker/render/integrator/light_components.h"
 #include "worker/render/integrator/mis.h"
 #include "worker/render/integrator/offset_ray.h"
+#include "worker/render/integrator/shared_tail.h"
 #include "worker/render/integrator/termination.h"
 #include "worker/render/integrator/vertex_nee.h"
 #include "worker/render/math/sampler.h"
@@ -101,6 +104,10 @@ class PathTracer {
   // With F.connected: follows a ray of the sun, and calls keep(vertex) for each light vertex on its way.
   template <class Keep>
   void follow_light(const SunMap::Ray& ray, const Keep& keep);
+  // With F.reuse: adds to each path the light that all of them found from their second vertices on. They have
+  // been traced, and belong to different pixels.
+  static void share(std::span<PathTracer* const> group);
+  const SampleOutcome& outcome() const { return outcome_; }
 
  private:
   friend class Light<F>;
@@ -180,6 +187,29 @@ class PathTracer {
     return world_.connections_per_ray * rays * (is_black(ng) ? 1 : std::abs(dot(ng, world_.sun.direction)));
   }
   void arrive(const Vertex& from, const V3& p, const V3& ng);
+
+  // With F.reuse: what a path sees from its first vertex of another path's second one.
+  struct Look {
+    V3 w{0, 0, 0};      // the direction towards it
+    C3 value{0, 0, 0};  // the light from there to the camera, of what it scatters towards the first vertex
+    float density = 0;  // with which the path could have found it, per area or volume; 0: not at all
+  };
+  void begin_sharing(const SurfaceHit* hit, const Medium* medium);
+  void look_for_second();
+  template <class Accepts>
+  void begin_tail(const PathVertex& at, const V3& n, const V3& start, const Accepts& accepts);
+  void go_on_as_tail(const V3& w, const C3& weight);
+  Look look_at(const SharedTail& tail, bool own);
+  BsdfEval scattered_at(const PathVertex& y, const V3& d, const V3& w) const;
+  void add_shared(const C3& light) {
+    outcome_.radiance += light;
+    if constexpr (F.split) (*split_)[static_cast<std::size_t>(part_of(2, first_in_medium_))] += light;
+  }
+  bool looks_for_second() const {
+    if constexpr (F.reuse) return sharing_.part == SharingPath::Part::second;
+    return false;
+  }
+
   // The sum of densities_, with back() as `back`.
   template <class Back>
   float densities_sum(const Back& back) const {
@@ -211,6 +241,13 @@ class PathTracer {
   void add(const C3& weighted, bool ahead = false) {
     C3 light = weighted;
     if constexpr (F.chromatic) light = weighted / mean(density_);
+    if constexpr (F.reuse) {
+      if (sharing_.part == SharingPath::Part::tail) {
+        sharing_.tail.scattered += light;
+        return;
+      }
+      light *= sharing_.scale;
+    }
     outcome_.radiance += light;
     if constexpr (F.split) {
       const bool in_medium = depth_ == 0 ? ahead : first_in_medium_;
@@ -242,6 +279,8 @@ class PathTracer {
   MediumCounters counters_;
   // With F.aimed: the distribution of directions near lamps at the current vertex
   LampDirections near_lamps_;
+  struct Nothing {};
+  std::conditional_t<F.reuse, SharingPath, Nothing> sharing_;
 };
 
 template <Features F, template <Features> class Light>
@@ -421,7 +460,18 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
     if (hit.normal_replaced) densities_ = {};
     prefetch_light_vertices();
   }
-  light_surface(hit, wo);
+  if constexpr (F.reuse) {
+    const bool shared = surface.smooth && !hit.normal_replaced;
+    if (shared) begin_sharing(&hit, nullptr);
+    if (shared && looks_for_second()) {
+      begin_tail({hit.p, nullptr, hit}, hit.shading.n, hit.p,
+                 [&](const V3& w) { return (dot(w, hit.shading.n) > 0) == (dot(w, hit.ng) > 0); });
+    } else {
+      light_surface(hit, wo);
+    }
+  } else {
+    light_surface(hit, wo);
+  }
   if constexpr (F.connected) {
     if (surface.smooth) connect_on(hit, surface, wo);
   }
@@ -432,7 +482,17 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   // The path is absorbed if w lies on different sides of the surface by its geometric and by its shading
   // normal.
   if ((dot(w, hit.ng) > 0) != (s->wi.z > 0)) return {Collision::absorbed};
-  beta_ *= s->weight;
+  if constexpr (F.reuse) {
+    if (looks_for_second() && sharing_.tail.usable && !s->delta) {
+      go_on_as_tail(w, s->weight);
+    } else {
+      beta_ *= s->weight;
+      if (looks_for_second()) sharing_.part = SharingPath::Part::alone;
+      if (depth_ == 1 && sharing_.first.usable && !s->delta) look_for_second();
+    }
+  } else {
+    beta_ *= s->weight;
+  }
   if (s->transmitted) eta_scale_ *= s->eta * s->eta;
   last_ = Vertex{};
   last_.p = hit.p;
@@ -510,6 +570,14 @@ void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
   float weight = 1;
   if (!last_.delta) {
     const float p_l = world_.lights.pdf(hit, last_.p, ray_.d, last_.n);
+    if constexpr (F.reuse) {
+      if (sharing_.part == SharingPath::Part::tail && depth_ == 2) {
+        sharing_.tail.emitted = beta_ * emitted;
+        if constexpr (F.chromatic) sharing_.tail.emitted /= mean(density_);
+        sharing_.tail.hit_pdf = p_l;
+        return;
+      }
+    }
     weight = balance_weight(last_.pdf, p_l * last_.in_medium.found_as_light(world_.lights.pivot(hit)));
   }
   add(beta_ * emitted * weight);
@@ -528,6 +596,7 @@ bool PathTracer<F, Light>::survives(float u) {
   if (is_black(beta_)) return false;
   if (depth_ < world_.rr_depth) return true;
   float size = max_component(beta_) * eta_scale_;
+  if constexpr (F.reuse) size *= sharing_.survival;
   if constexpr (F.chromatic) size /= mean(density_);
   const float q = std::min(size, forced_survival(depth_));
   if (q >= 1) return true;
@@ -540,4 +609,5 @@ bool PathTracer<F, Light>::survives(float u) {
 
 #include "worker/render/integrator/connection.h"
 #include "worker/render/integrator/medium_crossing.h"
+#include "worker/render/integrator/path_reuse.h"
 #include "worker/render/integrator/shadow_ray.h"

@@ -3,10 +3,13 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <map>
 #include <memory>
+#include <vector>
 
 #include "worker/render/integrator/aov_pixel.h"
 #include "worker/render/integrator/light_paths.h"
+#include "worker/render/integrator/sharing_block.h"
 #include "worker/render/integrator/variant.h"
 #include "worker/render/math/flush_denormals.h"
 #include "worker/render/math/rounded.h"
@@ -31,12 +34,14 @@ static_assert(std::end(kVariants)[-1].covers == kEveryScene);
 std::span<const Variant> variants_for(const World& w) {
   if (w.need.connected) return connected_variants();
   if (w.need.aimed) return aimed_variants();
+  if (w.need.reuse) return reuse_variants();
   if (w.need.whitted) return whitted_variants();
   return w.distant_mis ? distant_variants() : std::span<const Variant>(kVariants);
 }
 const Variant& split_variant(const World& w) {
   if (w.need.connected) return kConnectedSplitVariant;
   if (w.need.aimed) return kAimedSplitVariant;
+  if (w.need.reuse) return kReuseSplitVariant;
   if (w.need.whitted) return kWhittedSplitVariant;
   return w.distant_mis ? kDistantSplitVariant : kSplitVariant;
 }
@@ -85,12 +90,31 @@ HealthCause rejected_for(const SampleOutcome& s) {
   if (cause == HealthCause::none && negative(s)) health.add(HealthCause::negative, 1, spot);
 }
 
-// Provides the connections for samples of a world. It holds the light vertices of the last sample of each
-// half, so that the cache is asked only when the set changes.
-class SampleConnections {
+// Renders the samples `range` of pixels with a variant, one by one, and keeps what consecutive ones have in
+// common.
+class Samples {
  public:
-  explicit SampleConnections(const World& w) : w_(w) {}
-  Connections of(std::uint64_t sample) {
+  Samples(const World& w, const Variant& v, SampleRange range, Breadcrumb* crumb = nullptr)
+      : w_(w), v_(v), range_(range), crumb_(crumb) {}
+  // `split` gets the light components; it may be null if the variant computes none.
+  SampleOutcome of(int x, int y, std::uint64_t sample, LightSplit* split) {
+    if (v_.group) return shared(x, y, sample, split);
+    if (crumb_) mark({x, y}, sample);
+    return v_.sample(w_, x, y, sample, split, connections(sample));
+  }
+
+ private:
+  // The light vertices of the last sample of each half, so that the cache is asked only when the set changes
+  struct Kept {
+    std::uint64_t set = 0;
+    std::shared_ptr<const LightVertices> vertices;
+  };
+  void mark(PixelAt p, std::uint64_t sample) {
+    crumb_->x.store(p.x, std::memory_order_relaxed);
+    crumb_->y.store(p.y, std::memory_order_relaxed);
+    crumb_->sample.store(sample, std::memory_order_relaxed);
+  }
+  Connections connections(std::uint64_t sample) {
     if (!w_.need.connected) return {};
     Kept& kept = kept_[sample & 1];
     const std::uint64_t set = LightVertexCache::set_of(sample);
@@ -99,13 +123,49 @@ class SampleConnections {
     return {.vertices = kept.vertices.get()};
   }
 
- private:
-  struct Kept {
-    std::uint64_t set = 0;
-    std::shared_ptr<const LightVertices> vertices;
+  SampleOutcome shared(int x, int y, std::uint64_t sample, LightSplit* split) {
+    const SharingBlock block(w_, {x, y});
+    if (block.row() != row_) blocks_.clear();
+    row_ = block.row();
+    auto [it, is_new] = blocks_.try_emplace(block.column());
+    Rendered& r = it->second;
+    if (is_new) render(block, r);
+    const std::size_t i = (sample - range_.s0) * block.pixels() + block.index({x, y});
+    if (split && v_.covers.split) *split = r.splits[i];
+    return r.outcomes[i];
+  }
+
+  struct Rendered {
+    std::vector<SampleOutcome> outcomes;  // of all samples of a block: its pixels vary faster
+    std::vector<LightSplit> splits;
   };
+  void render(const SharingBlock& block, Rendered& r) {
+    r.outcomes.resize((range_.s1 - range_.s0) * block.pixels());
+    if (v_.covers.split) r.splits.resize(r.outcomes.size());
+    for (std::uint64_t s = range_.s0; s < range_.s1; ++s) {
+      const std::size_t begin = (s - range_.s0) * block.pixels();
+      block.for_each_group(s, [&](std::span<const PixelAt> group) {
+        if (crumb_) mark(group.front(), s);
+        std::array<SampleOutcome, kMostSharing> outcomes;
+        std::array<LightSplit, kMostSharing> splits;
+        for (LightSplit& split : splits) split.fill(C3(0));
+        v_.group(w_, group, s, v_.covers.split ? std::span(splits) : std::span<LightSplit>(), outcomes);
+        for (std::size_t k = 0; k < group.size(); ++k) {
+          const std::size_t i = begin + block.index(group[k]);
+          r.outcomes[i] = outcomes[k];
+          if (v_.covers.split) r.splits[i] = splits[k];
+        }
+      });
+    }
+  }
+
   const World& w_;
+  const Variant& v_;
+  SampleRange range_;
+  Breadcrumb* crumb_;
   std::array<Kept, 2> kept_;
+  int row_ = -1;                    // of the blocks that are kept
+  std::map<int, Rendered> blocks_;  // by column
 };
 
 struct PixelSums {
@@ -122,13 +182,11 @@ struct NoAovs {
 };
 
 template <class Aovs>
-PixelSums render_pixel(const World& w, SampleFn sample, int x, int y, SampleRange range,
-                       SampleConnections& connections, Health& health, Breadcrumb* crumb, Aovs& aovs) {
+PixelSums render_pixel(Samples& samples, int x, int y, SampleRange range, Health& health, Aovs& aovs) {
   PixelSums sums;
   for (std::uint64_t s = range.s0; s < range.s1; ++s) {
-    if (crumb) crumb->sample.store(s, std::memory_order_relaxed);
     aovs.begin_sample();
-    const SampleOutcome out = sample(w, x, y, s, aovs.split(), connections.of(s));
+    const SampleOutcome out = samples.of(x, y, s, aovs.split());
     aovs.end_sample(x, y, s, usable(out));
     // A bad sample is counted in the health and contributes zero to the pixel. It remains one of the pixel's
     // N samples and is never replaced.
@@ -142,10 +200,10 @@ PixelSums render_pixel(const World& w, SampleFn sample, int x, int y, SampleRang
 }
 
 template <class Aovs>
-TileResult render_tile_with(const World& w, SampleFn sample, PixelRect tile, SampleRange range,
+TileResult render_tile_with(const World& w, const Variant& v, PixelRect tile, SampleRange range,
                             const std::atomic<bool>* stop, Breadcrumb* crumb, Aovs aovs) {
   const FlushDenormals mode;
-  SampleConnections connections(w);
+  Samples samples(w, v, range, crumb);
   TileResult r;
   const auto pixels = static_cast<std::size_t>(tile.pixels());
   r.sums.assign((6 + planes_of(w.aovs).count()) * pixels, 0.f);
@@ -156,12 +214,8 @@ TileResult render_tile_with(const World& w, SampleFn sample, PixelRect tile, Sam
       return r;
     }
     for (int x = tile.x0; x < tile.x1; ++x, ++i) {
-      if (crumb) {
-        crumb->x.store(x, std::memory_order_relaxed);
-        crumb->y.store(y, std::memory_order_relaxed);
-      }
       aovs.begin_pixel();
-      const PixelSums sums = render_pixel(w, sample, x, y, range, connections, r.health, crumb, aovs);
+      const PixelSums sums = render_pixel(samples, x, y, range, r.health, aovs);
       aovs.store(r.sums.data() + 6 * pixels, pixels, i);
       for (std::size_t h = 0; h < 2; ++h)
         for (std::size_t c = 0; c < 3; ++c) r.sums[(3 * h + c) * pixels + i] = rounded(sums.half[h][c]);
@@ -169,23 +223,25 @@ TileResult render_tile_with(const World& w, SampleFn sample, PixelRect tile, Sam
   }
   return r;
 }
-TileResult render_tile_with(const World& w, SampleFn sample, PixelRect tile, SampleRange range,
+TileResult render_tile_with(const World& w, const Variant& v, PixelRect tile, SampleRange range,
                             const std::atomic<bool>* stop, Breadcrumb* crumb) {
-  if (w.aovs.empty()) return render_tile_with(w, sample, tile, range, stop, crumb, NoAovs{});
-  return render_tile_with(w, sample, tile, range, stop, crumb, AovPixel(w));
+  if (w.aovs.empty()) return render_tile_with(w, v, tile, range, stop, crumb, NoAovs{});
+  return render_tile_with(w, v, tile, range, stop, crumb, AovPixel(w));
 }
 
 // Renders with a variant that computes light components, whether or not the settings request them.
 TileResult render_split(const World& w, const Variant& v, PixelRect tile, SampleRange range) {
-  return render_tile_with(w, v.sample, tile, range, nullptr, nullptr, AovPixel(w));
+  return render_tile_with(w, v, tile, range, nullptr, nullptr, AovPixel(w));
 }
 
 }  // namespace
 
 TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, const std::atomic<bool>* stop,
                        Breadcrumb* breadcrumb) {
-  return render_tile_with(world, choose(world).sample, tile, samples, stop, breadcrumb);
+  return render_tile_with(world, choose(world), tile, samples, stop, breadcrumb);
 }
+
+int tile_alignment(const World& world) { return world.need.reuse ? SharingBlock::kSide : 1; }
 
 std::vector<std::string> all_variants(const World& world) {
   std::vector<std::string> names;
@@ -205,7 +261,7 @@ std::vector<std::string> covering_variants(const World& world) {
 
 TileResult render_tile_as(const World& world, const std::string& name, PixelRect tile, SampleRange samples) {
   for (const Variant& v : variants_for(world)) {
-    if (name == v.name) return render_tile_with(world, v.sample, tile, samples, nullptr, nullptr);
+    if (name == v.name) return render_tile_with(world, v, tile, samples, nullptr, nullptr);
   }
   const Variant& split = split_variant(world);
   if (name == split.name) return render_split(world, split, tile, samples);
@@ -216,8 +272,7 @@ SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample
   const FlushDenormals mode;
   LightSplit split;
   split.fill(C3(0));
-  const SampleOutcome out =
-      choose(world).sample(world, x, y, sample, &split, SampleConnections(world).of(sample));
+  const SampleOutcome out = Samples(world, choose(world), {sample, sample + 1}).of(x, y, sample, &split);
   SampleValue value{{out.radiance.x, out.radiance.y, out.radiance.z}, usable(out), {}};
   count(out, {x, y, sample}, value.health);
   return value;

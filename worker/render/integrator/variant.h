@@ -2,7 +2,9 @@
 // integrator. A scene is rendered with a variant that has all features that the scene needs.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "worker/render/base/features.h"
@@ -15,10 +17,19 @@ namespace ls::render {
 // light components and the connections. The last two are used only by variants with Features::split and
 // Features::connected.
 using SampleFn = SampleOutcome (*)(const World&, int, int, std::uint64_t, LightSplit*, Connections);
+
+// Renders sample number `sample` of several pixels, at most kMostSharing, that share what their paths find.
+// `splits` has the light components of each, or is empty.
+struct PixelAt {
+  int x, y;
+};
+using GroupFn = void (*)(const World&, std::span<const PixelAt>, std::uint64_t sample,
+                         std::span<LightSplit> splits, std::span<SampleOutcome> outcomes);
 struct Variant {
   Features covers;
   const char* name;
   SampleFn sample;
+  GroupFn group = nullptr;  // with Features::reuse: instead of `sample`
 };
 
 inline CameraRay camera_ray(const World& w, const SampleStream& stream, int x, int y) {
@@ -40,6 +51,26 @@ constexpr Variant variant(const char* name) {
   return {F, name, &sample_with<F, Light>};
 }
 
+template <Features F>
+void group_with(const World& w, std::span<const PixelAt> pixels, std::uint64_t sample,
+                std::span<LightSplit> splits, std::span<SampleOutcome> outcomes) {
+  std::array<std::optional<SampleStream>, kMostSharing> streams;
+  std::array<std::optional<PathTracer<F>>, kMostSharing> paths;
+  std::array<PathTracer<F>*, kMostSharing> group;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const int x = pixels[i].x + w.origin_x, y = pixels[i].y + w.origin_y;
+    streams[i].emplace(w.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), sample);
+    group[i] = &paths[i].emplace(w, *streams[i], splits.empty() ? nullptr : &splits[i]);
+    (void)group[i]->trace(camera_ray(w, *streams[i], x, y));
+  }
+  PathTracer<F>::share(std::span(group).first(pixels.size()));
+  for (std::size_t i = 0; i < pixels.size(); ++i) outcomes[i] = group[i]->outcome();
+}
+template <Features F>
+constexpr Variant group_variant(const char* name) {
+  return {F, name, nullptr, &group_with<F>};
+}
+
 // The variants of the integrator `volpath` with Features::aimed, cheapest first; the last one has the
 // features of every scene.
 std::span<const Variant> aimed_variants();
@@ -49,11 +80,14 @@ std::span<const Variant> connected_variants();
 // The variants of the integrator `volpath_distant_mis`, cheapest first; the last one has the features of
 // every scene.
 std::span<const Variant> distant_variants();
+// The variants in which paths of several pixels share their tails, likewise. They support only homogeneous
+// media that neither overlap nor emit light.
+std::span<const Variant> reuse_variants();
 // The variants of the integrator `whitted`, likewise. It leaves media out.
 std::span<const Variant> whitted_variants();
 // The variants of the integrators `volpath` (without and with Features::aimed) and `volpath_distant_mis`, and
 // of `whitted`, that also compute light components. Each has all other features.
 extern const Variant kSplitVariant, kAimedSplitVariant, kDistantSplitVariant, kConnectedSplitVariant,
-    kWhittedSplitVariant;
+    kReuseSplitVariant, kWhittedSplitVariant;
 
 }  // namespace ls::render

@@ -71,6 +71,8 @@ class World {
   float connections_per_ray = 1;
   float faint = 0;  // connections that would add less than this are made at random (Russian roulette)
   mutable LightVertexCache light_vertices;  // safe from several threads
+  // With Features::reuse: the number of pixels whose paths share their tails
+  int reuse = 0;
   bool hide_emitters = false;
   int max_depth = -1;  // maximum path length in segments; -1: unlimited
   // True if passing a null boundary or a null-transmitting surface counts as a segment for max_depth, as in

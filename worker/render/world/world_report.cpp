@@ -69,6 +69,7 @@ TechniqueSet techniques_of(const World& w) {
   put(w.lamp_flights, Technique::lamp_flights);
   put(w.need.connected, Technique::light_vertices);
   put(w.lights.has_tree(), Technique::light_tree);
+  put(w.need.reuse, Technique::path_reuse);
   return set;
 }
 
@@ -97,6 +98,7 @@ WorldReport describe(const World& w) {
   feature(w.lights.can_sample(), "next-event estimation");
   feature(w.lights.count() > 1, "choice among lights");
   feature(techniques.has(Technique::light_tree), "tree of lights");
+  feature(techniques.has(Technique::path_reuse), "paths that serve several pixels");
   feature(w.camera.has_lens(), "thin lens");
   feature(!w.geometry.instances.empty(), "instances of groups");
   feature(w.geometry.primitive_count() > w.geometry.triangle_count(), "user geometries in the BVH");

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 
+#include "tests/support/lamp_room.h"
 #include "tests/support/render_check.h"
 #include "tests/support/significance.h"
 #include "tests/support/sunny_room.h"
@@ -70,7 +71,8 @@ std::vector<Case> cases() {
           {Technique::lamp_directions, lamp_in_fog()},
           {Technique::lamp_flights, lamp_in_fog()},
           {Technique::light_vertices, test::SunnyRoom{.fog = .3, .light_vertices = 1}.builder({24, 16})},
-          {Technique::light_tree, many_lamps()}};
+          {Technique::light_tree, many_lamps()},
+          {Technique::path_reuse, test::LampRoom{.fog = .3, .path_reuse = 8}.builder({24, 16})}};
 }
 
 // What off_switch() says, done to the description that the reader would make of it.
@@ -85,6 +87,7 @@ SceneBuilder switched_off(const Case& c) {
       {"phase_only", [&] { i.phase_only = true; }},
       {"camera_points", [&] { i.camera_points = -1; }},
       {"light_vertices", [&] { i.light_vertices = -1; }},
+      {"path_reuse", [&] { i.path_reuse = 0; }},
       {"distance", [&] {
          i.distance =
              off.value == "exponential" ? DistanceSampling::exponential : DistanceSampling::equiangular;
@@ -103,6 +106,8 @@ TEST(Techniques, EachIsUsedWhereItPaysAndGoneWhenItIsSwitchedOff) {
 
 TEST(Techniques, WithoutOneOfThemTheImageIsTheSame) {
   for (const Case& c : cases()) {
+    // Its pixels depend on each other: tests/property/path_reuse_test.cpp
+    if (c.technique == Technique::path_reuse) continue;
     const auto with = test::estimate(c.builder, 64), without = test::estimate(switched_off(c), 64);
     for (std::size_t k = 0; k < 3; ++k)
       EXPECT_NEAR(with.mean[k], without.mean[k],

@@ -1,0 +1,97 @@
+// Paths that serve several pixels bring the same image as paths that serve one.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+
+#include "tests/support/lamp_room.h"
+#include "tests/support/significance.h"
+
+namespace ls::test {
+namespace {
+
+// A point light on the way to which stands a glass ball, and a mirror ball: paths begin with delta lobes.
+SceneBuilder mirrors(int path_reuse) {
+  SceneBuilder b = LampRoom{.path_reuse = path_reuse}.builder();
+  b.scene.emitters.push_back(PointEmitter{{-.5, .8, .5}, {.5, .6, .7}});
+  b.shape(SphereShape{{.2, -.7, -.2}, .3}, {}, b.glass(1.5));
+  b.shape(SphereShape{{-.2, -.3, -.6}, .3}, {}, b.mirror());
+  return b;
+}
+
+// The means of the quarters of an image of 16 x 16, in each channel: sharing moves light between pixels, and
+// in a white room keeps the mean of all of them whatever the weights. Pixels that share tell too little of
+// the error of a mean; images of different seeds are independent.
+constexpr int kSide = 16;
+constexpr std::size_t kQuarters = 4 * 3;
+struct Means {
+  std::array<double, kQuarters> mean{}, variance{};  // of the mean
+};
+Means means_of(const SceneBuilder& builder, std::uint64_t spp, int seeds, std::uint64_t first) {
+  Means all;
+  std::array<double, kQuarters> squares{};
+  for (int i = 0; i < seeds; ++i) {
+    const auto world = world_of(builder, first + static_cast<std::uint64_t>(i), 2);
+    const auto sums = render::render_tile(*world, {0, 0, kSide, kSide}, {0, spp}, nullptr, nullptr).sums;
+    std::array<double, kQuarters> image{};
+    for (std::size_t plane = 0; plane < 6; ++plane)
+      for (std::size_t p = 0; p < kSide * kSide; ++p) {
+        const std::size_t right = p % kSide >= kSide / 2, below = p / kSide >= kSide / 2;
+        image[(2 * below + right) * 3 + plane % 3] +=
+            double{sums[plane * kSide * kSide + p]} / (static_cast<double>(spp) * kSide * kSide / 4);
+      }
+    for (std::size_t q = 0; q < kQuarters; ++q) {
+      all.mean[q] += image[q] / seeds;
+      squares[q] += image[q] * image[q] / seeds;
+    }
+  }
+  for (std::size_t q = 0; q < kQuarters; ++q)
+    all.variance[q] = (squares[q] - all.mean[q] * all.mean[q]) / (seeds - 1);
+  return all;
+}
+
+TEST(PathReuse, GivesTheSameImageAsPathsAlone) {
+  constexpr int kSeeds = 64;
+  Tests tests("property/path_reuse");
+  struct Rival {
+    const char* name;
+    std::function<SceneBuilder(int path_reuse)> scene;
+  };
+  const auto room = [](LampRoom r) {
+    return [r](int path_reuse) mutable {
+      r.path_reuse = path_reuse;
+      return r.builder();
+    };
+  };
+  const Rival rivals[] = {{"diffuse", room({})},
+                          {"glossy", room({.glossy = true})},
+                          {"fog", room({.fog = .8})},
+                          {"glossy in fog", room({.glossy = true, .fog = .4})},
+                          {"chromatic fog", room({.fog = 1, .chromatic = true})},
+                          {"mirrors", mirrors}};
+  const double level = tests.level(std::size(rivals) * kQuarters);
+  for (const Rival& rival : rivals) {
+    const SceneBuilder on = rival.scene(7), off = rival.scene(0);
+    ASSERT_THAT(estimate(on, 2).variant, testing::HasSubstr("shared")) << rival.name;
+    ASSERT_THAT(estimate(off, 2).variant, testing::Not(testing::HasSubstr("shared")));
+    const Means a = means_of(on, 32, kSeeds, 100), b = means_of(off, 64, kSeeds, 900);
+    double least = 1;
+    for (std::size_t q = 0; q < kQuarters; ++q) {
+      const double error = std::sqrt(a.variance[q] + b.variance[q]);
+      // Student's test with the freedom of one of the two alone: that of both together is larger
+      EXPECT_LT(std::abs(a.mean[q] - b.mean[q]), cli::student_quantile(level, kSeeds - 1) * error)
+          << rival.name << ", quarter and channel " << q << ": " << a.mean[q] << " and " << b.mean[q];
+      least = std::min(least, error / b.mean[q]);
+    }
+    std::printf("%s: +- %.2g %%\n", rival.name, 100 * least);
+    EXPECT_LT(least, .01) << rival.name << ": the test has no power";
+  }
+  tests.close();
+}
+
+}  // namespace
+}  // namespace ls::test

@@ -1,0 +1,213 @@
+// Part of path_tracer.h, which includes it: the paths of a group of pixels share what they find from their
+// second vertices on (Bekaert, Sbert, Halton 2002, "Accelerating path tracing by re-using paths").
+//
+// Let x_k be the first vertex of the path of pixel k, and q_k(y) the density per area or volume with which
+// that path finds a second vertex y: the density of the direction, times that of a flight that ends at y, or
+// 0 if something blocks the way. Each pixel i looks from x_i at the second vertex y_j of each path j of its
+// group, and weights what it sees by the balance heuristic over all paths that could have found it: light
+// that arrives at y_j along w has the estimate
+//   beta_i f(x_i, y_j) V(x_i, y_j) f(y_j, w) L(w) / sum over k of q_k(y_j) p_k(w),
+// where f are BSDFs or phase functions with cosines, V is the transmittance with the geometric terms, and
+// p_k(w) is the density with which path k continues along w from y_j. Light found by next-event estimation
+// has that technique's density in place of p_k, or in the sum with it where both can find it. The group needs
+// one shadow ray for each pair, and no path has to be followed again.
+//
+// The densities of flights must be known, so media are homogeneous. Light on the segment from the first to
+// the second vertex is not sampled equi-angularly: its density would have to be known for all k.
+#pragma once
+
+#include <cmath>
+
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+// Records the first vertex of the path, if it is at depth 1.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::begin_sharing(const SurfaceHit* hit, const Medium* medium) {
+  FirstVertex& first = sharing_.first;
+  if (depth_ != 1) return;
+  first.usable = true;
+  first.at.medium = medium;
+  first.at.p = hit ? hit->p : last_.p;
+  if (hit) first.at.hit = *hit;
+  first.d = ray_.d;
+  first.around = medium_;
+  first.beta = beta_;
+  if constexpr (F.chromatic) {
+    first.beta /= mean(density_);
+    first.density = density_ / mean(density_);
+  }
+}
+
+// After the direction of the first vertex was sampled by a smooth lobe: the weight up to here moves to
+// `scale`, and the densities become relative to their mean.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::look_for_second() {
+  sharing_.part = SharingPath::Part::second;
+  sharing_.scale = beta_;
+  if constexpr (F.chromatic) {
+    sharing_.scale /= mean(density_);
+    density_ /= mean(density_);
+  }
+  sharing_.survival = max_component(sharing_.scale);
+  beta_ = C3(1);
+}
+
+// Next-event estimation at the second vertex. `back` accepts directions towards lights.
+template <Features F, template <Features> class Light>
+template <class Accepts>
+void PathTracer<F, Light>::begin_tail(const PathVertex& at, const V3& n, const V3& start,
+                                      const Accepts& accepts) {
+  SharedTail& tail = sharing_.tail;
+  tail.usable = true;
+  tail.at = at;
+  if (!world_.lights.can_sample()) return;
+  const Group g = stream_.group(depth_, Purpose::light);
+  const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, at.p, n);
+  const auto light = world_.lights.sample(choice, at.p);
+  if (!light || !accepts(light->direction)) return;
+  const V3 p = at.medium ? at.p : offset_point(at.hit, light->direction);
+  const Within medium =
+      at.medium ? medium_
+                : beyond(at.hit, world_.geometry.surfaces[at.hit.surface], light->direction, ray_.d, medium_);
+  const C3 arriving = unoccluded(start, p, *light, medium, stream_.stream(depth_, Purpose::track_shadow));
+  if (is_black(arriving)) return;
+  tail.to_light = light->direction;
+  tail.light_pdf = light->pdf;
+  tail.light_is_delta = light->delta;
+  tail.light = arriving;
+}
+
+// The path goes on from the second vertex along w, sampled by a smooth lobe with this weight.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::go_on_as_tail(const V3& w, const C3& weight) {
+  sharing_.tail.goes_on = true;
+  sharing_.tail.onward = w;
+  sharing_.part = SharingPath::Part::tail;
+  C3 size = sharing_.scale * beta_ * weight;
+  if constexpr (F.chromatic) {
+    size /= mean(density_);
+    density_ /= mean(density_);
+  }
+  sharing_.survival = max_component(size);
+  beta_ = C3(1);
+}
+
+// What this path's first vertex scatters towards the vertex y of a tail. `own` is true for the path's own
+// tail, to which the way is known to be free.
+template <Features F, template <Features> class Light>
+auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
+  Look look;
+  const FirstVertex& x = sharing_.first;
+  const PathVertex& y = tail.at;
+  const V3 f = y.p - x.at.p;
+  const float r2 = dot(f, f);
+  if (!x.usable || !(r2 > 0)) return look;
+  const V3 w = f / std::sqrt(r2);
+  C3 value;
+  float pdf = 0, cosine = 1;
+  V3 origin = x.at.p;
+  OneMedium around = x.around;
+  if (x.at.medium) {
+    pdf = x.at.medium->phase.value(x.d, w);
+    value = C3(pdf);
+  } else {
+    const SurfaceHit& hit = x.at.hit;
+    const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+    const V3 wi = hit.shading.to_local(w);
+    if ((wi.z > 0) != (dot(w, hit.ng) > 0)) return look;
+    const BsdfEval eval = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), hit.shading.to_local(-x.d), wi);
+    value = eval.f_cos;
+    pdf = eval.pdf;
+    origin = offset_point(hit, w);
+    around = beyond(hit, surface, w, x.d, around);
+  }
+  if (!(pdf > 0)) return look;
+  LightSample end;
+  end.target = y.p;
+  if (!y.medium) {
+    // A path from x would find another normal there
+    if ((y.hit.shading.to_local(-w).z > 0) != (dot(w, y.hit.ng) < 0)) return look;
+    cosine = std::abs(dot(w, y.hit.ng));
+    end.target = offset_point(y.hit, -w);
+  }
+  C3 through;
+  if (own) {
+    for (int c = 0; c < 3; ++c) through[c] = std::exp(-tail.depth[c]);
+  } else {
+    end.direction = w;
+    end.distance = std::sqrt(r2);
+    end.radiance = C3(1);
+    depth_ = 1;
+    through = unoccluded(x.at.p, origin, end, around, stream_.stream(1, Purpose::track_connect));
+  }
+  const float geometry = cosine / r2;
+  look.w = w;
+  look.value = x.beta * value * through * geometry;
+  C3 found = x.density * through;
+  if (y.medium) {
+    look.value *= y.medium->sigma_s;
+    found *= y.medium->sigma_t;
+  }
+  look.density = pdf * geometry * mean(found);
+  return look;
+}
+
+// What the vertex of a tail scatters from the direction w to a path that arrives along `d`.
+template <Features F, template <Features> class Light>
+BsdfEval PathTracer<F, Light>::scattered_at(const PathVertex& y, const V3& d, const V3& w) const {
+  if (y.medium) {
+    const float phase = y.medium->phase.value(d, w);
+    return {C3(phase), phase};
+  }
+  return world_.bsdfs.eval(world_.geometry.surfaces[y.hit.surface].bsdf, y.hit.uv_point(),
+                           y.hit.shading.to_local(-d), y.hit.shading.to_local(w));
+}
+
+// Adds to each path of a group the light that the tails of all of them bring.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::share(std::span<PathTracer* const> group) {
+  struct Seen {
+    Look look;
+    C3 lit, onward;  // scattered towards the path, from the light and from the direction of the tail
+  };
+  std::array<Seen, kMostSharing> seen;
+  for (PathTracer* const giver : group) {
+    const SharedTail& tail = giver->sharing_.tail;
+    if (!tail.usable || !tail.brings_light()) continue;
+    float lit = 0, scattered = 0, emitted = 0;  // sums of densities
+    for (std::size_t k = 0; k < group.size(); ++k) {
+      Seen& s = seen[k];
+      s.look = group[k]->look_at(tail, group[k] == giver);
+      if (!(s.look.density > 0)) continue;
+      if (tail.light_pdf > 0) {
+        const BsdfEval eval = giver->scattered_at(tail.at, s.look.w, tail.to_light);
+        s.lit = eval.f_cos;
+        lit += s.look.density * (tail.light_is_delta ? tail.light_pdf : tail.light_pdf + eval.pdf);
+      }
+      if (tail.goes_on) {
+        const BsdfEval eval = giver->scattered_at(tail.at, s.look.w, tail.onward);
+        s.onward = eval.f_cos;
+        scattered += s.look.density * eval.pdf;
+        emitted += s.look.density * (eval.pdf + tail.hit_pdf);
+      }
+    }
+    for (std::size_t k = 0; k < group.size(); ++k) {
+      const Seen& s = seen[k];
+      if (!(s.look.density > 0)) continue;
+      C3 light(0);
+      if (lit > 0) light += s.lit * tail.light / lit;
+      if (scattered > 0) light += s.onward * tail.scattered / scattered;
+      if (emitted > 0) light += s.onward * tail.emitted / emitted;
+      group[k]->add_shared(s.look.value * light);
+    }
+  }
+  // A tail that was given up is missing in all pixels of the group
+  for (const PathTracer* giver : group) {
+    if (giver->outcome_.cut_off == HealthCause::none) continue;
+    for (PathTracer* path : group) path->outcome_.reject(giver->outcome_.cut_off);
+  }
+}
+
+}  // namespace ls::render

@@ -1,0 +1,66 @@
+// What the paths of a group of pixels know of each other, so that each pixel also gets the light that the
+// others' paths find from their second vertices on (path_reuse.h).
+#pragma once
+
+#include "worker/render/geometry/geometry.h"
+#include "worker/render/media/medium.h"
+#include "worker/render/media/medium_stack.h"
+
+namespace ls::render {
+
+// The largest number of pixels that share.
+inline constexpr std::size_t kMostSharing = 64;
+
+struct PathVertex {
+  V3 p{0, 0, 0};
+  const Medium* medium = nullptr;  // null: on a surface, at `hit`
+  SurfaceHit hit;
+};
+
+// The first vertex of a path, from which the second vertices of others are looked at.
+struct FirstVertex {
+  bool usable = false;  // false: there is none, or it scatters by delta lobes alone
+  PathVertex at;
+  V3 d{0, 0, 0};        // the direction of travel before it
+  C3 beta{0, 0, 0};     // the weight of the path up to it
+  C3 density{1, 1, 1};  // for each channel as the hero, the density of the path over the mean of the three
+  OneMedium around;     // the medium in front of it
+};
+
+// The second vertex of a path, and the light that arrives there.
+struct SharedTail {
+  bool usable = false;  // false: there is none, or it was not sampled by a smooth lobe
+  PathVertex at;
+  C3 depth{0, 0, 0};  // the optical depth from the path's own first vertex, in each channel
+
+  // By next-event estimation. light_pdf 0: none.
+  V3 to_light{0, 0, 0};
+  float light_pdf = 0;
+  bool light_is_delta = false;
+  C3 light{0, 0, 0};
+
+  // From the direction in which the path goes on: light that was emitted there straight towards the vertex,
+  // which next-event estimation finds with the density hit_pdf, and light that was scattered on its way.
+  bool goes_on = false;
+  V3 onward{0, 0, 0};
+  C3 emitted{0, 0, 0}, scattered{0, 0, 0};
+  float hit_pdf = 0;
+
+  bool brings_light() const { return light_pdf > 0 || !is_black(emitted) || !is_black(scattered); }
+};
+
+// The state of a path that records both.
+struct SharingPath {
+  enum class Part : std::uint8_t {
+    alone,   // before the first vertex, and where light is the pixel's alone
+    second,  // on the way from the first vertex to the second
+    tail,    // from the second vertex on
+  };
+  Part part = Part::alone;
+  FirstVertex first;
+  SharedTail tail;
+  C3 scale{1, 1, 1};   // of light that is the pixel's alone
+  float survival = 1;  // what Russian roulette multiplies the path's weight by
+};
+
+}  // namespace ls::render

@@ -1,0 +1,64 @@
+// Which pixels' paths share their tails (path_reuse.h). The full frame is cut into squares; for each sample
+// the pixels of a square are dealt into groups at random, so that two pixels rarely meet and their errors are
+// nearly independent. Squares begin at the corner of the full frame and a group knows no tiles: the pixels of
+// a tile or crop are the same as those of the whole image.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+
+#include "common/scene/scene.h"
+#include "worker/render/integrator/variant.h"
+#include "worker/render/math/random.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+// Sets `reuse` and Features::reuse of a world that is otherwise complete, if its scene asks for it and has
+// nothing for which the densities of second vertices are unknown.
+void share_tails(const IntegratorSettings& settings, World& w);
+
+class SharingBlock {
+ public:
+  static constexpr int kSide = 16;  // pixels
+
+  // The block of a pixel of the image.
+  SharingBlock(const World& w, PixelAt pixel) : w_(w) {
+    row_ = (pixel.y + w.origin_y) / kSide;
+    column_ = (pixel.x + w.origin_x) / kSide;
+    width_ = std::min(kSide, w.frame.width - column_ * kSide);
+    height_ = std::min(kSide, w.frame.height - row_ * kSide);
+  }
+  int row() const { return row_; }
+  int column() const { return column_; }
+  std::size_t pixels() const { return static_cast<std::size_t>(width_ * height_); }
+  std::size_t index(PixelAt p) const {
+    return static_cast<std::size_t>((p.y + w_.origin_y - row_ * kSide) * width_ + p.x + w_.origin_x -
+                                    column_ * kSide);
+  }
+  // Calls f(pixels) for each group of the sample. Pixels of the block may be outside the image.
+  template <class F>
+  void for_each_group(std::uint64_t sample, const F& f) const {
+    std::array<PixelAt, kSide * kSide> order;
+    std::size_t n = 0;
+    for (int y = 0; y < height_; ++y)
+      for (int x = 0; x < width_; ++x)
+        order[n++] = {column_ * kSide + x - w_.origin_x, row_ * kSide + y - w_.origin_y};
+    const auto corner = (static_cast<std::uint64_t>(row_) << 32) | static_cast<std::uint64_t>(column_);
+    RandomStream dice(combine(combine(combine(w_.seed, kDealing), corner), sample));
+    for (std::size_t i = n; i > 1; --i) std::swap(order[i - 1], order[dice.next() % i]);
+    const auto size = static_cast<std::size_t>(w_.reuse);
+    for (std::size_t i = 0; i < n; i += size) f(std::span(order).subspan(i, std::min(size, n - i)));
+  }
+
+ private:
+  static constexpr std::uint64_t kDealing = 0x6465'616c;  // keys the random numbers
+
+  const World& w_;
+  int row_, column_, width_, height_;
+};
+
+}  // namespace ls::render
