@@ -15,6 +15,8 @@ case "${1:-}" in
     [ "${#changed[@]}" -eq 0 ] || clang-tidy-14 -p build/dev --quiet "${changed[@]}"
     ;;
 esac
+# Only a warning; the architecture test refuses files of more than 800 lines.
+wc -l "${files[@]}" | awk '$1 > 400 && $2 !~ /^(total|tests\/)/ { print "long, is it one subject? " $2 ": " $1 " lines" }'
 /usr/bin/python3 tests/lint/links.py
 /usr/bin/python3 tests/lint/words.py
 /usr/bin/python3 python/generate.py --check

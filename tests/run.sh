@@ -94,23 +94,14 @@ run_lint() {
   echo "lint: $(tail -n 1 "$logs/lint.log")"
 }
 
-run_python() {
-  local python
-  if python=$(tests/python/venv.sh 2>"$logs/python-venv.log"); then PYTHON="$python" run_pytest python tests/python tests/packages
-  else count 0 1 0; tail -n 20 "$logs/python-venv.log"; echo "python: the package could not be built or installed"; fi
-}
-
-run_openjd() {
-  local python
-  if python=$(tests/openjd/venv.sh 2>"$logs/openjd-venv.log"); then PYTHON="$python" run_pytest openjd tests/openjd
-  else count 0 1 0; tail -n 20 "$logs/openjd-venv.log"; echo "openjd: its packages could not be installed"; fi
+run_in_venv() {  # name, arguments...: by a Python that has what tests/NAME needs
+  local name="$1" python
+  if python=$(tests/venv.sh "$name" 2>"$logs/$name-venv.log"); then PYTHON="$python" run_pytest "$@"
+  else count 0 1 0; tail -n 20 "$logs/$name-venv.log"; echo "$name: what its tests need could not be installed"; fi
 }
 
 run_blender() {
-  if [ "$blender" -eq 0 ]; then run_pytest blender tests/blender/test_files.py; return; fi
-  local python
-  if python=$(tests/blender/venv.sh 2>"$logs/blender-venv.log"); then PYTHON="$python" run_pytest blender tests/blender
-  else count 0 1 0; tail -n 20 "$logs/blender-venv.log"; echo "blender: Blender could not be installed as a module"; fi
+  if [ "$blender" -eq 1 ]; then run_in_venv blender tests/blender; else run_pytest blender tests/blender/test_files.py; fi
 }
 
 run_kubernetes() {
@@ -155,8 +146,8 @@ run_packages() {
 waiting_lane() {
   step "system tests" run_pytest system tests/system
   step "browser tests" run_pytest web tests/web
-  step "Python package" run_python
-  step "Open Job Description" run_openjd
+  step "Python package" run_in_venv python tests/python tests/packages
+  step "Open Job Description" run_in_venv openjd tests/openjd
   step "Blender" run_blender
   step "Kubernetes" run_kubernetes
   step "upgrade" run_upgrade

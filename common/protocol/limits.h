@@ -24,6 +24,10 @@ inline constexpr std::size_t kTokenBytes = 512;
 inline constexpr std::size_t kSettingsBytes = 64 << 10;
 inline constexpr std::size_t kNeedsBytes = 16 << 10;
 
+// Both sides ping a silent connection after this time, and close it if there is no answer: a peer that has
+// vanished is noticed within 30 s.
+inline constexpr int kKeepaliveMs = 20'000, kKeepaliveTimeoutMs = 10'000;
+
 inline constexpr std::size_t kUnitsPerLease = 4096;
 inline constexpr std::size_t kLeasesPerWorker = 1024;
 inline constexpr std::size_t kAssetsPerJob = 4096;

@@ -193,7 +193,7 @@ struct Job {
   // Starts the stop rule if the plan has a target error, drops it if the plan has none any more, and has the
   // image judged again.
   void steer();
-  // The relMSE of the image itself at which the job will probably end; nullopt: unknown
+  // The relMSE of the image (before denoising) at which the job will probably end; nullopt: unknown
   std::optional<double> predicted_target() const {
     if (!denoised) return plan.target_error;
     return predicted_error > 0 ? std::optional(predicted_error) : std::nullopt;

@@ -33,10 +33,6 @@ constexpr int kReadThreads = 64;
 constexpr int kUnreadBytes = 64 << 10;
 constexpr int kHelloSeconds = 20;  // seconds after opening its stream in which a worker must send its hello
 constexpr int kHandshakeMs = 10'000;
-// Keepalive, with the same values as in worker/client/channel.cpp: a peer that has vanished is noticed within
-// 30 s.
-constexpr int kKeepaliveMs = 20'000;
-constexpr int kKeepaliveTimeoutMs = 10'000;
 // Clients that ping at shorter intervals are disconnected (GOAWAY too_many_pings).
 constexpr int kPingsNotOftenerMs = 5'000;
 
@@ -132,8 +128,8 @@ Result<int> GrpcServer::start(const std::string& address, const std::optional<Tl
   builder.SetMaxSendMessageSize(static_cast<int>(limits::kMessageBytes));
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, limits::kKeepaliveMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, limits::kKeepaliveTimeoutMs);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kPingsNotOftenerMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);

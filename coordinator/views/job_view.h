@@ -58,7 +58,7 @@ struct ErrorFigures {  // Estimated errors of the image up to the last round tha
   double rmse = 0;
   double relmse = 0;
   double relmse_lo = 0, relmse_hi = 0;  // 95 % intervals for the realised error
-  // Both 0: unknown, since an earlier version stored the error without them
+  // Both 0: there is no interval
   double rmse_lo = 0, rmse_hi = 0;
 };
 // Error against a reference image, from which the reference's own noise is subtracted

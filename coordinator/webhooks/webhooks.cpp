@@ -15,6 +15,9 @@
 #include "coordinator/webhooks/webhook_outbox.h"
 
 namespace ls::coordinator {
+namespace webhooks {
+struct State;
+}
 namespace {
 
 using nlohmann::json;
@@ -26,8 +29,10 @@ bool ended(const std::string& state) {
          state == "moved";
 }
 
+}  // namespace
+
 // The known states of jobs, and the notifications that must still be sent.
-struct State {
+struct webhooks::State {
   explicit State(webhooks::Outbox kept) : outbox(std::move(kept)), open(outbox.open_jobs()) {}
 
   void mark_open(const JobId& job) {
@@ -86,9 +91,9 @@ struct State {
   Webhooks::Figures figures;
 };
 
-class Teller final : public Webhooks {
+class Webhooks::Impl {
  public:
-  Teller(Options options, webhooks::Outbox outbox) : options_(std::move(options)), state_(std::move(outbox)) {
+  Impl(Options options, webhooks::Outbox outbox) : options_(std::move(options)), state_(std::move(outbox)) {
     if (!options_.send) options_.send = &post;
     const auto state = state_.lock();
     for (std::size_t i = 0; i < options_.urls.size(); ++i) {
@@ -101,7 +106,7 @@ class Teller final : public Webhooks {
     }
   }
 
-  ~Teller() override {
+  ~Impl() {
     subscription_.reset();  // waits until no callback is in progress
     for (auto& thread : threads_) thread.request_stop();
   }
@@ -122,7 +127,7 @@ class Teller final : public Webhooks {
       threads_.emplace_back([this, i](const std::stop_token& token) { deliver(i, token); });
   }
 
-  Figures figures() const override {
+  Figures figures() const {
     const auto state = state_.lock();
     Figures f = state->figures;
     for (const Line& line : state->lines) f.waiting += line.waiting();
@@ -202,7 +207,8 @@ class Teller final : public Webhooks {
     }
   }
 
-  void wait(Guarded<State>::Lock& state, std::optional<TimePoint> until, const std::stop_token& token) {
+  void wait(Guarded<webhooks::State>::Lock& state, std::optional<TimePoint> until,
+            const std::stop_token& token) {
     const auto have_new = [&, seen = state->last_number] { return state->last_number != seen; };
     if (until)
       woken_.wait_for(state, token, *until - options_.clock->now(), have_new);
@@ -244,13 +250,15 @@ class Teller final : public Webhooks {
   Options options_;
   Coordinator* coordinator_ = nullptr;
   std::set<std::string> kept_;  // JOB/STATE of the deliveries that were pending at the start
-  mutable Guarded<State> state_;
+  mutable Guarded<webhooks::State> state_;
   std::condition_variable_any woken_;
   std::shared_ptr<void> subscription_;
   std::vector<std::jthread> threads_;
 };
 
-}  // namespace
+Webhooks::Webhooks(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Webhooks::~Webhooks() = default;
+Webhooks::Figures Webhooks::figures() const { return impl_->figures(); }
 
 std::string webhook_signature(const std::string& secret, std::int64_t unix_seconds, const std::string& body) {
   return fmt::format("t={},v1={}", unix_seconds,
@@ -262,9 +270,9 @@ Result<std::unique_ptr<Webhooks>> Webhooks::start(Coordinator& coordinator, Opti
     if (auto fine = check_http_url(url, "--webhook"); !fine) return tl::unexpected(fine.error());
   auto outbox = webhooks::Outbox::open(options.folder, options.urls);
   if (!outbox) return tl::unexpected(outbox.error());
-  auto teller = std::make_unique<Teller>(std::move(options), std::move(*outbox));
-  teller->start(coordinator);
-  return teller;
+  auto impl = std::make_unique<Impl>(std::move(options), std::move(*outbox));
+  impl->start(coordinator);
+  return std::unique_ptr<Webhooks>(new Webhooks(std::move(impl)));
 }
 
 }  // namespace ls::coordinator

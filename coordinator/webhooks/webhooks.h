@@ -51,8 +51,13 @@ class Webhooks {
   };
   // Starts the sending threads. Destroying the returned object stops them; the coordinator must outlive it.
   static Result<std::unique_ptr<Webhooks>> start(Coordinator& coordinator, Options options);
-  virtual ~Webhooks() = default;
-  virtual Figures figures() const = 0;
+  ~Webhooks();
+  Figures figures() const;
+
+ private:
+  class Impl;
+  explicit Webhooks(std::unique_ptr<Impl> impl);
+  const std::unique_ptr<Impl> impl_;
 };
 
 // Returns the value of the header Lightshaft-Signature.

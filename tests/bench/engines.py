@@ -4,7 +4,7 @@
     tests/bench/engines.py [ENGINE...]      a row for each of local, slurm, ssh, docker, kubernetes, openjd, or of those that are named
 
 `local` is a worker that a person starts by hand. For openjd, which has no farm-up, the session with its worker is started together
-with the job, and the idle cost is that of the command `openjd` (tests/openjd/venv.sh installs it). Slurm and sshd are started on this machine. For docker its engine must answer; for
+with the job, and the idle cost is that of the command `openjd` (tests/venv.sh openjd installs it). Slurm and sshd are started on this machine. For docker its engine must answer; for
 kubernetes LIGHTSHAFT_KUBERNETES must say what tests/kubernetes/tools.sh has built: the API server is a real one, the node is
 tests/support/kubernetes_api.py. Fake workers, so that only the engine's own time shows.
 """

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "blender"), str(ROOT / "tests/support"), str(ROOT / "tests/blender")]
+sys.path.insert(0, str(ROOT / "blender"))
 
 from local_farm import LocalFarm, bin_dir  # noqa: E402
 
@@ -18,7 +18,7 @@ from local_farm import LocalFarm, bin_dir  # noqa: E402
 def blender(tmp_path_factory):
     """The module bpy, in which the add-on is installed and on."""
     if importlib.util.find_spec("bpy") is None:
-        pytest.skip("Blender is not installed as a module (tests/blender/venv.sh)")
+        pytest.skip("Blender is not installed as a module (tests/venv.sh blender)")
     # Before bpy is loaded: it looks once.
     os.environ["BLENDER_USER_RESOURCES"] = str(tmp_path_factory.mktemp("blender"))
     os.environ["LIGHTSHAFT_PROGRAM"] = str(bin_dir() / "lightshaft")

@@ -5,9 +5,9 @@ import subprocess
 
 import docker_engine
 import pytest
-from cli_kit import digest, lightshaft, write_fog
+from cli_kit import lightshaft
 from docker_engine import containers, docker
-from engine_kit import FarmUp, calm_pixels, connected
+from engine_kit import FarmUp, calm_pixels, connected, renders_as_alone
 from local_farm import SCENE, wait_until
 
 assert not docker_engine.missing(), docker_engine.missing()
@@ -30,16 +30,9 @@ def start(farm):
         docker("rm", "--force", "--volumes", container)
 
 
-def test_workers_render_the_pixels_of_render_and_go(farm, start, tmp_path):
-    scene = write_fog(tmp_path)
-    alone = digest(lightshaft("render", scene, "-o", tmp_path / "alone.exr", "--spp", 16))
-    sent = lightshaft("submit", scene, "--to", farm.url(), "--token-file", farm.data / "token", "--spp", 16)
+def test_workers_render_the_pixels_of_render_and_go(farm, start, fog, tmp_path):
+    up, job = renders_as_alone(farm, start, fog, tmp_path)
 
-    up = start("--until-done", "--workers", 2, fake=False)
-
-    assert up.wait() == 0, up.output()
-    job = sent.stdout.split()[0]
-    assert farm.pixels(job) == alone
     assert containers("farm", "--all") == []
     report = up.report()
     assert report["engine"].startswith("docker ") and report["workers_started"] >= 1

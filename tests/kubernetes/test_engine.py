@@ -6,8 +6,8 @@ import os
 import subprocess
 
 import pytest
-from cli_kit import digest, lightshaft, write_fog
-from engine_kit import FarmUp, calm_pixels, connected
+from cli_kit import lightshaft
+from engine_kit import FarmUp, calm_pixels, connected, renders_as_alone
 from kubernetes_api import Node, put_deployment
 from local_farm import SCENE, bin_dir, wait_until
 
@@ -64,15 +64,9 @@ def test_pods_follow_the_wish_up_and_down_to_none(farm, cluster, start):
     up.end()
 
 
-def test_workers_render_the_pixels_of_render_and_go(farm, cluster, node, start, tmp_path):
-    scene = write_fog(tmp_path)
-    alone = digest(lightshaft("render", scene, "-o", tmp_path / "alone.exr", "--spp", 16))
-    sent = lightshaft("submit", scene, "--to", farm.url(), "--token-file", farm.data / "token", "--spp", 16)
+def test_workers_render_the_pixels_of_render_and_go(farm, cluster, node, start, fog, tmp_path):
+    up, _ = renders_as_alone(farm, start, fog, tmp_path)
 
-    up = start("--until-done", "--workers", 2, fake=False)
-
-    assert up.wait() == 0, up.output()
-    assert farm.pixels(sent.stdout.split()[0]) == alone
     assert cluster.pods() == []
     report = up.report()
     assert report["engine"].startswith("kubernetes v1.") and report["workers_started"] >= 1

@@ -32,23 +32,17 @@ class Mover {
 
 Rgb times(const Rgb& c, double k) { return {c[0] * k, c[1] * k, c[2] * k}; }
 
+// Kinds of emitters call the same things by the same names.
 void move(const Mover& m, Emitter& e) {
-  std::visit(overloaded{[](ConstantEmitter&) {},
-                        [&](DirectionalEmitter& d) { d.direction = m.direction(d.direction); },
-                        [&](PointEmitter& p) {
-                          p.position = m.point(p.position);
-                          p.intensity = times(p.intensity, m.area());
-                        },
-                        [&](SpotEmitter& s) {
-                          m.place_rigid(s.to_world);
-                          s.intensity = times(s.intensity, m.area());
-                        },
-                        [&](EnvmapEmitter& v) { m.place_rigid(v.to_world); },
-                        [&](ProjectorEmitter& p) {
-                          m.place_rigid(p.to_world);
-                          p.scale *= m.area();
-                        }},
-             e);
+  std::visit(
+      [&](auto& light) {
+        if constexpr (requires { light.direction; }) light.direction = m.direction(light.direction);
+        if constexpr (requires { light.position; }) light.position = m.point(light.position);
+        if constexpr (requires { light.to_world; }) m.place_rigid(light.to_world);
+        if constexpr (requires { light.intensity; }) light.intensity = times(light.intensity, m.area());
+        if constexpr (std::is_same_v<decltype(light), ProjectorEmitter&>) light.scale *= m.area();
+      },
+      e);
 }
 
 void move(const Mover& m, Medium& medium) {

@@ -55,14 +55,19 @@ double brightest(const Scene& s) {
   const auto see = [&](const Rgb& c) { most = std::max({most, c[0], c[1], c[2]}); };
   for (const Texture& t : s.textures)
     if (const auto* c = std::get_if<ConstantTexture>(&t)) see(c->value);
-  for (const Emitter& e : s.emitters) {
-    if (const auto* c = std::get_if<ConstantEmitter>(&e)) see(c->radiance);
-    if (const auto* c = std::get_if<DirectionalEmitter>(&e)) see(c->irradiance);
-    if (const auto* c = std::get_if<PointEmitter>(&e)) see(c->intensity);
-    if (const auto* c = std::get_if<SpotEmitter>(&e)) see(c->intensity);
-    if (const auto* c = std::get_if<EnvmapEmitter>(&e)) see({c->scale, 0, 0});
-    if (const auto* c = std::get_if<ProjectorEmitter>(&e)) see({c->scale, 0, 0});
-  }
+  for (const Emitter& e : s.emitters)
+    std::visit(
+        [&](const auto& light) {
+          if constexpr (requires { light.scale; })
+            see({light.scale, 0, 0});
+          else if constexpr (requires { light.radiance; })
+            see(light.radiance);
+          else if constexpr (requires { light.irradiance; })
+            see(light.irradiance);
+          else
+            see(light.intensity);
+        },
+        e);
   for (const Medium& m : s.media) {
     if (const auto* h = std::get_if<HomogeneousMedium>(&m)) see(h->emission), see(h->source_radiance);
     if (const auto* h = std::get_if<HeterogeneousMedium>(&m)) see({h->emission_scale, 0, 0});

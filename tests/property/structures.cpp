@@ -1,7 +1,5 @@
 #include "tests/property/structures.h"
 
-#include "common/base/overloaded.h"
-
 namespace ls::test {
 namespace {
 
@@ -106,10 +104,16 @@ void dim(Emitter& e, double by) {
     for (double& x : c) x *= by;
   };
   std::visit(
-      overloaded{[&](ConstantEmitter& c) { times(c.radiance); },
-                 [&](DirectionalEmitter& d) { times(d.irradiance); },
-                 [&](PointEmitter& p) { times(p.intensity); }, [&](SpotEmitter& s) { times(s.intensity); },
-                 [&](EnvmapEmitter& v) { v.scale *= by; }, [&](ProjectorEmitter& p) { p.scale *= by; }},
+      [&](auto& light) {
+        if constexpr (requires { light.scale; })
+          light.scale *= by;
+        else if constexpr (requires { light.radiance; })
+          times(light.radiance);
+        else if constexpr (requires { light.irradiance; })
+          times(light.irradiance);
+        else
+          times(light.intensity);
+      },
       e);
 }
 

@@ -1,16 +1,9 @@
-"""The package as it is installed (tests/python/venv.sh), and a real farm for all tests of a module."""
-
-import pathlib
-import sys
+"""The package as it is installed (tests/venv.sh python), and a real farm for all tests of a module."""
 
 import pytest
+from local_farm import LocalFarm
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "tests/support"), str(ROOT / "tests/system")]
-
-from local_farm import LocalFarm  # noqa: E402
-
-import lightshaft  # noqa: E402
+import lightshaft
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import tomllib
 import zipfile
 
 import pytest
-from conftest import ROOT
+from local_farm import ROOT
 
 import lightshaft
 

@@ -3,7 +3,7 @@
 import re
 
 import numpy as np
-from conftest import ROOT
+from local_farm import ROOT
 
 PAGE = (ROOT / "docs/guide/python.md").read_text()
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
@@ -16,7 +16,7 @@ def test_every_block_is_marked():
 def test_the_wheel_is_built_as_the_page_says():
     (shell,) = (text for kind, text in BLOCKS if kind == "sh")
     command = re.search(r"pip (wheel --no-deps) -w \S+ (\./python)", shell)
-    script = (ROOT / "tests/python/venv.sh").read_text()
+    script = (ROOT / "tests/venv.sh").read_text()
     assert command and all(part in script for part in command.groups())
     assert "./python[notebook]" in shell and "[notebook,usd]" in script
 

@@ -8,7 +8,7 @@ from local_farm import SCENE
 
 import lightshaft
 
-pytest.importorskip("IPython", reason="tests/python/venv.sh installs it")
+pytest.importorskip("IPython", reason="tests/venv.sh python installs it")
 
 
 @pytest.fixture

@@ -10,8 +10,7 @@ import subprocess
 import sys
 
 import pytest
-from conftest import ROOT
-from local_farm import SCENE, wait_until
+from local_farm import ROOT, SCENE, wait_until
 from openapi_spec_validator import OpenAPIV31SpecValidator
 
 DOCUMENT = ROOT / "coordinator/http/openapi.json"

@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 import pytest
-from conftest import ROOT
+from local_farm import ROOT
 
 SETTINGS = (
     "--strict",

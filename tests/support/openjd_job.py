@@ -1,4 +1,4 @@
-"""`openjd run` of a template of deploy/openjd, as a process; the command is that of tests/openjd/venv.sh."""
+"""`openjd run` of a template of deploy/openjd, as a process; the command is that of tests/venv.sh openjd."""
 
 import os
 import pathlib

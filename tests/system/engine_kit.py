@@ -4,6 +4,7 @@ import json
 import os
 import signal
 
+from cli_kit import digest, lightshaft
 from local_farm import Process, bin_dir
 
 
@@ -36,6 +37,17 @@ def calm_pixels(farm, scene, **spec):
     pixels = farm.pixels(farm.submit(scene, **spec))
     worker.terminate()
     return pixels
+
+
+def renders_as_alone(farm, start, scene, folder):
+    """The workers of a farm-up that `start` starts give a scene the pixels of `lightshaft render`, and go. It, and the job."""
+    alone = digest(lightshaft("render", scene, "-o", folder / "alone.exr", "--spp", 16))
+    sent = lightshaft("submit", scene, "--to", farm.url(), "--token-file", farm.data / "token", "--spp", 16)
+    job = sent.stdout.split()[0]
+    up = start("--until-done", "--workers", 2, fake=False)
+    assert up.wait() == 0, up.output()
+    assert farm.pixels(job) == alone
+    return up, job
 
 
 def connected(farm):

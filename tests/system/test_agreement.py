@@ -1,14 +1,11 @@
 """Agreement with other renderers: three verdicts, and docs/measurements/agreement.md has those of the figures that it prints."""
 
 import re
-import sys
 
 import pytest
 from local_farm import ROOT
 
-sys.path.insert(0, str(ROOT / "tests" / "bench"))
-
-from verdicts import AGREES, DIFFERS, TOO_FEW, verdict  # noqa: E402
+from verdicts import AGREES, DIFFERS, TOO_FEW, verdict
 
 FIGURE = re.compile(r"([+-]\d+\.\d+) ± (\d+\.\d+) %")
 

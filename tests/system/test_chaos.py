@@ -1,15 +1,9 @@
 """A short version of tests/chaos/chaos.py: every storm once."""
 
-import sys
-
 import pytest
-from local_farm import ROOT
-
-sys.path.insert(0, str(ROOT / "tests" / "chaos"))
-
-from chaos import expected_pixels, try_once  # noqa: E402
-from storms import STORMS  # noqa: E402
-from weather import Skip  # noqa: E402
+from chaos import expected_pixels, try_once
+from storms import STORMS
+from weather import Skip
 
 
 @pytest.mark.slow

@@ -5,17 +5,14 @@ import json
 import os
 import random
 import subprocess
-import sys
 
 import farm_rpc
 import pytest
 import steam
-from local_farm import PATIENCE, ROOT, HttpError, LocalFarm, bin_dir, wait_until
+from local_farm import PATIENCE, HttpError, LocalFarm, bin_dir, wait_until
 from s3_server import ENVIRONMENT, S3Server
 
-sys.path.insert(0, str(ROOT / "tests" / "chaos"))
-
-from chaos_kit import flip_bytes  # noqa: E402
+from chaos_kit import flip_bytes
 
 SCENE = steam.scene(samples=4)
 SIDE = 48  # 442 kB of grid: read by the coordinator in two pieces

@@ -11,13 +11,10 @@ import signal
 import socket
 import stat
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-from http_coordinator import Coordinator, find_coordinator  # noqa: E402
+from http_coordinator import Coordinator, find_coordinator
 
 pytestmark = pytest.mark.skipif(find_coordinator() is None, reason="lightshaft-coordinator is not built")
 

@@ -2,14 +2,11 @@
 
 import csv
 import math
-import sys
 
 import pytest
 from local_farm import ROOT
 
-sys.path.insert(0, str(ROOT / "tests" / "bench"))
-
-import measured  # noqa: E402
+import measured
 
 
 def share_within(t, freedom, steps=20000):

@@ -1,12 +1,10 @@
 """The faults of tests/mutation/table.py have places in the sources as they are."""
-import sys
 
 import pytest
 from local_farm import ROOT
 
-sys.path.insert(0, str(ROOT / "tests" / "mutation"))
-import run  # noqa: E402
-import table  # noqa: E402
+import run
+import table
 
 
 @pytest.mark.parametrize("path", sorted({mutant.file for mutant in table.MUTANTS}))

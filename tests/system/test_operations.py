@@ -8,7 +8,6 @@ import queue
 import re
 import shutil
 import subprocess
-import sys
 import threading
 
 import pytest
@@ -121,7 +120,6 @@ def test_logs_are_lines_of_json_with_the_keys_of_job_and_worker(tmp_path):
 def test_a_result_that_is_refused_is_logged_with_job_tile_round_and_worker(tmp_path):
     """Cut short on its way by the meddler of the storms."""
     pytest.importorskip("grpc")
-    sys.path.insert(0, str(ROOT / "tests" / "chaos"))
     from meddler import Meddler
     with LocalFarm(tmp_path, flags=["--log-format", "json"]) as farm, Meddler(tmp_path, f"127.0.0.1:{farm.grpc}", 1, most_cut=1, cut=1) as meddler:
         farm.add_worker("--log-format", "json", coordinator=f"127.0.0.1:{meddler.port}")
@@ -158,7 +156,6 @@ def test_readiness_tells_that_redis_is_away(tmp_path):
 
 
 def test_readiness_tells_that_the_disk_is_full_until_results_can_be_stored_again(tmp_path, expected):
-    sys.path.insert(0, str(ROOT / "tests" / "chaos"))
     from chaos_kit import SmallDisk
     from weather import Skip
     try:
@@ -358,7 +355,6 @@ def test_a_restore_does_not_touch_a_folder_that_has_a_farm_in_it(tmp_path, folde
 
 def test_a_worker_of_another_protocol_is_refused_with_both_versions(farm, tmp_path):
     grpc = pytest.importorskip("grpc")
-    sys.path.insert(0, str(ROOT / "tests" / "chaos"))
     from meddler import load_protocol
     protocol = load_protocol(tmp_path)
     hello = protocol.FromWorker(hello=protocol.Hello(protocol=99, name="old-timer", build="9.9", numeric_class=bytes(32), threads=1,

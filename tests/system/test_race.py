@@ -12,15 +12,12 @@ import subprocess
 import sys
 
 import pytest
-
 from cli_kit import bin_dir, lightshaft, write_fog
 from local_farm import PATIENCE, ROOT
 
-sys.path.insert(0, str(ROOT / "tests" / "bench"))
-
-from racing import adapter, program  # noqa: E402
-from racing.adapter import Cost, Made, RaceError  # noqa: E402
-from racing.racers import next_run, next_turn  # noqa: E402
+from racing import adapter, program
+from racing.adapter import Cost, Made, RaceError
+from racing.racers import next_run, next_turn
 
 ADAPTERS = ROOT / "tests" / "bench" / "adapters"
 

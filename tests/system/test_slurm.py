@@ -5,8 +5,8 @@ import subprocess
 
 import pytest
 import slurm_cluster
-from cli_kit import digest, lightshaft, write_fog
-from engine_kit import FarmUp, calm_pixels, connected
+from cli_kit import lightshaft
+from engine_kit import FarmUp, calm_pixels, connected, renders_as_alone
 from local_farm import SCENE, wait_until
 
 pytestmark = pytest.mark.skipif(bool(slurm_cluster.missing()), reason=f"Slurm is not installed: no {', '.join(slurm_cluster.missing())}")
@@ -40,15 +40,9 @@ def running(cluster):
     return [job for job, state in cluster.jobs() if state == "RUNNING"]
 
 
-def test_workers_render_the_pixels_of_render_and_go(farm, cluster, start, tmp_path):
-    scene = write_fog(tmp_path)
-    alone = digest(lightshaft("render", scene, "-o", tmp_path / "alone.exr", "--spp", 16))
-    sent = lightshaft("submit", scene, "--to", farm.url(), "--token-file", farm.data / "token", "--spp", 16)
+def test_workers_render_the_pixels_of_render_and_go(farm, cluster, start, fog, tmp_path):
+    up, _ = renders_as_alone(farm, start, fog, tmp_path)
 
-    up = start("--until-done", "--workers", 2, fake=False)
-
-    assert up.wait() == 0, up.output()
-    assert farm.pixels(sent.stdout.split()[0]) == alone
     assert cluster.jobs() == []
     report = up.report()
     assert report["engine"].startswith("slurm")

@@ -6,8 +6,8 @@ import signal
 
 import pytest
 import ssh_server
-from cli_kit import digest, lightshaft, write_fog
-from engine_kit import FarmUp, calm_pixels, connected
+from cli_kit import lightshaft
+from engine_kit import FarmUp, calm_pixels, connected, renders_as_alone
 from local_farm import SCENE, bin_dir, wait_until
 
 pytestmark = pytest.mark.skipif(bool(ssh_server.missing()), reason="no sshd or ssh is installed")
@@ -51,15 +51,9 @@ def workers(farm):
     return found
 
 
-def test_workers_render_the_pixels_of_render_and_go(farm, start, tmp_path):
-    scene = write_fog(tmp_path)
-    alone = digest(lightshaft("render", scene, "-o", tmp_path / "alone.exr", "--spp", 16))
-    sent = lightshaft("submit", scene, "--to", farm.url(), "--token-file", farm.data / "token", "--spp", 16)
+def test_workers_render_the_pixels_of_render_and_go(farm, start, fog, tmp_path):
+    up, _ = renders_as_alone(farm, start, fog, tmp_path)
 
-    up = start("--until-done", "--workers", 2, fake=False)
-
-    assert up.wait() == 0, up.output()
-    assert farm.pixels(sent.stdout.split()[0]) == alone
     assert not workers(farm)
     assert up.report()["engine"].startswith("OpenSSH") and up.report()["spent_core_hours"] > 0
 

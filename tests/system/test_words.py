@@ -1,10 +1,6 @@
 """tests/lint/words.py finds words of our own in identifiers, and only there."""
-import sys
 
-from local_farm import ROOT
-
-sys.path.insert(0, str(ROOT / "tests" / "lint"))
-import words  # noqa: E402
+import words
 
 
 def test_parts_of_identifiers_are_found_once_with_their_line():

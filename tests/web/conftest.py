@@ -1,12 +1,6 @@
-import pathlib
-import sys
-
 import pytest
-
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
-
-from devtools import Browser, chromium_path  # noqa: E402
-from stub_farm import StubFarm, TOKEN  # noqa: E402
+from devtools import Browser, chromium_path
+from stub_farm import StubFarm, TOKEN
 
 
 @pytest.fixture(scope="session")

@@ -137,7 +137,8 @@ void shining_walls(Table& t) {
   }
 }
 
-// A furnace by maps and by walls, with every setting that looks for light along segments.
+// White furnaces: light of radiance 1 from all sides, from an environment or from the walls of a box, with
+// each setting that looks for light along segments.
 void surrounded(Table& t) {
   constexpr Configuration kVolpath{}, kMis{false, true}, kPoint{.camera_points = 1},
       kPoints{.camera_points = 5}, kEquiangular{false, true, DistanceSampling::equiangular},

@@ -30,7 +30,8 @@ SceneBuilder miniature(const Configuration& configuration, double s) {
 void of_any_scale(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     for (const int k : {-40, -13, 20, 60}) {
-      // Grids in Mitsuba's files have a float32 box of their own, so at every scale they fill the unit cube.
+      // The bounding box in Mitsuba's grid files is float32, which would round differently at each scale. So
+      // the grids' boxes are the unit cube at every scale, and `to_world` scales them.
       t.exact(fmt::format("N04-scaled-by-2^{}{}", k, configuration.name()), "N4 7.7",
               "A scene scaled by a power of two has the same pixels, bit for bit.", [=](const Bench& b) {
                 return same_bits(b, miniature(configuration, 1), miniature(configuration, std::ldexp(1., k)),

@@ -15,10 +15,6 @@ namespace ls::worker {
 namespace pb = ::lightshaft::farm::v1;
 namespace {
 
-// Keepalive, with the same values as in coordinator/rpc/rpc_server.cpp: a peer that has vanished is detected
-// within 30 s.
-constexpr int kKeepaliveMs = 20'000;
-constexpr int kKeepaliveTimeoutMs = 10'000;
 constexpr Duration kCloseLimit = std::chrono::seconds(2);
 
 std::shared_ptr<grpc::ChannelCredentials> credentials(const std::optional<LinkTls>& tls) {
@@ -34,8 +30,8 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address, const st
   grpc::ChannelArguments args;
   args.SetMaxReceiveMessageSize(static_cast<int>(limits::kMessageBytes));
   args.SetMaxSendMessageSize(static_cast<int>(limits::kMessageBytes));
-  args.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
-  args.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+  args.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, limits::kKeepaliveMs);
+  args.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, limits::kKeepaliveTimeoutMs);
   args.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   args.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   // The agent has its own back-off between attempts to connect; the back-off of gRPC must not be longer.

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/scene/analysis/needs.h"
-#include "common/scene/schema/describe.h"
+#include "common/scene/schema/describe_fields.h"
 
 namespace ls::scene {
 namespace {

@@ -1,4 +1,4 @@
-// Animations: what they make of nodes at one moment.
+// Evaluates animations: the transforms and morph weights of nodes at one moment.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace {
 
 using Values = std::vector<double>;
 
-// Turns from `a` to `b` by the share s, the shorter way round, at an even pace.
+// Spherical linear interpolation between the quaternions `a` (s = 0) and `b` (s = 1), along the shorter arc.
 Values turned(const Values& a, Values b, double s) {
   double cosine = 0;
   for (std::size_t i = 0; i < 4; ++i) cosine += a[i] * b[i];
@@ -32,14 +32,15 @@ class Sampler {
  public:
   Sampler(Translation& t, double seconds) : t_(t), seconds_(seconds) {}
 
-  // The numbers of this sampler, an item of an animation's "samplers", at the moment; empty: it is wrong,
-  // which has been reported. `is_rotation`: they are a quaternion. All nodes that it moves share them.
+  // Returns the value of a sampler, an item of an animation's "samplers", at the moment. All nodes that it
+  // moves share this value. `is_rotation`: the value is a quaternion. Empty: the sampler is wrong, which has
+  // been reported.
   std::shared_ptr<const Values> at(const Item& sampler, bool is_rotation) {
     const auto [known, is_new] = known_.try_emplace({sampler.identity(), is_rotation});
     if (!is_new) return known->second;
     Values values = read(sampler, is_rotation);
     numbers_ += values.size();
-    // No more than the file could say of its nodes itself
+    // The same limit as for the numbers in the file itself
     if (numbers_ > kMaxGltfValues)
       values = wrong(sampler, fmt::format("animations give more than {} numbers at a time: split the scene",
                                           kMaxGltfValues));
@@ -107,10 +108,10 @@ class Sampler {
   Translation& t_;
   const double seconds_;
   std::map<std::pair<const Value*, bool>, std::shared_ptr<const Values>> known_;
-  std::size_t numbers_ = 0;  // of all that are known
+  std::size_t numbers_ = 0;  // in all values of known_
 };
 
-// The animations that are to be seen.
+// Returns the animations that `-D animation` chooses.
 std::vector<Item> chosen_of(const Translation& t, const Moment& moment) {
   const std::vector<Item> all = t.root["animations"].list();
   if (all.empty()) {

@@ -35,7 +35,7 @@ Stored stored(const char* at) {
   return x;
 }
 
-// The value of a component; whole numbers that are normalised are shares of the largest.
+// Returns the value of a component. A normalised integer is divided by the largest value of its type.
 double component(const char* at, std::size_t code, bool normalised) {
   const auto scaled = [&](double x, double most) { return normalised ? std::max(x / most, -1.) : x; };
   switch (code) {
@@ -56,7 +56,7 @@ double component(const char* at, std::size_t code, bool normalised) {
 
 }  // namespace
 
-// Where the elements of an accessor stand.
+// The position of an accessor's elements in a buffer, and their type.
 struct Buffers::Layout {
   std::size_t code = kFloat, bytes = 4, width = 1, count = 0, stride = 0;
   bool normalised = false;
@@ -128,8 +128,8 @@ std::optional<std::string_view> Buffers::view(const Item& index) {
   return std::nullopt;
 }
 
-// Returns where the elements of `owner` (an accessor, or a part of a sparse one) lie in its buffer view.
-// There are `count` elements, each with the layout `like`.
+// Returns the position of the elements of `owner` (an accessor, or a part of a sparse one) in its buffer
+// view. There are `count` elements, each with the layout `like`.
 std::optional<Buffers::Layout> Buffers::layout_in(const Item& owner, Layout like, std::size_t count,
                                                   bool strided) {
   const auto bytes = view(owner["bufferView"]);

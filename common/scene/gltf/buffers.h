@@ -14,7 +14,7 @@
 
 namespace ls::scene::gltf {
 
-// Numbers of one accessor, `width` an element.
+// The numbers of an accessor, `width` of them for each element.
 template <class T>
 struct Numbers {
   std::size_t width = 1;
@@ -28,8 +28,8 @@ class Buffers {
   Buffers(const Item& root, AssetSource& assets, std::optional<std::string_view> chunk)
       : root_(root), assets_(assets), chunk_(chunk) {}
 
-  // Each returns nullopt if the bytes are not there or are no such numbers, which has been reported. `view`
-  // is an index of a buffer view, `accessor` of an accessor; `types` are those that are wanted, as "VEC3".
+  // Each returns nullopt if bytes are missing or have another type, which has been reported. `view` is the
+  // index of a buffer view, `accessor` that of an accessor; `types` lists the accepted types, such as "VEC3".
   std::optional<std::string_view> view(const Item& view);
   std::optional<Numbers<float>> floats(const Item& accessor, std::initializer_list<std::string_view> types);
   std::optional<std::vector<std::uint32_t>> indices(const Item& accessor);

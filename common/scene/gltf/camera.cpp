@@ -99,7 +99,7 @@ class CameraTranslator {
     add(out, "far_clip", lens["zfar"].number(kFarthest), out.at);
   }
 
-  // Ours sees from -1 to 1 across the frame's width.
+  // Our orthographic camera covers [-1, 1] across the frame's width.
   Element orthographic(const Item& lens, const Transform& to_world, const Span& at) {
     const double x = std::abs(lens["xmag"].number(0)), y = std::abs(lens["ymag"].number(0));
     Element out = made("sensor", "orthographic", at);

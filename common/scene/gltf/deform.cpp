@@ -22,14 +22,14 @@ std::optional<Numbers<float>> read_like(Translation& t, const Item& accessor, st
   return read;
 }
 
-// Makes a vector 1 long, unless it is 0. In double, as the square of a float may be beyond its range.
+// Normalises a vector unless it is 0. Uses double, since the square of a float may overflow.
 void put_unit(float* out, const Vec3& v) {
   const double length = std::hypot(v[0], v[1], v[2]);
   for (std::size_t k = 0; k < 3; ++k) out[k] = static_cast<float>(length > 0 ? v[k] / length : v[k]);
 }
 
-// The matrix by which normals turn: a multiple of the inverse transpose of the linear part, made of the cross
-// products of its columns.
+// Returns the matrix that transforms normals: a multiple of the inverse transpose of the linear part, whose
+// columns are cross products of the columns of that.
 void turn_normal(const Transform& m, float* n) {
   const auto column = [&](std::size_t i) { return Vec3{{m.m[i], m.m[4 + i], m.m[8 + i]}}; };
   const Vec3 x = column(0), y = column(1), z = column(2);

@@ -1,4 +1,4 @@
-// The page docs/reference/gltf.md, written from the reader's table.
+// Generates docs/reference/gltf.md from the reader's table.
 #pragma once
 
 #include <string>

@@ -28,13 +28,13 @@ std::uint32_t word(std::string_view bytes, std::size_t at) {
   return x;
 }
 
-// What a file consists of; of a .glb two chunks.
+// The parts of a file: its JSON and, in a .glb, the binary chunk behind it.
 struct Pieces {
   std::string_view json;
   std::optional<std::string_view> chunk;
 };
 
-// Returns the pieces, or what is wrong with the file.
+// Returns the parts. Error: a message that says what is wrong with the file.
 tl::expected<Pieces, std::string> taken_apart(std::string_view file) {
   if (!file.starts_with(kMagic)) return Pieces{file, std::nullopt};
   if (file.size() < kHeaderBytes + kChunkBytes)
@@ -71,14 +71,14 @@ std::size_t size_of(const Element& e) {
   return n;
 }
 
-// What -D of the command line, or the defines of a job, choose.
+// The options that -D of the command line, or the defines of a job, set.
 struct Choices {
   std::string camera;
   std::optional<double> environment;
   Moment moment;
 };
 
-// The number that -D gives, in [least, most].
+// Parses the value of an option -D, a number in [least, most].
 double number_of(const std::string& name, const std::string& value, double least, double most,
                  const Item& root) {
   double x = 0;

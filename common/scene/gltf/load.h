@@ -11,7 +11,7 @@ namespace ls::scene::gltf {
 bool is_gltf(std::string_view file_name);  // by its ending, .gltf or .glb
 std::string too_large(std::size_t bytes);  // what to do about a file of so many
 
-// nullopt: it can't be read, which has been reported.
+// nullopt: the file cannot be read, which has been reported.
 std::optional<Document> load_document(std::string_view file_name, std::string_view text, AssetSource& assets,
                                       const ReadOptions& options, Report& report);
 

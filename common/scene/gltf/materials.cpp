@@ -12,7 +12,7 @@ namespace {
 
 // Below this alpha a surface is smooth, as in the add-on.
 constexpr double kSmooth = 1e-3;
-// Light that a medium lets through is never less than this, so that its extinction is finite.
+// Lower bound of attenuationColor: for a transmittance of 0 the extinction would be infinite.
 constexpr double kLeastPassed = 1e-6;
 
 Element two_sided(Element inner, const Span& at) {
@@ -61,7 +61,8 @@ class MaterialTranslator {
     read_specular();
   }
 
-  // The index whose reflection straight on is `specularFactor` times that of `ior`.
+  // Computes seen_ior_, the index of refraction whose reflectance at normal incidence is `specularFactor`
+  // times that of ior_.
   void read_specular() {
     const Item specular = m_.extension("KHR_materials_specular");
     for (const char* name : {"specularTexture", "specularColorTexture"})
@@ -76,14 +77,15 @@ class MaterialTranslator {
     seen_ior_ = factor == 1 ? ior_ : std::max((1 + std::sqrt(f0)) / (1 - std::sqrt(f0)), 1.001);
   }
 
-  // What is rough blurs what is seen through it, which a sheet does not.
+  // True if the glass is read as a solid body, not as a thin sheet: it has a volume, or it is rough and so
+  // blurs what is behind it, as a sheet cannot.
   bool is_body() const {
     const double alpha = roughness_.factor[0] * roughness_.factor[0];
     return !roughness_.is_constant() || alpha >= kSmooth || has_volume();
   }
   bool has_volume() const { return m_.extension("KHR_materials_volume")["thicknessFactor"].number(0) > 0; }
 
-  // Unlit is what shines by itself and reflects nothing.
+  // An unlit material (KHR_materials_unlit) emits its colour and reflects nothing.
   Element unlit(Material& out) {
     out.light = shining(base_);
     Element black = made("bsdf", "diffuse", at_);
@@ -145,7 +147,7 @@ class MaterialTranslator {
       if (coat[name].given()) t_.warn_once(coat[name], fmt::format("{} has no effect here", name));
   }
 
-  // A body of glass, with what is in it.
+  // A solid body of glass, with the medium inside of it.
   Element body(Material& out) {
     if (has_volume())
       out.interior = interior();
@@ -162,7 +164,7 @@ class MaterialTranslator {
     Element glass = made("bsdf", smooth ? "dielectric" : "roughdielectric", at_);
     add(glass, "int_ior", ior_, at_);
     add(glass, "ext_ior", 1., at_);
-    // Light passes two surfaces of a body, so that each gives it the root of the colour.
+    // A ray through a body crosses its surface twice, so each crossing multiplies by the root of the colour.
     Rgb passed{};
     for (std::size_t i = 0; i < 3; ++i) passed[i] = std::sqrt(std::max(base_.factor[i], 0.));
     add(glass, "specular_transmittance", passed, at_);
@@ -174,7 +176,8 @@ class MaterialTranslator {
     return glass;
   }
 
-  // Of white light the share attenuationColor is left after attenuationDistance.
+  // Adds the absorbing medium whose transmittance over attenuationDistance is attenuationColor. Returns its
+  // id; empty: it absorbs nothing.
   std::string interior() {
     const Item volume = m_.extension("KHR_materials_volume");
     const auto colour = volume["attenuationColor"].numbers<3>({1, 1, 1});
@@ -196,7 +199,7 @@ class MaterialTranslator {
     return id;
   }
 
-  // A smooth surface that transmits without a volume is a sheet: light passes straight on.
+  // A smooth transmitting surface without a volume is a thin sheet: light passes straight through.
   Element sheet(Material& out) {
     Element glass = made("bsdf", "thindielectric", at_);
     add(glass, "int_ior", ior_, at_);
@@ -255,7 +258,7 @@ class MaterialTranslator {
   double ior_ = 1.5, seen_ior_ = 1.5;
 };
 
-// Every texture that is read of a material.
+// All textures of a material that are read.
 std::vector<Item> textures_of(const Item& m) {
   const Item pbr = m["pbrMetallicRoughness"];
   return {pbr["baseColorTexture"],

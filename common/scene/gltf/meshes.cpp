@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kTriangles = 4, kStrip = 5, kFan = 6;
 
-// The corners of all triangles. Those of a strip change their sense of turning from one to the next.
+// Returns the corner indices of all triangles. In a strip, every second triangle has the opposite winding.
 std::vector<std::uint32_t> triangles(const std::vector<std::uint32_t>& order, std::size_t mode) {
   std::vector<std::uint32_t> out;
   const std::size_t count =
@@ -31,7 +31,7 @@ std::vector<std::uint32_t> triangles(const std::vector<std::uint32_t>& order, st
   return out;
 }
 
-// True if the texture coordinates of some triangles turn the other way than the triangles do.
+// True if some triangle is mirrored in texture space: its winding there is the opposite of that in space.
 bool has_mirrored_uvs(const MadeMesh& mesh) {
   for (std::size_t i = 0; !mesh.uvs.empty() && i < mesh.indices.size(); i += 3) {
     const auto at = [&](std::size_t k, std::size_t axis) {
@@ -175,7 +175,7 @@ Element Meshes::shape(const Surface& s) {
   return out;
 }
 
-// What shines can't be an instance: it stands in the scene as often as it is used.
+// Meshes that emit light cannot be instanced, so they are added once for each use.
 void Meshes::add(const std::vector<Use>& uses) {
   using Form = std::tuple<const Value*, const std::vector<double>*, const std::vector<Transform>*>;
   const auto form_of = [](const Use& use) { return Form{use.mesh.identity(), use.weights, use.joints}; };
@@ -195,7 +195,7 @@ void Meshes::add(const std::vector<Use>& uses) {
     const auto placed = [&](const Surface& s, const Use& use) {
       Element e = shape(s);
       place(e, use.to_world, s.at);
-      // A mirror turns the order of corners round, and in glTF the front stays in front.
+      // A mirroring transform reverses the winding of triangles. In glTF their front stays the front.
       if (determinant3(use.to_world) < 0) scene::add(e, "boolean", "flip_normals", "true", s.at);
       if (s.material.light) scene::add(e, *s.material.light);
       t_.add(std::move(e));

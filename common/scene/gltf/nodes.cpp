@@ -24,7 +24,7 @@ class NodeReader {
   }
 
  private:
-  // The nodes of the file's scene; without scenes, all that are not within another.
+  // Returns the root nodes of the file's scene; if it has no scenes, all nodes without a parent.
   std::vector<Item> roots() {
     std::vector<Item> out;
     const std::vector<Item> scenes = t_.root["scenes"].list();
@@ -43,8 +43,8 @@ class NodeReader {
     return {};
   }
 
-  // `hidden`: what holds the node is not visible. Then the node isn't either, but it may be a joint of what
-  // is.
+  // `hidden`: an ancestor is invisible (KHR_node_visibility), and so is this node; but it may be a joint of a
+  // visible mesh.
   void visit(const Item& index, const Transform& outer, std::size_t depth, bool hidden) {
     const Item node = index.in(nodes_);
     if (!node.given() || t_.report.full()) return;
@@ -77,7 +77,7 @@ class NodeReader {
     Meshes::Use use{mesh, node, to_world, weights_of(mesh, node)};
     const Item instancing = node.extension("EXT_mesh_gpu_instancing");
     if (node["skin"].given()) {
-      // It leaves the node's own transform out, and places each corner in the world.
+      // A skin places each corner in the world, and ignores the transform of the node itself.
       use.to_world = {};
       stage_.meshes.push_back(use);
     } else if (instancing.given()) {
@@ -131,7 +131,7 @@ class NodeReader {
     return found == poses_.end() ? kStill : found->second;
   }
 
-  // The weights of morph targets; nullptr if the mesh has none of them, or has its base form.
+  // Returns the weights of morph targets; nullptr: there are no targets, or all weights are 0.
   const std::vector<double>* weights_of(const Item& mesh, const Item& node) {
     const auto& moved = pose_of(node).weights;
     const Item given = node["weights"].given() ? node["weights"] : mesh["weights"];
@@ -161,7 +161,8 @@ class NodeReader {
     return &*stage_.weights.insert(std::move(weights)).first;
   }
 
-  // How many morph targets the mesh has: all its primitives as many as the first, see add_targets().
+  // Returns the number of morph targets of the mesh, which its first primitive determines (see
+  // add_targets()).
   std::size_t targets_of(const Item& mesh) {
     const auto [known, is_new] = targets_.try_emplace(mesh.identity());
     if (!is_new) return known->second;

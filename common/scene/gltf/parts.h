@@ -19,7 +19,7 @@ namespace ls::scene::gltf {
 
 inline constexpr double kDegrees = 180 / std::numbers::pi;  // of a radian
 
-// The translated scene as far as it is read.
+// The scene as translated so far.
 struct Translation {
   AssetSource& assets;
   Report& report;
@@ -28,7 +28,7 @@ struct Translation {
   Element scene;
   std::size_t elements = 0;  // in `scene`
   bool has_light = false;
-  std::vector<std::string> warned;             // what is warned of once a file
+  std::vector<std::string> warned;             // texts of warnings that are given once a file
   std::map<const Value*, std::string> images;  // names of the files of images that are read
 
   std::set<std::string> ids;
@@ -38,10 +38,10 @@ struct Translation {
   void warn_once(const Item& at, std::string text);
 };
 
-// animation.cpp: what animations give nodes at one moment.
+// In animation.cpp: the pose of animated nodes at one moment.
 struct Moment {
-  std::optional<double> seconds;  // nullopt: nodes stand as they say themselves
-  std::string animation;          // name of the one that is seen; empty: the first; "*": all
+  std::optional<double> seconds;  // nullopt: animations have no effect
+  std::string animation;          // name of an animation; empty: the first one; "*": all
 };
 struct Pose {
   std::optional<std::array<double, 3>> translation, scale;
@@ -51,20 +51,21 @@ struct Pose {
 using Poses = std::map<const Value*, Pose>;  // by the node
 Poses read_poses(Translation& t, const Moment& moment);
 
-// deform.cpp: each changes positions and normals of `mesh`, which are those of `primitive`. False: something
-// is wrong, which has been reported.
-// Adds the morph targets, each times its weight.
+// In deform.cpp. Each changes the positions and normals of `mesh`, which was read from `primitive`. False:
+// the file is wrong, which has been reported.
+//
+// Adds the morph targets, each multiplied by its weight.
 bool add_targets(Translation& t, const Item& primitive, const std::vector<double>& weights, MadeMesh& mesh);
-// Moves corners with their joints, and turns the order of a triangle's corners round if they mirror most of
-// it. `joints`: the matrix of each, from the mesh as it is stored to the world.
+// Moves corners with their joints. Reverses the winding of triangles that most of their joints mirror.
+// `joints`: the matrix of each joint, from the mesh as stored to the world.
 bool add_skin(Translation& t, const Item& primitive, const std::vector<Transform>& joints, MadeMesh& mesh);
 
 // placing.cpp: matrices.
 Transform composed(const Vec3& move, const std::array<double, 4>& rotation, const Vec3& scale);
 Transform matrix_of(const std::array<double, 16>& by_columns);
 Transform local_transform(const Item& node, const Pose& pose);
-// Something at the origin of `to_world` that looks along its -z with +y up, without its scale and shear, as
-// ours look along +z. nullopt: it has no direction.
+// glTF's cameras and lights look along -z of `to_world`, ours along +z. Returns our transform, with +y up and
+// without scale and shear. nullopt: `to_world` is degenerate.
 std::optional<Transform> facing(const Transform& to_world);
 Transform looking(const Vec3& eye, const Vec3& target);
 void place(Element& parent, const Transform& to_world, const Span& at);
@@ -76,7 +77,7 @@ struct Box {
   bool is_empty() const { return low[0] > high[0]; }
 };
 
-// textures.cpp: a value that may be an image, or a product with one.
+// In textures.cpp: a value that is a constant, or the product of a constant and images.
 struct Source {
   std::array<double, 3> factor{1, 1, 1};
   std::vector<Element> images;  // by which the factor is multiplied
@@ -85,19 +86,20 @@ struct Source {
   bool is(double x) const { return is_constant() && factor == std::array<double, 3>{x, x, x}; }
 };
 enum class Part { colour, red, green, blue, alpha, normal };
-// The texture at `info`, a member such as "baseColorTexture"; nullopt: it is not given, or wrong and
-// reported.
+// Returns the texture at `info`, a member such as "baseColorTexture". nullopt: there is none, or it is wrong,
+// which has been reported.
 std::optional<Element> texture(Translation& t, const Item& info, Part part);
-// The set of texture coordinates that `info` names.
+// Returns the index of the set of texture coordinates that `info` names.
 std::size_t uv_set(const Item& info);
-// A factor (one number, or a colour) times a texture, either of which may be missing.
+// Each returns the product of a factor (a number or a colour) and a texture; either may be missing.
 Source number_source(Translation& t, const Item& factor, double fallback, const Item& info, Part part);
 Source colour_source(Translation& t, const std::array<double, 3>& factor, const Item& info);
-// Gives `parent` the parameter. With a threshold above 0 it is 1 where the value is at least that, else 0.
+// Adds the value to `parent` as the parameter `name`. With a threshold above 0 the parameter is 1 where the
+// value is at least the threshold, else 0.
 void give(Element& parent, std::string_view name, const Source& source, const Span& at, double threshold = 0);
 Element vertex_attribute(std::string_view name, const Span& at);
 
-// materials.cpp: what a material becomes for meshes of one kind.
+// In materials.cpp: a translated material, for meshes of one kind.
 struct Material {
   std::string id;        // of its bsdf
   std::string interior;  // id of the medium within; empty: none
@@ -106,13 +108,13 @@ struct Material {
   bool has_normal_map = false;
 };
 struct MeshKind {
-  bool colours = false, opacities = false;  // what its corners have
+  bool colours = false, opacities = false;  // true if its corners have them
   auto operator<=>(const MeshKind&) const = default;
 };
 class Materials {
  public:
   explicit Materials(Translation& t) : t_(t) {}
-  // `index`: of a primitive, which may have none. The set of texture coordinates does not depend on `kind`.
+  // `index`: the material of a primitive, which may have none. uv_set does not depend on `kind`.
   const Material& of(const Item& index, const MeshKind& kind);
   bool uses_opacity(const Item& index) const;
   std::size_t uv_set(const Item& index);
@@ -156,7 +158,7 @@ class Meshes {
   Box box_;
 };
 
-// nodes.cpp: what stands in the scene, placed.
+// In nodes.cpp: the objects of the scene, with their transforms.
 struct Standing {
   Item node;
   Transform to_world;
@@ -164,7 +166,7 @@ struct Standing {
 struct Stage {
   std::vector<Meshes::Use> meshes;
   std::vector<Standing> lights, cameras;
-  // To these meshes point. Equal weights stand here once, however many nodes and instances have them.
+  // Meshes::Use has pointers into these. Equal weights are stored once, however many nodes have them.
   std::map<const Value*, std::vector<Transform>> skins;
   std::set<std::vector<double>> weights;
 };
@@ -173,7 +175,7 @@ Stage read_nodes(Translation& t, const Poses& poses);
 // lights.cpp
 void add_light(Translation& t, const Standing& light);
 
-// camera.cpp: the camera of that name (empty: the first), or one that sees `box`.
+// In camera.cpp. Adds the camera of that name (empty: the first); if there is none, one that sees `box`.
 void add_camera(Translation& t, const std::vector<Standing>& cameras, const std::string& name,
                 const Box& box);
 

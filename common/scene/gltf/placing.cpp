@@ -1,4 +1,4 @@
-// Where nodes, cameras and lights stand.
+// Transforms of nodes, cameras and lights.
 #include <algorithm>
 #include <cmath>
 
@@ -16,7 +16,7 @@ std::optional<Vec3> unit(const Vec3& v) {
 
 Vec3 column(const Transform& t, std::size_t i) { return Vec3{{t.m[i], t.m[4 + i], t.m[8 + i]}}; }
 
-// With +x on the left, as our cameras have it.
+// Returns the transform of a camera at `at` that looks along `along`. Our cameras have +x on the left.
 std::optional<Transform> upright(const Vec3& at, const Vec3& along, const Vec3& up) {
   const auto ahead = unit(along);
   const auto left = ahead ? unit(cross(up, *ahead)) : std::nullopt;
@@ -56,7 +56,7 @@ Transform matrix_of(const std::array<double, 16>& by_columns) {
   return out;
 }
 
-// A matrix, or a translation, a rotation and a scale.
+// A node has either a matrix, or a translation, a rotation and a scale, which animations change.
 Transform local_transform(const Item& node, const Pose& pose) {
   if (node["matrix"].given())
     return matrix_of(node["matrix"].numbers<16>({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}));

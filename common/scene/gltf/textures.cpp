@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::string_view kPng = "\x89PNG", kJpeg = "\xff\xd8\xff";
 
-// The ending of the name of a file of such bytes; empty: they are no image that is read.
+// Returns the file name extension for these bytes; empty: they are not an image of a supported format.
 std::string_view ending_of(std::string_view bytes) {
   return bytes.starts_with(kPng) ? ".png" : bytes.starts_with(kJpeg) ? ".jpg" : "";
 }
@@ -25,7 +25,7 @@ bool is_image_name(std::string name) {
   return name.ends_with(".png") || name.ends_with(".jpg") || name.ends_with(".jpeg");
 }
 
-// The name of an image's file; empty: it can't be read, which has been reported.
+// Returns the name of an image's file; empty: it cannot be read, which has been reported.
 std::string read_image(Translation& t, const Item& image) {
   const Item uri = image["uri"];
   std::string held;
@@ -158,7 +158,7 @@ Source colour_source(Translation& t, const std::array<double, 3>& factor, const 
   return out;
 }
 
-// The last image stands for itself, and each before it, and the factor, for a product with what follows.
+// Several images, or an image and a factor, become nested textures "product"; the last image is innermost.
 void give(Element& parent, std::string_view name, const Source& source, const Span& at, double threshold) {
   if (source.is_constant()) {
     const auto& c = source.factor;

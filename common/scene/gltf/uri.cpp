@@ -54,7 +54,7 @@ std::optional<std::string> decode_percent(std::string_view text) {
   return out;
 }
 
-// A name that can be written in XML and JSON and read back.
+// True if the name can be written to XML and JSON and read back unchanged.
 bool is_name(const std::string& name) {
   const bool is_text = std::min(find_invalid_utf8(name), find_control(name)) == std::string::npos;
   return is_text && !name.empty() && name.find_first_of("\t\r\n") == std::string::npos;

@@ -1,4 +1,4 @@
-// What a "uri" of a glTF file names: a file beside it, or bytes that stand in the text.
+// Reads a "uri" of a glTF file: the name of a file beside it, or a data URI, which contains the bytes.
 #pragma once
 
 #include <optional>
@@ -14,7 +14,7 @@ struct Uri {
   std::string text;  // the bytes of a data URI; otherwise the name of the file
 };
 
-// nullopt: it is neither, which has been reported.
+// nullopt: the text is neither, which has been reported.
 std::optional<Uri> read_uri(const Item& uri);
 
 }  // namespace ls::scene::gltf

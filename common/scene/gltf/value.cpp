@@ -12,7 +12,7 @@
 namespace ls::scene::gltf {
 namespace {
 
-// Tells how far the parser has read.
+// An input iterator that records how far the parser has read.
 class Reading {
  public:
   using iterator_category = std::input_iterator_tag;
@@ -122,7 +122,7 @@ class Builder {
   std::string wrong_;
 };
 
-// The last of the values that begin at or before `offset`; nullptr: none does.
+// Returns the last of the values that begin at or before `offset`; nullptr: there is none.
 template <class List, class Offset>
 const auto* last_before(const List& list, std::size_t offset, Offset offset_of) {
   const auto after = std::upper_bound(list.begin(), list.end(), offset,

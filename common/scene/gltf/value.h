@@ -1,5 +1,5 @@
-// A JSON text as a tree that knows where in the text each value stands, and reading it with errors that have
-// that place. Errors say the path of the value, as in "materials[3].normalTexture".
+// JSON as a tree of values that know their place in the text, for errors that have this place. Errors also
+// contain the path of the value, such as "materials[3].normalTexture".
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ struct Member;
 struct Value {
   using List = std::vector<Value>;
   using Members = std::vector<Member>;
-  std::size_t offset = 0;  // in the text: of a member that of its name
+  std::size_t offset = 0;  // place in the text; for a member of an object, the place of its name
   std::variant<std::monostate, bool, double, std::string, List, Members> is;
 };
 struct Member {
@@ -28,21 +28,22 @@ struct Member {
   Value value;
 };
 
-// Parses a JSON text, and adds it to the report as a file of that name, in whose diagnostics the paths of
-// values stand. nullptr: it is malformed or beyond the limits, which has been reported.
+// Parses a JSON text, and adds it to the report as a file of that name whose diagnostics contain the paths of
+// values. nullptr: the text is malformed or beyond the limits, which has been reported.
 std::shared_ptr<const Value> parse_json(std::string name, std::string text, Report& report);
 
-// "materials[3].normalTexture" for the innermost value at or before `offset`; "" for the whole.
+// Returns the path of the innermost value at or before `offset`, such as "materials[3].normalTexture"; ""
+// for the root.
 std::string path_at(const Value& root, std::size_t offset);
 
-// A value that the file may have or lack. What is wrong with it is reported once it is asked for; then the
-// fallback is returned.
+// A value that the file may lack. The functions that read it return the fallback if it is missing, or if it
+// has the wrong type, which they report.
 class Item {
  public:
   Item(const Value& value, Report& report) : value_(&value), near_(&value), report_(&report) {}
 
   bool given() const { return value_ != nullptr; }
-  // A member of an object; of what is not given, nothing is given.
+  // Returns a member of an object; a value that is not given has members that are not given.
   Item operator[](std::string_view name) const;
   Item extension(std::string_view name) const { return (*this)["extensions"][name]; }
   std::vector<Item> list() const;  // the values of a list
@@ -56,9 +57,11 @@ class Item {
     std::copy(all.begin(), all.end(), fallback.begin());
     return fallback;
   }
-  // A whole number from `least` to `most`; nullopt: it is not given, or it is wrong and reported.
+  // Returns a whole number from `least` to `most`. nullopt: it is not given, or it is wrong, which is
+  // reported.
   std::optional<std::size_t> whole(std::size_t least, std::size_t most) const;
-  // Returns the value that this index in the list `all` stands for; not given: so is the result.
+  // Returns the value in the list `all` that this value is the index of. If this value is not given, neither
+  // is the result.
   Item in(const Item& all) const;
 
   Span at() const { return {0, near_->offset, 1}; }

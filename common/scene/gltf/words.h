@@ -1,5 +1,5 @@
-// What glTF's files can say, and what becomes of it here. The reader asks this table about extensions;
-// docs/reference/gltf.md is written from it.
+// The objects and extensions of glTF, and how they are translated. The reader looks up extensions in this
+// table, and docs/reference/gltf.md is generated from it.
 #pragma once
 
 #include <span>
@@ -9,9 +9,9 @@ namespace ls::scene::gltf {
 
 enum class Use { read, ignored, refused };
 struct Row {
-  std::string_view where, name;  // the object and its member; of an extension its name
+  std::string_view where, name;  // the object and its member; for an extension "" and its name
   Use use;
-  std::string_view meaning;  // what becomes of it; if nothing does, why, and what to do
+  std::string_view meaning;  // how it is translated; if it is not, the reason and what to do
 };
 
 std::span<const Row> objects();

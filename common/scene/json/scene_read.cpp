@@ -146,9 +146,8 @@ class ObjectReader {
     ObjectReader r(j, std::move(path), wrong_);
     const std::string type = r.type();
     if (!wrong_.empty()) return;
-    const bool known =
-        ((kInfo<Ts>.name == type && (x.template emplace<Ts>(), describe(r, std::get<Ts>(x)), true)) || ...);
-    if (!known) r.fail("type", "is unknown");
+    const auto read = [&]<class Kind>() { describe(r, x.template emplace<Kind>()); };
+    if (!with_kind_named<std::variant<Ts...>>(type, read)) r.fail("type", "is unknown");
     r.finish();
   }
 

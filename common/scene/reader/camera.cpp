@@ -147,23 +147,18 @@ void Reader::check_crop(const Element& e, Params& p, bool has_width, bool has_he
   if (f.crop_size == f.size) f.crop_size = {0, 0};
 }
 
-template <class T>
-ReconstructionFilter Reader::read_plain_filter(const Element& e) {
-  Params p(*this, e);
-  T filter;
-  bind(p, filter);
-  p.finish();
-  return filter;
-}
-
 ReconstructionFilter Reader::read_filter(const Element& e) {
   used_parts_.insert(&e);
-  const std::string_view type = e.get("type");
-  if (type == "box") return read_plain_filter<BoxFilter>(e);
-  if (type == "tent") return read_plain_filter<TentFilter>(e);
-  if (type == "gaussian") return read_plain_filter<GaussianFilter>(e);
-  unknown_plugin(e, report_);
-  return GaussianFilter{};
+  ReconstructionFilter filter = GaussianFilter{};
+  const auto read = [&]<class Kind>() {
+    Params p(*this, e);
+    Kind kind;
+    bind(p, kind);
+    p.finish();
+    filter = kind;
+  };
+  if (!with_kind_named<ReconstructionFilter>(e.get("type"), read)) unknown_plugin(e, report_);
+  return filter;
 }
 
 // Reads only the number of samples: the sampler itself is always this program's own.

@@ -7,24 +7,15 @@
 
 namespace ls::scene {
 
-void Reader::read_emitter(const Element& e) {
-  const std::string_view type = e.get("type");
-  // Reads a kind all of whose parameters have rows in describe().
-  const auto read_plain = [&](auto emitter) {
-    Params p(*this, e);
-    bind(p, emitter);
-    p.finish();
-    scene_.emitters.emplace_back(emitter);
-  };
-  if (type == "directional") return read_directional(e);
-  if (type == "point") return read_point(e);
-  if (type == "spot") return read_spot(e);
-  if (type == "envmap") return read_envmap(e);
-  if (type == "projector") return read_projector(e);
-  if (type == "area") return report_.error(e.at, "an emitter \"area\" stands in the shape that shines");
-  if (type != "constant") return unknown_plugin(e, report_);
-  check_only_environment(e);
-  read_plain(ConstantEmitter{});
+// Reads a kind all of whose parameters have rows in describe(). Kinds that need more are specialised below.
+template <class Kind>
+void Reader::read_emitter_as(const Element& e) {
+  if constexpr (std::is_same_v<Kind, ConstantEmitter>) check_only_environment(e);
+  Params p(*this, e);
+  Kind emitter;
+  bind(p, emitter);
+  p.finish();
+  scene_.emitters.emplace_back(emitter);
 }
 
 void Reader::check_only_environment(const Element& e) {
@@ -33,7 +24,8 @@ void Reader::check_only_environment(const Element& e) {
       report_.error(e.at, "a second environment: a scene has one emitter \"constant\" or \"envmap\" at most");
 }
 
-void Reader::read_envmap(const Element& e) {
+template <>
+void Reader::read_emitter_as<EnvmapEmitter>(const Element& e) {
   Params p(*this, e);
   EnvmapEmitter emitter;
   bind(p, emitter);
@@ -44,7 +36,8 @@ void Reader::read_envmap(const Element& e) {
   scene_.emitters.emplace_back(emitter);
 }
 
-void Reader::read_directional(const Element& e) {
+template <>
+void Reader::read_emitter_as<DirectionalEmitter>(const Element& e) {
   Params p(*this, e);
   DirectionalEmitter emitter;
   if (p.has("direction") && p.has("to_world"))
@@ -56,7 +49,8 @@ void Reader::read_directional(const Element& e) {
   scene_.emitters.emplace_back(emitter);
 }
 
-void Reader::read_point(const Element& e) {
+template <>
+void Reader::read_emitter_as<PointEmitter>(const Element& e) {
   Params p(*this, e);
   PointEmitter emitter;
   if (p.has("position") && p.has("to_world"))
@@ -67,7 +61,8 @@ void Reader::read_point(const Element& e) {
   scene_.emitters.emplace_back(emitter);
 }
 
-void Reader::read_projector(const Element& e) {
+template <>
+void Reader::read_emitter_as<ProjectorEmitter>(const Element& e) {
   Params p(*this, e);
   ProjectorEmitter emitter;
   Sensor lens;  // a projector has the field-of-view parameters of a camera
@@ -85,7 +80,8 @@ void Reader::read_projector(const Element& e) {
   scene_.emitters.emplace_back(emitter);
 }
 
-void Reader::read_spot(const Element& e) {
+template <>
+void Reader::read_emitter_as<SpotEmitter>(const Element& e) {
   Params p(*this, e);
   SpotEmitter emitter;
   const bool has_beam = p.has("beam_width");
@@ -102,6 +98,13 @@ void Reader::read_spot(const Element& e) {
   if (!invertible(emitter.to_world))
     report_.error(e.at, "to_world flattens this light or leaves the range of numbers: it can't be inverted");
   scene_.emitters.emplace_back(emitter);
+}
+
+void Reader::read_emitter(const Element& e) {
+  const std::string_view type = e.get("type");
+  if (type == "area") return report_.error(e.at, "an emitter \"area\" stands in the shape that shines");
+  if (!with_kind_named<Emitter>(type, [&]<class Kind>() { read_emitter_as<Kind>(e); }))
+    unknown_plugin(e, report_);
 }
 
 }  // namespace ls::scene

@@ -127,15 +127,13 @@ std::optional<PhaseIndex> Reader::read_phase(const Element& e) {
 
 std::optional<MediumIndex> Reader::read_medium(const Element& e) {
   std::optional<MediumIndex> read;
-  const auto read_as = [&]<class... Kinds>(std::type_identity<std::variant<Kinds...>>) {
-    return ((e.get("type") == kInfo<Kinds>.name && (read = read_any_medium<Kinds>(e), true)) || ...);
-  };
-  if (!read_as(std::type_identity<Medium>{})) unknown_plugin(e, report_);
+  if (!with_kind_named<Medium>(e.get("type"), [&]<class Kind>() { read = read_medium_as<Kind>(e); }))
+    unknown_plugin(e, report_);
   return read;
 }
 
 template <class T>
-std::optional<MediumIndex> Reader::read_any_medium(const Element& e) {
+std::optional<MediumIndex> Reader::read_medium_as(const Element& e) {
   Params p(*this, e);
   T medium;
   if (e.old) read_old_coefficients(p, medium, report_);

@@ -77,21 +77,13 @@ class Reader {
   std::optional<TextureIndex> read_raw_constant(const Element& e);
   std::optional<Spectrum> read_spectrum(const Element& e);
   std::optional<BsdfIndex> read_bsdf(const Element& e);
+  template <class Kind>
+  std::optional<BsdfIndex> read_bsdf_as(const Element& e);
   template <class T>
-  std::optional<BsdfIndex> read_plain_bsdf(const Element& e);
-  template <class T>
-  std::optional<BsdfIndex> read_metal(const Element& e);
-  template <class T>
-  std::optional<BsdfIndex> read_rough(const Element& e);
-  std::optional<BsdfIndex> read_twosided(const Element& e);
+  void bind_rough(Params& p, T& b);
   TextureIndex old_number(const Element& e, TextureIndex t);
   void check_multiple_scattering(const Element& e, TextureIndex alpha_u, TextureIndex alpha_v);
-  std::optional<BsdfIndex> read_mask(const Element& e);
-  std::optional<BsdfIndex> read_blend(const Element& e);
-  std::optional<BsdfIndex> read_normal_map(const Element& e);
-  std::optional<BsdfIndex> read_bump_map(const Element& e);
   bool read_heights(Params& p, BumpMapBsdf& b);
-  std::optional<BsdfIndex> read_principled(const Element& e);
   std::optional<std::vector<BsdfIndex>> read_inner_bsdfs(Params& p, std::size_t at_least,
                                                          std::size_t at_most);
   std::optional<BsdfIndex> add_bsdf(const Element& e, const Bsdf& bsdf);
@@ -100,8 +92,8 @@ class Reader {
   std::optional<VolumeIndex> read_volume(const Element& e);
   std::optional<PhaseIndex> read_phase(const Element& e);
   std::optional<MediumIndex> read_medium(const Element& e);
-  template <class T>
-  std::optional<MediumIndex> read_any_medium(const Element& e);
+  template <class Kind>
+  std::optional<MediumIndex> read_medium_as(const Element& e);
   void unbound_constant_density(const Element& e);
 
   void read_shape(const Element& e);
@@ -117,11 +109,8 @@ class Reader {
   void refuse_in_group(const Element& use, std::string_view type);
 
   void read_emitter(const Element& e);
-  void read_directional(const Element& e);
-  void read_point(const Element& e);
-  void read_spot(const Element& e);
-  void read_projector(const Element& e);
-  void read_envmap(const Element& e);
+  template <class Kind>
+  void read_emitter_as(const Element& e);
   void check_only_environment(const Element& e);
 
   void read_sensor(const Element& e);
@@ -131,8 +120,6 @@ class Reader {
   void read_film(const Element& e);
   void check_crop(const Element& e, Params& p, bool has_width, bool has_height);
   ReconstructionFilter read_filter(const Element& e);
-  template <class T>
-  ReconstructionFilter read_plain_filter(const Element& e);
   void read_sampler(const Element& e);
   void read_integrator(const Element& e, int depth);
   void refuse(Params& p, std::initializer_list<std::string_view> names, std::string_view of);

@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kMaxCurvePoints = 4096;  // of one curve
 constexpr double kHottest = 1e6;               // kelvin
 
-// The numbers of a needed <string>; empty: there is an error, which has been reported.
+// Reads the numbers of a required <string>. Empty: it is missing or wrong, which has been reported.
 std::vector<double> curve_numbers(Params& p, std::string_view name, Report& report) {
   const Element* given = p.take(name);
   if (!given)

@@ -89,43 +89,6 @@ std::optional<TextureIndex> Reader::read_raw_constant(const Element& e) {
   return add_constant_texture(value);
 }
 
-namespace {
-
-// Reads all fields that the table has for T; `alpha` sets alpha_u and alpha_v.
-template <class T>
-void bind_with_alpha(Params& p, T& b, Report& report) {
-  if (p.has("alpha") && (p.has("alpha_u") || p.has("alpha_v")))
-    report.error(p.object().at, fmt::format("{} gives both alpha and alpha_u, alpha_v", p.title()));
-  bind(p, b);
-  if (const Element* alpha = p.take("alpha")) {
-    p.convert({.name = "alpha", .doc = "", .range = kPositive}, *alpha, b.alpha_u);
-    b.alpha_v = b.alpha_u;
-  }
-}
-
-}  // namespace
-
-std::optional<BsdfIndex> Reader::read_bsdf(const Element& e) {
-  const std::string_view type = e.get("type");
-  if (type == "diffuse") return read_plain_bsdf<DiffuseBsdf>(e);
-  if (type == "null") return read_plain_bsdf<NullBsdf>(e);
-  if (type == "dielectric") return read_plain_bsdf<DielectricBsdf>(e);
-  if (type == "thindielectric") return read_plain_bsdf<ThinDielectricBsdf>(e);
-  if (type == "roughdielectric") return read_rough<RoughDielectricBsdf>(e);
-  if (type == "plastic") return read_plain_bsdf<PlasticBsdf>(e);
-  if (type == "roughplastic") return read_plain_bsdf<RoughPlasticBsdf>(e);
-  if (type == "conductor") return read_metal<ConductorBsdf>(e);
-  if (type == "roughconductor") return read_metal<RoughConductorBsdf>(e);
-  if (type == "twosided") return read_twosided(e);
-  if (type == "mask") return read_mask(e);
-  if (type == "blendbsdf") return read_blend(e);
-  if (type == "normalmap") return read_normal_map(e);
-  if (type == "bumpmap") return read_bump_map(e);
-  if (type == "principled") return read_principled(e);
-  unknown_plugin(e, report_);
-  return std::nullopt;
-}
-
 std::optional<BsdfIndex> Reader::add_bsdf(const Element& e, const Bsdf& bsdf) {
   scene_.bsdfs.push_back(bsdf);
   const BsdfIndex index{static_cast<std::uint32_t>(scene_.bsdfs.size() - 1)};
@@ -141,10 +104,11 @@ const BsdfTraits& Reader::traits(BsdfIndex bsdf) {
   return bsdf_traits_[bsdf.value];
 }
 
-template <class T>
-std::optional<BsdfIndex> Reader::read_plain_bsdf(const Element& e) {
+// Reads a kind all of whose parameters have rows in describe(). Kinds that need more are specialised below.
+template <class Kind>
+std::optional<BsdfIndex> Reader::read_bsdf_as(const Element& e) {
   Params p(*this, e);
-  T b;
+  Kind b;
   bind(p, b);
   p.finish();
   return add_bsdf(e, b);
@@ -167,32 +131,27 @@ void Reader::check_multiple_scattering(const Element& e, TextureIndex alpha_u, T
                                     e.get("type")));
 }
 
+// Reads all fields that the table has for T, a rough surface; `alpha` sets alpha_u and alpha_v.
 template <class T>
-std::optional<BsdfIndex> Reader::read_rough(const Element& e) {
-  Params p(*this, e);
-  T b;
-  bind_with_alpha(p, b, report_);
+void Reader::bind_rough(Params& p, T& b) {
+  const Element& e = p.object();
+  if (p.has("alpha") && (p.has("alpha_u") || p.has("alpha_v")))
+    report_.error(e.at, fmt::format("{} gives both alpha and alpha_u, alpha_v", p.title()));
+  bind(p, b);
+  if (const Element* alpha = p.take("alpha")) {
+    p.convert({.name = "alpha", .doc = "", .range = kPositive}, *alpha, b.alpha_u);
+    b.alpha_v = b.alpha_u;
+  }
   b.alpha_u = old_number(e, b.alpha_u);
   b.alpha_v = old_number(e, b.alpha_v);
   if (b.multiple_scattering) check_multiple_scattering(e, b.alpha_u, b.alpha_v);
-  p.finish();
-  return add_bsdf(e, b);
 }
 
-// Reads a conductor; eta and k may also be given by a metal's name.
-template <class T>
-std::optional<BsdfIndex> Reader::read_metal(const Element& e) {
+template <>
+std::optional<BsdfIndex> Reader::read_bsdf_as<RoughDielectricBsdf>(const Element& e) {
   Params p(*this, e);
-  T b;
-  read_metal_preset(p, b.eta, b.k);
-  if constexpr (std::is_same_v<T, RoughConductorBsdf>) {
-    bind_with_alpha(p, b, report_);
-    b.alpha_u = old_number(e, b.alpha_u);
-    b.alpha_v = old_number(e, b.alpha_v);
-    if (b.multiple_scattering) check_multiple_scattering(e, b.alpha_u, b.alpha_v);
-  } else {
-    bind(p, b);
-  }
+  RoughDielectricBsdf b;
+  bind_rough(p, b);
   p.finish();
   return add_bsdf(e, b);
 }
@@ -213,6 +172,26 @@ void Reader::read_metal_preset(Params& p, Rgb& eta, Rgb& k) {
     return report_.error(given->at, fmt::format("{} gives both a material and eta or k", p.title()));
   eta = metal->eta;
   k = metal->k;
+}
+
+template <>
+std::optional<BsdfIndex> Reader::read_bsdf_as<ConductorBsdf>(const Element& e) {
+  Params p(*this, e);
+  ConductorBsdf b;
+  read_metal_preset(p, b.eta, b.k);
+  bind(p, b);
+  p.finish();
+  return add_bsdf(e, b);
+}
+
+template <>
+std::optional<BsdfIndex> Reader::read_bsdf_as<RoughConductorBsdf>(const Element& e) {
+  Params p(*this, e);
+  RoughConductorBsdf b;
+  read_metal_preset(p, b.eta, b.k);
+  bind_rough(p, b);
+  p.finish();
+  return add_bsdf(e, b);
 }
 
 // Returns the nested bsdfs in the order of the file. Those of a blend are ordered by name if both have one,
@@ -248,7 +227,8 @@ std::optional<std::vector<BsdfIndex>> Reader::read_inner_bsdfs(Params& p, std::s
   return inner;
 }
 
-std::optional<BsdfIndex> Reader::read_twosided(const Element& e) {
+template <>
+std::optional<BsdfIndex> Reader::read_bsdf_as<TwoSidedBsdf>(const Element& e) {
   Params p(*this, e);
   const auto sides = read_inner_bsdfs(p, 1, 2);
   if (!sides) return std::nullopt;
@@ -270,7 +250,8 @@ TextureIndex Reader::old_number(const Element& e, TextureIndex t) {
   return old_numbers_[t] = {static_cast<std::uint32_t>(scene_.textures.size() - 1)};
 }
 
-std::optional<BsdfIndex> Reader::read_mask(const Element& e) {
+template <>
+std::optional<BsdfIndex> Reader::read_bsdf_as<MaskBsdf>(const Element& e) {
   Params p(*this, e);
   MaskBsdf b;
   bind(p, b);
@@ -290,7 +271,8 @@ std::optional<BsdfIndex> Reader::read_mask(const Element& e) {
   return add_bsdf(e, b);
 }
 
-std::optional<BsdfIndex> Reader::read_blend(const Element& e) {
+template <>
+std::optional<BsdfIndex> Reader::read_bsdf_as<BlendBsdf>(const Element& e) {
   Params p(*this, e);
   BlendBsdf b;
   bind(p, b);
@@ -302,7 +284,8 @@ std::optional<BsdfIndex> Reader::read_blend(const Element& e) {
   return add_bsdf(e, b);
 }
 
-std::optional<BsdfIndex> Reader::read_normal_map(const Element& e) {
+template <>
+std::optional<BsdfIndex> Reader::read_bsdf_as<NormalMapBsdf>(const Element& e) {
   Params p(*this, e);
   NormalMapBsdf b;
   bind(p, b);
@@ -312,7 +295,8 @@ std::optional<BsdfIndex> Reader::read_normal_map(const Element& e) {
   return add_bsdf(e, b);
 }
 
-std::optional<BsdfIndex> Reader::read_bump_map(const Element& e) {
+template <>
+std::optional<BsdfIndex> Reader::read_bsdf_as<BumpMapBsdf>(const Element& e) {
   Params p(*this, e);
   BumpMapBsdf b;
   if (!read_heights(p, b)) return std::nullopt;
@@ -342,7 +326,8 @@ bool Reader::read_heights(Params& p, BumpMapBsdf& b) {
   return false;
 }
 
-std::optional<BsdfIndex> Reader::read_principled(const Element& e) {
+template <>
+std::optional<BsdfIndex> Reader::read_bsdf_as<PrincipledBsdf>(const Element& e) {
   Params p(*this, e);
   PrincipledBsdf b;
   if (p.has("eta") && p.has("specular"))
@@ -358,6 +343,13 @@ std::optional<BsdfIndex> Reader::read_principled(const Element& e) {
     if (const auto* share = std::get_if<ConstantTexture>(&scene_.textures[b.spec_trans->value]))
       if (share->value == Rgb{0, 0, 0}) b.spec_trans.reset();
   return add_bsdf(e, b);
+}
+
+std::optional<BsdfIndex> Reader::read_bsdf(const Element& e) {
+  std::optional<BsdfIndex> read;
+  if (!with_kind_named<Bsdf>(e.get("type"), [&]<class Kind>() { read = read_bsdf_as<Kind>(e); }))
+    unknown_plugin(e, report_);
+  return read;
 }
 
 }  // namespace ls::scene

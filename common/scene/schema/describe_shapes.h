@@ -1,22 +1,31 @@
-// The describe() overloads of shapes, camera and film; see describe.h.
+// The table of shapes, camera and film; see describe.h.
 #pragma once
 
 #include "common/scene/schema/describe.h"
 
 namespace ls::scene {
 
-// Shapes.
+LS_TYPE(RectangleShape, "shape", "rectangle", "", "[-1, 1]^2 in the plane z = 0, normal +z")
 template <class V, Of<RectangleShape> T>
 void describe(V&, T&) {}
+
+LS_TYPE(CubeShape, "shape", "cube", "", "[-1, 1]^3, normals outwards")
 template <class V, Of<CubeShape> T>
 void describe(V&, T&) {}
+
+LS_TYPE(DiskShape, "shape", "disk", "", "unit disk in the plane z = 0, normal +z")
 template <class V, Of<DiskShape> T>
 void describe(V&, T&) {}
+
+LS_TYPE(SphereShape, "shape", "sphere", "",
+        "a ball's surface; `center` and `radius` act before `to_world`, which may not stretch it")
 template <class V, Of<SphereShape> T>
 void describe(V& v, T& s) {
   v.field({.name = "center", .doc = "centre", .unit = "length", .given_as = "point"}, s.center);
   v.field({.name = "radius", .doc = "radius", .unit = "length", .range = kPositive}, s.radius);
 }
+
+LS_TYPE(MeshShape, "shape", "mesh", "obj, ply, serialized", "triangles from a file")
 template <class V, Of<MeshShape> T>
 void describe(V& v, T& s) {
   v.field(
@@ -35,14 +44,27 @@ void describe(V& v, T& s) {
   v.field({.name = "shape_index", .doc = "which mesh of a `serialized` file", .range = {0, 1e6}},
           s.shape_index);
 }
+
+LS_TYPE(
+    CylinderShape, "shape", "cylinder", "",
+    "an open cylinder about the line from `p0` to `p1`, normals outwards; `to_world` may stretch it along "
+    "that line only")
 template <class V, Of<CylinderShape> T>
 void describe(V& v, T& s) {
   v.field({.name = "p0", .doc = "where its axis begins", .unit = "length", .given_as = "point"}, s.p0);
   v.field({.name = "p1", .doc = "where its axis ends", .unit = "length", .given_as = "point"}, s.p1);
   v.field({.name = "radius", .doc = "radius", .unit = "length", .range = kPositive}, s.radius);
 }
+
+LS_TYPE(ShapeGroup, "shape", "shapegroup", "",
+        "shapes that are seen where an `instance` of the group stands, and kept in memory once; they stand "
+        "inside, placed within the group by their own `to_world`. Shapes that emit light, and instances, "
+        "can't be in a group")
 template <class V, Of<ShapeGroup> T>
 void describe(V&, T&) {}
+
+LS_TYPE(Instance, "shape", "instance", "",
+        "a `shapegroup` once more: a `<ref>` to it, or the group itself, stands inside")
 template <class V, Of<Instance> T>
 void describe(V& v, T& s) {
   v.field({.name = "group", .doc = "the group", .derived = true, .given_as = "<shapegroup>"}, s.group);
@@ -80,18 +102,28 @@ void describe(V& v, T& s) {
 }
 
 // Camera and film.
+LS_TYPE(BoxFilter, "rfilter", "box", "", "each sample counts in its own pixel")
 template <class V, Of<BoxFilter> T>
 void describe(V& v, T& f) {
   v.field({.name = "radius", .doc = "half width", .unit = "pixels", .range = {0, 32, true}}, f.radius);
 }
+
+LS_TYPE(TentFilter, "rfilter", "tent", "", "falls off linearly")
 template <class V, Of<TentFilter> T>
 void describe(V& v, T& f) {
   v.field({.name = "radius", .doc = "half width", .unit = "pixels", .range = {0, 32, true}}, f.radius);
 }
+
+LS_TYPE(GaussianFilter, "rfilter", "gaussian", "", "Gaussian, cut at four standard deviations")
 template <class V, Of<GaussianFilter> T>
 void describe(V& v, T& f) {
   v.field({.name = "stddev", .doc = "standard deviation", .unit = "pixels", .range = {0, 8, true}}, f.stddev);
 }
+
+LS_TYPE(Sensor, "sensor", "perspective", "perspective, thinlens, orthographic, spherical",
+        "looks along the +z of `to_world`, +y up, +x to the left. `orthographic`: parallel rays from a sheet "
+        "of 2 by 2 height / width, which `to_world` may scale. `spherical`: all directions by latitude and "
+        "longitude, +y in the top row; of the horizon the left edge is -z, a quarter of the width further +x")
 template <class V, Of<Sensor> T>
 void describe_clips(V& v, T& s) {
   v.field({.name = "to_world", .doc = "places and turns the camera"}, s.to_world);
@@ -155,6 +187,8 @@ void describe(V& v, T& s) {
            .given_as = "medium"},
           s.medium);
 }
+
+LS_TYPE(FilmSettings, "film", "hdrfilm", "", "size of the frame and its reconstruction filter")
 template <class V, Of<FilmSettings> T>
 void describe(V& v, T& f) {
   v.field({.name = "width", .doc = "of the frame", .unit = "pixels", .range = {1, kMaxFrameSide}},

@@ -1,4 +1,4 @@
-// The describe() overloads of surfaces; see describe.h.
+// The table of surfaces; see describe.h.
 #pragma once
 
 #include "common/scene/schema/describe.h"
@@ -15,13 +15,15 @@ void describe_multiple_scattering(V& v, T& b) {
           b.multiple_scattering);
 }
 
-// Surfaces.
+LS_TYPE(DiffuseBsdf, "bsdf", "diffuse", "", "ideally rough surface, one-sided unless wrapped in `twosided`")
 template <class V, Of<DiffuseBsdf> T>
 void describe(V& v, T& b) {
   v.field(
       {.name = "reflectance", .doc = "share of light sent back", .range = kUnit, .fallback = {.5, .5, .5}},
       b.reflectance);
 }
+
+LS_TYPE(ConductorBsdf, "bsdf", "conductor", "", "smooth metal")
 template <class V, Of<ConductorBsdf> T>
 void describe(V& v, T& b) {
   v.field(
@@ -31,6 +33,9 @@ void describe(V& v, T& b) {
   v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
           b.specular_reflectance);
 }
+
+LS_TYPE(RoughConductorBsdf, "bsdf", "roughconductor", "",
+        "rough metal; `alpha` sets both alpha_u and alpha_v")
 template <class V, Of<RoughConductorBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
@@ -54,6 +59,8 @@ void describe(V& v, T& b) {
           b.specular_reflectance);
   describe_multiple_scattering(v, b);
 }
+
+LS_TYPE(DielectricBsdf, "bsdf", "dielectric", "", "smooth boundary of glass, water or the like")
 template <class V, Of<DielectricBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
@@ -65,6 +72,10 @@ void describe(V& v, T& b) {
   v.field({.name = "specular_transmittance", .doc = "factor on the refraction", .range = kUnit},
           b.specular_transmittance);
 }
+
+LS_TYPE(RoughDielectricBsdf, "bsdf", "roughdielectric", "",
+        "rough boundary of glass, water or the like; `alpha` sets both alpha_u and alpha_v. Indices within a "
+        "thousandth of each other, or a roughness below one, make it a `dielectric`")
 template <class V, Of<RoughDielectricBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
@@ -90,6 +101,10 @@ void describe(V& v, T& b) {
           b.specular_transmittance);
   describe_multiple_scattering(v, b);
 }
+
+LS_TYPE(ThinDielectricBsdf, "bsdf", "thindielectric", "",
+        "a sheet of glass as one surface, reflections within the sheet included: light passes straight on, "
+        "which counts as no scattering")
 template <class V, Of<ThinDielectricBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
@@ -101,6 +116,8 @@ void describe(V& v, T& b) {
   v.field({.name = "specular_transmittance", .doc = "factor on what passes", .range = kUnit},
           b.specular_transmittance);
 }
+
+LS_TYPE(PlasticBsdf, "bsdf", "plastic", "", "diffuse base under a smooth dielectric coat")
 template <class V, Of<PlasticBsdf> T>
 void describe(V& v, T& b) {
   v.field(
@@ -114,6 +131,8 @@ void describe(V& v, T& b) {
   v.field({.name = "specular_reflectance", .doc = "factor on the coat's reflection", .range = kUnit},
           b.specular_reflectance);
 }
+
+LS_TYPE(RoughPlasticBsdf, "bsdf", "roughplastic", "", "diffuse base under a rough dielectric coat")
 template <class V, Of<RoughPlasticBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
@@ -130,8 +149,13 @@ void describe(V& v, T& b) {
           b.specular_reflectance);
   describe_multiple_scattering(v, b);
 }
+
+LS_TYPE(NullBsdf, "bsdf", "null", "", "index-matched boundary of a medium: light passes unchanged")
 template <class V, Of<NullBsdf> T>
 void describe(V&, T&) {}
+
+LS_TYPE(TwoSidedBsdf, "bsdf", "twosided", "",
+        "gives each side of a surface a bsdf; one nested bsdf serves both")
 template <class V, Of<TwoSidedBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "front", .doc = "of the front", .derived = true, .given_as = "<bsdf>"}, b.front);
@@ -142,6 +166,9 @@ void describe(V& v, T& b) {
           b.back);
 }
 
+LS_TYPE(MaskBsdf, "bsdf", "mask", "",
+        "lets a share of the light pass straight on, shadows included; that counts as no scattering, and an "
+        "emitter on the surface is not masked")
 template <class V, Of<MaskBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "opacity",
@@ -153,6 +180,8 @@ void describe(V& v, T& b) {
           b.opacity);
   v.field({.name = "bsdf", .doc = "of the opaque share", .derived = true, .given_as = "<bsdf>"}, b.bsdf);
 }
+
+LS_TYPE(BlendBsdf, "bsdf", "blendbsdf", "", "a mixture of two bsdfs")
 template <class V, Of<BlendBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "weight",
@@ -176,6 +205,10 @@ void describe_map(V& v, T& b) {
            .doc = "let steep places cast shadows, so that light ends softly; false in files of version 0.x"},
           b.use_shadowing_function);
 }
+
+LS_TYPE(NormalMapBsdf, "bsdf", "normalmap", "",
+        "turns the normal that a bsdf sees by an image (`raw` as a rule); light that the turned and the true "
+        "normal put on different sides is left out")
 template <class V, Of<NormalMapBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "normalmap",
@@ -187,6 +220,10 @@ void describe(V& v, T& b) {
   describe_map(v, b);
 }
 
+LS_TYPE(BumpMapBsdf, "bsdf", "bumpmap", "",
+        "turns the normal that a bsdf sees as if the surface were lifted by the luminance of an image, its "
+        "`texture` (`raw` as a rule; bilinear, or else it is flat), which may also carry another name or "
+        "none; light that the turned and the true normal put on different sides is left out")
 template <class V, Of<BumpMapBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "texture", .doc = "heights, a `bitmap`", .fallback = {0, 0, 0}}, b.texture);
@@ -194,6 +231,10 @@ void describe(V& v, T& b) {
   v.field({.name = "bsdf", .doc = "that sees the slopes", .derived = true, .given_as = "<bsdf>"}, b.bsdf);
   describe_map(v, b);
 }
+
+LS_TYPE(PrincipledBsdf, "bsdf", "principled", "",
+        "Burley's model of metals, coated dielectrics and glass. `specular` instead of `eta` means "
+        "eta = 2 / (1 - sqrt(0.08 specular)) - 1")
 template <class V, Of<PrincipledBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "base_color", .doc = "the colour", .range = kUnit, .fallback = {.5, .5, .5}},

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "common/scene/schema/describe_fields.h"
+
 namespace ls::scene {
 namespace {
 
@@ -110,8 +112,6 @@ constexpr PluginRow kPlugins[] = {
     {"texture", "scale", kRefused, "multiply the image, or the colours, beforehand", kOlder},
     {"texture", "vertexcolors", kRefused, "write it as a \"mesh_attribute\" of a \"ply\"", kOlder},
     {"texture", "wireframe", kRefused, kBakeTexture, kOlder},
-    {"texture", "peak", kRead, "", kOurs},
-    {"texture", "product", kRead, "", kOurs},
 
     {"spectrum", "blackbody", kInPart,
      "of lights: the radiance that Mitsuba's spectral modes show, cut off at 0 outside of sRGB; its RGB "
@@ -234,14 +234,46 @@ constexpr PluginRow kPlugins[] = {
     {"rfilter", "tent", kRead, ""},
 };
 
+bool has_row(const std::vector<PluginRow>& rows, std::string_view tag, std::string_view name) {
+  return std::ranges::any_of(rows, [&](const PluginRow& r) { return r.tag == tag && r.name == name; });
+}
+
+// Adds those kinds of a variant that Mitsuba does not have, behind the rows of the same element.
+template <class... Kinds>
+void add_ours(std::vector<PluginRow>& rows, std::type_identity<std::variant<Kinds...>>) {
+  for (const TypeInfo& kind : {kInfo<Kinds>...}) {
+    // A kind with `plugins` is read under those names alone.
+    if (!kind.plugins.empty() || has_row(rows, kind.kind, kind.name)) continue;
+    const auto last =
+        std::find_if(rows.rbegin(), rows.rend(), [&](const PluginRow& r) { return r.tag == kind.kind; });
+    rows.insert(last.base(), {kind.kind, kind.name, kRead, "", kOurs});
+  }
+}
+
+const std::vector<PluginRow>& all_rows() {
+  static const std::vector<PluginRow> all = [] {
+    std::vector<PluginRow> rows(std::begin(kPlugins), std::end(kPlugins));
+    add_ours(rows, std::type_identity<Geometry>{});
+    add_ours(rows, std::type_identity<Bsdf>{});
+    add_ours(rows, std::type_identity<Texture>{});
+    add_ours(rows, std::type_identity<Emitter>{});
+    add_ours(rows, std::type_identity<Medium>{});
+    add_ours(rows, std::type_identity<Phase>{});
+    add_ours(rows, std::type_identity<Volume>{});
+    return rows;
+  }();
+  return all;
+}
+
 }  // namespace
 
-std::span<const PluginRow> mitsuba_plugins() { return kPlugins; }
+std::span<const PluginRow> mitsuba_plugins() { return all_rows(); }
 
 const PluginRow* plugin_row(std::string_view tag, std::string_view name) {
+  const auto& rows = all_rows();
   const auto row =
-      std::ranges::find_if(kPlugins, [&](const PluginRow& r) { return r.tag == tag && r.name == name; });
-  return row == std::end(kPlugins) ? nullptr : &*row;
+      std::ranges::find_if(rows, [&](const PluginRow& r) { return r.tag == tag && r.name == name; });
+  return row == rows.end() ? nullptr : &*row;
 }
 
 bool is_read_plugin(std::string_view tag, std::string_view name) {
@@ -251,7 +283,7 @@ bool is_read_plugin(std::string_view tag, std::string_view name) {
 
 std::vector<std::string> read_plugins(std::string_view tag) {
   std::vector<std::string> names;
-  for (const PluginRow& row : kPlugins)
+  for (const PluginRow& row : all_rows())
     if (row.tag == tag && row.standing != Standing::refused) names.emplace_back(row.name);
   return names;
 }

@@ -61,18 +61,6 @@ Result<void> Farm::State::may_extend(const Job& job, std::uint64_t spp) {
   return check_plan(plan);
 }
 
-Result<void> Farm::may_retarget(const JobId& id, double target_error) const {
-  const Job* job = state_->find(id);
-  if (job == nullptr) return fail(Errc::not_found, fmt::format("there is no job {}", id.value));
-  return State::may_retarget(*job, target_error);
-}
-
-Result<void> Farm::may_extend(const JobId& id, std::uint64_t spp) const {
-  const Job* job = state_->find(id);
-  if (job == nullptr) return fail(Errc::not_found, fmt::format("there is no job {}", id.value));
-  return State::may_extend(*job, spp);
-}
-
 void Farm::State::on(const JobRetargeted& event) {
   Job* job = find(event.job);
   if (job == nullptr || !may_retarget(*job, event.target_error)) return;

@@ -74,6 +74,18 @@ Wanted Farm::wanted(const UnitKey& unit, const Digest& numeric_class) const {
   return {verdict, job->range(code), job->plan.grid.rect(unit.tile), job->numeric_class.has_value()};
 }
 
+Result<void> Farm::may_retarget(const JobId& id, double target_error) const {
+  const Job* job = state_->find(id);
+  if (job == nullptr) return fail(Errc::not_found, fmt::format("there is no job {}", id.value));
+  return State::may_retarget(*job, target_error);
+}
+
+Result<void> Farm::may_extend(const JobId& id, std::uint64_t spp) const {
+  const Job* job = state_->find(id);
+  if (job == nullptr) return fail(Errc::not_found, fmt::format("there is no job {}", id.value));
+  return State::may_extend(*job, spp);
+}
+
 std::vector<JobId> Farm::jobs() const {
   std::vector<JobId> ids;
   for (const auto& [seq, job] : state_->jobs) ids.push_back(job->plan.brief.job);

@@ -64,7 +64,7 @@ struct JobTotals {
 struct StoredJob {
   JobId id;
   std::string name;   // scene file name
-  std::string owner;  // user name; empty: the administrator, or a record of an earlier version
+  std::string owner;  // user name; empty: the administrator
   double submitted_unix = 0;
   // The span of the program that submitted the job, to which the job's trace belongs
   // (common/trace/context.h); empty: none
@@ -78,7 +78,7 @@ struct StoredJob {
   std::vector<std::string> warnings;
   bool reference_same_seed = false;  // result of same_noise() for the job and its reference image
   std::vector<std::string> features_used, features_left_out;
-  std::string needs;  // canonical JSON (common/scene/analysis/needs.h); empty in records of earlier versions
+  std::string needs;  // canonical JSON (common/scene/analysis/needs.h)
   // JSON for the report: the renderer's features with reasons, and the pruned parts of the scene
   std::string analysis;
   JobState state = JobState::queued;

@@ -308,24 +308,6 @@ class SqliteJobStore final : public JobStore {
   std::atomic<std::uint64_t> log_lines_{0};
 };
 
-// Adds the columns that a database of an earlier version lacks. The earlier version can still read it
-// afterwards.
-Result<void> add_missing_columns(const Db& db, std::string_view what) {
-  for (const auto& [table, column] :
-       {std::pair("points", "rmse_lo"), std::pair("points", "rmse_hi"), std::pair("truths", "mse_stderr"),
-        std::pair("truths", "relmse_stderr")}) {
-    Statement known(db, "SELECT 1 FROM pragma_table_info(?) WHERE name = ?");
-    const auto found = known.bind(std::string_view(table)).bind(std::string_view(column)).step(what);
-    if (!found) return tl::unexpected(found.error());
-    if (*found) continue;
-    if (auto done =
-            execute(db, fmt::format("ALTER TABLE {} ADD COLUMN {} REAL", table, column).c_str(), what);
-        !done)
-      return done;
-  }
-  return {};
-}
-
 }  // namespace
 
 Result<std::unique_ptr<JobStore>> open_sqlite_job_store(const std::filesystem::path& file) {
@@ -352,7 +334,6 @@ Result<std::unique_ptr<JobStore>> open_sqlite_job_store(const std::filesystem::p
             file.string(), found, kSchemaVersion));
   if (auto done = version.run(what); !done) return tl::unexpected(done.error());
   if (auto done = execute(db, kSchema, what); !done) return tl::unexpected(done.error());
-  if (auto done = add_missing_columns(db, what); !done) return tl::unexpected(done.error());
   if (auto done = execute(db, fmt::format("PRAGMA user_version = {}", kSchemaVersion).c_str(), what); !done)
     return tl::unexpected(done.error());
   return std::make_unique<SqliteJobStore>(std::move(db));

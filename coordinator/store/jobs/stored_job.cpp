@@ -28,24 +28,16 @@ json to_value(const JobTotals& t) {
           {"few_hits", t.few_hits ? json(*t.few_hits) : json()}};
 }
 
-// Returns 0 if the key is missing, as in records of earlier versions.
+// Returns 0 if the key is missing: a counter that is 0 is not stored.
 std::uint64_t count_or_none(const json& j, const char* key) {
   const auto found = j.find(key);
   return found == j.end() ? 0 : count_of(*found);
 }
 
-Health health_of(const json& totals) {
-  Health health;
-  if (const auto causes = totals.find("health"); causes != totals.end()) {
-    auto read = parse_health(causes->dump());
-    if (!read) throw std::invalid_argument(read.error().message);
-    return std::move(*read);
-  }
-  // A record of an earlier version, which counted bad samples without their causes.
-  health.add(HealthCause::unnamed, count_of(totals.at("nonfinite")));
-  health.add(HealthCause::negative, count_of(totals.at("negative")));
-  health.add(HealthCause::majorant_violation, count_of(totals.at("majorant_violations")));
-  return health;
+template <class T>
+T required(Result<T> parsed) {
+  if (!parsed) throw std::invalid_argument(parsed.error().message);
+  return std::move(*parsed);
 }
 
 JobTotals totals_of(const json& j) {
@@ -56,16 +48,13 @@ JobTotals totals_of(const json& j) {
   t.peak_rss_bytes = count_of(j.at("peak_rss_bytes"));
   t.spp_done = j.at("spp_done");
   t.units = count_of(j.at("units"));
-  t.units_planned = count_or_none(j, "units_planned");
-  t.health = health_of(j);
-  const json time = j.value("time", json::object());  // missing in records of earlier versions
-  for (const TimePart& part : kTimeParts)
-    if (const auto found = time.find(part.name); found != time.end())
-      t.time.*part.seconds = number_of(*found);
-  t.began_unix = j.value("began_unix", 0.0);
-  t.ended_unix = j.value("ended_unix", 0.0);
-  t.doubt = j.value("doubt", std::string());
-  if (const auto few = j.find("few_hits"); few != j.end() && !few->is_null()) t.few_hits = count_of(*few);
+  t.units_planned = count_of(j.at("units_planned"));
+  t.health = required(parse_health(j.at("health").dump()));
+  for (const TimePart& part : kTimeParts) t.time.*part.seconds = number_of(j.at("time").at(part.name));
+  t.began_unix = j.at("began_unix");
+  t.ended_unix = j.at("ended_unix");
+  t.doubt = j.at("doubt");
+  if (const json& few = j.at("few_hits"); !few.is_null()) t.few_hits = count_of(few);
   return t;
 }
 
@@ -83,17 +72,11 @@ Enum enum_from(const json& j, std::initializer_list<Enum> all) {
   throw std::invalid_argument("unknown word '" + word + "'");
 }
 
-template <class T>
-T required(Result<T> parsed) {
-  if (!parsed) throw std::invalid_argument(parsed.error().message);
-  return std::move(*parsed);
-}
-
 StoredJob stored_from(const json& j) {
   StoredJob job;
   job.id.value = j.at("id");
   job.name = j.at("name");
-  job.owner = j.value("owner", std::string());
+  job.owner = j.at("owner");
   job.submitted_unix = j.at("submitted_unix");
   job.traceparent = j.value("traceparent", std::string());
   job.scene = digest_from(j.at("scene"));
@@ -103,11 +86,11 @@ StoredJob stored_from(const json& j) {
   for (const auto& a : j.at("assets"))
     job.assets.push_back({digest_from(a.at("digest")), count_of(a.at("bytes")), a.at("name")});
   job.warnings = j.at("warnings");
-  job.reference_same_seed = j.value("reference_same_seed", false);  // missing in earlier versions
+  job.reference_same_seed = j.value("reference_same_seed", false);
   job.features_used = j.at("features_used");
   job.features_left_out = j.at("features_left_out");
-  job.needs = j.value("needs", std::string());
-  job.analysis = j.value("analysis", std::string());
+  job.needs = j.at("needs");
+  job.analysis = j.at("analysis");
   job.state = enum_from(j.at("state"), {JobState::queued, JobState::running, JobState::paused, JobState::done,
                                         JobState::failed, JobState::cancelled});
   if (!j.at("stopped").is_null())
@@ -116,11 +99,11 @@ StoredJob stored_from(const json& j) {
   job.error = j.at("error");
   if (!j.at("numeric_class").is_null()) job.numeric_class = digest_from(j.at("numeric_class"));
   job.build = j.at("build");
-  job.fake = j.value("fake", false);  // missing in earlier versions
+  job.fake = j.value("fake", false);
   job.totals = totals_of(j.at("totals"));
   if (const auto missing_blobs = j.find("awaited"); missing_blobs != j.end())
     for (const auto& digest : *missing_blobs) job.missing_blobs.insert(digest_from(digest));
-  job.techniques = TechniqueSet::of_bits(j.value("techniques", 0u));  // missing in earlier versions
+  job.techniques = TechniqueSet::of_bits(j.value("techniques", 0u));
   if (const auto checks = j.find("denoised_checks"); checks != j.end())
     for (const json& c : *checks)
       job.denoised_checks.push_back(

@@ -23,8 +23,6 @@ namespace ls::coordinator {
 // The binary header of a record in the partial log, which holds one partial: the encoded
 // pixel sums of one unit, that is of one tile and one range of samples.
 constexpr std::uint32_t kPartialMagic = 0x3250534c;  // "LSP2"
-// "LSP1": records of an earlier version, with three counters instead of the health text
-constexpr std::uint32_t kOldPartialMagic = 0x3150534c;
 
 // Little endian, as on every supported machine.
 struct RawHeader {
@@ -38,8 +36,7 @@ struct RawHeader {
   std::uint64_t payload_check = 0;
   std::uint64_t header_check = 0;  // checksum of the header's preceding bytes
 
-  std::uint64_t text_bytes() const { return magic == kPartialMagic ? health_bytes : 0; }
-  std::uint64_t record_bytes() const { return sizeof(RawHeader) + bytes + text_bytes(); }
+  std::uint64_t record_bytes() const { return sizeof(RawHeader) + bytes + health_bytes; }
 };
 static_assert(sizeof(RawHeader) == 184);
 
@@ -129,10 +126,9 @@ std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::
   if (!bytes) return std::nullopt;
   RawHeader raw;
   std::memcpy(&raw, bytes->data(), sizeof raw);
-  if ((raw.magic != kPartialMagic && raw.magic != kOldPartialMagic) || raw.header_check != header_check(raw))
-    return std::nullopt;
-  if (raw.bytes > ls::limits::kPartialBytes || raw.text_bytes() > kHealthBytes ||
-      raw.bytes + raw.text_bytes() > size - offset - sizeof raw)
+  if (raw.magic != kPartialMagic || raw.header_check != header_check(raw)) return std::nullopt;
+  if (raw.bytes > ls::limits::kPartialBytes || raw.health_bytes > kHealthBytes ||
+      raw.bytes + raw.health_bytes > size - offset - sizeof raw)
     return std::nullopt;
   return raw;
 }
@@ -141,12 +137,6 @@ std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::
 std::optional<Health> health_at(const File& file, std::uint64_t offset, const RawHeader& raw,
                                 const std::filesystem::path& path) {
   Health health;
-  if (raw.magic == kOldPartialMagic) {
-    health.add(HealthCause::unnamed, raw.health_bytes);
-    health.add(HealthCause::negative, raw.health_check);
-    health.add(HealthCause::majorant_violation, raw.unused);
-    return health;
-  }
   if (raw.health_bytes == 0) return health;
   const auto bytes = read_at(file, offset, raw.health_bytes, path);
   if (!bytes || check_of(*bytes) != raw.health_check) return std::nullopt;

@@ -52,8 +52,8 @@ std::string dumped(const json& value) { return value.dump(-1, ' ', false, json::
 std::optional<ReferenceError> reference_error_of(const json& t) {
   if (t.is_null()) return {};
   ReferenceError reference_error{t.at(0), t.at(1), {}};
-  const auto known = [&](std::size_t i) {  // the last two are missing in earlier records
-    return i < t.size() && !t.at(i).is_null() ? std::optional(t.at(i).get<double>()) : std::nullopt;
+  const auto known = [&](std::size_t i) {
+    return t.at(i).is_null() ? std::nullopt : std::optional(t.at(i).get<double>());
   };
   reference_error.flip = known(2), reference_error.mse_stderr = known(3),
   reference_error.relmse_stderr = known(4);
@@ -70,9 +70,8 @@ json reference_error_value(const std::optional<ReferenceError>& reference_error)
 std::vector<ConvergencePoint> parse_points(const std::string& text) {
   std::vector<ConvergencePoint> points;
   for (const json& p : json::parse(text)) {
-    ErrorFigures error{number_of(p.at(3)), number_of(p.at(4)), number_of(p.at(5)), number_of(p.at(6))};
-    // Missing in earlier records
-    if (p.size() > 9) error.rmse_lo = number_of(p.at(8)), error.rmse_hi = number_of(p.at(9));
+    const ErrorFigures error{number_of(p.at(3)), number_of(p.at(4)), number_of(p.at(5)),
+                             number_of(p.at(6)), number_of(p.at(8)), number_of(p.at(9))};
     points.push_back(
         {number_of(p.at(0)), number_of(p.at(1)), number_of(p.at(2)), error, reference_error_of(p.at(7))});
   }

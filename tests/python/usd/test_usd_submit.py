@@ -7,8 +7,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from conftest import ROOT
-from local_farm import bin_dir
+from local_farm import ROOT, bin_dir
 from stage_kit import (
     Gf,
     Sdf,

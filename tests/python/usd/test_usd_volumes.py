@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from local_farm import ROOT
 from stage_kit import (
     Gf,
     NARROW,

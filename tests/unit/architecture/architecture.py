@@ -87,6 +87,29 @@ MAX_FILES = 30  # of C++ in a folder
 MAX_LINES = 800
 LONG_FILES = {}  # path: reason
 
+MAX_SOURCES = 2  # of a class
+MAX_METHODS = 40  # of a class, nested ones apart
+STATE_MACHINE = "one state machine behind a narrow door, whose reactions to events are grouped by subject"
+ONE_MEMO = "one memo of objects that are read once, for readers of many kinds"
+SPREAD_CLASSES = {
+    ("coordinator/domain/farm", "Farm::State"): STATE_MACHINE,
+    ("common/scene/reader", "Reader"): ONE_MEMO,
+    ("worker/agent", "Agent::Impl"): "one file for each of its threads",
+}
+WIDE_CLASSES = {
+    ("coordinator/domain/farm/farm_state.h", "Farm::State"): STATE_MACHINE,
+    ("common/scene/reader/reader.h", "Reader"): ONE_MEMO,
+    ("coordinator/service/coordinator.h", "Coordinator"): "the facade: a function for each request of users, workers and operators",
+    ("worker/render/integrator/path_tracer.h", "PathTracer"): "one path, in steps of a few lines that share its state",
+    ("worker/render/lights/lights.h", "Lights"): "choosing, sampling and hitting lights, whose densities must agree",
+}
+# Interfaces of which the product has one implementation.
+LONE_INTERFACES = {
+    "Clock": "tests say what time it is",
+    "Racer": "tests of a race's order render nothing",
+    "WorkerSession": "hides the service from the two transports that hold one",
+}
+
 # Tests of real threads and sockets may bound their patience by a clock; those of the state machine have a fake one.
 CLOCK_READERS = re.compile(r"^common/base/clock\.(h|cpp)$|(^|/)main\.cpp$|^tests/(?!unit/domain/)")
 CLOCK_EXCEPTIONS = {
@@ -297,6 +320,71 @@ def short_files(tree):
             yield f"{path} is short enough now: take it off the list of long files"
 
 
+MEMBER_DEFINITION = re.compile(r"^(?!\s)[^\n;{}()]*?\b((?:[A-Z]\w*(?:<[^<>]*>)?::)+)(?:~?\w+|operator[^\s(]*)\(", re.M)
+CLASS_HEAD = re.compile(r"\b(?:class|struct)\s+((?:\w+::)*\w+)(?:\s+final)?\s*(?::[^;{()]*)?\{")
+METHOD = re.compile(r"(?:\b~?[A-Za-z_]\w*|\boperator\s*\S+?)\s*\(")
+BASES = re.compile(r"\b(?:class|struct)\s+[\w:]+(?:\s+final)?\s*:([^;{()]*)\{")
+
+
+def classes_are_whole(tree):
+    """A class is defined in at most two sources."""
+    sources = {}
+    for path, text in product(tree).items():
+        if path.endswith(".cpp"):
+            for match in MEMBER_DEFINITION.finditer(without_texts(text)):
+                sources.setdefault((folder(path), match[1].removesuffix("::")), set()).add(path)
+    for key, found in sources.items():
+        if len(found) > MAX_SOURCES and key not in SPREAD_CLASSES:
+            yield f"{key[0]}: {key[1]} is defined in {len(found)} sources: make classes by subject of it, or list it with a reason"
+    for key in SPREAD_CLASSES:
+        if len(sources.get(key, ())) <= MAX_SOURCES:
+            yield f"{key[0]}: {key[1]} is whole: take it off the list of spread classes"
+
+
+def members(text, at):
+    """The declarations of the class whose brace is before `at`, without what is in braces within."""
+    depth, out = 1, []
+    while depth and at < len(text):
+        depth += {"{": 1, "}": -1}.get(text[at], 0)
+        if depth == 1:
+            out.append(";" if text[at] == "}" else text[at])
+        at += 1
+    return re.split(r";|\b(?:public|private|protected):", "".join(out))
+
+
+def classes(tree):
+    """(path, name, number of member functions, number of pure virtual ones) of every class in a header."""
+    for path, text in product(tree).items():
+        seen = without_texts(text) if path.endswith(".h") else ""
+        for match in CLASS_HEAD.finditer(seen):
+            declared = [" ".join(part.split()) for part in members(seen, match.end())]
+            methods = [part for part in declared if METHOD.search(part.split(" = ")[0]) and not part.startswith(("using ", "static_assert", "friend "))]
+            yield path, match[1], len(methods), sum(part.endswith("= 0") for part in methods)
+
+
+def narrow_classes(tree):
+    counts = {(path, name): methods for path, name, methods, _ in classes(tree)}
+    for (path, name), methods in counts.items():
+        if methods > MAX_METHODS and (path, name) not in WIDE_CLASSES:
+            yield f"{path}: {name} has {methods} member functions: split it by subject, or list it with a reason"
+    for key in WIDE_CLASSES:
+        if counts.get(key, 0) <= MAX_METHODS:
+            yield f"{key[0]}: {key[1]} is narrow: take it off the list of wide classes"
+
+
+def interfaces_have_two_implementations(tree):
+    bases = [set(re.findall(r"\w+", listed)) for text in product(tree).values() for listed in BASES.findall(without_texts(text))]
+    found = {name.split("::")[-1] for _, name, _, pure in classes(tree) if pure}
+    for name in sorted(found):
+        many = sum(name in names for names in bases)
+        if many < 2 and name not in LONE_INTERFACES:
+            yield f"{name} has {many} implementations in the product: make it a class, or list it with a reason"
+        if many >= 2 and name in LONE_INTERFACES:
+            yield f"{name} has several implementations: take it off the list of lone interfaces"
+    for name in sorted(set(LONE_INTERFACES) - found):
+        yield f"{name} is no interface: take it off the list of lone interfaces"
+
+
 def the_type_says_who_holds_the_lock(tree):
     """A name that asks its callers to hold a lock is checked by nobody; Guarded<> (common/base/guarded.h) is."""
     for path, text in product(tree).items():
@@ -397,5 +485,5 @@ def constants_are_listed(tree):
 
 
 RULES = [layering, quoted_includes_exist, include_cycles, folder_cycles, small_rooms, doors, library_types_stay_behind_their_doors, headers_are_guarded,
-         short_files, the_type_says_who_holds_the_lock, nothing_unfinished, clock_is_injected, tests_do_not_sleep, tests_assert_no_times, nobody_exits,
+         short_files, classes_are_whole, narrow_classes, interfaces_have_two_implementations, the_type_says_who_holds_the_lock, nothing_unfinished, clock_is_injected, tests_do_not_sleep, tests_assert_no_times, nobody_exits,
          exceptions_are_files, constants_are_listed]

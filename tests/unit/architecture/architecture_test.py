@@ -115,6 +115,30 @@ class Rules(unittest.TestCase):
     def test_lengths(self):
         self.assert_finds(architecture.short_files, {"web/a.js": "\n" * 801, "web/b.js": "\n" * 800}, "web/a.js has 801")
 
+    def test_classes_in_many_sources(self):
+        parts = {f"cli/a/{name}.cpp": "void Wide::f() {\n  other(1);\n}\nResult<void> Wide::g(int x) const {}\n" for name in "xyz"}
+        spread = {f"{place}/{name}.cpp": f"void {cls}::f() {{}}\n" for place, cls in architecture.SPREAD_CLASSES for name in "xyz"}
+        self.assert_finds(architecture.classes_are_whole, {**parts, **spread, "cli/b/x.cpp": "void Wide::h() {}\n", "tests/t.cpp": "int Wide::f() {}\n"}, "Wide is defined in 3 sources")
+        place, cls = next(iter(architecture.SPREAD_CLASSES))
+        self.assert_finds(architecture.classes_are_whole, {path: text for path, text in spread.items() if path != f"{place}/x.cpp"}, f"{cls} is whole")
+
+    def test_wide_classes(self):
+        def header(name, methods):
+            return f"struct {name} : Base {{\n  struct Part {{ void f(); void g(); }};\n" + "  int f(int x = g(1)) const { return h(x); }\n" * methods + "  int member = f(3);\n};\n"
+        listed = {path: header(name, 41) for path, name in architecture.WIDE_CLASSES}
+        self.assert_finds(architecture.narrow_classes, {**listed, "cli/a.h": header("A", 41), "cli/b.h": header("B", 40)}, "A has 41 member functions")
+        path, name = next(iter(architecture.WIDE_CLASSES))
+        self.assert_finds(architecture.narrow_classes, {**listed, path: header(name, 40)}, f"{name} is narrow")
+
+    def test_interfaces(self):
+        def interface(name):
+            return f"class {name} {{\n public:\n  virtual ~{name}() = default;\n  virtual int f() const = 0;\n}};\n"
+        lone = {f"cli/lone_{name}.h": interface(name) for name in architecture.LONE_INTERFACES}
+        self.assert_finds(architecture.interfaces_have_two_implementations, {
+            **lone, "cli/one.h": interface("One"), "cli/two.h": interface("Two"),
+            "cli/a.cpp": "class A final : public One {};\nclass B : public Two {};\nstruct C final : cli::Two {};\n",
+            "tests/t.cpp": "class FakeOne : public One {};\n"}, "One has 1 implementations")
+
     def test_locked_names(self):
         self.assert_finds(architecture.the_type_says_who_holds_the_lock, {
             "coordinator/a.h": "void send_locked();  // not for drop_locked\n", "coordinator/b.h": "bool locked; int unlocked;", "tests/c.cpp": "send_locked();"},

@@ -182,7 +182,9 @@ class PathTracer {
   void connect_on(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo);
   template <class Scattering>
   void connect(const Receiver& x, const V3& start, const Scattering& scattering);
-  // The density of the first vertex after the sun, where rays have the density `rays`.
+  // Density of light vertices that the sun reaches directly, times the number of them among which a
+  // connection chooses: per area of a surface with normal ng or, in a medium (ng = 0), per area across the
+  // sun's rays. `rays`: density of these rays, per area across them.
   float first_density(float rays, const V3& ng) const {
     return world_.connections_per_ray * rays * (is_black(ng) ? 1 : std::abs(dot(ng, world_.sun.direction)));
   }

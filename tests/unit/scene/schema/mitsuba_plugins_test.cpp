@@ -8,7 +8,7 @@
 #include <iterator>
 #include <set>
 
-#include "common/scene/schema/describe.h"
+#include "common/scene/schema/describe_fields.h"
 #include "common/scene/schema/integrators.h"
 #include "tests/unit/scene/scene_testing.h"
 

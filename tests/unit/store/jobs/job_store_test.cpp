@@ -1,7 +1,6 @@
 #include "coordinator/store/jobs/job_store.h"
 
 #include <gtest/gtest.h>
-#include <sqlite3.h>
 
 #include <limits>
 
@@ -15,20 +14,6 @@ namespace {
 TEST(StoredJob, IsTheSameAfterJson) {
   const StoredJob job = sample_job("j-1");
   EXPECT_EQ(parse_stored_job(to_json(job)).value(), job);
-}
-
-TEST(StoredJob, OfAVersionBeforeThereWereUsersHasNoOwner) {
-  auto job = sample_job("j-1");
-  std::string text = to_json(job);
-  const std::string field = R"("owner":"anna",)";
-  ASSERT_NE(text.find(field), std::string::npos);
-  text.erase(text.find(field), field.size());
-
-  const auto read = parse_stored_job(text);
-
-  ASSERT_TRUE(read) << read.error().message;
-  job.owner.clear();
-  EXPECT_EQ(*read, job);
 }
 
 TEST(StoredJob, RefusesDamagedJson) {
@@ -166,29 +151,6 @@ TEST(SqliteJobStore, RemembersOverReopening) {
   EXPECT_EQ(store->quarantined().value().size(), 1u);
   EXPECT_EQ(store->jobs().value(), std::vector{sample_job("j-1")});
   EXPECT_EQ(store->reserve("events", 1).value(), 7u);
-}
-
-TEST(SqliteJobStore, AddsWhatADatabaseOfAnEarlierVersionLacks) {
-  TempFolder dir;
-  const auto file = dir.path() / "jobs.sqlite";
-  const auto with_reference_error = [&](const ReferenceError& reference_error) {
-    const auto store = open_sqlite_job_store(file).value();
-    EXPECT_TRUE(store->add_point({"a"}, {1, 2, 4, {}}));
-    EXPECT_TRUE(store->set_reference_error({"a"}, 4, reference_error));
-  };
-  with_reference_error({.5, .25, .1, .01, .02});
-  sqlite3* db = nullptr;
-  ASSERT_EQ(sqlite3_open(file.c_str(), &db), SQLITE_OK);
-  for (const char* sql :
-       {"ALTER TABLE truths DROP COLUMN mse_stderr", "ALTER TABLE truths DROP COLUMN relmse_stderr",
-        "ALTER TABLE points DROP COLUMN rmse_lo"})
-    EXPECT_EQ(sqlite3_exec(db, sql, nullptr, nullptr, nullptr), SQLITE_OK) << sql;
-  sqlite3_close(db);
-
-  const auto points = open_sqlite_job_store(file).value()->points({"a"});
-
-  ASSERT_TRUE(points) << points.error().message;
-  EXPECT_EQ(points->at(0).reference_error, (ReferenceError{.5, .25, .1}));
 }
 
 TEST(SqliteJobStore, SaysThatAFileIsNoDatabase) {
