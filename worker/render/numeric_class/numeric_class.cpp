@@ -240,8 +240,7 @@ const Digest& numeric_class() {
 }
 
 const std::string& platform() {
-  static const std::string words = fmt::format("{}:gcc-{}.{}.{}:embree-{}", LIGHTSHAFT_ARCH, __GNUC__,
-                                               __GNUC_MINOR__, __GNUC_PATCHLEVEL__, Accel::version());
+  static const std::string words = fmt::format("{}:embree-{}", LIGHTSHAFT_PLATFORM, Accel::version());
   return words;
 }
 
