@@ -19,8 +19,8 @@ namespace ls::scene::gltf {
 struct Member;
 struct Value {
   using List = std::vector<Value>;
-  using Members = std::vector<Member>;
-  std::size_t offset = 0;  // in the text: of a member that of its name
+  using Members = std::vector<Member>;  // by name, as a file may have a million that are asked for often
+  std::size_t offset = 0;               // in the text: of a member that of its name
   std::variant<std::monostate, bool, double, std::string, List, Members> is;
 };
 struct Member {
