@@ -4,8 +4,8 @@
 usage: usd_scenes.py DIR -o FOLDER [--cycles PYTHON] [--only TEXT] [--size WxH] [--spp N]
        usd_scenes.py DIR --every
 DIR holds github.com/usd-wg/assets at commit 274fa4584dd6afe7e7d84ea30e1ec9c652858d9a. Of each scene of SCENES it
-writes NAME.png: Lightshaft's picture, and right of it, with --cycles, that of Cycles, by an interpreter that has
-`bpy`; and prints a row of a table with the ratio of the means of all but the sky. With --every it reads each
+writes, with --cycles, usd-NAME.jpg: Lightshaft's picture, and right of it that of Cycles, by an interpreter that has
+`bpy`, each with an exposure of its own; and prints a row of a table with the ratio of the means of all but the sky. With --every it reads each
 stage below DIR, and counts what is read and what is refused; an error of another kind than LightshaftError ends
 it. Needs the package lightshaft[usd]; the programs come from LIGHTSHAFT_BIN. A bench, not a test.
 """
@@ -69,19 +69,10 @@ def load(path):
     return np.stack([np.asarray(channels[name].pixels, float) for name in "RGB"], -1)
 
 
-def shown(values):
-    import numpy as np
-
-    low = values <= 0.0031308
-    coded = np.where(low, 12.92 * values, 1.055 * np.maximum(values, 1e-9) ** (1 / 2.4) - 0.055)
-    return np.round(255 * np.clip(coded, 0, 1)).astype(np.uint8)
-
-
 def pair(name, stage, options):
-    import numpy as np
-    from PIL import Image
-
     import lightshaft.usd
+    import numpy as np
+    from pairs import exposure_for, write_pair
 
     folder = options.output / name
     scene = lightshaft.usd.read(stage, size=options.size)
@@ -89,21 +80,17 @@ def pair(name, stage, options):
     width, height = options.size
     common = ["-o", folder / "ours.exr", "--float", "--spp", options.spp, "--size", f"{width}x{height}"]
     subprocess.run([str(x) for x in (BIN / "lightshaft", "render", made, *common, "--quiet")], check=True)
-    pictures, ratio = [load(folder / "ours.exr")], "-"
+    ours, ratio = load(folder / "ours.exr"), "-"
     if options.cycles:
         theirs = folder / "cycles.exr"
         call = [options.cycles, __file__, stage, "-o", theirs, "--as-cycles", "--spp", options.spp]
         call += ["--size", f"{width}x{height}"]
         environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
         subprocess.run([str(x) for x in call], check=True, env=environment, stdout=subprocess.DEVNULL)
-        pictures.append(load(theirs))
-        ours = pictures[0]
+        theirs = load(theirs)
         things = ours.any(axis=2) & ~np.isclose(ours, 1, atol=1e-4).all(axis=2)  # neither black nor the sky
-        means = [picture[things].mean(axis=0) for picture in pictures]
-        ratio = ", ".join(f"{a / b:.3f}" for a, b in zip(*means))
-    Image.fromarray(np.concatenate([shown(picture) for picture in pictures], axis=1)).save(
-        options.output / f"{name}.png"
-    )
+        ratio = ", ".join(f"{a / b:.3f}" for a, b in zip(ours[things].mean(axis=0), theirs[things].mean(axis=0)))
+        write_pair(options.output / f"usd-{name}.jpg", *(x * exposure_for(x) for x in (ours, theirs)))
     print(f"| {name} | {SCENES[name]} | {len(scene.warnings)} | {ratio} |", flush=True)
     for warning in scene.warnings:
         print(f"    {warning}", flush=True)

@@ -143,6 +143,18 @@ def test_a_scene_of_two_gigabytes_is_told_how_to_export_it(tmp_path, ending):
     assert not (tmp_path / "city.exr").exists()
 
 
+def test_a_buffer_of_two_gigabytes_is_refused_with_its_place(tmp_path):
+    scene, glb = tmp_path / "city.gltf", Glb()
+    glb.json["buffers"] = [{"byteLength": 2 << 30, "uri": "city.bin"}]
+    scene.write_text(json.dumps(glb.json))
+    (tmp_path / "city.bin").touch()
+    os.truncate(tmp_path / "city.bin", 2 << 30)
+
+    told = lightshaft("render", scene, "-o", tmp_path / "city.exr", code=2).stderr
+
+    assert 'city.gltf:1:' in told and 'buffers[0].uri: "city.bin" is larger than the 32 MiB' in told
+
+
 def test_a_surface_of_emission_one_has_radiance_one(tmp_path):
     glb = Glb()
     glb.json["materials"][0] = {

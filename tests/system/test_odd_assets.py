@@ -5,8 +5,10 @@ Everything is written here, byte by byte or by OpenVDB's own module, with no mor
 
 import json
 import math
+import os
 import struct
 
+import local_farm
 import pytest
 from cli_kit import lightshaft, load
 
@@ -131,3 +133,18 @@ def test_a_sun_of_34000_in_an_environment_is_sampled(tmp_path):
 
     # Found by chance alone, one direction in a thousand, a diffuse ball's relMSE would be of the order of 10.
     assert load(tmp_path / "r.json")["relmse"] < .05
+
+
+def test_a_volume_that_is_cut_off_ends_its_job_on_a_farm_and_no_other(tmp_path):
+    (tmp_path / "cloud.nvdb").write_bytes(b"NanoVDB0")
+    volume = '<volume name="sigma_t" type="gridvolume"><string name="filename" value="cloud.nvdb"/></volume>'
+    scene = tmp_path / "scene.xml"
+    scene.write_text(SCENE % f'<shape type="cube"><bsdf type="null"/><medium name="interior" type="heterogeneous">{volume}</medium></shape>')
+    with local_farm.LocalFarm(tmp_path / "farm") as farm:
+        farm.add_worker(fake=False)
+        environment = {**os.environ, "LIGHTSHAFT_URL": farm.url(), "LIGHTSHAFT_TOKEN": farm.token}
+
+        told = lightshaft("submit", scene, "--spp", 2, "--wait", "-o", tmp_path / "out.exr", env=environment, code=1).stderr
+
+        assert "on worker-1: cloud.nvdb: not a readable NanoVDB file: damaged, or cut short" in told and not (tmp_path / "out.exr").exists()
+        farm.wait_for_job(farm.submit(local_farm.SCENE, spp=2))

@@ -212,7 +212,8 @@ class Page:
         return out
 
     def screenshot(self, path, whole=True):
-        """Of the whole page, or of what fits the window."""
-        data = self.call("Page.captureScreenshot", {"format": "png", "captureBeyondViewport": whole})["data"]
+        """Of the whole page, or of what fits the window: a PNG, or a .jpg."""
+        form = {"format": "jpeg", "quality": 80} if str(path).endswith(".jpg") else {"format": "png"}
+        data = self.call("Page.captureScreenshot", {**form, "captureBeyondViewport": whole})["data"]
         with open(path, "wb") as file:
             file.write(base64.b64decode(data))

@@ -168,9 +168,7 @@ void Translation::add(Element e) {
 }
 
 void Translation::warn_once(const Item& at, std::string text) {
-  if (std::find(warned.begin(), warned.end(), text) != warned.end()) return;
-  warned.push_back(text);
-  at.warning(std::move(text));
+  if (warned.insert(text).second) at.warning(std::move(text));
 }
 
 bool is_gltf(std::string_view file_name) { return has_ending(file_name, {".gltf", ".glb"}); }

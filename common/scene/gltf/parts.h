@@ -28,7 +28,7 @@ struct Translation {
   Element scene;
   std::size_t elements = 0;  // in `scene`
   bool has_light = false;
-  std::vector<std::string> warned;             // texts of warnings that are given once a file
+  std::set<std::string> warned;                // texts of warnings that are given once a file
   std::map<const Value*, std::string> images;  // names of the files of images that are read
 
   std::set<std::string> ids;

@@ -92,6 +92,9 @@ class Builder {
   bool close() {
     Value done = std::move(open_.back().value);
     open_.pop_back();
+    if (auto* members = std::get_if<Value::Members>(&done.is))
+      std::stable_sort(members->begin(), members->end(),
+                       [](const Member& a, const Member& b) { return a.name < b.name; });
     return place(std::move(done));
   }
   bool place(Value value) {
@@ -123,11 +126,16 @@ class Builder {
 };
 
 // Returns the last of the values that begin at or before `offset`; nullptr: there is none.
-template <class List, class Offset>
-const auto* last_before(const List& list, std::size_t offset, Offset offset_of) {
+const Value* last_before(const Value::List& list, std::size_t offset) {
   const auto after = std::upper_bound(list.begin(), list.end(), offset,
-                                      [&](std::size_t x, const auto& one) { return x < offset_of(one); });
+                                      [](std::size_t x, const Value& one) { return x < one.offset; });
   return after == list.begin() ? nullptr : &*(after - 1);
+}
+const Member* last_before(const Value::Members& members, std::size_t offset) {
+  const Member* last = nullptr;
+  for (const Member& one : members)
+    if (one.value.offset <= offset && (!last || one.value.offset > last->value.offset)) last = &one;
+  return last;
 }
 
 }  // namespace
@@ -138,10 +146,10 @@ std::string path_at(const Value& root, std::size_t offset) {
   while (at) {
     const Value* next = nullptr;
     if (const auto* list = std::get_if<Value::List>(&at->is)) {
-      next = last_before(*list, offset, [](const Value& v) { return v.offset; });
+      next = last_before(*list, offset);
       if (next) path += fmt::format("[{}]", next - list->data());
     } else if (const auto* members = std::get_if<Value::Members>(&at->is)) {
-      const Member* m = last_before(*members, offset, [](const Member& one) { return one.value.offset; });
+      const Member* m = last_before(*members, offset);
       if (m) path += fmt::format("{}{}", path.empty() ? "" : ".", m->name);
       next = m ? &m->value : nullptr;
     }
@@ -175,9 +183,9 @@ Item Item::operator[](std::string_view name) const {
     error("an object is wanted here, {...}");
     return {nullptr, near_, report_};
   }
-  const auto found =
-      std::find_if(members->begin(), members->end(), [&](const Member& m) { return m.name == name; });
-  if (found == members->end()) return {nullptr, value_, report_};
+  const auto found = std::lower_bound(members->begin(), members->end(), name,
+                                      [](const Member& m, std::string_view x) { return m.name < x; });
+  if (found == members->end() || found->name != name) return {nullptr, value_, report_};
   return {&found->value, &found->value, report_};
 }
 

@@ -23,7 +23,8 @@ class NvdbBytes {
   std::span<const std::byte> part(std::uint64_t at, std::uint64_t n) const {
     if (at > data_.size() || n > data_.size() - at)
       throw Refused{1, "not a readable NanoVDB file: damaged, or cut short: " + std::string(what_) + " of " +
-                           std::to_string(data_.size()) + " bytes has none at " + std::to_string(at)};
+                           std::to_string(data_.size()) + " bytes, of which " + std::to_string(n) +
+                           " are wanted from byte " + std::to_string(at) + " on"};
     return data_.subspan(at, n);
   }
   template <class T>

@@ -265,6 +265,18 @@ TEST(GltfHostile, ManyValuesAreRefused) {
   EXPECT_NE(said_of(many).find("more than 2000000 values"), std::string::npos);
 }
 
+// Every primitive asks its material for several members: searched in order they would take hours.
+TEST(GltfHostile, MembersAreFoundAmongAMillion) {
+  GltfFile file;
+  json& primitives = file.j["meshes"][0]["primitives"];
+  primitives = json(50'000, primitives[0]);
+  for (std::size_t i = 0; i < 1'000'000; ++i) file.material()[std::to_string(i)] = 0;
+  file.material()["alphaMode"] = "FADE";
+
+  EXPECT_NE(said_of(file.glb()).find("materials[0].alphaMode: alphaMode is OPAQUE, MASK or BLEND"),
+            std::string::npos);
+}
+
 TEST(GltfHostile, ManyInstancesAreRefused) {
   GltfFile file;
   const std::size_t moves = file.add(std::vector<float>(3 * 200'000, 1), "VEC3");
