@@ -31,9 +31,9 @@ from local_farm import wait_until
 from soak import figures
 from webhook_receiver import signed_by
 
-PLANNED = {"jobs an hour": 150, "workers": 200, "of what the workers could": .5}  # that two hours have 300 jobs
+PLANNED = {"jobs an hour": 150, "workers": 200, "of what the workers could": .45}  # that two hours have 300 jobs
 WAVE = 600.0  # seconds from one wave of jobs to the next
-SHOWN = ("id", "owner", "state", "units_done", "units_total", "core_seconds", "queued_core_seconds", "priority", "fake")
+SHOWN = ("id", "owner", "state", "units_done", "units_total", "core_seconds", "queued_core_seconds", "priority", "spp")
 COUNTED = re.compile(r"lightshaft_(units_freed_total|results_total|audits_total|workers_quarantined_total|tiles_discarded_total|workers\{|units_leased |leases |"
                      r"queued_core_seconds|webhook|redis|http_connections|http_event_streams|background_writes|results_)|process_(resident|open|threads|cpu)")
 
