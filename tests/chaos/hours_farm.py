@@ -159,18 +159,20 @@ class SharedFarm(contextlib.ExitStack):
 
     def _add_workers(self, fakes, reals):
         """A tenth of the fake ones behind lines that can be cut, a tenth in the namespace, some behind the meddler; three steady ones that nothing is
-        done to themselves; the others are killed, frozen and so on."""
+        done to themselves; the others are killed, frozen and so on. Of hundreds ten each are one process (tests/bench/fleet.cpp), as on a machine
+        with ten of them."""
         ports = [c.grpc for c in self.coordinators]
         direct = [f"127.0.0.1:{port}" for port in ports]
         tenth, few = max(1, fakes // 10), max(1, fakes // 30)
-        sizes = {"steady": min(3, few), "cut": tenth, "meddled": few, "network": tenth if self.network else 0, "watched": max(3, few), "crash": max(4, few)}
+        sizes = {"steady": min(3, few), "crash": 4, "cut": tenth, "meddled": few, "network": tenth if self.network else 0, "watched": max(3, few)}
         sizes["fake"] = fakes - sum(sizes.values())
         assert sizes["fake"] > 0, "too few workers"
         for group, size in sizes.items():
-            flags = ["--fake-sample-seconds", self.unit, "--tags", "fake" if group in ("steady", "fake", "cut", "meddled", "network") else f"fake,{group}"]
+            flags = ["--fake-sample-seconds", self.unit, "--tags", "fake" if group == "fake" else f"fake,{group}"]
             if group == "crash":
                 flags += ["--fake-fault", "crash,seed=13,tile=2,round=1"]
-            for n in range(size):
+            each = 1 if fakes < 60 or group in ("steady", "crash") else 10 if size >= 20 else size
+            for n, first in enumerate(range(0, size, each)):
                 addresses = direct[n % 3:] + direct[:n % 3]
                 if group == "cut":
                     addresses = [f"127.0.0.1:{line.port}" for line in self.worker_lines[n % 3:] + self.worker_lines[:n % 3]]
@@ -178,13 +180,17 @@ class SharedFarm(contextlib.ExitStack):
                     addresses = [f"127.0.0.1:{self.meddler.port}", *direct[1:]]
                 if group == "network":
                     addresses = [f"{self.network.host}:{port}" for port in ports[n % 3:] + ports[:n % 3]]
-                self.add(group, f"{group}-{n}", *flags, coordinator=",".join(addresses), within=self.network.inside if group == "network" else ())
+                self.add(group, f"{group}-{n}", *flags, size=min(each, size - first), coordinator=",".join(addresses),
+                         within=self.network.inside if group == "network" else ())
         for n in range(reals):
             self.add("real", f"real-{n}", "--tags", "real", fake=False, coordinator=",".join(direct[n % 3:] + direct[:n % 3]))
 
-    def add(self, group, name, *flags, **options):
-        worker = self.coordinators[0].add_worker(*flags, name=name, **options)
-        worker.shown = name
+    def add(self, group, name, *flags, size=1, **options):
+        program = ("lightshaft-worker",) if size == 1 else ("fleet", size)
+        # On one machine hundreds of workers would leave the coordinators no time.
+        within = (*options.pop("within", ()), "nice", "-n", "5")
+        worker = self.coordinators[0].add_worker(*flags, name=name, program=program, within=within, **options)
+        worker.shown, worker.size = name, size
         self.workers.setdefault(group, []).append(worker)
         return worker
 

@@ -33,17 +33,22 @@ def wait(seconds):
 
 # ---- workers ----
 
+TAKING = threading.Lock()
 MORTAL = ("fake", "cut", "meddled", "network", "watched", "crash")
 
 
 @contextlib.contextmanager
 def taken(farm, dice, most, groups=MORTAL):
-    """Some workers that live, and that no other fault has."""
-    free = [w for group in groups for w in farm.workers.get(group, []) if w not in farm.away and w.alive()]
-    if not free:
-        raise Busy
-    some = dice.sample(free, min(len(free), dice.randint(1, most)))
-    farm.away |= set(some)
+    """Some workers that live, and that no other fault has: processes of altogether some `most` workers."""
+    with TAKING:
+        free = [w for group in groups for w in farm.workers.get(group, []) if w not in farm.away and w.alive()]
+        if not free:
+            raise Busy
+        dice.shuffle(free)
+        some, wanted = [], dice.randint(1, most)
+        while free and sum(w.size for w in some) < wanted:
+            some.append(free.pop())
+        farm.away |= set(some)
     try:
         yield some
     finally:
@@ -59,7 +64,7 @@ def workers_killed(farm, dice):
     with taken(farm, dice, 20) as some:
         for worker in some:
             worker.kill()
-        yield {"workers": len(some)}
+        yield {"workers": sum(w.size for w in some)}
         wait(dice.uniform(0, 15))
 
 
@@ -68,7 +73,7 @@ def workers_frozen(farm, dice):
     with taken(farm, dice, 15) as some:
         for worker in some:
             worker.stop()
-        yield {"workers": len(some)}
+        yield {"workers": sum(w.size for w in some)}
         wait(dice.uniform(3, 45))
 
 
@@ -77,7 +82,7 @@ def workers_drained_by_SIGTERM(farm, dice):
     with taken(farm, dice, 10) as some:
         for worker in some:
             worker.signal(signal.SIGTERM)
-        yield {"workers": len(some)}
+        yield {"workers": sum(w.size for w in some)}
         for worker in some:
             try:
                 code = worker.wait(60)
@@ -97,7 +102,7 @@ def slow_workers(farm, dice):
                 worker.terminate()
                 worker.args[worker.args.index("--fake-sample-seconds") + 1] = str(5 * farm.unit)
                 worker.start()
-            yield {"workers": len(some)}
+            yield {"workers": sum(w.size for w in some)}
             wait(dice.uniform(40, 90))
         finally:
             for worker in some:
@@ -328,7 +333,7 @@ def weather(name, times=1, least=5, most=25, **what):
             raise Busy
         try:
             farm.network.weather(**what)
-            yield {"workers": len(farm.workers["network"])}
+            yield {"workers": sum(w.size for w in farm.workers["network"])}
             wait(dice.uniform(least, most))
         finally:
             farm.network.weather()
@@ -349,7 +354,7 @@ def lines_of_some_workers_cut(farm, dice):
     lines, loud = dice.sample(farm.worker_lines, dice.randint(1, 3)), dice.random() < .5
     for line in lines:
         line.cut(loud)
-    yield {"workers": len(farm.workers["cut"]), "loud": loud}
+    yield {"workers": sum(w.size for w in farm.workers["cut"]), "loud": loud}
     wait(dice.uniform(2, 20))
     for line in lines:
         line.mend()
@@ -361,7 +366,7 @@ def messages_doubled_moved_and_cut(farm, dice):
     meddler.chances = dict(doubled=.3, held=.2, cut=.1, oversized=.01, to_doubled=.3, to_held=.2)
     meddler.cuts_left = 2
     before = dict(meddler.done)
-    yield {"workers": len(farm.workers["meddled"])}
+    yield {"workers": sum(w.size for w in farm.workers["meddled"])}
     wait(dice.uniform(20, 60))
     meddler.chances = dict.fromkeys(meddler.chances, 0)
     farm.record.write("meddled", **{k: meddler.done[k] - before[k] for k in before})

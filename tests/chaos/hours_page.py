@@ -10,8 +10,12 @@ SETTLES = 20.0  # seconds after its end in which a fault still costs time: worke
 LOCALITY = 5.0  # seconds of the whole farm's time that a job may have above its share for its loaded world (docs/design/scheduling.md)
 LEASE = 2.0  # seconds of work in a lease, or one unit
 MORE_MEMORY = 1.15  # of the last third against the middle one, at most
-LOST = ("worker lost", "deadline passed", "failed", "returned", "replaced by a newer stream")
+LOST = ("worker lost", "deadline passed", "failed", "returned", "replaced by a newer stream", "worker quarantined")
 SECOND = ("equal", "differing", "unwanted")
+# Faults that can make a coordinator lose what it has done of a job: taken over, damaged, or discarded since a worker lied.
+OF_JOBS = ("coordinator", "redis", "disk of", "clock of", "a worker lies")
+# Faults that cost no unit: they delay uploads, takeovers, events, or nothing.
+HARMLESS = ("s3", "receiver", "strangers")
 # the columns of a job in a sample, as hours.py writes them
 ID, OWNER, STATE, DONE, TOTAL, CORE, QUEUED, PRIORITY, SPP = range(9)
 
@@ -37,7 +41,17 @@ class Run:
         return [(line["name"], line["t"], ends.get(line["number"], last), line) for line in self.by["fault begins"]]
 
     def under_way(self, begin, end):
-        return [name for name, from_, to, _ in self.faults if from_ < end and to + SETTLES > begin]
+        return [(name, told.get("coordinator")) for name, from_, to, told in self.faults if from_ < end and to + SETTLES > begin]
+
+
+def could(fault, cause, at):
+    """Whether this fault can have cost units for this cause at this coordinator."""
+    name, coordinator = fault
+    if name.startswith(HARMLESS):
+        return False
+    if cause == "lost with its coordinator":
+        return any(word in name for word in OF_JOBS) and coordinator in (None, at)
+    return coordinator in (None, at)
 
 
 def counted(sample, name, label, value):
@@ -58,7 +72,7 @@ class Ledger:
 
     def __init__(self, run):
         self.run = run
-        self.rows = []  # (begin, end, seconds of workers, of them spent on results that were accepted, units again by why)
+        self.rows = []  # (begin, end, units accepted, audits, {(why, coordinator): units again}, predicted seconds of work that waited)
         last = [None] * 3  # the last look at which each coordinator answered
         most, place = {}, {}  # units done of each job; the coordinator that had it
         before = None
@@ -67,21 +81,22 @@ class Ledger:
             for at, now in enumerate(sample["coordinators"]):
                 if not now["answers"]:
                     continue
-                old = last[at]
-                if old:
-                    delta = lambda name, label, value: grown(counted(old, name, label, value), counted(now, name, label, value))  # noqa: E731
+                if last[at]:
+                    def delta(name, label, value, old=last[at], new=now):
+                        return grown(counted(old, name, label, value), counted(new, name, label, value))
                     for cause in LOST:
-                        again[cause] += delta("units_freed_total", "cause", cause)
+                        again[cause, at] += delta("units_freed_total", "cause", cause)
                     audited = delta("audits_total", "verdict", "equal") + delta("audits_total", "verdict", "differ")
-                    again["second result"] += max(0, sum(delta("results_total", "verdict", v) for v in SECOND) - audited)
+                    again["second result", at] += max(0, sum(delta("results_total", "verdict", v) for v in SECOND) - audited)
                     audits += audited
                     work += delta("results_total", "verdict", "accepted")
                 last[at] = now
                 for job in now["jobs"]:
-                    if job[ID] in most and place[job[ID]] != at and job[DONE] < most[job[ID]]:
-                        again["taken over"] += most[job[ID]] - job[DONE]
-                    if job[ID] not in most or place[job[ID]] != at or job[DONE] >= most[job[ID]]:
-                        most[job[ID]], place[job[ID]] = job[DONE], at
+                    name, done = job[ID], job[DONE]
+                    if done < most.get(name, 0) and (place[name] != at or sample["coordinators"][place[name]] is now):
+                        again["lost with its coordinator", place[name]] += most[name] - done
+                    if name not in most or place[name] != at or done != most[name]:
+                        most[name], place[name] = done, at
             if before is not None:
                 queued = sum(job[QUEUED] for c in sample["coordinators"] if c["answers"] for job in c["jobs"] if job[STATE] in ("running", "queued"))
                 self.rows.append((before["t"], sample["t"], work, audits, again, queued))
@@ -89,24 +104,34 @@ class Ledger:
         units = sum(line["units"] for line in run.by["ended"] if line["state"] == "done")
         self.unit = sum(line["core_seconds"] for line in run.by["ended"] if line["state"] == "done") / max(1, units)
 
+    def waits(self, row):
+        """Whether there was work for all workers."""
+        return row[5] > self.run.begin["workers"] * self.unit
+
     def by_fault(self):
-        """{fault, or None: [intervals' seconds of workers while work waited, of them lost, units again]}; what happens while several are under
-        way is shared out evenly."""
+        """{fault, or None: [workers' seconds while work waited, of them lost, units again]}; what several faults can have cost is shared out evenly."""
         table = collections.defaultdict(lambda: [0.0, 0.0, 0.0])
-        for begin, end, work, audits, again, queued in self.rows:
-            names = self.run.under_way(begin, end) or [None]
-            waits = queued > self.run.begin["workers"] * self.unit
-            had = (end - begin) * self.run.begin["workers"] if waits else 0
-            lost = had - (work + audits) * self.unit if waits else 0
-            for name in names:
-                row = table[name]
-                row[0] += had / len(names)
-                row[1] += lost / len(names)
-                row[2] += sum(again.values()) / len(names)
+        for row in self.rows:
+            begin, end, work, audits, again, _ = row
+            faults = self.run.under_way(begin, end)
+            if self.waits(row):
+                had = (end - begin) * self.run.begin["workers"]
+                guilty = [f for f in faults if not f[0].startswith(HARMLESS)] or [(None, None)]
+                for name, _ in guilty:
+                    table[name][0] += had / len(guilty)
+                    table[name][1] += (had - (work + audits) * self.unit) / len(guilty)
+            for (cause, at), units in again.items():
+                guilty = [f for f in faults if could(f, cause, at)] or [(None, None)]
+                for name, _ in guilty:
+                    table[name][2] += units / len(guilty)
         return table
 
     def causes(self):
-        return sum((row[4] for row in self.rows), collections.Counter())
+        total = collections.Counter()
+        for row in self.rows:
+            for (cause, _), units in row[4].items():
+                total[cause] += units
+        return total
 
 
 # ---- fairness ----
@@ -174,14 +199,9 @@ def processes(run):
 
 
 def idle_files(sample):
-    """Open files and threads of the coordinators without those of connections to users and workers."""
-    rows = []
-    for name, coordinator in zip("abc", sample["coordinators"]):
-        process = sample["processes"].get(name)
-        if coordinator["answers"] and process:
-            rows.append((name, process["files"] - coordinator["counted"].get("lightshaft_http_connections", 0) - workers_of(coordinator),
-                         process["threads"], process["memory"]))
-    return rows
+    """(name, open files without connections to users and workers, threads, memory) of each coordinator."""
+    return [(name, process["files"] - process.get("connections", 0), process["threads"], process["memory"])
+            for name in "abc" if (process := sample["processes"].get(name))]
 
 
 def growth_table(run):
@@ -255,7 +275,7 @@ Users handed in {kinds}; they {acts}. Beside that: {notes}.
 
 ## Time lost
 
-*Units again*: units that a worker had in hand when it was lost, drained, too slow or failed, second results, and what a dead coordinator had done of the jobs that another one took over; audits are not in it. *Seconds*: of the whole farm while work waited, beyond the {usual:.0%} that it loses with no fault under way (workers without work at one coordinator while another has some, the ends of jobs). What happens while several faults are under way, or within {settles:.0f} s after their end, is shared out evenly between them, so rows of rare faults have much of their neighbours in them.
+*Units again*: units that a worker had in hand when it was lost, drained, too slow or failed, second results, and what was done of jobs that another coordinator took over, or whose partials were damaged; audits are not in it. *Seconds*: of the whole farm while work waited, beyond the {usual:.0%} that it loses with no fault under way (workers without work at one coordinator while another has some, the ends of jobs). A fault counts as under way until {settles:.0f} s after its end. What several that are under way can have cost is shared out evenly between them, so rows of rare faults have much of their neighbours in them; faults of the store, of receivers and of strangers cost no units and count for nothing.
 
 | fault | times | lasted (s) | units again | a time | seconds |
 |---|---|---|---|---|---|
@@ -324,7 +344,7 @@ def page(path):
     none = shares.get(None, (0, 0, 0))[2]
     units = sum(line["units"] for line in run.by["ended"])
     at_once, most = spans(run)
-    waited = sum(end - begin for begin, end, _, _, _, queued in ledger.rows if queued > run.begin["workers"] * ledger.unit)
+    waited = sum(row[1] - row[0] for row in ledger.rows if ledger.waits(row))
     notes = collections.Counter(line["what"] for line in run.by["note"])
     strays = collections.Counter("removed job that came back" if line["removed_before"] else "job whose taking was not answered" for line in run.by["stray"])
     taken = run.by["webhooks"][0] if run.by["webhooks"] else {"taken": 0, "jobs": 0}
