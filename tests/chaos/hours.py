@@ -165,7 +165,7 @@ def what_is_left(farm, caller, users):
 def run(arguments, folder, record):
     seconds, dice = 60 * arguments.minutes, random.Random(arguments.seed)
     count = max(10, round(PLANNED["jobs an hour"] * arguments.minutes / 60 * arguments.workers / PLANNED["workers"])) if not arguments.jobs else arguments.jobs
-    handing_in, storming = .84 * seconds, .9 * seconds
+    handing_in, storming = .9 * seconds, .96 * seconds
     tasks = draw_tasks(arguments.seed, count, handing_in, min(WAVE, seconds / 2))
     fake_samples = sum(t.samples() for t in tasks if t.kind != "real")
     unit = PLANNED["of what the workers could"] * arguments.workers * handing_in / fake_samples
