@@ -1,5 +1,6 @@
 // Many fake workers in one process, as many as a machine could not hold one by one: each has its own agent,
-// connections and thread, and is to the farm what `lightshaft-worker --fake` is. Made for tests/chaos/hours.py.
+// connections and thread, and is to the farm what `lightshaft-worker --fake` is. Made for
+// tests/chaos/hours.py.
 //   fleet COUNT [options of lightshaft-worker]
 // Its workers are called NAME-0, NAME-1, ... SIGTERM drains all of them. Exit codes are the worker's.
 #include <signal.h>

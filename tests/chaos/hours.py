@@ -25,13 +25,13 @@ import time
 from chaos_kit import ROOT
 from hours_farm import Caller, Record, SharedFarm
 from hours_faults import Storm
-from hours_users import USERS, Strangers, Undisturbed, User, draw_tasks
+from hours_users import LARGEST, USERS, Strangers, Undisturbed, User, draw_tasks
 from hours_page import page
 from local_farm import wait_until
 from soak import figures
 from webhook_receiver import signed_by
 
-PLANNED = {"jobs an hour": 150, "workers": 200, "of what the workers could": .45}  # that two hours have 300 jobs
+PLANNED = {"jobs an hour": 150, "workers": 200, "of what the workers could": .3}  # that two hours have 300 jobs
 ESTABLISHED = "01"  # in /proc/net/tcp
 WAVE = 600.0  # seconds from one wave of jobs to the next
 SHOWN = ("id", "owner", "state", "units_done", "units_total", "core_seconds", "queued_core_seconds", "priority", "spp")
@@ -177,7 +177,7 @@ def run(arguments, folder, record):
         everybody = dict(tokens, read=make_token(farm, "read", "monitor"), admin=farm.admin_token, join=farm.coordinators[0].join_token, none="")
         undisturbed = Undisturbed(folder, farm)
         record.began = time.monotonic()
-        record.write("begin", seed=arguments.seed, minutes=arguments.minutes, workers=arguments.workers, jobs=count, unit=unit, cores=os.cpu_count(),
+        record.write("begin", seed=arguments.seed, minutes=arguments.minutes, workers=arguments.workers, jobs=count, unit=unit, largest=LARGEST * unit, cores=os.cpu_count(),
                      joined=round(record.began - began, 1), left_out=farm.left_out, commit=commit(), audits=farm.audits, waves=min(WAVE, seconds / 2),
                      groups={group: sum(w.size for w in workers) for group, workers in farm.workers.items()})
         users = [User(farm, name, tokens[name], [t for t in tasks if t.user == name], undisturbed, dice.random()) for name in USERS]
@@ -214,7 +214,7 @@ def commit():
     return subprocess.run(["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"], capture_output=True, text=True).stdout.strip()
 
 
-def main():
+def read_options(words=None):
     parser = argparse.ArgumentParser()
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--minutes", type=float, default=5)
@@ -225,8 +225,11 @@ def main():
     parser.add_argument("--record", default="", help="where to write what happens, a line of JSON each")
     parser.add_argument("--from", dest="recorded", default="", help="make the page of this record; nothing is run")
     parser.add_argument("--write", default="")
-    arguments = parser.parse_args()
+    return parser.parse_args(words)
 
+
+def main():
+    arguments = read_options()
     with tempfile.TemporaryDirectory(prefix="lightshaft-hours-", ignore_cleanup_errors=True) as folder:
         path = pathlib.Path(arguments.recorded or arguments.record or pathlib.Path(folder) / "record.jsonl")
         if not arguments.recorded:

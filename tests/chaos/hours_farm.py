@@ -168,7 +168,9 @@ class SharedFarm(contextlib.ExitStack):
         sizes["fake"] = fakes - sum(sizes.values())
         assert sizes["fake"] > 0, "too few workers"
         for group, size in sizes.items():
-            flags = ["--fake-sample-seconds", self.unit, "--tags", "fake" if group == "fake" else f"fake,{group}"]
+            # Those that are to find a liar have no other work: so enough of them are where it is.
+            tags = group if group in ("fake", "watched") else f"fake,{group}"
+            flags = ["--fake-sample-seconds", self.unit, "--tags", tags]
             if group == "crash":
                 flags += ["--fake-fault", "crash,seed=13,tile=2,round=1"]
             each = 1 if fakes < 60 or group in ("steady", "crash") else 10 if size >= 20 else size

@@ -28,8 +28,12 @@ import steam  # noqa: E402
 USERS = ("anna", "bert", "carl", "dora", "emil")
 GRID = 48  # voxels a side of a grid that is uploaded
 BAD_SEED = 13  # workers with the tag crash die of it
-SIZES, SAMPLES = ("256x192", "384x256", "512x384"), (128, 128, 192, 256)
+SIZES, SAMPLES, MORE = ("256x192", "384x256"), (48, 64, 64, 64), 32
+LARGEST = 32 * 32 * 32  # pixels and samples of the largest unit of these, in rounds of 2, 2, 4, 8, 16, 32 and 32 samples
 SEEDS = 60  # jobs with the same seed are the same job, so that one undisturbed worker keeps up; those of one wave have different ones
+# How a job of a kind may fail, and with which words: its unit is a crash; where only one honest worker could be asked about a liar, there is no
+# third one to decide (docs/design/scheduling.md).
+RIGHT_TO_FAIL = {"crash": "--pixel", "watched": "no third one agrees"}
 ENDED = ("done", "failed", "cancelled")
 
 
@@ -102,9 +106,9 @@ def draw_tasks(seed, count, seconds, period):
         elif chance < .27:
             acts = [(dice.uniform(0, .8), ("pause", dice.uniform(2, 20)))]
         elif chance < .42:
-            acts = [(dice.uniform(0, .7), ("extend", 64))]
+            acts = [(dice.uniform(0, .7), ("extend", MORE))]
         elif chance < .5:
-            acts = [(1, ("extend later", 64))]
+            acts = [(1, ("extend later", MORE))]
         elif chance < .6:
             acts = [(dice.uniform(0, .4), ("priority", -1)), (dice.uniform(.4, .8), ("priority", 0))]
         elif chance < .7:
@@ -344,7 +348,7 @@ class User(threading.Thread):
                     task.spp += more
                     self.record.write("act", number=task.number, what=what)
                 return
-        elif state == "failed" and (task.kind != "crash" or "--pixel" not in (view["error"] or "")):
+        elif state == "failed" and RIGHT_TO_FAIL.get(task.kind, "\0") not in (view["error"] or ""):
             self.record.wrong("a job failed", number=task.number, job=task.id, error=view["error"])
         elif state == "cancelled" and task.asked != "cancelled":
             self.record.wrong("a job was cancelled by nobody", number=task.number, job=task.id)
