@@ -157,8 +157,10 @@ def dead(farm, dice, numbers=(1, 2), by=signal.SIGKILL):
                 farm.record.wrong("a coordinator did not end as it was told", coordinator=number, code=code)
             yield number
         finally:
-            farm.start(number)
-            farm.down.discard(number)
+            try:
+                farm.start(number)
+            finally:
+                farm.down.discard(number)
 
 
 @fault(2)

@@ -34,6 +34,7 @@ SEEDS = 60  # jobs with the same seed are the same job, so that one undisturbed 
 # How a job of a kind may fail, and with which words: its unit is a crash; where only one honest worker could be asked about a liar, there is no
 # third one to decide (docs/design/scheduling.md).
 RIGHT_TO_FAIL = {"crash": "--pixel", "watched": "no third one agrees"}
+LOST_AFTER = 300  # seconds in which no coordinator has a job
 ENDED = ("done", "failed", "cancelled")
 
 
@@ -374,7 +375,7 @@ class User(threading.Thread):
                 self.record.write("stray", job=job, user=self.name_, removed_before=job in self.gone, state=view["state"], at=at)
                 self.caller.try_ask(at, "DELETE", f"/api/v1/jobs/{job}")
         for task in list(self.tasks.values()):
-            if task.id not in found and time.monotonic() - task.seen > 180 and self.note(task, "nobody has it", every=60):
+            if task.id not in found and time.monotonic() - task.seen > LOST_AFTER and self.note(task, "nobody has it", every=60):
                 self.record.wrong("a job is lost", number=task.number, job=task.id)
 
     def run(self):
