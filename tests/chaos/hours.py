@@ -175,7 +175,7 @@ def what_is_left(farm, caller, users):
 def run(arguments, folder, record):
     seconds, dice = 60 * arguments.minutes, random.Random(arguments.seed)
     count = max(10, round(PLANNED["jobs an hour"] * arguments.minutes / 60 * arguments.workers / PLANNED["workers"])) if not arguments.jobs else arguments.jobs
-    handing_in, storming = .9 * seconds, .96 * seconds
+    handing_in, storming = .84 * seconds, .93 * seconds
     tasks = draw_tasks(arguments.seed, count, handing_in, min(WAVE, seconds / 2))
     fake_samples = sum(t.samples() for t in tasks if t.kind != "real")
     unit = PLANNED["of what the workers could"] * arguments.workers * handing_in / fake_samples
@@ -189,8 +189,8 @@ def run(arguments, folder, record):
         record.write("begin", seed=arguments.seed, minutes=arguments.minutes, workers=arguments.workers, jobs=count, unit=unit, largest=LARGEST * unit, cores=os.cpu_count(),
                      joined=joined, left_out=farm.left_out, commit=commit(), audits=farm.audits, waves=min(WAVE, seconds / 2),
                      groups={group: sum(w.size for w in workers) for group, workers in farm.workers.items()})
-        users = [User(farm, name, tokens[name], [t for t in tasks if t.user == name], undisturbed, dice.random()) for name in USERS]
-        farm.keeper = User(farm, "keeper", tokens["keeper"], [], undisturbed, dice.random())
+        users = [User(farm, name, tokens[name], [t for t in tasks if t.user == name], undisturbed, dice.random(), handing_in) for name in USERS]
+        farm.keeper = User(farm, "keeper", tokens["keeper"], [], undisturbed, dice.random(), handing_in)
         farm.keeper.stays = True
         watch, strangers = Watch(farm), Strangers(farm, users, everybody, dice.random())
         watch.look("quiet before")

@@ -258,7 +258,7 @@ def fault_table(run, ledger):
 
 PAGE = """# Hours of chaos
 
-`/usr/bin/python3 tests/chaos/hours.py --seed {seed} --minutes {minutes:g} --workers {workers} --write docs/measurements/chaos-hours.md` made this page, commit {commit}, on {cores} cores, with other work on the machine.{broken} Faults of every kind came at once on one farm: three coordinators with TLS that share a real Redis and an S3 store (`tests/support/s3_server.py`), {workers} fake workers and two that render, {jobs} jobs of five users in waves of {waves:.0f} minutes, {audits} % of the results audited. {faults} faults began, {at_once:.1f} were under way on average, at most {most}. Jobs, what users do to them, and the faults with their order follow from the seed; when something happens does not.
+`/usr/bin/python3 tests/chaos/hours.py --seed {seed} --minutes {minutes:g} --workers {workers} --write docs/measurements/chaos-hours.md` made this page, commit {commit}, on {cores} cores, with other work on the machine (load average {load:.0f} in the mean, at most {most_load:.0f}).{broken} Faults of every kind came at once on one farm: three coordinators with TLS that share a real Redis and an S3 store (`tests/support/s3_server.py`), {workers} fake workers and two that render, {jobs} jobs of five users in waves of {waves:.0f} minutes, {audits} % of the results audited. {faults} faults began, {at_once:.1f} were under way on average, at most {most}. Jobs, what users do to them, and the faults with their order follow from the seed; when something happens does not.
 
 ## What must hold
 
@@ -274,7 +274,7 @@ PAGE = """# Hours of chaos
 | two users who both have work for all workers of a coordinator get the same, within a lease for each worker and the preference for loaded worlds | {fair} |
 
 {violations}
-Users handed in {kinds}; they {acts}. Beside that: {notes}.
+Users handed in {kinds}{less}; they {acts}. Beside that: {notes}.
 
 ## Time lost
 
@@ -324,8 +324,8 @@ def listed(counter):
 
 def page(path):
     run = Run(path)
-    if not run.begin:
-        return "The run did not begin.\n", [str(line) for line in run.by["wrong"]] or ["it did not begin"]
+    if not run.begin or len(run.samples) < 2:
+        return "The run did not come far.\n", [str(line) for line in run.by["wrong"]] or ["it did not begin"]
     ledger = Ledger(run)
     table, usual, shares = fault_table(run, ledger)
     grown_lines, grown_wrong = growth_table(run)
@@ -353,17 +353,21 @@ def page(path):
     taken = run.by["webhooks"][0] if run.by["webhooks"] else {"taken": 0, "jobs": 0}
     text = PAGE.format(
         **{key: run.begin[key] for key in ("seed", "minutes", "workers", "commit", "cores", "jobs", "audits")}, waves=run.begin["waves"] / 60,
+        load=statistics.mean(line["load"] for line in run.samples), most_load=max(line["load"] for line in run.samples),
         broken="" if run.end else " It did not come to its end.", faults=len(run.faults), at_once=at_once, most=most,
         hashes=f"{sum(n for (_, equal), n in hashes.items() if equal)} of {sum(hashes.values())} ({listed(collections.Counter({kind: n for (kind, equal), n in hashes.items() if equal}))})",
         ends=f"{sum(ended.values())} ended: {listed(ended)}" + ("" if held("a job", "nobody") else "; **not all as wanted**"),
-        tokens=f"{sum(strangers['tried'].values()):,} tries ({listed(collections.Counter(strangers['tried']))})" + ("" if held("a token") else "; **some did**"),
-        liars=f"{sum(line['found'] for line in liars)} of {len(liars)} found; honest ones quarantined: {sum(line['what'].startswith('an honest') for line in run.by['wrong'])}",
+        tokens=f"{sum(strangers['tried'].values()):,} tries, none did ({listed(collections.Counter(strangers['tried']))}; {strangers['redirects']} of the first were sent on by a coordinator "
+               "that does not have the job to the one that refused it)" if held("a token") else "**some did**",
+        liars=f"{sum(line['found'] for line in liars)} of {len(liars)} found, {sum(not line['found'] and line['ended'] == 'failed' for line in liars)} told of with the evidence where no third "
+              f"worker could decide; honest ones quarantined: {sum(line['what'].startswith('an honest') for line in run.by['wrong'])}",
         left="yes" if held("jobs are left", "folders", "Redis has", "the store", "uploads") else "**no**",
         webhooks=f"{taken['taken']:,} events of {taken['jobs']} jobs" + ("" if held("a webhook", "no webhook", "events") else "; **not all**"),
         processes="yes" if held("a worker ended", "a coordinator") and not grown_wrong + quiet_wrong else "**no**",
         fair=(f"{len(windows)} times of two users, {sum(s for s, _ in windows) / 60:.0f} minutes together: they differed by {statistics.median(d for _, d in windows):.1f} s a worker "
               f"(median; most {max(d for _, d in windows):.1f}, bound {bound:.1f})" if windows else "no two users had work for all workers of a coordinator for 20 s"),
         violations="".join(f"- {what}\n" for what in [*wrong, *derived]) or "Nothing that must hold was found not to hold.\n",
+        less=(f" ({count} fewer than planned: a user has at most eight jobs under way)" if (count := sum(line["jobs"] for line in run.by["not handed in"])) else ""),
         kinds=listed(collections.Counter(line["what"] for line in run.submitted.values())), acts=listed(collections.Counter(line["what"] for line in run.by["act"])),
         notes=listed(notes + strays), usual=usual, settles=SETTLES, fault_table="\n".join(table), units=units, again=round(all_again),
         share=all_again / max(1, units), causes=listed(collections.Counter({k: round(v) for k, v in again.items() if v})),

@@ -34,6 +34,7 @@ SEEDS = 60  # jobs with the same seed are the same job, so that one undisturbed 
 # How a job of a kind may fail, and with which words: its unit is a crash; where only one honest worker could be asked about a liar, there is no
 # third one to decide (docs/design/scheduling.md).
 RIGHT_TO_FAIL = {"crash": "--pixel", "watched": "no third one agrees"}
+AT_ONCE = 8  # jobs of a user that have not ended: on a machine that is short of time a wave waits for the one before
 LOST_AFTER = 300  # seconds in which no coordinator has a job
 ENDED = ("done", "failed", "cancelled")
 
@@ -169,8 +170,9 @@ class Undisturbed(threading.Thread):
 class User(threading.Thread):
     """One user's jobs, through whichever coordinator answers."""
 
-    def __init__(self, farm, name, token, tasks, undisturbed, seed):
+    def __init__(self, farm, name, token, tasks, undisturbed, seed, until):
         super().__init__()
+        self.until = until  # seconds from which on nothing is handed in
         self.farm, self.name_, self.record = farm, name, farm.record
         self.caller, self.todo, self.undisturbed = Caller(farm, token), sorted(tasks, key=lambda t: t.due), undisturbed
         self.dice, self.tasks, self.hurry = random.Random(seed), {}, threading.Event()
@@ -364,7 +366,10 @@ class User(threading.Thread):
             self.finished.append(self.tasks.pop(task.id))
 
     def turn(self):
-        while self.todo and (self.todo[0].due <= self.record.now()):
+        if self.todo and self.record.now() > self.until:
+            self.record.write("not handed in", user=self.name_, jobs=len(self.todo))
+            self.todo = []
+        while self.todo and self.todo[0].due <= self.record.now() and len(self.tasks) < AT_ONCE:
             self.hand_in(self.todo.pop(0))
         found = self.views()
         for job, (at, view) in found.items():

@@ -22,7 +22,7 @@ constexpr int kKeepaliveTimeoutMs = 10'000;
 // How long one attempt to connect may take, with the handshake of TLS. With less, a handshake over a slow
 // line, or with a busy coordinator that many workers join at once, is broken off and begins anew, for ever;
 // with more, a line that was cut meanwhile is tried again later.
-constexpr int kConnectMs = 5'000;
+constexpr int kConnectMs = 10'000;
 constexpr Duration kCloseLimit = std::chrono::seconds(2);
 
 std::shared_ptr<grpc::ChannelCredentials> credentials(const std::optional<LinkTls>& tls) {
