@@ -10,6 +10,7 @@ import threading
 import time
 
 from chaos_kit import flip_bytes
+from hours_farm import wait
 from hours_users import Task
 
 FAULTS = {}  # name: (function, times in a deck)
@@ -24,11 +25,6 @@ def fault(times=1):
         FAULTS[function.__name__.replace("_", " ")] = function, times
         return function
     return remember
-
-
-def wait(seconds):
-    """Faults last: this is their time."""
-    threading.Event().wait(seconds)
 
 
 # ---- workers ----

@@ -17,7 +17,7 @@ import time
 import zipfile
 
 from chaos_kit import FOG, ROOT
-from hours_farm import ANYWHERE, Caller
+from hours_farm import ANYWHERE, Caller, wait
 from local_farm import SCENE, LocalFarm, bin_dir
 
 sys.path.insert(0, str(ROOT / "tests" / "system"))
@@ -193,7 +193,7 @@ class User(threading.Thread):
             first = int(headers["Upload-Offset"]) if status == 404 else None
             if first is None:
                 at = (at + 1) % 3
-                time.sleep(.3)
+                wait(.3)
                 continue
             if breaks and len(data) - first > 1000:
                 breaks -= 1
@@ -203,7 +203,7 @@ class User(threading.Thread):
                                                **{"Content-Range": f"bytes {first}-{len(data) - 1}/{len(data)}"} if first else {})
             if status not in (200, 201, 202, 204):
                 self.record.write("upload", user=self.name_, status=status)
-                time.sleep(.5)
+                wait(.5)
         return False
 
     def break_off(self, at, path, data, first):
