@@ -194,9 +194,7 @@ class SharedFarm(contextlib.ExitStack):
 
     def add(self, group, name, *flags, size=1, **options):
         program = ("lightshaft-worker",) if size == 1 else ("fleet", size)
-        # On one machine hundreds of workers would leave the coordinators no time.
-        within = (*options.pop("within", ()), *(() if group == "real" else ("nice", "-n", "5")))
-        worker = self.coordinators[0].add_worker(*flags, name=name, program=program, within=within, **options)
+        worker = self.coordinators[0].add_worker(*flags, name=name, program=program, **options)
         worker.shown, worker.size = name, size
         self.workers.setdefault(group, []).append(worker)
         return worker
