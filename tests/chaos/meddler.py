@@ -36,9 +36,10 @@ def load_protocol(folder):
 class Meddler:
     """`chances`: of "doubled", "held" (sent after the next one), "cut", "oversized", for each result; of "to_doubled", "to_held",
     "to_cut", for each lease and acknowledgement that a worker is sent. `most_cut`: results that may be cut short in all, since each
-    counts against its worker."""
+    counts against its worker. `tls`: the folder of what --tls made, of a farm that speaks it: to its workers it passes for the coordinator,
+    to the coordinator for a worker."""
 
-    def __init__(self, folder, coordinator, seed, most_cut=2, **chances):
+    def __init__(self, folder, coordinator, seed, most_cut=2, tls=None, **chances):
         self.grpc, self.protocol = None, load_protocol(folder)
         import grpc
         self.grpc = grpc
@@ -46,7 +47,10 @@ class Meddler:
         self.done = dict.fromkeys(chances, 0)
         self.lock = threading.Lock()
         limits = [("grpc.max_receive_message_length", -1), ("grpc.max_send_message_length", -1)]
-        self.channel = grpc.insecure_channel(coordinator, options=limits)
+        def pem(name):
+            return (tls / name).read_bytes()
+        self.channel = grpc.secure_channel(coordinator, grpc.ssl_channel_credentials(pem("ca.pem"), pem("worker.key"), pem("worker.pem")), options=limits) \
+            if tls else grpc.insecure_channel(coordinator, options=limits)
         same = dict(request_serializer=None, response_deserializer=None)
         self.work = self.channel.stream_stream("/lightshaft.farm.v1.Farm/Work", **same)
         self.fetch = self.channel.unary_stream("/lightshaft.farm.v1.Farm/FetchBlob", **same)
@@ -54,7 +58,8 @@ class Meddler:
         self.server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("lightshaft.farm.v1.Farm", {
             "Work": grpc.stream_stream_rpc_method_handler(self._work),
             "FetchBlob": grpc.unary_stream_rpc_method_handler(self._fetch)}),))
-        self.port = self.server.add_insecure_port("127.0.0.1:0")
+        self.port = self.server.add_secure_port("127.0.0.1:0", grpc.ssl_server_credentials([(pem("server.key"), pem("server.pem"))], pem("ca.pem"), True)) \
+            if tls else self.server.add_insecure_port("127.0.0.1:0")
         self.server.start()
 
     def __enter__(self):

@@ -154,12 +154,13 @@ class LocalFarm:
         self.start_coordinator()
 
     # ---- workers ----
-    def add_worker(self, *flags, threads=1, token=None, fake=True, within=(), environment=None, coordinator=None, name=None):
-        """`within`: a command that starts it somewhere else, e.g. in a network namespace. `coordinator`: another address than its own."""
+    def add_worker(self, *flags, threads=1, token=None, fake=True, within=(), environment=None, coordinator=None, name=None, program=("lightshaft-worker",)):
+        """`within`: a command that starts it somewhere else, e.g. in a network namespace. `coordinator`: another address than its own.
+        `program`: another one that takes a worker's options, and what comes before them."""
         self.count += 1
         called, name = name, f"worker-{self.count}"
         env = dict(os.environ, LIGHTSHAFT_JOIN_TOKEN=self.join_token if token is None else token, **(environment or {}))
-        args = [*within, self.bin / "lightshaft-worker", "--coordinator", coordinator or f"{self.host}:{self.grpc}", "--threads", threads,
+        args = [*within, self.bin / program[0], *program[1:], "--coordinator", coordinator or f"{self.host}:{self.grpc}", "--threads", threads,
                 "--cache", self.folder / "cache" / name, "--name", called or name]
         if self.tls:
             args += ["--tls-ca", self.secrets / "tls/ca.pem", "--tls-cert", self.secrets / "tls/worker.pem",

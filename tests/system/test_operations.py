@@ -1,18 +1,14 @@
 """What docs/guide/operations.md promises: metrics and the dashboard that shows them, logs, webhooks, backup and restore."""
 
-import hashlib
-import hmac
-import http.server
 import json
-import queue
 import re
 import shutil
 import subprocess
-import threading
 
 import pytest
-from local_farm import PATIENCE, ROOT, SCENE, HttpError, LocalFarm, refused_coordinator, wait_until
+from local_farm import ROOT, SCENE, HttpError, LocalFarm, refused_coordinator, wait_until
 from redis_server import RedisServer
+from webhook_receiver import Receiver, signature_is_right
 
 SPEC = dict(spp=24, seed=5)
 
@@ -180,50 +176,6 @@ def test_readiness_tells_that_the_disk_is_full_until_results_can_be_stored_again
 
 
 # ---- webhooks ----
-
-class Receiver(http.server.ThreadingHTTPServer):
-    """Takes POSTs; answers with the statuses it is given, then 200."""
-
-    def __init__(self, statuses=()):
-        class Handler(http.server.BaseHTTPRequestHandler):
-            def do_POST(self):
-                body = self.rfile.read(int(self.headers["Content-Length"]))
-                status = self.server.statuses.pop(0) if self.server.statuses else 200
-                self.send_response(status)
-                if status == 302:
-                    self.send_header("Location", f"http://127.0.0.1:{self.server.server_port}/elsewhere")
-                self.send_header("Content-Length", "0")
-                self.end_headers()
-                self.server.came.put((self.path, dict(self.headers), body, status))
-
-            def log_message(self, *arguments):
-                pass
-
-        super().__init__(("127.0.0.1", 0), Handler)
-        self.statuses, self.came = list(statuses), queue.Queue()
-        self.url = f"http://127.0.0.1:{self.server_port}/hook"
-        threading.Thread(target=self.serve_forever, daemon=True).start()
-
-    def __exit__(self, *error):
-        self.shutdown()
-        super().__exit__(*error)
-
-    def next(self):
-        return self.came.get(timeout=PATIENCE)
-
-    def until(self, event):
-        """All that comes, up to the first delivery of this event that was taken."""
-        seen = [self.next()]
-        while seen[-1][1]["Lightshaft-Event"] != event or seen[-1][3] != 200:
-            seen.append(self.next())
-        return seen
-
-
-def signature_is_right(farm, headers, body):
-    secret = (farm.data / "webhook-secret").read_text().strip()
-    fields = dict(part.split("=", 1) for part in headers["Lightshaft-Signature"].split(","))
-    return hmac.compare_digest(hmac.new(secret.encode(), fields["t"].encode() + b"." + body, hashlib.sha256).hexdigest(), fields["v1"])
-
 
 def test_a_webhook_is_told_of_a_jobs_life_signed_and_in_order(tmp_path):
     with Receiver() as receiver, LocalFarm(tmp_path, flags=["--webhook", receiver.url]) as farm:

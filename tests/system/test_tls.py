@@ -9,10 +9,11 @@ import socket
 import ssl
 import stat
 import subprocess
+import sys
 import threading
 
 import pytest
-from local_farm import LocalFarm, Process, bin_dir, wait_until
+from local_farm import ROOT, LocalFarm, Process, bin_dir, wait_until
 
 SCENE = """<scene version="3.0.0"><integrator type="volpath"/>
 <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/></film></sensor>
@@ -205,6 +206,21 @@ def test_tls_to_a_plain_port_fails_at_once(tmp_path):
     with LocalFarm(tmp_path) as plain:
         with socket.create_connection(("127.0.0.1", plain.http), timeout=TIMEOUT) as raw, pytest.raises(ssl.SSLError):
             ssl.create_default_context().wrap_socket(raw, server_hostname="127.0.0.1")
+
+
+@pytest.mark.slow
+def test_a_worker_joins_though_a_handshake_takes_longer_than_a_second(tmp_path):
+    """A far coordinator, or one that many workers join at once: an attempt that is broken off too soon begins anew, for ever."""
+    sys.path.insert(0, str(ROOT / "tests" / "chaos"))
+    from weather import Network, Skip
+    try:
+        network = Network(1)
+    except Skip as why:
+        pytest.skip(str(why))
+    with network, LocalFarm(tmp_path, tls=True, host=network.host, flags=["--tls-names", network.host]) as far:
+        network.weather(delay=.4)  # one way; a connection and its handshake are two ways there and back
+        far.add_worker(within=network.inside)
+        far.wait_for_workers(1)
 
 
 def test_slow_handshakes_wait_alone_and_are_cut(farm):

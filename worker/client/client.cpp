@@ -15,6 +15,10 @@ namespace ls::worker {
 namespace pb = ::lightshaft::farm::v1;
 namespace {
 
+// How long one attempt to connect may take, with the handshake of TLS. With less, a handshake over a slow
+// line, or with a busy coordinator that many workers join at once, is broken off and begins anew, for ever;
+// with more, a line that was cut meanwhile is tried again later.
+constexpr int kConnectMs = 10'000;
 constexpr Duration kCloseLimit = std::chrono::seconds(2);
 
 std::shared_ptr<grpc::ChannelCredentials> credentials(const std::optional<LinkTls>& tls) {
@@ -36,7 +40,7 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address, const st
   args.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   // The agent has its own back-off between attempts to connect; the back-off of gRPC must not be longer.
   args.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
-  args.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 1000);
+  args.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kConnectMs);
   args.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
   args.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   args.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);

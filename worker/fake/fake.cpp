@@ -4,6 +4,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <csignal>
@@ -17,6 +18,7 @@ namespace ls::worker {
 namespace {
 
 constexpr std::size_t kAllocationChunk = 64 << 20;  // bytes that the fault `memory` allocates at a time
+constexpr Duration kLongestNap = std::chrono::milliseconds(20);
 
 double thread_cpu_seconds() {
   timespec t{};
@@ -96,11 +98,15 @@ class FakeBackend final : public LocalBackend {
     }
   }
 
-  // Sleeps for `delay`. Returns false if `stop` was set meanwhile.
+  // Sleeps for `delay`. Returns false if `stop` was set meanwhile. It looks at `stop` a hundred times, but
+  // not more often than every millisecond: hundreds of fake workers share a machine.
   static bool pause(Duration delay, const std::atomic<bool>& stop) {
     const auto end = std::chrono::steady_clock::now() + delay;
-    while (!stop && std::chrono::steady_clock::now() < end)
-      ::usleep(static_cast<useconds_t>(std::min<std::int64_t>(1000, delay.count() / 1000 + 1)));
+    const auto nap = std::clamp<Duration>(delay / 100, std::chrono::milliseconds(1), kLongestNap);
+    for (auto left = delay; !stop && left > Duration{};
+         left = std::chrono::duration_cast<Duration>(end - std::chrono::steady_clock::now()))
+      ::usleep(static_cast<useconds_t>(
+          std::chrono::duration_cast<std::chrono::microseconds>(std::min(left, nap)).count() + 1));
     return !stop;
   }
 
