@@ -5,9 +5,10 @@
 namespace ls::test {
 namespace {
 
-std::string scene(const std::string& inside, const std::string& eye = "0, 0, 3.9", int depth = 8) {
+std::string scene(const std::string& inside, const std::string& eye = "0, 0, 3.9", int depth = 8,
+                  int path_reuse = 0) {
   return fmt::format(R"(<scene version="3.0.0">
-<integrator type="volpath"><integer name="max_depth" value="{}"/><integer name="rr_depth" value="5"/></integrator>
+<integrator type="volpath"><integer name="max_depth" value="{}"/><integer name="rr_depth" value="5"/><integer name="path_reuse" value="{}"/></integrator>
 <sensor type="perspective"><float name="fov" value="39"/>
   <transform name="to_world"><lookat origin="{}" target="0, 0, 0" up="0, 1, 0"/></transform>
   <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/><rfilter type="box"/></film></sensor>
@@ -15,7 +16,7 @@ std::string scene(const std::string& inside, const std::string& eye = "0, 0, 3.9
 <bsdf type="twosided" id="red"><bsdf type="diffuse"><rgb name="reflectance" value="0.6, 0.07, 0.05"/></bsdf></bsdf>
 <bsdf type="twosided" id="green"><bsdf type="diffuse"><rgb name="reflectance" value="0.12, 0.45, 0.1"/></bsdf></bsdf>
 {}</scene>)",
-                     depth, eye, inside);
+                     depth, path_reuse, eye, inside);
 }
 
 std::string cube(double sx, double sy, double sz, double x, double y, double z, const std::string& rest) {
@@ -94,6 +95,8 @@ const std::vector<CoverageScene>& coverage_scenes() {
       {"media, dark", scene(fog(2, .95, .9) + lamp(2))},
       {"surfaces, connected", scene(slit())},
       {"media, connected", scene(slit() + fog(.3, .9, .99))},
+      {"surfaces, shared", scene(room(lamp(400, .1)), "0, 0, 3.9", 8, 16)},
+      {"media, shared", scene(room(lamp(60)) + fog(.6, .9, .995), "0, 0, 3.9", 8, 16)},
       {"surfaces, to a target", scene(room(lamp(400, .1))), 4096, false, 1.5e-3},
       {"media, to a target", scene(fog(1, .9, .9) + lamp(60, .1)), 4096, false, 1e-4},
       {"fireflies", scene(caustic()), 64, true},
