@@ -6,6 +6,9 @@ add_library(ls_flags INTERFACE)
 target_include_directories(ls_flags INTERFACE ${CMAKE_SOURCE_DIR})
 target_compile_options(ls_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wno-missing-field-initializers -Werror=unused-function -march=${LIGHTSHAFT_ARCH} -ffp-contract=off -fno-fast-math -fno-math-errno -fno-trapping-math -fno-tree-slp-vectorize)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)$")
+  target_compile_options(ls_flags INTERFACE -fsigned-char)  # as on x86
+endif()
 if(LIGHTSHAFT_ARCH STREQUAL "x86-64-v3" AND NOT LIGHTSHAFT_SANITIZE)
   # The loader, not a SIGILL in a static initialiser, tells the user that the CPU is too old.
   add_link_options(-Wl,-z,x86-64-v3)

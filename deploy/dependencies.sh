@@ -21,6 +21,7 @@ while read -r line; do
         "$([ "$section" = build ] && echo "To build and to run" || echo "For the tests besides")"
       continue ;;
   esac
+  line="${line%% *}"
   dpkg-query -W -f='| `${Package}` | ${Version} | ${binary:Summary} |\n' "$line" 2>/dev/null ||
     { echo "error: $line is not installed: deploy/install-deps.sh --tests first" >&2; exit 1; }
 done <"$here/packages.txt"

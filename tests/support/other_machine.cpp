@@ -38,11 +38,14 @@ extern "C" void* rtcNewDevice(const char* config) {
   return real(text.c_str());  // of two equal settings the later one is used
 }
 
-// The layout of RTCRayHit up to the primitive's number, after 12 numbers of the ray and 5 of the hit.
-extern "C" void rtcIntersect1(void* scene, void* context, void* ray) {
+// The layout of RTCRayHit up to the primitive's number, after 12 numbers of the ray and 5 of the hit. The ray
+// is Embree 3's third argument and Embree 4's second.
+extern "C" void rtcIntersect1(void* scene, void* second, void* third) {
   static const auto real = library<void(void*, void*, void*)>("rtcIntersect1");
   static const bool off = setting("LIGHTSHAFT_TEST_OFF") == "rtcIntersect1";
-  real(scene, context, ray);
+  static const bool embree3 = dlsym(RTLD_NEXT, "rtcInitIntersectContext") != nullptr;
+  real(scene, second, third);
+  void* ray = embree3 ? third : second;
   constexpr int kPrimitive = 17;
   unsigned& primitive = static_cast<unsigned*>(ray)[kPrimitive];
   if (off && primitive == 1) primitive = 0;

@@ -24,8 +24,8 @@ namespace {
 
 // System calls.
 constexpr std::uint32_t kDeny = SECCOMP_RET_ERRNO | EPERM;
-// System calls that are always denied, by their numbers on x86-64, our only platform. io_uring is among them
-// because it could open sockets without the other calls.
+// System calls that are always denied, by their numbers on this platform. io_uring is among them because it
+// could open sockets without the other calls.
 constexpr std::uint32_t kDenied[] = {
     SYS_socket,
     SYS_ptrace,
@@ -80,7 +80,12 @@ constexpr std::uint32_t kDenied[] = {
     SYS_msgget,
     SYS_mq_open,
 };
-constexpr std::uint32_t kX32 = 0x40000000;  // added to the numbers of the same calls in the x32 ABI
+constexpr std::uint32_t kX32 = 0x40000000;  // added to the numbers of the same calls in x86-64's x32 ABI
+#ifdef __x86_64__
+constexpr std::uint32_t kPlatform = AUDIT_ARCH_X86_64;
+#else
+constexpr std::uint32_t kPlatform = AUDIT_ARCH_AARCH64;
+#endif
 
 // A system call that is allowed or denied depending on one of its arguments. Only the lower 32 bits of the
 // argument are compared; the kernel ignores the others for these calls. Each call is listed once.
@@ -120,7 +125,7 @@ bool filter_calls() {
   std::vector<sock_filter> program;
   const auto put = [&](sock_filter failpoint) { program.push_back(failpoint); };
   put(BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, arch)));
-  put(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, AUDIT_ARCH_X86_64, 1, 0));
+  put(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, kPlatform, 1, 0));
   put(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS));
   put(BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)));
   put(BPF_JUMP(BPF_JMP | BPF_JGE | BPF_K, kX32, static_cast<std::uint8_t>(kCount), 0));

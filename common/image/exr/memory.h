@@ -8,6 +8,7 @@
 #include <Iex.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <exception>
 #include <mutex>

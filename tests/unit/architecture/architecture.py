@@ -59,7 +59,7 @@ class Door:
 EVERYWHERE = r"^(common|worker|coordinator|validation|compare|cli)/"
 
 DOORS = [
-    Door("Embree", r"^embree\d?/", r"^worker/render/geometry/accel(_shapes)?\.(h|cpp)$", "accel.h and its parts"),
+    Door("Embree", r"^embree\d?/", r"^worker/render/geometry/embree\.h$", "what differs between its versions"),
     Door("OpenVDB", r"^(openvdb|nanovdb)/", r"^worker/render/vdb/", "a program of its own"),
     Door("Blosc", r"^blosc\.h$", r"^worker/render/vdb/", "the same program"),
     Door("OpenEXR", r"^(OpenEXR/|Imf\w*\.h|Iex\w*\.h|half\.h)", r"^common/image/exr/", "common/image/exr"),

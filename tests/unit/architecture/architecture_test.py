@@ -87,7 +87,7 @@ class Rules(unittest.TestCase):
     def test_doors(self):
         self.assert_finds(architecture.doors, {
             "worker/render/world.cpp": "#include <embree3/rtcore.h>\n",
-            "worker/render/geometry/accel.cpp": "#include <embree3/rtcore.h>\n",
+            "worker/render/geometry/embree.h": "#include <embree3/rtcore.h>\n#include <embree4/rtcore.h>\n",
             "coordinator/rpc/a.cpp": "#include <boost/asio.hpp>\n#include <grpcpp/grpcpp.h>\n",
             "coordinator/http/net/a.cpp": "#include <boost/asio.hpp>\n",
             "coordinator/http/a.cpp": "#include <sqlite3.h>\n",

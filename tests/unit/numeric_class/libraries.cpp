@@ -4,7 +4,6 @@
 #include <ImfHeader.h>
 #include <ImfInputPart.h>
 #include <dlfcn.h>
-#include <embree3/rtcore.h>
 
 #include <cmath>
 #include <cstdio>  // jpeglib.h needs it first
@@ -12,6 +11,8 @@
 #include <limits>
 
 #include <jpeglib.h>
+
+#include "worker/render/geometry/embree.h"
 
 namespace {
 
@@ -88,12 +89,23 @@ extern "C" ssize_t rtcGetDeviceProperty(RTCDevice device, RTCDeviceProperty prop
 }
 
 // One triangle is taken for the one beside it.
-extern "C" void rtcIntersect1(RTCScene scene, RTCIntersectContext* context, RTCRayHit* ray) {
-  static const auto real = library<void(RTCScene, RTCIntersectContext*, RTCRayHit*)>("rtcIntersect1");
-  real(scene, context, ray);
+static void other_triangle(RTCRayHit* ray) {
   constexpr unsigned kTriangle = 2353;  // of 4608, in the middle of the mesh
   if (perturbs("rtcIntersect1") && ray->hit.primID == kTriangle) --ray->hit.primID;
 }
+#if LIGHTSHAFT_EMBREE == 3
+extern "C" void rtcIntersect1(RTCScene scene, RTCIntersectContext* context, RTCRayHit* ray) {
+  static const auto real = library<void(RTCScene, RTCIntersectContext*, RTCRayHit*)>("rtcIntersect1");
+  real(scene, context, ray);
+  other_triangle(ray);
+}
+#else
+extern "C" void rtcIntersect1(RTCScene scene, RTCRayHit* ray, RTCIntersectArguments* arguments) {
+  static const auto real = library<void(RTCScene, RTCRayHit*, RTCIntersectArguments*)>("rtcIntersect1");
+  real(scene, ray, arguments);
+  other_triangle(ray);
+}
+#endif
 
 extern "C" JDIMENSION jpeg_read_scanlines(j_decompress_ptr info, JSAMPARRAY rows, JDIMENSION count) {
   static const auto real =

@@ -1,6 +1,5 @@
 #include "worker/render/geometry/accel.h"
 
-#include <embree3/rtcore.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,12 +12,17 @@
 #include <tuple>
 
 #include "worker/render/geometry/accel_shapes.h"
+#include "worker/render/geometry/embree.h"
 #include "worker/render/geometry/primitive_side.h"
 
 namespace ls::render {
 namespace {
 
+#ifdef __x86_64__
 constexpr char kDeviceConfig[] = "isa=avx2,max_isa=avx2,frequency_level=simd256,set_affinity=0";
+#else
+constexpr char kDeviceConfig[] = "set_affinity=0";  // one set of instructions: NEON
+#endif
 
 // A ray is written in 16-byte words, the units in which Embree reads it: a load that spans several smaller
 // stores has to wait for them.
@@ -104,8 +108,7 @@ RTCGeometry shape_geometry(RTCDevice device, ShapeSet<Shape>& set) {
 
 RTCScene new_scene(RTCDevice device, bool coincident) {
   RTCScene s = rtcNewScene(device);
-  rtcSetSceneFlags(s, coincident ? static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST |
-                                                              RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION)
+  rtcSetSceneFlags(s, coincident ? static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | kFilterOfQuery)
                                  : RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(s, RTC_BUILD_QUALITY_MEDIUM);
   return s;
@@ -218,7 +221,7 @@ PrimitiveId primitive_in(const Scenes& in, unsigned geometry, unsigned primitive
   set_ray(rh.ray, o, d, t_max);
   rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   Tracing tracing(o, d);
-  rtcIntersect1(scene, &tracing.context, &rh);
+  embree_intersect(scene, tracing.context, rh, nullptr);
   return primitive_of(st, rh.hit);
 }
 
@@ -280,8 +283,7 @@ CoincidentHits Accel::between(const V3& a, const V3& b) const {
   set_ray(rh.ray, a, d, 1);
   rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   Collecting all(a, d);
-  all.context.filter = collect_callback;
-  rtcIntersect1(state_->own->all, &all.context, &rh);
+  embree_intersect(state_->own->all, all.context, rh, collect_callback);
   for (std::size_t i = 0; i < all.count; ++i) coincident_hits.ids[i] = *primitive_of(*state_, all.met[i]);
   // A triangle may be reported once for every leaf that contains part of it.
   const auto first = coincident_hits.ids.begin(), last = first + static_cast<std::ptrdiff_t>(all.count);
@@ -297,7 +299,7 @@ bool Accel::occluded(const V3& o, const V3& d, float t_max) const {
   RTCRay ray;
   set_ray(ray, o, d, t_max);
   Tracing tracing(o, d);
-  rtcOccluded1(state_->own->opaque, &tracing.context, &ray);
+  embree_occluded(state_->own->opaque, tracing.context, ray);
   return ray.tfar < 0;
 }
 

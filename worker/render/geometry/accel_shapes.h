@@ -2,8 +2,6 @@
 // along a ray.
 #pragma once
 
-#include <embree3/rtcore.h>
-
 #include <array>
 #include <cstddef>
 #include <limits>
@@ -11,6 +9,7 @@
 
 #include "worker/render/base/work_counters.h"
 #include "worker/render/geometry/accel.h"
+#include "worker/render/geometry/embree.h"
 #include "worker/render/geometry/shape_boxes.h"
 
 namespace ls::render {
@@ -52,23 +51,23 @@ void bounds_callback(const RTCBoundsFunctionArguments* args) {
 // world space. Inside an instance Embree passes to the callback only the ray as transformed, in float32, to
 // the group's space.
 struct Tracing {
-  RTCIntersectContext context;
+  EmbreeContext context;
   const V3 *o, *d;
+  bool collects = false;  // true for Collecting
 
-  Tracing(const V3& origin, const V3& direction) : o(&origin), d(&direction) {
-    rtcInitIntersectContext(&context);
-  }
+  Tracing(const V3& origin, const V3& direction) : o(&origin), d(&direction) { embree_start(context); }
+
+  static Tracing& of(EmbreeContext* context) { return *reinterpret_cast<Tracing*>(context); }
 };
 
 template <class Shape>
-double shape_distance(const void* user, unsigned prim, const RTCIntersectContext* context,
-                      const RTCRay& ray) {
+double shape_distance(const void* user, unsigned prim, EmbreeContext* context, const RTCRay& ray) {
   LS_COUNT(user_geometry);
   const auto& set = *static_cast<const ShapeSet<Shape>*>(user);
   const Shape& s = set.shapes[prim];
   if (context->instID[0] != RTC_INVALID_GEOMETRY_ID) {
     // This is the same computation as in Geometry::complete_instanced, so that both find the same hits.
-    const auto& tracing = *reinterpret_cast<const Tracing*>(context);
+    const Tracing& tracing = Tracing::of(context);
     const PlacedInstance& i = set.instances[context->instID[0] - kFirstInstance];
     return intersect(s, i.to_local.point(V3d(*tracing.o)), i.to_local.vector(V3d(*tracing.d)), ray.tnear,
                      ray.tfar);
@@ -80,12 +79,12 @@ double shape_distance(const void* user, unsigned prim, const RTCIntersectContext
 // The state of a trace that collects all hits along the ray. Its filter rejects every hit, so that Embree
 // continues.
 struct Collecting : Tracing {
-  using Tracing::Tracing;
+  Collecting(const V3& origin, const V3& direction) : Tracing(origin, direction) { collects = true; }
   std::array<RTCHit, CoincidentHits::kMost> met;  // only the ids are set
   std::size_t count = 0;
 
-  static void keep(RTCIntersectContext* context, unsigned geometry, unsigned primitive, unsigned instance) {
-    auto& c = static_cast<Collecting&>(*reinterpret_cast<Tracing*>(context));
+  static void keep(EmbreeContext* context, unsigned geometry, unsigned primitive, unsigned instance) {
+    auto& c = static_cast<Collecting&>(Tracing::of(context));
     if (c.count < c.met.size())
       c.met[c.count++] = {.primID = primitive, .geomID = geometry, .instID = {instance}};
   }
@@ -104,7 +103,7 @@ void intersect_callback(const RTCIntersectFunctionNArguments* args) {
   const double t = shape_distance<Shape>(args->geometryUserPtr, args->primID, args->context, rh->ray);
   const auto tf = static_cast<float>(t);
   if (!(tf < rh->ray.tfar)) return;
-  if (args->context->filter)
+  if (Tracing::of(args->context).collects)
     return Collecting::keep(args->context, args->geomID, args->primID, args->context->instID[0]);
   rh->ray.tfar = tf;
   rh->hit.primID = args->primID;

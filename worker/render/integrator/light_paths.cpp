@@ -5,7 +5,7 @@
 
 #include "worker/render/integrator/camera_segment_nee.h"
 #include "worker/render/integrator/variant.h"
-#include "worker/render/math/flush_denormals.h"
+#include "worker/render/math/processor.h"
 #include "worker/render/world/aim.h"
 #include "worker/render/world/world_build.h"
 

@@ -8,7 +8,7 @@
 #include "worker/render/integrator/aov_pixel.h"
 #include "worker/render/integrator/light_paths.h"
 #include "worker/render/integrator/variant.h"
-#include "worker/render/math/flush_denormals.h"
+#include "worker/render/math/processor.h"
 #include "worker/render/math/rounded.h"
 #include "worker/render/world/world.h"
 

@@ -10,14 +10,13 @@
 #include <string_view>
 #include <vector>
 
-#include <immintrin.h>
-
 #include "common/assets/image.h"
 #include "common/base/digest.h"
 #include "worker/render/base/build_id.h"
 #include "worker/render/bsdf/bsdf.h"
 #include "worker/render/geometry/accel.h"
 #include "worker/render/geometry/geometry.h"
+#include "worker/render/math/processor.h"
 #include "worker/render/math/random.h"
 #include "worker/render/media/medium.h"
 #include "worker/render/numeric_class/battery_images.h"
@@ -62,13 +61,13 @@ void add_math_in_double(Sha256& h) {
   add(h, v);
 }
 
-// Adds the processor's reciprocal estimates, which Embree uses and which manufacturers implement differently.
+// Adds the processor's reciprocal estimates.
 void add_reciprocals(Sha256& h) {
   std::vector<float> v;
   for (int i = 1; i <= 4096; ++i) {
-    const __m128 x = _mm_set_ss(static_cast<float>(i) * .37f);
-    v.push_back(_mm_cvtss_f32(_mm_rcp_ss(x)));
-    v.push_back(_mm_cvtss_f32(_mm_rsqrt_ss(x)));
+    const float x = static_cast<float>(i) * .37f;
+    v.push_back(reciprocal_estimate(x));
+    v.push_back(reciprocal_root_estimate(x));
   }
   add(h, v);
 }

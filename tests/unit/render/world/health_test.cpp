@@ -2,12 +2,12 @@
 // replayed.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <xmmintrin.h>
 
 #include <cmath>
 #include <limits>
 
 #include "tests/support/render_check.h"
+#include "worker/render/math/processor.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {
@@ -167,15 +167,14 @@ TEST(Health, DenormalNumbersAreZerosWhileRaysAreTracedInEveryThread) {
   builder.container(CubeShape{}, {}, builder.null(), medium);
   builder.look({0, -5, 0}, {0, 0, 0}, 30);
   const auto world = test::world_of(builder);
-  const unsigned usual = _mm_getcsr();
+  const std::uint64_t usual = FlushDenormals::read();
   std::vector<float> sums[2];
-  for (const unsigned zeros : {0u, 0x8040u}) {
-    const unsigned set = (usual & ~0x8040u) | zeros;
-    _mm_setcsr(set);
+  for (const std::uint64_t zeros : {std::uint64_t{0}, FlushDenormals::kFlush}) {
+    FlushDenormals::write((usual & ~FlushDenormals::kFlush) | zeros);
     sums[zeros ? 1 : 0] = render_tile(*world, {0, 0, 4, 4}, {0, 16}, nullptr, nullptr).sums;
-    EXPECT_EQ(_mm_getcsr() & 0x8040u, zeros);
+    EXPECT_EQ(FlushDenormals::read() & FlushDenormals::kFlush, zeros);
   }
-  _mm_setcsr(usual);
+  FlushDenormals::write(usual);
   EXPECT_EQ(sums[0], sums[1]);
   EXPECT_THAT(sums[0], ::testing::Each(0.f));
 }

@@ -1,0 +1,48 @@
+// What our processors, x86-64 and 64-bit ARM, do in instructions of their own.
+#pragma once
+
+#ifdef __x86_64__
+#include <immintrin.h>
+#else
+#include <arm_neon.h>
+#endif
+
+#include <cstdint>
+
+namespace ls::render {
+
+// Treats denormals as zero in this thread while the object lives, as Embree requires where rays are traced.
+// Afterwards denormals work again, since folding (adding up results) needs them.
+class FlushDenormals {
+ public:
+  FlushDenormals() : saved_(read()) { write(saved_ | kFlush); }
+  ~FlushDenormals() { write(saved_); }
+  FlushDenormals(const FlushDenormals&) = delete;
+  FlushDenormals& operator=(const FlushDenormals&) = delete;
+
+  // The thread's control word of floating-point arithmetic, and the bits of it that are set meanwhile
+#ifdef __x86_64__
+  static constexpr std::uint64_t kFlush = 0x8040;
+  static std::uint64_t read() { return _mm_getcsr(); }
+  static void write(std::uint64_t control) { _mm_setcsr(static_cast<unsigned>(control)); }
+#else
+  static constexpr std::uint64_t kFlush = std::uint64_t{1} << 24;
+  static std::uint64_t read() { return __builtin_aarch64_get_fpcr64(); }
+  static void write(std::uint64_t control) { __builtin_aarch64_set_fpcr64(control); }
+#endif
+
+ private:
+  std::uint64_t saved_;
+};
+
+// The processor's estimates of 1 / x and 1 / sqrt(x), which Embree uses. Manufacturers implement them
+// differently.
+#ifdef __x86_64__
+inline float reciprocal_estimate(float x) { return _mm_cvtss_f32(_mm_rcp_ss(_mm_set_ss(x))); }
+inline float reciprocal_root_estimate(float x) { return _mm_cvtss_f32(_mm_rsqrt_ss(_mm_set_ss(x))); }
+#else
+inline float reciprocal_estimate(float x) { return vrecpes_f32(x); }
+inline float reciprocal_root_estimate(float x) { return vrsqrtes_f32(x); }
+#endif
+
+}  // namespace ls::render
