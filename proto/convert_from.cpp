@@ -70,6 +70,7 @@ Result<FromWorker> hello_from(const pb::Hello& in) {
   if (name.empty()) return wrong("hello.name", "is missing");
   LS_TRY(build, text_from(in.build(), limits::kNameBytes, "hello.build"));
   LS_TRY(numeric_class, digest_from(in.numeric_class(), "hello.numeric_class"));
+  LS_TRY(platform, text_from(in.platform(), limits::kNameBytes, "hello.platform"));
   if (in.threads() < 1 || in.threads() > limits::kThreads)
     return wrong("hello.threads", fmt::format("is {}; it must be 1 to {}", in.threads(), limits::kThreads));
   if (in.join_token().size() > limits::kTokenBytes) return wrong("hello.join_token", "is too long");
@@ -97,6 +98,7 @@ Result<FromWorker> hello_from(const pb::Hello& in) {
   hello.memory_bytes = in.memory_bytes();
   hello.join_token = in.join_token();
   hello.fake = in.fake();
+  hello.platform = platform;
   return hello;
 }
 

@@ -45,6 +45,7 @@ void put(const WorkerHello& hello, pb::FromWorker& out) {
   h->set_join_token(hello.join_token);
   h->set_previous_id(hello.previous_id.value);
   h->set_fake(hello.fake);
+  h->set_platform(sendable(hello.platform, limits::kNameBytes));
 }
 
 void put(const WorkerProgress& progress, pb::FromWorker& out) {

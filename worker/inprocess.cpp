@@ -58,6 +58,7 @@ class InProcessBackend final : public LocalBackend {
   explicit InProcessBackend(int threads) : threads_(threads) {}
 
   Digest numeric_class() const override { return render::numeric_class(); }
+  std::string platform() const override { return render::platform(); }
 
   tl::expected<void, UnitFailure> prepare(const LocalJob& job) override {
     if (world(job.brief)) return {};

@@ -126,7 +126,10 @@ std::variant<Options, int> parse_options(int argc, char** argv) {
   const auto fault = parse_fake_fault(o.fake_fault_text);
   if (!fault) return usage("--fake-fault: " + fault.error().message);
   o.fake_options.fault = *fault;
-  if (!o.fake_class.empty()) o.fake_options.numeric_class = sha256(o.fake_class);
+  if (!o.fake_class.empty()) {
+    o.fake_options.numeric_class = sha256(o.fake_class);
+    o.fake_options.platform = "fake:" + o.fake_class;
+  }
   if (o.render_child) return o;
   const bool addresses = std::all_of(o.coordinators.begin(), o.coordinators.end(),
                                      [](const auto& a) { return a.find(':') != std::string::npos; });

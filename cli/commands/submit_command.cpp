@@ -128,6 +128,11 @@ void add_submit(CLI::App& app, Action& action) {
   submit->add_option("--memory", flags->job.memory, "only workers with so much memory, 8G say")
       ->type_name("BYTES");
   submit
+      ->add_option("--numeric-class", flags->job.numeric_class,
+                   "only workers of this class, by the beginning of its digits or of its platform in "
+                   "`lightshaft workers`")
+      ->type_name("CLASS");
+  submit
       ->add_option("--reference", flags->reference,
                    "the right image: every checkpoint is compared with it. Of another seed than the job's")
       ->type_name("REF.exr");

@@ -326,6 +326,7 @@ std::string spec_query(const JobSpec& spec, bool with_priority) {
   query.add("max_workers", spec.max_workers);
   query.add("max_units", spec.max_units);
   query.add("memory", spec.memory);
+  query.add("numeric_class", spec.numeric_class);
   if (spec.reference) query.add("reference", spec.reference->hex());
   return query.take();
 }

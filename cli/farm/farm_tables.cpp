@@ -153,6 +153,18 @@ void add_error_rows(std::vector<Row>& rows, const json& job) {
   add_known(rows, "efficiency", job, "efficiency_per_core", "{:.3g} (1 / (relMSE x core seconds))");
 }
 
+// The class of a worker or job as `submit --numeric-class` takes it, in digits and in words.
+std::string class_text(const json& of) {
+  const std::string digits = text(of, "numeric_class").substr(0, 12), platform = text(of, "platform");
+  return platform.empty() ? digits : digits + " " + platform;
+}
+
+std::string share_text(const json& share) {
+  return fmt::format("{} of the farm: {} of {} workers, {} of {} threads", percent(share, "share"),
+                     int_field(share, "workers", 0), int_field(share, "of_workers", 0),
+                     int_field(share, "threads", 0), int_field(share, "of_threads", 0));
+}
+
 }  // namespace
 
 std::string jobs_table(const json& answer) {
@@ -179,14 +191,15 @@ std::string tokens_table(const json& answer) {
 }
 
 std::string workers_table(const json& answer) {
-  std::vector<Row> rows{{"NAME", "STATE", "THREADS", "UNITS", "CPU", "MEMORY", "SEEN", "JOB", "ACTIVITY"}};
+  std::vector<Row> rows{
+      {"NAME", "STATE", "THREADS", "UNITS", "CPU", "MEMORY", "SEEN", "CLASS", "JOB", "ACTIVITY"}};
   for (const json& w : objects(answer, "workers")) {
     const auto rss = w.find("rss_bytes");
     rows.push_back({text(w, "name"), text(w, "state") + (flag_field(w, "fake") ? " (fake)" : ""),
                     number(w, "threads", "{:.0f}"), number(w, "units_done", "{:.0f}"),
                     time_of(w, "cpu_seconds"),
                     rss != w.end() && rss->is_number_unsigned() ? show_bytes(rss->get<std::uint64_t>()) : "-",
-                    time_of(w, "last_seen_seconds"), text(w, "job"), text(w, "activity")});
+                    time_of(w, "last_seen_seconds"), class_text(w), text(w, "job"), text(w, "activity")});
   }
   return rows.size() == 1 ? "no workers" : table(rows);
 }
@@ -206,6 +219,9 @@ std::string job_text(const json& job) {
   if (const auto more = job.find("eta_with_more"); more != job.end() && more->is_object())
     rows.push_back({fmt::format("with {} more workers", int_field(*more, "workers", 0)),
                     time_left_text(job, *more, "seconds", "ci95")});
+  if (const std::string pinned = class_text(job); !pinned.empty()) rows.push_back({"numeric class", pinned});
+  if (const auto share = job.find("class_share"); share != job.end() && share->is_object())
+    rows.push_back({"can take it", share_text(*share)});
   if (const std::string error = text(job, "error"); !error.empty()) rows.push_back({"error", error});
   if (flag_field(job, "fake")) rows.push_back({"fake", kFakePixels});
   if (const auto warnings = job.find("warnings"); warnings != job.end() && warnings->is_array())

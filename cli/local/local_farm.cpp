@@ -107,6 +107,7 @@ struct LocalFarm::Watched final : worker::RenderBackend {
   Watched(std::unique_ptr<worker::RenderBackend> b, const Clock& c) : backend(std::move(b)), clock(c) {}
 
   Digest numeric_class() const override { return backend->numeric_class(); }
+  std::string platform() const override { return backend->platform(); }
   tl::expected<void, UnitFailure> prepare(const worker::LocalJob& job) override {
     const TimePoint start = clock.now();
     auto ready = backend->prepare(job);

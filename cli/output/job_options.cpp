@@ -162,6 +162,7 @@ Result<JobSpec> JobOptions::parse() const {
         take(memory, spec.memory, [](const std::string& text) { return parse_bytes("--memory", text); })})
     if (!taken) return tl::unexpected(taken.error());
   if (!integrator.empty()) spec.integrator = integrator;
+  if (!numeric_class.empty()) spec.numeric_class = numeric_class;
   auto values = parse_defines(defines);
   if (!values) return tl::unexpected(values.error());
   spec.defines = std::move(*values);

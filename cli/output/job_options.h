@@ -15,7 +15,7 @@ namespace ls::cli {
 // Numbers are kept as text until parse(), which makes the error messages.
 struct JobOptions {
   std::string spp, target_error, target_layer, time, seed, size, integrator, priority, frames;
-  std::string max_workers, max_units, memory;
+  std::string max_workers, max_units, memory, numeric_class;
   std::vector<std::string> aov, defines, tags;
   bool float_output = false;
   bool denoise = false;

@@ -174,6 +174,7 @@ std::string canonical_json(const JobSpec& spec) {
   if (spec.max_workers) json["max_workers"] = *spec.max_workers;
   if (spec.max_units) json["max_units"] = *spec.max_units;
   if (spec.memory) json["memory"] = *spec.memory;
+  if (spec.numeric_class) json["numeric_class"] = *spec.numeric_class;
   if (spec.reference) json["reference"] = spec.reference->hex();
   return dump(json);
 }
@@ -187,10 +188,10 @@ Result<JobSpec> parse_job_spec(std::string_view text) {
 
 Result<JobSpec> job_spec_of(const nlohmann::json& object) {
   if (!object.is_object()) return fail(Errc::invalid_argument, "spec: must be a JSON object {...}");
-  Fields fields(
-      object, "spec",
-      {"spp", "target_error", "target_layer", "time", "seed", "size", "integrator", "aov", "defines",
-       "priority", "float", "denoise", "tags", "frames", "max_workers", "max_units", "memory", "reference"});
+  Fields fields(object, "spec",
+                {"spp", "target_error", "target_layer", "time", "seed", "size", "integrator", "aov",
+                 "defines", "priority", "float", "denoise", "tags", "frames", "max_workers", "max_units",
+                 "memory", "numeric_class", "reference"});
   JobSpec spec;
   spec.spp = fields.whole("spp", 1, kMaxSpp);
   spec.target_error = fields.positive("target_error", kMaxTargetError);
@@ -212,6 +213,7 @@ Result<JobSpec> job_spec_of(const nlohmann::json& object) {
   spec.max_workers = some("max_workers");
   spec.max_units = some("max_units");
   spec.memory = fields.whole("memory", 1, kMaxMemory);
+  spec.numeric_class = fields.name("numeric_class");
   read_reference(fields, spec);
   if (fields.error()) return tl::unexpected(*fields.error());
   return spec;

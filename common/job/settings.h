@@ -62,6 +62,9 @@ struct JobSpec {
   std::optional<std::uint32_t> max_units;    // maximum number of leased units at the same time
   // bytes of memory that a worker must have; a job always requires at least the size of its files
   std::optional<std::uint64_t> memory;
+  // The numeric class that renders it, by the beginning of its hexadecimal digits or of its platform
+  // (WorkerHello::platform): only workers that match get units
+  std::optional<std::string> numeric_class;
   std::optional<Digest> reference;  // digest of the reference image, an EXR of the job's size
   bool operator==(const JobSpec&) const = default;
 };

@@ -127,7 +127,8 @@ struct WorkerHello {
   // Id that the coordinator assigned in an earlier Welcome; empty for a new worker. A worker keeps its id
   // over reconnects.
   WorkerId previous_id;
-  bool fake = false;  // true if the worker generates fake pixels instead of rendering
+  bool fake = false;     // true if the worker generates fake pixels instead of rendering
+  std::string platform;  // machine and build of its numeric class in words; may be empty
   bool operator==(const WorkerHello&) const = default;
 };
 // Renews the deadlines of the given leases. The worker sends it about once a second while it has work.

@@ -283,6 +283,7 @@ JobPlan plan_of(const StoredJob& job) {
   plan.max_workers = job.spec.max_workers.value_or(0);
   plan.max_units = job.spec.max_units.value_or(0);
   plan.memory_bytes = memory_need(job);
+  plan.class_asked = job.spec.numeric_class.value_or("");
   plan.focus = job.focus;
   return plan;
 }

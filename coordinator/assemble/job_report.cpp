@@ -288,6 +288,7 @@ std::string report_json(const ReportFacts& facts) {
          {"features_left_out", job.features_left_out},
          {"numeric_class", job.numeric_class ? json(job.numeric_class->hex()) : json()},
          {"build", job.build},
+         {"platform", job.platform.empty() ? json() : json(job.platform)},
          {"fake", job.fake},
          {"stopped", job.stopped ? json(to_string(*job.stopped)) : json()},
          {"warnings", job.warnings},

@@ -44,6 +44,9 @@ struct JobPlan {
   std::uint32_t max_workers = 0;   // most workers that hold units at the same time; 0: no limit
   std::uint32_t max_units = 0;     // most units leased at the same time; 0: no limit
   std::uint64_t memory_bytes = 0;  // the least a worker needs for this job; 0: unknown
+  // The beginning of the hexadecimal digits, or of the platform, of the numeric class that is to render it.
+  // Empty: any class may begin it
+  std::string class_asked;
   // Pixels of the frame whose tiles are leased before all other tiles; nullopt: all tiles are treated alike.
   // It changes the order in which units are leased, and nothing about the image.
   std::optional<PixelRect> focus;
@@ -148,6 +151,7 @@ struct WorkerJoined {
   // False: it gets units only of jobs that are pinned to its numeric class already, as a worker of another
   // version than the coordinator's does
   bool may_begin = true;
+  std::string platform = {};  // machine and build of its numeric class in words
 };
 // The worker rendered wrong pixels; this was found before a restart or by another coordinator. It gets no
 // work, and its results for jobs of this farm are void.

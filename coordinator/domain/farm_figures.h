@@ -77,6 +77,14 @@ struct ShareLimits {
   bool operator==(const ShareLimits&) const = default;
 };
 
+// How much of the farm can take the units of a job that is pinned to a numeric class: the workers of this
+// class and their threads, of all that are connected and not quarantined.
+struct ClassShare {
+  int workers = 0, of_workers = 0;
+  int threads = 0, of_threads = 0;
+  bool operator==(const ClassShare&) const = default;
+};
+
 // Counts of audits since the start of the coordinator. In an audit another worker renders the unit of an
 // accepted result again, and the two results are compared.
 struct AuditFigures {

@@ -18,6 +18,9 @@ using namespace std::chrono_literals;
 // Most samples per pixel of a job that gives only a target error or a time
 inline constexpr std::uint64_t kMaxSppWithoutLimit = 65536;
 
+// Digits of a numeric class in messages
+inline constexpr std::size_t kClassDigits = 12;
+
 // Leases
 inline constexpr double kLeaseSeconds = 2.0;  // work that a lease should give to all threads of a worker
 // Lower bound for the share of a core that a worker's thread gets

@@ -71,7 +71,14 @@ void WorkerTable::connected(Worker& worker, bool yes) {
   connected_ += yes ? 1 : -1;
   cores_ = connected_ > 0 ? cores_ + (yes ? worker.cores() : -worker.cores()) : 0;
   if (worker.quarantined) return;
-  yes ? ++classes_[worker.numeric_class] : --classes_[worker.numeric_class];
+  count(worker, yes);
+}
+
+void WorkerTable::count(const Worker& worker, bool yes) {
+  Count& c = classes_[worker.numeric_class];
+  c.workers += yes ? 1 : -1;
+  c.threads += yes ? worker.threads : -worker.threads;
+  if (c.workers == 0) classes_.erase(worker.numeric_class);
 }
 
 void WorkerTable::measured(Worker& worker, double cpu_seconds, double wait_seconds) {
@@ -81,12 +88,21 @@ void WorkerTable::measured(Worker& worker, double cpu_seconds, double wait_secon
 }
 
 void WorkerTable::quarantine(Worker& worker) {
-  if (!std::exchange(worker.quarantined, true) && worker.connected) --classes_[worker.numeric_class];
+  if (!std::exchange(worker.quarantined, true) && worker.connected) count(worker, false);
 }
 
-std::uint32_t WorkerTable::of_class(const Digest& numeric_class) const {
+WorkerTable::Count WorkerTable::of_class(const Digest& numeric_class) const {
   const auto found = classes_.find(numeric_class);
-  return found == classes_.end() ? 0 : found->second;
+  return found == classes_.end() ? Count{} : found->second;
+}
+
+WorkerTable::Count WorkerTable::of_all_classes() const {
+  Count all;
+  for (const auto& [numeric_class, c] : classes_) {
+    all.workers += c.workers;
+    all.threads += c.threads;
+  }
+  return all;
 }
 
 std::uint64_t head_of(const Digest& digest) {
@@ -100,10 +116,16 @@ bool holds(const Job& job, const Worker& worker) {
          std::binary_search(worker.blobs.begin(), worker.blobs.end(), head_of(job.plan.brief.scene));
 }
 
+bool of_class_asked(const Job& job, const Worker& worker) {
+  const std::string& asked = job.plan.class_asked;
+  return worker.platform.starts_with(asked) || worker.numeric_class.hex().starts_with(asked);
+}
+
 bool fits(const Job& job, const Worker& worker) {
   if (worker.quarantined) return false;
   if (worker.memory_bytes != 0 && job.plan.memory_bytes > worker.memory_bytes) return false;
   if (job.numeric_class ? *job.numeric_class != worker.numeric_class : !worker.may_begin) return false;
+  if (!of_class_asked(job, worker)) return false;
   return std::includes(worker.tags.begin(), worker.tags.end(), job.plan.tags.begin(), job.plan.tags.end());
 }
 

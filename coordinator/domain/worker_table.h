@@ -55,6 +55,7 @@ struct Worker {
   std::string name;
   std::uint64_t epoch = 0;
   Digest numeric_class;
+  std::string platform;
   int threads = 1;
   std::vector<std::string> tags;   // sorted
   std::uint64_t memory_bytes = 0;  // 0: unknown
@@ -142,8 +143,12 @@ class WorkerTable {
   // Adds a measurement to the worker's core share
   void measured(Worker& worker, double cpu_seconds, double wait_seconds);
   void quarantine(Worker& worker);
-  // Returns the number of connected workers of this numeric class that are not quarantined
-  std::uint32_t of_class(const Digest& numeric_class) const;
+  // Workers that are connected and not quarantined: those of this numeric class, and all of them.
+  struct Count {
+    int workers = 0, threads = 0;
+  };
+  Count of_class(const Digest& numeric_class) const;
+  Count of_all_classes() const;
 
  private:
   std::vector<WorkerId> ids_;
@@ -154,7 +159,8 @@ class WorkerTable {
   std::set<WorkerIndex> wanting_work_;
   int threads_ = 0, connected_ = 0;
   double cores_ = 0;
-  std::map<Digest, std::uint32_t> classes_;
+  void count(const Worker& worker, bool yes);
+  std::map<Digest, Count> classes_;  // without empty ones
 };
 
 // Returns the first 8 bytes of a digest, as in Worker::blobs
@@ -162,6 +168,8 @@ std::uint64_t head_of(const Digest& digest);
 // True if the worker has loaded the job's world, or at least reports to hold its scene file.
 bool holds(const Job& job, const Worker& worker);
 
+// True if the worker's numeric class is the one that the job asks for, if it does.
+bool of_class_asked(const Job& job, const Worker& worker);
 // True if the worker has the job's numeric class (or may begin the job, if it has none yet) and tags, has
 // enough memory, and is not quarantined. Whether the worker is busy does not matter.
 bool fits(const Job& job, const Worker& worker);

@@ -219,10 +219,18 @@ void FarmDriver::on(const JobPinned& e) {
   for (const auto& [id, worker] : core_.workers)
     if (worker.hello.numeric_class == e.numeric_class) {
       entry->stored.build = worker.hello.build;
+      entry->stored.platform = worker.hello.platform;
       entry->stored.fake |= worker.hello.fake;
     }
   entry->pin_unsaved = true;
   if (!core_.records.put_pin(entry)) todo_.push_back(JobPaused{e.job});
+  if (const auto figures = farm_.job(e.job); figures && figures->class_share) {
+    const ClassShare& s = *figures->class_share;
+    core_.records.log(
+        e.job, fmt::format("pinned to numeric class {}: {} of {} workers can take it, with {} of {} threads",
+                           class_in_words(e.numeric_class, entry->stored.platform), s.workers, s.of_workers,
+                           s.threads, s.of_threads));
+  }
 }
 
 // The state `done` is published and stored only after the final image is written: see ImageWriter.

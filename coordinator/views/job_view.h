@@ -22,6 +22,7 @@
 #include "common/job/settings.h"
 #include "common/scene/diagnostic.h"
 #include "coordinator/domain/denoised_target.h"
+#include "coordinator/domain/farm_figures.h"
 #include "coordinator/domain/job_state.h"
 
 namespace ls::coordinator {
@@ -159,6 +160,10 @@ struct JobView {
   double submitted_unix = 0;  // time of submission by the wall clock, for display
   Health health;  // numeric health of its folded units (rounds of tiles); for a sequence only the totals
   std::vector<HealthNote> notes;  // the numeric health as sentences for users; empty: no problems
+  // The numeric class that it is pinned to, with its platform, and how much of the farm is of that class
+  std::optional<Digest> numeric_class;
+  std::string platform;
+  std::optional<ClassShare> class_share;  // nullopt: it is pinned to none, has ended, or is a sequence
   bool fake = false;  // true if fake workers invented its pixels; for a sequence: the pixels of any frame
   // Set only for a sequence. The other values of its view combine all frames: they are sums or means over
   // pixels, and elapsed_seconds counts from the first ray of any frame to the last fold.
@@ -213,7 +218,8 @@ struct WorkerView {
   std::string name;
   std::string build;
   Digest numeric_class;
-  bool fake = false;  // true for a fake worker (for tests), which invents its pixels instead of rendering
+  std::string platform;  // machine and build of the class; empty: unknown
+  bool fake = false;     // true for a fake worker (for tests), which invents its pixels instead of rendering
   int threads = 1;
   std::vector<std::string> tags;
   std::string state;     // "connected", "draining", "lost", "sick"

@@ -51,6 +51,15 @@ json to_value(const DenoisedCheck& c) {
           {"at_most", c.at_most ? number(*c.at_most) : json()}};
 }
 
+// A share of nothing is none.
+json to_value(const ClassShare& s) {
+  return {{"workers", s.workers},
+          {"of_workers", s.of_workers},
+          {"threads", s.threads},
+          {"of_threads", s.of_threads},
+          {"share", s.of_threads > 0 ? json(static_cast<double>(s.threads) / s.of_threads) : json()}};
+}
+
 json to_value(const JobView& v) {
   json j{{"id", v.id.value},
          {"name", v.name},
@@ -92,6 +101,9 @@ json to_value(const JobView& v) {
   j["max_workers"] = v.max_workers ? json(*v.max_workers) : json();
   j["max_units"] = v.max_units ? json(*v.max_units) : json();
   j["memory_bytes"] = v.memory_bytes;
+  j["numeric_class"] = v.numeric_class ? json(v.numeric_class->hex()) : json();
+  j["platform"] = text_or_null(v.platform);
+  j["class_share"] = v.class_share ? to_value(*v.class_share) : json();
   const auto frame = frame_of(v.id);
   j["sequence"] = frame ? json(frame->sequence.value) : json();
   j["frame"] = frame ? json(frame->frame) : json();
@@ -128,6 +140,7 @@ json to_value(const WorkerView& v) {
           {"name", v.name},
           {"build", v.build},
           {"numeric_class", v.numeric_class.hex()},
+          {"platform", text_or_null(v.platform)},
           {"fake", v.fake},
           {"threads", v.threads},
           {"tags", v.tags},

@@ -95,3 +95,30 @@ def test_a_worker_of_another_numeric_class_gets_no_unit_of_the_job_and_is_named(
     farm.wait_for_job(job)
     workers = {w["name"]: w["units_done"] for w in farm.get("/api/v1/workers")["workers"]}
     assert workers[other.name] == 0
+
+
+def test_a_job_that_is_pinned_to_a_class_says_what_share_of_the_farm_can_take_it(farm):
+    farm.add_workers(2, "--fake-delay", 10, "--fake-class", "x86", threads=2)
+    arm = farm.add_worker("--fake-delay", 10, "--fake-class", "arm", threads=1)
+    farm.wait_for_workers(3)
+    of_class = {w["platform"]: w["numeric_class"] for w in farm.get("/api/v1/workers")["workers"]}
+    assert set(of_class) == {"fake:x86", "fake:arm"}
+
+    long, short = farm.submit(SCENE, spp=100000, seed=GOOD), farm.submit(SCENE, spp=24, seed=GOOD, numeric_class="fake:arm")
+
+    # The arm worker is alone in its class: nobody could audit it, so it begins only what asks for it.
+    farm.wait_for_progress(long, 3)
+    job = farm.job(long)
+    assert (job["numeric_class"], job["platform"]) == (of_class["fake:x86"], "fake:x86")
+    assert job["class_share"] == {"workers": 2, "of_workers": 3, "threads": 4, "of_threads": 5, "share": 0.8}
+    farm.wait_for_job(short)
+    report = farm.report(short)
+    assert (report["numeric_class"], report["platform"]) == (of_class["fake:arm"], "fake:arm")
+    assert farm.job(short)["class_share"] is None, "it has ended"
+    assert f"pinned to numeric class {of_class['fake:arm'][:12]} (fake:arm): 1 of 3 workers can take it, with 1 of 5 threads" in farm.request("GET", f"/api/v1/jobs/{short}/log").decode()
+
+    arm.terminate()
+    waits = farm.submit(SCENE, spp=24, seed=GOOD, numeric_class=of_class["fake:arm"][:8])
+    wait_until(lambda: f"and the job asks for '{of_class['fake:arm'][:8]}'" in (farm.job(waits)["error"] or ""), "the job says what it waits for")
+    farm.add_worker("--fake-delay", 10, "--fake-class", "arm")
+    farm.wait_for_job(waits)

@@ -137,6 +137,7 @@ void Agent::Impl::open_connection() {
   WorkerHello hello = options.hello;
   hello.threads = options.threads;
   hello.numeric_class = backend.numeric_class();
+  hello.platform = backend.platform();
   hello.blobs_held = files.held(limits::kBlobsHeld);
   hello.previous_id = id;
   {

@@ -24,7 +24,7 @@
 namespace ls::worker {
 
 struct AgentOptions {
-  WorkerHello hello;  // threads, numeric_class and blobs_held are filled in by the agent
+  WorkerHello hello;  // threads, numeric_class, platform and blobs_held are filled in by the agent
   int threads = 1;
   // No further unit is begun while unacknowledged results occupy this many bytes
   std::size_t outbox_bytes = 64 << 20;

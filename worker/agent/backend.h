@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <variant>
 
 #include "common/base/error.h"
@@ -48,6 +49,8 @@ class RenderBackend {
  public:
   virtual ~RenderBackend() = default;
   virtual Digest numeric_class() const = 0;
+  // Machine and build of the class in words; empty: unknown
+  virtual std::string platform() const { return {}; }
   // Builds the job's world (its scene, ready to render). Does nothing if the world is already built. Returns
   // the reason if it cannot be built.
   virtual tl::expected<void, UnitFailure> prepare(const LocalJob& job) = 0;

@@ -56,6 +56,7 @@ class ChildBackend final : public RenderBackend {
   }
 
   Digest numeric_class() const override { return numeric_class_; }
+  std::string platform() const override { return platform_; }
   tl::expected<void, UnitFailure> prepare(const LocalJob& job) override;
   tl::expected<RenderedUnit, UnitFailure> render(const LocalJob& job, const LeaseUnit& unit,
                                                  const std::atomic<bool>& stop) override;
@@ -87,6 +88,7 @@ class ChildBackend final : public RenderBackend {
   const ChildOptions options_;
   const SystemClock clock_;
   Digest numeric_class_;
+  std::string platform_;
   std::mutex control_mutex_;  // allows one request at a time on the control channel; also guards respawning
   mutable std::mutex mutex_;
   std::shared_ptr<Process> process_;  // guarded by mutex_, as are all members below
@@ -149,7 +151,10 @@ Result<void> ChildBackend::greet(Process& process) {
     return fail(first || end.signal ? Errc::internal : Errc::unavailable, std::move(why));
   }
   // Set by the first child, before any other thread was started
-  if (numeric_class_ == Digest{}) numeric_class_ = answer->reply.numeric_class;
+  if (numeric_class_ == Digest{}) {
+    numeric_class_ = answer->reply.numeric_class;
+    platform_ = answer->text;
+  }
   if (numeric_class_ != answer->reply.numeric_class)
     return broken_by(
         fmt::format("a new render child has the numeric class {}, not {} as this worker began with",

@@ -55,8 +55,8 @@ enum class Outcome : std::uint32_t { ok, scene_at_fault, failed, out_of_memory, 
 
 struct Reply {
   Outcome outcome{};
-  // Length of the text that follows: the reason of a failure, or the health of a rendered unit that is not
-  // clean.
+  // Length of the text that follows: the reason of a failure, the health of a rendered unit that is not
+  // clean, or in the hello the platform.
   std::uint32_t text_bytes = 0;
   Digest numeric_class;  // only in the hello
   double cpu_seconds = 0, wall_seconds = 0;

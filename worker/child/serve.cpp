@@ -115,6 +115,7 @@ class Server {
   std::string control(const Request& request, const std::string& text, Reply& reply) {
     if (request.kind == Kind::hello) {
       reply.numeric_class = backend_.numeric_class();
+      return backend_.platform();
     } else if (request.kind == Kind::prepare) {
       auto job = from_text(text);
       if (!job) return refused(reply, UnitFailure{.reason = job.error().message});

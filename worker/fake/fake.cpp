@@ -26,9 +26,10 @@ double thread_cpu_seconds() {
 
 class FakeBackend final : public LocalBackend {
  public:
-  explicit FakeBackend(FakeOptions options) : options_(options) {}
+  explicit FakeBackend(FakeOptions options) : options_(std::move(options)) {}
 
   Digest numeric_class() const override { return options_.numeric_class; }
+  std::string platform() const override { return options_.platform; }
   tl::expected<void, UnitFailure> prepare(const LocalJob&) override { return {}; }
   void forget(const JobId&) override {}
   std::uint64_t rss_bytes() const override { return 0; }

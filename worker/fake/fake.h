@@ -31,6 +31,7 @@ struct FakeOptions {
   double sample_seconds = 0;  // additional time per sample of a pixel, which is reported as CPU time
   FakeFault fault;
   Digest numeric_class = fake_numeric_class();  // set to another value to simulate another class of machine
+  std::string platform = "fake";
 };
 
 std::unique_ptr<LocalBackend> make_fake_backend(FakeOptions options);

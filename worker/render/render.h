@@ -95,5 +95,8 @@ WorldReport describe(const World& world);
 // battery of test computations. These run once, at the first call. Machines of the same class produce the
 // same bits.
 const Digest& numeric_class();
+// Describes the machine and build of the class for people: "armv8-a:gcc-14.2.0:embree-4.3.3". Classes may
+// differ where it does not.
+const std::string& platform();
 
 }  // namespace ls::render

@@ -32,6 +32,9 @@ namespace ls::coordinator {
 // is not positive.
 Result<void> check_plan(const JobPlan& plan);
 
+// Names a numeric class for people: "3f2a9c11d0e4 (armv8-a:gcc-14.2.0:embree-4.3.3)".
+std::string class_in_words(const Digest& numeric_class, const std::string& platform);
+
 // How the service should handle a result that has arrived
 struct Wanted {
   enum class Verdict {
@@ -68,6 +71,7 @@ struct JobFigures {
   double seconds_per_sample = 0;   // mean CPU seconds per pixel sample; 0: nothing measured yet
   std::optional<TimePoint> first_ray;
   std::optional<Digest> numeric_class;
+  std::optional<ClassShare> class_share;  // nullopt: the job is pinned to no class
 };
 
 struct WorkerFigures {

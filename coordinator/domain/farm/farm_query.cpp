@@ -18,6 +18,11 @@ std::string in_words(std::uint64_t bytes) {
 
 }  // namespace
 
+std::string class_in_words(const Digest& numeric_class, const std::string& platform) {
+  const std::string digits = numeric_class.hex().substr(0, kClassDigits);
+  return platform.empty() ? digits : fmt::format("{} ({})", digits, platform);
+}
+
 Farm::Farm() : Farm(Options{}) {}
 Farm::Farm(Options options) : state_(std::make_unique<State>(std::move(options))) {}
 Farm::~Farm() = default;
@@ -130,6 +135,10 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
   }
   f.first_ray = job->first_ray;
   f.numeric_class = job->numeric_class;
+  if (job->numeric_class) {
+    const auto own = state_->workers.of_class(*job->numeric_class), all = state_->workers.of_all_classes();
+    f.class_share = ClassShare{own.workers, all.workers, own.threads, all.threads};
+  }
   return f;
 }
 
@@ -181,7 +190,11 @@ std::string Farm::why_waiting(const JobId& id) const {
     ++connected;
     std::string why;
     if (job->numeric_class && *job->numeric_class != worker->numeric_class)
-      why = "is of another numeric class";
+      why = fmt::format("is of another numeric class, {}",
+                        class_in_words(worker->numeric_class, worker->platform));
+    else if (!of_class_asked(*job, *worker))
+      why = fmt::format("is of numeric class {} and the job asks for '{}'",
+                        class_in_words(worker->numeric_class, worker->platform), job->plan.class_asked);
     else if (!job->numeric_class && !worker->may_begin)
       why = "is of another version than the coordinator and begins no job";
     else if (worker->quarantined)

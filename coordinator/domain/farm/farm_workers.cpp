@@ -23,6 +23,7 @@ void Farm::State::on(const WorkerJoined& event) {
   worker.epoch = event.epoch;
   worker.name = event.name.empty() ? event.worker.value : event.name;
   worker.numeric_class = event.numeric_class;
+  worker.platform = event.platform;
   worker.threads = std::clamp(event.threads, 1, kMaxThreads);
   worker.tags = event.tags;
   std::sort(worker.tags.begin(), worker.tags.end());

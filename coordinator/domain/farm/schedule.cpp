@@ -152,7 +152,8 @@ Farm::State::Takes Farm::State::takes(Job& job, const Worker& worker) {
 // A worker that is alone in its numeric class cannot be audited. So, if some class has several workers that
 // fit the job, the job may be pinned only to such a class. Without audits any class will do.
 bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
-  if (job.numeric_class || options.audit_rate <= 0 || workers.of_class(worker.numeric_class) > 1) return true;
+  if (job.numeric_class || options.audit_rate <= 0 || workers.of_class(worker.numeric_class).workers > 1)
+    return true;
   std::map<Digest, int> others;
   for (const auto& [index, other] : workers.all()) {
     const bool there = other->connected && !other->draining && !other->unhealthy_since &&

@@ -49,7 +49,8 @@ std::optional<Result<Json>> parse_value(std::string_view key, std::string_view t
   if (key == "target_error" || key == "time") return json_number<double>(key, text, "a number");
   if (key == "priority") return json_number<int>(key, text, "a whole number");
   if (key == "size") return parse_size(text);
-  if (key == "integrator" || key == "frames" || key == "reference" || key == "target_layer")
+  if (key == "integrator" || key == "frames" || key == "reference" || key == "target_layer" ||
+      key == "numeric_class")
     return Result<Json>(Json(std::string(text)));
   if (key == "aov" || key == "tags") return Result<Json>(parse_list(text));
   if (key == "float" || key == "denoise") {
@@ -94,7 +95,7 @@ Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, cons
           fmt::format("unknown query parameter '{}'; known: {}{}spp, target_error, target_layer, time, seed, "
                       "size, integrator, "
                       "aov, define, priority, float, denoise, tags, frames, max_workers, max_units, memory, "
-                      "reference",
+                      "numeric_class, reference",
                       key, also, also.empty() ? "" : ", "));
     if (!*value) return tl::unexpected(value->error());
     spec[key] = std::move(**value);

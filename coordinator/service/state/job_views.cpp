@@ -72,6 +72,8 @@ JobView JobViews::job(const JobEntry& entry) const {
   v.error = job.error.empty() ? entry.trouble : job.error;
   v.warnings = job.warnings;
   v.fake = job.fake;
+  v.numeric_class = job.numeric_class;
+  v.platform = job.platform;
   v.size = job.settings.size;
   v.tile = job.settings.tile;
   v.priority = job.spec.priority;
@@ -105,6 +107,7 @@ JobView JobViews::job(const JobEntry& entry) const {
     v.units_done = figures->units_done;
     v.units_total = figures->units_total;
     v.queued_core_seconds = figures->core_seconds_queued;
+    if (!is_terminal(v.state)) v.class_share = figures->class_share;
     const Eta out = eta(entry, *figures, v);
     v.progress = out.progress;
     const std::string waits = !entry.finishing && figures->units_leased == 0 ? farm_.why_waiting(job.id) : "";
@@ -152,6 +155,7 @@ WorkerView JobViews::worker(const WorkerId& id, const WorkerEntry& worker) const
   v.name = worker.hello.name;
   v.build = worker.hello.build;
   v.numeric_class = worker.hello.numeric_class;
+  v.platform = worker.hello.platform;
   v.fake = worker.hello.fake;
   v.threads = worker.hello.threads;
   v.tags = worker.hello.tags;

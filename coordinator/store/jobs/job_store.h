@@ -85,7 +85,8 @@ struct StoredJob {
   std::optional<StopReason> stopped;
   std::string error;
   std::optional<Digest> numeric_class;
-  std::string build;  // build of the worker whose class the job was pinned to
+  // Build of the worker whose class the job was pinned to, and platform of the class (WorkerHello)
+  std::string build, platform;
   bool fake = false;  // true if pinned to a fake worker; then only fake workers may render its units
   JobTotals totals;
   TechniqueSet techniques;  // that its workers used, as far as they have said

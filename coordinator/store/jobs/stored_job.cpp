@@ -116,7 +116,8 @@ StoredJob stored_from(const json& j) {
   job.error = j.at("error");
   if (!j.at("numeric_class").is_null()) job.numeric_class = digest_from(j.at("numeric_class"));
   job.build = j.at("build");
-  job.fake = j.value("fake", false);  // missing in earlier versions
+  job.platform = j.value("platform", std::string());  // missing in earlier versions
+  job.fake = j.value("fake", false);                  // missing in earlier versions
   job.totals = totals_of(j.at("totals"));
   if (const auto missing_blobs = j.find("awaited"); missing_blobs != j.end())
     for (const auto& digest : *missing_blobs) job.missing_blobs.insert(digest_from(digest));
@@ -166,6 +167,7 @@ std::string to_json(const StoredJob& job) {
                                     {"relmse", finite(c.relmse)},
                                     {"at_most", c.at_most ? json(finite(*c.at_most)) : json()}});
   if (job.reference_same_seed) j["reference_same_seed"] = true;
+  if (!job.platform.empty()) j["platform"] = job.platform;
   if (job.fake) j["fake"] = true;
   if (!job.traceparent.empty()) j["traceparent"] = job.traceparent;
   if (job.focus) j["focus"] = {job.focus->x0, job.focus->y0, job.focus->x1, job.focus->y1};

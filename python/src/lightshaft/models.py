@@ -89,6 +89,9 @@ class JobSpec(TypedDict):
     """At most so many units of it are lent at once."""
     memory: NotRequired[int]
     """Bytes of memory that a worker must have; without it, as many as the job's files have."""
+    numeric_class: NotRequired[str]
+    """Only workers of this numeric class render it, by the beginning of its digits or of its platform:
+    armv8-a, say."""
     frames: NotRequired[str]
     """A sequence: FIRST-LAST, or FIRST-LASTxSTEP; at most 10000 frames. In the names of files a run of #
     stands for the frame's number, zero-padded to its length, and $frame is defined to be it. Frame N has
@@ -211,6 +214,14 @@ class Job(TypedDict):
     """Asked."""
     memory_bytes: NotRequired[int]
     """That a worker must have, at least."""
+    numeric_class: NotRequired[Union[str, None]]
+    """The class that it is pinned to; null: none yet."""
+    platform: NotRequired[Union[str, None]]
+    """Processor, compiler and Embree of that class."""
+    class_share: NotRequired[Union["JobClassShare", None]]
+    """How much of the farm can take it: the workers of the class that it is pinned to, and their threads,
+    of all that are connected; share is that of the threads, null if nobody is connected. Null of a job that
+    is pinned to no class yet or has ended, and of a sequence."""
     units_done: NotRequired[int]
     units_total: NotRequired[int]
     elapsed_seconds: NotRequired[float]
@@ -267,6 +278,17 @@ class JobEtaWithMore(TypedDict):
     seconds: NotRequired[float]
     ci95: NotRequired[Union[list[float], None]]
     """[low, high] for seconds, as eta_ci95."""
+
+
+class JobClassShare(TypedDict):
+    """How much of the farm can take it: the workers of the class that it is pinned to, and their threads,
+    of all that are connected; share is that of the threads, null if nobody is connected. Null of a job that
+    is pinned to no class yet or has ended, and of a sequence."""
+    workers: NotRequired[int]
+    of_workers: NotRequired[int]
+    threads: NotRequired[int]
+    of_threads: NotRequired[int]
+    share: NotRequired[Union[float, None]]
 
 
 class TimeSplit(TypedDict):
@@ -369,6 +391,8 @@ class Worker(TypedDict):
     name: NotRequired[str]
     build: NotRequired[str]
     numeric_class: NotRequired[str]
+    platform: NotRequired[Union[str, None]]
+    """Processor, compiler and Embree of that class; null: not told."""
     fake: NotRequired[bool]
     """It makes pixels up (--fake) instead of rendering, for tests of the farm."""
     threads: NotRequired[int]
@@ -408,6 +432,8 @@ class Report(TypedDict):
     """Seconds since the first ray that were asked for."""
     build: NotRequired[str]
     """Of the worker that the job was pinned with."""
+    platform: NotRequired[Union[str, None]]
+    """Processor, compiler and Embree of the numeric class."""
     fake: NotRequired[bool]
     """Fake workers (--fake) made its pixels up: it is no picture of the scene."""
     warnings: NotRequired[list[str]]

@@ -37,6 +37,7 @@ TEST(SpecQuery, SaysAllOfASpec) {
   spec.max_workers = 4;
   spec.max_units = 100;
   spec.memory = std::uint64_t{8} << 30;
+  spec.numeric_class = "armv8-a:gcc-14.2.0";
 
   EXPECT_EQ(as_the_coordinator_reads(spec, true), spec);
 }

@@ -73,6 +73,19 @@ TEST(FarmTables, SayWhatIsFake) {
   EXPECT_THAT(tables(false), testing::Each(Not(HasSubstr("fake"))));
 }
 
+TEST(FarmTables, NameTheClassAndItsShareOfTheFarm) {
+  const std::string digits(64, 'a');
+  const json worker{{"name", "w"}, {"numeric_class", digits}, {"platform", "armv8-a:gcc-14.2.0"}};
+  const json share{{"workers", 1}, {"of_workers", 3}, {"threads", 2}, {"of_threads", 8}, {"share", .25}};
+  const json job{
+      {"id", "j-1"}, {"numeric_class", digits}, {"platform", "armv8-a:gcc-14.2.0"}, {"class_share", share}};
+
+  EXPECT_THAT(workers_table({{"workers", {worker}}}), HasSubstr("aaaaaaaaaaaa armv8-a:gcc-14.2.0"));
+  EXPECT_THAT(job_text(job), testing::AllOf(HasSubstr("aaaaaaaaaaaa armv8-a:gcc-14.2.0"),
+                                            HasSubstr("25 % of the farm: 1 of 3 workers, 2 of 8 threads")));
+  EXPECT_THAT(job_text({{"id", "j-1"}, {"class_share", nullptr}}), Not(HasSubstr("of the farm")));
+}
+
 TEST(FarmTables, LetNoNameReachTheTerminalsControls) {
   const json jobs{{"jobs", {{{"id", "j-1"}, {"name", "a\x1b[2Jb\nc"}}}}};
 

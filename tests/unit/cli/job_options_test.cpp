@@ -36,6 +36,7 @@ TEST(JobOptions, TakesEveryOption) {
   options.max_workers = "4";
   options.max_units = "100";
   options.memory = "8G";
+  options.numeric_class = "armv8-a";
 
   const auto spec = options.parse();
 
@@ -53,6 +54,7 @@ TEST(JobOptions, TakesEveryOption) {
   EXPECT_EQ(spec->max_workers, 4u);
   EXPECT_EQ(spec->max_units, 100u);
   EXPECT_EQ(spec->memory, std::uint64_t{8} << 30);
+  EXPECT_EQ(spec->numeric_class, "armv8-a");
 }
 
 TEST(JobOptions, NamesTheOptionAndWhatIsWrongWithIt) {

@@ -159,7 +159,7 @@ TEST(Lease, AJobIsPinnedToTheNumericClassOfItsFirstLease) {
   rig.lose("a");
 
   EXPECT_TRUE(rig.held[{"b"}].empty());
-  EXPECT_EQ(rig.farm.why_waiting({"j"}), "b is of another numeric class");
+  EXPECT_EQ(rig.farm.why_waiting({"j"}), "b is of another numeric class, 020000000000");
 }
 
 TEST(Lease, TagsOfTheJobMustBeTheWorkers) {

@@ -98,5 +98,45 @@ TEST(Pin, TheClassOfTheFirstResultToBeStoredIsThatOfTheJob) {
   EXPECT_EQ(rig.farm.audit(), "");
 }
 
+TEST(Pin, AJobThatAsksForAClassWaitsForItAndSaysWhatThereIs) {
+  for (const std::string asked : {digest_number(9).hex().substr(0, 12), std::string("armv8-a:gcc-14")}) {
+    Rig rig(audited(.01));
+    for (const char* name : {"a", "b"}) rig.join_of_platform(name, 1, 1, "x86-64-v3:gcc-12.2.0");
+    JobPlan plan = plan_of("j", 40, 2);
+    plan.class_asked = asked;
+
+    rig.submit(plan);
+    EXPECT_TRUE(rig.held[{"a"}].empty());
+    EXPECT_EQ(rig.farm.why_waiting({"j"}),
+              "a is of numeric class 010000000000 (x86-64-v3:gcc-12.2.0) and the job asks for '" + asked +
+                  "'; b is of numeric class 010000000000 (x86-64-v3:gcc-12.2.0) and the job asks for '" +
+                  asked + "'");
+
+    rig.join_of_platform("arm", 1, 9, "armv8-a:gcc-14.2.0");
+    EXPECT_EQ(rig.job().numeric_class, digest_number(9)) << "although it is alone in its class";
+    EXPECT_FALSE(rig.held[{"arm"}].empty());
+    EXPECT_EQ(rig.farm.audit(), "");
+  }
+}
+
+TEST(Pin, APinnedJobSaysHowMuchOfTheFarmCanTakeIt) {
+  Rig rig;
+  rig.submit(plan_of("j", 400, 2));
+  EXPECT_EQ(rig.job().class_share, std::nullopt);
+
+  rig.join("a", 2, 1);
+  EXPECT_EQ(rig.job().class_share, (ClassShare{1, 1, 2, 2}));
+  rig.join("b", 6, 9);
+  rig.join("c", 4, 1);
+  EXPECT_EQ(rig.job().class_share, (ClassShare{2, 3, 6, 12}));
+  rig.lose("a");
+  EXPECT_EQ(rig.job().class_share, (ClassShare{1, 2, 4, 10}));
+  rig.send(WorkerQuarantined{{"c"}, "wrong pixels"});
+  EXPECT_EQ(rig.job().class_share, (ClassShare{0, 1, 0, 6}));
+  rig.lose("b");
+  rig.lose("c");
+  EXPECT_EQ(rig.job().class_share, (ClassShare{0, 0, 0, 0}));
+}
+
 }  // namespace
 }  // namespace ls::coordinator

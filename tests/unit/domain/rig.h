@@ -124,6 +124,11 @@ class Rig {
     return send(WorkerJoined{
         {name}, ++epochs_[{name}], name, digest_number(numeric_class), threads, {}, 0, {}, false});
   }
+  std::vector<Effect> join_of_platform(const std::string& name, int threads, std::uint64_t numeric_class,
+                                       const std::string& platform) {
+    return send(WorkerJoined{
+        {name}, ++epochs_[{name}], name, digest_number(numeric_class), threads, {}, 0, {}, true, platform});
+  }
   std::vector<Effect> lose(const std::string& name) {
     held.erase({name});
     return send(WorkerLost{{name}, epochs_[{name}]});

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/assets/image.h"
+#include "common/job/settings.h"
 #include "tests/unit/numeric_class/libraries.h"
 #include "worker/render/numeric_class/battery_images.h"
 #include "worker/render/render.h"
@@ -50,6 +51,16 @@ TEST(NumericClass, DiffersWhereAnyFunctionThatTheRendererCallsDoes) {
     EXPECT_EQ(there.size(), 64u) << name << ": " << there;
     EXPECT_NE(there, here) << name;
   }
+}
+
+TEST(NumericClass, HasAPlatformThatAJobCanAskFor) {
+  const std::string asked = R"({"numeric_class": ")" + platform() + "\"}";
+
+  const auto spec = parse_job_spec(asked);
+
+  ASSERT_TRUE(spec) << spec.error().message;
+  EXPECT_EQ(spec->numeric_class, platform());
+  EXPECT_NE(platform().find(":embree-"), std::string::npos) << platform();
 }
 
 TEST(NumericClass, HoldsPicturesThatCanBeReadAndSayMuch) {

@@ -27,6 +27,7 @@ inline StoredJob sample_job(std::string id) {
   job.state = JobState::running;
   job.stopped = StopReason::error;
   job.numeric_class = sha256("class");
+  job.platform = "armv8-a:gcc-14.2.0";
   job.fake = true;
   job.missing_blobs = {sha256("gone")};
   job.totals.core_seconds = 12.125;

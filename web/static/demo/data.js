@@ -22,6 +22,7 @@ const untrusted = {
   progress: 0.071, spp: 65536, spp_asked: null, spp_done: 36, rmse: 0.0921, rmse_ci95: [0.0876, 0.0968], relmse: 0.0386, relmse_ci95: [0.0351, 0.0424], target_error: 0.005,
   eta_seconds: 4310, eta_ci95: [3200, 6100], eta_with_more: { workers: 8, seconds: 1140, ci95: [850, 1600] }, units_done: 2448, units_total: 34680, elapsed_seconds: 880, core_seconds: 3490,
   verdict: kHeavy, slope: -0.71, slope_ci95: [-0.95, -0.47], efficiency_per_core: 0.00742, few_hits: 31, size: [1920, 1080],
+  numeric_class: "02be77c19d40e3f6", platform: "armv8-a:gcc-14.2.0:embree-4.3.3", class_share: { workers: 1, of_workers: 4, threads: 4, of_threads: 36, share: 4 / 36 },
   time: { load: 0.4, build: 3.1, render: 3490, transfer: 21, merge: 14.2, idle: 38 },
 };
 
@@ -77,7 +78,7 @@ export const workers = [
   worker("w-1", "lab-01", { tags: ["avx512", "lab"] }),
   worker("w-2", "lab-02", { activity: "rendering tile 105, round 6", units_done: 338, tags: ["lab"] }),
   worker("w-3", "lab-03", { activity: "fetching steam.vdb (61 MiB)", threads: 16, units_done: 702, cpu_seconds: 3012, rss_bytes: 1.3 * 2 ** 30 }),
-  worker("w-4", "attic", { numeric_class: "02be77c19d40e3f6", threads: 4, activity: "rendering tile 12, round 2", job: "j-a04be6d1", units_done: 90, cpu_seconds: 655 }),
+  worker("w-4", "attic", { numeric_class: "02be77c19d40e3f6", platform: "armv8-a:gcc-14.2.0:embree-4.3.3", threads: 4, activity: "rendering tile 12, round 2", job: "j-a04be6d1", units_done: 90, cpu_seconds: 655 }),
   worker("w-5", "lab-04", { state: "lost", activity: "", job: "", units_done: 17, cpu_seconds: 70, rss_bytes: null, last_seen_seconds: 372 }),
 ];
 

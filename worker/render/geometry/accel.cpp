@@ -225,6 +225,14 @@ PrimitiveId primitive_in(const Scenes& in, unsigned geometry, unsigned primitive
   return primitive_of(st, rh.hit);
 }
 
+// The version of the loaded library, which may differ from that of the headers.
+ssize_t loaded_version() {
+  const RTCDevice device = rtcNewDevice(fmt::format("threads=1,user_threads=0,{}", kDeviceConfig).c_str());
+  const ssize_t version = device ? rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION) : 0;
+  if (device) rtcReleaseDevice(device);
+  return version;
+}
+
 }  // namespace
 
 Accel::Accel() = default;
@@ -307,12 +315,10 @@ bool Accel::has_boundaries() const { return state_->own->boundary != nullptr; }
 std::uint64_t Accel::bytes() const {
   return static_cast<std::uint64_t>(std::max<std::int64_t>(0, state_->bytes));
 }
-std::string Accel::describe() {
-  // The version is that of the loaded library, which may differ from the headers.
-  const RTCDevice device = rtcNewDevice(fmt::format("threads=1,user_threads=0,{}", kDeviceConfig).c_str());
-  const auto version = device ? rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION) : 0;
-  if (device) rtcReleaseDevice(device);
-  return fmt::format("embree {} {}", version, kDeviceConfig);
+std::string Accel::describe() { return fmt::format("embree {} {}", loaded_version(), kDeviceConfig); }
+std::string Accel::version() {
+  const auto v = loaded_version();
+  return fmt::format("{}.{}.{}", v / 10000, v / 100 % 100, v % 100);
 }
 
 }  // namespace ls::render

@@ -47,6 +47,7 @@ class Accel {
   // Embree's version and the instruction set that it is configured to use. The text is part of the numeric
   // class, the digest that identifies machines that render the same bits (numeric_class() in render.h).
   static std::string describe();
+  static std::string version();  // "4.3.3"
 
   struct State;
 

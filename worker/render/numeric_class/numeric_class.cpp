@@ -1,5 +1,7 @@
 // Computes the numeric class. Machines of the same class render the same bits: they have the same build, and
 // the computations below give the same bits on them. Each add_ function adds results to the digest.
+#include <fmt/format.h>
+
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -235,6 +237,11 @@ Digest compute() {
 const Digest& numeric_class() {
   static const Digest digest = compute();
   return digest;
+}
+
+const std::string& platform() {
+  static const std::string words = fmt::format("{}:embree-{}", LIGHTSHAFT_PLATFORM, Accel::version());
+  return words;
 }
 
 }  // namespace ls::render

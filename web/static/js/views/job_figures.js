@@ -1,7 +1,7 @@
 // The numbers of one job, and its tiles being rendered.
 import { h } from "../dom.js";
 import { colourOf, healthComplaints, isOver } from "../state.js";
-import { count, duration, figure, given, plural, spp } from "../format.js";
+import { count, duration, figure, given, percent, plural, spp } from "../format.js";
 import { phrases } from "../phrases.js";
 import { atLeast, confidence, denoisedTarget, doubtful, trueFigure } from "../verdict.js";
 import { workerMark } from "./pieces.js";
@@ -20,6 +20,7 @@ export function figures(job) {
     fact("Core time", duration(job.core_seconds)),
     fact("Efficiency", figure(job.efficiency_per_core), ["1 / (relMSE × core s)"]),
     job.reference ? trueFigures(job.reference, job.reference_same_seed === true) : null,
+    job.class_share && job.class_share.share < 1 ? fact("Can take it", percent(job.class_share.share), [`${count(job.class_share.workers)} of ${plural(job.class_share.of_workers, "worker")}: of its numeric class`]) : null,
     fact("Units", count(job.units_done), [`of ${count(job.units_total)}`]),
     fact("Numeric health", clean ? "clean" : "see above", [], clean ? "good" : "bad"));
 }

@@ -40,7 +40,7 @@ function card(state, worker) {
       pair("CPU time", duration(worker.cpu_seconds)),
       pair("Memory", bytes(worker.rss_bytes)),
       pair("Last seen", alive(worker) && worker.last_seen_seconds < 5 ? "now" : `${duration(worker.last_seen_seconds)} ago`),
-      pair("Class", h("code", null, String(worker.numeric_class ?? "–").slice(0, 8)))),
+      pair("Class", h("code", { title: worker.platform || null }, String(worker.numeric_class ?? "–").slice(0, 8)))),
     worker.tags?.length ? h("p", { class: "tags" }, worker.tags.map((tag) => h("span", { key: tag, class: "tag" }, tag))) : null);
 }
 
