@@ -20,7 +20,7 @@ from exr_layers import read  # noqa: E402
 from local_farm import LocalFarm, bin_dir, wait_until  # noqa: E402
 
 IN_ROOT = ROOT / "tests/mixed/in_root.sh"
-PAGE = ROOT / "docs/measurements/mixed-farms.md"
+PAGE = ROOT / "docs" / "measurements" / "mixed-farms.md"
 BENCH = ROOT / "build/bench"
 PATIENCE = 1800  # qemu is slow
 SCENES = ("shafts", "fogbox", "cloud", "spotfog", "tint", "surface")

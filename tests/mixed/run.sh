@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # A farm of machines that are not alike: builds the programs on Debian 13 and Ubuntu 24.04 and for 64-bit ARM, compares the
-# pixels of all of them with those of this machine's build, and runs a farm of all of them. Writes
-# docs/measurements/mixed-farms.md with --write.
+# pixels of all of them with those of this machine's build, and runs a farm of all of them. Writes its page of
+# measurements with --write.
 #   tests/mixed/run.sh [--write]
 # As root, on Debian 12 with Linux 6.7, with the packages mmdebstrap and qemu-user-static and 6 GB of disk in $LIGHTSHAFT_MIXED
 # (build/mixed). This machine's programs must be there: $LIGHTSHAFT_BIN, or build/release/bin. JOBS: how many compilers at once.
