@@ -49,7 +49,8 @@ class Materials:
     def build(self, owner):
         material = owner.material
         if material is None:
-            return Surface(two_sided(element("bsdf", "diffuse", None, reflectance=[0.8, 0.8, 0.8])))
+            # What Blender 5 shows then: a Principled BSDF with its defaults.
+            return Surface(two_sided(opaque([0.8] * 3, 0.0, 0.5, 0.0, 1.5)))
         node = output_node(material.node_tree, "OUTPUT_MATERIAL") if material.node_tree else None
         if node is None:
             return Surface(two_sided(element("bsdf", "diffuse", None, reflectance=[0.0, 0.0, 0.0])))

@@ -42,7 +42,9 @@ def stage(blender, tmp_path):
 
 @pytest.fixture(scope="module")
 def farm(blender, tmp_path_factory):
-    with LocalFarm(tmp_path_factory.mktemp("farm")) as local:
+    # Open Image Denoise, or what stands in for it.
+    denoiser = os.environ.get("LIGHTSHAFT_OIDN") or str(bin_dir().parent / "fake_oidn" / "blurs.so")
+    with LocalFarm(tmp_path_factory.mktemp("farm"), environment={"LIGHTSHAFT_OIDN": denoiser}) as local:
         local.add_worker(fake=False)
         local.wait_for_workers(1)
         os.environ["LIGHTSHAFT_URL"], os.environ["LIGHTSHAFT_TOKEN"] = local.url(), local.token

@@ -103,6 +103,18 @@ def test_principled_surfaces(stage, name):
     differ(stage, band, 32)
 
 
+@pytest.mark.parametrize("engine", ["LIGHTSHAFT", "CYCLES"])
+def test_a_mesh_without_a_material_is_a_default_principled_bsdf(stage, engine):
+    from stage import principled
+
+    stage.light("SUN", 3, rotation=(0.5, 0.2, 0))
+    plane = stage.plane(None)
+    bare = stage.render(engine, 4)
+    plane.data.materials.append(principled())
+
+    assert bare.mean() > 0.1 and np.allclose(stage.render(engine, 4), bare, rtol=1e-5)
+
+
 def test_a_sheet_that_glows_lights_both_sides(stage):
     from stage import diffuse, material
 

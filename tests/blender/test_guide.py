@@ -13,8 +13,15 @@ GUIDE = pathlib.Path(__file__).resolve().parents[2] / "docs/guide/blender.md"
 
 
 
-def ten_steps(bpy, farm):
-    preferences = bpy.context.preferences.addons["bl_ext.user_default.lightshaft"].preferences
+@pytest.fixture
+def preferences(blender):
+    """Those of the add-on, empty again after the test."""
+    found = blender.context.preferences.addons["bl_ext.user_default.lightshaft"].preferences
+    yield found
+    found.url = found.token = ""
+
+
+def ten_steps(bpy, farm, preferences):
     preferences.url, preferences.token = farm.url(), farm.token  # 3
 
     bpy.ops.wm.read_homefile(app_template="", use_factory_startup=True)  # 4
@@ -64,12 +71,14 @@ def test_the_guide_has_ten_steps_and_says_these_values():
         assert value in section, value
 
 
-def test_ten_steps_from_a_blank_file_to_a_farms_picture_as_cycles_has_it(blender, farm, tmp_path):
-    scene = ten_steps(blender, farm)
+def test_ten_steps_from_a_blank_file_to_a_farms_picture_as_cycles_has_it(blender, farm, preferences, tmp_path):
+    scene = ten_steps(blender, farm, preferences)
 
     ours = pixels(blender, scene, tmp_path / "farm.exr")
-    scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 64, False
-    scene.cycles.max_bounces = scene.cycles.volume_bounces = scene.cycles.diffuse_bounces = 64
+    scene.render.engine, cycles = "CYCLES", scene.cycles
+    cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling = 64, False, False
+    cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = cycles.volume_bounces = 64
+    cycles.sample_clamp_indirect = cycles.blur_glossy = 0
     theirs = pixels(blender, scene, tmp_path / "cycles.exr")
 
     job = farm.get("/api/v1/jobs")["jobs"][0]

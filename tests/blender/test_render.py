@@ -197,12 +197,25 @@ def test_a_wrong_token(stage, on_farm, monkeypatch):
     assert "The farm does not know this token" in refused(stage)
 
 
-def test_no_denoiser_is_said_in_words(stage, on_farm):
+def test_the_denoised_pass_is_that_of_the_finished_image(stage, on_farm):
+    import sys
+
+    simple(stage)
+    stage.settings.denoise = True
+
+    stage.render(samples=8)
+
+    job = on_farm.get("/api/v1/jobs")["jobs"][0]["id"]
+    exr = sys.modules["bl_ext.user_default.lightshaft.exr"]
+    layers = exr.read(on_farm.request("GET", f"/api/v1/jobs/{job}/image.exr"))
+    for channel in "RGB":
+        assert np.array_equal(stage.layers["Denoised"][channel], layers[f"denoised.{channel}"])
+        assert not np.array_equal(stage.layers["Denoised"][channel], stage.layers["Combined"][channel])
+
+
+def test_no_denoiser_is_said_in_words(stage, monkeypatch):
     stage.sky(1)
     stage.settings.denoise = True
-    try:
-        stage.render(samples=1)
-    except RuntimeError as error:
-        assert "Open Image Denoise" in str(error)
-    else:
-        assert "Denoised" in stage.layers
+    monkeypatch.setenv("LIGHTSHAFT_OIDN", "/no/such/folder")
+
+    assert "Open Image Denoise" in refused(stage)
