@@ -20,7 +20,7 @@ struct Member;
 struct Value {
   using List = std::vector<Value>;
   using Members = std::vector<Member>;  // by name, as a file may have a million that are asked for often
-  std::size_t offset = 0;  // place in the text; for a member of an object, the place of its name
+  std::size_t offset = 0;               // place in the text; for a member of an object, the place of its name
   std::variant<std::monostate, bool, double, std::string, List, Members> is;
 };
 struct Member {
