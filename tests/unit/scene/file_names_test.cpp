@@ -29,6 +29,14 @@ TEST(FileNames, OfOtherProgramsSayWhatToDo) {
     EXPECT_NE(told_of(name).find(want), std::string::npos) << told_of(name);
 }
 
+// As the Python package sends a stage of USD: as XML, under the stage's name
+TEST(FileNames, OfOtherProgramsMayBeThoseOfScenes) {
+  MemoryAssets assets;
+  const ReadResult r = read_scene("shot.usda", "<?xml version=\"1.0\"?>\n<scene version=\"3.0.0\"/>", assets);
+
+  EXPECT_EQ(messages(r).find("USD"), std::string::npos) << messages(r);
+}
+
 TEST(FileNames, OfScenesSayNothing) {
   for (const char* name : {"", "scene", "scene.xml", "usd", "scene.usd.xml", "a.gltf", "a.glb", "a.pbrt"})
     EXPECT_EQ(scene::why_no_scene(name), "") << name;
