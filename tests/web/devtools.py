@@ -213,7 +213,7 @@ class Page:
 
     def screenshot(self, path, whole=True):
         """Of the whole page, or of what fits the window: a PNG, or a .jpg."""
-        form = {"format": "jpeg", "quality": 80} if str(path).endswith(".jpg") else {"format": "png"}
+        form = {"format": "jpeg", "quality": 50} if str(path).endswith(".jpg") else {"format": "png"}
         data = self.call("Page.captureScreenshot", {**form, "captureBeyondViewport": whole})["data"]
         with open(path, "wb") as file:
             file.write(base64.b64decode(data))

@@ -1,6 +1,6 @@
 """Pictures of the viewer of a farm of this machine, at three sizes, light and dark: python3 tests/web/viewer_pictures.py FOLDER
 
-The bath with 4 samples a pixel, compared with 32 of them (wipe), and its denoised layer. Needs Open Image Denoise
+The bath with 4 samples a pixel, compared with 16 of them (wipe), and its denoised layer. Needs Open Image Denoise
 (deploy/install-denoiser.sh).
 """
 import os
@@ -35,7 +35,7 @@ def picture(browser, farm, view, theme, out, **size):
     page.wait("document.querySelector('float-view')?.dataset.painted", timeout=PATIENCE)
     x, y = page.evaluate(f"(() => {{ const b = document.querySelector('float-view').getBoundingClientRect(); return [b.left + {POINTED[0]} * b.width, b.top + {POINTED[1]} * b.height]; }})()")
     page.call("Input.dispatchMouseEvent", {"type": "mouseMoved", "x": x, "y": y})
-    page.wait("document.querySelector('.viewer-reading').innerText.includes('±') || document.querySelector('.viewer-value')")
+    page.wait("document.querySelector('.viewer-reading .viewer-value')")
     page.screenshot(out, whole=False)
     page.close()
 
@@ -48,7 +48,7 @@ def main(folder):
         subprocess.run([sys.executable, ROOT / "scenes/bath/make_bath.py", scene], check=True)
         farm.add_workers(2, fake=False)
         noisy = submit(farm, scene / "bath.xml", "--spp", "4", "--denoise")
-        clean = submit(farm, scene / "bath.xml", "--spp", "32")
+        clean = submit(farm, scene / "bath.xml", "--spp", "16")
         for kind, size in SIZES.items():
             for theme in ("light", "dark"):
                 picture(browser, farm, f"{noisy}?with={clean}&region=250,180,330,240", theme, folder / f"viewer-{kind}-{theme}.jpg", **size)
