@@ -164,7 +164,7 @@ class SharedFarm(contextlib.ExitStack):
 
     def _add_workers(self, fakes, reals):
         """A tenth of the fake ones behind lines that can be cut, a tenth in the namespace, some behind the meddler; three steady ones that nothing is
-        done to themselves; the others are killed, frozen and so on. Of hundreds ten each are one process (tests/bench/fleet.cpp), as on a machine
+        done to themselves; the others are killed, frozen and so on. Of many ten each are one process (tests/bench/fleet.cpp), as on a machine
         with ten of them."""
         ports = [c.grpc for c in self.coordinators]
         direct = [f"127.0.0.1:{port}" for port in ports]
@@ -178,7 +178,7 @@ class SharedFarm(contextlib.ExitStack):
             flags = ["--fake-sample-seconds", self.unit, "--tags", tags]
             if group == "crash":
                 flags += ["--fake-fault", "crash,seed=13,tile=2,round=1"]
-            each = 1 if fakes < 60 or group in ("steady", "crash") else 10 if size >= 20 else size
+            each = 1 if fakes < 40 or group in ("steady", "crash") else 10 if size >= 20 else size
             for n, first in enumerate(range(0, size, each)):
                 addresses = direct[n % 3:] + direct[:n % 3]
                 if group == "cut":
