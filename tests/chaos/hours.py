@@ -1,7 +1,7 @@
 """Hours of chaos: faults of every kind at once on one farm that five users share.
 
-    tests/chaos/hours.py [--seed S] [--minutes M] [--workers N] [--record FILE] [--write docs/measurements/chaos-hours.md]
-    tests/chaos/hours.py --from FILE --write docs/measurements/chaos-hours.md     makes the page again of what was recorded
+    tests/chaos/hours.py [--seed S] [--minutes M] [--workers N] [--record FILE] [--write PAGE]
+    tests/chaos/hours.py --from FILE --write PAGE     makes the page again of what was recorded
 
 Three coordinators with TLS on a real Redis and an S3 store, fake workers and two that render, jobs in proportion to the time (300 in two
 hours). Ends with 1 if a finished job has another image than one undisturbed worker makes, a token opened what it must not, a job or

@@ -1,8 +1,11 @@
-// The path tracer with Features::split. It takes long to compile, so it has its own source file.
+// The path tracers with Features::split of the integrators `volpath` and `volpath_distant_mis`. They take long
+// to compile, so they have their own source file.
+#include "worker/render/integrator/segment_nee.h"
 #include "worker/render/integrator/variant.h"
 
 namespace ls::render {
 
 const Variant kSplitVariant = variant<kEverything>("everything, and light in parts");
+const Variant kDistantSplitVariant = variant<kEverything, SegmentNee>("everything, and light in parts");
 
 }  // namespace ls::render
