@@ -43,7 +43,7 @@ extern "C" void* rtcNewDevice(const char* config) {
 extern "C" void rtcIntersect1(void* scene, void* second, void* third) {
   static const auto real = library<void(void*, void*, void*)>("rtcIntersect1");
   static const bool off = setting("LIGHTSHAFT_TEST_OFF") == "rtcIntersect1";
-  static const bool embree3 = dlsym(RTLD_NEXT, "rtcInitIntersectContext") != nullptr;
+  static const bool embree3 = dlsym(RTLD_NEXT, "rtcIntersect1M") != nullptr;  // not in 4
   real(scene, second, third);
   void* ray = embree3 ? third : second;
   constexpr int kPrimitive = 17;
