@@ -48,7 +48,7 @@ class RawClient {
   // Whether something to read comes; nothing is read.
   bool readable() {
     pollfd p{fd_, POLLIN, 0};
-    return ::poll(&p, 1, 20'000) == 1;
+    return ::poll(&p, 1, 180'000) == 1;
   }
   std::string read_all() {
     while (read_some()) {
@@ -77,7 +77,7 @@ class RawClient {
  private:
   bool read_some() {
     pollfd p{fd_, POLLIN, 0};
-    if (::poll(&p, 1, 20'000) != 1) {
+    if (::poll(&p, 1, 180'000) != 1) {
       ADD_FAILURE() << "nothing came within 20 s";
       return false;
     }
