@@ -83,7 +83,7 @@ TEST_F(ServerTest, SlowReadersOfFinishedImagesTakeNoMemory) {
 TEST_F(ServerTest, AnswersInMemoryAreBoundedAndLaterOnesAreToldToComeAgain) {
   records->log_bytes = 100u << 20;
   Limits limits = quick_limits();
-  limits.body_grace_seconds = 60;
+  limits.body_grace_seconds = 600;
   start(limits);
   const std::string get_log =
       "GET /api/v1/jobs/" + coordinator::submit(*coordinator).value + "/log HTTP/1.1\r\nHost: x\r\n" + kAuth;

@@ -78,7 +78,7 @@ class RawClient {
   bool read_some() {
     pollfd p{fd_, POLLIN, 0};
     if (::poll(&p, 1, 180'000) != 1) {
-      ADD_FAILURE() << "nothing came within 20 s";
+      ADD_FAILURE() << "nothing came within 180 s";
       return false;
     }
     char buffer[4096];
