@@ -49,7 +49,7 @@ class Materials:
     def build(self, owner):
         material = owner.material
         if material is None:
-            # What Blender 5 shows then: a Principled BSDF with its defaults.
+            # Blender 5 shows such a mesh with the default Principled BSDF.
             return Surface(two_sided(opaque([0.8] * 3, 0.0, 0.5, 0.0, 1.5)))
         node = output_node(material.node_tree, "OUTPUT_MATERIAL") if material.node_tree else None
         if node is None:

@@ -15,7 +15,7 @@ void put(std::string& out, std::uint32_t x) {
 void put(std::string& out, float x) { put(out, std::bit_cast<std::uint32_t>(x)); }
 void put(std::string& out, int x) { put(out, static_cast<std::uint32_t>(x)); }
 
-// What a corner has besides its place, and what each number of it is called in the file.
+// An attribute of a mesh's corners, such as normals, and the names of its components in the file.
 struct Part {
   const std::vector<float>& values;
   std::vector<std::string_view> names;

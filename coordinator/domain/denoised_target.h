@@ -12,8 +12,8 @@
 // too. A check without an interval meets no target. An image without noise ends at the first check that meets
 // the target: its pixels will not change any more.
 //
-// What a denoiser computes may differ between machines. So each check is made once, by the coordinator, and
-// stored with the job: after a restart, or at another coordinator, the stored values decide.
+// A denoiser may give different results on different machines. So each check is made once, by the
+// coordinator, and stored with the job: after a restart, or at another coordinator, the stored values decide.
 #pragma once
 
 #include <optional>

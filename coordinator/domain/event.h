@@ -89,7 +89,7 @@ struct JobRestored {
     bool operator==(const Audit&) const = default;
   };
   std::vector<Audit> audits;
-  // What is known of the error of the denoised layers, if the target error is theirs
+  // The checks of the denoised layers' error so far, if the target error is theirs
   std::vector<DenoisedCheck> denoised_checks;
 };
 

@@ -48,7 +48,7 @@ EVENLY = '<float name="wavelength_min" value="380"/><float name="wavelength_max"
 ROOM = ('<shape type="cube"><boolean name="flip_normals" value="true"/><transform name="to_world"><scale value="5"/></transform>'
         '<bsdf type="diffuse"><rgb name="reflectance" value="0.8"/></bsdf></shape>' + LAMP.format('<float name="intensity" value="30"/>'))
 GREY = '<rgb name="reflectance" value="0.5"/>'
-# Of each: the objects, and Mitsuba's variant.
+# For each scene: its objects, and the variant of Mitsuba that renders it.
 SCENES = {
     "rawconstant of one number": (SKY + BALL.format('<texture type="rawconstant" name="reflectance"><float name="value" value="0.3"/></texture>'), "scalar_rgb"),
     "rawconstant of three": (SKY + BALL.format('<texture type="rawconstant" name="reflectance"><vector name="value" value="0.2, 0.5, 0.7"/></texture>'), "scalar_rgb"),

@@ -20,7 +20,7 @@ enum class Origin {
 struct PluginRow {
   std::string_view tag, name;
   Standing standing;
-  // What it becomes if its name does not say so, what is left out if it is read in part, or why it is refused
+  // Read: the plugin it becomes, if the name differs. Read in part: what is left out. Refused: the reason,
   // and what to use instead.
   std::string_view note;
   Origin origin = Origin::mitsuba3;

@@ -17,7 +17,7 @@ namespace ls::http {
 
 class Api;
 
-// Who may use a route, by the role of the caller's token (Role in message/message.h).
+// The callers that may use a route, by the role of their token (Role in message/message.h).
 enum class Access {
   open,  // everybody, even without a token
   // The roles submit, read and admin: any token except a worker's. A submit token sees only its own jobs

@@ -39,7 +39,7 @@ class Stream {
   using executor_type = Tcp::socket::executor_type;
   executor_type get_executor() { return socket_.get_executor(); }
 
-  // What a read or a write with this completion token returns.
+  // The return type of a read or a write with this completion token.
   template <class Token>
   using Started = typename net::async_result<std::decay_t<Token>, void(error_code, std::size_t)>::return_type;
   template <class Buffers, class Token>

@@ -14,7 +14,7 @@ import OpenEXR
 
 from .images import Array
 
-# Of plugins that read a file, the keys that may hold an array instead. The first present is taken.
+# Keys under which plugins that read a file accept an array instead. The first key present is used.
 IMAGE_KEYS, GRID_KEYS = ("data", "bitmap"), ("data", "grid")
 MESH_KEYS = ("vertex_positions", "faces", "vertex_normals", "vertex_texcoords")
 ATTRIBUTE = re.compile("(?!face_normals$)(vertex|face)_[A-Za-z0-9_]{1,64}")  # not that flag of all meshes

@@ -17,7 +17,7 @@ struct PathVertex {
   SurfaceHit hit;
 };
 
-// The first vertex of a path, from which the second vertices of others are looked at.
+// The first vertex of a path, which is connected to the second vertices of other paths.
 struct FirstVertex {
   bool usable = false;  // false: there is none, or it scatters by delta lobes alone
   PathVertex at;
@@ -59,8 +59,8 @@ struct SharingPath {
   Part part = Part::alone;
   FirstVertex first;
   SharedTail tail;
-  C3 scale{1, 1, 1};   // of light that is the pixel's alone
-  float survival = 1;  // what Russian roulette multiplies the path's weight by
+  C3 scale{1, 1, 1};   // the factor of light that is the pixel's alone
+  float survival = 1;  // Russian roulette multiplies the path's weight by it
 };
 
 }  // namespace ls::render

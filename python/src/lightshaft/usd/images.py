@@ -55,7 +55,7 @@ class Images:
         grey = picture is not None and picture.mode in ("L", "1")
         raw = _is_raw(picture, look.space)
         plain = look.channels == "rgb" or (grey and look.channels == "r" and raw)
-        # Of EXR and HDR, texels are linear whatever is said of them here.
+        # Texels of EXR and HDR are linear, whatever color space the stage names.
         fits = picture.format is not None if picture is not None else look.space != "sRGB"
         if plain and fits and not look.changes() and asset.suffix in READ_AS_THEY_ARE:
             return self._files.take(asset), raw

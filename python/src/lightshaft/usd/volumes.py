@@ -13,7 +13,7 @@ from .shading import plain
 from .transforms import Matrix, is_usable, scale, translation
 
 MARGIN = 1.001  # the box of a medium is larger than its grid, whose border has density
-# What no schema of USD says of a volume, as primvars of it: name and value where it has none.
+# Settings of a volume for which USD has no schema. They are primvars: name, and default value.
 SETTINGS = {
     "densityScale": 1.0,
     "albedo": [0.75, 0.75, 0.75],
