@@ -203,13 +203,14 @@ class Composer {
     if (out_.choice.calm) {
       i.max_depth = 2 + static_cast<int>(dice_.below(3));
       i.rr_depth = 5;
-      // Light vertices are shared by all pixels: their means have errors that pixels alone do not tell
-      // (connections_test.cpp)
+      // Pixels that share light vertices or paths have errors that are alike: the mean's error is not known
+      // from pixels alone (connections_test.cpp, path_reuse_test.cpp)
       i.light_vertices = -1;
+      i.path_reuse = 0;
     }
     i.camera_points = std::min(i.camera_points, 8);  // more only cost time
     if (i.name != kNames[0]) {
-      i.camera_points = i.light_vertices = i.equiangular = i.lamp_flights = 0;
+      i.camera_points = i.light_vertices = i.equiangular = i.lamp_flights = i.path_reuse = 0;
       i.phase_only = false;
     }
     if (i.name == kNames[1]) return;
