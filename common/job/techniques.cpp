@@ -51,7 +51,7 @@ TechniqueSwitch off_switch(Technique technique, std::string_view integrator) {
     case Technique::light_tree:
       return {"light_tree", "-1"};
     case Technique::path_reuse:
-      return {"path_reuse", "0"};
+      return {"path_reuse", "-1"};
   }
   return {};
 }

@@ -323,7 +323,8 @@ struct IntegratorSettings {
   // flights that end near lamps; 0: if they pay for the scene; -1: never.
   int equiangular = 0, lamp_flights = 0;
   int light_tree = 0;  // -1: lights are chosen by their power alone
-  // The number of pixels that share what their paths find from the second vertices on; 0: none.
+  // For "volpath" only: the number of pixels that share what their paths find from the second vertices on; 0:
+  // a number that pays for the scene, which may be none; -1 or 1: none.
   int path_reuse = 0;
   bool operator==(const IntegratorSettings&) const = default;
 };

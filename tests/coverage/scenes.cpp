@@ -6,7 +6,7 @@ namespace ls::test {
 namespace {
 
 std::string scene(const std::string& inside, const std::string& eye = "0, 0, 3.9", int depth = 8,
-                  int path_reuse = 0) {
+                  int path_reuse = -1) {
   return fmt::format(R"(<scene version="3.0.0">
 <integrator type="volpath"><integer name="max_depth" value="{}"/><integer name="rr_depth" value="5"/><integer name="path_reuse" value="{}"/></integrator>
 <sensor type="perspective"><float name="fov" value="39"/>

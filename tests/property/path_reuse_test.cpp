@@ -75,7 +75,7 @@ TEST(PathReuse, GivesTheSameImageAsPathsAlone) {
                           {"mirrors", mirrors}};
   const double level = tests.level(std::size(rivals) * kQuarters);
   for (const Rival& rival : rivals) {
-    const SceneBuilder on = rival.scene(7), off = rival.scene(0);
+    const SceneBuilder on = rival.scene(7), off = rival.scene(-1);
     ASSERT_THAT(estimate(on, 2).variant, testing::HasSubstr("shared")) << rival.name;
     ASSERT_THAT(estimate(off, 2).variant, testing::Not(testing::HasSubstr("shared")));
     const Quarters a = quarters_of(on, 8, kSeeds, 100), b = quarters_of(off, 16, kSeeds, 900);

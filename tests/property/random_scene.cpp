@@ -206,7 +206,7 @@ class Composer {
       // Pixels that share light vertices or paths have errors that are alike: the mean's error is not known
       // from pixels alone (connections_test.cpp, path_reuse_test.cpp)
       i.light_vertices = -1;
-      i.path_reuse = 0;
+      i.path_reuse = -1;
     }
     i.camera_points = std::min(i.camera_points, 8);  // more only cost time
     if (i.name != kNames[0]) {

@@ -10,7 +10,7 @@ struct LampRoom {
   bool glossy = false;
   double fog = 0;
   bool chromatic = false;
-  int path_reuse = 0;
+  int path_reuse = -1;
   int max_depth = 6;
 
   SceneBuilder builder(FrameSize size = {16, 16}) const {

@@ -9,6 +9,7 @@
 namespace ls::render {
 namespace {
 
+using test::operator*;
 using test::LampRoom;
 using test::SceneBuilder;
 
@@ -36,6 +37,25 @@ TEST(PathReuse, IsThereIfAskedForAndPossible) {
   EXPECT_FALSE(shares(changed([](SceneBuilder& b) {
     b.container(RectangleShape{}, test::scale(.1), b.null(), MediumIndex{0});
   }))) << "an open boundary";
+}
+
+// A lamp above a grey floor in the open, where light that was scattered once is nearly all there is.
+SceneBuilder open_floor() {
+  SceneBuilder b;
+  b.scene.integrator.path_reuse = 0;
+  b.look({0, 2, 4}, {0, 0, 0}, 50, {0, 1, 0});
+  b.shape(RectangleShape{}, test::rotate_x(-90) * test::scale(4), b.diffuse(.3));
+  b.shape(SphereShape{{0, .5, 0}, .5}, {}, b.diffuse(.3));
+  b.shape(RectangleShape{}, test::translate({.2, 3, -.1}) * test::rotate_x(90) * test::scale(.5),
+          b.diffuse(.3))
+      .emitter = AreaEmitter{b.texture({18, 15, 11})};
+  return b;
+}
+
+TEST(PathReuse, IsThereByDefaultWhereNoiseIsOfLightScatteredSeveralTimes) {
+  EXPECT_TRUE(shares(LampRoom{.path_reuse = 0}.builder()));
+  EXPECT_TRUE(shares(LampRoom{.fog = .5, .path_reuse = 0}.builder()));
+  EXPECT_FALSE(shares(open_floor()));
 }
 
 std::vector<float> tile(const World& w, PixelRect rect, SampleRange samples) {
@@ -72,6 +92,18 @@ TEST(PathReuse, GivesTheSamePixelsInEveryTileCropAndSampleRange) {
   EXPECT_FLOAT_EQ(static_cast<float>(sum), part(whole, kAll, {18, 17, 19, 18})[1]);
 }
 
+// The job's seed has no say in whether sharing pays, and the pilot leaves the world as it was.
+TEST(PathReuse, IsTheSameByDefaultAsIfAskedFor) {
+  constexpr PixelRect kAll{0, 0, 16, 16};
+  for (const std::uint64_t seed : {0, 1, 2}) {
+    const auto sums = [&](LampRoom room) {
+      return tile(*test::world_of(room.builder(), seed), kAll, {0, 2});
+    };
+    EXPECT_EQ(sums({.path_reuse = 0}), sums({.path_reuse = 16})) << seed;
+    EXPECT_EQ(sums({.fog = .5, .path_reuse = 0}), sums({.fog = .5, .path_reuse = 16})) << seed;
+  }
+}
+
 TEST(PathReuse, GivesTheSameBitsInEveryVariant) {
   for (const LampRoom& room :
        {LampRoom{.glossy = true, .path_reuse = 5}, LampRoom{.fog = .5, .path_reuse = 5},
@@ -97,7 +129,7 @@ TEST(PathReuse, TakesTheNoiseFromIndirectLight) {
       const auto e = test::estimate(LampRoom{.fog = fog, .path_reuse = path_reuse}.builder({32, 32}), 16);
       return e.standard_error[1] * e.standard_error[1];
     };
-    const double with = squared_error(16), without = squared_error(0);
+    const double with = squared_error(16), without = squared_error(-1);
     std::printf("fog %g: %.3f\n", fog, with / without);
     EXPECT_LT(with, .75 * without) << fog;
   }

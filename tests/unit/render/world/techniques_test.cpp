@@ -87,7 +87,7 @@ SceneBuilder switched_off(const Case& c) {
       {"phase_only", [&] { i.phase_only = true; }},
       {"camera_points", [&] { i.camera_points = -1; }},
       {"light_vertices", [&] { i.light_vertices = -1; }},
-      {"path_reuse", [&] { i.path_reuse = 0; }},
+      {"path_reuse", [&] { i.path_reuse = -1; }},
       {"distance", [&] {
          i.distance =
              off.value == "exponential" ? DistanceSampling::exponential : DistanceSampling::equiangular;
