@@ -51,7 +51,8 @@ def test_inspect_foretells_what_the_reports_of_a_render_and_of_a_farm_name(scene
 
 
 def test_a_scene_that_uses_none_names_none(scene, tmp_path):
-    scene.write_text(SCENE.replace('value="4"/></integrator>', 'value="4"/><integer name="equiangular" value="-1"/></integrator>'))
+    off = '<integer name="equiangular" value="-1"/><integer name="path_reuse" value="-1"/>'
+    scene.write_text(SCENE.replace('value="4"/></integrator>', f'value="4"/>{off}</integrator>'))
     lightshaft("render", scene, "-o", tmp_path / "a.exr", "--report", tmp_path / "a.json", "--html", tmp_path / "a.html")
 
     assert names(json.loads((tmp_path / "a.json").read_text())) == []

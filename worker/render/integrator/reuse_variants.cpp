@@ -18,7 +18,8 @@ constexpr int kSharing = 16;  // pixels that share by default
 // A few pixels are rendered to find out whether sharing pays, with as many samples as a quick image has: the
 // fewer there are, the more of the noise is of edges and soft shadows.
 constexpr std::uint64_t kPilotSeed = 0x5eed0f9a7e;
-constexpr std::uint64_t kPilotPixels = 256, kPilotSamples = 32;
+constexpr std::uint64_t kPilotPixels = 256;
+constexpr std::uint64_t kPilotSamples = 32;
 constexpr int kPilotDepth = 32;  // paths in a white and dense medium have thousands of segments
 // Sharing leaves about a quarter of the noise of light that was scattered several times, and all noise of
 // other light, in 1.7 times the time (docs/decisions/0036-path-reuse.md). So it pays where the ratio r of all
