@@ -42,7 +42,7 @@ STILL_LIFE = """<shape type="rectangle"><transform name="to_world"><scale value=
 """
 VARIED = {
     "grid": (FOG, 2),
-    "homogeneous": (GRID.sub(HOMOGENEOUS.format("1.5"), FOG), 4),
+    "homogeneous": (GRID.sub(HOMOGENEOUS.format("1.5"), FOG), 3),
     "chromatic": (GRID.sub(HOMOGENEOUS.format("0.5, 1.5, 3"), FOG), 2),
     "glowing": (GRID.sub(GLOWING, FOG), 1),
     "vacuum": (GRID.sub("", FOG), 5),
@@ -55,7 +55,7 @@ VARIED = {
                              .replace('<shape type="cube">', '<shape type="cube"><transform name="to_world"><scale value="4.5"/></transform>'), 3),
     "still life through a lens": (re.sub(r'  <shape type="cube">.*?</shape>\n', STILL_LIFE, FOG, flags=re.S)
                                   .replace('<sensor type="perspective">', '<sensor type="thinlens"><float name="aperture_radius" value="0.1"/>'
-                                           '<float name="focus_distance" value="4"/>'), 7),
+                                           '<float name="focus_distance" value="4"/>'), 4),
     "chosen by distance": (FOG.replace('<integrator type="volpath"/>', '<integrator type="volpath_distant_mis"/>'), 2),
 }
 
