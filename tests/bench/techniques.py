@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """What each technique of a scene's integrator costs and brings: the scene as it is, and with one of them switched off in turn.
 
-usage: techniques.py SCENE[@WxH]... [--seeds N] [--first SEED] [--spp N] [--threads N] [--json OUT.json] [--out PAGE.md]
+usage: techniques.py SCENE[@WxH]... [--seeds N] [--first SEED] [--spp N] [--threads N] [--denoise] [--json OUT.json] [--out PAGE.md]
 `lightshaft inspect` says which techniques a scene uses and what switches each off (`techniques`; docs/reference/scene-format.md,
 Integrators); one that it does not use has no row. All settings take turns, seed by seed, with equal samples. Columns:
   error      mean relMSE without the technique over that with it: what it brings. Each image's own estimate, from its two halves, is
              unbiased, so no reference is needed
+  denoised   with --denoise, the same of the denoised layers
   seconds    mean core seconds with it over those without: what it costs
   work       the same of instructions, which do not depend on what else the machine does; - where it cannot count them
   efficiency 1 / (relMSE x core seconds) with it over that without
@@ -14,15 +15,16 @@ the interval says so. Any scene that Lightshaft reads will do. `phase_only` swit
 """
 import argparse
 import json
+import os
 import pathlib
 import re
 import statistics
 import subprocess
 import tempfile
 
-from efficiency import BIN
-from measured import ratio_of_means
+from measured import ROOT, ratio_of_means
 
+BIN = pathlib.Path(os.environ.get("LIGHTSHAFT_BIN", ROOT / "build" / "release" / "bin"))
 TYPES = {"true": "boolean", "false": "boolean"}
 
 
@@ -47,19 +49,19 @@ def without(scene, off):
 
 
 def rendered(scene, size, asked, seed, folder):
-    """relMSE, core seconds, instructions (None: not counted)."""
+    """relMSE, core seconds, instructions (None: not counted), relMSE of the denoised layers (None: not asked for)."""
     report = folder / "report.json"
     lightshaft("render", scene, "-o", folder / "out.exr", "--report", report, "--quiet", "--spp", asked.spp, "--seed", seed, "--threads", asked.threads,
-               *(["--size", size] if size else []))
+               *(["--size", size] if size else []), *(["--denoise"] if asked.denoise else []))
     told = json.loads(report.read_text())
-    return told["relmse"], told["core_seconds"], told["instructions"].get("count")
+    return told["relmse"], told["core_seconds"], told["instructions"].get("count"), told.get("denoised", {}).get("relmse")
 
 
 def measured(name, asked, folder):
     """[{scene, technique, ...}], a row for each technique that the scene uses."""
     given, _, size = name.partition("@")
     scene = folder / "scene.xml"
-    lightshaft("convert", given, "-o", scene)
+    lightshaft("convert", given, scene)
     found = json.loads(lightshaft("inspect", scene, "--json"))["techniques"]
     files = {"": scene, **{one["name"]: without(scene, one["off"]) for one in found}}
     for technique, file in files.items():
@@ -69,12 +71,13 @@ def measured(name, asked, folder):
     for seed in range(asked.first, asked.first + asked.seeds):
         for technique, file in files.items():
             runs[technique].append(rendered(file, size, asked, seed, folder))
-    errors, seconds, work = ({t: [run[i] for run in of] for t, of in runs.items()} for i in range(3))
+    errors, seconds, work, denoised = ({t: [run[i] for run in of] for t, of in runs.items()} for i in range(4))
     cost = {t: [e * s for e, s in zip(errors[t], seconds[t])] for t in runs}
     ratio = ratio_of_means if asked.seeds > 1 else lambda a, b: (statistics.fmean(a) / statistics.fmean(b),) * 3
     for one in found:
         t = one["name"]
         yield {"scene": pathlib.Path(given).stem, "technique": t, "off": one["off"], "error": ratio(errors[t], errors[""]),
+               "denoised": ratio(denoised[t], denoised[""]) if asked.denoise else None,
                "seconds": ratio(seconds[""], seconds[t]), "work": ratio(work[""], work[t]) if all(work[""] + work[t]) else None,
                "efficiency": ratio(cost[t], cost[""])}
 
@@ -93,17 +96,19 @@ def main():
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--spp", type=int, default=32)
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--denoise", action="store_true")
     parser.add_argument("--json", type=pathlib.Path)
     parser.add_argument("--out", type=pathlib.Path)
     asked = parser.parse_args()
-    lines, rows = ["| scene | technique | switched off by | error | seconds | work | efficiency |", "|---|---|---|---|---|---|---|"], []
+    columns = ("error", *(["denoised"] if asked.denoise else []), "seconds", "work", "efficiency")
+    lines, rows = [f"| scene | technique | switched off by | {' | '.join(columns)} |", "|---" * (3 + len(columns)) + "|"], []
     print("\n".join(lines))
     for name in asked.scenes:
         with tempfile.TemporaryDirectory() as folder:
             for row in measured(name, asked, pathlib.Path(folder)):
                 rows.append(row)
                 off = f"`{row['off']['parameter']}` {row['off']['value']}"
-                lines.append(f"| {row['scene']} | {row['technique']} | {off} | " + " | ".join(cell(row[k]) for k in ("error", "seconds", "work", "efficiency")) + " |")
+                lines.append(f"| {row['scene']} | {row['technique']} | {off} | " + " | ".join(cell(row[k]) for k in columns) + " |")
                 print(lines[-1], flush=True)
     if asked.json:
         asked.json.write_text(json.dumps(rows, indent=2) + "\n")

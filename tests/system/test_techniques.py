@@ -2,10 +2,12 @@
 
 import json
 import pathlib
+import subprocess
+import sys
 
 import pytest
 from cli_kit import lightshaft
-from local_farm import LocalFarm
+from local_farm import ROOT, LocalFarm
 
 SCENE = """<scene version="3.0.0">
   <integrator type="volpath"><integer name="max_depth" value="4"/></integrator>
@@ -57,3 +59,12 @@ def test_a_scene_that_uses_none_names_none(scene, tmp_path):
 
     assert names(json.loads((tmp_path / "a.json").read_text())) == []
     assert "How it looked for light" not in (tmp_path / "a.html").read_text()
+
+
+def test_the_script_tells_what_each_technique_costs_and_brings(scene):
+    script = [sys.executable, ROOT / "tests/bench/techniques.py", f"{scene}@16x12", "--seeds", "2", "--spp", "4", "--json", scene.with_suffix(".json")]
+    page = subprocess.run(script, check=True, capture_output=True, text=True).stdout
+    rows = json.loads(scene.with_suffix(".json").read_text())
+
+    assert [row["technique"] for row in rows] == USED
+    assert all(row["error"][0] > 0 and row["seconds"][0] > 0 and row["off"]["parameter"] in page for row in rows)
