@@ -32,34 +32,44 @@ FrameSize small(FrameSize size) {
   return {scaled(size.width), scaled(size.height)};
 }
 
+// The world of a small image of the scene. Whether pixels share paths depends on the size: the small image
+// does what the whole one does.
+tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> small_world(
+    LocalScene scene, const LocalWorld& whole) {
+  int& path_reuse = scene.scene.integrator.path_reuse;
+  const bool shared = render::techniques_of(*whole.world).has(Technique::path_reuse);
+  if (path_reuse == 0) path_reuse = shared ? kUsualPathReuse : -1;
+  RenderSettings settings = whole.job.settings;
+  settings.size = small(settings.size);
+  return build_world_again(scene, settings, worker::usable_cpus());
+}
+
 // Renders a small image with every integrator variant that has the scene's features. Returns the digest of
 // each variant's sums.
-tl::expected<VariantBitsList, coordinator::Rejected> render_variants(const LocalScene& scene, JobSpec spec,
-                                                                     FrameSize full) {
-  spec.size = small(full);
-  const auto built = build_local_world(scene, spec, worker::usable_cpus());
-  if (!built) return tl::unexpected(built.error());
-  const PixelRect all{0, 0, spec.size->width, spec.size->height};
+tl::expected<VariantBitsList, coordinator::Rejected> render_variants(const LocalScene& scene,
+                                                                     const LocalWorld& whole) {
+  const auto world = small_world(scene, whole);
+  if (!world) return tl::unexpected(world.error());
+  const FrameSize size = small(whole.job.settings.size);
+  const PixelRect all{0, 0, size.width, size.height};
   const double paths =
       static_cast<double>(all.pixels()) * static_cast<double>(kSmallSamples.s1 - kSmallSamples.s0);
-  return measure_variants(render::covering_variants(*built->world), paths, InstructionCounter::open(),
+  return measure_variants(render::covering_variants(**world), paths, InstructionCounter::open(),
                           [&](const std::string& name) {
-                            const auto tile = render::render_tile_as(*built->world, name, all, kSmallSamples);
+                            const auto tile = render::render_tile_as(**world, name, all, kSmallSamples);
                             return sha256(std::as_bytes(std::span(tile.sums)));
                           });
 }
 
 // Returns the work counters of rendering a small image.
 tl::expected<nlohmann::ordered_json, coordinator::Rejected> count_work(
-    [[maybe_unused]] const LocalScene& scene, [[maybe_unused]] JobSpec spec,
-    [[maybe_unused]] FrameSize full) {
+    [[maybe_unused]] const LocalScene& scene, [[maybe_unused]] const LocalWorld& whole) {
 #ifdef LIGHTSHAFT_COUNT
-  spec.size = small(full);
-  const auto built = build_local_world(scene, spec, worker::usable_cpus());
-  if (!built) return tl::unexpected(built.error());
+  const auto world = small_world(scene, whole);
+  if (!world) return tl::unexpected(world.error());
+  const FrameSize size = small(whole.job.settings.size);
   render::work_counters() = {};
-  render::render_tile(*built->world, {0, 0, spec.size->width, spec.size->height}, kSmallSamples, nullptr,
-                      nullptr);
+  render::render_tile(**world, {0, 0, size.width, size.height}, kSmallSamples, nullptr, nullptr);
   nlohmann::ordered_json work;
   for (const auto& [name, count] : render::listed(render::work_counters())) work[name] = count;
   return work;
@@ -89,13 +99,13 @@ int run(const InspectFlags& flags) {
     fmt::print(stderr, "{}{}", warning, warning.ends_with('\n') ? "" : "\n");
   VariantBitsList variants;
   if (flags.variants) {
-    auto rendered = render_variants(*scene, spec, built->job.settings.size);
+    auto rendered = render_variants(*scene, *built);
     if (!rendered) return print_rejected(rendered.error());
     variants = std::move(*rendered);
   }
   auto report = inspection(*scene, *built, variants);
   if (flags.work) {
-    const auto work = count_work(*scene, spec, built->job.settings.size);
+    const auto work = count_work(*scene, *built);
     if (!work) return print_rejected(work.error());
     report["work"] = *work;
   }

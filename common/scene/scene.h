@@ -303,6 +303,7 @@ using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, 
                              ProjectorEmitter>;
 
 // Integrator.
+inline constexpr int kUsualPathReuse = 16;  // pixels that share paths where that pays
 struct IntegratorSettings {
   // Our name: "volpath", "volpath_distant_mis", "path" or "whitted".
   std::string name = "volpath";
@@ -324,7 +325,7 @@ struct IntegratorSettings {
   int equiangular = 0, lamp_flights = 0;
   int light_tree = 0;  // -1: lights are chosen by their power alone
   // For "volpath" only: the number of pixels that share what their paths find from the second vertices on; 0:
-  // a number that pays for the scene, which may be none; -1 or 1: none.
+  // kUsualPathReuse if that pays for the scene, else none; -1 or 1: none.
   int path_reuse = 0;
   bool operator==(const IntegratorSettings&) const = default;
 };

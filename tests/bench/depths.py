@@ -15,7 +15,7 @@ import tempfile
 import numpy
 
 from denoised import publish, render
-from techniques import lightshaft, without
+from techniques import decided, lightshaft, without
 
 DEPTHS = (2, 3, 4, 6, 8, None)  # None: the scene's own limit
 
@@ -33,7 +33,8 @@ def rows(given, asked, folder):
     name, _, size = given.partition("@")
     scene = folder / "scene.xml"
     lightshaft("convert", name, scene)
-    used = json.loads(lightshaft("inspect", scene, "--json"))["techniques"]
+    used = decided(scene)
+    own = json.loads(lightshaft("inspect", scene, "--json"))["max_depth"]
     whole = render(scene, folder, size, asked.reference_spp, 10**6)[0][0]
     weight = 1 / (whole * whole + 0.01)
     plain = scene
@@ -42,6 +43,9 @@ def rows(given, asked, folder):
     for title, file in (("all", scene), *([("none of " + ", ".join(t["name"] for t in used), plain)] if used else [])):
         cells = []
         for depth in DEPTHS:
+            if depth and 0 <= own <= depth:
+                cells.append("-")
+                continue
             limited = without(file, {"parameter": "max_depth", "value": str(depth)}) if depth else file
             images = [render(limited, folder, size, asked.spp, seed)[0][0] for seed in range(asked.first, asked.first + asked.seeds)]
             cells.append("{:.2g} ± {:.1g}".format(*noise(images, weight)))
@@ -57,6 +61,8 @@ def main():
     parser.add_argument("--reference-spp", type=int, default=512)
     parser.add_argument("--out", type=pathlib.Path)
     asked = parser.parse_args()
+    if asked.seeds < 2:
+        parser.error("--seeds: an error needs two images")
     lines = ["| scene | techniques | " + " | ".join(f"`max_depth` {d}" if d else "whole image" for d in DEPTHS) + " |", "|---" * (2 + len(DEPTHS)) + "|"]
     for scene in asked.scenes:
         with tempfile.TemporaryDirectory() as folder:

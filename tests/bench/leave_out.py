@@ -67,7 +67,7 @@ TAKEN_OUT = "What is left out, and how: [design/leave-out.md](../design/leave-ou
 
 
 def scene_text(name):
-    text = SCENES[name]
+    text = SCENES[name].replace('<integrator type="volpath"/>', '<integrator type="volpath"><integer name="path_reuse" value="-1"/></integrator>')
     return text if "$density" in text else text.replace('<default name="density" value="2"/>', "")
 
 

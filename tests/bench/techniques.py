@@ -48,6 +48,15 @@ def without(scene, off):
     return copy
 
 
+def decided(scene):
+    """The techniques that a canonical scene uses. From now on it says itself whether paths are shared: its copies would decide anew."""
+    told = json.loads(lightshaft("inspect", scene, "--json"))
+    if told["integrator"] == "volpath":
+        sharing = any(t["name"] == "path_reuse" for t in told["techniques"])
+        without(scene, {"parameter": "path_reuse", "value": "16" if sharing else "-1"}).replace(scene)
+    return told["techniques"]
+
+
 def rendered(scene, size, asked, seed, folder):
     """relMSE, core seconds, instructions (None: not counted), relMSE of the denoised layers (None: not asked for)."""
     report = folder / "report.json"
@@ -62,7 +71,7 @@ def measured(name, asked, folder):
     given, _, size = name.partition("@")
     scene = folder / "scene.xml"
     lightshaft("convert", given, scene)
-    found = json.loads(lightshaft("inspect", scene, "--json"))["techniques"]
+    found = decided(scene)
     files = {"": scene, **{one["name"]: without(scene, one["off"]) for one in found}}
     for technique, file in files.items():
         left = {one["name"] for one in json.loads(lightshaft("inspect", file, "--json"))["techniques"]}

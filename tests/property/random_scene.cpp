@@ -197,6 +197,7 @@ class Composer {
     constexpr const char* kNames[] = {"volpath", "volpath_distant_mis", "path"};
     IntegratorSettings& i = scene_.integrator;
     draw_.fill(i);
+    if (dice_.chance(.5)) i.path_reuse = 0;  // a number would hardly ever leave the decision to the renderer
     i.name = kNames[dice_.below(3)];
     // Without roulette paths in a white room have no end.
     if (i.max_depth < 0 || i.max_depth > 1000) i.rr_depth = std::min(i.rr_depth, 50);

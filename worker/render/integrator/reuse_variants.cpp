@@ -1,11 +1,14 @@
 // The path tracers with Features::reuse, and which worlds use them. They take long to compile, so they have
 // their own source file.
 #include <algorithm>
-#include <utility>
+#include <array>
+#include <cmath>
+#include <vector>
 
 #include "common/image/error/relative_weights.h"
 #include "worker/render/integrator/sharing_block.h"
 #include "worker/render/integrator/variant.h"
+#include "worker/render/math/processor.h"
 #include "worker/render/render.h"
 
 namespace ls::render {
@@ -13,65 +16,104 @@ namespace {
 
 constexpr Features kAllSplit{.media = true, .chromatic = true, .passing = true, .split = true, .reuse = true};
 
-constexpr int kSharing = 16;  // pixels that share by default
+constexpr std::size_t kSharing = kUsualPathReuse;
 
-// A few pixels are rendered to find out whether sharing pays, with as many samples as a quick image has: the
-// fewer there are, the more of the noise is of edges and soft shadows.
+// Some groups of pixels are rendered to find out whether sharing pays, with as many samples as a quick image
+// has: the fewer there are, the more of the noise is of edges and soft shadows, which sharing leaves.
 constexpr std::uint64_t kPilotSeed = 0x5eed0f9a7e;
-constexpr std::uint64_t kPilotPixels = 256;
+constexpr std::uint64_t kPilotGroups = 16;
 constexpr std::uint64_t kPilotSamples = 32;
 constexpr int kPilotDepth = 32;  // paths in a white and dense medium have thousands of segments
-// Sharing leaves about a quarter of the noise of light that was scattered several times, and all noise of
-// other light, in 1.7 times the time (docs/decisions/0036-path-reuse.md). So it pays where the ratio r of all
-// noise to that of other light exceeds (1 + (r - 1) / 4) * 1.7, which is from 2.2 on. It is a little less
-// here because the ratio rises with the samples: low-discrepancy points help direct light most.
-constexpr double kNoiseThatPays = 2;
-// With a ratio that is so much larger after a few pixels, the others are not needed.
-constexpr std::uint64_t kFirstPilotPixels = 64;
+// A frame with fewer pixels than all these groups is not worth the pilot; of a scene with more boundaries
+// than this, single paths may take as long as images of others.
+constexpr std::size_t kPilotBoundaries = 64;
+// How many times longer a sample takes if its path is shared, as measured
+// (docs/decisions/0036-path-reuse.md). Paths in media are longer, so that the rays between pixels take a
+// smaller part of the time.
+constexpr double kCostOnSurfaces = 2;
+constexpr double kCostInMedia = 1.5;
+// With a gain that is so much larger after a few groups, the others are not needed.
+constexpr std::uint64_t kFirstPilotGroups = 4;
 constexpr double kBeyondDoubt = 4;
 
-struct Halves {
-  V3d mean[2] = {V3d(0), V3d(0)};
-  bool finite = true;
-};
-Halves two_halves(const World& w, int x, int y) {
-  Halves h;
-  for (std::uint64_t n = 0; n < kPilotSamples; ++n) {
-    const SampleValue v = render_sample(w, x, y, n);
-    h.finite = h.finite && v.finite;
-    h.mean[n % 2] += V3d(v.rgb[0], v.rgb[1], v.rgb[2]) / (kPilotSamples / 2.);
+// Gives the world the pilot's settings, and its own back at the end.
+class Pilot {
+ public:
+  explicit Pilot(World& w) : w_(w), seed_(w.seed), max_depth_(w.max_depth) {
+    w.seed = kPilotSeed;
+    w.max_depth = w.depth_allows(kPilotDepth) ? kPilotDepth : w.max_depth;
+    w.reuse = kSharing;
   }
-  return h;
-}
+  Pilot(const Pilot&) = delete;
+  Pilot& operator=(const Pilot&) = delete;
+  ~Pilot() {
+    w_.seed = seed_;
+    w_.max_depth = max_depth_;
+    w_.reuse = 0;
+  }
 
-// Whether most noise comes from light that was scattered several times. The world is changed meanwhile.
-bool sharing_pays(World& w) {
-  const std::uint64_t seed = std::exchange(w.seed, kPilotSeed);
-  const int max_depth = w.max_depth;
-  RandomStream places(kPilotSeed);
-  double once = 0, all = 0;  // sums of squared relative errors
-  bool finite = true;
-  for (std::uint64_t i = 0; i < kPilotPixels; ++i) {
-    const int x = static_cast<int>(places.next() % static_cast<std::uint64_t>(w.frame.width)) - w.origin_x;
-    const int y = static_cast<int>(places.next() % static_cast<std::uint64_t>(w.frame.height)) - w.origin_y;
-    w.max_depth = 2;
-    const Halves direct = two_halves(w, x, y);
-    w.max_depth = max_depth < 0 ? kPilotDepth : std::min(max_depth, kPilotDepth);
-    const Halves whole = two_halves(w, x, y);
-    finite = finite && direct.finite && whole.finite;
-    for (int c = 0; c < 3; ++c) {
-      const double mean = (whole.mean[0][c] + whole.mean[1][c]) / 2;
-      const double weight = 1 / (mean * mean + kRelMseDenominator);
-      const double of_direct = direct.mean[0][c] - direct.mean[1][c];
-      const double of_all = whole.mean[0][c] - whole.mean[1][c];
-      once += of_direct * of_direct * weight;
-      all += of_all * of_all * weight;
+  // Renders a group of a square that is chosen at random, its paths shared and alone. `dealing` is the sample
+  // whose groups it is one of. False: a sample went wrong.
+  bool add_group(const Variant& sharing, std::uint64_t dealing) {
+    const auto among = [&](int n) {
+      return static_cast<int>(places_.next() % static_cast<std::uint64_t>(n));
+    };
+    const PixelAt somewhere{among(w_.frame.width) - w_.origin_x, among(w_.frame.height) - w_.origin_y};
+    std::vector<PixelAt> group;
+    SharingBlock(w_, somewhere).for_each_group(dealing, [&](std::span<const PixelAt> pixels) {
+      if (group.empty()) group.assign(pixels.begin(), pixels.end());
+    });
+    std::array<Halves, kSharing> shared, alone;
+    shared.fill({V3d(0), V3d(0)});
+    alone = shared;
+    for (std::uint64_t n = 0; n < kPilotSamples; ++n) {
+      std::array<SampleOutcome, kSharing> outcomes;
+      sharing.group(w_, group, n, {}, outcomes);
+      for (std::size_t k = 0; k < group.size(); ++k) {
+        const SampleValue v = render_sample(w_, group[k].x, group[k].y, n);
+        if (!v.finite || outcomes[k].cut_off != HealthCause::none || !is_finite(outcomes[k].radiance))
+          return false;
+        shared[k][n % 2] += V3d(outcomes[k].radiance);
+        alone[k][n % 2] += V3d(v.rgb[0], v.rgb[1], v.rgb[2]);
+      }
     }
-    if (i + 1 == kFirstPilotPixels && all > kBeyondDoubt * kNoiseThatPays * once) break;
+    for (std::size_t k = 0; k < group.size(); ++k)
+      for (int c = 0; c < 3; ++c) {
+        const double mean = (shared[k][0][c] + shared[k][1][c]) / kPilotSamples;
+        const double weight = 1 / (mean * mean + kRelMseDenominator);
+        const auto squared = [](double x) { return x * x; };
+        noise_shared_ += squared(shared[k][0][c] - shared[k][1][c]) * weight;
+        noise_alone_ += squared(alone[k][0][c] - alone[k][1][c]) * weight;
+      }
+    return true;
   }
-  w.seed = seed;
-  w.max_depth = max_depth;
-  return finite && all > kNoiseThatPays * once;
+  // Whether sharing takes away this many times the noise.
+  bool gains(double factor) const { return noise_alone_ > factor * noise_shared_; }
+
+ private:
+  using Halves = std::array<V3d, 2>;  // sums of samples
+
+  World& w_;
+  const std::uint64_t seed_;
+  const int max_depth_;
+  RandomStream places_{kPilotSeed};
+  double noise_shared_ = 0, noise_alone_ = 0;  // sums of squared relative errors
+};
+
+bool sharing_pays(World& w, const Variant& sharing) {
+  const auto pixels = static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
+  if (pixels < kPilotGroups * kSharing) return false;
+  const auto is_boundary = [](const SurfaceInfo& s) { return s.null; };
+  if (std::ranges::count_if(w.geometry.surfaces, is_boundary) > std::ptrdiff_t{kPilotBoundaries})
+    return false;
+  const FlushDenormals mode;
+  const double cost = w.need.media ? kCostInMedia : kCostOnSurfaces;
+  Pilot pilot(w);
+  for (std::uint64_t i = 0; i < kPilotGroups; ++i) {
+    if (!pilot.add_group(sharing, i)) return false;
+    if (i + 1 == kFirstPilotGroups && pilot.gains(kBeyondDoubt * cost)) return true;
+  }
+  return pilot.gains(cost);
 }
 
 }  // namespace
@@ -96,8 +138,10 @@ void share_tails(const IntegratorSettings& settings, World& w) {
   need.reuse = true;
   // Grids have no density of flights in closed form; lamps in media, light vertices and points on segments
   // change how directions are sampled; lights without a position are weighted one by one where rays end.
-  if (settings.path_reuse < 0 || settings.path_reuse == 1 || !reuse_variants().back().covers.covers(need))
-    return;
+  const auto variants = reuse_variants();
+  const auto sharing =
+      std::ranges::find_if(variants, [&](const Variant& v) { return v.covers.covers(need); });
+  if (settings.path_reuse < 0 || settings.path_reuse == 1 || sharing == variants.end()) return;
   if (w.lights.any_without_place() || w.null_transmission || !w.depth_allows(2)) return;
   // Roulette at the first vertex would be a part of the densities
   if (w.rr_depth < 2 || (w.passing_counts && w.need.passing)) return;
@@ -106,8 +150,8 @@ void share_tails(const IntegratorSettings& settings, World& w) {
     // is one of several such on a path.
     if ((s.transition && s.sheet) || (s.null && s.light != kNone)) return;
   const bool automatic = settings.path_reuse == 0;
-  if (automatic && !sharing_pays(w)) return;
-  w.reuse = automatic ? kSharing : settings.path_reuse;
+  if (automatic && !sharing_pays(w, *sharing)) return;
+  w.reuse = automatic ? kUsualPathReuse : settings.path_reuse;
   w.need.reuse = true;
 }
 

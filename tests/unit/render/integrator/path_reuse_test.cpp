@@ -52,10 +52,26 @@ SceneBuilder open_floor() {
   return b;
 }
 
+// A glass ball between a lamp and the floor: the noise is of the caustic, which paths find beyond delta
+// lobes.
+SceneBuilder caustic() {
+  SceneBuilder b;
+  b.scene.integrator.path_reuse = 0;
+  b.look({0, 2, 4}, {0, 0, 0}, 50, {0, 1, 0});
+  b.shape(RectangleShape{}, test::rotate_x(-90) * test::scale(4), b.diffuse(.3));
+  b.shape(SphereShape{{0, .8, 0}, .6}, {}, b.glass(1.5));
+  b.shape(RectangleShape{}, test::translate({0, 3, 0}) * test::rotate_x(90) * test::scale(.5), b.diffuse(.3))
+      .emitter = AreaEmitter{b.texture({18, 15, 11})};
+  return b;
+}
+
 TEST(PathReuse, IsThereByDefaultWhereNoiseIsOfLightScatteredSeveralTimes) {
-  EXPECT_TRUE(shares(LampRoom{.path_reuse = 0}.builder()));
+  EXPECT_TRUE(shares(LampRoom{.path_reuse = 0}.builder({256, 256})));
+  EXPECT_FALSE(shares(LampRoom{.path_reuse = 0}.builder())) << "pixels see too different points";
   EXPECT_TRUE(shares(LampRoom{.fog = .5, .path_reuse = 0}.builder()));
   EXPECT_FALSE(shares(open_floor()));
+  EXPECT_FALSE(shares(caustic()));
+  EXPECT_FALSE(shares(LampRoom{.fog = .5, .path_reuse = 0}.builder({15, 17}))) << "too few pixels";
 }
 
 std::vector<float> tile(const World& w, PixelRect rect, SampleRange samples) {
@@ -92,16 +108,21 @@ TEST(PathReuse, GivesTheSamePixelsInEveryTileCropAndSampleRange) {
   EXPECT_FLOAT_EQ(static_cast<float>(sum), part(whole, kAll, {18, 17, 19, 18})[1]);
 }
 
-// The job's seed has no say in whether sharing pays, and the pilot leaves the world as it was.
+// Neither the job's seed nor a crop has a say in whether sharing pays, and the pilot leaves the world as it
+// was.
 TEST(PathReuse, IsTheSameByDefaultAsIfAskedFor) {
   constexpr PixelRect kAll{0, 0, 16, 16};
   for (const std::uint64_t seed : {0, 1, 2}) {
     const auto sums = [&](LampRoom room) {
       return tile(*test::world_of(room.builder(), seed), kAll, {0, 2});
     };
-    EXPECT_EQ(sums({.path_reuse = 0}), sums({.path_reuse = 16})) << seed;
     EXPECT_EQ(sums({.fog = .5, .path_reuse = 0}), sums({.fog = .5, .path_reuse = 16})) << seed;
   }
+  SceneBuilder cropped = LampRoom{.fog = .5, .path_reuse = 0}.builder();
+  cropped.scene.film.crop_offset = {5, 3};
+  cropped.scene.film.crop_size = {2, 1};
+  const auto whole = tile(*test::world_of(LampRoom{.fog = .5, .path_reuse = 16}.builder()), kAll, {0, 2});
+  EXPECT_EQ(tile(*test::world_of(cropped), {0, 0, 2, 1}, {0, 2}), part(whole, kAll, {5, 3, 7, 4}));
 }
 
 TEST(PathReuse, GivesTheSameBitsInEveryVariant) {
