@@ -9,6 +9,7 @@
 #include "cli/local/local_world.h"
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
+#include "common/scene/analysis/prune.h"
 #include "worker/machine.h"
 #include "worker/render/base/work_counters_list.h"
 
@@ -41,6 +42,7 @@ tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> small_
   if (path_reuse == 0) path_reuse = shared ? kUsualPathReuse : -1;
   RenderSettings settings = whole.job.settings;
   settings.size = small(settings.size);
+  scene.scene = scene::pruned(scene.scene, scene::pruned_for(settings.integrator, settings.max_depth)).scene;
   return build_world_again(scene, settings, worker::usable_cpus());
 }
 
