@@ -171,9 +171,10 @@ def page(systems):
     here = systems[0]
     commit = subprocess.run(["git", "-C", ROOT, "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
     cpu = re.search(r"model name\s*:\s*(.*)", pathlib.Path("/proc/cpuinfo").read_text()).group(1)
-    lines = ["# Farms of unlike machines", "",
-             f"Made by `tests/mixed/run.sh --write` of commit {commit} on {cpu}; the ARM programs run under qemu {qemu()}. What a farm does with such "
-             "machines: [the guide](../guide/mixed-farms.md).", "", "## What each is built with", "",
+    emulated = f"; the ARM programs run under qemu {qemu()}" if systems[-1].name == "arm64" else ""
+    lines = ["# Pixels of unlike machines", "",
+             f"Made by `tests/mixed/run.sh --write {' '.join(s.name for s in systems[1:])}` of commit {commit} on {cpu}{emulated}. What a farm does with "
+             "such machines: [the guide](../guide/mixed-farms.md).", "", "## What each is built with", "",
              "| | " + " | ".join(s.words for s in systems) + " |", "|---|" + "---|" * len(systems)]
     versions = [s.versions() for s in systems]
     lines += [f"| {library} | " + " | ".join(v[library] for v in versions) + " |" for library in LIBRARIES.values()]
