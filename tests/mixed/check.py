@@ -167,9 +167,8 @@ def programs(systems, folder):
         so(True, f"{system.words}: `lightshaft validate --quick`, {seconds:.0f} s: {system.validated}")
 
 
-def page(systems):
+def page(systems, commit):
     here = systems[0]
-    commit = subprocess.run(["git", "-C", ROOT, "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
     cpu = re.search(r"model name\s*:\s*(.*)", pathlib.Path("/proc/cpuinfo").read_text()).group(1)
     emulated = f"; the ARM programs run under qemu {qemu()}" if systems[-1].name == "arm64" else ""
     lines = ["# Pixels of unlike machines", "",
@@ -205,6 +204,7 @@ def main():
     parser.add_argument("--write", action="store_true", help="the page")
     parser.add_argument("systems", nargs="+", choices=("trixie", "noble", "arm64"), help="those that this machine is compared with")
     options = parser.parse_args()
+    commit = subprocess.run(["git", "-C", ROOT, "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
     subprocess.run([sys.executable, ROOT / "scenes/bench/make_bench.py", ROOT / "build/bench"], check=True, stdout=subprocess.DEVNULL)
     systems = [System("bookworm", "Debian 12"),
                System("trixie", "Debian 13", options.mixed, "trixie-amd64", "trixie-amd64"),
@@ -220,7 +220,7 @@ def main():
             refused(farm, systems)
         programs(systems, folder)
     if options.write:
-        page(systems)
+        page(systems, commit)
 
 
 if __name__ == "__main__":
