@@ -21,19 +21,20 @@ constexpr std::size_t kSharing = kUsualPathReuse;
 // Some groups of pixels are rendered to find out whether sharing pays, with as many samples as a quick image
 // has: the fewer there are, the more of the noise is of edges and soft shadows, which sharing leaves.
 constexpr std::uint64_t kPilotSeed = 0x5eed0f9a7e;
-constexpr std::uint64_t kPilotGroups = 16;
+constexpr std::uint64_t kPilotGroups = 64;  // at most
+constexpr std::uint64_t kFewestPilotGroups = 4;
+constexpr std::uint64_t kPixelsPerGroup =
+    1024;  // of the frame: the pilot takes as long as a sample of each pixel
 constexpr std::uint64_t kPilotSamples = 32;
 constexpr int kPilotDepth = 32;  // paths in a white and dense medium have thousands of segments
-// A frame with fewer pixels than all these groups is not worth the pilot; of a scene with more boundaries
+// A frame with fewer pixels than this is not worth the pilot; of a scene with more boundaries
 // than this, single paths may take as long as images of others.
-constexpr std::size_t kPilotBoundaries = 64;
-// How many times longer a sample takes if its path is shared, as measured
-// (docs/decisions/0036-path-reuse.md). Paths in media are longer, so that the rays between pixels take a
-// smaller part of the time.
-constexpr double kCostOnSurfaces = 2;
-constexpr double kCostInMedia = 1.5;
-// With a gain that is so much larger after a few groups, the others are not needed.
-constexpr std::uint64_t kFirstPilotGroups = 4;
+constexpr std::uint64_t kPilotFrame = 256;
+constexpr std::ptrdiff_t kPilotBoundaries = 64;
+// Sharing pays if it takes away this many times the noise. A sample takes 1.4 to 2.4 times as long (docs/
+// decisions/0036-path-reuse.md), but so few pixels rarely show the rare bright paths that sharing helps most.
+constexpr double kGainThatPays = 1.5;
+// With a gain that is so much larger after some of the groups, the others are not needed.
 constexpr double kBeyondDoubt = 4;
 
 // Gives the world the pilot's settings, and its own back at the end.
@@ -102,18 +103,17 @@ class Pilot {
 
 bool sharing_pays(World& w, const Variant& sharing) {
   const auto pixels = static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
-  if (pixels < kPilotGroups * kSharing) return false;
+  if (pixels < kPilotFrame) return false;
   const auto is_boundary = [](const SurfaceInfo& s) { return s.null; };
-  if (std::ranges::count_if(w.geometry.surfaces, is_boundary) > std::ptrdiff_t{kPilotBoundaries})
-    return false;
+  if (std::ranges::count_if(w.geometry.surfaces, is_boundary) > kPilotBoundaries) return false;
   const FlushDenormals mode;
-  const double cost = w.need.media ? kCostInMedia : kCostOnSurfaces;
+  const std::uint64_t groups = std::clamp(pixels / kPixelsPerGroup, kFewestPilotGroups, kPilotGroups);
   Pilot pilot(w);
-  for (std::uint64_t i = 0; i < kPilotGroups; ++i) {
+  for (std::uint64_t i = 0; i < groups; ++i) {
     if (!pilot.add_group(sharing, i)) return false;
-    if (i + 1 == kFirstPilotGroups && pilot.gains(kBeyondDoubt * cost)) return true;
+    if (i + 1 >= kFewestPilotGroups && pilot.gains(kBeyondDoubt * kGainThatPays)) return true;
   }
-  return pilot.gains(cost);
+  return pilot.gains(kGainThatPays);
 }
 
 }  // namespace
