@@ -55,9 +55,9 @@ class Runner {
     bool any = false;
     for (const std::string& name : names) any = any || asked_for(name);
     if (!any) return {};
+    // The error of the mean is measured from pixels, which must err independently
     Scene alone = scene;
-    alone.integrator.path_reuse =
-        -1;  // the error of the mean is measured from pixels, which must err independently
+    alone.integrator.path_reuse = -1;
     const auto m = measure(alone, files_, test_.sample_count, seed, options_.threads);
     if (!m) return tl::unexpected(m.error());
     for (std::size_t k = 0; k < names.size(); ++k) {

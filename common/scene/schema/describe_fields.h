@@ -81,8 +81,7 @@ void describe(V& v, T& i) {
       {.name = "path_reuse",
        .doc = "`volpath` alone: how many pixels share what their paths find from the second scattering on, "
               "where lights have a place and media are homogeneous; 0: 16 if that pays for the scene, else "
-              "none; -1 "
-              "or 1: none",
+              "none; -1 or 1: none",
        .range = {-1, 64},
        .elided = true},
       i.path_reuse);

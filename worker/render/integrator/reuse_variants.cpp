@@ -23,16 +23,17 @@ constexpr std::size_t kSharing = kUsualPathReuse;
 constexpr std::uint64_t kPilotSeed = 0x5eed0f9a7e;
 constexpr std::uint64_t kPilotGroups = 64;  // at most
 constexpr std::uint64_t kFewestPilotGroups = 4;
-constexpr std::uint64_t kPixelsPerGroup =
-    1024;  // of the frame: the pilot takes as long as a sample of each pixel
+// The frame's pixels for each group: the pilot takes about as long as one sample of each pixel.
+constexpr std::uint64_t kPixelsPerGroup = 1024;
 constexpr std::uint64_t kPilotSamples = 32;
 constexpr int kPilotDepth = 32;  // paths in a white and dense medium have thousands of segments
-// A frame with fewer pixels than this is not worth the pilot; of a scene with more boundaries
-// than this, single paths may take as long as images of others.
-constexpr std::uint64_t kPilotFrame = 256;
+// A smaller frame is not worth the pilot.
+constexpr std::uint64_t kPilotFrame = 256;  // pixels
+// With more null boundaries, a single path may take as long as the image of another scene.
 constexpr std::ptrdiff_t kPilotBoundaries = 64;
-// Sharing pays if it takes away this many times the noise. A sample takes 1.4 to 2.4 times as long (docs/
-// decisions/0036-path-reuse.md), but so few pixels rarely show the rare bright paths that sharing helps most.
+// Sharing pays if pixels have more than this many times as much noise without it. A sample takes 1.4 to 2.4
+// times as long (docs/ decisions/0036-path-reuse.md), but so few pixels rarely show the rare bright paths
+// that sharing helps most.
 constexpr double kGainThatPays = 1.5;
 // With a gain that is so much larger after some of the groups, the others are not needed.
 constexpr double kBeyondDoubt = 4;
@@ -53,8 +54,8 @@ class Pilot {
     w_.reuse = 0;
   }
 
-  // Renders a group of a square that is chosen at random, its paths shared and alone. `dealing` is the sample
-  // whose groups it is one of. False: a sample went wrong.
+  // Chooses a square at random and renders one group of its pixels, with shared paths and without. `dealing`
+  // is the sample number for which the square is dealt into groups. Returns false if a sample is not usable.
   bool add_group(const Variant& sharing, std::uint64_t dealing) {
     const auto among = [&](int n) {
       return static_cast<int>(places_.next() % static_cast<std::uint64_t>(n));
@@ -88,7 +89,7 @@ class Pilot {
       }
     return true;
   }
-  // Whether sharing takes away this many times the noise.
+  // Returns true if the pixels have more than `factor` times as much noise without sharing.
   bool gains(double factor) const { return noise_alone_ > factor * noise_shared_; }
 
  private:
