@@ -172,13 +172,15 @@ class Page:
         return self.evaluate(f"document.querySelectorAll({json.dumps(selector)}).length")
 
     def click(self, selector):
-        """As a mouse does it: at the middle of the element, which must be what lies there."""
+        """As a mouse does it: at the middle of the element, which must be what lies there and lie still for two frames."""
         where = self.wait(f"""(() => {{
           const element = document.querySelector({json.dumps(selector)});
           element.scrollIntoView({{block: "center", behavior: "instant"}});
           const box = element.getBoundingClientRect();
           const [x, y] = [box.left + box.width / 2, box.top + box.height / 2];
-          return !element.disabled && element.contains(document.elementFromPoint(x, y)) && [x, y];
+          const still = window.clickPlace === x + " " + y;
+          window.clickPlace = still ? null : x + " " + y;
+          return still && !element.disabled && element.contains(document.elementFromPoint(x, y)) && [x, y];
         }})()""")
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", {"type": kind, "x": where[0], "y": where[1], "button": "left", "clickCount": 1})

@@ -229,7 +229,8 @@ def test_the_files_of_all_frames_are_taken_along_and_the_range_is_sent(farm, das
     page = dashboard("#/submit")
     page.wait("document.getElementById('files')")
     page.set_files("#files", [tmp_path / name for name in files])
-    page.wait("document.querySelector('.bundle h2')")
+    # The list of files moves the form down when the scene has been read
+    page.wait("document.querySelector('.settings button:not([disabled])')")
     page.click("#set-frames")
     page.type("1-two")
     page.click(".settings button")
