@@ -155,6 +155,25 @@ def refused(farm, systems):
     print(f"ok  without {gone.words}, a job that asks for it waits: {farm.job(job)['error']}")
 
 
+def coordinators(systems, folder):
+    """Each system's coordinator, with a worker of this machine: the pixels, and what it still has after a kill."""
+    here = systems[0]
+    for system in systems[1:]:
+        with LocalFarm(folder / f"farm-{system.name}", bin=system.bin, within=system.within, allow_fake=False) as farm:
+            farm.bin = here.bin
+            farm.add_worker(fake=False, threads=2, name="here")
+            job = submit(farm, bundle("fogbox", folder))
+            image = picture(farm, job, folder)
+            so(image["sha"] == here.rendered["fogbox"]["sha"], f"the coordinator of {system.words} merges the same pixels")
+            so(b"Lightshaft" in farm.request("GET", "/"), "and serves the dashboard")
+            farm.bin = system.bin
+            farm.restart_coordinator()
+            so(picture(farm, job, folder)["sha"] == image["sha"], "and after kill -9 it has them still")
+            farm.bin = here.bin
+            again = picture(farm, submit(farm, bundle("fogbox", folder)), folder)
+            so(again["sha"] == image["sha"], "and takes the next job from the worker that stayed")
+
+
 def programs(systems, folder):
     """What the command line says on each system: the pixels of the farm, and the table of known answers."""
     for system in systems:
@@ -190,7 +209,8 @@ def page(systems, commit):
         lines.append(f"| {scene} | " + " | ".join(f"{100 * a['differ']:.3g} % | {a['of_noise']:.2g}" for a in apart) + " |")
     lines += ["", f"A farm of two workers of {here.words} with two threads each and one of each other system with one: a job that asks for no class is "
               f"rendered by the two, and says that 4 of {4 + len(systems) - 1} threads can take it; one that asks for a class by its platform has the bits of "
-              "`lightshaft render` on that system. The script checks it.", ""]
+              "`lightshaft render` on that system. The coordinator of each system merges the same pixels from this machine's worker, keeps "
+              "them through kill -9, and goes on. The script checks it.", ""]
     PAGE.write_text("\n".join(lines))
 
 
@@ -218,6 +238,7 @@ def main():
             shares(farm, systems, bundle("fogbox", folder), folder)
             compare(farm, systems, folder)
             refused(farm, systems)
+        coordinators(systems, folder)
         programs(systems, folder)
     if options.write:
         page(systems, commit)

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # A farm of machines that are not alike: builds the programs on Debian 13 and Ubuntu 24.04 and for 64-bit ARM, compares the
-# pixels of all of them with those of this machine's build, and runs a farm of all of them. Writes its page of
-# measurements with --write.
+# pixels of all of them with those of this machine's build, and runs a farm of all of them and a coordinator of each. Writes
+# its page of measurements with --write.
 #   tests/mixed/run.sh [--write] [SYSTEM...]
 # SYSTEM: trixie, noble or arm64; all three where none is named.
 # As root, on Debian 12 with Linux 6.7, with the packages mmdebstrap and qemu-user-static and 6 GB of disk in $LIGHTSHAFT_MIXED
@@ -28,7 +28,7 @@ build() {  # NAME ROOT [OPTIONS OF CMAKE...]
   mkdir -p "$mixed/build/$name"
   local inside=("$here/in_root.sh" "$mixed/$root" "$mixed/build/$name" env CCACHE_DIR=/build/ccache)
   "${inside[@]}" cmake --preset release -S /src -B /build -DLIGHTSHAFT_TESTS=OFF "$@" >"$mixed/$name.log"
-  "${inside[@]}" cmake --build /build ${JOBS:+-j "$JOBS"} --target lightshaft lightshaft-worker lightshaft-vdb >>"$mixed/$name.log" ||
+  "${inside[@]}" cmake --build /build ${JOBS:+-j "$JOBS"} --target lightshaft lightshaft-worker lightshaft-coordinator lightshaft-vdb >>"$mixed/$name.log" ||
     { tail -n 40 "$mixed/$name.log" >&2; exit 1; }
 }
 for system in "${systems[@]}"; do

@@ -96,7 +96,8 @@ def refused_coordinator(folder, *flags, code=(1, 2), env=None):
 
 
 class LocalFarm:
-    def __init__(self, folder=None, bin=None, flags=(), tls=False, host="127.0.0.1", environment=None, secrets=None, allow_fake=True):
+    def __init__(self, folder=None, bin=None, flags=(), tls=False, host="127.0.0.1", environment=None, secrets=None, allow_fake=True, within=()):
+        self.within = list(within)  # a command that starts the coordinator somewhere else, e.g. in another system's folder
         self.host = host  # the host that workers connect to
         # variables for the coordinator in addition to this process's; read at every start
         self.environment = dict(environment or {})
@@ -138,7 +139,7 @@ class LocalFarm:
         (self.data / "ports.json").unlink(missing_ok=True)
         self.coordinator = Process(
             "coordinator",
-            [self.bin / "lightshaft-coordinator", "--http", f"127.0.0.1:{self.http or 0}",
+            [*self.within, self.bin / "lightshaft-coordinator", "--http", f"127.0.0.1:{self.http or 0}",
              "--grpc", f"{self.host}:{self.grpc or 0}", "--data", self.data] + self.flags,
             self.folder / "coordinator.log", dict(os.environ, **self.environment))
         wait_until(lambda: (self.data / "ports.json").exists() or not self.coordinator.alive(), "the coordinator listens")
