@@ -1,4 +1,4 @@
-// SHA-256 digests: they identify blobs, scenes, settings, units and pixels.
+// SHA-256 digests: they identify blobs, scenes, settings, units (ranges of samples of one tile) and pixels.
 #pragma once
 
 #include <array>

@@ -15,7 +15,7 @@ enum class Errc {
   invalid_argument,  // the input is wrong; sending it again will not help
   not_found,         // there is no such job, blob, worker or file
   already_exists,
-  failed_precondition,  // valid input, but the state is wrong (cancelled job, other numeric class)
+  failed_precondition,  // valid input, but the state is wrong (job cancelled, worker's arithmetic differs)
   resource_exhausted,   // a limit is exceeded, or a disk is full
   permission_denied,
   unauthenticated,

@@ -11,7 +11,7 @@
 namespace ls {
 namespace {
 
-constexpr std::size_t kMostShown = 40;  // characters of an invalid text that a message quotes
+constexpr std::size_t kMostShown = 40;  // a message quotes at most this many characters of an invalid text
 
 // Parses a number at the front of `text` and removes it from `text`.
 std::optional<std::uint32_t> take_number(std::string_view& text) {

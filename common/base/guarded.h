@@ -25,7 +25,8 @@ class Guarded {
     T* operator->() const { return &**this; }
     void unlock() { lock_.unlock(); }
     void lock() { lock_.lock(); }
-    // Waits until `done` returns true. It is called whenever `changed` is notified.
+    // Waits until `done` returns true: calls it at once, and again whenever `changed` is notified. The mutex
+    // is held during these calls, not while waiting.
     template <class Done>
     void wait(std::condition_variable& changed, Done&& done) {
       changed.wait(lock_, std::forward<Done>(done));

@@ -15,8 +15,8 @@ extern char** environ;
 namespace ls {
 namespace {
 
-// The files to be inherited, under descriptors above those that they get in the program: no dup2 into place
-// overwrites a file that is still to be moved.
+// Duplicates of the files to be inherited, with numbers above all those that the files get in the program. So
+// moving one file into place with dup2 cannot overwrite another that is still to be moved.
 class HighFiles {
  public:
   ~HighFiles() {
@@ -25,7 +25,7 @@ class HighFiles {
   // Returns an error number, 0 for success.
   int add(int fd, int lowest) {
     const int high = ::fcntl(fd, F_DUPFD_CLOEXEC, lowest);
-    if (high < 0) return errno == EINVAL ? EMFILE : errno;  // EINVAL: the limit is below `lowest`
+    if (high < 0) return errno == EINVAL ? EMFILE : errno;  // EINVAL: `lowest` exceeds the descriptor limit
     fds_.push_back(high);
     return 0;
   }

@@ -9,7 +9,7 @@
 
 namespace ls {
 
-// Most cells of edit-distance tables that are computed for one suggestion
+// Upper limit of the cells of edit-distance tables that are computed for one suggestion
 inline constexpr std::size_t kMaxNameWork = 4'000'000;
 
 // Returns the name in `known` that is nearest to `given` by edit distance (a swap of neighbouring letters

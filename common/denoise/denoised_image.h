@@ -14,18 +14,20 @@
 //
 // the squared error of D, for every denoiser. The product shows the errors that the denoiser makes in both
 // halves, the difference those that it makes in only one. Relative errors are weighted by 1 / (D^2 + 0.01).
-// To first order this is wrong by - x f' s Var, with f' the derivative of the weight and s the share of a
-// pixel's own noise in its denoised value: too low where the denoiser darkens, too high where it brightens,
-// and little where s is small.
+// This weight depends on D, so to first order the relative error is wrong by - x f' s Var, with f' the
+// derivative of the weight, s the share of a pixel's own noise in its denoised value, and Var the variance of
+// that noise: the figure is too low where the denoiser darkens, too high where it brightens, and hardly wrong
+// where s is small.
 //
-// Interval: the estimate differs from the realised squared error by n = a b - x b - a y. It is nearly
+// Interval: the estimate differs from the realised squared error by n = a b - x b - a y. This n is nearly
 // uncorrelated between pixels: a pixel contributes only little to its neighbours' denoised values. If a share
-// s of a pixel's own noise remains in it, x = s a and y = s b, n is (1 - 2 s) a b = (1 - s)^2 a b - s^2 a b.
-// The first term is the product of the residuals. The second is as large as (D(A) - D(B))^2 / sqrt(12) in the
-// mean square (E (a - b)^4 = 12 Var^2 for Gaussian noise, more for heavier tails). So the sum of both squares
-// is at least n^2 in the mean; bias increases it and makes the interval wider. Channels are summed before
-// they are squared, since they share paths. There is no interval if fewer than four pixels, (sum n^2)^2 / sum
-// n^4, carry all of the noise: the variance of a single pixel cannot be estimated from one pair of halves.
+// s of a pixel's own noise remains in its denoised value, so that x = s a and y = s b, then n = (1 - 2 s) a b
+// = (1 - s)^2 a b - s^2 a b. The first term is the product of the residuals. The second is as large as (D(A)
+// - D(B))^2 / sqrt(12) in the mean square (E (a - b)^4 = 12 Var^2 for Gaussian noise, more for heavier
+// tails). So the sum of both squares is at least n^2 in the mean; bias increases it and makes the interval
+// wider. Channels are summed before they are squared, since they share paths. No interval is given if the
+// number of pixels that carry the noise, (sum n^2)^2 / sum n^4, is below four: the variance of a single pixel
+// cannot be estimated from one pair of halves.
 #pragma once
 
 #include <algorithm>
@@ -41,20 +43,22 @@
 namespace ls {
 
 // Means over the pixels that have samples, and 95 % intervals. The mean squared errors are estimates, which
-// noise can make negative. Lower ends are at least 0, and rmse is the square root of max(0, mse).
+// noise can make negative. Lower ends of intervals are at least 0, and rmse is the square root of max(0,
+// mse).
 struct DenoisedError {
   double mse = 0, rmse = 0, rmse_lo = 0, rmse_hi = 0;
   double relmse = 0, relmse_lo = 0, relmse_hi = 0;
   bool rmse_interval = false, relmse_interval = false;  // false: the interval is not known
   // The largest relMSE that the interval allows; nullopt: there is no interval. An estimate below 0 counts as
-  // 0, with an interval as wide: it shows that the noise is larger than the error, not that the error is 0.
+  // 0, and the upper end moves up with it: such an estimate shows that the noise is larger than the error,
+  // not that the error is 0.
   std::optional<double> relmse_at_most() const {
     return relmse_interval ? std::optional(relmse_hi - std::min(0.0, relmse)) : std::nullopt;
   }
 };
 
-// Half means and their denoised images: R, G, B of each pixel, row by row. `counts` is false where a pixel
-// has no samples.
+// Half means and their denoised images: R, G, B of each pixel, row by row. `counts` has one element per
+// pixel: false if the pixel has no samples.
 struct DenoisedHalves {
   std::vector<float> a, b, denoised_a, denoised_b;
   std::vector<bool> counts;
@@ -67,8 +71,8 @@ struct DenoisedImage {
   DenoisedError error;
   std::string by;  // the denoiser: Denoiser::name()
 };
-// Denoises a film that has the AOVs aovs_of(AovKind::guide); it may be unfinished. Errors are those of
-// Denoiser.
+// Denoises a film that has the AOVs aovs_of(AovKind::guide). The film may be unfinished. Returns the errors
+// of Denoiser::denoise().
 Result<DenoisedImage> denoised_image(const Film& film, const Denoiser& denoiser);
 
 }  // namespace ls

@@ -28,9 +28,9 @@ struct NoisyImage {
 class Denoiser {
  public:
   // Finds the library and reads its version. `library` is its file; if it is empty, the library is searched
-  // for as described above. A library that hangs is ended after `least_seconds` and
-  // more for large images. failed_precondition: it
-  // cannot be used on this machine; the message says why, and how to install it.
+  // for as described above. A library that hangs is ended after `least_seconds`, for large images later.
+  // failed_precondition: the library cannot be used on this machine; the message says why, and how to install
+  // it.
   static Result<Denoiser> find(int threads, const std::string& library = {},
                                const std::filesystem::path& program = program_beside_us("lightshaft-denoise"),
                                int least_seconds = 600);
@@ -38,13 +38,12 @@ class Denoiser {
   const std::string& name() const { return name_; }  // for example "Open Image Denoise 2.5.1"
 
   // Returns the denoised colours, one for each image, all finite. All images have the size `size`.
-  // resource_exhausted: there was not enough memory, or the library hung; internal: the
-  // library failed.
+  // resource_exhausted: there was not enough memory, or the library hung; internal: the library failed.
   Result<std::vector<std::vector<float>>> denoise(FrameSize size, std::span<const NoisyImage> images) const;
 
  private:
-  // The time that denoising may take: far more than it needs on one loaded core, where a megapixel takes
-  // seconds.
+  // The time limit for denoising, in seconds: far more than it takes even on one busy core, where a megapixel
+  // needs a few seconds.
   int most_seconds(FrameSize size, std::size_t images) const;
 
   std::filesystem::path program_;

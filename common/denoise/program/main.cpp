@@ -24,11 +24,11 @@ namespace {
 using ls::denoise::Header;
 using ls::denoise::Outcome;
 
-// Most memory of the library itself: larger images are denoised in parts
+// Limit of the library's own memory: images that need more are denoised in parts
 constexpr int kMaxMemoryMegabytes = 2048;
 
-// Limits this process: its end is the parent's at the latest, and threads of the library that wait for each
-// other for ever use no CPU time, so the limit is on the time that passes.
+// Limits this process: it is killed when its parent ends, or after `most_seconds` of wall-clock time. (A
+// limit of CPU time would not help: threads of the library that wait for each other for ever use none.)
 void confine(unsigned most_seconds) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);

@@ -54,7 +54,7 @@ constexpr Alias kAliases[] = {
 // Layers that every image has.
 constexpr std::string_view kAlways[] = {"spp", "stderr", "sample_count", "standard_error"};
 
-constexpr std::size_t kMostShown = 64;  // most characters of a wrong name that a message shows
+constexpr std::size_t kMostShown = 64;  // a message shows at most this many characters of a wrong name
 
 std::string plain(std::string_view name) {
   std::string out;

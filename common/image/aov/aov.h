@@ -2,8 +2,8 @@
 // tile and range of samples). docs/reference/aovs.md defines each.
 //
 // After its six colour planes a partial has the planes of sums of the requested AOVs, then the planes of
-// identifiers (id_slots.h). AOVs of each of the two kinds are sorted by name, which is also the order in the
-// file.
+// identifiers (id_slots.h). Within the sums, and within the identifiers, AOVs are sorted by name. The file
+// has the same order.
 #pragma once
 
 #include <cstddef>

@@ -18,7 +18,7 @@ constexpr double kPriorSpread = .15;
 // For forecasts: how much the slope varies, see kBend in the header
 constexpr double kBend = .06;
 constexpr double kSlow = .85, kFast = 1.1;  // the verdict is slow below kSlow and fast above kFast
-constexpr std::size_t kMostPoints = 32;     // most doublings of the sample count that are used
+constexpr std::size_t kMostPoints = 32;     // at most this many doublings of the sample count are used
 
 struct Log {
   double time = 0, error = 0, spp = 0;

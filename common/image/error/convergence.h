@@ -49,11 +49,11 @@ struct ConvergenceStatus {
 };
 const char* to_string(ConvergenceStatus::Kind kind);
 // Judges an image's convergence. `doubt` is ImageError::verdict, empty if the image's own figures are
-// trusted. If there are several reasons for distrust, the first of these is given: `doubt`, a bias floor, the
-// slope. A bias floor is a squared bias: the part of the true error that the estimated one lacks and that
-// does not fall with samples. Random differences between the two errors fall with samples, except for the
-// reference's own noise, which stays as well. A floor is reported if two conditions hold:
-// - The last true error exceeds the estimated one by four standard deviations (by chance: once in 30,000).
+// trusted. If there are several reasons for distrust, the first one in this order is given: `doubt`, a bias
+// floor, the slope. A bias floor is a squared bias: the part of the true error that the estimated one lacks
+// and that does not fall with samples. Random differences between the two errors fall with samples, except
+// for the reference's own noise, which stays as well. A floor is reported if two conditions hold:
+// - The latest true error exceeds the estimated one by four standard deviations (by chance: once in 30,000).
 //   The standard deviation combines the estimate's, from its interval on a logarithmic scale, and the noise
 //   of the reference.
 // - The excess falls more slowly than 1 / sqrt(N), which is half way between staying and falling like 1/N.
@@ -73,9 +73,10 @@ struct Forecast {
 // Slopes change: the gain of low-discrepancy points on smooth parts of an image is used up eventually, and a
 // slope of 1.2 at 4 samples becomes 1.0 at 256 (the bench scene `tint`). A straight line through all
 // doublings would continue too steeply, and the better the points are known the more confidently it would do
-// so. So the slope follows a Brownian motion in log time, by 0.05 per doubling (kBend = .05 / sqrt(log 2)): a
-// local linear trend (Harvey 1989, chapter 2.3). Counted from the last point, this adds b^2 u^2 (3 v - u) / 6
-// to the covariance of the points at times u <= v before it, and b^2 u^3 / 3 to the variance at u after it.
+// so. So the slope is modelled as a Brownian motion in log time with a standard deviation of 0.05 per
+// doubling (kBend = .05 / sqrt(log 2)): a local linear trend (Harvey 1989, chapter 2.3). With time counted
+// from the last point, this adds b^2 u^2 (3 v - u) / 6 to the covariance of the points at times u <= v before
+// it, and b^2 u^3 / 3 to the variance at u after it.
 std::optional<Forecast> forecast_of(std::span<const ErrorPoint> points, double target);
 
 }  // namespace ls

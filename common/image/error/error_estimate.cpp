@@ -15,19 +15,21 @@ namespace {
 
 constexpr int kReach = 2;                  // radius of the 5 x 5 window
 constexpr double k95 = 1.959963984540054;  // two-sided 95 % point of the normal distribution
-// If fewer pixels than this carry the error, the scatter of their values (sqrt(4/3/100) = 12 % of the sum)
-// makes the sum unreliable. In small images fewer pixels suffice: in one of 32 x 32, object edges alone
-// sometimes carry the error.
+// The figures are not trusted if fewer than kFewPixels pixels carry the error: the scatter of their values
+// (sqrt(4/3/100) = 12 % of the sum) makes the sum unreliable. In small images a share of 1 / kPartOfSmall of
+// the pixels is enough, because in an image of 32 x 32 object edges alone sometimes carry the error.
 constexpr double kFewPixels = 100, kPartOfSmall = 48;
 constexpr double kLargeShare = 0.1;  // largest share of the error in one pixel, for images with many pixels
-// The largest ratio between the fourth powers of D in smooth parts of the image and the variance from pairs
-// of neighbours for which the estimate is trusted. The ratio is 1 for Gaussian noise, and up to 6 for
-// low-discrepancy points on a smooth image (tests/coverage).
+// In smooth parts of the image tr(V^2) is estimated both from fourth powers of D and from pairs of
+// neighbours. The figures are not trusted if the first estimate is larger than the second by more than this
+// factor. The ratio is 1 for Gaussian noise, and up to 6 for low-discrepancy points on a smooth image
+// (tests/coverage).
 constexpr double kHeavy = 10;
 // a pixel has few hits if one half has at least this many times the light of the other
 constexpr double kOneSided = 19;
-// Least number of samples in the last round for estimating the distribution of the noise from it. With 8
-// samples per half, a single sample that finds rare light would dominate.
+// The distribution of the noise is estimated from the last round (range of samples) only if that round and
+// the part before it have at least this many samples per pixel each. With 8 samples per half, a single sample
+// that finds rare light would dominate.
 constexpr std::uint64_t kTellingSamples = 16;
 
 // Returns the expected amount by which skewed noise lowers the sum of squared relative errors (derived in
@@ -95,8 +97,7 @@ ChangeSums change_sums(const std::vector<double>& a, const std::vector<double>& 
   return out;
 }
 
-// Returns the ratio of fourth powers to pairs of neighbours in smooth parts of the image; 0 where edges
-// dominate.
+// Returns the ratio that kHeavy limits; 0 if smooth parts have at most the share kPart of the fourth powers.
 double heaviness(const NoiseSums& s) {
   constexpr double kPart = .25;
   const double flat = s.pixel_fourth - s.edge_pixel_fourth;

@@ -25,8 +25,8 @@
 // Skew: where g is near 1, the pixel's value enters its own weight, and the noise of rendered pixels is
 // skewed. A bright sample raises both D^2 and S, so the sum of f D^2 is too low, to first order by f'(m) g
 // cov(D^2, S). This relative error falls like 1/N (2 % at 64 samples, docs/design/error.md). It is estimated
-// from the samples of the last round, which are independent of earlier ones. Let n of N samples be in the
-// last round and o before it, and let D and S be indexed by part. Then
+// from the samples of the last round (range of samples), which are independent of earlier ones. Let n of N
+// samples be in the last round and o before it, and let D and S be indexed by part. Then
 //   E[D_n^2 (S_n - S_o)] = k / n^2  and  E[D_o^2 (S_o - S_n)] = k / o^2,
 // with k the third cumulant of a sample; the pixel's true value cancels in the difference. cov(D^2, S) is k /
 // N^2, and
@@ -63,7 +63,8 @@
 //   From pairs of neighbours, for any distribution: E[(D(p) . D(q))^2] = tr V(p) V(q), since their D are
 //   independent. This equals tr V^2 where the noise varies slowly. The noise does so where the image does,
 //   that is, where g is small.
-// An untrusted image has an interval from fourth powers alone, which is wider.
+// If the image's figures are not trusted (ImageError::trusted), the interval is from fourth powers alone, and
+// wider.
 #pragma once
 
 #include <cstdint>
@@ -95,7 +96,7 @@ struct NoiseSums {
   double edge_channel_fourth = 0, edge_pixel_fourth = 0;
   double flat_pairs = 0;  // sum over pixels of 1 - g^2 times the mean of (D(p) . D(q))^2
   double largest = 0;     // largest sum over channels of D^2 of one pixel
-  // Used unless the last round cannot be used; then one of the estimates above gives tr(V^2)
+  // These give tr(V^2); only if the last round cannot be used, the sums above do
   ChangeSums changes;
   void add(const NoiseSums& other);
   bool operator==(const NoiseSums&) const = default;
@@ -104,11 +105,12 @@ struct NoiseSums {
 struct TileError {
   std::uint64_t pixels = 0;
   std::uint64_t samples = 0;  // samples per pixel times pixels
-  // Number of pixels with few hits: at least one half has almost no light although the pixel has some. Its
-  // light came from very few samples, so neither its value nor its difference is reliable. A pixel counts if
-  // one half has 19 times as much light as the other, or if both have none and more than half of the
-  // neighbours in its window have some. (k equal hits all fall into one half with probability 2^-(k-1): of
-  // pixels with 2 hits half are found, with 5 one in 16, with 10 one in 500.)
+  // Number of pixels with few hits: at least one half has almost no light although the pixel, or its
+  // surroundings, have some. The pixel's light came from very few samples, so neither its value nor the
+  // difference of its halves is reliable. A pixel counts if one half has 19 times as much light as the other,
+  // or if both have none and more than half of the neighbours in its window have some. (k equal hits all fall
+  // into one half with probability 2^-(k-1): of pixels with 2 hits half are found, with 5 one in 16, with 10
+  // one in 500.)
   std::uint64_t few_hits = 0;
   std::uint64_t lit = 0;  // number of pixels in which some sample found light
   NoiseSums plain;        // sums of D

@@ -26,8 +26,8 @@ struct RgbImage {
 };
 
 struct ExrLimits {
-  std::uint64_t max_bytes = std::uint64_t{1} << 30;   // most bytes of the file
-  std::uint64_t max_pixels = std::uint64_t{1} << 28;  // most pixels of the data window
+  std::uint64_t max_bytes = std::uint64_t{1} << 30;   // largest file, in bytes
+  std::uint64_t max_pixels = std::uint64_t{1} << 28;  // largest data window, in pixels
   int max_side = 65536;
 };
 

@@ -1,6 +1,7 @@
-// Decodes partials, which are untrusted input. A partial has exactly one form (uncompressed scanlines of
-// known float channels under a known header). So it is parsed byte by byte against that form, instead of by a
-// library that accepts every EXR. Nothing is allocated before the sizes are known to be those of the tile.
+// Decodes partials (files with the pixel sums of one tile and range of samples), which are untrusted input. A
+// partial has exactly one form (uncompressed scanlines of known float channels under a known header). So it
+// is parsed byte by byte against that form, instead of by a library that accepts every EXR. Nothing is
+// allocated before the sizes are known to be those of the tile.
 #include "common/image/exr/partial_decoder.h"
 
 #include <fmt/format.h>
@@ -20,7 +21,7 @@ namespace ls {
 namespace {
 
 constexpr std::int32_t kMaxUnitJson = 1024;
-// Most bytes of the channel list; all AOVs together need about 2700
+// Upper limit of the size of the channel list; all AOVs together need about 2700 bytes
 constexpr std::int32_t kMaxChannelList = 8192;
 constexpr std::size_t kMaxNameBytes = 31;  // longest name in the format without the long-names flag
 

@@ -1,5 +1,5 @@
-// Encodes partials. partial_decoder.cpp decodes them without the library, as untrusted input of one fixed
-// form.
+// Encodes partials (files with the pixel sums of one tile and range of samples) with OpenEXR. They are
+// decoded without that library, as untrusted input of one fixed form (partial_decoder.cpp).
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>

@@ -75,7 +75,7 @@ std::vector<std::string> differences(const std::string& sealed, const std::strin
       if (found == theirs->end() || found->second != digest) names.insert(name);
     }
   std::vector<std::string> out(names.begin(), names.end());
-  // The two texts have the same content in different forms.
+  // The texts differ although they list the same digests: the seal itself was changed.
   if (out.empty() && sealed != now) out.emplace_back(fmt::format("header {}", kSealName));
   return out;
 }

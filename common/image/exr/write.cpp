@@ -45,7 +45,8 @@ Result<void> check(const ExrPicture& picture) {
 // Writes rows, the first of which is row y0 of the file.
 void write_rows(Imf::OutputFile& file, const ExrPicture& rows, int y0) {
   Imf::FrameBuffer buffer;
-  // the outer vector may grow: this moves the inner ones without copying, so the slices stay valid
+  // when the outer vector grows, it moves the inner ones without copying their values, so the slices stay
+  // valid
   std::vector<std::vector<half>> halves;
   const auto add = [&](const std::string& name, Imf::PixelType type, const void* data) {
     buffer.insert(name, Imf::Slice::Make(type, data, {0, y0}, rows.size.width, rows.size.height));
@@ -106,7 +107,8 @@ Result<void> write_bands(Imf::OStream& out, const ExrBands& bands) {
   return each_band(bands, [&](const ExrPicture& rows, int y) { write_rows(file, rows, y); });
 }
 
-// The library reports errors as exceptions only, so the sink's own error is kept here.
+// A stream that writes to a sink. It can tell the library of an error only by an exception, so the sink's own
+// Error is kept in `trouble`.
 class SinkStream final : public Imf::OStream {
  public:
   explicit SinkStream(ByteSink& sink) : OStream("image"), sink_(sink) {}

@@ -67,7 +67,7 @@ class Film {
   void discard(TileIndex tile) { tiles_[tile] = nullptr; }
 
   // Figures of one tile.
-  // Number of complete rounds, and so the index of the next round to fold
+  // Number of complete rounds folded, and so the index of the next round to fold
   RoundIndex full_rounds(TileIndex tile) const;
   RoundIndex rounds_folded(TileIndex tile) const;  // full_rounds(), plus one if there is a tail
   std::optional<SampleRange> tail(TileIndex tile) const;
@@ -95,11 +95,12 @@ class Film {
 
   // Saving and loading, for a restart of the coordinator.
   //
-  // The bytes of a tile have a version and end with a SHA-256. A tile without folded rounds has no bytes.
-  // Loading rejects damaged or foreign bytes.
+  // The bytes of a tile have a version and end with a SHA-256. For a tile without samples save_tile() returns
+  // none. load_tile() rejects bytes that are damaged, or of another tile or version.
   std::vector<std::byte> save_tile(TileIndex tile) const;
-  // Returns a function that later does save_tile() of the tile in its present state. It keeps only that tile
-  // in memory, whereas a copy of the film would keep all tiles.
+  // Takes a snapshot of the tile. The returned function may be called later and serialises that snapshot as
+  // save_tile() would have done now. It keeps only this one tile in memory, whereas a copy of the film would
+  // keep all tiles.
   std::function<std::vector<std::byte>()> saver(TileIndex tile) const;
   Result<void> load_tile(TileIndex tile, std::span<const std::byte> bytes);
 
