@@ -9,22 +9,22 @@
 namespace ls {
 
 inline constexpr int kMinTile = 8, kMaxTile = 256;  // pixels per side
-// Most units of a job; its number of units is tiles times rounds. 2^24 samples are possible for one small
-// tile (262 thousand rounds), not for a whole frame.
+// Largest number of units of a job: tiles times rounds (ranges of samples). 2^24 samples are possible for one
+// small tile (262 thousand rounds), not for a whole frame.
 inline constexpr std::uint64_t kMaxUnits = std::uint64_t{1} << 26;
-// Most bytes of a film's sums: all AOVs of a UHD frame take about 5 GB, colour alone of the largest frame 3.2
-// GB.
+// Largest size of a film's sums in bytes: all AOVs of a UHD frame take about 5 GB, colour alone of the
+// largest frame 3.2 GB.
 inline constexpr std::uint64_t kMaxFilmBytes = std::uint64_t{8} << 30;
 inline constexpr double kMaxSeconds = 1e9;  // longest time budget
 inline constexpr double kMaxTargetError = 1e6;
 inline constexpr int kMaxPriority = 1'000'000;  // largest absolute value of a priority
-// Most bytes of the text of a spec or of settings
+// Largest size in bytes of the text of a spec or of settings
 inline constexpr std::size_t kMaxSpecBytes = std::size_t{1} << 20;
-// Largest value of a job's own limits on the workers and on the leased units at the same time.
+// Largest value of a job's own limits, JobSpec::max_workers and max_units.
 inline constexpr std::uint64_t kMaxAtOnce = 1'000'000;
-// Most bytes of memory that a job may require of a worker.
+// Largest memory, in bytes, that a job may require of a worker.
 inline constexpr std::uint64_t kMaxMemory = std::uint64_t{1} << 50;
-inline constexpr std::size_t kMaxNames = 64;  // most names in `aov` and in `tags`
+inline constexpr std::size_t kMaxNames = 64;  // largest number of names in `aov` and in `tags`
 inline constexpr std::size_t kMaxNameBytes = 64;
 inline constexpr std::size_t kMaxDefines = 1024, kMaxDefineBytes = 65536;
 

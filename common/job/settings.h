@@ -19,8 +19,8 @@
 
 namespace ls {
 
-// Everything except the scene that determines the value of a sample. Its canonical JSON is hashed into every
-// unit.
+// Everything except the scene that determines the value of a sample. The digest of its canonical JSON is part
+// of every unit's header (common/image/film/partial.h).
 struct RenderSettings {
   FrameSize size;
   int tile = 32;
@@ -59,11 +59,12 @@ struct JobSpec {
   // The frames of a sequence, which has one film per frame; nullopt: a single image
   std::optional<FrameRange> frames;
   std::optional<std::uint32_t> max_workers;  // maximum number of workers at the same time
-  std::optional<std::uint32_t> max_units;    // maximum number of leased units at the same time
-  // bytes of memory that a worker must have; a job always requires at least the size of its files
+  std::optional<std::uint32_t> max_units;    // maximum number of units assigned to workers at the same time
+  // Memory in bytes that a worker must have; a job always requires at least the size of its files
   std::optional<std::uint64_t> memory;
-  // The numeric class that renders it, by the beginning of its hexadecimal digits or of its platform
-  // (WorkerHello::platform): only workers that match get units
+  // The numeric class that renders the job (machines of one class compute the same bits), given by the first
+  // characters of its digest in hexadecimal or of its platform (WorkerHello::platform). Only workers that
+  // match get units
   std::optional<std::string> numeric_class;
   std::optional<Digest> reference;  // digest of the reference image, an EXR of the job's size
   bool operator==(const JobSpec&) const = default;

@@ -1,7 +1,7 @@
-// The techniques by which the integrators find light that directions of the material or the medium and
-// next-event estimation at vertices find too rarely. Which of them a job uses depends on its scene and its
-// files: the workers find out when they build the world, and say so with each result. A parameter of the
-// scene's integrator switches each off (docs/reference/scene-format.md, Integrators).
+// The techniques by which the integrators find light that is found too rarely by sampling the directions of
+// materials and media, and by next-event estimation at vertices. Which of them a job uses depends on its
+// scene and its files: the workers find out when they build the world, and say so with each result. A
+// parameter of the scene's integrator switches each off (docs/reference/scene-format.md, Integrators).
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,11 @@
 namespace ls {
 
 enum class Technique : std::uint8_t {
-  equiangular,      // points on segments, near lights with a place
-  exponential,      // points on segments, as light fades along them
-  camera_points,    // several points on camera segments
-  lamp_directions,  // directions near lights without extent
-  lamp_flights,     // flights that end near these
+  equiangular,      // points on segments of paths in media, chosen near lights that have a position
+  exponential,      // points on segments of paths in media, chosen as light fades along them
+  camera_points,    // several points on the segments of camera rays in media
+  lamp_directions,  // a share of the directions is aimed close to lights without extent
+  lamp_flights,     // a share of the flights through media ends close to lights without extent
   light_vertices,   // connections to points that a directional emitter lights
   light_tree,       // one of many lights chosen by a tree
   path_reuse,       // paths that serve several pixels from their second vertices on

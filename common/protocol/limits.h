@@ -34,7 +34,7 @@ inline constexpr std::size_t kAssetsPerJob = 4096;
 inline constexpr std::size_t kTags = 64;
 inline constexpr std::size_t kBlobsHeld = 8192;
 inline constexpr int kThreads = 4096;
-// Most seconds that a worker may report for any duration, so that sums of durations stay finite.
+// Longest duration in seconds that a worker may report, so that sums of durations stay finite.
 inline constexpr double kSeconds = 1e12;
 
 inline constexpr int kFrameSide = kMaxFrameSide;  // pixels

@@ -78,7 +78,7 @@ struct Lease {
 struct UnitTimes {
   double load = 0, build = 0;
   double transfer = 0;  // encoding the result and computing its digest
-  double idle = 0;      // idle time of its thread since the last unit of the job
+  double idle = 0;      // idle time of its thread since the previous unit of the job
   // Time its thread waited for a core while rendering: wall-clock seconds minus cpu_seconds
   double wait = 0;
   bool operator==(const UnitTimes&) const = default;
@@ -92,9 +92,9 @@ struct UnitResult {
   double cpu_seconds = 0;      // CPU time of the thread that rendered the unit
   Health health;
   UnitTimes times;
-  TechniqueSet techniques;  // of the world that it was rendered in; none: not known
+  TechniqueSet techniques;  // those that the integrator used for this job's world; none: not known
   // If its lease is traced: when the worker received the unit, by its clock in nanoseconds since 1970; 0: not
-  // told
+  // sent
   std::uint64_t held_unix_ns = 0;
   bool operator==(const UnitResult&) const = default;
 };
@@ -149,8 +149,8 @@ struct WorkerProgress {
 struct WorkerDraining {
   bool operator==(const WorkerDraining&) const = default;
 };
-// Units of this lease that this worker has not rendered and will not render, because it drains, or because
-// they were cancelled.
+// Units of this lease that this worker has not rendered and will not render, because it drains
+// (WorkerDraining), or because they were cancelled.
 struct LeaseReturned {
   LeaseId lease;
   std::vector<UnitKey> unrendered;
@@ -175,7 +175,7 @@ struct Refused {  // after this message the coordinator closes the connection
 struct AssignLease {
   Lease lease;
   std::optional<JobBrief> brief;  // sent with a job's first lease on this connection
-  // The lease's span, below which the worker records its own; nullopt: the lease is not traced
+  // The lease's trace span: the worker's own spans become its children. nullopt: the lease is not traced
   std::optional<trace::SpanContext> trace = std::nullopt;
   bool operator==(const AssignLease&) const = default;
 };

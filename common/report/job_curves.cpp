@@ -12,7 +12,7 @@
 namespace ls::report {
 namespace {
 
-constexpr std::size_t kMostRows = 256;  // most rows of the table; if there are more, the last ones are shown
+constexpr std::size_t kMostRows = 256;  // table rows; if there are more, the last ones are shown
 
 struct Clock {
   const char* key;
@@ -27,14 +27,15 @@ std::string range(const std::optional<std::pair<double, double>>& ci, std::strin
   return ci ? fmt::format("{} to {}", words(ci->first), words(ci->second)) : std::string();
 }
 
-// Returns the interval of the error at a checkpoint. It is not known for single checkpoints whether their
-// figures can be trusted: if those of the last one cannot (`doubt`), no interval is shown.
+// Returns the interval of the error at a checkpoint. Whether figures can be trusted is known only for the
+// last checkpoint, not for earlier ones. If the last one's cannot be trusted (`doubt`), no checkpoint gets an
+// interval.
 std::optional<std::pair<double, double>> shown_interval(const Json& point, bool doubt) {
   return doubt ? std::nullopt : interval(point, "relmse_ci95");
 }
 
 // Returns the point at which the error will reach the requested target. If the curve is over wall time, the
-// remaining time is extrapolated at the previous pace.
+// remaining time is extrapolated at the pace so far.
 std::optional<Ahead> ahead_of(const Json& report, const Json& last, const Clock& clock) {
   const Json& forecast = member(report, "forecast");
   const double more = number(forecast, "core_seconds"), now = number(last, clock.key);

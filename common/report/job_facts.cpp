@@ -65,14 +65,14 @@ std::string row(const char* name, const std::string& value, bool code = false) {
 
 std::string whole(double n) { return std::isfinite(n) ? fmt::format("{:.0f}", n) : std::string(); }
 
-// The target error, and whose error it means if that is not the image's own.
+// Returns the target error, with a note if it is that of the denoised layers instead of the image.
 std::string target_of(const Json& report) {
   const double target = number(report, "target_error");
   if (!(target > 0)) return "";
   return given(target) + (denoised_target(report) ? " of the denoised layers" : "");
 }
 
-// Describes the requested path limits and end conditions, those that were given.
+// Lists the path limits and end conditions that were requested; those that were not are left out.
 std::string asked(const Json& report) {
   const double depth = number(report, "max_depth"), spp = number(report, "spp_asked");
   const std::string roulette = whole(number(report, "rr_depth"));

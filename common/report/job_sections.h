@@ -30,7 +30,7 @@ std::string verdict(const Json& report);  // why they are not reliable, with fur
 // A sentence for a report that is not doubtful; empty: no sentence
 std::string verdict_words(const Json& report);
 std::string failure(const Json& report);
-bool denoised_target(const Json& report);  // true if its target error means its denoised layers
+bool denoised_target(const Json& report);  // true if the target error is that of the denoised layers
 
 // Error against time (job_curves.cpp).
 std::string curves(const Json& report);

@@ -15,7 +15,7 @@ constexpr double kMargin = 0.06;  // margin on either side, as a share of the ra
 constexpr double kShort = 2.2;    // decades: a shorter axis also has labels at 2 and 5
 constexpr double kFine = 4.5;     // decades: a shorter axis has lines at 2 to 9
 constexpr std::size_t kMostLabels = 8;
-constexpr std::size_t kFewTimes = 4;  // with fewer labels of time, intermediate times are added
+constexpr std::size_t kFewTimes = 4;  // with fewer time labels than this, intermediate ones are added
 constexpr double kFarthest = 300;     // largest distance from 1 in decades: near the range of double
 constexpr double kMinute = 60, kHour = 3600, kDay = 86400;
 
@@ -92,7 +92,7 @@ LogAxis log_axis(double lo, double hi, double from, double to) {
 }
 
 std::vector<Tick> ticks(const LogAxis& axis, AxisUnit unit) {
-  // the axis was not made by log_axis()
+  // no axis that log_axis() makes has such ends
   if (!(axis.lo > 0) || !(axis.hi < std::pow(10.0, kFarthest + 1))) return {};
   return unit == AxisUnit::seconds ? time_ticks(axis) : plain_ticks(axis);
 }

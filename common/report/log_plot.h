@@ -21,7 +21,7 @@ struct Curve {
   bool dashed = false;
 };
 inline constexpr std::size_t kMostCurves = 8;  // each has its own colour and mark
-// Most points drawn per curve; longer curves are thinned evenly
+// Largest number of points drawn per curve; longer curves are thinned evenly
 inline constexpr std::size_t kMostCurvePoints = 512;
 
 // A predicted point: the x at which the first curve will reach the target.

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxNamesLookedAt = 4096;  // most files in a folder that are examined for a suggestion
+constexpr std::size_t kMaxNamesLookedAt = 4096;  // files of a folder examined for a suggestion
 
 // Returns a suggestion like "; did you mean 'cloud.vol'?" from the files beside the missing one.
 std::string names_like(const fs::path& missing) {

@@ -36,7 +36,8 @@ class FolderAssets final : public AssetSource {
   // file, or cannot be read.
   Result<Asset> find(std::string_view name) override;
   Result<std::string> text(std::string_view name) override;
-  // Writes the file to a temporary folder. It replaces a file of that name in the scene's own folder.
+  // Writes the file to a temporary folder. From then on find() returns it instead of any file of that name in
+  // the scene's own folder, which is not changed.
   Result<Asset> keep(std::string_view name, const std::string& bytes) override;
 
   // Returns the folder of the files that keep() stored; null if there are none.

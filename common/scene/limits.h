@@ -35,25 +35,25 @@ inline constexpr std::size_t kMaxPbrtTexts = 256;
 inline constexpr std::size_t kMaxPbrtNesting = 256;       // depth of AttributeBegin in a pbrt file
 inline constexpr std::size_t kMaxGltfValues = 2'000'000;  // values of the JSON of a glTF file
 inline constexpr std::size_t kMaxGltfNodes = 256;         // depth of nodes in a glTF file
-// Elements of accessors of a glTF file without data of their own
+// Elements of all accessors of a glTF file that have no buffer view, and so are all 0
 inline constexpr std::size_t kMaxGltfEmptyCount = 1 << 20;
-// Numbers that are read of a glTF file, those of an accessor as often as it is used
+// Numbers that are read from a glTF file; those of an accessor count each time it is used
 inline constexpr std::size_t kMaxGltfNumbers = std::size_t{1} << 28;
-// Morph targets of a mesh of a glTF file, and numbers that its animations give one node at a time
+// Morph targets of a mesh of a glTF file, and numbers of one keyframe of its animations
 inline constexpr std::size_t kMaxGltfTargets = 4096;
-// Sets of joints and weights of a primitive of a glTF file, four joints a corner each
+// Sets of joints and weights of a primitive of a glTF file; each set has four joints per vertex
 inline constexpr std::size_t kMaxGltfJointSets = 8;
 // Bytes of all meshes of a glTF file, written as PLY
 inline constexpr std::size_t kMaxGltfMeshBytes = std::size_t{1} << 30;
 // Depth of objects within objects, including by reference
 inline constexpr int kMaxReferenceDepth = 64;
-// Depth of nested bsdfs; blends of this depth may contain 2^7 of them
+// Depth of nested bsdfs; a blend of this depth may contain 2^7 bsdfs
 inline constexpr int kMaxBsdfNesting = 8;
 inline constexpr std::size_t kMaxDiagnostics = 20;
 inline constexpr std::size_t kMaxExcerptBytes = 160;  // bytes of a source line that a message shows
 inline constexpr std::size_t kMaxSceneJsonBytes = std::size_t{256} << 20;
 inline constexpr int kMaxJsonNesting = 16;
-// Most pairs of shapes that are compared to find whether one lets light into the other.
+// Largest number of pairs of shapes that are compared to find whether one lets light into the other.
 inline constexpr std::uint64_t kMaxEntrances = std::uint64_t{1} << 23;
 
 }  // namespace ls::scene

@@ -1,4 +1,4 @@
-// Files that readers make of the numbers in a scene's text.
+// Files that readers make from the numbers in a scene's text.
 #pragma once
 
 #include <array>
@@ -12,9 +12,9 @@ namespace ls::scene {
 
 // Triangles for a PLY file. Each list but positions and indices may be empty.
 struct MadeMesh {
-  std::vector<float> positions, normals, uvs;  // three, three, two numbers a corner
+  std::vector<float> positions, normals, uvs;  // three, three, two numbers per corner (vertex)
   std::vector<float> colours, opacities;       // the attributes "vertex_color", "vertex_opacity": three, one
-  std::vector<std::uint32_t> indices;          // three a triangle, in range
+  std::vector<std::uint32_t> indices;          // three per triangle, all in range
   std::size_t corners() const { return positions.size() / 3; }
   std::size_t bytes() const;  // of the file
 };
@@ -25,10 +25,11 @@ struct MadeGrid {
   std::vector<float> values;  // x fastest, channels within a voxel
 };
 
-// Each gives `assets` the file to keep and returns its name, which is that of its bytes.
+// Each makes a file, gives it to `assets` to keep, and returns its name, which contains a digest of its
+// bytes.
 Result<std::string> keep_made(AssetSource& assets, const MadeMesh& mesh);
 Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid);
-// The bytes of a file of this kind ("image") whose name has this ending (".png").
+// Keeps a file with these bytes; its name begins with `kind` ("image") and ends in `ending` (".png").
 Result<std::string> keep_made(AssetSource& assets, std::string_view kind, std::string_view ending,
                               const std::string& bytes);
 

@@ -33,11 +33,11 @@ struct BitmapTexture {
   Wrap wrap = Wrap::repeat;
   bool raw = false;  // true: 8- and 16-bit values are not decoded from sRGB
   UvTransform to_uv;
-  // For a texture that is used as an opacity. If true, the value is the image's alpha channel if that falls
-  // below 1/2 somewhere, otherwise the image's colour.
+  // For a texture that is used as an opacity. If true, the value is the image's alpha channel if that is
+  // below 1/2 in some pixel, otherwise the image's colour.
   bool alpha = false;
-  // If it is one channel, the value is that number, without sRGB decoding; a channel that the image lacks
-  // is 1.
+  // One channel: the value is that channel's number, without sRGB decoding; a channel that the image lacks is
+  // 1.
   Channel channel = Channel::all;
   bool operator==(const BitmapTexture&) const = default;
 };
@@ -303,7 +303,7 @@ using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, 
                              ProjectorEmitter>;
 
 // Integrator.
-inline constexpr int kUsualPathReuse = 16;  // pixels that share paths where that pays
+inline constexpr int kUsualPathReuse = 16;  // number of pixels that share paths, if path_reuse is automatic
 struct IntegratorSettings {
   // Our name: "volpath", "volpath_distant_mis", "path" or "whitted".
   std::string name = "volpath";
@@ -313,19 +313,20 @@ struct IntegratorSettings {
   // Distance and heuristic are used by "volpath_distant_mis" only
   DistanceSampling distance = DistanceSampling::mis;
   MisHeuristic heuristic = MisHeuristic::power;
-  // For "volpath" only: number of points on a camera segment through a medium that look for light. 0: a
-  // number that pays for the scene, which may be none; -1: none.
+  // For "volpath" only: number of points on the segment of a camera ray through a medium at which light is
+  // sampled. 0: chosen for the scene, possibly none; -1: none.
   int camera_points = 0;
-  bool phase_only = false;  // true: directions are sampled by the phase function only, never towards lamps
-  // Connections of paths to points that a directional emitter lights. 0: only if they pay for the scene; -1:
-  // never; 1: always.
+  bool phase_only = false;  // true: no direction is aimed at a point, spot or projector light
+  // Connections of paths to points that a directional emitter lights. 0: chosen for the scene; -1: never; 1:
+  // always.
   int light_vertices = 0;
-  // For "volpath" only: points near lamps on segments (without which nothing is aimed at lamps either), and
-  // flights that end near lamps; 0: if they pay for the scene; -1: never.
+  // For "volpath" only, with lamps being point, spot and projector lights. equiangular: points on segments
+  // near lamps; without these points no direction is aimed at lamps either. lamp_flights: flights that end
+  // near lamps. 0: chosen for the scene; -1: never.
   int equiangular = 0, lamp_flights = 0;
-  int light_tree = 0;  // -1: lights are chosen by their power alone
-  // For "volpath" only: the number of pixels that share what their paths find from the second vertices on; 0:
-  // kUsualPathReuse if that pays for the scene, else none; -1 or 1: none.
+  int light_tree = 0;  // 0: a tree chooses among many lights; -1: lights are chosen by their power alone
+  // For "volpath" only: the number of pixels that share what their paths find from the second vertices on. 0:
+  // kUsualPathReuse or none, chosen for the scene; -1 or 1: none.
   int path_reuse = 0;
   bool operator==(const IntegratorSettings&) const = default;
 };

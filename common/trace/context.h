@@ -11,7 +11,7 @@
 
 namespace ls::trace {
 
-// All zero bytes: none; such ids are invalid on the wire.
+// An id of zero bytes means that there is none; `traceparent` does not allow such ids.
 struct TraceId {
   std::array<std::uint8_t, 16> bytes{};
   auto operator<=>(const TraceId&) const = default;

@@ -122,7 +122,8 @@ Result<Sampler> read_sampler(std::string name, const std::string& argument) {
 
 Result<void> check_protocol(const Setting& protocol) {
   if (protocol.value.empty() || protocol.value == "http/json") return {};
-  // Often set for all programs of a machine. Collectors take both encodings on one port.
+  // Only a warning: this value is often set for all programs of a machine, and collectors take both encodings
+  // on one port.
   if (protocol.value == "http/protobuf") {
     log_warn("", fmt::format("{} is http/protobuf, but spans are sent as http/json: the collector must take "
                              "that, too",

@@ -1,5 +1,5 @@
-// Where traces go and which are recorded, as the operator says by OpenTelemetry's standard variables
-// (https://opentelemetry.io/docs/specs/otel/configuration/sdk-environment-variables/).
+// Where traces are sent and which are recorded, as the operator sets it by OpenTelemetry's standard
+// environment variables (https://opentelemetry.io/docs/specs/otel/configuration/sdk-environment-variables/).
 #pragma once
 
 #include <functional>
@@ -25,9 +25,9 @@ struct Settings {
   std::string url;  // for POST requests with spans
   std::vector<std::pair<std::string, std::string>> headers;
   std::string ca_file;  // certificates of authorities; empty: the system's
-  double seconds = 10;  // most seconds until an answer
+  double seconds = 10;  // time limit until the answer
   std::string service;  // OTEL_SERVICE_NAME, or service.name of the attributes, or the name of the program
-  std::vector<std::pair<std::string, std::string>> resource;  // OTEL_RESOURCE_ATTRIBUTES but service.name
+  std::vector<std::pair<std::string, std::string>> resource;  // OTEL_RESOURCE_ATTRIBUTES without service.name
   Sampler sampler;
 };
 

@@ -15,13 +15,13 @@ namespace ls::trace {
 
 inline constexpr std::size_t kMaxWaiting = 8192;  // spans, about 0.5 KB each
 inline constexpr std::size_t kMaxBatch = 512;     // spans in one request
-inline constexpr double kCollectSeconds = 1;     // a batch is sent at the latest so long after its first span
-inline constexpr int kMaxSendings = 5;           // attempts to send a batch; then it is dropped
-inline constexpr double kFirstPauseSeconds = 1;  // after a failed attempt; each further one doubles it
+inline constexpr double kCollectSeconds = 1;      // a batch is sent at most this long after its first span
+inline constexpr int kMaxSendings = 5;            // attempts to send a batch; then it is dropped
+inline constexpr double kFirstPauseSeconds = 1;   // after a failed attempt; each further failure doubles it
 
 struct Figures {
   std::uint64_t sent = 0;      // spans that the collector took
-  std::uint64_t left_out = 0;  // spans dropped since the queue was full
+  std::uint64_t left_out = 0;  // spans dropped because the queue was full
   std::uint64_t refused = 0;   // spans that the collector rejected, or did not take in kMaxSendings attempts
 };
 
@@ -33,11 +33,11 @@ class SpanQueue {
   const std::vector<Span>& due(TimePoint now);
   // Returns the time from which due() will return a batch; nullopt: no span waits.
   std::optional<TimePoint> next_due() const;
-  // Makes everything that waits due, without further pauses: the program ends.
+  // Makes all waiting spans due at once and without pauses, for the end of the program.
   void hurry() { hurried_ = true; }
 
   // The caller reports how sending the batch of due() ended:
-  void taken(std::uint64_t rejected);              // the collector has it, except for so many spans
+  void taken(std::uint64_t rejected);              // the collector took it, except for `rejected` spans
   void failed(TimePoint now);                      // it may be sent again
   void refused();                                  // it would be refused again
   bool in_trouble() const { return in_trouble_; }  // the last attempt to send a batch failed
@@ -47,11 +47,11 @@ class SpanQueue {
  private:
   std::deque<Span> waiting_;
   std::vector<Span> batch_;  // being sent, or to be sent again
-  int attempts_ = 0;         // failed ones, of batch_
-  int failures_ = 0;         // failed attempts since the collector answered last; they lengthen the pause
+  int attempts_ = 0;         // failed attempts to send batch_
+  int failures_ = 0;         // failed attempts since the collector's last answer; each lengthens the pause
   bool in_trouble_ = false;
-  TimePoint not_before_{};  // of the batch's next attempt
-  TimePoint first_at_{};    // when waiting_ was empty last
+  TimePoint not_before_{};  // earliest time of the next attempt
+  TimePoint first_at_{};    // when waiting_ got its first span, or last gave a batch
   bool hurried_ = false;
   Figures figures_;
 };

@@ -1,7 +1,6 @@
 // Records spans and sends them to a collector, on a thread of its own. Recording takes a short lock and never
 // waits for the collector: if the collector refuses, hangs or is gone, spans are dropped and counted. A
-// program that is not traced has no Tracer; its callers hold a null pointer and do nothing more than look at
-// it.
+// program that is not traced has no Tracer; its callers hold a null pointer and only check it.
 #pragma once
 
 #include <atomic>
@@ -27,14 +26,14 @@ class Tracer {
     Settings settings;
     std::string version;  // of this program
     std::string
-        instance;  // which of the programs of this kind it is, such as a worker's name; empty: not told
+        instance;  // which of the programs of this kind it is, such as a worker's name; empty: not sent
     std::shared_ptr<const Clock> clock;
     std::function<std::int64_t()> unix_ns;  // nanoseconds since 1970
     // Sends a request; ls::post by default
     std::function<Result<HttpAnswer>(const HttpPost&)> send = {};
   };
   explicit Tracer(Options options);
-  // Sends what waits, if the collector takes it within kLastSeconds.
+  // Sends the waiting spans, if the collector takes them within kLastSeconds.
   ~Tracer();
 
   // Adds the span to those that wait to be sent. Thread-safe. The span must be of a sampled trace.

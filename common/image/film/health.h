@@ -1,6 +1,6 @@
-// Numeric health of the rendered samples: which problems occurred, how often, and where first. For a healthy
-// job it is empty and allocates nothing. It depends only on the samples: merging gives the same result in any
-// order.
+// Numeric health of the rendered samples: which problems occurred, how often, and where first. A Health
+// without problems is empty and allocates nothing. It depends only on the samples: merging gives the same
+// result in any order.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +33,8 @@ enum class HealthCause : std::uint8_t {
   negative,
   // a density exceeded the bound (majorant) of its cell; each occurrence counts
   majorant_violation,
-  // Corrected values of the scene. They are the same for all units of a job, and have no pixel.
+  // Values of the scene that were corrected. They are the same for all units (ranges of samples of one tile)
+  // of a job, and have no pixel.
   negative_density,
   bright_albedo,
   negative_texel,
@@ -56,7 +57,7 @@ struct HealthLocation {
     return y != o.y ? y < o.y : x != o.x ? x < o.x : sample < o.sample;
   }
 };
-inline constexpr std::size_t kHealthLocations = 8;  // number of locations that are kept per cause
+inline constexpr std::size_t kHealthLocations = 8;  // at most this many locations are kept per cause
 
 struct HealthEntry {
   std::uint64_t count = 0;

@@ -20,7 +20,7 @@ namespace ls {
 struct UnitHeader {
   Digest scene;          // digest of the canonical scene
   Digest settings;       // digest of the canonical RenderSettings (common/job/settings.h)
-  Digest numeric_class;  // numeric class of the machine that rendered it
+  Digest numeric_class;  // class of the machine that rendered it; machines of one class compute the same bits
   PixelRect tile;
   SampleRange samples;
   bool operator==(const UnitHeader&) const = default;

@@ -9,7 +9,7 @@
 namespace ls {
 namespace {
 
-constexpr std::size_t kMaxHeaderJson = 1024;  // most bytes; our own headers have about 320
+constexpr std::size_t kMaxHeaderJson = 1024;  // in bytes; our own headers have about 320
 
 Error bad(std::string_view what) {
   return Error{Errc::invalid_argument, fmt::format("unit header: {}", what)};

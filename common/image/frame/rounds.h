@@ -1,6 +1,6 @@
-// Rounds group a tile's samples: 2, 2, 4, 8, 16, 32, then 64 in each round. The grouping is fixed: it does
-// not depend on the number of samples, cost or timing. So any two jobs group the same samples in the same
-// way, and their double sums are equal bit for bit.
+// Rounds are ranges of a tile's sample indices: with 2, 2, 4, 8, 16, 32 samples per pixel, then with 64 each.
+// The grouping is fixed: it does not depend on the number of samples, cost or timing. So any two jobs add up
+// the same samples in the same groups, and their sums in double are equal bit for bit.
 #pragma once
 
 #include <algorithm>

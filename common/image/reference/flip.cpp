@@ -13,7 +13,7 @@ namespace {
 
 using flip::Planes;
 
-// Conversion to CIE XYZ of the Rec. 709 primaries with D65 white, and this white.
+// Conversions from linear RGB (Rec. 709 primaries, D65 white) to CIE XYZ and back, and this white in XYZ.
 constexpr float kToXyz[3][3] = {{10135552.F / 24577794.F, 8788810.F / 24577794.F, 4435075.F / 24577794.F},
                                 {2613072.F / 12288897.F, 8788810.F / 12288897.F, 887015.F / 12288897.F},
                                 {1425312.F / 73733382.F, 8788810.F / 73733382.F, 70074185.F / 73733382.F}};
@@ -145,13 +145,14 @@ FlipExposures flip_exposures(std::span<const float> rgb) {
   const auto middle = light.begin() + static_cast<std::ptrdiff_t>(light.size() / 2);
   std::nth_element(light.begin(), middle, light.end());
   const float median = *middle, most = *std::max_element(light.begin(), light.end());
-  // Returns the larger x at which the tone curve is kLevel, from a quadratic equation.
+  // x is the larger of the two values at which the tone curve equals kLevel: a solution of a quadratic
+  // equation.
   constexpr float kLevel = .85F;
   const float a = kTone[0] - kLevel * kTone[3], b = kTone[1] - kLevel * kTone[4],
               c = kTone[2] - kLevel * kTone[5];
   const float x = (-b + std::sqrt(b * b - 4 * a * c)) / (2 * a);
   FlipExposures out{std::log2(x / most), std::log2(x / median), 2};
-  constexpr int kMost = 64;  // most exposures: an image with a range of 64 stops is not sensible
+  constexpr int kMost = 64;  // largest number of exposures: no sensible image has a range of 64 stops
   out.count = std::clamp(static_cast<int>(std::ceil(out.last - out.first)), 2, kMost);
   return out;
 }

@@ -4,9 +4,9 @@
 //   [LDR] Andersson, Nilsson, Akenine-Moeller, Oskarsson, Astrom, Fairchild 2020, "FLIP: A Difference
 //         Evaluator for Alternating Images", HPG (equations (1) to (14) there).
 //   [HDR] Andersson, Nilsson, Shirley, Akenine-Moeller 2021, "Visualizing Errors in Rendered High
-//         Dynamic Range Images", Eurographics short papers: LDR-FLIP of both images tone-mapped at
-//         several exposures, of which each pixel keeps its largest; the exposures follow from the
-//         reference alone.
+//         Dynamic Range Images", Eurographics short papers: LDR-FLIP of both images tone-mapped at several
+//         exposures; each pixel keeps the largest of these errors; the exposures follow from the reference
+//         alone.
 //
 // Pixels are linear with Rec. 709 primaries, R, G, B interleaved, row by row. Beyond the edge the nearest
 // pixel is repeated. Values are single precision; sums have a fixed order, so that the same images give the

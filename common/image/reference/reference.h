@@ -18,18 +18,18 @@
 // times e^2 f in a noisy reference. In (e - a) (e - b) f(A), b is not in the weight and vanishes in the mean,
 // which leaves (e^2 - e a) f(A). The part with -e a averages out over an image whose errors have both signs.
 // The bias e^2 f" r of e^2 f(A) is subtracted within f (relative_weight()), where r comes from the
-// neighbours' s^2, which are independent of a. The remaining bias is of second order: for bright m 60 r^2 /
-// m^4 of the value.
+// neighbours' s^2, which are independent of a. The remaining bias is of second order: for bright m it is 60
+// r^2 / m^4 of the value.
 //
-// The standard error of these figures is that from the reference's noise alone. Over channels (e - a) . (e -
-// b) has the variance 4 e'Ve + 4 tr V^2, with V the covariance of the reference. For Gaussian noise, 4 ((x -
-// ref) . s)^2 with the signs of s has this mean, because ref and A - B are independent. The signs are not
-// stored, so the sum of |x - ref| s is used, which is at least as large. It is right for grey noise, and a
-// third too wide for independent channels (with r much larger than e^2; there the mean of the square is 3 + 6
-// (2 / pi)^2 of 3).
+// The standard error that is given for these figures contains the reference's noise alone. Over channels (e -
+// a) . (e - b) has the variance 4 e'Ve + 4 tr V^2, with V the covariance of the reference. For Gaussian
+// noise, 4 ((x - ref) . s)^2 with the signs of s has this mean, because ref and A - B are independent. The
+// signs are not stored, so the sum of |x - ref| s is used, which is at least as large. It is right for grey
+// noise. For independent channels, with r much larger than e^2, it is a third too wide: the mean square of
+// the sum is then 3 + 6 (2 / pi)^2 instead of 3.
 //
-// Without these layers s is 0, and the figures include an unknown amount of the reference's noise. The
-// difference of noisy numbers can be negative, and is then set to 0.
+// Without the layers stderr.R, G, B, s is 0, and the figures include an unknown amount of the reference's
+// noise. The difference of noisy numbers can be negative, and is then set to 0.
 #pragma once
 
 #include <cstddef>
@@ -65,8 +65,8 @@ struct Reference {
   ReferenceOrigin origin = {};
 };
 // Reads a reference image. invalid_argument: it is not an image, has another size than `size`, or has values
-// that are not finite. A file whose error layers have values that are not finite and positive is also
-// rejected. `name` is for messages.
+// that are not finite. It is also invalid_argument if an error layer has a value that is negative or not
+// finite. `name` is for messages.
 Result<Reference> read_reference(std::span<const std::byte> exr, const std::string& name, FrameSize size,
                                  const ExrLimits& limits = {});
 

@@ -63,7 +63,7 @@ std::string canonical_json(const Needs& needs);
 // they are equal. Any text is accepted.
 std::string first_difference(const std::string& here, const std::string& there);
 
-// A part of the renderer ("volume grids"), whether the scene needs it, and the reason.
+// A part of the renderer (for example "volume grids"), whether the scene needs it, and the reason.
 struct Need {
   std::string part;
   bool used = false;

@@ -1,9 +1,9 @@
-// Removes parts of a scene that cannot affect any pixel, before the scene is stored, sent or loaded. These
-// are dead branches of materials, lights without power, media without effect or that no light enters
+// Removes parts of a scene that cannot affect any pixel, before the scene is stored, sent or loaded. They are
+// dead branches of materials, lights without power, media without effect or that no light enters
 // (unreachable.h), phase functions of media that do not scatter, and invisible surfaces; also the files that
-// only these refer to. The image stays the same. Its bits stay the same too, with three exceptions: rays hit
-// a removed surface before, next-event estimation sampled a removed light, or a removed medium (one that no
-// light enters) caused equi-angular sampling in the remaining media.
+// only these refer to. The image stays the same. Its bits stay the same too, unless one of the removed parts
+// took part in sampling: rays hit a removed surface, next-event estimation sampled a removed light, or a
+// removed medium (one that no light enters) was the reason for equi-angular sampling in the remaining media.
 #pragma once
 
 #include <string>

@@ -12,10 +12,10 @@ namespace ls::scene {
 // nothing else refers to that medium. `scene` must be consistent. Paths begin at the camera, in the sensor's
 // medium. They enter another medium when they leave a surface towards its side, by reflection or
 // transmission. An interior can be removed for either of two reasons:
-// - The surface is black behind: no path leaves it to that side.
-// - The shape is a sphere or cube that no light passes, and inside or on it there is no camera, no emitter
-// and no surface that light passes. Only rounding can put a path inside (around an edge of a cube), and it
-// finds no light there.
+// - The back of the surface is black: no path leaves the surface to that side.
+// - The shape is a sphere or cube that no light passes, and inside or on this shape there is no camera, no
+// emitter and no surface that light passes. Only rounding can put a path inside (around an edge of a cube),
+// and such a path finds no light there.
 std::vector<bool> unreachable_interiors(const Scene& scene);
 
 }  // namespace ls::scene

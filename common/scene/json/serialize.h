@@ -1,6 +1,6 @@
-// The canonical form of a Scene: JSON with sorted keys, every field written, doubles in the shortest form
-// that reads back to the same bits. Its SHA-256 is the scene's digest. The coordinator sends this form to
-// workers.
+// The canonical form of a Scene: JSON with sorted keys, all fields (except some that have their default,
+// Field::elided), doubles in the shortest form that reads back to the same bits. Its SHA-256 is the scene's
+// digest. The coordinator sends this form to workers.
 #pragma once
 
 #include <string>

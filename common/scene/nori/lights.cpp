@@ -1,4 +1,4 @@
-// Translates emitters.
+// Translates Nori's emitters.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -73,8 +73,8 @@ Element environment(Object& o) {
   Element out = light("envmap", o);
   add_as(out, o.take("filename"), "filename");
   add_as(out, o.take("strength"), "scale");
-  // Rotates from Mitsuba's convention (+y at the top, -z at the left edge, +x a quarter further) to Nori's:
-  // +z, +x and +y.
+  // Rotates from Mitsuba's convention (+y at the top, -z at the left edge, +x a quarter further) to Nori's
+  // (+z at the top, +x at the left edge, +y a quarter further).
   add_transform(out, o.take("toWorld"), "to_world",
                 {matrix_step({0, 0, -1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1}, o.element().at)});
   return out;

@@ -1,4 +1,4 @@
-// Translates media with their phase functions and volumes.
+// Translates Nori's media with their phase functions and volumes.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ struct Coefficients {
   Rgb sigma_t, albedo;
 };
 
-// Reads the three notations of coefficients: sigma_a and sigma_s, absorption and scattering, sigma_t and
+// Reads the three notations of coefficients: sigma_a with sigma_s, absorption with scattering, sigma_t with
 // albedo.
 class Reader {
  public:

@@ -213,8 +213,7 @@ void Object::left_over(const Child& c) {
     if (p.name == name && !p.idle.empty())
       return report_.warning(value_place(*c.e, "name"),
                              fmt::format("'{}' of {} has no effect here: {}", name, title(), p.idle));
-    // The parameter is known but has no effect with the other parameters. It was reported, or is implied by
-    // them.
+    // The parameter is known, but nobody took it: with the other parameters it has no meaning.
     if (p.name == name)
       return report_.error(
           value_place(*c.e, "name"),

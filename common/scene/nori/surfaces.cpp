@@ -1,4 +1,4 @@
-// Translates bsdfs and textures.
+// Translates Nori's bsdfs and textures.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -29,8 +29,8 @@ std::array<double, 2> pair(Object& o, std::string_view parameter, double fallbac
   return {v->front(), v->size() > 1 ? (*v)[1] : v->front()};
 }
 
-// Returns the offset of u between the two formats on a sphere: half a turn. (On a mesh, v starts at the
-// bottom in Nori and at the top in Mitsuba.)
+// Returns the difference of u between Nori and Mitsuba: half a turn on a sphere, otherwise none. (v differs
+// on meshes: it starts at the bottom in Nori and at the top in Mitsuba.)
 double half_turn(const Mesh& mesh) { return mesh.sphere ? .5 : 0; }
 
 Element checkerboard(Object& o, const Mesh& mesh) {
@@ -167,12 +167,13 @@ Element principled(Object& o, const Mesh& mesh, Report& report) {
                            "sheen_tint", "spec_tint", "spec_trans"})
     add_as(out, o.take(name), name);
   const double specular = o.number("specular", .5);
-  // the same value as in Kombu
+  // the same value as in Kombu, a descendant of Nori
   add(out, "specular", glass && specular == 0 ? 1e-3 : specular, o.element().at);
   return out;
 }
 
-// Translates Kombu's blend. Its parts have names; its weight may be a texture without a name.
+// Translates the blend of Kombu, a descendant of Nori. Its parts have names; its weight may be a texture
+// without a name.
 std::optional<Element> blend(Object& o, const Mesh& mesh, Report& report) {
   Element out = bsdf_of("blendbsdf", o.element());
   const Element* fresnel = o.take("fresnel");

@@ -148,7 +148,8 @@ class SceneTranslator {
     add(out_, std::move(*sensor));
   }
 
-  // Kombu puts the camera into the medium of the mesh whose bounding box contains it.
+  // Kombu (a descendant of Nori) puts the camera into the medium of the mesh whose bounding box contains the
+  // camera.
   void inside_of_mesh(Element& sensor) {
     const auto placed = std::find_if(sensor.children.begin(), sensor.children.end(),
                                      [](const Element& c) { return c.tag == "transform"; });

@@ -7,8 +7,8 @@
 
 namespace ls::scene {
 
-// Warns if the camera is inside a boundary: as in Mitsuba, only the sensor's `medium` decides in which medium
-// it is.
+// Warns if the camera is inside a shape with an interior medium but has no `medium` itself: as in Mitsuba,
+// only the sensor's `medium` says in which medium the camera is.
 void Reader::warn_of_media_around_camera() {
   if (!sensor_ || scene_.sensor.medium || report_.has_errors()) return;
   const auto& m = scene_.sensor.to_world.m;

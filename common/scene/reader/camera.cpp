@@ -128,8 +128,8 @@ void Reader::read_film(const Element& e) {
   p.finish();
 }
 
-// Checks the crop. A missing side is the frame's. A crop of the whole frame is stored as no crop, so that
-// both scenes are equal.
+// Checks the crop. If its width or height is missing, the frame's is used. A crop of the whole frame is
+// stored as no crop, so that both scenes are equal.
 void Reader::check_crop(const Element& e, Params& p, bool has_width, bool has_height) {
   FilmSettings& f = scene_.film;
   if (!has_width) f.crop_size.width = f.size.width;

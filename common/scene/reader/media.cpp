@@ -13,7 +13,7 @@ void need_both(Params& p, const char* one, const char* other, Report& report) {
   report.error(p.object().at, fmt::format("{} needs {} and {}", p.title(), one, other));
 }
 
-// Reads sigma_a and sigma_s, or sigma_t and albedo; the others are derived.
+// Reads sigma_a and sigma_s, or sigma_t and albedo; the other two are derived.
 void read_old_coefficients(Params& p, HomogeneousMedium& medium, Report& report) {
   const bool apart = p.has("sigma_a") || p.has("sigma_s"), together = p.has("sigma_t") || p.has("albedo");
   if (apart && together)
@@ -49,8 +49,8 @@ void need_inverse(const Transform& to_world, const Element& e, Report& report) {
     report.error(e.at, "to_world flattens this volume or leaves the range of numbers: it can't be inverted");
 }
 
-// The parameters that have an effect only together with another one. Must be constructed before parameters
-// are taken.
+// Whether parameters are given that have an effect only together with another one. Must be constructed before
+// parameters are taken.
 struct Factors {
   explicit Factors(const Params& p)
       : light(p.has("emission_scale")), heat(p.has("temperature_scale") || p.has("temperature_offset")) {}

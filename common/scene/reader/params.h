@@ -35,8 +35,8 @@ class Params {
   // Reports the parameters that no reader took.
   void finish();
 
-  // Each returns a plain value. Returns nullopt if it is absent; also if it has the wrong type, which is
-  // reported.
+  // Each returns the value of a parameter that is no object. nullopt: the parameter is absent, or its type is
+  // wrong, which is reported.
   std::optional<std::string> take_string(std::string_view name);
   std::optional<double> take_number(std::string_view name);
   std::optional<Transform> take_transform(std::string_view name);

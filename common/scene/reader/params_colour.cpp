@@ -61,7 +61,7 @@ std::optional<Rgb> Params::spectrum(const Field& f, const Element& e, std::strin
   return in_range(f, e, *c) ? c : std::nullopt;
 }
 
-// A spectrum, or a texture that is the same everywhere.
+// Returns the colour of an object: of a spectrum, or of a texture that is the same everywhere.
 std::optional<Rgb> Params::colour_of_object(const Field& f, const Element& e, const Element& object) {
   std::optional<Rgb> c;
   if (Reader::is_spectrum(object)) {

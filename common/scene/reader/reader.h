@@ -35,8 +35,9 @@ class Reader {
   std::optional<PhaseIndex> phase(const Element& object, const Element& use);
   std::optional<MediumIndex> medium(const Element& object, const Element& use);
 
-  // A spectrum of which the use decides the colour: one that is the colour of light in any case, and a curve,
-  // which is seen as it is (light) or under D65 (anything else).
+  // A spectrum given as an object. Rgb: a colour for any use. LightColour: the colour of a light, allowed for
+  // emitters only. SpectralCurve: its colour depends on the use: a curve of light is converted as it is, any
+  // other one under D65.
   struct LightColour {
     Rgb value;
   };
@@ -158,7 +159,7 @@ class Reader {
   // The index of each shape group that was read; nullopt: the group has no shape, or is wrong.
   std::unordered_map<const Element*, std::optional<GroupIndex>> groups_;
   std::optional<GroupIndex> group_;            // the group whose shapes are being read
-  std::unordered_set<const Element*> merges_;  // read so far
+  std::unordered_set<const Element*> merges_;  // the shapes "merge" that were read so far
   std::map<std::string, AssetIndex> assets_by_name_;
   std::unordered_set<const Element*> in_progress_;
   std::unordered_set<const Element*> bad_refs_;  // references whose errors have been reported

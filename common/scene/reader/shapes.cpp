@@ -62,8 +62,8 @@ void Reader::read_shape_group(const Element& e) {
   index = group;
 }
 
-// Its shapes look the same apart. One use of each, and none within another: references to references could
-// make more shapes than there is memory.
+// Reads the shapes in a shape "merge" one by one; the image is the same. A merge may be used only once, and
+// not within another: nested references could multiply its shapes until memory runs out.
 void Reader::read_merge(const Element& e) {
   if (!merges_.insert(&e).second)
     return report_.error(
@@ -233,7 +233,8 @@ bool stays_cylinder(const CylinderShape& c, const Transform& t) {
 
 }  // namespace
 
-// Checks the attributes that textures read. Whether the file has them is checked when the mesh is loaded.
+// Checks that the shape is a PLY mesh if its textures read mesh attributes. Whether the file has these
+// attributes is checked when the mesh is loaded.
 void Reader::check_attributes(const Element& e, const Shape& shape) {
   const auto* mesh = std::get_if<MeshShape>(&shape.geometry);
   if (!reads_attributes_ || (mesh && mesh->format == MeshFormat::ply)) return;

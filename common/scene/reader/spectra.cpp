@@ -55,7 +55,7 @@ std::optional<Reader::Spectrum> Reader::read_spectrum(const Element& e) {
   Params p(*this, e);
   Spectrum s;
   if (type == "d65") {
-    // As in Mitsuba's RGB modes: the white of sRGB.
+    // As in Mitsuba's RGB modes, d65 is the white of sRGB.
     Rgb colour{1, 1, 1};
     double scale = 1;
     if (const Element* given = p.take("color")) p.convert({.name = "color", .doc = ""}, *given, colour);
@@ -71,7 +71,7 @@ std::optional<Reader::Spectrum> Reader::read_spectrum(const Element& e) {
         needed_number(p, "temperature", {.min = 0, .max = kHottest, .open_min = true}, report_);
     if (report_.has_errors()) return std::nullopt;
     Rgb colour = linear_srgb(black_body_xyz(kelvin));
-    for (double& x : colour) x = std::max(x, 0.0);  // a red outside of sRGB
+    for (double& x : colour) x = std::max(x, 0.0);  // a red outside of sRGB has negative components
     s = LightColour{colour};
   } else {
     SpectralCurve curve;

@@ -70,7 +70,7 @@ std::optional<TextureIndex> Reader::read_uniform_texture(const Element& e, std::
   return add_constant_texture(value);
 }
 
-// Its value is one number, or the three of a <vector>.
+// Reads a texture "rawconstant": its value is one number, or the three of a <vector>.
 std::optional<TextureIndex> Reader::read_raw_constant(const Element& e) {
   Params p(*this, e);
   Rgb value{};
@@ -104,7 +104,8 @@ const BsdfTraits& Reader::traits(BsdfIndex bsdf) {
   return bsdf_traits_[bsdf.value];
 }
 
-// Reads a kind all of whose parameters have rows in describe(). Kinds that need more are specialised below.
+// Reads a bsdf whose parameters all have rows in describe(). Kinds of bsdfs that need more have
+// specialisations below.
 template <class Kind>
 std::optional<BsdfIndex> Reader::read_bsdf_as(const Element& e) {
   Params p(*this, e);

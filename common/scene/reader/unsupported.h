@@ -1,4 +1,4 @@
-// Parameters of the dialect that have no effect here.
+// Parameters of Mitsuba's scene format that have no effect in this program.
 #pragma once
 
 #include <string>

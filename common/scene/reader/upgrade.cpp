@@ -101,8 +101,8 @@ void place_texture(Element& e) {
   e.children.push_back(std::move(transform));
 }
 
-// Upgrades a bitmap texture. A gamma of -1 means the file's own; 1 means linear, which is now `raw`. The
-// texture gets one wrap mode for both directions.
+// Upgrades a bitmap texture. A gamma of -1 means that of the image's file; 1 means linear, which is now
+// `raw`. The wrap modes for u and v become one for both.
 void upgrade_bitmap(Element& e) {
   if (const Element* gamma = child(e, "gamma")) {
     const auto value = parse_number(gamma->get("value"));

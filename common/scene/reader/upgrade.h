@@ -11,7 +11,7 @@
 
 namespace ls::scene {
 
-// True if `version` is that of such a file ("0.5.0", but not "3.0.0").
+// True if `version` is that of an old file ("0.5.0", but not "3.0.0").
 bool is_old_version(std::string_view version);
 
 // Upgrades an element, whose children have been upgraded already, and marks it as old. Leaves everything

@@ -330,7 +330,7 @@ class Writer {
     if (x != f.unwritten) value("float", f.name, number(x));
   }
   void property(const Field& f, int x) {
-    // Left out if there is no crop, or if the mesh is the only one in its file.
+    // 0 is the default, and left out: no crop or an offset of 0, and the first mesh of a file.
     if (x == 0 && (f.name.starts_with("crop_") || f.name == "shape_index")) return;
     if (x == f.unwritten) return;
     value("integer", f.name, std::to_string(x));

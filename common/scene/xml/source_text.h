@@ -23,7 +23,8 @@ struct Span {
 
 class SourceText {
  public:
-  // `path_of` names what stands at an offset, for the beginning of messages about it; empty: nothing does.
+  // Returns a name of what stands at an offset (a path in the document), with which messages about that place
+  // begin; an empty text: there is no such name.
   using PathOf = std::function<std::string(std::size_t)>;
   SourceText(std::string name, std::string text, PathOf path_of = {});
 
@@ -32,7 +33,7 @@ class SourceText {
   // Returns line and column of a byte, both from 1. The column counts characters (UTF-8 code points), not
   // bytes, which takes time proportional to the line's length.
   SourcePlace place(std::size_t offset) const;
-  int line(std::size_t offset) const;  // returns the line only, which needs no scan of it
+  int line(std::size_t offset) const;  // returns the line only, in constant time
   std::size_t index_bytes() const { return lines_before_.size() * sizeof lines_before_[0]; }
   // Makes a diagnostic about the bytes [offset, offset + length), with their line cut to a readable length.
   Diagnostic diagnose(Diagnostic::Severity severity, std::size_t offset, std::size_t length,
@@ -49,7 +50,7 @@ class SourceText {
 
 // Returns the offset of the first byte that is not well-formed UTF-8; npos if there is none.
 std::size_t find_invalid_utf8(std::string_view text);
-// Returns the offset of the first control character in well-formed UTF-8 (below U+0020 except blanks and line
+// Returns the offset of the first control character in well-formed UTF-8 (below U+0020 except tabs and line
 // ends, U+007F to U+009F); npos if there is none.
 std::size_t find_control(std::string_view text);
 

@@ -26,7 +26,8 @@ Transform read_transform(const Element& e, Report& report);
 // True if the singular values of the linear part are equal within the rounding of single precision: the
 // matrix scales equally in all directions.
 bool is_similarity(const Transform& t);
-// Returns the x and y rows and the translation of a 4 x 4 matrix, as Mitsuba 3 uses them for textures.
+// Returns the part of a 4 x 4 matrix that maps x and y to x and y, with their translation: what Mitsuba 3
+// uses for textures.
 UvTransform uv_part(const Transform& t);
 
 // Reads x, y, z or value="..." of <translate>, <rotate>, <scale>, <vector> or <point>; missing components

@@ -23,8 +23,8 @@ std::optional<Rgb> parse_rgb(std::string_view text);
 // Parses #rrggbb without decoding: 255 becomes 1.
 std::optional<Rgb> parse_hex(std::string_view text);
 double decode_srgb(double x);  // converts to linear (IEC 61966-2-1)
-// The value of a <spectrum>: one number, three numbers of linear sRGB (0.x files), or wavelength:value pairs
-// in nm; std::monostate if the text is none of these.
+// The value of a <spectrum>: one number, three numbers of linear sRGB (in files of Mitsuba 0.x), or
+// wavelength:value pairs in nm; std::monostate if the text is none of these.
 using SpectrumText = std::variant<std::monostate, double, Rgb, SpectralCurve>;
 SpectrumText parse_spectrum(std::string_view text);
 
