@@ -35,8 +35,8 @@ std::string one_line(std::string_view text) {
   return line;
 }
 
-// Splits "a=1 b=two words c=3" into keys and values: a word without '=' belongs to the value before it. Of
-// equal keys the first is kept.
+// Splits "a=1 b=two words c=3" into keys and values: a word without '=' belongs to the value before it. If a
+// key occurs twice, its first value is kept.
 void add_keys(nlohmann::ordered_json& line, std::string_view keys) {
   std::string key, value;
   const auto flush = [&] {

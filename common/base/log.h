@@ -1,6 +1,6 @@
-// One line per event, with keys: log_info("job=j-12 tile=4 worker=w-3", "unit accepted"). info = a state
-// changed, warn = something was retried, error = a person must act. An error is either logged or returned,
-// never both.
+// Logs one line per event, with keys and a text: log_info("job=j-12 tile=4 worker=w-3", "unit accepted").
+// info = a state changed, warn = something was retried, error = a person must act. An error is either logged
+// or returned, never both.
 #pragma once
 
 #include <optional>

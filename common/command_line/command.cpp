@@ -59,7 +59,7 @@ Command describe_command(const CLI::App& app) {
   const auto shown = [](const CLI::App* each) { return !each->get_group().empty(); };
   for (const CLI::App* each : app.get_subcommands(shown)) {
     command.commands.push_back(describe_command(*each));
-    // CLI11 copies a command's footer to its subcommands, where it is removed.
+    // CLI11 copies a command's footer to its subcommands; the copies are removed.
     if (command.commands.back().footer == command.footer) command.commands.back().footer.clear();
   }
   return command;

@@ -2,9 +2,10 @@
 // optional and is searched for at run time. It runs in a separate program, lightshaft-denoise, installed
 // beside the executable: a crash or a lack of memory in it is merely an error here.
 //
-// The library is searched for in this order: the environment variable LIGHTSHAFT_OIDN (the library's file,
-// its folder, or the folder above that); `oidn/lib` beside the executable, and `oidn/lib` two folders above
-// it, where deploy/install-denoiser.sh puts it in a build; the places where the system's loader looks.
+// If the environment variable LIGHTSHAFT_OIDN is set, it names the library: its file, its folder, or the
+// folder above that. Otherwise the library is searched for in this order: `oidn/lib` beside the executable;
+// `oidn/lib` two folders above the executable, where deploy/install-denoiser.sh puts it in a build; the
+// places where the system's loader looks.
 #pragma once
 
 #include <filesystem>

@@ -48,7 +48,7 @@ std::string verdict(const Json& report) {
     const std::string words = text(report, "verdict");
     out += fmt::format("<p class=\"verdict\" role=\"note\">{}</p>",
                        escape_html(words.empty() ? phrase("estimateInDoubt") : words));
-  } else if (objects(report, "convergence").empty()) {  // otherwise it is shown below the curves
+  } else if (objects(report, "convergence").empty()) {  // otherwise the words are below the curves
     out += paragraph("note", verdict_words(report));
   }
   return out + paragraph("note", unreached(report)) + paragraph("note", one_seed(report)) +

@@ -43,15 +43,15 @@ struct BitmapTexture {
 };
 // A checkerboard: color0 where floor(2 u') + floor(2 v') is even after to_uv, with u', v' taken modulo 1
 // (Mitsuba's `checkerboard`). If it is read as a scalar (roughness, opacity, weight of a blend, all
-// parameters of `principled` except its colour) the two are swapped, as in Mitsuba 3.9.
+// parameters of `principled` except its colour) color0 and color1 are swapped, as in Mitsuba 3.9.
 struct CheckerboardTexture {
   TextureIndex color0, color1;
   UvTransform to_uv;
   bool operator==(const CheckerboardTexture&) const = default;
 };
 // The largest channel of another texture or, with `hue`, the colour of that texture divided by its largest
-// channel (white where it is black). The product of the two is the texture itself. This is an extension, used
-// to express Nori's `microfacet`.
+// channel (white where that texture is black). The product of the variants with and without `hue` is the
+// texture itself. This is an extension, used to express Nori's `microfacet`.
 struct PeakTexture {
   TextureIndex texture;
   bool hue = false;
@@ -273,7 +273,7 @@ struct SpotEmitter {  // a spot light at the origin of to_world, which emits alo
   Transform to_world;
   Rgb intensity{1, 1, 1};
   double cutoff_angle = 20;  // degrees from the axis; no light beyond this
-  // Full intensity within this angle; linear in the angle between the two
+  // Full intensity within this angle; up to cutoff_angle the intensity falls linearly with the angle
   double beam_width = 15;
   std::optional<TextureIndex> texture;  // image by which the light is multiplied, projected as in Mitsuba
   bool operator==(const SpotEmitter&) const = default;

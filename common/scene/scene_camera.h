@@ -12,10 +12,10 @@ namespace ls {
 
 enum class FovAxis { x, y, diagonal, smaller, larger };
 
-// How the camera projects. orthographic: parallel rays from the rectangle [-1, 1] x [-1/a, 1/a] of its own x
-// and y (a: width / height of the image), which to_world may scale. spherical: all directions by latitude and
-// longitude; the top row is +y, the left edge -z, and a quarter of the width further is +x (Mitsuba 0.x); it
-// has no clip planes.
+// How the camera projects. orthographic: parallel rays from the rectangle [-1, 1] x [-1/a, 1/a] in the
+// camera's x and y (a: width / height of the image), which to_world may scale. spherical: all directions by
+// latitude and longitude; the top row is +y, the left edge -z, and a quarter of the width further is +x
+// (Mitsuba 0.x); it has no clip planes.
 enum class Projection { perspective, orthographic, spherical };
 struct Sensor {  // looks along +z of to_world, with +y up and +x to the LEFT (Mitsuba)
   Transform to_world;

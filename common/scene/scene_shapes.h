@@ -42,8 +42,8 @@ using Geometry = std::variant<RectangleShape, CubeShape, SphereShape, DiskShape,
 
 // Light from a shape's surface, emitted on the side of the normal only. It is a beam if beam_width is set. At
 // an angle a from the normal, in degrees, the radiance is then the full one for a within beam_width and zero
-// beyond cutoff_angle; in between it is the full one times s^falloff with s = (cos a - cos cutoff_angle) /
-// (cos beam_width - cos cutoff_angle).
+// beyond cutoff_angle; in between it is the full radiance times s^falloff with s = (cos a - cos cutoff_angle)
+// / (cos beam_width - cos cutoff_angle).
 struct AreaEmitter {
   TextureIndex radiance;
   double cutoff_angle = 90, beam_width = 90, falloff = 1;

@@ -18,8 +18,8 @@ using Pairs = std::vector<std::pair<std::string, std::string>>;
 constexpr const char* kTracesPath = "/v1/traces";
 constexpr std::string_view kServiceName = "service.name";
 
-// The variable for traces, else the one for all signals, with its name for messages; an empty value counts as
-// not set.
+// The value of the variable for traces, or else of the one for all signals (traces, metrics, logs), with the
+// variable's name for messages. An empty value counts as not set.
 struct Setting {
   std::string name, value;
 };

@@ -38,8 +38,8 @@ class SpanQueue {
 
   // The caller reports how sending the batch of due() ended:
   void taken(std::uint64_t rejected);              // the collector took it, except for `rejected` spans
-  void failed(TimePoint now);                      // it may be sent again
-  void refused();                                  // it would be refused again
+  void failed(TimePoint now);                      // the batch may be sent again
+  void refused();                                  // the batch is dropped: it would be refused again
   bool in_trouble() const { return in_trouble_; }  // the last attempt to send a batch failed
 
   const Figures& figures() const { return figures_; }

@@ -57,7 +57,7 @@ struct AovRow {
   std::string_view name;  // name in requests, and of the layer
   AovKind kind;
   std::string_view components;  // channels of the layer, one letter each
-  bool half;                    // stored as half floats, unless the image is in floats
+  bool half;                    // stored as half floats, unless float output is requested
 };
 std::span<const AovRow> aov_rows();  // all AOVs, sorted by name
 const AovRow& row_of(Aov aov);

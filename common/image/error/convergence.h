@@ -5,9 +5,10 @@
 // the half difference at n. With independent samples D_m is (n/m) D_n plus an independent rest, so corr(D_n,
 // D_m) = sqrt(n/m). For Gaussian D the estimates, sums of D^2, have the correlation n/m. Their logarithms are
 // fitted by generalised least squares (Aitken 1936) with this covariance; without it the slope's interval
-// would be far too narrow. The variance of one estimate is half of the variance of its interval: an interval
-// for the realised error also contains the variance of the realised error, which is as large
-// (error_estimate.h). Only checkpoints at doubling sample counts are used; those between them add little.
+// would be far too narrow. The variance of one estimate is half of the variance that its interval shows: the
+// interval is for the realised error, so it also contains the variance of the realised error, which is as
+// large (error_estimate.h). Only checkpoints at doubling sample counts are used; those between them add
+// little.
 #pragma once
 
 #include <optional>
@@ -67,8 +68,8 @@ struct Forecast {
 };
 // Forecasts what is needed until the estimated relMSE reaches `target`, rounded up to a whole round (range of
 // samples). Core seconds of 0: the target has been reached. nullopt: no point has a positive error and time.
-// The slope is the fitted one, moved towards 1 as far as the points leave it open (a Gaussian prior of
-// standard deviation 0.15).
+// The slope is the fitted one, moved towards 1 as far as the points leave it open (a Gaussian prior of mean 1
+// and standard deviation 0.15).
 //
 // Slopes change: the gain of low-discrepancy points on smooth parts of an image is used up eventually, and a
 // slope of 1.2 at 4 samples becomes 1.0 at 256 (the bench scene `tint`). A straight line through all

@@ -58,12 +58,12 @@ class Film {
   // Folds the partial of round `round` of tile `tile`. The rounds of a tile must come in the order 0, 1, 2,
   // ...; a truncated round only as the last. invalid_argument: the partial is not of this tile or round;
   // failed_precondition: an earlier round is missing (the message names the next one); already_exists: this
-  // round, or more of it, has been folded. On error the film is unchanged. `digest` is unit_digest(partial),
-  // if already known.
+  // range of the round, or a longer one, has been folded before. On error the film is unchanged. `digest` is
+  // unit_digest(partial), if already known.
   Result<TileError> fold(TileIndex tile, RoundIndex round, const Partial& partial);
   Result<TileError> fold(TileIndex tile, RoundIndex round, const Partial& partial, const Digest& digest);
 
-  // Resets a tile, because a worker sent wrong results: it starts again from round 0.
+  // Removes all samples of a tile, because a worker sent wrong results. The tile starts again from round 0.
   void discard(TileIndex tile) { tiles_[tile] = nullptr; }
 
   // Figures of one tile.

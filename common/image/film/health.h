@@ -73,8 +73,8 @@ struct Health {
   bool clean() const { return causes.empty(); }
   void add(HealthCause cause, std::uint64_t count);
   void add(HealthCause cause, std::uint64_t count, const HealthLocation& location);
-  // Merges the health of other samples of the same job: counts add up, except those of inputs, which are the
-  // same in both.
+  // Merges the health of other samples of the same job: counts add up, except those of HealthEffect::input,
+  // which are the same in both.
   void merge(const Health& other);
   bool operator==(const Health&) const = default;
 };

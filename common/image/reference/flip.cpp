@@ -97,7 +97,8 @@ constexpr float kTone[6] = {.6F * .6F * 2.51F, .6F * .03F, 0, .6F * .6F * 2.43F,
 float tone_mapped(float v) {
   if (!(v > 0)) return 0;
   if (!std::isfinite(v)) return 1;
-  // Limits v, since larger values would overflow when squared. The curve is constant there, above 1.
+  // Limits v, since larger values would overflow when squared. For such values the curve is constant, above
+  // 1.
   v = std::min(v, 1e15F);
   return shown((kTone[0] * v * v + kTone[1] * v + kTone[2]) / (kTone[3] * v * v + kTone[4] * v + kTone[5]));
 }

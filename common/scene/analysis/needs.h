@@ -30,8 +30,8 @@ struct Needs {
   // isotropic.
   bool media = false, grids = false, chromatic = false, emission = false, anisotropic = false;
   bool camera_in_medium = false;
-  // boundaries: it has index-matched surfaces. null_transmission: it has surfaces through which part of the
-  // light passes straight.
+  // boundaries: the scene has index-matched surfaces. null_transmission: it has surfaces through which a part
+  // of the light passes without a change of direction.
   bool boundaries = false, null_transmission = false;
   bool lens = false, crop = false;
   // Number of objects of each type, by the type's name in describe.h. Types without objects are left out.

@@ -96,8 +96,8 @@ class Search {
                        [&](const Entrance& e) { return e.shape != i && e.box && apart(box, e); });
   }
 
-  // True if the entrance (a surface through which light may come) is clear of the shape, beside it or around
-  // it.
+  // True if the entrance (a surface through which light may come) does not touch the shape, whose box is
+  // `tight`: it lies beside the shape or encloses it.
   bool apart(const Box& tight, const Entrance& e) const {
     const Box box = with_margin(tight, *e.box);
     if (!touch(box, *e.box)) return true;

@@ -32,8 +32,7 @@ class Object {
   std::string_view type() const { return plugin_.type; }
   bool has(std::string_view parameter) const;
 
-  // Returns the element that sets the parameter. Returns nullptr if there is none; also if it is wrong, which
-  // is reported.
+  // Returns the element that sets the parameter. nullptr: there is none, or it is wrong, which is reported.
   const Element* take(std::string_view parameter);
   double number(std::string_view parameter, double fallback);
   Rgb color(std::string_view parameter, const Rgb& fallback);

@@ -248,7 +248,7 @@ void Params::convert(const Field& f, const Element& e, TextureIndex& value) {
   if (object && !spectrum && (object->tag == "texture" || object->tag == "spectrum")) {
     const auto index = reader_.texture(*object, e);
     if (!index) return;
-    // The bounds of images are unknown here.
+    // The values of images are not known yet, so only textures with known bounds are checked.
     if (const auto& b = reader_.bounds(*index); b && !(in_range(f, e, b->low) && in_range(f, e, b->high)))
       return;
     value = *index;

@@ -41,7 +41,7 @@ class Params {
   std::optional<double> take_number(std::string_view name);
   std::optional<Transform> take_transform(std::string_view name);
 
-  // Used by Binder: these convert `e` to `value`, in the notation of that type, and report errors.
+  // Used by Binder: these read `value` from `e`, in the notation of the value's type, and report errors.
   void convert(const Field& f, const Element& e, double& value);
   void convert(const Field& f, const Element& e, int& value);
   void convert(const Field& f, const Element& e, bool& value);

@@ -4,8 +4,7 @@
 
 namespace ls::scene {
 
-// Reports that the object's type cannot be read: it is unsupported, or unknown, and then the message has a
-// suggestion.
+// Reports that the object's type is unsupported or unknown. The message for an unknown type has a suggestion.
 void unknown_plugin(const Element& e, Report& report);
 
 }  // namespace ls::scene

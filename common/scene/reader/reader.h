@@ -148,7 +148,7 @@ class Reader {
   std::vector<BsdfTraits> bsdf_traits_;  // traits of the first bsdfs of scene_; more are added when needed
 
   bool reads_attributes_ = false;  // true if some texture read so far is a mesh attribute
-  // Results of old_number(), by the texture as it was read
+  // Results of old_number(), a texture with swapped colours, by the texture as it was read
   std::map<TextureIndex, TextureIndex> old_numbers_;
   Memo<TextureIndex> textures_;
   Memo<Spectrum> spectra_;

@@ -236,8 +236,9 @@ std::optional<BsdfIndex> Reader::read_bsdf_as<TwoSidedBsdf>(const Element& e) {
   return add_bsdf(e, TwoSidedBsdf{sides->front(), sides->back()});
 }
 
-// In files of version 0.x a checkerboard shows the same squares as a scalar and as a colour (see scene.h). So
-// if it is used as a scalar, it is replaced by another one with the colours swapped.
+// In files of version 0.x a checkerboard shows the same squares as a scalar and as a colour, unlike in
+// version 3 (see CheckerboardTexture in scene.h). So if it is used as a scalar, it is replaced by another one
+// with the colours swapped.
 TextureIndex Reader::old_number(const Element& e, TextureIndex t) {
   if (!e.old || t.value >= scene_.textures.size()) return t;
   const auto* given = std::get_if<CheckerboardTexture>(&scene_.textures[t.value]);
@@ -261,7 +262,7 @@ std::optional<BsdfIndex> Reader::read_bsdf_as<MaskBsdf>(const Element& e) {
   const bool known = b.opacity.value < scene_.textures.size();
   const auto* image = known ? std::get_if<BitmapTexture>(&scene_.textures[b.opacity.value]) : nullptr;
   if (image && image->channel == Channel::all) {
-    BitmapTexture opacity = *image;  // a copy, because others may use its colour
+    BitmapTexture opacity = *image;  // a copy, because other objects may use the image's colour
     opacity.alpha = true;
     scene_.textures.emplace_back(opacity);
     b.opacity = {static_cast<std::uint32_t>(scene_.textures.size() - 1)};

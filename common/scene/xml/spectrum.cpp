@@ -12,8 +12,8 @@ namespace {
 
 using Xyz = std::array<double, 3>;
 
-// The inverse of the matrix of BT.709's primaries (x, y) = (.64, .33), (.30, .60), (.15, .06) and its white
-// (.3127, .3290), to six digits as is usual.
+// Converts XYZ to linear sRGB by the inverse of the matrix of BT.709's primaries (x, y) = (.64, .33), (.30,
+// .60), (.15, .06) and its white (.3127, .3290), to six digits as is usual.
 Rgb srgb_of(const Xyz& c) {
   return {3.240479 * c[0] - 1.537150 * c[1] - .498535 * c[2],
           -.969256 * c[0] + 1.875991 * c[1] + .041556 * c[2],

@@ -92,7 +92,7 @@ class TreeBuilder {
   bool read_attributes(pugi::xml_node node, Element& out) {
     AttributePlaces places(file_, text_, out.at.offset);
     for (const pugi::xml_attribute attribute : node.attributes()) {
-      // This also keeps the search for duplicate names short.
+      // This limit also keeps the search for duplicate names short.
       if (out.attributes.size() == kMaxElementAttributes) {
         report_.error(out.at,
                       fmt::format("<{}> has more than {} attributes", out.tag, kMaxElementAttributes));
@@ -124,9 +124,9 @@ class TreeBuilder {
   std::string_view text_;
 };
 
-// Returns the offset at which an attribute value begins whose closing quote is missing, so that it extends
-// into the next element (a parser would notice this only later); npos if there is none. XML allows no '<' in
-// values. Quotes in comments, CDATA and instructions are ignored.
+// Returns the offset of the first attribute value that has no closing quote before the next '<', which XML
+// does not allow in values; npos if there is none. (A parser would report such a missing quote at a later
+// place.) Quotes in comments, CDATA and instructions are ignored.
 std::size_t find_open_quote(std::string_view text) {
   static constexpr std::string_view kOpaque[][2] = {{"<!--", "-->"}, {"<![CDATA[", "]]>"}, {"<?", "?>"}};
   bool in_tag = false;
