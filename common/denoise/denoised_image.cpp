@@ -23,7 +23,8 @@ struct Noisy {
   std::vector<bool> counts;
 };
 
-// The planes of half A or B of a guide in TileAovs::sums, which are sorted by name: B, G, R or X, Y, Z.
+// The indices in TileAovs::sums of the three planes of one half (A or B) of a guide, an AOV for the denoiser.
+// The planes are sorted by name there: B, G, R or X, Y, Z.
 struct GuidePlanes {
   std::array<std::size_t, 3> plane{};
 };

@@ -24,8 +24,8 @@ class AssetSource {
   virtual Result<Asset> find(std::string_view name) = 0;
   // Returns the text of a scene file that another one includes; its size is limited.
   virtual Result<std::string> text(std::string_view name) = 0;
-  // Keeps a file that the reader has made of numbers in the scene's text; from then on find() returns it. If
-  // a source keeps no files, the sender of the scene must send this file, too, under the same name.
+  // Keeps a file that the reader has made from numbers in the scene's text; from then on find() returns it.
+  // If a source keeps no files, the sender of the scene must send this file, too, under the same name.
   virtual Result<Asset> keep(std::string_view name, const std::string& bytes);
 };
 

@@ -26,7 +26,8 @@ struct ConstantTexture {
   Rgb value{.5, .5, .5};
   bool operator==(const ConstantTexture&) const = default;
 };
-// v = 0 is the top row (Mitsuba 3): lookups do not flip; OBJ meshes flip v at load, see MeshShape.
+// An image as a texture. v = 0 is its top row, as in Mitsuba 3: lookups do not flip v, but OBJ meshes flip
+// theirs when they are loaded (MeshShape).
 struct BitmapTexture {
   AssetIndex file;
   TextureFilter filter = TextureFilter::bilinear;
@@ -76,9 +77,9 @@ using Texture = std::variant<ConstantTexture, BitmapTexture, CheckerboardTexture
 
 // Surfaces.
 enum class Microfacet { beckmann, ggx };
-// Rough surfaces with multiple_scattering include light that is scattered several times between microfacets,
-// which the plain model leaves out (docs/design/multiple-scattering.md). The roughness of such a surface must
-// be one constant.
+// Those of the following rough surfaces that have multiple_scattering set include light that is scattered
+// several times between microfacets, which the plain model leaves out (docs/design/multiple-scattering.md).
+// The roughness of such a surface must be one constant.
 
 struct DiffuseBsdf {
   TextureIndex reflectance;
@@ -110,7 +111,7 @@ struct RoughDielectricBsdf {
   bool multiple_scattering = false;
   bool operator==(const RoughDielectricBsdf&) const = default;
 };
-// A thin sheet, both sides in one surface: light passes without changing its direction
+// A thin sheet whose two sides are one surface: light passes without changing its direction
 struct ThinDielectricBsdf {
   double int_ior = 1.5046, ext_ior = 1.000277;
   TextureIndex specular_reflectance, specular_transmittance;
@@ -219,8 +220,8 @@ struct HgPhase {
 };
 using Phase = std::variant<IsotropicPhase, HgPhase>;
 
-// A medium with a constant extinction sigma_t (per scene unit) and albedo. When it is loaded, sigma_s =
-// albedo * sigma_t * scale. Emission per length is emission + sigma_a * source_radiance.
+// A medium with a constant extinction sigma_t (per scene unit) and albedo. When the medium is loaded, sigma_s
+// = albedo * sigma_t * scale. Emission per length is emission + sigma_a * source_radiance.
 struct HomogeneousMedium {
   Rgb sigma_t{1, 1, 1};
   Rgb albedo{.75, .75, .75};

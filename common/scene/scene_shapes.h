@@ -40,8 +40,8 @@ struct MeshShape {
 };
 using Geometry = std::variant<RectangleShape, CubeShape, SphereShape, DiskShape, MeshShape, CylinderShape>;
 
-// Light from a shape's surface, emitted on the side of the normal only. It is a beam if beam_width is set. At
-// an angle a from the normal, in degrees, the radiance is then the full one for a within beam_width and zero
+// Light from a shape's surface, emitted on the side of the normal only. If beam_width is set, the light is a
+// beam: at an angle a from the normal, in degrees, it has the full radiance for a within beam_width and zero
 // beyond cutoff_angle; in between it is the full radiance times s^falloff with s = (cos a - cos cutoff_angle)
 // / (cos beam_width - cos cutoff_angle).
 struct AreaEmitter {

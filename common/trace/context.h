@@ -11,7 +11,7 @@
 
 namespace ls::trace {
 
-// An id of zero bytes means that there is none; `traceparent` does not allow such ids.
+// If all bytes of an id are 0, there is no id; `traceparent` does not allow such ids.
 struct TraceId {
   std::array<std::uint8_t, 16> bytes{};
   auto operator<=>(const TraceId&) const = default;

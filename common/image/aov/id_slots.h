@@ -4,8 +4,8 @@
 // bits of the identifier; unused slots are 0, 0.
 //
 // Adding two sets keeps the largest slots of both; the others are counted in `more`. While the samples of a
-// pixel show no more than kIdSlots objects in total, every count is exact in any order; beyond that a count
-// may be too low by at most `more`.
+// pixel show no more than kIdSlots objects in total, every count is exact, in whatever order the sets are
+// added; beyond that a count may be too low by at most `more`.
 #pragma once
 
 #include <array>

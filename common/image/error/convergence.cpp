@@ -174,7 +174,8 @@ bool stands_on_a_floor(std::span<const ErrorPoint> points) {
   return false;
 }
 
-// Returns the earliest time after the last point, as a logarithm, at which `value` falls to `wanted`.
+// Returns the earliest time at which `value` has fallen to `wanted`. Times are logarithms, counted from the
+// last point.
 template <class Curve>
 double when(const Curve& value, double wanted) {
   constexpr double kMost = 60;  // reaching the value only after e^60 times as long counts as never

@@ -20,7 +20,8 @@ class Layers {
   explicit Layers(const Film& film)
       : film_(film), frame_(film.grid().frame), planes_(planes_of(film.aovs())) {
     sums_.assign(planes_.sums.size(), {});
-    // Hits, and half B of a guide, have no separate layer.
+    // Two kinds of planes have no layer of their own: the number of hits, and half B of a guide (an AOV for
+    // the denoiser), which is added to half A.
     for (std::size_t p = 0; p < sums_.size(); ++p)
       if (p != planes_.hits && planes_.sums[p].half == 0) sums_[p].resize(pixels_of(frame_));
     ids_.assign(planes_.ids.size() * 2 * kCryptomatteRanks, std::vector<float>(pixels_of(frame_)));
@@ -68,7 +69,8 @@ class Layers {
       if (sums_[p].empty()) continue;
       const AovRow& row = row_of(planes_.sums[p].aov);
       const bool by_hits = row.kind == AovKind::of_hits;
-      // The planes of half B of a guide follow those of A.
+      // A guide (an AOV for the denoiser) has planes for half A of the samples, then for half B. They are
+      // added.
       const double* other =
           row.kind == AovKind::guide ? &tile.sums[(p + row.components.size()) * n] : nullptr;
       each_pixel(tile.rect, frame_, [&](std::size_t to, std::size_t from) {

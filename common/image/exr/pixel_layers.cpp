@@ -55,7 +55,8 @@ std::vector<float> means(const TileAovs& tile, const AovPlanes& planes, const Ao
   for (std::size_t plane = 0; plane < planes.sums.size(); ++plane) {
     const AovPlane& p = planes.sums[plane];
     if (p.hits || p.aov != row.aov || p.half != 0) continue;
-    // The planes of half B of a guide follow those of A.
+    // A guide (an AOV for the denoiser) has planes for half A of the samples, then for half B. They are
+    // added.
     const double* other = row.kind == AovKind::guide ? &tile.sums[(plane + channels) * n] : nullptr;
     for (std::size_t i = 0; i < n; ++i) {
       const double count = row.kind == AovKind::of_hits ? hits[i] : static_cast<double>(tile.spp);

@@ -49,14 +49,14 @@ inline constexpr int kMaxLayerLevel = 10;  // at this level one pixel represents
 FrameSize level_size(FrameSize frame, int level);
 // Returns the pixels of the image that a rectangle of a mip level represents.
 PixelRect rect_in_image(FrameSize frame, int level, const PixelRect& rect);
-// invalid_argument: the rectangle is empty, outside of the level or too large; the message contains the
-// bounds.
+// Returns invalid_argument if the rectangle is empty, outside of the level or too large; the message contains
+// the bounds.
 Result<void> check_layer_rect(FrameSize frame, int level, const PixelRect& rect);
 
 // The values of one tile, layer by layer.
 class TileLayers {
  public:
-  // `aovs`: true if layers will be requested that are not computed from the colour
+  // `aovs`: true if layers of AOVs will be requested
   TileLayers(const Film& film, TileIndex tile, bool aovs);
   const PixelRect& rect() const { return colour_.rect; }
   // Returns the channels of each pixel, row by row; empty if the tile has no samples.

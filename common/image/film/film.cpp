@@ -20,7 +20,8 @@ Digest chained(const Digest& chain, const Digest& unit) {
   return hash.finish();
 }
 
-// Adds the identifiers of `from` to those in `to`, both planar.
+// Adds the identifiers of `from` to those in `to`. Each has kIdPlanes planes of `pixels` values for every AOV
+// of identifiers.
 void add_ids(std::vector<float>& to, std::span<const float> from, std::size_t pixels) {
   for (std::size_t first = 0; first < to.size(); first += kIdPlanes * pixels)
     for (std::size_t i = first; i < first + pixels; ++i)

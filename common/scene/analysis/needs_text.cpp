@@ -27,7 +27,7 @@ std::string listed(const std::map<std::string, std::uint32_t>& kinds) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-// Formats a value that another process has sent for a message: short, and on one line.
+// Formats, for a message, a value that another process has sent: short, and on one line.
 std::string shown(const json& j) {
   std::string text = j.dump(-1, ' ', true, json::error_handler_t::replace);
   if (text.size() > 80) text = text.substr(0, 77) + "...";

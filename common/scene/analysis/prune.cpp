@@ -203,8 +203,8 @@ void Pruner::materials() {
   for (Bsdf& b : s_.bsdfs)
     for (int step = 0; step < kMaxBsdfNesting && simplify(b); ++step) {
     }
-  // A blend in a two-sided material may have contained a two-sided one, whose front is then shown on both
-  // sides.
+  // After a blend was replaced by one of its branches, a side of a two-sided material may itself be
+  // two-sided. Such a side shows the front of the inner material, whichever side it is.
   for (Bsdf& b : s_.bsdfs)
     if (auto* two = std::get_if<TwoSidedBsdf>(&b))
       for (BsdfIndex* side : {&two->front, &two->back})

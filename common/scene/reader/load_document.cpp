@@ -35,7 +35,8 @@ class Parameters {
     note_length(std::string(kFrameParameter));
   }
 
-  // Warns of unused parameters from outside: they are probably misspelt, but no reason to stop.
+  // Warns of parameters that were given from outside (-D) but not used: they are probably misspelt, but no
+  // reason to stop.
   void warn_of_unused(const Span& at) const {
     std::vector<std::string> known;
     for (const auto& [name, value] : values_)

@@ -160,7 +160,8 @@ std::optional<MediumIndex> Reader::read_medium_as(const Element& e) {
   return MediumIndex{static_cast<std::uint32_t>(scene_.media.size() - 1)};
 }
 
-// In Mitsuba 0.x a constant density fills all of space, not only the unit cube.
+// In Mitsuba 0.x a constant density fills all of space, not only the unit cube. So a medium with such a
+// density becomes homogeneous.
 void Reader::unbound_constant_density(const Element& e) {
   const auto medium = std::get<HeterogeneousMedium>(scene_.media.back());
   const Rgb* density = constant(medium.sigma_t);

@@ -242,7 +242,8 @@ ReadResult read_scene(std::string_view file_name, std::string_view text, AssetSo
                       const ReadOptions& options) {
   scene::Report report(options.strict);
   ReadResult result;
-  // The Python package converts a USD stage to XML and sends that under the stage's name
+  // The Python package converts a USD stage to XML and sends the XML under the stage's name. So a text with a
+  // <scene> is read whatever its name
   const bool has_scene_element = text.substr(0, 4096).find("<scene") != text.npos;
   if (std::string why = scene::why_no_scene(file_name); !why.empty() && !has_scene_element) {
     const std::uint32_t file = report.add_file(scene::SourceText(std::string(file_name), ""));

@@ -1,5 +1,5 @@
-// Converts a Document to a Scene. This is the state shared by the readers of all kinds of objects, which have
-// one .cpp file per kind.
+// Converts a Document to a Scene. The class Reader is the state shared by the readers of all kinds of
+// objects, which have one .cpp file per kind.
 #pragma once
 
 #include <initializer_list>
@@ -148,7 +148,7 @@ class Reader {
   std::vector<BsdfTraits> bsdf_traits_;  // traits of the first bsdfs of scene_; more are added when needed
 
   bool reads_attributes_ = false;  // true if some texture read so far is a mesh attribute
-  // Results of old_number(), a texture with swapped colours, by the texture as it was read
+  // Results of old_number() (textures with swapped colours), by the texture as it was read
   std::map<TextureIndex, TextureIndex> old_numbers_;
   Memo<TextureIndex> textures_;
   Memo<Spectrum> spectra_;

@@ -117,7 +117,7 @@ void upgrade_bitmap(Element& e) {
   }
 }
 
-// An old <rgb> is linear even in hexadecimal; <srgb> is not.
+// In old files <rgb> is linear, even in hexadecimal; <srgb> is not linear.
 void upgrade_colour(Element& e) {
   Attribute* value = find(e, "value");
   const bool encoded = e.tag == "srgb";

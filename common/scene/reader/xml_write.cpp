@@ -152,7 +152,8 @@ class Writer {
   }
 
  private:
-  // Makes names unique, so that two assets of the same name are kept apart.
+  // Makes names unique, so that two assets of the same name are kept apart: by prefixes ("./" or "/") that do
+  // not change the path.
   void name_assets() {
     std::map<std::string, int> seen;
     for (const Asset& a : scene_.assets) {
@@ -230,7 +231,8 @@ class Writer {
       if (!mesh || mesh->format != MeshFormat::serialized || f.name != "flip_tex_coords") writer.field(f, x);
     }
   };
-  // The shapes of a group are contiguous.
+  // Writes the shapes, those of a group within the group's element. The shapes of a group are contiguous in
+  // the scene.
   void write_shapes() {
     std::optional<GroupIndex> group;
     const auto go_to = [&](std::optional<GroupIndex> next) {

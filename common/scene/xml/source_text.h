@@ -35,7 +35,8 @@ class SourceText {
   SourcePlace place(std::size_t offset) const;
   int line(std::size_t offset) const;  // returns the line only, in constant time
   std::size_t index_bytes() const { return lines_before_.size() * sizeof lines_before_[0]; }
-  // Makes a diagnostic about the bytes [offset, offset + length), with their line cut to a readable length.
+  // Makes a diagnostic about the bytes [offset, offset + length), with the line that they are in, unless this
+  // line is far too long to be shown.
   Diagnostic diagnose(Diagnostic::Severity severity, std::size_t offset, std::size_t length,
                       std::string message) const;
 

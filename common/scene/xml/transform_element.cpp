@@ -41,8 +41,8 @@ Transform rotation(const Vec3& axis, double degrees) {
            t * a[0] * a[2] - s * a[1], t * a[1] * a[2] + s * a[0], t * a[2] * a[2] + c, 0, 0, 0, 0, 1}};
 }
 
-// Returns a vector perpendicular to the unit vector n (the first of the two of Duff et al. 2017, "Building an
-// Orthonormal Basis, Revisited").
+// Returns a vector perpendicular to the unit vector n (the first of the two that Duff et al. 2017 give,
+// "Building an Orthonormal Basis, Revisited").
 Vec3 some_up(const Vec3& n) {
   const double sign = std::copysign(1.0, n[2]), a = -1 / (sign + n[2]);
   return {1 + sign * n[0] * n[0] * a, sign * n[0] * n[1] * a, -sign * n[0]};

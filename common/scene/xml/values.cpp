@@ -29,7 +29,7 @@ std::optional<T> parse_whole(std::string_view text) {
   return value;
 }
 
-// Calls f(std::string_view) -> bool for each part of the text, until it returns false.
+// Calls f(std::string_view) -> bool for each token of the text, until f returns false.
 template <class F>
 bool for_each_token(std::string_view text, F f) {
   for (std::size_t at = text.find_first_not_of(kSeparators); at < text.size();) {

@@ -167,7 +167,7 @@ void malformed(std::uint32_t file, const pugi::xml_parse_result& result, Report&
   report.error({file, offset, 1}, fmt::format("malformed XML: {}", result.description()));
 }
 
-// Checks the numbers of tags and attributes, which limit pugixml's memory.
+// Checks that the numbers of tags and attributes are within the limits, which bounds pugixml's memory.
 bool small_enough(std::uint32_t file, std::string_view text, Report& report, std::size_t& elements_left) {
   std::size_t tags = 0, attributes = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
