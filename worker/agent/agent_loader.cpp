@@ -15,8 +15,8 @@ namespace {
 constexpr std::size_t kWorldsKept = 2;
 constexpr std::size_t kBlobsTraced = 64;  // blobs of one scene that get a span each
 constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
-// A problem with loading a job is no longer reported if the job was not loaded again for this long after its
-// retry was due: the worker then has no units of the job any more.
+// A job's problem is no longer reported this long after the next attempt to load the job was due. If there
+// was no such attempt, the worker has no units of the job any more.
 constexpr Duration kTroubleShown = std::chrono::seconds(30);
 
 // True if the error is a problem of this machine, such as a full disk, that must not count as a failure of

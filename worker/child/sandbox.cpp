@@ -218,7 +218,7 @@ Sandboxed enter_sandbox(const std::vector<std::filesystem::path>& readable) {
   return {};
 #else
   const long abi = ::syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
-  // Comes before filter_calls(), since it makes system calls that filter_calls() forbids
+  // Comes before filter_calls(), so that the filter need not allow the system calls that this makes
   const bool files = bound_files(readable, abi);
   return {filter_calls(), files, files && abi >= 3};
 #endif
