@@ -91,7 +91,7 @@ class VertexNee {
     v.t = t - depths.from();
     const OpticalDepth::Point at_point = depths.at(t);
     v.flight_pdf = flight_pdf<F>(medium, path.density_, at_point);
-    // This holds also where the flight density underflows to 0, because points are sampled there too
+    // True also where the flight density underflows to 0, because equi-angular points are sampled there too
     // (sample_equiangular).
     v.equiangular = at_point.rate > 0 && v.length > 0;
     return v;

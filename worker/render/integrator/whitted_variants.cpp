@@ -4,7 +4,7 @@
 namespace ls::render {
 
 std::span<const Variant> whitted_variants() {
-  // Overlaps: where surfaces lie on each other, all are looked at.
+  // Features::overlaps: where surfaces coincide, all of them are tested.
   static constexpr Variant kVariants[] = {
       variant<Features{.passing = true, .whitted = true}>("surfaces, whitted"),
       variant<Features{.overlaps = true, .passing = true, .whitted = true}>("coincident surfaces, whitted"),
