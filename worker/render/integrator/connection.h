@@ -12,8 +12,7 @@ namespace ls::render {
 
 // Sets `densities_` for the vertex p, which the path reaches from the vertex `from`. ng is the geometric
 // normal if p is on a surface, and 0 in a medium. `densities_` stays 0 if `from` is the camera or has
-// scattered the path by a delta lobe: `from` is then not connected to light, so no connection of a shorter
-// subpath competes.
+// scattered the path by a delta lobe: then no connection of a shorter subpath finds the same path.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::arrive(const Vertex& from, const V3& p, const V3& ng) {
   densities_ = {};
@@ -210,7 +209,7 @@ void PathTracer<F, Light>::follow_light(const SunMap::Ray& from, const Keep& kee
       const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), to_light, g.u(2), {g.u(0), g.u(1)});
       if (!s || s->delta) return;
       const V3 w = normalize(hit.shading.to_world(s->wi));
-      if ((s->wi.z > 0) != (dot(w, hit.ng) > 0)) return;  // a camera path would use ng
+      if ((s->wi.z > 0) != (dot(w, hit.ng) > 0)) return;  // a camera path from there would use ng as normal
       const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), s->wi, to_light);
       beta_ *= f.f_cos * (std::abs(dot(w, hit.ng)) / (s->pdf * cosine));
       leave(s->pdf, f.pdf);

@@ -194,7 +194,7 @@ class PathTracer {
   struct Look {
     V3 w{0, 0, 0};      // the direction towards the second vertex
     C3 value{0, 0, 0};  // light at the camera per radiance that the second vertex scatters towards the first
-    float density = 0;  // per area or volume, of finding the second vertex by this path; 0: impossible
+    float density = 0;  // density, per area or volume, with which this path finds the second vertex; 0: never
   };
   void begin_sharing(const SurfaceHit* hit, const Medium* medium);
   void look_for_second();

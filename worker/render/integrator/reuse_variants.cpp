@@ -34,9 +34,9 @@ constexpr std::uint64_t kPilotFrame = 256;  // pixels
 // A scene with more null boundaries gets no pilot, since a single path may take as long as the image of
 // another scene.
 constexpr std::ptrdiff_t kPilotBoundaries = 64;
-// Sharing pays if the noise (the squared error) without it is more than this many times the noise with it. A
-// shared sample takes 1.4 to 2.4 times as long (docs/decisions/0036-path-reuse.md). The limit is low because
-// the few pixels of the pilot rarely show the rare bright paths that sharing helps most.
+// Sharing pays if the noise (squared relative error) without it is more than this many times the noise with
+// it. A shared sample takes 1.4 to 2.4 times as long (docs/decisions/0036-path-reuse.md). The limit is low
+// because the few pixels of the pilot rarely show the rare bright paths that sharing helps most.
 constexpr double kGainThatPays = 1.5;
 // If the gain after some of the groups is this many times kGainThatPays, the other groups are not rendered.
 constexpr double kBeyondDoubt = 4;

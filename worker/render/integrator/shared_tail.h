@@ -23,7 +23,7 @@ struct FirstVertex {
   PathVertex at;
   V3 d{0, 0, 0};        // the direction of travel before it
   C3 beta{0, 0, 0};     // the weight of the path up to it
-  C3 density{1, 1, 1};  // for each channel as the hero (medium.h), the density of the path over their mean
+  C3 density{1, 1, 1};  // the path's density with each channel as the hero (medium.h), over their mean
   OneMedium around;     // the medium in front of it
 };
 
