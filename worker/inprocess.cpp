@@ -33,7 +33,7 @@ tl::unexpected<UnitFailure> failed(const Error& error) {
 
 // Compares the scene's needs (the features and files that rendering it takes), as this worker finds them,
 // with the needs in the job's brief. The coordinator decides by those in the brief which files to send, so
-// coordinator and worker must find needs by the same rules.
+// coordinator and worker must derive the needs by the same rules.
 tl::expected<void, UnitFailure> check_needs(const Scene& scene, const JobBrief& brief) {
   if (brief.needs.empty()) return {};
   const std::string own =

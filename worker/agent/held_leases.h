@@ -28,7 +28,7 @@ class HeldLeases {
     LeaseId lease;
     LeaseUnit unit;
     State state = State::waiting;
-    // The span of its present lease; nullopt: the lease is not traced
+    // The trace span of the unit's present lease; nullopt: the lease is not traced
     std::optional<trace::SpanContext> trace = std::nullopt;
     std::int64_t since_unix_ns = 0;  // when the unit came to this worker; 0: not noted
   };

@@ -33,7 +33,7 @@ inline std::uint64_t fake_mix(std::uint64_t x) {  // the finaliser of splitmix64
 }
 
 // Returns a seed made of everything that identifies a unit's pixels except its position: the first 8 bytes of
-// both digests.
+// the digests of scene and settings.
 inline std::uint64_t fake_seed(const UnitHeader& header) {
   std::uint64_t scene = 0, settings = 0;
   std::memcpy(&scene, header.scene.bytes.data(), sizeof scene);

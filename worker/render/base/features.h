@@ -26,7 +26,7 @@ struct Features {
   // The integrator is `whitted`: a path continues only after mirrors and clear glass. At the first other
   // surface it finds only the light that comes straight from lights, and ends.
   bool whitted = false;
-  // Pixels share what their paths find from the second vertices on (path_reuse.h).
+  // Pixels share the parts of their paths from the second vertices on (path_reuse.h).
   bool reuse = false;
   bool operator==(const Features&) const = default;
 

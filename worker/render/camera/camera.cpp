@@ -93,7 +93,7 @@ float Camera::near_distance(const V3& d) const {
   return static_cast<float>(near_ * along / axis_z_.dot(V3d(d)));
 }
 
-// As in Mitsuba, the near plane is mapped by to_world, even if that moves it by stretching. The ray starts on
+// As in Mitsuba, the near plane is mapped by to_world, which may also scale its distance. The ray starts on
 // that plane and has the length far - near.
 CameraRay Camera::orthographic_ray(double x, double y) const {
   const V3d at = V3d(lens_x_) * x + V3d(lens_y_) * y;

@@ -84,7 +84,8 @@ LightVertices::Look look_of(const World& w, const LightVertex& y) {
     look.n = dot(y.to_light, y.hit.ng) > 0 ? y.hit.ng : -y.hit.ng;
     look.both_sides =
         surface.crossed || std::abs(dot(y.hit.shading.n, y.hit.ng)) < kUntilted || surface.wants_slopes;
-    // The mean over four directions at 45 degrees to the normal, on the lit side
+    // Estimates the reflected light by the mean over four directions at 45 degrees to the normal, on the lit
+    // side
     const V3 to_light = y.hit.shading.to_local(y.to_light);
     const float z = std::copysign(.70710678f, to_light.z);
     float reflected = 0;

@@ -81,7 +81,7 @@ void PathTracer<F, Light>::begin_tail(const PathVertex& at, const V3& n, const V
   tail.light = arriving;
 }
 
-// The path goes on from the second vertex along w, sampled by a smooth lobe with this weight.
+// Continues the path from the second vertex along w, which a smooth lobe sampled with this weight.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::go_on_as_tail(const V3& w, const C3& weight) {
   sharing_.tail.goes_on = true;
@@ -129,7 +129,7 @@ auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
   LightSample end;
   end.target = y.p;
   if (!y.medium) {
-    // A path from x would use the geometric normal there
+    // A path from x would use the geometric normal at y, because the shading normal faces away from it
     if ((y.hit.shading.to_local(-w).z > 0) != (dot(w, y.hit.ng) < 0)) return look;
     cosine = std::abs(dot(w, y.hit.ng));
     end.target = offset_point(y.hit, -w);
@@ -156,7 +156,8 @@ auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
   return look;
 }
 
-// What the vertex of a tail scatters from the direction w to a path that arrives along `d`.
+// Returns the BSDF or phase function at the vertex y of a tail, for light from the direction w and a path
+// that arrives along `d`.
 template <Features F, template <Features> class Light>
 BsdfEval PathTracer<F, Light>::scattered_at(const PathVertex& y, const V3& d, const V3& w) const {
   if (y.medium) {

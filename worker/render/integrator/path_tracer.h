@@ -348,7 +348,7 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
 }
 
 // Passes every index-matched surface, and each null-transmitting one with its probability. The random numbers
-// are those of the path itself as long as both hit the same surfaces.
+// are those of trace() for the same ray, as long as both hit the same surfaces.
 template <Features F, template <Features> class Light>
 std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay& ray) {
   ray_ = {ray.o, ray.o, ray.d};
@@ -432,7 +432,7 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   if (!light) return;
   const V3 wi = hit.shading.to_local(light->direction);
   // A shading normal must not let light through a surface that is opaque by its geometric normal. Sampled
-  // directions are checked likewise.
+  // directions are checked in the same way (scatter_on_surface).
   if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0)) return;
   const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wo, wi);
   if (is_black(f.f_cos)) return;

@@ -1,4 +1,5 @@
-// A separate source file, because instantiating the path tracer takes long to compile.
+// The path tracers of the integrator `whitted`. They take long to compile, so they have their own source
+// file.
 #include "worker/render/integrator/variant.h"
 
 namespace ls::render {

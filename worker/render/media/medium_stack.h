@@ -17,7 +17,7 @@
 
 namespace ls::render {
 
-// The medium of a path in scenes without overlaps: the medium of the last boundary crossed, on the side where
+// The medium of a path in scenes without overlaps: the medium of the boundary crossed last, on the side where
 // the path is (Mitsuba's rule).
 struct OneMedium {
   std::uint32_t medium = kNone;
