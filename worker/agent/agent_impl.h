@@ -99,8 +99,8 @@ struct Agent::Impl {
   void trace_sent(const UnitKey& unit);
   // Returns the span of the lease of the job's first waiting unit; nullopt: nothing is traced.
   std::optional<trace::SpanContext> trace_of(const JobId& job) const;
-  // Its destructor records a trace span for the loading of a scene, unless `parent` (the span of a lease) is
-  // nullopt.
+  // A guard whose destructor records a trace span for the loading of a scene, unless `parent` (the span of a
+  // lease) is nullopt.
   struct LoadSpan {
     LoadSpan(const Impl& agent, const JobId& job, TimePoint begin);
     ~LoadSpan();

@@ -41,7 +41,7 @@ inline std::uint64_t fake_seed(const UnitHeader& header) {
   return fake_mix(scene + 0x9e3779b97f4a7c15ull) ^ fake_mix(settings);
 }
 
-inline constexpr std::uint64_t kFakeMarkerEvery = 32;  // every how many pixels there is a marker
+inline constexpr std::uint64_t kFakeMarkerEvery = 32;  // one in this many pixels is a marker
 inline constexpr RoundIndex kFakeMarkerRounds = 8;
 
 // Returns the seed of a pixel's samples.

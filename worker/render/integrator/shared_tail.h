@@ -21,10 +21,10 @@ struct PathVertex {
 struct FirstVertex {
   bool usable = false;  // false: there is none, or it scatters by delta lobes alone
   PathVertex at;
-  V3 d{0, 0, 0};        // the direction of travel before it
-  C3 beta{0, 0, 0};     // the weight of the path up to it
+  V3 d{0, 0, 0};        // the direction of travel before the vertex
+  C3 beta{0, 0, 0};     // the weight of the path up to the vertex
   C3 density{1, 1, 1};  // the path's density with each channel as the hero (medium.h), over their mean
-  OneMedium around;     // the medium in front of it
+  OneMedium around;     // the medium in front of the vertex
 };
 
 // The second vertex of a path, and the light that arrives there.
@@ -60,7 +60,7 @@ struct SharingPath {
   FirstVertex first;
   SharedTail tail;
   C3 scale{1, 1, 1};   // the factor of light that counts for this pixel only
-  float survival = 1;  // Russian roulette multiplies the path's weight by it
+  float survival = 1;  // factor of the path's weight in Russian roulette (survives)
 };
 
 }  // namespace ls::render

@@ -74,7 +74,7 @@ class VertexNee {
   template <class Path>
   static Plan ahead(Path& path, const Medium& medium, Segment segment) {
     if (medium.equiangular_mode == EquiangularMode::none) return {};
-    if (path.looks_for_second()) return {};  // path_reuse.h says why
+    if (path.looks_for_second()) return {};  // not for shared paths: see path_reuse.h
     if (!path.may_scatter() || !(points_only(medium) || std::isfinite(segment.length))) return {};
     sample_equiangular(path, medium, segment);
     return {segment.length};

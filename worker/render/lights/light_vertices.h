@@ -111,11 +111,11 @@ struct SubpathDensities {
 struct LightVertex {
   SurfaceHit hit;  // valid if the vertex is on a surface
   V3 p{0, 0, 0};
-  std::uint32_t medium = kNone;  // index of the medium in which it is; kNone: it is on a surface
+  std::uint32_t medium = kNone;  // index of the medium in which the vertex is; kNone: it is on a surface
   // The light that arrives at the vertex, divided by the expected number of vertices per area of the surface
   // or per volume. In a medium it includes the albedo.
   C3 light{0, 0, 0};
-  V3 to_light{0, 0, 1};  // the direction from which it arrives
+  V3 to_light{0, 0, 1};  // the direction from which the light arrives
   int scatterings = 0;   // scatterings of the light so far, including the one at this vertex
   SubpathDensities densities;
 };
