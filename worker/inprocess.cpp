@@ -31,8 +31,9 @@ tl::unexpected<UnitFailure> failed(const Error& error) {
       UnitFailure{.scene_at_fault = error.code == Errc::invalid_argument, .reason = error.message});
 }
 
-// Compares the needs of the scene, as this worker finds them, with the needs in the job's brief. The
-// coordinator decides by its needs which files to send, so both must use the same rules.
+// Compares the scene's needs (the features and files that rendering it takes), as this worker finds them,
+// with the needs in the job's brief. The coordinator decides by those in the brief which files to send, so
+// coordinator and worker must derive the needs by the same rules.
 tl::expected<void, UnitFailure> check_needs(const Scene& scene, const JobBrief& brief) {
   if (brief.needs.empty()) return {};
   const std::string own =

@@ -9,7 +9,7 @@ namespace ls::worker {
 
 std::string host_name();
 int usable_cpus();  // number of CPUs on which this process may run
-// Returns the memory of the machine, or the limit of our control group if that is lower.
+// Returns the memory of the machine, or the limit of this process's control group if that is lower.
 std::uint64_t usable_memory_bytes();
 // Returns the cache's default folder, in XDG_CACHE_HOME or ~/.cache or else in the system's temporary folder.
 std::filesystem::path default_cache();

@@ -16,8 +16,8 @@ struct Options {
   std::vector<std::string> coordinators;  // addresses HOST:PORT
   int threads = 1;
   std::filesystem::path cache;
-  std::uint64_t cache_limit = 0;   // most bytes of the cache; 0: no limit
-  std::uint64_t memory_limit = 0;  // most bytes of memory that the render child may use; 0: no limit
+  std::uint64_t cache_limit = 0;   // upper limit for the bytes of the cache; 0: no limit
+  std::uint64_t memory_limit = 0;  // upper limit for the render child's memory in bytes; 0: no limit
   double hang_seconds = 300;
   double build_seconds = 1800;
   double idle_seconds = 0;  // 0: no limit

@@ -5,7 +5,7 @@
 //
 // Threads: run() is the control thread (connection, progress reports, timers). One loader thread fetches
 // blobs and prepares worlds (scenes that are built and ready to render) ahead of need. Each of `threads`
-// render threads takes the next unit as soon as it has delivered the last one. One mutex guards the state
+// render threads takes the next unit as soon as it has delivered the previous one. One mutex guards the state
 // (worker/agent/held_leases.h, result_outbox.h). While it is held the agent makes no call that may block: it
 // calls only forget() and rss_bytes() of the backend, and no function of the link or the files.
 #pragma once
@@ -54,9 +54,9 @@ class Agent {
   // backend's if the backend is broken (after finished results were delivered).
   Result<void> run();
 
-  // Both may be called from any thread. After drain(), run() finishes the running units, delivers all results
-  // and returns the other units to the coordinator. After stop(), run() ends as soon as possible and delivers
-  // nothing more.
+  // drain() and stop() may be called from any thread. After drain(), run() finishes the running units,
+  // delivers all results and returns the other units to the coordinator. After stop(), run() ends as soon as
+  // possible and delivers nothing more.
   void drain();
   void stop();
   // Makes run() check its timers again, after a test has advanced `clock`. For tests only.

@@ -30,20 +30,21 @@ struct Agent::Impl {
     enum class State { idle, loading, ready } state = State::idle;
     std::shared_ptr<const LocalJob> local;
     std::vector<std::shared_ptr<const BlobFile>> files;  // these objects keep the job's files in the cache
-    std::uint64_t last_use = 0;  // value of the counter `uses` at the last use; orders the jobs by it
+    std::uint64_t last_use = 0;  // value of the counter `uses` when the job was used last; the least recently
+                                 // used job is forgotten first
     bool cancelled = false;
     TimePoint retry_at{};  // time to load again after an interrupted transfer or a problem of this machine
     std::string trouble;   // the problem of this machine that made the last attempt to load fail
-    UnitTimes unreported;  // time spent on loading the job that the coordinator does not know yet
+    UnitTimes unreported;  // time spent on loading the job, not yet reported to the coordinator
   };
   struct RenderSlot {
     std::atomic<bool> stop{false};
     std::optional<UnitKey> unit;  // the unit being rendered; guarded by mutex
-    // Used by the slot's own thread only: the job of its last unit, and when that unit ended.
+    // Used only by the slot's own thread: the job of its previous unit, and when that unit ended.
     JobId last_job;
     TimePoint last_end{};
-    double last_transfer = 0;  // seconds spent packing the last result
-    TimePoint began{};         // when its present unit began; set only if this worker is traced
+    double last_transfer = 0;  // seconds spent packing the previous unit's result
+    TimePoint began{};         // when the present unit began; set only if this worker is traced
   };
   enum class Connection { down, opening, up };
 
@@ -57,8 +58,8 @@ struct Agent::Impl {
   void cancel(const JobId& job);
   void stop_dropped_units();  // sets the stop flag of each running unit that is no longer in `table`
   void begin_drain();
-  void look_at_backend();   // starts draining if the backend is broken, so that run() ends with its error
-  void look_at_idleness();  // ends the work if there has been none for options.idle_limit
+  void look_at_backend();   // drains if the backend is broken, so that run() ends with the backend's error
+  void look_at_idleness();  // drains or ends this worker after options.idle_limit without work
   std::vector<FromWorker> due_messages();
   std::optional<Result<void>> verdict();  // the result of run() if it should end now; nullopt: it continues
   Duration until_next_timer() const;
@@ -81,14 +82,16 @@ struct Agent::Impl {
   void render_loop(RenderSlot& slot, std::stop_token token);
   std::optional<HeldLeases::Held> next_unit(RenderSlot& slot, std::stop_token token,
                                             std::shared_ptr<const LocalJob>& job);
-  // Records and returns for how many seconds the slot idled between the end of its last unit and the first
-  // sample of the unit that it has just rendered in `wall_seconds`. 0 if the last unit was not of this job.
+  // Call when the slot has just rendered a unit of `job` in `wall_seconds`, from its first sample to its
+  // last. Records and returns for how many seconds the slot had idled before, since the end of its previous
+  // unit. 0 if the previous unit was of another job.
   double note_gap(RenderSlot& slot, const JobId& job, double wall_seconds);
   tl::expected<UnitResult, UnitFailure> rendered_unit(RenderSlot& slot, const LocalJob& job,
                                                       const HeldLeases::Held& held);
   tl::expected<UnitResult, UnitFailure> render(RenderSlot& slot, const LocalJob& job,
                                                const HeldLeases::Held& held);
-  // Record spans below the lease's span `parent`; only with a tracer (agent_trace.cpp).
+  // Record trace spans as children of the span `parent` or of the unit's lease. Called only if there is a
+  // tracer (agent_trace.cpp).
   void record(const char* name, const trace::SpanContext& parent, TimePoint begin, TimePoint end,
               trace::Attributes attributes, bool failed = false) const;
   void trace_unit(const RenderSlot& slot, const HeldLeases::Held& held,
@@ -96,7 +99,8 @@ struct Agent::Impl {
   void trace_sent(const UnitKey& unit);
   // Returns the span of the lease of the job's first waiting unit; nullopt: nothing is traced.
   std::optional<trace::SpanContext> trace_of(const JobId& job) const;
-  // Records at its end that a scene was loaded, unless `parent` (the span of a lease) is nullopt.
+  // A guard whose destructor records a trace span for the loading of a scene, unless `parent` (the span of a
+  // lease) is nullopt.
   struct LoadSpan {
     LoadSpan(const Impl& agent, const JobId& job, TimePoint begin);
     ~LoadSpan();
@@ -105,7 +109,7 @@ struct Agent::Impl {
     const TimePoint begin;
     const std::optional<trace::SpanContext> parent;
     const trace::SpanContext own;
-    std::optional<TimePoint> loaded_at;  // nullopt: it was not loaded
+    std::optional<TimePoint> loaded_at;  // nullopt: the scene could not be loaded
   };
   void finished(RenderSlot& slot, const UnitKey& key, tl::expected<UnitResult, UnitFailure> outcome);
 
@@ -144,7 +148,7 @@ struct Agent::Impl {
     TimePoint since{};
   };
   std::map<UnitKey, Unsent> unsent;
-  std::deque<FromWorker> outgoing;  // messages that return leases, to be sent when the stream is open
+  std::deque<FromWorker> outgoing;  // returned leases and notices of draining, sent when the connection is up
   std::vector<std::unique_ptr<RenderSlot>> slots;
   Connection connection = Connection::down;
   bool draining = false;

@@ -15,8 +15,8 @@ namespace {
 constexpr std::size_t kWorldsKept = 2;
 constexpr std::size_t kBlobsTraced = 64;  // blobs of one scene that get a span each
 constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
-// A problem with loading a job is no longer reported if the job was not loaded again for this long after its
-// retry was due: the worker then has no units of the job any more.
+// A problem with loading a job is reported until this long after the next attempt to load the job was due. If
+// there was no such attempt by then, the worker has no units of the job any more.
 constexpr Duration kTroubleShown = std::chrono::seconds(30);
 
 // True if the error is a problem of this machine, such as a full disk, that must not count as a failure of
@@ -126,7 +126,7 @@ void Agent::Impl::load(const JobBrief& brief) {
   loading.clear();
   load_seconds = seconds(clock.now() - start);
   const auto it = jobs.find(id);
-  // The job was replaced by another one meanwhile
+  // The job was replaced by another one while it was being loaded
   if (it == jobs.end() || it->second.state != Job::State::loading) return;
   it->second.state = Job::State::ready;
   it->second.local = std::move(local);

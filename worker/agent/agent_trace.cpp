@@ -1,5 +1,5 @@
-// The spans that a worker records of the units that it renders and the scenes that it loads, below the spans
-// of their leases. Called only if the worker has a tracer.
+// Records trace spans for the units that this worker renders and the scenes that it loads, as children of the
+// spans of their leases. Used only if the worker has a tracer.
 #include <algorithm>
 #include <utility>
 
@@ -45,7 +45,7 @@ void Agent::Impl::trace_sent(const UnitKey& unit) {
   {
     const std::lock_guard lock(mutex);
     const auto found = unsent.find(unit);
-    if (found == unsent.end()) return;  // it is sent again
+    if (found == unsent.end()) return;  // the result was sent and its span recorded before
     sent = found->second;
     unsent.erase(found);
   }

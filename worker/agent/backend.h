@@ -25,8 +25,8 @@ struct LocalJob {
   std::map<Digest, std::filesystem::path> assets;  // files by digest
 };
 
-// Identifies the world of a job. The job's id is not enough: a coordinator whose data were replaced may reuse
-// it for another job.
+// Identifies the world of a job (its scene, ready to render). The job's id is not enough: a coordinator whose
+// data were replaced may reuse it for another job.
 struct WorldKey {
   JobId job;
   Digest scene, settings;
@@ -39,7 +39,7 @@ struct RenderedUnit {
   double cpu_seconds = 0;
   double wall_seconds = 0;  // wall-clock time from the first sample to the last
   Health health;
-  TechniqueSet techniques;  // of the world that it was rendered in
+  TechniqueSet techniques;  // those that the integrator uses for this world
 };
 
 // Renders units. All calls block, and the agent makes them from several threads concurrently. If the caller
@@ -49,7 +49,7 @@ class RenderBackend {
  public:
   virtual ~RenderBackend() = default;
   virtual Digest numeric_class() const = 0;
-  // Machine and build of the class in words; empty: unknown
+  // Describes in words the machine and build that the numeric class stands for; empty: unknown
   virtual std::string platform() const { return {}; }
   // Builds the job's world (its scene, ready to render). Does nothing if the world is already built. Returns
   // the reason if it cannot be built.

@@ -29,8 +29,8 @@ class BlobFiles {
   // coordinator) that is not the job's fault and may pass. Other errors are final: for example not_found, if
   // no source has the blob.
   virtual Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob) = 0;
-  // Returns the blobs that are here, at most `limit`, most recently used first. The worker's hello sends this
-  // list to the coordinator.
+  // Returns the digests of the blobs on this machine, at most `limit`, most recently used first. The worker's
+  // hello sends this list to the coordinator.
   virtual std::vector<Digest> held(std::size_t limit) const = 0;
 };
 

@@ -1,6 +1,6 @@
-// The units that this worker holds (each is one tile and one range of samples to render), and the leases by
-// which the coordinator assigned them, in order of arrival. It has no locks and no clock. A unit is held only
-// once: if a later lease contains it again, it belongs to that lease from then on.
+// The leases by which the coordinator has assigned work to this worker, in order of arrival, and their units:
+// each unit is one tile and one range of samples to render. The class has no locks and no clock. A unit is
+// held only once: if a later lease contains it again, it belongs to that lease from then on.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +28,7 @@ class HeldLeases {
     LeaseId lease;
     LeaseUnit unit;
     State state = State::waiting;
-    // The span of its present lease; nullopt: the lease is not traced
+    // The trace span of the unit's present lease; nullopt: the lease is not traced
     std::optional<trace::SpanContext> trace = std::nullopt;
     std::int64_t since_unix_ns = 0;  // when the unit came to this worker; 0: not noted
   };
@@ -37,7 +37,8 @@ class HeldLeases {
   // already. `trace`: the lease's span, if it is traced; `unix_ns`: the time now.
   void add(const Lease& lease, const std::function<bool(const UnitKey&)>& handed_in,
            const std::optional<trace::SpanContext>& trace = std::nullopt, std::int64_t unix_ns = 0);
-  // Returns the first waiting unit whose job is in `ready`, and marks it as running.
+  // Returns the first waiting unit for whose job `ready` returns true, and marks the unit as running;
+  // nullopt: there is none.
   std::optional<Held> take(const std::function<bool(const JobId&)>& ready);
   // Removes a unit that was running and has been rendered. Returns its present lease; nullopt: the unit was
   // dropped meanwhile.

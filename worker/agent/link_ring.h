@@ -14,7 +14,7 @@
 namespace ls::worker {
 
 // A worker moves to the next coordinator after this many progress reports without a lease. An idle worker
-// sends one every few seconds.
+// sends a report every few seconds.
 inline constexpr int kIdleReports = 3;
 
 class LinkRing final : public CoordinatorLink {

@@ -1,5 +1,5 @@
 // Results and failures of units (one tile and one range of samples each) that the coordinator has not
-// acknowledged, oldest first. After a reconnect all of them are sent again. It has no locks.
+// acknowledged, oldest first. After a reconnect all of them are sent again. The class has no locks.
 #pragma once
 
 #include <list>

@@ -34,8 +34,8 @@ class LockedFile final : public BlobFile {
   int fd_;
 };
 
-// Turns a temporary error of the coordinator (a blob that is missing, damaged or denied there) into one of a
-// kind that the agent tries again later.
+// Gives an error of a transfer a code after which the agent tries again later, since the coordinator's
+// problem (a blob that is missing, damaged or denied there) may pass.
 Error passing(Error error) {
   const bool temporary = error.code == Errc::unavailable || error.code == Errc::resource_exhausted;
   if (!temporary) error.code = Errc::internal;

@@ -39,8 +39,8 @@ bool remove_unused(const std::filesystem::path& path);
 void remove_orphans(const std::filesystem::path& folder);
 
 // Locks the file `fd`, which was opened at `path`, by flock(2) without waiting; `how` is LOCK_SH or LOCK_EX.
-// `lost`: another process has the lock, or the path belongs to another file since the opening. `failed`: this
-// file system cannot lock; errno says why.
+// `lost`: another process has the lock, or `path` no longer names the file that was opened. `failed`: the
+// file cannot be locked; errno says why.
 enum class Lock { taken, lost, failed };
 Lock lock_at(int fd, const std::filesystem::path& path, int how);
 

@@ -23,17 +23,18 @@ using child::Reply;
 using child::Request;
 using child::Slot;
 
-// Number of times in a row that the child may die while it renders a unit, each time because of another unit,
-// before this worker reports the unit as failed. Each such death fails the other unit, and after three
-// failures the farm gives the worker no more units of that job. So the limit is high enough that an innocent
-// unit does not reach it before the farm has stopped the ones at fault.
+// If the child dies because of one unit, the other units that it was rendering are rendered again. A unit
+// that was rendered again this many times in a row is reported as failed all the same. Each death of the
+// child also fails the unit that caused it, and after three failures the farm gives this worker no more units
+// of that job. So the limit is high enough that the farm stops the units at fault before an innocent one
+// reaches it.
 constexpr int kInnocentDeaths = 64;
 
 std::size_t floats_of(const LocalJob& job, const LeaseUnit& unit) {
   return static_cast<std::size_t>(unit.rect.pixels()) *
          (kPartialChannels + planes_of(aovs_of(job.brief.settings)).count());
 }
-// Number of children in a row that may exit before they are ready; the backend is broken then.
+// If this many children in a row exit before they are ready, the backend is broken.
 constexpr int kUnreadyChildren = 5;
 // Time after setting the stop flag within which the child must answer; otherwise it is killed
 constexpr Duration kStopLimit = std::chrono::seconds(10);
@@ -75,8 +76,8 @@ class ChildBackend final : public RenderBackend {
   Result<void> greet(Process& process);
   tl::unexpected<Error> broken_by(std::string why);
   bool send_forgotten(Process& process);
-  // Returns a child that has built the job's world; sets `number` to the job's number in that child's
-  // protocol.
+  // Returns a child that has built the job's world (its scene, ready to render). Sets `number` to the number
+  // that stands for the job in requests to the child.
   tl::expected<std::shared_ptr<Process>, UnitFailure> ready_process(const LocalJob& job,
                                                                     std::uint64_t& number);
   tl::expected<void, UnitFailure> prepare_in(Process& process, const LocalJob& job, std::uint64_t number);

@@ -1,6 +1,6 @@
 // A RenderBackend that runs the renderer in a child process. If a scene crashes the renderer, hangs it or
-// uses up all memory, this costs only a unit (one tile and one range of samples) and not the worker. The
-// child is this same executable, started with other arguments by posix_spawn.
+// uses up all memory, only a unit (one tile and one range of samples) is lost, and not the worker. The child
+// is this same executable, started with other arguments by posix_spawn.
 //
 // When the child dies, the unit at fault is the one whose thread received the signal or made no progress. The
 // units on other threads are rendered again by the next child and do not count as failed. If it is unknown
@@ -27,10 +27,10 @@ struct ChildOptions {
   // Number of units rendered at the same time: the caller's number of threads
   int slots = 1;
   Duration hang_limit = std::chrono::minutes(5);      // longest time that a thread may take for one sample
-  Duration prepare_limit = std::chrono::minutes(30);  // longest time to build one world
-  Duration forget_limit = std::chrono::minutes(1);    // longest time to free one world
-  // Longest time from the child's start to its hello. This includes the computations whose results identify
-  // the machine's numeric class
+  Duration prepare_limit = std::chrono::minutes(30);  // longest time to build one scene
+  Duration forget_limit = std::chrono::minutes(1);    // longest time to free one scene
+  // Longest time from the child's start to its hello. This includes the computations that determine the
+  // numeric class (machines of one class render the same bits)
   Duration start_limit = std::chrono::minutes(2);
   // Pause before the replacement of a child that exited before it was ready; doubles each time.
   Duration respawn_pause = std::chrono::seconds(1);

@@ -1,7 +1,7 @@
 // The protocol between agent and render child. Requests and replies are structs of fixed size over a socket
-// pair per channel: one channel for control and one for each slot, that is, render thread. The pixel sums of
-// rendered units are in shared memory, and so is, for each slot, the sample that it is rendering. Agent and
-// child are the same executable, so plain structs suffice.
+// pair per channel: one channel for control and one for each slot (render thread). Shared memory holds, for
+// each slot, the pixel sums of the unit that it has rendered and the pixel and number of the sample that it
+// is rendering. Agent and child are the same executable, so plain structs suffice.
 #pragma once
 
 #include <atomic>
@@ -27,13 +27,14 @@ inline constexpr int kControlFd = 4;
 inline constexpr int kFirstSlotFd = 5;
 inline constexpr int kMostSlots = kMostChildThreads;
 
-// Most bytes of one asset in the text of a job (child/job_text.h): its digest, size and name, then the digest
-// again with the path. Escapes may double the bytes of names and paths.
+// Upper limit for the bytes of one asset in the text of a job (child/job_text.h): its digest, size and name,
+// then the digest again with the path. Escapes may double the bytes of names and paths.
 inline constexpr std::size_t kAssetTextBytes = 2 * 64 + 20 + 2 * limits::kNameBytes + 2 * PATH_MAX + 64;
-// Most bytes of the whole text: the settings as a JSON string, all assets and the scene's file.
+// Upper limit for the bytes of the whole text: the settings as a JSON string, all assets and the scene's
+// file.
 inline constexpr std::size_t kTextBytes =
     2 * limits::kSettingsBytes + (limits::kAssetsPerJob + 2) * kAssetTextBytes;
-inline constexpr std::size_t kReasonBytes = 64 << 10;  // most bytes of the text of a reply
+inline constexpr std::size_t kReasonBytes = 64 << 10;  // upper limit for the text of a reply
 
 // Number of floats in the largest partial (the pixel sums of one unit) that fits into a message: a tile of
 // 202 x 202 pixels without AOVs.
@@ -56,9 +57,9 @@ enum class Outcome : std::uint32_t { ok, scene_at_fault, failed, out_of_memory, 
 struct Reply {
   Outcome outcome{};
   // Length of the text that follows: the reason of a failure, the health of a rendered unit that is not
-  // clean, or in the hello the platform.
+  // clean, or the platform in the reply to `hello`.
   std::uint32_t text_bytes = 0;
-  Digest numeric_class;  // only in the hello
+  Digest numeric_class;  // only in the reply to `hello`
   double cpu_seconds = 0, wall_seconds = 0;
   std::uint32_t techniques = 0;  // TechniqueSet::bits() of a rendered unit
 };

@@ -57,7 +57,7 @@ constexpr std::uint32_t kDenied[] = {
     SYS_clock_settime,
     SYS_acct,
     SYS_quotactl,
-    // Effects on the agent and other processes of its user: signals, scheduling, memory.
+    // Calls that affect the agent and other processes of its user: signals, scheduling, memory.
     SYS_kill,
     SYS_tkill,
     SYS_rt_sigqueueinfo,
@@ -73,7 +73,7 @@ constexpr std::uint32_t kDenied[] = {
     SYS_move_pages,
     SYS_process_madvise,
     SYS_kcmp,
-    // Objects that outlive the process and are not counted in its memory limit.
+    // Calls that make objects that outlive the process and are not counted in its memory limit.
     SYS_shmget,
     SYS_shmat,
     SYS_semget,
@@ -218,7 +218,7 @@ Sandboxed enter_sandbox(const std::vector<std::filesystem::path>& readable) {
   return {};
 #else
   const long abi = ::syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
-  // Comes before filter_calls(), since it makes system calls that filter_calls() forbids
+  // Comes before filter_calls(), so that the filter need not allow the system calls that this makes
   const bool files = bound_files(readable, abi);
   return {filter_calls(), files, files && abi >= 3};
 #endif

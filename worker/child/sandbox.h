@@ -14,7 +14,7 @@ struct Sandboxed {
   // True if the process can write no files, and read only the given folders and the system's libraries
   // (Landlock).
   bool files = false;
-  // True if it also cannot truncate files that it may read (needs the Landlock of Linux 6.2)
+  // True if the process also cannot truncate files that it may read (needs the Landlock of Linux 6.2)
   bool sizes = false;
 };
 

@@ -170,7 +170,7 @@ class Server {
 
 void confine(std::uint64_t memory_limit) {
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-  // Names the process: as it was started by /proc/self/exe, its name would be "exe".
+  // Without this, the process would be named "exe", because it was started by /proc/self/exe.
   ::prctl(PR_SET_NAME, "ls-render-child");
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);

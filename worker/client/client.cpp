@@ -15,9 +15,9 @@ namespace ls::worker {
 namespace pb = ::lightshaft::farm::v1;
 namespace {
 
-// How long one attempt to connect may take, with the handshake of TLS. With less, a handshake over a slow
-// line, or with a busy coordinator that many workers join at once, is broken off and begins anew, for ever;
-// with more, a line that was cut meanwhile is tried again later.
+// Time that one attempt to connect may take, including the TLS handshake. If it were shorter, a handshake
+// over a slow line, or with a coordinator that many workers join at once, would be cut off and begun anew
+// without end. If it were longer, the next attempt after a broken connection would come later.
 constexpr int kConnectMs = 10'000;
 constexpr Duration kCloseLimit = std::chrono::seconds(2);
 

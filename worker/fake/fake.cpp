@@ -98,8 +98,8 @@ class FakeBackend final : public LocalBackend {
     }
   }
 
-  // Sleeps for `delay`. Returns false if `stop` was set meanwhile. It looks at `stop` a hundred times, but
-  // not more often than every millisecond: hundreds of fake workers share a machine.
+  // Sleeps for `delay`. Returns false if `stop` was set meanwhile. It checks `stop` every 1 to 20 ms (a
+  // hundredth of the delay), not more often, since hundreds of fake workers may share a machine.
   static bool pause(Duration delay, const std::atomic<bool>& stop) {
     const auto end = std::chrono::steady_clock::now() + delay;
     const auto nap = std::clamp<Duration>(delay / 100, std::chrono::milliseconds(1), kLongestNap);

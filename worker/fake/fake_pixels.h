@@ -1,15 +1,16 @@
 // Pixels of the fake renderer, for tests of everything around the renderer. They are a pure function of the
-// unit (one tile and range of samples). A sample is 21 bits of noise in [0, 1) plus a gradient of the pixel.
-// The samples of a unit are summed in double and rounded once, as the renderer does, so the resulting floats
-// have full mantissas.
+// unit (one tile and one round, that is, range of samples). A sample is 21 bits of noise in [0, 1) plus a
+// gradient of the pixel. The samples of a unit are summed in double and rounded once, as the renderer does,
+// so the resulting floats have full mantissas.
 //
-// That alone does not reveal the order in which rounds are folded: double sums of a few floats of similar
-// size are exact, hence equal in every order. Therefore one pixel in kFakeMarkerEvery is a *marker*. Its
-// samples are in [2^-47, 2^-46). In every group of kFakeMarkerRounds rounds one round also adds a value of
-// [1/2, 1) and a later round subtracts it again. While that value is in the sum, the sum keeps no bit below
-// 2^-53, so every fold in between is rounded, and the last bits of the finished pixel depend on which rounds
-// were folded before, between and after. Only the first two rounds of a tile may be swapped undetected: a + b
-// is b + a. If a job ends within a group, only markers whose two rounds are both folded can detect the order.
+// That alone does not reveal the order in which rounds are folded (added to the image): double sums of a few
+// floats of similar size are exact, hence equal in every order. Therefore one pixel in kFakeMarkerEvery is a
+// *marker*. Its samples are in [2^-47, 2^-46). In every group of kFakeMarkerRounds rounds one round also adds
+// a value of [1/2, 1) and a later round subtracts it again. While that value is in the sum, the sum keeps no
+// bit below 2^-53, so every fold in between is rounded, and the last bits of the finished pixel depend on
+// which rounds were folded before, between and after. Only the first two rounds of a tile may be swapped
+// undetected: a + b is b + a. If a job ends within a group, only markers whose two rounds are both folded can
+// detect the order.
 #pragma once
 
 #include <algorithm>
@@ -32,7 +33,7 @@ inline std::uint64_t fake_mix(std::uint64_t x) {  // the finaliser of splitmix64
 }
 
 // Returns a seed made of everything that identifies a unit's pixels except its position: the first 8 bytes of
-// both digests.
+// the digests of scene and settings.
 inline std::uint64_t fake_seed(const UnitHeader& header) {
   std::uint64_t scene = 0, settings = 0;
   std::memcpy(&scene, header.scene.bytes.data(), sizeof scene);
@@ -40,7 +41,7 @@ inline std::uint64_t fake_seed(const UnitHeader& header) {
   return fake_mix(scene + 0x9e3779b97f4a7c15ull) ^ fake_mix(settings);
 }
 
-inline constexpr std::uint64_t kFakeMarkerEvery = 32;  // every how many pixels there is a marker
+inline constexpr std::uint64_t kFakeMarkerEvery = 32;  // one in this many pixels is a marker
 inline constexpr RoundIndex kFakeMarkerRounds = 8;
 
 // Returns the seed of a pixel's samples.
@@ -72,8 +73,8 @@ inline RoundIndex fake_round(std::uint64_t sample) {
   return static_cast<RoundIndex>(sample / 64 + 5);
 }
 
-// Returns the value that a marker adds to the sum of each half in this round, besides its samples: a value
-// with a full mantissa, its negative, or 0.
+// Returns the value that a marker adds in this round to both of its sums (of the even and of the odd
+// samples), besides the samples: a value with a full mantissa, its negative, or 0.
 inline double fake_mark(std::uint64_t pixel_seed, std::size_t channel, RoundIndex round) {
   const std::uint64_t h = fake_mix(~pixel_seed + 3 * (round / kFakeMarkerRounds) + channel);
   const auto one = static_cast<RoundIndex>(h % kFakeMarkerRounds);

@@ -41,7 +41,7 @@ struct Breadcrumb {
 
 struct TileResult {
   std::vector<float> sums;  // planes as in common/image/film/partial.h: six, plus those of the requested AOVs
-  // Health of the samples, by cause and pixel; corrected inputs of the scene are not included
+  // The number of bad samples by cause, and where they are; corrected inputs of the scene are not included
   Health health;
   bool stopped = false;  // true if `stop` was set: the sums are then not valid
 };
@@ -67,7 +67,7 @@ TileResult render_tile_as(const World& world, const std::string& variant, PixelR
 struct SampleValue {
   double rgb[3];
   bool finite;    // false if the sample is rejected
-  Health health;  // health of this sample only
+  Health health;  // the problems of this sample, by cause
 };
 SampleValue render_sample(const World& world, int x, int y, std::uint64_t sample);
 
@@ -98,8 +98,8 @@ WorldReport describe(const World& world);
 // battery of test computations. These run once, at the first call. Machines of the same class produce the
 // same bits.
 const Digest& numeric_class();
-// Describes the machine and build of the class for people: "armv8-a:gcc-14.2.0:embree-4.3.3". Classes may
-// differ where it does not.
+// Describes the machine and build of the class for people: "armv8-a:gcc-14.2.0:embree-4.3.3". Different
+// classes may have the same description.
 const std::string& platform();
 
 }  // namespace ls::render

@@ -23,10 +23,10 @@ struct Features {
   bool aimed = false;
   // Vertices of paths are connected to points that a directional emitter lights (light_vertices.h).
   bool connected = false;
-  // The integrator is `whitted`: a path goes on after mirrors and clear glass alone, and ends with the light
-  // that reaches the first other surface straight from a lamp.
+  // The integrator is `whitted`: a path continues only after mirrors and clear glass. At the first other
+  // surface it finds only the light that comes straight from lights, and ends.
   bool whitted = false;
-  // Pixels share what their paths find from the second vertices on (path_reuse.h).
+  // Pixels share the parts of their paths from the second vertices on (path_reuse.h).
   bool reuse = false;
   bool operator==(const Features&) const = default;
 

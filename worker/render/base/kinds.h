@@ -1,5 +1,5 @@
-// Variants of structs, one struct per kind of light or material. Each family of kinds lists its own in its
-// own file, so that adding a kind changes only the files of its family.
+// Variants of structs, one struct per kind of light or material. Each family of kinds (such as area lights)
+// lists its kinds in its own file, so that adding a kind changes only the files of its family.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@ template <class... Families>
 using VariantOf = typename Joined<Families...>::Variant;
 
 // Calls f with the kind that v holds. For many kinds, std::visit makes an indirect call through a table of
-// functions; this compiles to a switch, into which the calls can be inlined.
+// functions; with_kind() compiles to a switch, into which the calls can be inlined.
 template <std::size_t I = 0, class Variant, class F>
 [[gnu::always_inline]] inline auto with_kind(Variant& v, F&& f) {
   if constexpr (I + 1 < std::variant_size_v<std::remove_const_t<Variant>>)

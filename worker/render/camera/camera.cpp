@@ -40,8 +40,8 @@ Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale, const 
 }
 
 bool Camera::usable() const {
-  // Rays depend linearly on the positions on the film and on the lens, so testing the corners of both
-  // suffices.
+  // Rays depend linearly on the positions on the film and on the lens, so testing the corners of film and
+  // lens suffices.
   for (const double fx : {0., 1.})
     for (const double fy : {0., 1.})
       for (const V2& lens : {V2(0, 0), V2(0, 1), V2(1, 0), V2(1, 1)}) {
@@ -93,8 +93,8 @@ float Camera::near_distance(const V3& d) const {
   return static_cast<float>(near_ * along / axis_z_.dot(V3d(d)));
 }
 
-// As in Mitsuba, the near plane is mapped by to_world, even if that stretches it. The ray starts there and
-// has the length far - near.
+// As in Mitsuba, the near plane is mapped by to_world, which may also scale its distance. The ray starts on
+// that plane and has the length far - near.
 CameraRay Camera::orthographic_ray(double x, double y) const {
   const V3d at = V3d(lens_x_) * x + V3d(lens_y_) * y;
   return {V3(V3d(origin_) + at + axis_z_ * near_), V3(axis_z_.normalized()), far_ - near_};

@@ -141,7 +141,8 @@ void attach(RTCDevice device, const Geometry& g, const PrimitiveSet& set, Scenes
 // Adds the primitives of `set` to the Embree scenes `to`. The caller then commits these scenes.
 void fill(const Accel::State& st, const Geometry& g, const PrimitiveSet& set, bool boundaries, Scenes& to) {
   const RTCDevice device = st.device;
-  // between() traces `all`; if there are no boundaries, `opaque` is the same scene as `all`.
+  // Only between() needs hits to be filtered (st.coincident). It traces `all`, which is the same scene as
+  // `opaque` if there are no boundaries.
   to.opaque = new_scene(device, st.coincident && !boundaries);
   if (!boundaries) {
     to.all = to.opaque;

@@ -16,8 +16,9 @@ namespace ls::render {
 
 // The Embree geometry ids of the primitives: kind + side * kKinds. Side 0 contains the opaque primitives and
 // side 1 those that let light pass. The ids are the same in every Embree scene. In the Embree scenes of
-// groups kInGroup is added, so that the id of a hit alone shows whether the primitive is in a group. In the
-// world's Embree scenes the instances have the ids from kFirstInstance on.
+// groups (shapes that are placed by instances) kInGroup is added, so that the id of a hit alone shows whether
+// the primitive is in a group. In the world's Embree scenes the instances have the ids from kFirstInstance
+// on.
 enum : unsigned {
   kTriangles = 0,
   kSpheres = 1,

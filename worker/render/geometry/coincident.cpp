@@ -116,7 +116,7 @@ class Finder {
   void compare(const SurfaceBox& n, const SurfaceBox& o) {
     if (spent(1) || !n.touches(o)) return;
     if (n.surface == o.surface && n.instance == o.instance) return twice_in_itself(n);
-    // Each pair of null surfaces is found twice, once from each side; it is compared only once.
+    // Each pair of null surfaces is found twice, once in each order; it is compared only once.
     if (g_.surfaces[o.surface].null && o.surface < n.surface) return;
     if (n.instance != kNone || o.instance != kNone) {
       mark(n.surface, 1, n.instance == kNone);
@@ -169,7 +169,7 @@ class Finder {
     }
   }
 
-  // Marks a mesh that contains the same triangle twice, as a mesh of cells does whose cells share a wall.
+  // Marks a mesh that contains the same triangle twice, for example a mesh of cells that share walls.
   void twice_in_itself(const SurfaceBox& n) {
     std::vector<std::array<double, 9>> keys;
     const Parts& mine = shapes_[n.surface];

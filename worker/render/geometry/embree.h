@@ -1,5 +1,6 @@
-// The door to Embree: version 3 (Debian 12) or 4 (Debian 13, Ubuntu 24.04), as CMake finds it. What differs
-// between the two is here; everything else in accel.cpp and accel_shapes.h is the same for both.
+// Wrappers for the parts of Embree that differ between version 3 (Debian 12) and version 4 (Debian 13, Ubuntu
+// 24.04). CMake chooses the version that it finds. The other code that uses Embree (accel.cpp,
+// accel_shapes.h) is the same for both versions.
 #pragma once
 
 #if LIGHTSHAFT_EMBREE == 3

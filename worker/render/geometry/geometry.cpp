@@ -28,16 +28,16 @@ bool meet_triangle(const V3d& v0, const V3d& e1, const V3d& e2, const V3d& o, co
 }
 
 // Moves a hit away from the edges of its triangle. The BVH decides in float32 which triangle is hit; near an
-// edge exact arithmetic may place the point just outside. If another wall of a room begins at the edge,
-// rounding by at most sqrt(3) / 2 ulps, 2^-24, of the reach may put the point behind that wall, and light
-// would leak through there. So points keep a distance of four ulps of the reach from every edge. `twice_area`
-// is twice the area of the triangle.
+// edge exact arithmetic may place the point just outside. Rounding moves the point by at most sqrt(3) / 2
+// ulps; an ulp is 2^-24 of the reach (SurfaceHit::reach). If another wall of a room begins at the edge, this
+// may put the point behind that wall, and light would leak in. So points keep a distance of four ulps from
+// every edge. `twice_area` is twice the area of the triangle.
 [[gnu::noinline]] void keep_from_edges(const V3d& e1, const V3d& e2, double twice_area, float reach,
                                        Barycentric& b) {
   const double w = 1 - b.u - b.v;
   // The distance from an edge in barycentric units is the distance divided by the triangle's height over that
   // edge: four ulps of the reach (2^-22 reach) times the length of the edge over twice the area. `margin` is
-  // this without the factor length.
+  // this without the edge's length.
   const double margin = 0x1p-22 * reach / twice_area;
   const auto least = [&](const V3d& edge) { return std::min(.25, margin * edge.length()); };
   const double lw = least(e2 - e1), lu = least(e2), lv = least(e1);
@@ -76,8 +76,8 @@ template <class V>
   if (s.normals) {
     const V3 m = g.normals[idx[0]] * w + g.normals[idx[1]] * u + g.normals[idx[2]] * v;
     if (dot(m, m) > 0) ns = normalize(m) * s.orientation;
-    // At silhouettes interpolated normals may face away from a viewer in front of the surface: taken alone
-    // they would put the path behind it, and light from there would leak through.
+    // At silhouettes interpolated normals may face away from a viewer in front of the surface: used unchanged
+    // they would put the path behind the surface, and light from behind would leak through.
     if ((dot(ns, V3(d)) < 0) != (dot(hit.ng, V3(d)) < 0)) {
       ns = hit.ng;
       hit.normal_replaced = true;
@@ -248,11 +248,13 @@ bool Geometry::complete_local(PrimitiveId id, const V3d& o, const V3d& d, Surfac
 
 namespace {
 
-// Returns the reach of a hit p, with normal ng, in the instance i, where `local` is its reach in the group's
-// space. The BVH transforms the ray to the group's space in single precision. Each component of its origin
-// there is a sum of four products, accurate to four ulps of the largest such sum. In the world, the error
-// perpendicular to the surface is weighted by the mapped normal's components; the reach in the group's space
-// is transformed to the world in the same way.
+// Returns the reach (SurfaceHit::reach) in the world of a hit p, with normal ng, in the instance i, where
+// `local` is its reach in the group's space. The BVH transforms the ray to the group's space in single
+// precision. Each component of the ray's origin is then a sum of four products, accurate to four ulps of the
+// sum of their absolute values. offset_point() moves rays by 16 ulps of the reach, so the reach must be a
+// quarter of that sum. In the world, the errors of the three components move the hit off the surface in
+// proportion to the components of the normal in the group's space. The reach in the group's space is
+// transformed to the world in the same way.
 float reach_of(const PlacedInstance& i, const V3& p, const V3& ng, float local) {
   const auto& a = i.to_world.a;
   const auto& b = i.to_local.a;
@@ -271,8 +273,8 @@ float reach_of(const PlacedInstance& i, const V3& p, const V3& ng, float local) 
 }  // namespace
 
 // The ray is transformed to the group's space without normalisation, so distances along it are the same in
-// both spaces. Normals are transformed back by the inverse transpose, which keeps their side: the cofactors,
-// negated if the map mirrors.
+// both spaces. Normals are transformed back by the matrix of cofactors, negated if the map mirrors: a
+// positive multiple of the inverse transpose, so that normals keep their side of the surface.
 bool Geometry::complete_instanced(PrimitiveId id, const V3& o, const V3& d, SurfaceHit& hit) const {
   LS_COUNT(instances);
   const PlacedInstance& i = instances[id.instance];

@@ -27,11 +27,11 @@ struct SurfaceInfo {  // properties of a surface; a surface is one shape of the 
   std::uint32_t light = kNone;                       // index into Lights
   std::uint32_t interior = kNone, exterior = kNone;  // indices of media
   bool transition = false;                           // true if the media on its two sides differ
-  // True if `transition`, or if it coincides with a surface that has a transition
+  // True if `transition` is, or if the surface coincides with others (coincident_reach > 0)
   bool borders = false;
-  // True if it neither emits nor lets light pass, as most surfaces
+  // True if the surface neither emits light nor lets it pass straight through, as most surfaces
   bool plain = false;
-  bool crossed = false;  // true if some light reaches its other side
+  bool crossed = false;  // true if some light gets to the other side of the surface
   // True if the surface is not closed: it has an edge, or it encloses a volume only together with other
   // surfaces.
   bool sheet = false;
@@ -53,8 +53,8 @@ struct SurfaceInfo {  // properties of a surface; a surface is one shape of the 
   // surface coincides with no other.
   float coincident_reach = 0;
   // For triangles: the reach (see SurfaceHit::reach) of every hit, if the reaches of all triangles of the
-  // surface are within a factor of 16; 0 if each triangle has its own. For other shapes: the smallest reach
-  // of a hit.
+  // surface are within a factor of 16; 0 if each triangle has its own. For other shapes: a lower bound for
+  // the reach of a hit.
   float reach = 0;
   double edge = 0;  // a hit whose barycentric coordinates all exceed this is far enough from all edges
 };
@@ -115,7 +115,7 @@ struct SurfaceHit {
   V3 p;   // point on the surface, computed from barycentrics or the sphere's centre, not as o + t d
   V3 ng;  // geometric normal, unit
   Frame shading;
-  // True if `shading` is that of ng because the interpolated normal faces away from the ray
+  // True if `shading` has the normal ng because the interpolated normal would face away from the ray
   bool normal_replaced = false;
   V2 uv;
   V3 du{1, 0, 0}, dv{0, 1, 0};  // see UvPoint
@@ -195,11 +195,11 @@ V2 sphere_uv(const Sphere& s, const V3d& n);
 inline float largest(const V3& v) { return std::max(std::abs(v.x), std::max(std::abs(v.y), std::abs(v.z))); }
 
 // Moves the point p on a surface of geometric normal ng off the surface, to the side that `w` points to, by
-// 16 ulps of the reach. Rounding moves p at most one ulp off the surface (sqrt(3) / 2). The BVH subtracts the
-// ray's origin from a triangle's corners and finds the distance of the triangle's plane by products of these
-// differences: each component is accurate to half an ulp of the difference of two coordinates, at most twice
-// the reach, and so are the six rounded products and sums: together below 8 ulps. So 16 ulps leave a safety
-// factor of two.
+// 16 ulps, where an ulp is 2^-24 of the reach. Rounding moves p off the surface by at most sqrt(3) / 2 ulps.
+// The BVH subtracts the ray's origin from a triangle's corners and finds the distance of the triangle's plane
+// by products of these differences. Each difference of two coordinates is at most twice the reach and
+// accurate to half an ulp of its value, and so are the six products and sums that follow; all errors together
+// are below 8 ulps. So 16 ulps leave a safety factor of two.
 inline V3 offset_point(const V3& p, const V3& ng, float reach, const V3& w) {
   return p + ng * std::copysign(reach * 0x1p-20f, dot(ng, w));
 }
@@ -208,8 +208,8 @@ inline V3 offset_point(const SurfaceHit& hit, const V3& w) {
 }
 // Returns the reach of a hit p on a shape that is intersected in double precision; `size` is the largest
 // distance of p from the shape's reference point. p itself is rounded to float32, so the largest coordinate
-// of p counts in full. `size` counts 2^-28 times, which turns 16 ulps of float32 into 16 ulps of double,
-// times 2.
+// of p counts in full. `size` is multiplied by 2^-28, because an ulp of double is 2^-29 times one of float32,
+// and for a safety factor of 2.
 inline float reach_in_double(const V3& p, double size) {
   return std::max(largest(p), static_cast<float>(size * 0x1p-28));
 }

@@ -71,8 +71,9 @@ double bits_left(const Bounds& b, const V3d& origin) {
 }
 
 // The space of the world. Its centre is the middle of the box of all shapes. If this leaves some mesh less
-// than 8 of 24 bits (as in a small scene lit by a sphere of radius 1e5 at 1e7), the centre of the mesh
-// with the fewest bits is used instead, provided that every mesh then has more bits than this one had before.
+// than 8 of the 24 bits of float32 (as in a small scene lit by a sphere of radius 1e5 at 1e7), the centre of
+// the mesh with the fewest bits is used instead, provided that every mesh then has more bits than this one
+// had before.
 Space world_space(const std::vector<Bounds>& meshes, const Bounds& all) {
   Space s = unit_space(all);
   constexpr double kFewBits = 0x1p-16;
@@ -107,7 +108,8 @@ bool is_sheet(const LocalMesh& mesh) {
 
 // Normals from a file decide which side of a triangle emits and is lit, even against its winding; but the
 // winding decides on which side each medium is. So the winding is made to follow the normals, and the media
-// swap sides with it. A mesh between media that has triangles of both kinds stays as it is.
+// swap sides with it. A mesh between different media of which only some triangles wind against their normals
+// stays unchanged.
 void follow_normals(const LocalMesh& mesh, SurfaceInfo& info, std::vector<std::uint32_t>& indices) {
   const auto opposes = [&](std::size_t i) {
     const std::uint32_t a = indices[i], b = indices[i + 1], c = indices[i + 2];
@@ -233,7 +235,7 @@ struct Parts {
   std::vector<Bounds> meshes;  // bounds of the world's own triangle meshes
 };
 
-// The largest number of vertices: their indices have 32 bits, also in the BVH.
+// The largest number of vertices of a scene. Indices of vertices have 32 bits, also in the BVH.
 constexpr std::uint64_t kMaxVertices = std::uint64_t{1} << 31;
 
 Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {

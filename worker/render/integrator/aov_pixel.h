@@ -43,8 +43,8 @@ class AovPixel {
   AovPlanes planes_;
   bool wants_surface_, wants_light_, wants_guide_;
   LightSplit split_;
-  // Sums over the samples. For guides, [0] is half A of the samples and [1] is half B; for other AOVs, [0] is
-  // the sum of both.
+  // Sums over the samples. For denoising guides, [0] is the sum over the even samples and [1] that over the
+  // odd ones; for other AOVs, [0] is the sum over all samples.
   std::array<std::array<Sums, kAovs>, 2> sums_{};
   double hits_ = 0;
   std::vector<IdSlot> shapes_, materials_;

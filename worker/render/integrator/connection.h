@@ -10,9 +10,9 @@
 
 namespace ls::render {
 
-// Sets `densities_` for the vertex p, on a surface of the geometric normal ng or in a medium (0), which the
-// path reaches from the vertex `from`. Light is not connected to a vertex that a delta lobe sampled, or that
-// is the first: then no shorter subpath competes.
+// Sets `densities_` for the vertex p, which the path reaches from the vertex `from`. ng is the geometric
+// normal if p is on a surface, and 0 in a medium. `densities_` stays 0 if `from` is the camera or has
+// scattered the path by a delta lobe: then no connection of a shorter subpath finds the same path.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::arrive(const Vertex& from, const V3& p, const V3& ng) {
   densities_ = {};
@@ -74,8 +74,8 @@ void PathTracer<F, Light>::connect_on(const SurfaceHit& hit, const SurfaceInfo& 
   connect(x, hit.p, OnSurface{*this, hit, surface, wo});
 }
 
-// Connects the vertex x to a light vertex and adds the light. `start` is the origin of shadow rays through
-// media.
+// Connects the vertex x to a light vertex and adds the light. `start` is the position of x before it was
+// moved off a surface; lengths in media are measured from there.
 template <Features F, template <Features> class Light>
 template <class Scattering>
 void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Scattering& scattering) {
@@ -100,10 +100,10 @@ void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Sca
   light.target = y.p;
   float cos_y = 1, camera_pdf = 0, light_pdf = 0;  // at y
   if (y.medium == kNone) {
-    // The same directions are allowed as where next-event estimation finds the sun (light_surface)
+    // Rejects the directions in which next-event estimation would not find the sun (light_surface)
     const V3 to_x = y.hit.shading.to_local(-w), to_light = y.hit.shading.to_local(y.to_light);
     if ((to_light.z > 0) != (dot(y.to_light, y.hit.ng) > 0)) return;
-    if ((to_x.z > 0) != (dot(w, y.hit.ng) < 0)) return;  // a path from x would find another normal there
+    if ((to_x.z > 0) != (dot(w, y.hit.ng) < 0)) return;  // a path from x would use ng as normal
     cos_y = std::abs(dot(w, y.hit.ng));
     const BsdfIndex bsdf = world_.geometry.surfaces[y.hit.surface].bsdf;
     const BsdfEval f_y = world_.bsdfs.eval(bsdf, y.hit.uv_point(), to_x, to_light);
@@ -121,7 +121,7 @@ void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Sca
   float from_light = 0;
   if (densities_.last > 0)
     from_light = light_pdf * scattering.cosine(w) * densities_sum([&] { return scattering.back(w); });
-  // The balance heuristic's weight over r^2
+  // The balance heuristic's weight, divided by r^2 for the geometric term
   const float weight = 1 / (r2 + from_camera + from_light);
   C3 added = beta_ * value * y.light * (weight * choice.weight);
   const float size = mean(added);
@@ -137,8 +137,9 @@ void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Sca
   --depth_;
 }
 
-// Light is scattered as paths are: a surface samples the direction to which it sends light as if that came
-// from the camera, and then the weight has the values for both directions exchanged.
+// Light is scattered as camera paths are. At a surface the next direction is sampled as if the light came
+// from the camera. The BSDF is then evaluated with the two directions exchanged, because light travels the
+// other way.
 template <Features F, template <Features> class Light>
 template <class Keep>
 void PathTracer<F, Light>::follow_light(const SunMap::Ray& from, const Keep& keep) {
@@ -167,7 +168,7 @@ void PathTracer<F, Light>::follow_light(const SunMap::Ray& from, const Keep& kee
     hit.normal_replaced = false;
     const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, kInfinity);
     if (!primitive || !world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit)) return;
-    const Medium* medium = nullptr;  // in which the light is scattered
+    const Medium* medium = nullptr;  // that scatters the light; null: none
     if constexpr (F.media) {
       if (medium_.any()) {
         const Medium& around = world_.media[medium_.one()];
@@ -199,7 +200,7 @@ void PathTracer<F, Light>::follow_light(const SunMap::Ray& from, const Keep& kee
       }
       const float cosine = std::abs(dot(ray_.d, hit.ng));
       const V3 to_light = hit.shading.to_local(-ray_.d);
-      // The light that next-event estimation finds (light_surface)
+      // Continues only with light that next-event estimation would find (light_surface)
       if (!surface.smooth || !(cosine > 0) || (to_light.z > 0) != (dot(ray_.d, hit.ng) < 0)) return;
       if (hit.normal_replaced) return;
       y.medium = kNone;
@@ -208,7 +209,7 @@ void PathTracer<F, Light>::follow_light(const SunMap::Ray& from, const Keep& kee
       const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), to_light, g.u(2), {g.u(0), g.u(1)});
       if (!s || s->delta) return;
       const V3 w = normalize(hit.shading.to_world(s->wi));
-      if ((s->wi.z > 0) != (dot(w, hit.ng) > 0)) return;  // a path that comes from there finds another normal
+      if ((s->wi.z > 0) != (dot(w, hit.ng) > 0)) return;  // a camera path from there would use ng as normal
       const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), s->wi, to_light);
       beta_ *= f.f_cos * (std::abs(dot(w, hit.ng)) / (s->pdf * cosine));
       leave(s->pdf, f.pdf);

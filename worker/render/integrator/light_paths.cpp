@@ -13,30 +13,31 @@
 namespace ls::render {
 namespace {
 
-// Number of camera paths from which the sun map is learned: at most kLearningPaths, and at most
-// kLearningPathsPerPixel for each pixel of the full frame. Learning may stop after kFirstPaths if connections
-// clearly do not pay.
+// Number of camera paths from which the sun map (the distribution of rays from the sun: SunMap) is learned:
+// at most kLearningPaths, and at most kLearningPathsPerPixel for each pixel of the full frame. Learning may
+// stop after kFirstPaths if connections clearly do not pay.
 constexpr std::uint64_t kLearningPaths = 1 << 16;
 constexpr std::uint64_t kLearningPathsPerPixel = 16;
 constexpr std::uint64_t kFirstPaths = 1 << 12;
 // Learning stops after this many vertices in total, since paths may be long.
 constexpr double kLearningVertices = 1 << 21;
-constexpr std::uint64_t kSunRays = 1 << 14;  // of one set of light vertices
-// Rays that tell how many light vertices a ray of the sun has.
+constexpr std::uint64_t kSunRays = 1 << 14;  // rays of the sun for one set of light vertices
+// Number of rays from which the mean number of light vertices per ray of the sun is estimated.
 constexpr std::uint64_t kLearningRays = 1 << 12;
-// From this many scatterings on, connected paths are subject to Russian roulette: what deep paths bring,
-// connections of their first vertices bring too.
+// From this many scatterings on, connected paths are subject to Russian roulette: light that deep paths find
+// is also found by connections of their first vertices.
 constexpr int kConnectedRoulette = 2;
-// Connections pay where paths find the sun at less than this share of the vertices, and where more than this
-// share of the image's light comes from there.
+// Connections pay if next-event estimation finds the sun at less than the share kLitThatPays of the vertices,
+// and if the light that it finds there is more than the share kLightThatPays of the image's light.
 constexpr double kLitThatPays = .15;
 constexpr double kLightThatPays = .1;
 // Lower bound for the light that a surface vertex reflects, per unit cosine of the sun [1/sr]. A glossy
 // surface may reflect little in the four directions that are evaluated, but much in others.
 constexpr float kLeastReflected = .01f;
-// A shading normal counts as tilted if its cosine to the geometric normal is smaller.
+// A shading normal counts as tilted if its cosine to the geometric normal is smaller than this.
 constexpr float kUntilted = .999999f;
-// Connections that would add less than this share of the image's mean are subject to Russian roulette.
+// Connections that would add less than this share of the image's mean radiance are subject to Russian
+// roulette.
 constexpr float kFaint = .5f;
 
 constexpr std::uint64_t kLearningSeed = 0x5eed0f1ea2;
@@ -73,7 +74,7 @@ void learn(const World& w, bool in_any_case, Learned& learned) {
   }
 }
 
-// How a light vertex looks from elsewhere.
+// Computes the data by which the contribution of a light vertex to other points is estimated.
 LightVertices::Look look_of(const World& w, const LightVertex& y) {
   const float light = mean_component(y.light) / mean_component(w.sun.irradiance);
   LightVertices::Look look;
@@ -83,7 +84,8 @@ LightVertices::Look look_of(const World& w, const LightVertex& y) {
     look.n = dot(y.to_light, y.hit.ng) > 0 ? y.hit.ng : -y.hit.ng;
     look.both_sides =
         surface.crossed || std::abs(dot(y.hit.shading.n, y.hit.ng)) < kUntilted || surface.wants_slopes;
-    // Towards four directions at 45 degrees to the normal, on the side that is lit
+    // Estimates the reflected light by the mean over four directions at 45 degrees to the normal, on the lit
+    // side
     const V3 to_light = y.hit.shading.to_local(y.to_light);
     const float z = std::copysign(.70710678f, to_light.z);
     float reflected = 0;
@@ -122,7 +124,7 @@ constexpr Features kAimed = [] {
   return f;
 }();
 
-// The features must be those of the camera's paths: weights depend on how directions are sampled.
+// Uses the same features as camera paths do, because weights depend on how directions are sampled.
 LightVertices trace(const World& w, std::uint64_t seed, std::uint32_t set, std::uint64_t rays) {
   if (w.need.aimed) return trace_with<kAimed>(w, seed, set, rays);
   return w.need.media ? trace_with<kMedia>(w, seed, set, rays) : trace_with<kSurfaces>(w, seed, set, rays);
@@ -159,7 +161,7 @@ void learn_connections(const IntegratorSettings& settings, World& w) {
   w.sun_map = std::move(learned.learner.map);
   w.faint = kFaint * static_cast<float>(learned.radiance / static_cast<double>(learned.paths));
   w.need.connected = true;
-  aim(settings, w.frame, w);  // anew: points on camera segments pay more often
+  aim(settings, w.frame, w);  // again, since with connections points on camera segments pay more often
   w.rr_depth = std::min(w.rr_depth, kConnectedRoulette);
   const std::size_t count = trace(w, kLearningSeed, 0, kLearningRays).count();
   w.connections_per_ray =

@@ -258,9 +258,9 @@ CoincidentHits PathTracer<F, Light>::others_at(const SurfaceHit& hit, const V3& 
   return all;
 }
 
-// The media after crossing the hit surface and all null surfaces that coincide with it. All bodies are left
-// before any is entered, so that a path is never inside more bodies than exist: cells of one mesh that share
-// a wall are one body.
+// The media after crossing the hit surface and all null surfaces that coincide with it. All boundaries are
+// left before any is entered, so that a path is never counted as inside more boundaries than there are: cells
+// of one mesh that share a wall are one boundary.
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::through_all(const SurfaceHit& hit, const V3& w, const V3& from, Within in) const
     -> Within {

@@ -56,9 +56,9 @@ struct OffsetRay {
  private:
   // Returns the part of a surface's offset (the vector by which rays that leave it are moved) that a point
   // still needs if it is displaced by `from_surface` from the surface. Zero if the point is far enough from
-  // the surface; more than the whole offset if it is behind the surface. That happens near curved surfaces:
-  // the length was measured along the line from the moved start, and a grazing line from the unmoved start
-  // leaves the surface earlier.
+  // the surface; more than the whole offset if it is behind the surface. A point may be behind a curved
+  // surface, because the length was measured along the line from `origin`, and a grazing line from `start`
+  // crosses the surface earlier.
   static V3 missing_offset(const V3& offset, const V3& from_surface) {
     const float share = dot(from_surface, offset) / dot(offset, offset);
     return share < 1 ? offset * (1 - share) : V3(0);

@@ -1,5 +1,6 @@
-// Part of path_tracer.h, which includes it: the paths of a group of pixels share what they find from their
-// second vertices on (Bekaert, Sbert, Halton 2002, "Accelerating path tracing by re-using paths").
+// Part of path_tracer.h, which includes it: the paths of a group of pixels share their tails, that is, the
+// parts from their second vertices on and the light found there (Bekaert, Sbert, Halton 2002, "Accelerating
+// path tracing by re-using paths").
 //
 // Let x_k be the first vertex of the path of pixel k, and q_k(y) the density per area or volume with which
 // that path finds a second vertex y: the density of the direction, times that of a flight that ends at y, or
@@ -40,8 +41,8 @@ void PathTracer<F, Light>::begin_sharing(const SurfaceHit* hit, const Medium* me
   }
 }
 
-// After the direction of the first vertex was sampled by a smooth lobe: the weight up to here moves to
-// `scale`, and the densities become relative to their mean.
+// After the direction of the first vertex was sampled by a smooth lobe: the weight of the path so far moves
+// to `scale`, and the densities become relative to their mean.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::look_for_second() {
   sharing_.part = SharingPath::Part::second;
@@ -54,7 +55,8 @@ void PathTracer<F, Light>::look_for_second() {
   beta_ = C3(1);
 }
 
-// Next-event estimation at the second vertex. `back` accepts directions towards lights.
+// Begins the tail at the second vertex, with next-event estimation. `accepts` returns false for directions
+// from which light must not be added.
 template <Features F, template <Features> class Light>
 template <class Accepts>
 void PathTracer<F, Light>::begin_tail(const PathVertex& at, const V3& n, const V3& start,
@@ -79,7 +81,7 @@ void PathTracer<F, Light>::begin_tail(const PathVertex& at, const V3& n, const V
   tail.light = arriving;
 }
 
-// The path goes on from the second vertex along w, sampled by a smooth lobe with this weight.
+// Continues the path from the second vertex along w, which a smooth lobe sampled with this weight.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::go_on_as_tail(const V3& w, const C3& weight) {
   sharing_.tail.goes_on = true;
@@ -94,7 +96,7 @@ void PathTracer<F, Light>::go_on_as_tail(const V3& w, const C3& weight) {
   beta_ = C3(1);
 }
 
-// What this path's first vertex scatters towards the vertex y of a tail. `own` is true for the path's own
+// Computes what this path's first vertex x sees of the vertex y of a tail. `own` is true for the path's own
 // tail, to which the way is known to be free.
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
@@ -127,7 +129,7 @@ auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
   LightSample end;
   end.target = y.p;
   if (!y.medium) {
-    // A path from x would find another normal there
+    // A path from x would use the geometric normal at y, because the shading normal faces away from it
     if ((y.hit.shading.to_local(-w).z > 0) != (dot(w, y.hit.ng) < 0)) return look;
     cosine = std::abs(dot(w, y.hit.ng));
     end.target = offset_point(y.hit, -w);
@@ -154,7 +156,8 @@ auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
   return look;
 }
 
-// What the vertex of a tail scatters from the direction w to a path that arrives along `d`.
+// Returns the BSDF or phase function at the vertex y of a tail, for light from the direction w and a path
+// that arrives along `d`.
 template <Features F, template <Features> class Light>
 BsdfEval PathTracer<F, Light>::scattered_at(const PathVertex& y, const V3& d, const V3& w) const {
   if (y.medium) {
@@ -165,12 +168,13 @@ BsdfEval PathTracer<F, Light>::scattered_at(const PathVertex& y, const V3& d, co
                            y.hit.shading.to_local(-d), y.hit.shading.to_local(w));
 }
 
-// Adds to each path of a group the light that the tails of all of them bring.
+// Adds to each path of the group the light of the tails of all paths of the group.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::share(std::span<PathTracer* const> group) {
   struct Seen {
     Look look;
-    C3 lit, onward;  // scattered towards the path, from the light and from the direction of the tail
+    C3 lit, onward;  // BSDF or phase function towards this path, for light from the light source and from the
+                     // tail
   };
   std::array<Seen, kMostSharing> seen;
   for (PathTracer* const giver : group) {
@@ -203,7 +207,7 @@ void PathTracer<F, Light>::share(std::span<PathTracer* const> group) {
       group[k]->add_shared(s.look.value * light);
     }
   }
-  // A tail that was given up is missing in all pixels of the group
+  // If a path was cut off, its tail is missing in all pixels of the group, so all samples are rejected
   for (const PathTracer* giver : group) {
     if (giver->outcome_.cut_off == HealthCause::none) continue;
     for (PathTracer* path : group) path->outcome_.reject(giver->outcome_.cut_off);

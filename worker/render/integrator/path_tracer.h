@@ -104,8 +104,8 @@ class PathTracer {
   // With F.connected: follows a ray of the sun, and calls keep(vertex) for each light vertex on its way.
   template <class Keep>
   void follow_light(const SunMap::Ray& ray, const Keep& keep);
-  // With F.reuse: adds to each path the light that all of them found from their second vertices on. They have
-  // been traced, and belong to different pixels.
+  // With F.reuse: adds to each path the light that all paths found from their second vertices on. The paths
+  // must have been traced and belong to different pixels.
   static void share(std::span<PathTracer* const> group);
   const SampleOutcome& outcome() const { return outcome_; }
 
@@ -182,19 +182,19 @@ class PathTracer {
   void connect_on(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo);
   template <class Scattering>
   void connect(const Receiver& x, const V3& start, const Scattering& scattering);
-  // Density of light vertices that the sun reaches directly, times the number of them among which a
-  // connection chooses: per area of a surface with normal ng or, in a medium (ng = 0), per area across the
-  // sun's rays. `rays`: density of these rays, per area across them.
+  // Density of the light vertices that the sun lights directly, times the number of light vertices among
+  // which a connection chooses. It is per area of a surface with normal ng or, in a medium (ng = 0), per area
+  // perpendicular to the sun's rays. `rays` is the density of these rays, per area perpendicular to them.
   float first_density(float rays, const V3& ng) const {
     return world_.connections_per_ray * rays * (is_black(ng) ? 1 : std::abs(dot(ng, world_.sun.direction)));
   }
   void arrive(const Vertex& from, const V3& p, const V3& ng);
 
-  // With F.reuse: what a path sees from its first vertex of another path's second one.
+  // With F.reuse: how the second vertex of a path's tail looks from the first vertex of another path.
   struct Look {
-    V3 w{0, 0, 0};      // the direction towards it
-    C3 value{0, 0, 0};  // the light from there to the camera, of what it scatters towards the first vertex
-    float density = 0;  // with which the path could have found it, per area or volume; 0: not at all
+    V3 w{0, 0, 0};      // the direction towards the second vertex
+    C3 value{0, 0, 0};  // light at the camera per radiance that the second vertex scatters towards the first
+    float density = 0;  // density, per area or volume, with which this path finds the second vertex; 0: never
   };
   void begin_sharing(const SurfaceHit* hit, const Medium* medium);
   void look_for_second();
@@ -219,8 +219,8 @@ class PathTracer {
   }
 
   // Adds light that next-event estimation found at the current vertex p, on a surface of the geometric normal
-  // ng, or in a medium (0). back() is the density with which light from there is scattered back along the
-  // path.
+  // ng, or in a medium (0). back() is the density with which a path from the light would be scattered back
+  // along this path.
   template <class Back>
   void add_found([[maybe_unused]] const LightChoice& choice, [[maybe_unused]] const V3& p,
                  [[maybe_unused]] const V3& ng, C3 light, [[maybe_unused]] const Back& back) {
@@ -348,7 +348,7 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
 }
 
 // Passes every index-matched surface, and each null-transmitting one with its probability. The random numbers
-// are those of the path itself as long as both hit the same surfaces.
+// are those of trace() for the same ray, as long as both hit the same surfaces.
 template <Features F, template <Features> class Light>
 std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay& ray) {
   ray_ = {ray.o, ray.o, ray.d};
@@ -432,7 +432,7 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   if (!light) return;
   const V3 wi = hit.shading.to_local(light->direction);
   // A shading normal must not let light through a surface that is opaque by its geometric normal. Sampled
-  // directions are checked likewise.
+  // directions are checked in the same way (scatter_on_surface).
   if ((wi.z > 0) != (dot(light->direction, hit.ng) > 0)) return;
   const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wo, wi);
   if (is_black(f.f_cos)) return;

@@ -18,8 +18,8 @@
 namespace ls::render {
 namespace {
 
-// The variants of the integrators `volpath` and `path`, cheapest first. The last one has the
-// features of every scene.
+// The variants of the integrators `volpath` and `path`, cheapest first. A variant is the path tracer compiled
+// for one set of features (features.h); the last one has the features of every scene.
 constexpr Variant kVariants[] = {
     variant<Features{}>("surfaces"),
     variant<Features{.passing = true}>("surfaces that light passes"),
@@ -90,8 +90,8 @@ HealthCause rejected_for(const SampleOutcome& s) {
   if (cause == HealthCause::none && negative(s)) health.add(HealthCause::negative, 1, spot);
 }
 
-// Renders the samples `range` of pixels with a variant, one by one, and keeps what consecutive ones have in
-// common.
+// Renders the samples `range` of pixels with a variant, one by one, and keeps data that consecutive samples
+// have in common.
 class Samples {
  public:
   Samples(const World& w, const Variant& v, SampleRange range, Breadcrumb* crumb = nullptr)
@@ -104,7 +104,8 @@ class Samples {
   }
 
  private:
-  // The light vertices of the last sample of each half, so that the cache is asked only when the set changes
+  // The set of light vertices of the previous even sample and of the previous odd one. The cache is asked
+  // only when the set changes (LightVertexCache).
   struct Kept {
     std::uint64_t set = 0;
     std::shared_ptr<const LightVertices> vertices;
@@ -136,7 +137,7 @@ class Samples {
   }
 
   struct Rendered {
-    std::vector<SampleOutcome> outcomes;  // of all samples of a block: its pixels vary faster
+    std::vector<SampleOutcome> outcomes;  // of all samples of a block; entry sample * pixels + pixel
     std::vector<LightSplit> splits;
   };
   void render(const SharingBlock& block, Rendered& r) {
@@ -164,7 +165,7 @@ class Samples {
   SampleRange range_;
   Breadcrumb* crumb_;
   std::array<Kept, 2> kept_;
-  int row_ = -1;                    // of the blocks that are kept
+  int row_ = -1;                    // row of the blocks in `blocks_`
   std::map<int, Rendered> blocks_;  // by column
 };
 

@@ -1,5 +1,5 @@
-// The path tracers with Features::reuse, and which worlds use them. They take long to compile, so they have
-// their own source file.
+// The path tracers with Features::reuse (pixels share the tails of their paths: path_reuse.h), and the
+// decision which worlds use them. They take long to compile, so they have their own source file.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,27 +18,30 @@ constexpr Features kAllSplit{.media = true, .chromatic = true, .passing = true, 
 
 constexpr std::size_t kSharing = kUsualPathReuse;
 
-// Some groups of pixels are rendered to find out whether sharing pays, with as many samples as a quick image
-// has: the fewer there are, the more of the noise is of edges and soft shadows, which sharing leaves.
+// The pilot renders some groups of pixels to find out whether sharing pays. It takes as many samples as a
+// quick image has: with fewer, more of the noise would be that of edges and soft shadows, which sharing does
+// not reduce.
 constexpr std::uint64_t kPilotSeed = 0x5eed0f9a7e;
 constexpr std::uint64_t kPilotGroups = 64;  // at most
 constexpr std::uint64_t kFewestPilotGroups = 4;
-// The frame's pixels for each group: the pilot takes about as long as one sample of each pixel.
+// One group is rendered for this many pixels of the frame, so that the pilot takes about as long as one
+// sample of each pixel.
 constexpr std::uint64_t kPixelsPerGroup = 1024;
 constexpr std::uint64_t kPilotSamples = 32;
 constexpr int kPilotDepth = 32;  // paths in a white and dense medium have thousands of segments
 // A smaller frame is not worth the pilot.
 constexpr std::uint64_t kPilotFrame = 256;  // pixels
-// With more null boundaries, a single path may take as long as the image of another scene.
+// A scene with more null boundaries gets no pilot, since a single path may take as long as the image of
+// another scene.
 constexpr std::ptrdiff_t kPilotBoundaries = 64;
-// Sharing pays if pixels have more than this many times as much noise without it. A sample takes 1.4 to 2.4
-// times as long (docs/ decisions/0036-path-reuse.md), but so few pixels rarely show the rare bright paths
-// that sharing helps most.
+// Sharing pays if the noise (squared relative error) without it is more than this many times the noise with
+// it. A shared sample takes 1.4 to 2.4 times as long (docs/decisions/0036-path-reuse.md). The limit is low
+// because the few pixels of the pilot rarely show the rare bright paths that sharing helps most.
 constexpr double kGainThatPays = 1.5;
-// With a gain that is so much larger after some of the groups, the others are not needed.
+// If the gain after some of the groups is this many times kGainThatPays, the other groups are not rendered.
 constexpr double kBeyondDoubt = 4;
 
-// Gives the world the pilot's settings, and its own back at the end.
+// Sets the pilot's settings in the world; the destructor restores the world's own.
 class Pilot {
  public:
   explicit Pilot(World& w) : w_(w), seed_(w.seed), max_depth_(w.max_depth) {
@@ -55,7 +58,8 @@ class Pilot {
   }
 
   // Chooses a square at random and renders one group of its pixels, with shared paths and without. `dealing`
-  // is the sample number for which the square is dealt into groups. Returns false if a sample is not usable.
+  // is the sample number that determines how the square is divided into groups. Returns false if a sample is
+  // not usable.
   bool add_group(const Variant& sharing, std::uint64_t dealing) {
     const auto among = [&](int n) {
       return static_cast<int>(places_.next() % static_cast<std::uint64_t>(n));
@@ -137,8 +141,9 @@ void share_tails(const IntegratorSettings& settings, World& w) {
   Features need = w.need;
   need.split = false;
   need.reuse = true;
-  // Grids have no density of flights in closed form; lamps in media, light vertices and points on segments
-  // change how directions are sampled; lights without a position are weighted one by one where rays end.
+  // Paths are not shared in scenes with grids (the density of flights has no closed form), with lamps in
+  // media, light vertices or points on segments (these change how directions are sampled), or with lights
+  // without a position (these are weighted one by one where rays end).
   const auto variants = reuse_variants();
   const auto sharing =
       std::ranges::find_if(variants, [&](const Variant& v) { return v.covers.covers(need); });
@@ -147,8 +152,8 @@ void share_tails(const IntegratorSettings& settings, World& w) {
   // Roulette at the first vertex would be a part of the densities
   if (w.rr_depth < 2 || (w.passing_counts && w.need.passing)) return;
   for (const SurfaceInfo& s : w.geometry.surfaces)
-    // Rays from two sides may find different media behind an open boundary. A null surface that emits light
-    // is one of several such on a path.
+    // Rays from two sides may find different media behind an open boundary. A path may cross several null
+    // surfaces that emit light, but a tail records only one.
     if ((s.transition && s.sheet) || (s.null && s.light != kNone)) return;
   const bool automatic = settings.path_reuse == 0;
   if (automatic && !sharing_pays(w, *sharing)) return;

@@ -187,7 +187,7 @@ class SegmentNee {
     const bool both = choice.has_place && v.by_angle && v.by_depth;
     const float e_depth = at_point.rate * depth_pdf(path, medium, plan, at_point.x);
     if (both && !by_angle) e_angle = v.angle_pdf(pivot);
-    // For each of the two ways, the expected number of points per unit length
+    // The expected number of points per unit length, by depth and by the strategy of this point
     const float by_depth = e_depth * v.points;
     const float own = by_angle ? e_angle : by_depth;
     if (!(own > 0)) return;

@@ -32,7 +32,7 @@ C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSam
 
 // Returns `value` times the null transmission of surfaces and the transmittance of media along the ray from p
 // in the direction d, of length `left`. The ray must not be blocked by an opaque surface. `medium` contains
-// the media at the start of the ray.
+// the media at the start of the ray; `start` is as in unoccluded().
 template <Features F, template <Features> class Light>
 C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3& p, const V3& d, float left,
                                             Within medium, RandomStream stream) {

@@ -1,5 +1,5 @@
-// What the paths of a group of pixels know of each other, so that each pixel also gets the light that the
-// others' paths find from their second vertices on (path_reuse.h).
+// Data that the paths of a group of pixels share, so that each pixel also gets the light that the other
+// pixels' paths find from their second vertices on (path_reuse.h). That part of a path is its tail.
 #pragma once
 
 #include "worker/render/geometry/geometry.h"
@@ -8,7 +8,7 @@
 
 namespace ls::render {
 
-// The largest number of pixels that share.
+// The largest number of pixels in a group.
 inline constexpr std::size_t kMostSharing = 64;
 
 struct PathVertex {
@@ -21,10 +21,10 @@ struct PathVertex {
 struct FirstVertex {
   bool usable = false;  // false: there is none, or it scatters by delta lobes alone
   PathVertex at;
-  V3 d{0, 0, 0};        // the direction of travel before it
-  C3 beta{0, 0, 0};     // the weight of the path up to it
-  C3 density{1, 1, 1};  // for each channel as the hero, the density of the path over the mean of the three
-  OneMedium around;     // the medium in front of it
+  V3 d{0, 0, 0};        // the direction of travel before the vertex
+  C3 beta{0, 0, 0};     // the weight of the path up to the vertex
+  C3 density{1, 1, 1};  // the path's density with each channel as the hero (medium.h), over their mean
+  OneMedium around;     // the medium in front of the vertex
 };
 
 // The second vertex of a path, and the light that arrives there.
@@ -33,14 +33,14 @@ struct SharedTail {
   PathVertex at;
   C3 depth{0, 0, 0};  // the optical depth from the path's own first vertex, in each channel
 
-  // By next-event estimation. light_pdf 0: none.
+  // Light found by next-event estimation; light_pdf = 0: none.
   V3 to_light{0, 0, 0};
   float light_pdf = 0;
   bool light_is_delta = false;
   C3 light{0, 0, 0};
 
-  // From the direction in which the path goes on: light that was emitted there straight towards the vertex,
-  // which next-event estimation finds with the density hit_pdf, and light that was scattered on its way.
+  // Light from `onward`, the direction in which the path goes on. `emitted` comes straight from a light
+  // source, which next-event estimation finds with the density hit_pdf; `scattered` was scattered on its way.
   bool goes_on = false;
   V3 onward{0, 0, 0};
   C3 emitted{0, 0, 0}, scattered{0, 0, 0};
@@ -49,18 +49,18 @@ struct SharedTail {
   bool brings_light() const { return light_pdf > 0 || !is_black(emitted) || !is_black(scattered); }
 };
 
-// The state of a path that records both.
+// The state of a path that records its first vertex and its tail.
 struct SharingPath {
   enum class Part : std::uint8_t {
-    alone,   // before the first vertex, and where light is the pixel's alone
+    alone,   // before the first vertex, and where light counts for this pixel only
     second,  // on the way from the first vertex to the second
     tail,    // from the second vertex on
   };
   Part part = Part::alone;
   FirstVertex first;
   SharedTail tail;
-  C3 scale{1, 1, 1};   // the factor of light that is the pixel's alone
-  float survival = 1;  // Russian roulette multiplies the path's weight by it
+  C3 scale{1, 1, 1};   // the factor of light that counts for this pixel only
+  float survival = 1;  // factor of the path's weight in Russian roulette (survives)
 };
 
 }  // namespace ls::render

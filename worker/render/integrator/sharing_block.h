@@ -1,7 +1,7 @@
-// Which pixels' paths share their tails (path_reuse.h). The full frame is cut into squares; for each sample
-// the pixels of a square are dealt into groups at random, so that two pixels rarely meet and their errors are
-// nearly independent. Squares begin at the corner of the full frame and a group knows no tiles: the pixels of
-// a tile or crop are the same as those of the whole image.
+// Chooses the pixels whose paths share their tails (path_reuse.h). The full frame is cut into squares
+// (blocks). For each sample the pixels of a block are divided into groups at random, so that two pixels are
+// rarely in the same group and their errors are nearly independent. Blocks begin at the corner of the full
+// frame and do not depend on tiles, so the pixels of a tile or crop are the same as those of the whole image.
 #pragma once
 
 #include <algorithm>
@@ -17,8 +17,9 @@
 
 namespace ls::render {
 
-// Sets `reuse` and Features::reuse of a world that is otherwise complete, if its scene asks for it and has
-// nothing for which the densities of second vertices are unknown.
+// Sets `reuse` and Features::reuse of a world that is otherwise complete, if the densities of second vertices
+// are known in its scene, and if the settings ask for sharing or leave the choice to a pilot that finds that
+// sharing pays (reuse_variants.cpp).
 void share_tails(const IntegratorSettings& settings, World& w);
 
 class SharingBlock {

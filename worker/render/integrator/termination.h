@@ -17,8 +17,8 @@ inline constexpr int kMaxShadowSegments = 1 << 16;
 inline constexpr int kForcedRouletteDepth = 1024;
 inline constexpr int kLastRouletteDepth = 1 << 16;
 inline constexpr float kLastSurvival = 1 - 0x1p-14f;
-// Light subpaths of media that lose no light would fill the memory: from kMostUnforced scatterings on, at
-// least half of them end at each.
+// Light subpaths in media that lose no light would fill the memory. So from kMostUnforced scatterings on,
+// each scattering ends a light subpath with probability 1 - kForcedLight or more.
 inline constexpr int kMostUnforced = 8;
 inline constexpr float kForcedLight = .5f;
 constexpr float forced_survival(int depth) {

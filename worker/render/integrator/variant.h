@@ -80,10 +80,10 @@ std::span<const Variant> connected_variants();
 // The variants of the integrator `volpath_distant_mis`, cheapest first; the last one has the features of
 // every scene.
 std::span<const Variant> distant_variants();
-// The variants in which paths of several pixels share their tails, likewise. They support only homogeneous
-// media that neither overlap nor emit light.
+// The variants in which paths of several pixels share their tails, cheapest first. They support only
+// homogeneous media that neither overlap nor emit light.
 std::span<const Variant> reuse_variants();
-// The variants of the integrator `whitted`, likewise. It leaves media out.
+// The variants of the integrator `whitted`, which ignores media, cheapest first.
 std::span<const Variant> whitted_variants();
 // The variants of the integrators `volpath` (without and with Features::aimed) and `volpath_distant_mis`, and
 // of `whitted`, that also compute light components. Each has all other features.

@@ -74,7 +74,7 @@ class VertexNee {
   template <class Path>
   static Plan ahead(Path& path, const Medium& medium, Segment segment) {
     if (medium.equiangular_mode == EquiangularMode::none) return {};
-    if (path.looks_for_second()) return {};  // path_reuse.h says why
+    if (path.looks_for_second()) return {};  // not for shared paths: see path_reuse.h
     if (!path.may_scatter() || !(points_only(medium) || std::isfinite(segment.length))) return {};
     sample_equiangular(path, medium, segment);
     return {segment.length};
@@ -91,7 +91,7 @@ class VertexNee {
     v.t = t - depths.from();
     const OpticalDepth::Point at_point = depths.at(t);
     v.flight_pdf = flight_pdf<F>(medium, path.density_, at_point);
-    // This holds also where the flight density underflows to 0, because points are sampled there too
+    // True also where the flight density underflows to 0, because equi-angular points are sampled there too
     // (sample_equiangular).
     v.equiangular = at_point.rate > 0 && v.length > 0;
     return v;

@@ -1,10 +1,11 @@
-// A separate source file, because instantiating the path tracer takes long to compile.
+// The path tracers of the integrator `whitted`. They take long to compile, so they have their own source
+// file.
 #include "worker/render/integrator/variant.h"
 
 namespace ls::render {
 
 std::span<const Variant> whitted_variants() {
-  // Overlaps: where surfaces lie on each other, all are looked at.
+  // Features::overlaps: where surfaces coincide, all of them are tested.
   static constexpr Variant kVariants[] = {
       variant<Features{.passing = true, .whitted = true}>("surfaces, whitted"),
       variant<Features{.overlaps = true, .passing = true, .whitted = true}>("coincident surfaces, whitted"),

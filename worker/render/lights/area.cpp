@@ -134,7 +134,7 @@ LightBounds MeshLight::bounds(const LightWorld& world) const {
   return b;
 }
 
-// numbers.x chooses the triangle; the rescaled rest of it is used for the point.
+// numbers.x chooses the triangle; its remainder, rescaled to [0, 1], is used for the point.
 AreaPoint MeshLight::point(const LightWorld& world, const LightNumbers& numbers) const {
   const Geometry& g = world.geometry;
   const double target = (numbers.x + .5) * 0x1p-32 * cdf.back();

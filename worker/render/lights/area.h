@@ -21,11 +21,12 @@ struct AreaLight : LightKind {
   bool textured = false;
   bool beam = false;     // true if the radiance depends on the angle
   bool uniform = false;  // true if the light is neither textured nor a beam
-  C3 value;              // its radiance if it is uniform
-  // For a beam; the transition is linear in the cosine
+  C3 value;              // the light's radiance if `uniform`
+  // For a beam. From cos_beam to cos_cutoff its radiance falls as a power of a term that is linear in the
+  // cosine
   float cos_cutoff = 0, cos_beam = 0, inv_transition = 0, falloff = 1;
   float sign = 1;   // orientation of the emitting side
-  float reach = 1;  // the largest coordinate of its points: bounds the rounding error
+  float reach = 1;  // the largest coordinate of the light's points, which bounds the rounding error
   double area = 0;
 
   void set_emission(const AreaEmitter& emitter, float orientation, const LightWorld& world);
@@ -40,8 +41,8 @@ struct AreaLight : LightKind {
     const C3 varying = world.textures.eval(radiance, uv, face);
     return beam ? varying * beam_share(cosine) : varying;
   }
-  // Returns the light that arrives at x from the point y. Its target is just in front of the light, so that
-  // the shadow ray ends before the light.
+  // Returns the light that arrives at x from the point y. The sample's target is just in front of the light,
+  // so that the shadow ray ends before the light.
   std::optional<LightSample> from_point(const LightWorld& world, const AreaPoint& y, const V3& x,
                                         float p) const;
   // The density, per steradian at x, with which sample() finds the point `hit` in this direction.

@@ -1,4 +1,5 @@
 // The choice of a light: by the table of all lights or, if the shaded point is known, also by the tree.
+// Either maps a word, a random integer of 32 bits, to a light.
 #include <algorithm>
 #include <cmath>
 
@@ -83,8 +84,8 @@ Lights::Drawn Lights::by_table(std::uint32_t word) const {
   return {i, lights_[i].probability};
 }
 
-// How many of the words below table_words_ choose light i by the table. Of these, word number w is mapped to
-// the table's word kTableShare * w.
+// Returns how many of the words below table_words_ choose light i. These words choose by the table: word w is
+// mapped to the table's word kTableShare * w.
 std::uint64_t Lights::table_words(std::uint32_t i) const {
   const std::uint64_t first = i == 0 ? 0 : std::uint64_t{last_[i - 1]} + 1, end = std::uint64_t{last_[i]} + 1;
   return (end + kTableShare - 1) / kTableShare - (first + kTableShare - 1) / kTableShare;

@@ -49,8 +49,8 @@ struct LightNumbers {
   V2 unit() const { return {unit_float(x), unit_float(y)}; }
 };
 
-// Data that lights refer to, and the units of the world. Lengths are multiplied by its scale, so intensities
-// (power per solid angle) by the square of the scale; radiance and irradiance do not change.
+// Data that lights refer to, and the units of the world. Lengths are multiplied by the world's scale, so
+// intensities (power per solid angle) by the square of the scale; radiance and irradiance do not change.
 struct LightWorld {
   const Geometry& geometry;
   const TextureTable& textures;

@@ -8,7 +8,7 @@
 namespace ls::render {
 namespace {
 
-// cos_less() returns cos(max(0, a - b)), and the next function cos(min(pi, a + b)), for angles a and b from 0
+// cos_less() returns cos(max(0, a - b)) and cos_more() returns cos(min(pi, a + b)), for angles a and b from 0
 // to pi.
 float cos_less(float sin_a, float cos_a, float sin_b, float cos_b) {
   return cos_a > cos_b ? 1 : cos_a * cos_b + sin_a * sin_b;

@@ -9,19 +9,20 @@
 namespace ls::render {
 namespace {
 
-// The shares of rays that are uniform over the rectangle and over the whole scene, so that light which paths
-// found seldom or never while learning is connected too.
+// The shares of the sun map's rays that are uniform over its rectangle and over the whole scene, so that
+// light that paths found seldom or never while learning is connected too.
 constexpr double kRectangleShare = .2;
 constexpr double kSceneShare = .05;
-constexpr float kSmallestMargin = 1e-4f;  // of the rectangle, over the scene's radius
-// The estimate takes media to scatter no more sharply: beyond, rounding would rule it.
+constexpr float kSmallestMargin = 1e-4f;  // margin of the rectangle, as a share of the scene's radius
+// The largest |g| of a phase function in towards(): with sharper ones, rounding errors would dominate the
+// estimate.
 constexpr float kSharpest = .98f;
 constexpr float kTiny = 1e-30f;
-// A glossy surface may reflect much light that arrives at a grazing angle, so the estimate adds this constant
-// to its cosines.
+// A glossy surface may reflect much light that arrives at a grazing angle, so towards() adds this constant to
+// the cosines.
 constexpr float kGrazing = .1f;
-// The share of choices among all vertices that can be seen alike. It bounds the weight of those that
-// contribute more than the estimate says.
+// The share of choices that are uniform over all vertices that can be seen. It bounds the weight of vertices
+// that contribute more than estimated.
 constexpr float kAnyShare = .1f;
 
 }  // namespace
@@ -115,9 +116,10 @@ void LightVertices::finish() {
   blocks_.shrink_to_fit();
 }
 
-// The estimated contributions of a block's vertices, without visibility and transmittance: up to a common
-// factor strength * phase_y * cos_y * f_x * c / (c r^2 + p_x cos_y), with f_x and p_x those of a diffuse
-// surface or of the medium. Lanes that are not filled have a strength of 0.
+// Estimates the contributions of a block's light vertices y to the receiver x, without visibility and
+// transmittance. Up to a common factor they are strength * phase_y * cos_y * f_x * c / (c r^2 + p_x cos_y),
+// where c is Look::density, r the distance, f_x the BSDF times cosine or the phase function at x, and p_x its
+// density. Surfaces count as diffuse. Unused lanes have a strength of 0.
 void LightVertices::towards(const Block& b, const Receiver& x, Lane& target) {
   const float other_side = x.both_sides ? 1.f : 0.f;
   const auto phase = [](float g, float cosine) {

@@ -1,20 +1,22 @@
-// Light vertices: the points at which the light of a directional emitter is scattered.
+// Light vertices: the points at which the light of a directional emitter, the sun, is scattered.
 //
 // A path that looks for the sun at its own vertices finds it only where a vertex happens to be lit. In a room
-// with a window few are, and nearly all light that is scattered twice or more comes from there. So paths are
-// traced from the sun, their vertices are kept, and every vertex of a camera path is connected to one of
-// them: bidirectional path tracing (Veach 1997, ch. 10) with light subpaths that are kept and used again by
-// many paths (Keller 1997, "Instant radiosity"; Davidovic et al. 2014, "Progressive light transport
+// with a window few vertices are lit, and nearly all light that is scattered twice or more comes from them.
+// So paths are traced from the sun, their vertices are kept, and every vertex of a camera path is connected
+// to one of them: bidirectional path tracing (Veach 1997, ch. 10) with light subpaths that are kept and used
+// again by many paths (Keller 1997, "Instant radiosity"; Davidovic et al. 2014, "Progressive light transport
 // simulation on the GPU").
 //
 // A path of several vertices can be found in several ways: the first k of its vertices are sampled from the
-// camera, and the others from the sun; without others, by next-event estimation. All ways are weighted by the
-// balance heuristic. A way that connects has the density of a vertex that it samples from the sun
-//   first after the sun: kCandidates / (vertices per ray) * (rays per area of the sun's plane) * |cos_sun|,
-//   others: pdf |cos| / r^2, with the density `pdf` of the direction in which light was scattered,
-// and of those that it samples from the camera pdf |cos| / r^2 each. In a medium the cosines are 1.
-// Transmittances and Russian roulette are left out of all densities, which is right: weights need not use the
-// true densities, only the same functions of the path for all ways to find it.
+// camera, and the others from the sun. If there are no others, the way is next-event estimation. All ways are
+// weighted by the balance heuristic. In a way that connects, each vertex has one of these densities:
+//   the first vertex after the sun:
+//     kCandidates / (vertices per ray) * (rays per area of the sun's plane) * |cos_sun|,
+//   every other vertex, sampled from the sun or from the camera:
+//     pdf |cos| / r^2, with the density `pdf` of the direction in which the vertex before it scattered.
+// In a medium the cosines are 1. Transmittances and Russian roulette are left out of all densities, which is
+// right: weights need not use the true densities, only the same functions of the path for all ways to find
+// it.
 //
 // The sum over all light vertices is estimated by resampled importance sampling (Talbot et al. 2005): a block
 // of kCandidates vertices is chosen uniformly, and one of them in proportion to a cheap estimate of its
@@ -37,8 +39,8 @@
 namespace ls::render {
 
 // The distribution of the rays from the sun, over a plane normal to the sun's direction. It is learned: it
-// has one density for each cell of a rectangle around the points at which paths found the sun. A small share
-// is uniform over the whole scene.
+// has one density for each cell of a rectangle around the points at which camera paths found the sun. A small
+// share is uniform over the whole scene.
 class SunMap {
  public:
   SunMap() = default;
@@ -82,21 +84,23 @@ class SunMap {
   std::vector<std::uint32_t> last_;
 };
 
-// What the weights need to know of a subpath, from the camera or from the sun: the sum, over all shorter
-// subpaths of the same path, of their densities over that of this one. It is computed vertex by vertex, as by
-// Georgiev 2012, "Implementing vertex connection and merging", eqs. 31 to 36.
+// A subpath's share in the denominator of the balance heuristic, for subpaths from the camera and from the
+// sun. It is the sum, over all ways that find the same path with a shorter subpath from this end, of their
+// densities over that of the way with this subpath. It is computed vertex by vertex, as by Georgiev 2012,
+// "Implementing vertex connection and merging", eqs. 31 to 36.
 struct SubpathDensities {
   float last = 0;    // 1 / density of the last vertex
-  float before = 0;  // of the vertices before it, but for the density `back` below
+  float before = 0;  // the part of the vertices before it, without the factor `back` of sum()
 
-  // The sum, but for the density of the last vertex when sampled from the other end. `back`: density per
-  // steradian with which the other end, at the last vertex, samples the direction to the one before.
+  // Returns the sum without one factor, the density with which the last vertex is sampled from the other end.
+  // `back` is the density, per steradian, with which a path from the other end samples, at the last vertex,
+  // the direction to the vertex before.
   float sum(float back) const { return last * (1 + before * back); }
   bool needs_back() const { return before > 0; }
 
-  // The densities of the subpath that is one segment longer: `f` is this segment, `pdf` the density with
-  // which its direction was sampled, `sum` that of the shorter subpath, and the normals are the geometric
-  // ones at its end and at its start, 0 in media.
+  // Returns the densities of a subpath that is one segment longer. `f` is the new segment, `pdf` the density
+  // with which its direction was sampled, and `sum` the sum() of the shorter subpath. ng and ng_before are
+  // the geometric normals at the end and at the start of the segment, 0 in media.
   static SubpathDensities extended(const V3& f, float pdf, float sum, const V3& ng, const V3& ng_before) {
     const float r2 = dot(f, f), r = std::sqrt(r2);
     const auto cosine = [&](const V3& n) { return is_black(n) ? 1.f : std::abs(dot(n, f)) / r; };
@@ -107,12 +111,12 @@ struct SubpathDensities {
 struct LightVertex {
   SurfaceHit hit;  // valid if the vertex is on a surface
   V3 p{0, 0, 0};
-  std::uint32_t medium = kNone;  // index of the medium in which it is; kNone: it is on a surface
-  // The light that arrives there, divided by the expected number of vertices per area of the surface or per
-  // volume. In a medium it includes the albedo.
+  std::uint32_t medium = kNone;  // index of the medium in which the vertex is; kNone: it is on a surface
+  // The light that arrives at the vertex, divided by the expected number of vertices per area of the surface
+  // or per volume. In a medium it includes the albedo.
   C3 light{0, 0, 0};
-  V3 to_light{0, 0, 1};  // the direction from which it arrives
-  int scatterings = 0;   // of the light, this one included
+  V3 to_light{0, 0, 1};  // the direction from which the light arrives
+  int scatterings = 0;   // scatterings of the light so far, including the one at this vertex
   SubpathDensities densities;
 };
 
@@ -136,9 +140,9 @@ class LightVertices {
     // Surfaces: light may leave on the other side too, as through glass or where the shading normal is tilted
     bool both_sides = false;
     float g = 0;         // media: the parameter of the phase function
-    float strength = 0;  // in proportion to the radiance that leaves it in a typical direction, > 0
-    // The inverse of its densities' sum: the larger, the better connections are than what else finds its
-    // light
+    float strength = 0;  // proportional to the radiance that leaves the vertex in a typical direction; > 0
+    // 1 / densities.sum(1 / (4 pi)). The larger it is, the better connections are compared with the other
+    // ways that find the light of the vertex.
     float density = 0;
   };
   void add(const LightVertex& vertex, const Look& look);
@@ -167,9 +171,9 @@ class LightVertices {
   std::vector<Block> blocks_;
 };
 
-// Caches the sets of light vertices of a world. A pixel's samples belong to two halves in turn. In each half
-// kEpoch / 2 successive samples use the same set. So the halves are independent, and more samples also
-// average over more sets.
+// Caches the sets of light vertices of a world. Even samples of a pixel form one half, odd samples the other.
+// In each half kEpoch / 2 successive samples use the same set. So the halves are independent, and more
+// samples also average over more sets.
 class LightVertexCache {
  public:
   static constexpr std::uint64_t kEpoch = 128;

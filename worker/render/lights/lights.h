@@ -83,7 +83,7 @@ class Lights {
   const EnvironmentMap* map() const { return map_.get(); }
 
   // From this call on, lights are also chosen by the tree for points in media, if there is a tree. Only for
-  // integrators that do not sample points on segments, since these choose the light before the point.
+  // integrators that do not sample points on segments: for such points the light is chosen before the point.
   void use_tree_in_media() { tree_in_media_ = true; }
   bool has_tree() const { return !tree_.empty(); }
   std::uint64_t tree_bytes() const { return tree_.bytes(); }

@@ -1,4 +1,4 @@
-// What our processors, x86-64 and 64-bit ARM, do in instructions of their own.
+// Wrappers for instructions that differ between the supported processors, x86-64 and 64-bit ARM.
 #pragma once
 
 #ifdef __x86_64__
@@ -12,7 +12,7 @@
 namespace ls::render {
 
 // Treats denormals as zero in this thread while the object lives, as Embree requires where rays are traced.
-// Afterwards denormals work again, since folding (adding up results) needs them.
+// When it is destroyed, denormals work again, since folding (adding results to the image) needs them.
 class FlushDenormals {
  public:
   FlushDenormals() : saved_(read()) { write(saved_ | kFlush); }
@@ -20,7 +20,8 @@ class FlushDenormals {
   FlushDenormals(const FlushDenormals&) = delete;
   FlushDenormals& operator=(const FlushDenormals&) = delete;
 
-  // The thread's control word of floating-point arithmetic, and the bits of it that are set meanwhile
+  // read() and write() access the thread's floating-point control word. kFlush has the bits that are set
+  // while the object lives.
 #ifdef __x86_64__
   static constexpr std::uint64_t kFlush = 0x8040;
   static std::uint64_t read() { return _mm_getcsr(); }

@@ -37,9 +37,9 @@ inline float exponential(std::uint32_t bits) {
   return minus_log((static_cast<float>(bits) + .5f) * 0x1p-32f, (static_cast<float>(~bits) + .5f) * 0x1p-32f);
 }
 
-// A random stream of unbounded length, for trackers: word i is mix64(key + i * odd constant), a function of
-// the key alone. Each purpose of random numbers has its own key, so drawing more numbers for one purpose does
-// not change those for another.
+// A random stream of unbounded length, for trackers (algorithms that step through a medium from collision to
+// collision): word i is mix64(key + i * odd constant), a function of the key alone. Each purpose of random
+// numbers has its own key, so drawing more numbers for one purpose does not change those for another.
 class RandomStream {
  public:
   explicit RandomStream(std::uint64_t key) : state_(key) {}

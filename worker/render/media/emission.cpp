@@ -93,8 +93,8 @@ class EmissionWalk {
     if (m_.emission_kind != EmissionKind::per_length && !(cell && cell->hi > 0)) return false;
     if (!emitter_) return true;
     if (!emitter_->inside(at)) return false;
-    // If the emission grid has several channels, only the bound of the first one is known here, so emission
-    // is assumed.
+    // If the emission grid has several channels, only the bound of the first one is at hand, so the cell is
+    // assumed to emit.
     if (m_.emitter[1] != m_.emitter[0]) return true;
     const float hi = emitter_->cell().hi;
     return m_.emission_kind == EmissionKind::black_body ? m_.kelvin_offset + m_.kelvin_scale * hi >= kColdest

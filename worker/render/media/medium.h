@@ -207,7 +207,7 @@ Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d
 // the control's optical depth alone: a ray that misses the dense voxel of an otherwise empty cell has a large
 // control depth there, which its factors compensate to a transmittance of 1 (docs/measurements/stability.md
 // N10). Roulette is played only in cells with a residual to track: constant densities cost nothing, and their
-// tails are exact (N05).
+// tails are exact (stability.md N05).
 inline constexpr float kRouletteDepth = 4;
 inline constexpr float kRouletteTransmittance = .018315639f;
 
@@ -216,8 +216,8 @@ C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float
   const float s_max = kChromatic ? max_component(m.sigma_t) : m.sigma_t.x;
   if (!(s_max > 0)) return {1, 1, 1};
   constexpr int kChannels = kChromatic ? 3 : 1;
-  // The estimate is factor * exp(-sigma control). The control part is folded into the factors once it is
-  // deep, so that both stay within float32.
+  // The estimate is factor * exp(-sigma control). The control part is multiplied into the factors once it is
+  // deep, so that both parts stay within float32.
   float control = 0, foldable = kRouletteDepth, factor[kChannels];
   for (float& x : factor) x = 1;
   // The optical depth of the residual up to the next collision; it carries over from cell to cell.

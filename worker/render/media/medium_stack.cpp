@@ -32,8 +32,8 @@ void MediaState::enter(const Body& b, bool sheet) {
 
 // Removes a boundary's interior from those that the path is in. A path that leaves an interior without having
 // entered it began inside, with the interior counted as its background. The boundary's exterior becomes the
-// background, unless the path is inside other boundaries that account for it, or entered from a place that
-// has a medium.
+// background, unless other boundaries around the path account for this exterior, or the path had entered the
+// boundary and has a background already.
 void MediaState::leave(const Body& b, bool through) {
   const auto end = body_.begin() + bodies_;
   bool known = false;

@@ -17,7 +17,7 @@
 
 namespace ls::render {
 
-// The medium of a path in scenes without overlaps: the medium of the last boundary crossed, on the side where
+// The medium of a path in scenes without overlaps: the medium of the boundary crossed last, on the side where
 // the path is (Mitsuba's rule).
 struct OneMedium {
   std::uint32_t medium = kNone;
@@ -62,7 +62,7 @@ class MediaState {
   // Sets the state of a path that starts outside of all boundaries, in the medium `background`.
   void start(std::uint32_t background, const std::vector<Medium>& media);
   // Updates the state of a path that is now outside of the boundary s (if `outside`) or inside. `through` is
-  // true if it came from the other side.
+  // true if the path came from the other side.
   void stand(const SurfaceInfo& s, bool outside, bool through, const std::vector<Medium>& media);
 
  private:

@@ -41,8 +41,8 @@ struct Texels {
 
 // Makes texels of `image`; `name` is for messages. Drops the alpha channel, decodes sRGB unless `raw` is set,
 // and fails on NaN and infinity with a message that names the texel. If `alpha` is set and the image has an
-// alpha channel that is below 1/2 somewhere, that channel is kept and the colour dropped. Of a `channel` only
-// that is kept, and not decoded; an image that lacks it is 1 everywhere.
+// alpha channel that is below 1/2 somewhere, that channel is kept and the colour dropped. If `channel`
+// selects one channel, only that one is kept, and it is not decoded; a missing alpha channel is 1 everywhere.
 Result<Texels> make_texels(std::string_view name, ImageData image, bool raw, bool alpha = false,
                            Channel channel = Channel::all);
 

@@ -45,7 +45,7 @@ struct Entry {
   std::uint32_t first = 0, second = 0;
   C3 value{0, 0, 0};  // the value of a constant; for other textures the mean
   UvAffine to_uv;
-  float scale = 1;  // of an attribute; of a product its threshold
+  float scale = 1;  // an attribute's scale; a product's threshold
 };
 
 }  // namespace
@@ -59,7 +59,7 @@ struct TextureTable::Data {
 
 namespace {
 
-using TexelsKey = std::tuple<std::uint32_t, bool, bool, Channel>;  // asset, raw, alpha
+using TexelsKey = std::tuple<std::uint32_t, bool, bool, Channel>;  // asset, raw, alpha, channel
 
 Result<std::uint32_t> load_texels(const Scene& scene, const BitmapTexture& b, const ImageLoader& load,
                                   TextureTable::Data& data, std::map<TexelsKey, std::uint32_t>& loaded) {

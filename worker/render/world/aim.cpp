@@ -9,12 +9,12 @@
 namespace ls::render {
 namespace {
 
-// The number of points on a camera segment, where points pay
+// The number of points on a camera segment if points pay
 // (docs/decisions/0027-light-along-camera-segments.md).
 constexpr int kPointsThatPay = 2;
-// They pay where camera rays are scattered in media with a mean probability below this. In denser media the
-// flights that end on the segment find the light often enough, unless connections have taken away most of the
-// other noise.
+// Points pay if the mean probability that a camera ray collides with a medium is below this. In denser media
+// the flights that end on the segment find the light often enough, unless connections to light vertices
+// (light_vertices.h) have removed most of the other noise.
 constexpr float kThin = .35f;
 
 // Returns the probability that media scatter or absorb a camera ray before it hits a surface.

@@ -1,5 +1,5 @@
-// Decides at which points and in which directions, besides those that paths sample anyway, a world's paths
-// look for light.
+// Decides at which additional points (camera_segment_nee.h) and in which additional directions
+// (lamp_directions.h) a world's paths look for light.
 #pragma once
 
 #include "common/image/frame/frame.h"

@@ -38,7 +38,7 @@ bool stands_in_ambience(const Geometry& g, std::uint32_t ambience) {
   });
 }
 
-constexpr int kMaxCrossings = 1 << 12;  // most surfaces crossed by a ray that determines the camera's media
+constexpr int kMaxCrossings = 1 << 12;  // largest number of surfaces that a ray of camera_media() crosses
 
 // Counts in `left` each boundary that the ray leaves without having entered it: these boundaries enclose the
 // ray's origin.

@@ -7,9 +7,9 @@
 
 namespace ls::render {
 
-// True if some point may be in several media, or in another medium than the one on its side of the last
-// boundary crossed. This is decided conservatively by bounding boxes: false is certain; an unnecessary true
-// only costs time.
+// True if some point may be in several media, or in another medium than the one on its side of the boundary
+// crossed last. This is decided conservatively by bounding boxes: false is certain; an unnecessary true only
+// costs time.
 bool media_may_overlap(const World& w);
 
 // Returns the media that the camera is in: the sensor's `medium`, plus the interiors of the closed boundaries

@@ -56,22 +56,22 @@ class World {
   // media.
   bool shadows_walk = false;
   bool distant_mis = false;  // true for the integrator `volpath_distant_mis` (segment_nee.h)
-  // How points on segments are sampled and weighted, by that integrator and with `camera_points`
+  // How points on segments are sampled and weighted, by `volpath_distant_mis` and with `camera_points`
   DistanceSampling distance = DistanceSampling::mis;
   MisHeuristic heuristic = MisHeuristic::power;
   // With Features::aimed:
-  Lamps lamps;                // about which directions are sampled too
+  Lamps lamps;                // lights without extent, near which directions are also sampled
   bool lamp_flights = false;  // a share of the flights through homogeneous media end near lamps
-  int camera_points =
-      0;  // on a camera segment through a medium, at which light is looked for; 0: at vertices only
+  int camera_points = 0;      // number of points on a camera segment at which light is sampled; 0: none
   // With Features::connected:
   Lights::Directional sun;  // the light whose light vertices paths are connected to
   SunMap sun_map;
-  // The number of light vertices among which a connection chooses, per light vertex of a ray of the sun
+  // The number of light vertices among which a connection chooses, over the mean number of light vertices
+  // that a ray of the sun has
   float connections_per_ray = 1;
   float faint = 0;  // connections that would add less than this are made at random (Russian roulette)
   mutable LightVertexCache light_vertices;  // safe from several threads
-  // With Features::reuse: the number of pixels whose paths share their tails
+  // With Features::reuse: the number of pixels whose paths share their tails (path_reuse.h)
   int reuse = 0;
   bool hide_emitters = false;
   int max_depth = -1;  // maximum path length in segments; -1: unlimited

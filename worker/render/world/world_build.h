@@ -1,4 +1,4 @@
-// Makes a World of a scene, without the data that are learned by tracing paths through it
+// Makes the World of a scene, without the data that are learned by tracing paths through that World
 // (integrator/light_paths.h).
 #pragma once
 
