@@ -34,9 +34,9 @@ std::vector<TileIndex> random_tiles(TileIndex all, std::uint64_t count, std::uin
 VerifiedTile verify_tile(const render::World& world, const SealedImage& image, TileIndex tile,
                          const std::atomic<bool>& stop);
 
-// Returns, as "header NAME", the image's headers that contradict its settings or the names in the scene. If
-// `tiles` has all tiles of the image, also returns headers that contradict their samples. The other headers
-// (seconds, health, ...) are protected by the seal only.
+// Returns, as "header NAME", the headers in the image that contradict its settings or the names in the scene.
+// If `tiles` has all tiles of the image, also returns headers that contradict the tiles' samples. The other
+// headers (seconds, health, ...) are protected by the seal only (a hash over all layers and headers).
 std::vector<std::string> wrong_headers(const SealedImage& image, const CryptomatteManifests& names,
                                        const std::vector<VerifiedTile>& tiles);
 
