@@ -49,8 +49,7 @@ class SceneRace {
   struct Ours {
     std::string name;
     JobSpec spec;
-    std::optional<LocalWorld>
-        world;  // the scene, ready to trace with the first seed; nullopt: not kept, or already used
+    std::optional<LocalWorld> world;  // the scene, built for the first seed; nullopt: not kept, or used
   };
 
   // Prepares every integrator of the race. Each is tried before the race begins, so that errors in the scene

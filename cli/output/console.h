@@ -27,9 +27,8 @@ void complain(const std::string& text);  // prints "lightshaft: error: text" to 
 int run_guarded(const std::string& command, const std::function<int()>& action);
 
 void print_diagnostics(const std::vector<Diagnostic>& diagnostics);
-void print_note(
-    const std::string& line);         // prints to stderr; plain_text() has made control characters harmless
-void print(const std::string& line);  // prints to stdout, unmodified and flushed
+void print_note(const std::string& line);  // prints to stderr; control characters become spaces
+void print(const std::string& line);       // prints to stdout, unmodified and flushed
 
 std::string show_bytes(std::uint64_t bytes);  // returns, for example, "3.2 MiB"
 std::string show_seconds(double seconds);     // returns, for example, "0.8 s", "42 s", "3:07", "2:05:11"
