@@ -26,8 +26,9 @@ void phase_peaks(Table& t) {
   }
 }
 
-// The share of singly scattered light that stays within an angle q of its direction, for a sun of that radius
-// behind the medium: found by phase-function sampling, by light sampling, or by both.
+// The share of the light scattered once that stays within an angle q of its direction. It is seen by looking
+// through the medium at a sun of that angular radius; phase-function sampling, light sampling, or both find
+// it.
 double share_within(double g, double degrees) {
   const double h = std::sin(degrees * kPi / 360), x = 2 * h * h;  // 1 - cos q
   return (1 - g) * (1 + g) / (2 * g) * (1 / (1 - g) - 1 / std::sqrt((1 - g) * (1 - g) + 2 * g * x));
