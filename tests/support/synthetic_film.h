@@ -1,7 +1,7 @@
 // Images whose true values are known, sampled without a renderer. A pixel's samples have a gamma distribution
-// about its mean, and occasionally one is a firefly. The sum of a round's samples is drawn at once (sums of
-// gamma variables are gamma variables, counts of fireflies binomial), so that a thousand jobs take seconds.
-// Tiles stop by the farm's own rule and error estimate.
+// about its mean, and occasionally one is a firefly. A round (range of samples) adds the sum of its samples,
+// which is drawn at once (sums of gamma variables are gamma variables, counts of fireflies binomial), so that
+// a thousand jobs take seconds. Tiles stop by the farm's own rule and error estimate.
 #pragma once
 
 #include <array>

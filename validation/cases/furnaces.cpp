@@ -59,8 +59,8 @@ void white_sky(Table& t) {
     }
   }
   {
-    // Some macro cells are so dense that their voxels are followed one by one, in others rays are tracked by
-    // tentative collisions.
+    // Some macro cells are so dense that the field is integrated voxel by voxel; in the others a tracker
+    // samples tentative collisions.
     SceneBuilder builder;
     const VolumeIndex v = builder.grid({12, 9, 7}, patchy(12 * 9 * 7, 6), kBox);
     builder.container(CubeShape{}, {}, builder.null(), builder.heterogeneous(v, rgb(1), 30, .8));

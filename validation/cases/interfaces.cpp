@@ -58,7 +58,7 @@ void stacks(Table& t) {
       {.band = .002, .slack = 1e-3, .slow = true});
 }
 
-// A mesh of a square, with more faces in its file: degenerate ones, for example.
+// A square as a mesh file. The faces `more` stand between its own two.
 SceneBuilder mesh(const std::string& more) {
   SceneBuilder builder;
   MeshShape m;

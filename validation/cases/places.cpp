@@ -19,8 +19,8 @@ void add_box(SceneBuilder& builder, MediumIndex m, const Vec3& lo, const Vec3& h
   builder.container(CubeShape{}, box(lo, hi) * box({.5, .5, .5}, {1, 1, 1}), builder.null(), m);
 }
 
-// The light that is measured falls straight down the line x = y = 0: an edge that boxes share, or across the
-// face between them.
+// The light that is measured falls straight down the line x = y = 0, along an edge that boxes share or across
+// the face between them.
 void faces_on_each_other(Table& t) {
   for (const Configuration& configuration : both_media()) {
     const auto medium = [configuration](SceneBuilder& builder, double sigma) {

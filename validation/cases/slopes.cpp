@@ -78,8 +78,8 @@ void lamps(Table& t) {
   }
 }
 
-// No surface ends the ray, so it has no angles as seen from the lamp to choose from: only free flights find
-// light near the lamp.
+// No surface ends the ray, so points on it cannot be sampled by their angle about the lamp: only free flights
+// come near it.
 void without_end(Table& t) {
   const Rgb sigma{.5, 1, 2}, albedo{1, .8, .5};
   Channels expected;
