@@ -28,7 +28,8 @@ constexpr std::uint64_t kPilotPaths = 1 << 13;
 constexpr double kSpare = 1.5, kAgain = 2, kMostAgain = 16;
 // The degrees of freedom of the standard error that are assumed when the number of paths is planned.
 constexpr double kPlannedFreedom = 1e3;
-// The level of the two one-sided tests that the figure lies in the band, as a two-sided level.
+// Two one-sided tests decide that the figure lies in the band; this is their level, as that of a two-sided
+// interval.
 constexpr double kBandLevel = 2 * kWrongPass / kAttempts;
 
 // FNV-1a, a hash of the case's id: so a case's random numbers do not depend on its neighbours in the table.

@@ -78,7 +78,7 @@ std::string tile_verdict(const VerifiedTile& t) {
   return t.stopped ? "stopped" : t.wrong() ? "fail" : "pass";
 }
 
-// What checking the seal of the whole file, and computing headers again, has found.
+// The results of two checks of the whole file: of its seal, and of the headers that can be computed again.
 struct Contents {
   bool sealed = false;
   std::vector<std::string> changed;  // changed parts, such as "layer depth.Z"
@@ -183,7 +183,7 @@ int run(const VerifyFlags& flags) {
   auto scene = read_local_scene(flags.scene, *defines, false, numbers->frame,
                                 coordinator::wants_labels(image->settings));
   if (!scene) return print_rejected(scene.error());
-  // The scene is pruned to the form in which a job renders it.
+  // A job renders its scene pruned: without what its integrator and max_depth do not need.
   scene->scene =
       scene::pruned(scene->scene, scene::pruned_for(image->settings.integrator, image->settings.max_depth))
           .scene;

@@ -173,7 +173,7 @@ Result<DockerContainers> parse_docker_ps(const std::string& lines, double unix_t
       found.ended.push_back(fields[0]);
       continue;
     }
-    // A container that was created and not started is what a failed `docker run` leaves.
+    // A failed `docker run` leaves a container that was created but not started.
     const bool stuck = state == "created";
     found.workers.push_back({fields[0], stuck ? State::stuck : State::running,
                              stuck ? 0 : std::max(0.0, unix_time - *started), *cores});

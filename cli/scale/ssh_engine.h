@@ -1,4 +1,4 @@
-// Runs workers on a list of machines over ssh, for sites without an engine.
+// Runs workers on a list of machines over ssh, for sites without Slurm, Docker or Kubernetes.
 #pragma once
 
 #include <filesystem>

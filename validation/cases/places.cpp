@@ -88,8 +88,8 @@ void panes_on_faces(Table& t) {
           });
 }
 
-// The answer is L + rho L + rho^2 L ... = 2. So sampled directions that hit the wall must also find the
-// light, which is in the same place.
+// The answer is L + rho L + rho^2 L ... = 2, with L = 1 and rho = 1/2. So sampled directions that hit the
+// wall must also find the light, which is in the same place.
 void lights_on_walls(Table& t) {
   for (const bool first : {false, true})
     t.mean(
