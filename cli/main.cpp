@@ -1,5 +1,5 @@
-// lightshaft: renders, inspects and merges on this machine, and talks to a farm. Exit codes: 0 ok, 1 failed,
-// 2 bad usage or bad scene.
+// The program `lightshaft`: renders, inspects and merges on this machine, and talks to a farm. Exit codes: 0
+// success, 1 failure, 2 bad usage or bad scene.
 #include <signal.h>
 
 #include <CLI/CLI.hpp>
@@ -15,7 +15,8 @@
 
 namespace {
 
-// Shows only important log lines of coordinator and worker: commands report everything relevant themselves.
+// Sets the log level of coordinator and worker, by LIGHTSHAFT_LOG. By default they log nothing: commands
+// report everything relevant themselves.
 void set_log_level() {
   const char* level = std::getenv("LIGHTSHAFT_LOG");
   const std::string_view wanted = level ? level : "off";

@@ -17,10 +17,10 @@ struct Prediction {
   std::optional<double> actual;          // nullopt: not reached by the end of the race, hence later than hi
   bool within() const { return actual && *actual >= lo && *actual <= hi; }
 };
-// Returns the predictions that forecast_of() makes from the checkpoints (measured images of a render) so far,
-// at each doubling of the samples from 8 per pixel on: for reaching a half, a quarter and an eighth of the
-// error estimated at that time. Only predictions whose interval ends within the race are returned, so that
-// the choice does not depend on the outcome.
+// Returns predictions that were made at each doubling of the samples, from 8 per pixel on. Each is what
+// forecast_of() predicts from the checkpoints (measured images of a render) up to then, for reaching a half,
+// a quarter or an eighth of the error estimated at that time. Only predictions whose interval ends within the
+// race are returned, so that the choice does not depend on the outcome.
 std::vector<Prediction> predictions_of(const Race& race);
 
 }  // namespace ls::race

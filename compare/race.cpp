@@ -9,8 +9,8 @@
 namespace ls::race {
 namespace {
 
-// The part of a race with one seed: runs the lanes (an entrant with this seed) to the end. Entrants that fail
-// are added to `failures`.
+// The part of a race with one seed: runs the lanes (a lane is one entrant with this seed) to the end.
+// Entrants that fail are added to `failures`.
 class Heat {
  public:
   Heat(std::size_t seed, Lanes& out) : seed_(seed), out_(out) {}
@@ -77,8 +77,8 @@ class Sum {
   double weights_ = 0;
 };
 
-// Returns the entrant with the smallest error as estimated by its final images, of those that render
-// everything.
+// Of the entrants that render everything, returns the one whose final images have the smallest estimated
+// error.
 std::optional<std::size_t> best_of(const Race& race, const Lanes& lanes, std::size_t seeds) {
   std::optional<std::size_t> best;
   double least = std::numeric_limits<double>::infinity();

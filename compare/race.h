@@ -15,7 +15,7 @@ namespace ls::race {
 
 struct Entrant {
   std::string name;
-  // It renders everything that the scene has, so its images can serve as references.
+  // True if it renders everything that the scene has, so that its images can serve as references.
   bool whole = false;
 };
 

@@ -18,7 +18,7 @@ double load_average();  // the kernel's one-minute average; negative: unknown
 class Others {
  public:
   Others() : start_(taken()) {}
-  // Returns the share, 0 to 1, of the time of all cores that was not used by this process. Negative: unknown.
+  // Returns the share, 0 to 1, of all cores' time that other processes have used. Negative: unknown.
   double share() const;
 
  private:

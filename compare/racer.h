@@ -26,8 +26,8 @@ struct Conditions {
   double seconds(const Cost& cost) const { return cost.seconds(clock, threads); }
 };
 
-// One image of a racer at some point of the race: its total cost up to there without loading, and its file,
-// written by keep().
+// One image of a racer at some point of the race: the racer's total cost up to then, without loading, and the
+// image's file, written by keep().
 struct Checkpoint {
   double spp = 0;
   Cost cost;

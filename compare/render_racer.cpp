@@ -102,7 +102,8 @@ class RenderRacer final : public Racer {
     return entry_.folder / fmt::format("{}.{}", entry_.name, what);
   }
 
-  // Renders and folds the next tile of the round. True: it was the last tile, or none was left.
+  // Renders and folds the next tile of the round. Returns true if the round has no more tiles, or if
+  // rendering was stopped. nullopt: an error, which is in trouble_.
   std::optional<bool> one_tile(const std::atomic<bool>& stop) {
     TileIndex tile;
     {
@@ -161,7 +162,8 @@ class RenderRacer final : public Racer {
     return keep(file("b"), means(1, 2, spp / 2));
   }
 
-  // Returns the means over the halves of the samples [from, to): 0 is half A, 1 is half B.
+  // Returns the mean image of the halves [from, to), which have this many samples per pixel: 0 is half A, 1
+  // half B.
   Pixels means(std::size_t from, std::size_t to, std::uint64_t samples) const {
     Pixels out(values());
     for (std::size_t i = 0; i < out.size(); ++i) {

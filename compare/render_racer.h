@@ -1,5 +1,6 @@
-// An integrator in a race: renders and folds the rounds of a job as usual, on threads of this process.
-// Its time includes rendering, folding and estimating the error, but not loading the scene.
+// An integrator in a race: renders the rounds (ranges of samples) of a job as usual and folds them (adds them
+// to the image), on threads of this process. Its time includes rendering, folding and estimating the error,
+// but not loading the scene.
 #pragma once
 
 #include <memory>

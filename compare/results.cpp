@@ -1,4 +1,4 @@
-// Content shared by both pages.
+// The content that the HTML page and the Markdown page share.
 #include "compare/results.h"
 
 #include <fmt/format.h>
@@ -14,7 +14,7 @@ namespace {
 
 using report::figure;
 
-// The load of an otherwise idle system, with background activity, is below this.
+// A share of all cores' time. The background activity of an otherwise idle system stays below it.
 constexpr double kIdleShare = .05;
 constexpr double kHeavySpread = 4;
 

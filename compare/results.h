@@ -44,7 +44,7 @@ std::string forecasts_csv(const Results& results);
 std::string markdown(const Results& results);
 std::string html_page(const Results& results);
 
-// All of these with their plots, by the names that the files have.
+// Returns the contents of all these files, and of the plots, by file name.
 std::map<std::string, std::string> files_of(const Results& results);
 
 // The plot of one race, as a separate SVG file; file_name() makes the scene's name safe for a path.

@@ -31,8 +31,8 @@ struct CurveAt {
   Estimate relmse;
 };
 // Returns the curve of an entrant: geometric means over the seeds at each sample count that the runs of the
-// different seeds share, and at the ends of the runs. Sample counts that less than half of the seeds reached,
-// and errors below the reference's noise, are omitted.
+// different seeds share, and at the ends of the runs. Sample counts that fewer than half of the seeds
+// reached, and errors below the reference's noise, are omitted.
 std::vector<CurveAt> curve_of(const Race& race, std::size_t entrant);
 
 }  // namespace ls::race

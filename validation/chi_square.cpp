@@ -20,9 +20,9 @@ using render::V2;
 using render::V3;
 
 constexpr std::uint64_t kSamplesPerCell = 5000;
-// Cells are integrated by the midpoint rule on successively finer grids until a step changes them by less
-// than this share (or less than a millionth of the total): with 1e6 samples that adds 1e6 * 1e-8 to the
-// statistic.
+// Cells are integrated by the midpoint rule on successively finer grids, until a step changes a cell by at
+// most the share kConverged of it (of kNegligible, if the cell is smaller than that share of the whole). With
+// 1e6 samples, such errors add 1e6 * kConverged^2 = 0.01 to the statistic.
 constexpr double kConverged = 1e-4, kNegligible = 1e-6;
 constexpr int kFirstGrid = 8, kLastGrid = 512;
 // A density whose integral exceeds 1 by more than this is an error; the integration is far more accurate.
@@ -56,8 +56,8 @@ V3 direction(double cosine, double phi) {
           static_cast<float>(cosine)};
 }
 
-// Cells of equal solid angle over the sphere: `rows` in the cosine, twice as many in phi; and one for samples
-// that are absorbed or scattered by a delta lobe.
+// Cells of equal solid angle over the sphere: `rows` rows in the cosine, and twice as many columns in phi.
+// One more cell is for samples that are absorbed or scattered by a delta lobe.
 class BinTable {
  public:
   BinTable(const render::BsdfTable& bsdfs, BsdfIndex index, int rows, const V3& wo)

@@ -55,7 +55,8 @@ class Runner {
     bool any = false;
     for (const std::string& name : names) any = any || asked_for(name);
     if (!any) return {};
-    // The error of the mean is measured from pixels, which must err independently
+    // The error of the mean is estimated from pixels, so their errors must be independent: pixels share no
+    // paths.
     Scene alone = scene;
     alone.integrator.path_reuse = -1;
     const auto m = measure(alone, files_, test_.sample_count, seed, options_.threads);

@@ -13,7 +13,7 @@ using nlohmann::ordered_json;
 // JSON has no infinity.
 ordered_json number(double x) { return std::isfinite(x) ? ordered_json(x) : ordered_json(); }
 
-// Only the table's own cases have a band.
+// Cases of a Nori file have no band (the deviation that the table's own cases tolerate).
 std::string band_of(const ValidateCase& c) {
   return c.kind.empty() ? "-" : c.kind == "exact" ? "exact" : fmt::format("{:.3g} %", 100 * c.band);
 }

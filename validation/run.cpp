@@ -21,14 +21,15 @@ using cli::ValidateCase;
 
 // Number of paths of a case's first run, which determines how many paths the case needs.
 constexpr std::uint64_t kPilotPaths = 1 << 13;
-// The number of paths is planned so that this many standard errors are left between the interval and the
-// band's end. In one run of seven chance takes more than that, or the variance in the first run was far off.
-// Then the case is repeated with as many paths as the better figures require, which is between kAgain and
-// kMostAgain times as many.
+// The number of paths is planned so that this many standard errors (1.5) remain between the interval and the
+// band's end. In about one run of seven, chance alone uses up more than that; or the first run's estimate of
+// the variance was far off. Then the case is repeated, with between kAgain and kMostAgain times as many
+// paths, as many as the better estimate requires.
 constexpr double kSpare = 1.5, kAgain = 2, kMostAgain = 16;
 // The degrees of freedom of the standard error that are assumed when the number of paths is planned.
 constexpr double kPlannedFreedom = 1e3;
-// The level of the two one-sided tests that the figure lies in the band, as a two-sided level.
+// Two one-sided tests decide that the figure lies in the band; this is their level, as that of a two-sided
+// interval.
 constexpr double kBandLevel = 2 * kWrongPass / kAttempts;
 
 // FNV-1a, a hash of the case's id: so a case's random numbers do not depend on its neighbours in the table.
@@ -95,7 +96,7 @@ class Runner {
   }
 
   Result<Sight> difference(const Same& same, std::uint64_t paths, std::uint64_t seed) const {
-    // The mean of such a case is not known in advance; a broken renderer is simulated with mean 1.
+    // The mean of such a case is not known in advance, so a broken renderer is simulated with mean 1.
     const auto a = options_.gain ? broken(grey(1)) : look(same.scene, paths, seed),
                b = options_.gain ? a : look(same.other, paths, ~seed);
     if (!a) return tl::unexpected(a.error());
@@ -117,9 +118,9 @@ class Runner {
     return s;
   }
 
-  // Returns the figures of a renderer whose values are `gain` times the right ones. Its standard error leaves
-  // room for kSpare more of it within the band, as growth() plans, relative to the mean of a correct
-  // renderer.
+  // Returns the figures of a simulated broken renderer, whose values are `gain` times the right ones. Its
+  // standard error is `gain` times the one that growth() plans for a correct renderer: kSpare standard errors
+  // remain between the interval and the band's end.
   Result<Measured> broken(const Channels& expected) const {
     Measured m;
     m.paths = kPilotPaths;

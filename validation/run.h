@@ -1,5 +1,5 @@
-// Runs cases: measures each, and judges it by equivalence (its interval must lie within a band around the
-// answer).
+// Runs cases of the table of `lightshaft validate`: measures each, and judges it by equivalence (the measured
+// confidence interval must lie within a band around the answer).
 #pragma once
 
 #include <cstdint>
@@ -29,10 +29,10 @@ struct RunOptions {
 // A scene that cannot be built gives a failed line.
 std::vector<cli::ValidateCase> run_cases(const Table& table, const RunOptions& options);
 
-// Runs one case, with the error probability that it has as a part of the whole table.
+// Runs one case, judged with the same error probability as when the whole table is run.
 std::vector<cli::ValidateCase> run_case(const Table& table, std::size_t index, const RunOptions& options);
 
-// The error probability, on either side, of each interval of the table.
+// The probability with which each confidence interval of the table may miss the right answer.
 double level_of(const Table& table);
 
 bool asked_for(const std::string& id, const std::string& only);

@@ -16,8 +16,8 @@ inline constexpr double kWrongVerdicts = 2e-4;
 // does (an intersection-union test: Berger 1982); it is shared among a case's attempts.
 inline constexpr double kWrongPass = 1e-3;
 
-// The most runs of one case. A case is run again, with more paths, if its interval came out too wide; each
-// run counts as an interval of the table.
+// The largest number of runs of one case. A case is run again, with more paths, if its interval came out too
+// wide; each run counts as an interval of the table.
 inline constexpr std::size_t kAttempts = 3;
 
 // The relative error allowed for rounding. Radiance is float32: a path of n vertices multiplies about 10 n

@@ -1,5 +1,5 @@
-// The commands. Each function adds its command to the command line. If the user gives that command, it sets
-// `action`, which main() then runs; its result is the exit code.
+// The commands. Each function adds its command to the command line. If the user gives that command, parsing
+// sets `action`, which main() then runs; its result is the exit code.
 #pragma once
 
 #include <fmt/format.h>

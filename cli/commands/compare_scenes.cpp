@@ -49,7 +49,7 @@ class SceneRace {
   struct Ours {
     std::string name;
     JobSpec spec;
-    std::optional<LocalWorld> world;  // the world for the first seed, until it is used
+    std::optional<LocalWorld> world;  // the scene, built for the first seed; nullopt: not kept, or used
   };
 
   // Prepares every integrator of the race. Each is tried before the race begins, so that errors in the scene
@@ -71,7 +71,7 @@ class SceneRace {
       if (ours.name.empty()) ours.name = world->job.settings.integrator;
       const bool whole = scene_.scene.media.empty() || scene::sees_media(world->job.settings.integrator);
       race_.entrants.push_back({"Lightshaft " + ours.name, whole});
-      // Only the first world is kept: all of them together would take too much memory
+      // Only one world (a scene ready to trace) is kept: all of them together would take too much memory
       if (first) ours.world = std::move(*world);
       ours_.push_back(std::move(ours));
       first = false;
@@ -133,7 +133,7 @@ class SceneRace {
   const SystemClock clock_;
   race::Race race_;
   std::vector<Ours> ours_;
-  std::vector<Digest> scenes_;  // digests of the scene that our images contain
+  std::vector<Digest> scenes_;  // the scene's digests, as our images contain them
   std::filesystem::path folder_;
 };
 

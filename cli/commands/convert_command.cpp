@@ -86,7 +86,8 @@ void rename_those_outside(Scene& scene) {
   }
 }
 
-// If `all` is false, only files that were made of numbers in the scene's text are copied.
+// Returns the copies of files that the converted scene needs. If `all` is false, these are only files that
+// were made from numbers in the scene's text.
 Result<std::vector<FileCopy>> copies_for(const LocalScene& scene, const Scene& written,
                                          const fs::path& folder, bool all) {
   std::vector<FileCopy> copies;
@@ -115,10 +116,10 @@ Result<std::vector<FileCopy>> copies_for(const LocalScene& scene, const Scene& w
 }
 
 // Converts a scene for the file `out`. If `out` is in the folder of the original scene, file names are
-// unchanged and nothing is copied. If it is in another folder, files keep their names relative to it; files
-// whose name is absolute or leads out by ".." are put directly into that folder. The text is then read again
-// and compared. internal: the text does not give the same scene; already_exists: the folder contains another
-// file with a name that is needed.
+// unchanged and nothing is copied. Otherwise files are copied to the folder of `out`, under the names that
+// the scene has for them; a file whose name is absolute or leads out by ".." is put directly into that
+// folder. The text is then read again and compared. internal: the text does not give the same scene;
+// already_exists: the folder contains another file with a name that is needed.
 Result<Converted> convert_scene(const LocalScene& scene, const fs::path& out) {
   Scene written = scene.scene;
   Converted converted;

@@ -58,7 +58,7 @@ Result<std::string> read_join_token(const std::string& file) {
   return token;
 }
 
-// HOURS for every user, or USER=HOURS.
+// Parses HOURS (a budget for each user) or USER=HOURS (a budget for one user).
 Result<void> read_user_budget(const std::string& text, Budgets& budgets) {
   const auto sign = text.rfind('=');
   const auto hours =
@@ -125,7 +125,7 @@ Result<int> parse_minutes(const FarmUpFlags& f) {
   return static_cast<int>(*minutes);
 }
 
-// Engines say by the wall clock when they started a worker.
+// Returns the seconds since 1970. Engines use this time to say when they started a worker.
 double unix_time() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }

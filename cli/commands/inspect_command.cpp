@@ -22,8 +22,8 @@ struct InspectFlags {
   bool json = false, strict = false, variants = false, work = false;
 };
 
-// Longer side of the small image that --variants renders with every instantiation, in pixels. It is large
-// enough that paths hit all parts of a scene, and small enough to be fast.
+// Longer side, in pixels, of the small image that --variants renders with every variant of the integrator. It
+// is large enough that paths hit all parts of a scene, and small enough to be fast.
 constexpr int kSmallSide = 32;
 constexpr SampleRange kSmallSamples{0, 4};
 
@@ -33,8 +33,8 @@ FrameSize small(FrameSize size) {
   return {scaled(size.width), scaled(size.height)};
 }
 
-// The world of a small image of the scene. Whether pixels share paths depends on the size: the small image
-// does what the whole one does.
+// Prepares the scene for tracing a small image. Whether pixels share paths normally depends on the size of
+// the image; this one is made to share them exactly if the whole image does.
 tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> small_world(
     LocalScene scene, const LocalWorld& whole) {
   int& path_reuse = scene.scene.integrator.path_reuse;
@@ -47,7 +47,7 @@ tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> small_
 }
 
 // Renders a small image with every integrator variant that has the scene's features. Returns the digest of
-// each variant's sums.
+// each variant's pixel sums.
 tl::expected<VariantBitsList, coordinator::Rejected> render_variants(const LocalScene& scene,
                                                                      const LocalWorld& whole) {
   const auto world = small_world(scene, whole);

@@ -85,8 +85,8 @@ std::string parts(const ordered_json& j, bool used) {
   return table.text();
 }
 
-// Describes facts that also depend on the scene's files: structures of the BVH and of the lights, sampling
-// strategies.
+// Describes what becomes known only when the scene's files are loaded: the structures of the BVH and of the
+// lights, and the sampling strategies.
 std::string made_ready(const ordered_json& j) {
   const auto listed = [&](const char* key) {
     std::vector<std::string> all;
@@ -153,8 +153,8 @@ std::string memory(const ordered_json& j) {
   return table.text() + fmt::format("in the coordinator's: {} of film\n", show_bytes(j.at("film_bytes")));
 }
 
-// Describes the instructions per path, and how many more the unused parts of the renderer would take. Either
-// argument is null if the instructions could not be counted.
+// Describes a variant's instructions per path, and by how many percent they exceed those of the cheapest
+// variant. Either argument is null if the instructions could not be counted.
 std::string instructions(const ordered_json& per_path, const ordered_json& cheapest) {
   if (per_path.is_null()) return "";
   const double n = per_path;

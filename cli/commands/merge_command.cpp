@@ -75,9 +75,9 @@ Result<void> write_report(const MergeFlags& flags, const Merged& merged, const s
   return save_result(flags.report, j.dump(2) + "\n");
 }
 
-// True if `digest` is that of the scene in the form in which a job renders it. A job's scene is pruned, which
-// depends on the integrator. Since partials (files with pixel sums) do not name the integrator, all possible
-// forms are tried.
+// True if `digest` is that of the scene in the form in which a job renders it: pruned, that is, reduced to
+// what the job's integrator can see. Since partials (files with pixel sums) do not name the integrator, all
+// possible forms are tried.
 bool is_of(const Scene& scene, const Digest& digest) {
   const std::string own = scene.integrator.name;
   return std::ranges::any_of(

@@ -24,7 +24,7 @@ struct ValidateFlags {
   bool strict = false, quick = false;
 };
 
-// Records the renderer and the options of the figures, so that tables of different ones cannot be mixed.
+// Records which renderer and options the figures come from, so that figures of different ones are not mixed.
 void add_origin(nlohmann::ordered_json& json, const ValidateFlags& flags) {
   json["build"] = render::kBuildId;
   json["numeric_class"] = render::numeric_class().hex();
@@ -45,8 +45,8 @@ int report(const std::vector<ValidateCase>& lines, nlohmann::ordered_json json, 
   return failed > 0 ? kFailed : kOk;
 }
 
-// Adds the descriptions of the rows of the list of cases, for the docs page and for the check that no row is
-// missing.
+// Returns the table as JSON, with its significance level and with the cases that --quick has left out. The
+// docs page is made from this; and a check uses it to see that no case is missing.
 nlohmann::ordered_json table_with_rows(const cases::Table& table, const std::vector<ValidateCase>& lines,
                                        bool quick) {
   nlohmann::ordered_json json = table_json(lines);

@@ -1,4 +1,5 @@
-// lightshaft verify: checks that an image is the result of its scene.
+// lightshaft verify: checks that an image is the result of its scene. An image's *seal* is a hash over all
+// its layers and headers, stored in it.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -77,7 +78,7 @@ std::string tile_verdict(const VerifiedTile& t) {
   return t.stopped ? "stopped" : t.wrong() ? "fail" : "pass";
 }
 
-// The results of checking the seal of the whole file, and of recomputing headers.
+// The results of two checks of the whole file: of its seal, and of the headers that can be computed again.
 struct Contents {
   bool sealed = false;
   std::vector<std::string> changed;  // changed parts, such as "layer depth.Z"
@@ -175,14 +176,14 @@ int run(const VerifyFlags& flags) {
   auto picture = open_image(flags.image);
   if (!picture) return print_error(picture.error());
   Contents contents = contents_of(*picture);
-  // This is reported before the next steps, which may fail because of it.
+  // A changed file is reported at once, since the next steps may fail because of the change.
   if (!contents.changed.empty()) complain(fmt::format("{}: {}", flags.image, line_of(contents)));
   const auto image = read_sealed_image(std::move(*picture), flags.image);
   if (!image) return print_error(image.error());
   auto scene = read_local_scene(flags.scene, *defines, false, numbers->frame,
                                 coordinator::wants_labels(image->settings));
   if (!scene) return print_rejected(scene.error());
-  // The scene is pruned to the form in which a job renders it.
+  // A job renders its scene pruned: without what its integrator and max_depth do not need.
   scene->scene =
       scene::pruned(scene->scene, scene::pruned_for(image->settings.integrator, image->settings.max_depth))
           .scene;

@@ -28,15 +28,15 @@ struct VerifiedTile {
 // The choice is a function of `seed`.
 std::vector<TileIndex> random_tiles(TileIndex all, std::uint64_t count, std::uint64_t seed);
 
-// Renders all rounds (ranges of samples) of the tile again. Compares the hash chain over the digests of its
-// units with the chain sealed in the image, and its values in every layer with the image's. The world must
-// have been built from the image's scene and settings.
+// Renders all rounds (ranges of samples) of the tile again. Compares the hash chain over the rounds' digests
+// with the chain stored in the image, and the values in every layer with the image's. The world must have
+// been built from the image's scene and settings.
 VerifiedTile verify_tile(const render::World& world, const SealedImage& image, TileIndex tile,
                          const std::atomic<bool>& stop);
 
-// Returns, as "header NAME", the image's headers that contradict its settings or the names in the scene. If
-// `tiles` has all tiles of the image, also returns headers that contradict their samples. The other headers
-// (seconds, health, ...) are protected by the seal only.
+// Returns, as "header NAME", the headers in the image that contradict its settings or the names in the scene.
+// If `tiles` has all tiles of the image, also returns headers that contradict the tiles' samples. The other
+// headers (seconds, health, ...) are protected by the seal only (a hash over all layers and headers).
 std::vector<std::string> wrong_headers(const SealedImage& image, const CryptomatteManifests& names,
                                        const std::vector<VerifiedTile>& tiles);
 

@@ -17,13 +17,14 @@ namespace {
 // Memory below this causes a warning: denoising an image takes up to 2 GiB (lightshaft-denoise limits itself
 // to that).
 constexpr std::uint64_t kLittleMemory = std::uint64_t{2} << 30;
-// Free disk space below kNoRoom is a problem, and below kLittleRoom causes a warning. A coordinator keeps the
-// largest scene in XML and its canonical form, so with less than twice its size a disk cannot store even a
-// scene without files. The OpenVDB file of a cloud has hundreds of MiB, so 1 GiB is full after a few.
+// Free disk space below kNoRoom is a problem, and below kLittleRoom causes a warning. A coordinator stores
+// each scene twice, as XML and in canonical form, so a disk with less than twice the size of the largest XML
+// may not hold even a scene without other files. The OpenVDB file of a cloud has hundreds of MiB, so a few of
+// them fill 1 GiB.
 constexpr std::uint64_t kNoRoom = 2 * http::kMaxSceneXml, kLittleRoom = std::uint64_t{1} << 30;
-// Differences between clocks, in seconds. Receivers of webhooks reject signatures that are minutes old
-// (docs/guide/operations.md), so a difference of a minute is still allowed. S3 rejects requests whose time
-// differs by more than 15 minutes.
+// Differences between clocks, in seconds. Receivers of webhooks reject signatures that are several minutes
+// old (docs/guide/operations.md), so a difference of up to a minute does no harm. S3 rejects requests whose
+// time differs by more than 15 minutes.
 constexpr double kClockWarning = 60, kClockProblem = 900;
 constexpr std::size_t kNamesShown = 5;
 
@@ -152,7 +153,8 @@ std::vector<Finding> judge_machine(const MachineFacts& facts) {
 }
 
 double clock_lead(double asked_at, double answered_at, std::int64_t date) {
-  // The coordinator's clock was in [date, date + 1), this machine's in [asked_at, answered_at].
+  // While the request ran, the coordinator's clock was at some time in [date, date + 1), and this machine's
+  // in [asked_at, answered_at].
   const double least = static_cast<double>(date) - answered_at;
   const double most = static_cast<double>(date) + 1 - asked_at;
   return least > 0 ? least : most < 0 ? most : 0;

@@ -22,15 +22,17 @@ struct Finding {
 };
 
 std::vector<Finding> judge_machine(const MachineFacts& facts);
-// Judges the farm. `program_version` is this command's version, `numeric_class` this machine's class.
+// Judges the farm. `program_version` is this command's version, `numeric_class` this machine's numeric class
+// (machines of one class render the same bits).
 std::vector<Finding> judge_farm(const FarmFacts& facts, const std::string& program_version,
                                 const std::string& numeric_class);
 
 Status worst(const std::vector<Finding>& findings);
 
-// Returns how many seconds the coordinator's clock is ahead of this machine's, at least; negative: behind; 0:
-// the clocks may agree. The header Date has whole seconds, rounded down, and was written at some time between
-// request and answer.
+// Returns the smallest difference, in seconds, between the coordinator's clock and this machine's that
+// explains the answer: positive if the coordinator's is ahead, negative if it is behind, 0 if the clocks may
+// agree. The difference is not known exactly: the header Date (`date`) has whole seconds, rounded down, and
+// was written at some time between request and answer.
 double clock_lead(double asked_at, double answered_at, std::int64_t date);
 
 }  // namespace ls::cli

@@ -14,19 +14,20 @@ namespace ls::cli {
 struct FolderFacts {
   std::string name;  // purpose of the folder: "cache"
   std::filesystem::path path;
-  bool usable = false;  // true if it is a folder, or can become one, and is writable
+  bool usable = false;  // true if a writable folder exists there or can be created
   std::uint64_t free_bytes = 0;
 };
 
 struct MachineFacts {
   std::string processor_target;  // processor for which the program was compiled: "x86-64-v3"
   bool processor_fits = false;
-  std::string numeric_class;  // numeric class of `lightshaft render` on this machine, in hexadecimal digits
+  std::string numeric_class;  // that of `lightshaft render` on this machine, in hexadecimal; machines of one
+                              // class render the same bits
   std::uint64_t memory_bytes = 0;
   int cpus = 0;
   double cpu_quota = 0;  // number of CPUs that the control group allows; 0: no limit
   std::uint64_t file_limit = 0;
-  // Result of entering the sandbox; nullopt: the attempt failed
+  // What the sandbox restricts, when entered on this machine; nullopt: the attempt failed
   std::optional<worker::child::Sandboxed> sandbox;
   std::filesystem::path vdb_program;
   bool vdb_found = false;
@@ -37,8 +38,8 @@ struct MachineFacts {
 
 MachineFacts observe_machine(const std::filesystem::path& cache, const std::filesystem::path& data);
 
-// A process cannot leave the sandbox again, so it is tried in a separate process: this program with this
-// flag, whose exit code is the result.
+// Entering the sandbox is tried in a separate process, since a process cannot leave it again. That process is
+// this program with this flag; its exit code is the result.
 inline constexpr const char* kSandboxProbeFlag = "--sandbox-probe";
 int run_sandbox_probe();
 

@@ -20,8 +20,8 @@ using nlohmann::json;
 
 constexpr std::size_t kMaxShownBody = 300;
 constexpr std::size_t kDigestsPerQuestion = 10'000;
-// Files of at least this size are sent in parts, so that an upload can continue after a broken connection.
-// Smaller files are sent again as a whole, which costs one request instead of two.
+// Files of at least this size are sent in parts, so that an upload can continue after a broken connection. A
+// smaller file is sent as a whole, if need be again; this saves the request that asks how much has arrived.
 constexpr std::uintmax_t kSentInParts = 1u << 20;
 constexpr int kBarrenAttempts = 8;  // give up after this many consecutive attempts without progress
 

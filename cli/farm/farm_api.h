@@ -60,7 +60,7 @@ class FarmApi {
   Answer<HttpResponse> send_file(const std::string& path, const std::filesystem::path& file);
   struct Sending {
     RetryPolicy retry;
-    std::uint64_t reached = 0;  // the most bytes that the coordinator has acknowledged
+    std::uint64_t reached = 0;  // the largest number of bytes that the coordinator has acknowledged
     int barren = 0;             // attempts since `reached` last increased
   };
   Answer<HttpResponse> send_rest(const std::string& path, const std::filesystem::path& file,

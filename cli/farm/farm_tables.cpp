@@ -54,7 +54,7 @@ std::string table(const std::vector<Row>& rows) {
   return out;
 }
 
-// Most frames listed; if there are more, only those with remarks are listed
+// Up to this number of frames are all listed. If there are more, those that are done or queued are left out.
 constexpr std::size_t kMostFrames = 100;
 
 const json* frames_of(const json& job) {
@@ -117,7 +117,7 @@ void add_pixels(std::vector<Row>& rows, const char* name, const json& job, const
     rows.push_back({name, fmt::format("{} pixels: {}", report::count(n), meaning)});
 }
 
-// The error of the denoised layers when it was last compared with the target.
+// Describes the most recent check of the denoised layers' error against the target.
 std::string denoised_check_text(const json& check) {
   const auto at_most = number_field(check, "at_most");
   return fmt::format("{}, {} (with {} samples per pixel)", number(check, "relmse", "{:.3g}"),
@@ -153,7 +153,8 @@ void add_error_rows(std::vector<Row>& rows, const json& job) {
   add_known(rows, "efficiency", job, "efficiency_per_core", "{:.3g} (1 / (relMSE x core seconds))");
 }
 
-// The class of a worker or job as `submit --numeric-class` takes it, in digits and in words.
+// Returns the numeric class of a worker or job (machines of one class render the same bits): the digits that
+// `submit --numeric-class` takes, and the platform in words.
 std::string class_text(const json& of) {
   const std::string digits = text(of, "numeric_class").substr(0, 12), platform = text(of, "platform");
   return platform.empty() ? digits : digits + " " + platform;

@@ -89,7 +89,7 @@ int print_end(const json& job, bool quiet) {
 }
 
 void print_denoised(FarmApi& api, const json& job) {
-  // A sequence has no error of its own: those are in the reports of its frames.
+  // A sequence has no error of its own; the report of each frame has the error of that frame.
   const auto frames = job.find("frames");
   const bool sequence = frames != job.end() && frames->is_object();
   if (!flag_field(job, "denoise") || sequence) return;

@@ -1,5 +1,6 @@
 // Counts the instructions executed by a thread and the threads that it starts, with the processor's counter.
-// Measures with it what the variants of the integrator cost.
+// Also measures, by these counts, what the variants of the integrator cost (a variant is compiled for a
+// subset of the features that a scene can have).
 #pragma once
 
 #include <cstdint>
@@ -33,9 +34,8 @@ class InstructionCounter {
   int fd_;
 };
 
-// Results of rendering the same small image with each variant of the integrator that has the scene's features
-// (a variant is compiled for a subset of features). It shows whether all variants give the same bits, and
-// what each costs.
+// What one variant gave for a small image. The same image is rendered with each variant that has the scene's
+// features, which shows whether all of them give the same bits, and what each costs.
 struct VariantBits {
   std::string name;
   Digest sums;
@@ -48,8 +48,9 @@ struct VariantBitsList {
 };
 
 // Measures the variants called `names`. `render` renders `paths` paths with the variant of the given name and
-// returns the digest of their sums. `counter` counts the instructions of this thread, or is the reason why
-// they cannot be counted. If counting fails for one variant, only its number is missing, with the reason.
+// returns the digest of the pixel sums. `counter` counts the instructions of this thread, or is the reason
+// why they cannot be counted. If counting fails for one variant, only its number is missing, and the reason
+// is given.
 VariantBitsList measure_variants(const std::vector<std::string>& names, double paths,
                                  const Result<InstructionCounter>& counter,
                                  const std::function<Digest(const std::string&)>& render);

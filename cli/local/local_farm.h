@@ -41,9 +41,9 @@ class LocalLink final : public worker::CoordinatorLink {
   std::unique_ptr<coordinator::WorkerSession> session_;
 };
 
-// Provides the blobs (files by digest) of the in-memory coordinator to the worker agent in this process as
-// files. Adopted files stay where they are; blobs in memory (the canonical scene) become memory files, which
-// leave nothing behind.
+// Gives the worker agent in this process the blobs (scene and assets, named by digest) of the in-memory
+// coordinator as files. Adopted files stay where they are. Blobs in memory (the canonical scene) become
+// memory files, which leave nothing on disk.
 class LocalBlobFiles final : public worker::BlobFiles {
  public:
   explicit LocalBlobFiles(std::shared_ptr<coordinator::MemoryBlobs> blobs) : blobs_(std::move(blobs)) {}

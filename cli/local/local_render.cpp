@@ -40,8 +40,8 @@ Result<void> save_html_report(const std::filesystem::path& file, const coordinat
 
 constexpr auto kProgressPeriod = std::chrono::milliseconds(200);
 
-// Stores the results of units in places other than the image. add() is called on the worker agent's thread,
-// everything else before or after that thread runs.
+// Stores the results of units for uses other than the image: in the folder of --partial-dir. add() is called
+// on the worker agent's thread, everything else before that thread starts or after it has ended.
 struct Keepers {
   std::optional<PartialDir> partials;
   std::mutex mutex;
@@ -157,7 +157,8 @@ class LocalRender {
       if (const auto fault = farm_->scene_fault()) return print_rejected(cli::scene_fault(scene_, *fault));
       return print_error({Errc::internal, view->error});
     }
-    // Nobody can resume the job: what there is is written, and the error ends the program.
+    // In this process nobody can resume a paused job. So the image is written as far as it is rendered, and
+    // the error ends the program.
     if (view->state == JobState::paused) {
       if (const auto written = write_results(true); !written) complain(written.error().message);
       return print_error({Errc::unavailable, view->error});

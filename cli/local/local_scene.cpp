@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostShown = 200;  // most characters of names in one message
+constexpr std::size_t kMostShown = 200;  // a message lists names until it has this many characters of them
 
 // A folder of assets that also records which files were requested.
 class RecordedFolder final : public AssetSource {
@@ -53,7 +53,7 @@ class RecordedFolder final : public AssetSource {
     return asset;
   }
   std::shared_ptr<const KeptFolder> kept() const { return folder_.kept(); }
-  // Returns the files requested since the last call.
+  // Returns the files requested since the previous call.
   std::map<std::string, LocalFile> take_files() { return std::exchange(files_, {}); }
   std::string take_included_texts() { return std::exchange(texts_, {}); }
 
@@ -147,7 +147,7 @@ tl::expected<LocalScene, coordinator::Rejected> SceneReader::read(std::optional<
   if (!read.scene)
     return tl::unexpected(coordinator::Rejected{
         {Errc::invalid_argument, fmt::format("{} cannot be read", in.path)}, std::move(read.diagnostics)});
-  // The reader of glTF knows each -D itself.
+  // The glTF reader checks the -D options itself.
   if (!scene::gltf::is_gltf(in.path))
     if (auto unused = unused_define(in.defines, in.text + included))
       return refused(in.path, std::move(*unused));

@@ -23,7 +23,7 @@ struct LocalFile {
   Digest digest;
   std::uint64_t bytes = 0;
   bool is_text = false;  // true for an included scene file
-  // True for a file that was made of numbers in the scene's text; it is in LocalScene::made
+  // True for a temporary file that was made from numbers in the scene's text; LocalScene::made keeps it
   bool is_made = false;
 };
 
@@ -33,7 +33,7 @@ struct LocalScene {
   Scene scene;
   std::vector<Diagnostic> warnings;
   std::map<std::string, LocalFile> files;  // assets and included scene files, by their names in the scene
-  std::optional<std::uint32_t> frame;      // the frame for which it was read
+  std::optional<std::uint32_t> frame;      // the frame for which the scene was read
   // The assets that a job uses: first with an integrator that ignores media, second with any other. Assets
   // that are not needed are not uploaded.
   std::array<std::set<Digest>, 2> needed = {};

@@ -27,7 +27,7 @@ void complain(const std::string& text);  // prints "lightshaft: error: text" to 
 int run_guarded(const std::string& command, const std::function<int()>& action);
 
 void print_diagnostics(const std::vector<Diagnostic>& diagnostics);
-void print_note(const std::string& line);  // prints to stderr, as plain_text()
+void print_note(const std::string& line);  // prints to stderr; control characters become spaces
 void print(const std::string& line);       // prints to stdout, unmodified and flushed
 
 std::string show_bytes(std::uint64_t bytes);  // returns, for example, "3.2 MiB"

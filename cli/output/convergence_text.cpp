@@ -100,7 +100,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMostCauses = 64;  // most causes that are read from a farm's answer
+constexpr std::size_t kMostCauses = 64;  // largest number of causes shown from a farm's answer
 
 const json* causes_of(const json& job) {
   const auto health = job.find("health");

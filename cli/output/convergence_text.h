@@ -23,15 +23,15 @@ Verdict verdict_of_report(const nlohmann::json& report);  // from the answer to 
 // Returns the error that `job` has under `key`, as "0.0123 (0.0118 to 0.0129)", "0.0123 (don't trust yet)",
 // or "-" if it is unknown. `interval` is the key of its interval.
 std::string estimate_text(const nlohmann::json& job, const char* key, const char* interval);
-// Returns the remaining time that `times` (the job, or a part of it) has under `key`, as "4:12 (3:06 to
-// 5:30)", "at least 4:12" (for a doubtful job with a target), or "-" if it is unknown. `interval` is the key
-// of its interval.
+// Returns the remaining time that `times` has under `key`, as "4:12 (3:06 to 5:30)", "at least 4:12" (for a
+// doubtful job with a target), or "-" if it is unknown. `times` is `job` itself or an object in it.
+// `interval` is the key of the interval in `times`.
 std::string time_left_text(const nlohmann::json& job, const nlohmann::json& times, const char* key,
                            const char* interval = nullptr);
-// Returns the error against the reference image that `object` has under `key`: "0.0123", "below the
-// reference's noise", or "0.0123 (not to be trusted: ...)" if `same_seed`, that is, image and reference were
-// rendered with the same seed; empty: unknown. `below` is the key of the flag that says that the error cannot
-// be distinguished from the reference's noise. `digits` is the number of significant digits.
+// Returns the error against the reference image that `object` has under `key`: "0.0123"; or "below the
+// reference's noise", if the flag under the key `below` is set; or "0.0123 (not to be trusted: ...)" if
+// `same_seed`, since an image and a reference of the same seed share their noise. Empty: unknown. `digits` is
+// the number of significant digits.
 std::string reference_error_text(const nlohmann::json& object, const char* key, const char* below,
                                  bool same_seed, int digits = 3);
 // Returns one line on the error of a job's image; empty: unknown.
@@ -40,9 +40,9 @@ std::string error_text(const nlohmann::json& job);
 // 0.0129)", or why there is no such image; empty: no denoising was requested.
 std::string denoised_text(const nlohmann::json& report);
 
-// Returns lines for the user about the `health` of `job`, which is a report or a farm's answer about a job:
-// each cause with its first location and the command that renders that sample again. Empty: the job is
-// healthy, or its health is unknown.
+// Returns lines for the user about the numeric health of `job` (invalid samples and the like). `job` is a
+// report or a farm's answer about a job. Each cause has its first location and the command that renders that
+// sample again. Empty: the job is healthy, or its health is unknown.
 std::vector<std::string> health_lines(const nlohmann::json& job);
 bool unclean(const nlohmann::json& job);
 

@@ -24,15 +24,15 @@ struct ProgressFigures {
   int more_workers = 8;
   bool doubtful = false;         // the error is not reliable yet, nor is the time to a target
   bool target_denoised = false;  // target_error means the denoised layers
-  // The largest relMSE of these that the interval of the last check allows
+  // Upper end of the interval that the most recent check gave for the relMSE of the denoised layers
   std::optional<double> denoised_at_most = {};
 };
 // Returns the line for the terminal: " 42 % [######          ] 26.9 spp  3.1 M samples/s  relMSE 0.0123
 // (0.0118 to 0.0129), target 0.001  4:12 left (3:06 to 5:30), 1:06 with 8 more". If it is longer than
 // `columns`, whole parts are omitted, in this order: the rate, the effect of more workers, the error's
-// interval, the bar, the forecast's interval, the target. The line of a doubtful job has no intervals but
-// "don't trust yet" and, with a target, "at least 4:12 left", which are never omitted. If the target means
-// the denoised layers, it reads ", denoised at most 0.0012, target 0.001". `columns` 0: any length.
+// interval, the bar, the forecast's interval, the target. The line of a doubtful job has "don't trust yet"
+// instead of intervals and, with a target, "at least 4:12 left"; these two are never omitted. If the target
+// means the denoised layers, the line has ", denoised at most 0.0012, target 0.001". `columns` 0: any length.
 std::string progress_line(const ProgressFigures& figures, int columns, bool with_bar = true);
 
 enum class ProgressForm {

@@ -40,13 +40,14 @@ struct Pipe {
 
 Result<pid_t> start_program(const Words& words, std::vector<int> standard_files) {
   const auto inherits = [](std::string_view variable) { return !variable.starts_with("LIGHTSHAFT_"); };
-  // A group of its own: Ctrl-C at the terminal is for us, and we decide what to do with the programs.
+  // The program gets its own process group. Otherwise Ctrl-C at the terminal would stop it too; it is for us
+  // alone, and we decide what to do with the program.
   return spawn({words.front(), words, std::move(standard_files), inherits, true});
 }
 
 int exit_code(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }
 
-// Reads what there is. Closes the end when the program has closed its own.
+// Appends to `text` what can be read now. Closes our end of the pipe once the program has closed its own.
 void read_some(int& fd, std::string& text) {
   std::array<char, 4096> bytes;
   const ssize_t count = ::read(fd, bytes.data(), bytes.size());
@@ -77,7 +78,8 @@ Result<CommandOutput> run_command(const Words& words, const std::string& input, 
   std::size_t written = 0;
   if (input.empty()) Pipe::close(in.write);
   std::optional<int> code;
-  // Reading stops when the program has ended: processes that it left behind may keep its output open.
+  // Reading stops soon after the program has ended, even if processes that it left behind keep its output
+  // open.
   while (out.read >= 0 || err.read >= 0 || !code) {
     if (!code)
       if (const auto status = poll_end(*pid)) code = exit_code(*status);
@@ -107,7 +109,7 @@ Result<LongCommand> LongCommand::start(const Words& words, const std::string& in
   if (in.read < 0) return fail(Errc::resource_exhausted, "no pipe to run a program with");
   int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
   if (file < 0) return bad_argument(fmt::format("{}: {}", log, std::strerror(errno)));
-  // Does not block: a pipe holds 64 KiB before anybody reads, far more than a command with its token.
+  // Writing does not block: a pipe holds 64 KiB before anybody reads, far more than a command with its token.
   ::fcntl(in.write, F_SETFL, O_NONBLOCK);
   const bool sent = ::write(in.write, input.data(), input.size()) == static_cast<ssize_t>(input.size());
   const Result<pid_t> pid = sent ? start_program(words, {in.read, file, file})

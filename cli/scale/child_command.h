@@ -18,15 +18,15 @@ struct CommandOutput {
   std::string out, err;
 };
 
-// Runs a program to its end. unavailable: it did not end in time, and was killed; resource_exhausted: it
-// printed too much, and was killed; not_found: there is no such program.
+// Runs a program to its end. unavailable: it did not end within `most_seconds`, and was killed;
+// resource_exhausted: it printed too much, and was killed; not_found: there is no such program.
 Result<CommandOutput> run_command(const Words& words, const std::string& input, double most_seconds);
 
 // A program that runs in the background. Its output goes to a file.
 class LongCommand {
  public:
-  // Starts the program, writes `input` to its standard input, and keeps that open until close_input() or the
-  // destructor.
+  // Starts the program and writes `input` to its standard input, which stays open until close_input() or the
+  // destructor. `log` is the file for its output.
   static Result<LongCommand> start(const Words& words, const std::string& input, const std::string& log);
   LongCommand(LongCommand&& other) noexcept;
   LongCommand& operator=(LongCommand&&) = delete;

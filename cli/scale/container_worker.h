@@ -7,7 +7,7 @@ namespace ls::cli {
 
 std::string new_worker_id();  // eight random hexadecimal digits
 
-// Writes FOLDER/NAME.log. A log that cannot be written is lost: it keeps no worker from being removed.
+// Writes FOLDER/NAME.log. If that fails, the log is lost: a worker is removed all the same.
 void keep_log(const std::string& folder, const std::string& name, const std::string& text);
 
 }  // namespace ls::cli

@@ -51,7 +51,7 @@ void read_jobs(const json& jobs, const Spending& spending, Demand& demand) {
     demand.queued_core_seconds += queued;
     left_of_owner -= queued;
     if (!number_field(job, "eta_seconds")) {
-      helps = true;  // without a forecast, more workers are assumed to help
+      helps = true;  // without a forecast, assume that more workers help
       continue;
     }
     forecast = true;

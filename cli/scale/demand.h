@@ -1,4 +1,5 @@
-// Reads from a coordinator's HTTP API how much work waits, for Scaler, and what has been spent.
+// Asks a coordinator, through its HTTP API, how much work waits (the *demand*, for Scaler), and what each job
+// and worker has cost (for Spending).
 #pragma once
 
 #include "cli/farm/farm_api.h"
@@ -7,15 +8,16 @@
 
 namespace ls::cli {
 
-// Tells our workers from others: those named FARM-... are ours, and run on `engine`.
+// How to tell our workers from others: ours have names FARM-..., and run on `engine`.
 struct OurWorkers {
   std::string farm, engine;
 };
 
-// Jobs whose budget is used up are left out of the demand.
+// Asks the coordinator, adds the costs to `spending`, and returns the demand. It leaves out the work of jobs
+// whose budget is used up.
 FarmApi::Answer<Demand> ask_demand(FarmApi& api, const OurWorkers& ours, Spending& spending);
 
-// The same from the answers to GET /api/v1/jobs and GET /api/v1/workers.
+// The same, from the coordinator's answers to GET /api/v1/jobs and GET /api/v1/workers.
 Demand demand_of(const nlohmann::json& jobs, const nlohmann::json& workers, const OurWorkers& ours,
                  Spending& spending);
 

@@ -14,12 +14,13 @@ namespace {
 
 using State = EngineWorker::State;
 
-constexpr double kDockerLimit = 60;      // seconds for one command of Docker
-constexpr double kDockerRunLimit = 600;  // and for one that may fetch the image first
+constexpr double kDockerLimit = 60;      // seconds allowed for one command of Docker
+constexpr double kDockerRunLimit = 600;  // the same for a command that may have to fetch the image first
 
-// The container's command waits for the token at a named pipe in its /tmp, which is in memory. So the token
-// is in no argument, no file, and not in the environment that `docker inspect` shows, but only in the
-// worker's own, which its user and root may read. Both ends make the pipe: whichever comes first.
+// The container's command waits at a named pipe for the farm's token. The pipe is in the container's /tmp,
+// which is in memory. So the token is in no argument, in no file, and not in the environment that `docker
+// inspect` shows; only the worker's own environment has it, which its user and root can read. Both commands
+// try to make the pipe, since either may come first.
 constexpr const char* kTakeToken =
     "mkfifo -m 600 /tmp/join-token 2>/dev/null; IFS= read -r LIGHTSHAFT_JOIN_TOKEN </tmp/join-token; "
     "export LIGHTSHAFT_JOIN_TOKEN; exec \"$@\"";
@@ -103,7 +104,7 @@ class Docker final : public Engine {
     return words;
   }
 
-  // Keeps its log.
+  // Removes a container after saving its log.
   void remove(const std::string& id) const {
     const auto log = run_command({"docker", "logs", container(id)}, "", kDockerLimit);
     if (log && log->code == 0)
@@ -122,8 +123,9 @@ class Docker final : public Engine {
     return std::move(output->out);
   }
 
-  // Containers that have ended since they were listed are no error: the others have got their signal, and
-  // must not get it twice, as the second SIGTERM ends a worker at once.
+  // Runs a command of Docker on several containers. Some may have ended since they were listed. That is no
+  // error, and the call must not be repeated: the others have got their signal, and a second SIGTERM ends a
+  // worker at once.
   Result<void> for_all(Words words, const std::vector<std::string>& ids) const {
     if (ids.empty()) return {};
     for (const std::string& id : ids) words.push_back(container(id));
@@ -171,7 +173,7 @@ Result<DockerContainers> parse_docker_ps(const std::string& lines, double unix_t
       found.ended.push_back(fields[0]);
       continue;
     }
-    // A container that was created and not started is what a failed `docker run` leaves.
+    // A failed `docker run` leaves a container that was created but not started.
     const bool stuck = state == "created";
     found.workers.push_back({fields[0], stuck ? State::stuck : State::running,
                              stuck ? 0 : std::max(0.0, unix_time - *started), *cores});

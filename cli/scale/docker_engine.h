@@ -1,5 +1,5 @@
-// Workers as containers of Docker: `docker run` starts them, `docker ps` lists them, signals drain and end
-// them.
+// Runs workers as containers of Docker: `docker run` starts them, `docker ps` lists them, and signals drain
+// and end them. To *drain* a worker is to ask it to deliver its results and end.
 #pragma once
 
 #include <functional>
@@ -9,20 +9,20 @@
 namespace ls::cli {
 
 struct DockerOptions {
-  WorkerCommand worker;  // program: in the image
+  WorkerCommand worker;  // `program` is the path in the image
   std::string join_token;
-  std::string image;             // deploy/images.sh makes it
-  int drain_seconds = 120;       // that Docker gives a worker which somebody else stops
+  std::string image;             // name of the image, which deploy/images.sh builds
+  int drain_seconds = 120;       // how long Docker lets a worker drain if somebody else stops its container
   std::string logs = ".";        // folder for the logs of workers that have ended
   std::vector<std::string> run;  // more options of `docker run`, one word each
 };
 
-// `unix_time`: seconds since 1970. failed_precondition: no Docker engine answers.
+// `unix_time` returns the seconds since 1970. failed_precondition: no Docker engine answers.
 Result<std::unique_ptr<Engine>> open_docker(DockerOptions options, std::function<double()> unix_time);
 
 struct DockerContainers {
   std::vector<EngineWorker> workers;
-  std::vector<std::string> ended;  // ids
+  std::vector<std::string> ended;  // ids of containers that have ended
 };
 // Reads the lines of `docker ps`. invalid_argument: a line is not in the format that open_docker() asks for.
 Result<DockerContainers> parse_docker_ps(const std::string& lines, double unix_time);

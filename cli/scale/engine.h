@@ -1,5 +1,6 @@
-// The interface of `lightshaft farm up` to an engine that runs workers (Slurm, ssh, Docker, Kubernetes). Its
-// calls fit any engine that can list, start and end instances of one program.
+// The interface between `lightshaft farm up` and an *engine*, which runs its workers: Slurm, ssh, Docker or
+// Kubernetes. Whatever can list, start and end instances of one program can be an engine. A *farm-up* is a
+// run of `lightshaft farm up`, with all earlier runs under the same name.
 #pragma once
 
 #include <memory>

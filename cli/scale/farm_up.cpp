@@ -18,7 +18,7 @@ namespace {
 
 using nlohmann::json;
 
-// Waits between two looks, or until the user asks for the end.
+// Waits between two checks, or until the user asks for the end.
 class Pause {
  public:
   void end() {
@@ -40,7 +40,7 @@ class Pause {
   bool ended_ = false;
 };
 
-// Prints a message only if it differs from the last one.
+// Prints a message only if it differs from the previous one.
 class Notes {
  public:
   void print(const std::string& text) {
@@ -108,8 +108,8 @@ class FarmUp {
   }
 
  private:
-  // Reads the demand. While the coordinator does not answer, the workers stay as they are. Error: it has
-  // never answered.
+  // Reads the demand. While the coordinator does not answer, the number of workers stays as it is. Error: it
+  // has never answered.
   FarmApi::Answer<void> look_at_jobs() {
     auto asked = ask_demand(api_, {options_.limits.farm, version_}, spending_);
     if (asked) {

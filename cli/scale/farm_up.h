@@ -1,4 +1,5 @@
-// `lightshaft farm up`: runs as many workers on an engine as a farm's jobs need, until the user stops it.
+// `lightshaft farm up`: runs as many workers as a farm's jobs need, until the user stops it. An *engine*
+// (Slurm, ssh, Docker or Kubernetes) starts and ends them.
 #pragma once
 
 #include <filesystem>
@@ -14,12 +15,14 @@ namespace ls::cli {
 struct FarmUpOptions {
   ScaleLimits limits;
   Budgets budgets;
-  bool until_done = false;       // ends when no job is queued or running
-  bool json = false;             // prints the report as JSON at the end
-  std::filesystem::path report;  // what was spent; read at the start, so that the sum goes on
+  bool until_done = false;       // end when no job is queued or running
+  bool json = false;             // print the report as JSON at the end
+  std::filesystem::path report;  // file with the costs so far; read at the start, to continue their sums, and
+                                 // written after each check
 };
 
-// Returns the exit code. At the first signal, and when until_done ends it, its workers are drained first.
+// Returns the exit code. Before it returns, because of a signal or of until_done, it drains its workers: they
+// deliver their results and end.
 int run_farm_up(FarmApi& api, Engine& engine, const FarmUpOptions& options, Interrupt& interrupt,
                 const Clock& clock);
 

@@ -19,19 +19,19 @@ namespace {
 using nlohmann::json;
 using State = EngineWorker::State;
 
-constexpr double kKubectlLimit = 60;  // seconds for one command
+constexpr double kKubectlLimit = 60;  // seconds allowed for one command
 constexpr const char* kFarmLabel = "lightshaft.io/farm";
 constexpr const char* kWorkerLabel = "lightshaft.io/worker";
 
 std::string pod_name(const std::string& id) { return "lightshaft-worker-" + id; }
 
-// "" if there is no text.
+// Returns the text at a JSON pointer such as "/metadata/name"; empty if there is none.
 std::string text_at(const json& object, const char* where) {
   const json::json_pointer pointer(where);
   return object.contains(pointer) && object[pointer].is_string() ? object[pointer].get<std::string>() : "";
 }
 
-// "4", "2500m": cores, rounded up. 0: none said.
+// Returns the cores that the container requests ("4" or "2500m"), rounded up; 0: it requests none.
 int cores_of(const json& container) {
   std::string text = text_at(container, "/resources/requests/cpu");
   const bool thousandths = text.ends_with('m');
@@ -40,7 +40,7 @@ int cores_of(const json& container) {
   return value ? static_cast<int>(std::ceil(thousandths ? *value / 1000 : *value)) : 0;
 }
 
-// "2026-11-25T15:03:21Z": seconds since 1970.
+// Parses, for example, "2026-11-25T15:03:21Z". Returns seconds since 1970.
 std::optional<double> seconds_of_utc(const std::string& text) {
   int year = 0, month = 0, day = 0, hour = 0, minute = 0, second = 0;
   char zone = 0;
@@ -54,7 +54,7 @@ std::optional<double> seconds_of_utc(const std::string& text) {
   return ((days * 24.0 + hour) * 60 + minute) * 60 + second;
 }
 
-// Why kubelet does not start a container, where waiting longer does not help.
+// True if a container of the pod does not start for a reason that waiting longer will not remove.
 bool hopeless(const json& status) {
   static const std::set<std::string> reasons{"ImagePullBackOff",     "ErrImagePull",
                                              "InvalidImageName",     "CreateContainerConfigError",
@@ -111,7 +111,7 @@ class Kubernetes final : public Engine {
 
   Result<void> drain(std::span<const EngineWorker> workers) override { return remove(workers, {}); }
 
-  // Without waiting for the node's answer, as a node that is lost gives none.
+  // Removes the pods without waiting for their node to confirm it, as a lost node never does.
   Result<void> kill(std::span<const EngineWorker> workers) override {
     return remove(workers, {"--grace-period=0", "--force"});
   }
@@ -183,7 +183,8 @@ Result<json> pod_like(const json& deployment, const KubernetesOptions& options, 
   pod["metadata"]["name"] = pod_name(id);
   pod["metadata"]["labels"][kFarmLabel] = options.farm;
   pod["metadata"]["labels"][kWorkerLabel] = id;
-  // A pod without a controller would keep an autoscaler of nodes from taking its node away.
+  // An autoscaler of nodes does not remove a node that runs a pod without a controller, such as this one,
+  // unless it is marked so.
   pod["metadata"]["annotations"]["cluster-autoscaler.kubernetes.io/safe-to-evict"] = "true";
   pod["spec"]["restartPolicy"] = "Never";
   pod["spec"]["terminationGracePeriodSeconds"] = options.drain_seconds;

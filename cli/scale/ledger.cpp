@@ -11,7 +11,8 @@ void Ledger::observe(std::span<const EngineWorker> workers, double elapsed) {
   for (const auto& w : workers) {
     if (w.state != EngineWorker::State::running) continue;
     const auto before = running_.find(w.id);
-    // If a worker has been running for less time than before, it was requeued, and its earlier run has ended.
+    // A worker's running time that is shorter than before means that the engine requeued it: the earlier run
+    // has ended.
     const bool same_run = before != running_.end() && w.seconds >= before->second.seconds;
     if (same_run)
       running_.erase(before);

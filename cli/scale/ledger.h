@@ -1,5 +1,6 @@
-// The cost of the workers of one farm-up, in core seconds that the engine reserved. It is stored in a file,
-// so that a farm-up that is started again continues the sum.
+// Adds up what the workers of `lightshaft farm up` cost, in core seconds reserved at the engine (Slurm, ssh,
+// Docker or Kubernetes). The sum is kept in a file, so the next run under the same name continues it instead
+// of starting from 0.
 #pragma once
 
 #include <map>
@@ -13,11 +14,12 @@ namespace ls::cli {
 
 class Ledger {
  public:
-  // Adds the cost since the last list of the engine. `elapsed` is the time in seconds since then. A worker
-  // that has disappeared is charged for all of it, since its end was not observed.
+  // Adds the cost since the previous call, `elapsed` seconds ago. `workers` is the engine's present list. A
+  // worker that is no longer in it is charged for all of `elapsed`, since nobody saw when it ended.
   void observe(std::span<const EngineWorker> workers, double elapsed);
   double core_seconds() const;
-  // Returns the number of workers that ran; a worker that was requeued counts again.
+  // Returns how many workers have started to run. A worker that the engine requeued and ran again counts
+  // again.
   int started() const { return started_; }
 
   nlohmann::json to_json() const;

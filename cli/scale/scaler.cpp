@@ -72,7 +72,8 @@ void Scaler::drain_failed(std::span<const EngineWorker> workers) {
   for (const auto& w : workers) seen_[w.id].draining_since.reset();
 }
 
-// Updates the known workers. A worker that ended, or got stuck, before it joined the farm is a failed start.
+// Updates the known workers. A worker that ended or got stuck before the farm knew it, without being drained,
+// is a failed start.
 void Scaler::observe(const Demand& demand, std::span<const EngineWorker> workers, TimePoint now) {
   std::map<std::string, Seen> present;
   for (const auto& w : workers) {
@@ -103,14 +104,14 @@ int Scaler::wanted(const Demand& demand) const {
   if (demand.open_jobs == 0) return 0;
   const double threads = std::ceil(demand.queued_core_seconds / limits_.finish_in) - demand.other_threads;
   const double workers = std::ceil(threads / limits_.threads);
-  // At least one worker is wanted: it measures a job whose cost is unknown, and finishes work that is leased
-  // already.
+  // Without workers of others at least one is wanted: it finds out what a job of unknown cost takes, and
+  // finishes work that workers hold already (which queued_core_seconds leaves out).
   const double least = demand.other_threads > 0 ? 0 : 1;
   return static_cast<int>(std::clamp(workers, least, static_cast<double>(limits_.most_workers)));
 }
 
-// Returns how many more workers, besides the existing ones, the budget allows to run for kWorthStarting
-// seconds and drain.
+// Returns how many more workers the budget allows. It must pay for kWorthStarting seconds, and the time to
+// end, of each new and each existing worker.
 int Scaler::affordable(std::span<const EngineWorker> workers, double spent) const {
   if (!limits_.budget_core_seconds) return limits_.most_workers;
   const double each = kWorthStarting + seconds_to_end();
@@ -120,8 +121,8 @@ int Scaler::affordable(std::span<const EngineWorker> workers, double spent) cons
                   static_cast<int>(std::min<double>(limits_.most_workers, left / (limits_.threads * each))));
 }
 
-// Returns how long a worker may continue to cost after a check has found it too expensive. It drains; and up
-// to two check intervals pass until it is told to and until its end is observed.
+// Returns for how many seconds, at most, a worker still costs after a check has decided to end it: the time
+// to drain, and two intervals between checks (until it is told to drain, and until its end is seen).
 double Scaler::seconds_to_end() const { return limits_.drain_seconds + 2 * limits_.poll_seconds; }
 
 void Scaler::drain(const EngineWorker& worker, ScaleActions& out, TimePoint now) {

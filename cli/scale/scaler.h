@@ -1,5 +1,6 @@
-// Decides how many workers an engine should run. It reads no clock and starts nothing: its inputs are demand,
-// workers and time, its outputs are actions.
+// Decides how many workers `lightshaft farm up` should have on an engine (Slurm, ssh, Docker or Kubernetes).
+// It reads no clock and starts nothing: its inputs are demand, workers and time, its outputs are actions. To
+// *drain* a worker is to ask it to deliver its results and end.
 #pragma once
 
 #include <map>
@@ -14,14 +15,15 @@
 
 namespace ls::cli {
 
-// The state of the coordinator's jobs and workers, as its HTTP interface reports it.
+// What the coordinator's jobs need, and which workers it has, as its HTTP interface reports it.
 struct Demand {
   int open_jobs = 0;    // queued or running, with something left of their budgets
-  int unpaid_jobs = 0;  // queued or running, with nothing left
-  // Predicted for work that no worker holds, as far as budgets pay for it; 0 also if nothing was measured yet
+  int unpaid_jobs = 0;  // queued or running, but nothing is left of their budgets
+  // Predicted cost of the work that no worker holds, as far as budgets pay for it. 0 also if no cost was
+  // measured yet.
   double queued_core_seconds = 0;
-  bool more_helps = true;        // false: the coordinator predicts that more workers would not end it earlier
-  int other_threads = 0;         // of connected workers that this farm-up did not start
+  bool more_helps = true;        // false: by the coordinator's forecast, more workers would save no time
+  int other_threads = 0;         // threads of connected workers that this command did not start
   std::set<std::string> joined;  // names of connected workers
   std::set<std::string> idle;    // names of the connected workers that hold no work
 };
@@ -40,26 +42,26 @@ struct ScaleLimits {
 struct ScaleActions {
   int start = 0;
   std::vector<EngineWorker> drain, kill;
-  std::string why;  // reason for the user; empty: there is nothing to report
+  std::string why;  // the reason, shown to the user; empty: there is nothing to report
 };
 
 class Scaler {
  public:
   explicit Scaler(ScaleLimits limits) : limits_(std::move(limits)) {}
 
-  // `spent`: core seconds used so far. `workers`: all workers that the engine lists.
+  // `spent`: core seconds that our workers have cost so far. `workers`: all workers that the engine lists.
   ScaleActions decide(const Demand& demand, std::span<const EngineWorker> workers, double spent,
                       TimePoint now);
-  // Drains all workers and starts none, since farm-up is ending.
+  // For the end of the command: starts no worker, drains all, and kills those that take too long.
   ScaleActions end(std::span<const EngineWorker> workers, TimePoint now);
-  // Notes that the engine could not start workers: the next attempt waits, longer with each failure.
+  // Must be called if the engine could not start workers. The next attempt waits, longer with each failure.
   void start_failed(TimePoint now);
-  // Notes that the engine could not drain these workers: the request will be repeated.
+  // Must be called if the engine could not ask these workers to drain. The request will be repeated.
   void drain_failed(std::span<const EngineWorker> workers);
 
   // A worker is started only if it can run for at least this many seconds within the budget.
   static constexpr double kWorthStarting = 60;
-  // Seconds until the next attempt to start workers
+  // Seconds that pass until the next attempt to start workers: after the first failure, and at most
   static constexpr double kFirstPause = 5, kLongestPause = 600;
 
  private:

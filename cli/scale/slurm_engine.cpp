@@ -14,8 +14,8 @@ namespace {
 
 using State = EngineWorker::State;
 
-constexpr double kTimeLimit = 60;          // most seconds for one command of Slurm
-constexpr std::size_t kMostInACall = 500;  // most jobs in one call of scancel
+constexpr double kTimeLimit = 60;          // seconds allowed for one command of Slurm
+constexpr std::size_t kMostInACall = 500;  // largest number of jobs in one call of scancel
 
 // The job's script. The worker's command line is passed as arguments, so that no shell parses it. `exec`
 // makes the worker the process that Slurm signals. The token is in a file that only its owner can read, since
@@ -95,8 +95,8 @@ class Slurm final : public Engine {
   Result<void> drain(std::span<const EngineWorker> workers) override {
     std::vector<std::string> running, others;
     for (const auto& w : workers) (w.state == State::running ? running : others).push_back(w.id);
-    // --batch: only the worker itself gets the signal. --state: jobs that have started since they were listed
-    // are left alone; they are drained after the next list.
+    // With --batch only the worker itself gets the signal. With --state=PENDING, jobs that have started since
+    // they were listed are left alone; they are drained after the next list.
     const auto drained = scancel({"--batch", "--signal=TERM"}, running);
     const auto withdrawn = scancel({"--state=PENDING"}, others);
     return drained ? withdrawn : drained;
@@ -133,8 +133,9 @@ class Slurm final : public Engine {
     return {};
   }
 
-  // True if scancel complains only about jobs that have ended since they were listed. The other jobs have
-  // then got their signal, and must not get it twice: a second SIGTERM stops a worker immediately.
+  // True if scancel complains only about jobs that have ended since they were listed. That is no error, and
+  // the call must not be repeated: the other jobs have got their signal, and a second SIGTERM stops a worker
+  // immediately.
   static bool only_ended(const std::string& complaints) {
     std::istringstream in(complaints);
     for (std::string line; std::getline(in, line);)
@@ -172,12 +173,13 @@ Result<std::vector<EngineWorker>> parse_squeue(const std::string& lines) {
     if (!seconds || cores < 1) return bad_argument(fmt::format("squeue answered '{}'", line));
     const std::string& state = fields[1];
     const std::string reason = fields.size() > 4 ? fields[4] : "";
-    // Slurm holds a job that it could not start several times. A job that is requeued after the loss of its
-    // node has to wait for two minutes (BeginTime), in which another one could render; both count as stuck.
+    // Two kinds of jobs count as stuck, so that other workers are started instead. Slurm holds a job that it
+    // could not start several times. And a job that is requeued after the loss of its node has to wait for
+    // two minutes (BeginTime).
     const bool held = state == "REQUEUE_HOLD" || state == "SPECIAL_EXIT" ||
                       (state == "PENDING" && reason.find("requeued held") != std::string::npos) ||
                       (state == "PENDING" && (reason.starts_with("JobHeld") || reason == "BeginTime"));
-    // A job that is being requeued is COMPLETING first, and holds its cores meanwhile.
+    // A job that is being requeued is COMPLETING at first, and still occupies its cores.
     const bool running = state == "RUNNING" || state == "COMPLETING" || state == "SUSPENDED" ||
                          state == "STOPPED" || state == "SIGNALING";
     workers.push_back({fields[0],

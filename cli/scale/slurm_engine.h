@@ -1,5 +1,5 @@
 // Runs workers as jobs of Slurm: sbatch starts them as an array, squeue lists them, scancel drains and stops
-// them.
+// them. To *drain* a worker is to ask it to deliver its results and end.
 #pragma once
 
 #include "cli/scale/engine.h"
@@ -17,7 +17,7 @@ struct SlurmOptions {
 // failed_precondition: Slurm's commands are not installed.
 Result<std::unique_ptr<Engine>> open_slurm(SlurmOptions options);
 
-// Parses the lines of squeue. invalid_argument: a line does not have the format that open_slurm() requests.
+// Parses the output of squeue. invalid_argument: a line does not have the format that open_slurm() requests.
 Result<std::vector<EngineWorker>> parse_squeue(const std::string& lines);
 
 }  // namespace ls::cli

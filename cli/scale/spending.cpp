@@ -22,8 +22,8 @@ void Spending::observe(std::span<const JobCost> jobs, std::span<const WorkerCost
     Job& job = it->second;
     job.name = cost.name, job.owner = cost.owner;
     if (is_new && !begun_) job.before = cost.core_seconds;
-    // A coordinator that was killed may have lost the latest results: what was rendered was spent all the
-    // same.
+    // A coordinator that was killed may have lost the latest results, and then reports less. The core seconds
+    // were spent all the same, so a sum never falls.
     job.now = std::max(job.now, cost.core_seconds);
   }
   for (const WorkerCost& cost : workers) {
@@ -31,7 +31,7 @@ void Spending::observe(std::span<const JobCost> jobs, std::span<const WorkerCost
     Worker& worker = it->second;
     worker.engine = cost.engine;
     if (is_new && !begun_) worker.before = cost.core_seconds;
-    // One that has rendered less than before was started again.
+    // A worker that has rendered less than before was restarted.
     if (cost.core_seconds < worker.now) worker.earlier += worker.now - std::exchange(worker.before, 0);
     worker.now = cost.core_seconds;
   }

@@ -15,25 +15,25 @@ namespace ls::cli {
 
 inline constexpr double kCoreHour = 3600;  // core seconds
 
-// Core seconds; none: no limit.
+// Upper limits in core seconds; nullopt: no limit.
 struct Budgets {
-  std::optional<double> job;            // of each job
-  std::optional<double> user;           // of each user that `users` does not name
-  std::map<std::string, double> users;  // "": the administrator
+  std::optional<double> job;            // for each job
+  std::optional<double> user;           // for each user that `users` does not name
+  std::map<std::string, double> users;  // for the users named; "": the administrator
 };
 
 struct JobCost {
   std::string id, name, owner;  // owner "": the administrator
-  double core_seconds = 0;      // rendered since the job was submitted
+  double core_seconds = 0;      // spent on rendering since the job was submitted
 };
 
 struct WorkerCost {
   std::string id, engine;
-  double core_seconds = 0;  // rendered since it was started
+  double core_seconds = 0;  // spent on rendering since the worker was started
 };
 
-// Everything counts from the first report on. A job or worker that the coordinator has forgotten keeps its
-// last sum.
+// Costs before the first report are not counted. A job or worker that the coordinator has forgotten keeps its
+// most recent sum.
 class Spending {
  public:
   explicit Spending(Budgets budgets = {}) : budgets_(std::move(budgets)) {}
@@ -42,25 +42,26 @@ class Spending {
 
   double of_job(const std::string& id) const;
   double of_user(const std::string& owner) const;
-  // Core seconds left in the budget of a job or of its owner. At or below 0 the budget is spent.
+  // Returns the core seconds that remain in the budget of a job or of a user: infinity without a budget; 0 or
+  // less if it is used up.
   double left_of_job(const std::string& id) const;
   double left_of_user(const std::string& owner) const;
 
   nlohmann::json report() const;  // core hours by job, by user and by engine
   nlohmann::json to_json() const;
-  // Takes up the sums of an earlier run. invalid_argument: these are none.
+  // Continues the sums of an earlier run, from its to_json(). invalid_argument: `json` has no such sums.
   Result<void> go_on_from(const nlohmann::json& json);
 
  private:
   struct Job {
     std::string name, owner;
-    double before = 0;  // rendered before the first report
+    double before = 0;  // core seconds before the first report
     double now = 0;
   };
   struct Worker {
     std::string engine;
-    double earlier = 0;          // rendered by earlier processes of the same id
-    double before = 0, now = 0;  // as of a job
+    double earlier = 0;          // core seconds of earlier processes with the same id
+    double before = 0, now = 0;  // of the present process; as in Job
   };
   Budgets budgets_;
   bool begun_ = false;

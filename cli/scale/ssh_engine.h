@@ -1,4 +1,4 @@
-// Runs workers on a list of machines over ssh, for sites without an engine.
+// Runs workers on a list of machines over ssh, for sites without Slurm, Docker or Kubernetes.
 #pragma once
 
 #include <filesystem>
@@ -16,8 +16,9 @@ struct SshOptions {
   std::string logs = ".";             // folder for the workers' logs
 };
 
-// Opens an engine that runs one worker per machine. A worker lives as long as its connection: when that
-// breaks, or farm-up ends, it delivers its results and ends. failed_precondition: ssh is not installed.
+// Opens an engine that runs one worker per machine. A worker lives as long as its ssh connection: when the
+// connection breaks, or `farm up` ends, the worker delivers its results and ends. failed_precondition: ssh is
+// not installed.
 Result<std::unique_ptr<Engine>> open_ssh(SshOptions options, const Clock& clock);
 
 // Reads a list of machines, one per line; # begins a comment. invalid_argument: a line is not a machine's

@@ -17,10 +17,10 @@
 
 namespace ls::test {
 
-inline constexpr double kLeastExpected = 10;  // samples of a cell
+inline constexpr double kLeastExpected = 10;  // samples; cells with fewer are merged
 
-// The tests of one share. At their end it checks their number and prints the smallest p that occurred: for n
-// correct tests about 1 / n.
+// The tests of one share (a line of kShares in significance.h). close() checks their number and prints the
+// smallest p that occurred, which is about 1 / n for n correct tests.
 class ChiSquareTally {
  public:
   explicit ChiSquareTally(std::string_view file) : tests_(file) {}

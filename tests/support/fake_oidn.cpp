@@ -1,14 +1,13 @@
 // A stand-in for Open Image Denoise's library: the part of its C API that lightshaft-denoise calls. Compiled
 // with one of
-//   FAKE_OIDN_BLURS   a colour becomes the mean of its 3 x 3 window, clipped to the image, plus 1/16 of
-//   albedo
-//                     and normal, which were first halved by their own filters: so a test sees which planes
-//                     and settings arrived
+//   FAKE_OIDN_BLURS   a colour becomes the mean of its 3 x 3 window, clipped to the image, plus 1/16 of its
+//                     albedo and normal, which their own filters have halved before: so a test sees which
+//                     planes and settings arrived
 //   FAKE_OIDN_COPIES  colours stay as they are
 //   FAKE_OIDN_FAILS   every execution reports an error
 //   FAKE_OIDN_CRASHES every execution aborts
 //   FAKE_OIDN_HANGS   every execution waits for ever
-//   FAKE_OIDN_NAN     colours become NaN
+//   FAKE_OIDN_NAN     the last value of the image becomes NaN
 //   FAKE_OIDN_OLD     it is version 1.4.3
 #include <cstddef>
 #include <cstdlib>

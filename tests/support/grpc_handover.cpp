@@ -1,6 +1,6 @@
 // Tells ThreadSanitizer of the points where gRPC hands work from one thread to another. Debian's gRPC is not
-// compiled for ThreadSanitizer, which therefore sees none of gRPC's own synchronisation and takes every
-// object that crosses it for a race.
+// compiled for ThreadSanitizer, which therefore sees none of gRPC's own synchronisation and reports a race
+// for every object that passes through it.
 //
 // The functions below replace those of the library that start an operation or schedule a reaction; each calls
 // the library's. They state what gRPC promises and no more, so a race of our own code stays a race:
@@ -102,8 +102,8 @@ UNSEEN void started(void* tag) {
   __tsan_release(tag);
 }
 
-// Runs reactions in order on a separate thread, whose queue ThreadSanitizer sees. It does not see the
-// library's own executor for them.
+// Runs reactions in order on a separate thread, whose queue ThreadSanitizer sees. It cannot see the library's
+// own executor, which would run them otherwise.
 class Reactions {
  public:
   void run(std::function<void()> reaction) {
@@ -146,8 +146,9 @@ struct Reached : grpc::internal::ServerCallbackCall {
 
 }  // namespace
 
-// The library's own object for the next call is made without an operation, on the thread that received the
-// last one, and ended after OnDone.
+// The library makes its own object for the next call without an operation, on the thread that received the
+// previous call, and ends it after OnDone. ThreadSanitizer sees no order in this, so its report is
+// suppressed.
 extern "C" const char* __tsan_default_suppressions() {
   return "race:CallbackCallTag::ContinueRunAfterInterception()::{lambda\n";
 }

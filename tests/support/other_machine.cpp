@@ -1,7 +1,7 @@
-// Preloaded into a program, this makes it behave as on another machine. LIGHTSHAFT_TEST_ISA: Embree is
-// configured for these instructions instead of those that the program names. LIGHTSHAFT_TEST_OFF: results of
-// this function are off by one unit in the last place ("expf"), or one triangle is replaced by its neighbour
-// ("rtcIntersect1").
+// Preloaded into a program, this makes it behave as on another machine. LIGHTSHAFT_TEST_ISA names the
+// instruction set for which Embree is configured, instead of the one that the program names.
+// LIGHTSHAFT_TEST_OFF names a function that gives wrong results: with "expf" they are off by one unit in the
+// last place, with "rtcIntersect1" one triangle is replaced by its neighbour.
 #include <dlfcn.h>
 
 #include <cmath>

@@ -1,7 +1,7 @@
-// Renders a scene to the mean of its pixels, with a standard error that is valid for low-discrepancy
-// sequences, too: the two halves of every pixel and all pixels are independent (where no paths are shared
-// between these: the builder leaves path_reuse off), so (A - B)^2 / 4 estimates each pixel's squared error
-// without bias.
+// Renders a scene to the mean of its pixels. The standard error is valid for low-discrepancy sequences, too:
+// the two halves of every pixel's samples are independent, and so are all pixels, since the builder leaves
+// path_reuse off and no paths are shared between them. So (A - B)^2 / 4, with A and B the means of the
+// halves, estimates each pixel's squared error without bias.
 #pragma once
 
 #include <algorithm>

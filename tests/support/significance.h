@@ -28,7 +28,7 @@ enum class Family {
   chi_square,     // samples against densities: unit tests of sampling, bsdf and render
   scenes,         // the same image by other means: tests/property
   coverage,       // estimated errors against true ones: tests/coverage
-  single_figures  // a mean within kStandardErrors of the expected value, or more: other unit tests
+  single_figures  // means with a tolerance of at least kStandardErrors standard errors: other unit tests
 };
 struct Rate {
   Family family;

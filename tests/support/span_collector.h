@@ -1,5 +1,5 @@
-// A collector of traces without a network: it answers a tracer's requests as it is told, and keeps their
-// spans.
+// A collector of traces without a network: it gives a tracer's requests the answer that the test has set, and
+// keeps their spans.
 #pragma once
 
 #include <condition_variable>
@@ -67,7 +67,7 @@ class SpanCollector {
     std::erase_if(all, [&](const CollectedSpan& span) { return span.name != name; });
     return all;
   }
-  // False: so many requests did not come within 20 s.
+  // Returns false if fewer than `count` requests have come within two minutes.
   bool wait_for_requests(std::size_t count) {
     std::unique_lock lock(mutex_);
     return came_.wait_for(lock, std::chrono::minutes(2), [&] { return requests.size() >= count; });

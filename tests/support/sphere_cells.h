@@ -31,9 +31,10 @@ class SphereCells {
     if (!(x < 1)) return reach_ >= 2 && x < 1.001 ? cell(rows_ - 1, azimuth(v)) : size() - 1;
     return cell(std::min(rows_ - 1, static_cast<int>(x * rows_)), azimuth(v));
   }
-  // Returns the probabilities of the cells, and last that of no cell. Each cell has `grid` points on a side.
-  // From one column of points to the next they are shifted by the golden ratio of a step, so that an edge of
-  // the density along a row does not hit or miss a whole row of points.
+  // Returns the probability of each cell and, as the last element, that of all other directions. The density
+  // is summed up over `grid` x `grid` points in each cell. From one column of points to the next they are
+  // shifted by the golden ratio times a step, so that an edge of the density along a row does not hit or miss
+  // a whole row of points.
   std::vector<double> masses(const std::function<double(const render::V3&)>& pdf, int grid) const {
     std::vector<double> p(size(), 0);
     const double steps = double{1} * rows_ * grid, turns = double{1} * columns_ * grid;
@@ -53,7 +54,7 @@ class SphereCells {
     total_ = all;
     return p;
   }
-  // Integral of the density over the cells of the last call of masses().
+  // Integral of the density over the cells, from the most recent call of masses().
   double total() const { return total_; }
 
  private:

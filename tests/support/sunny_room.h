@@ -11,7 +11,7 @@ struct SunnyRoom {
   // true: rough metal, plastic and glass are in the room, and a half-transparent sheet is in the slit
   bool glossy = false;
   bool sheet = true;  // false: no sheet in any case
-  // The extinction of the air, as a constant or as a grid
+  // The extinction of the air; `grid`: as a grid whose density varies, instead of a constant
   double fog = 0;
   bool grid = false;
   int light_vertices = 0;

@@ -1,7 +1,7 @@
 // Images whose true values are known, sampled without a renderer. A pixel's samples have a gamma distribution
-// about its mean, and occasionally one is a firefly. The sum of a round's samples is drawn at once (sums of
-// gamma variables are gamma variables, counts of fireflies binomial), so that a thousand jobs take seconds.
-// Tiles stop by the farm's own rule and error estimate.
+// about its mean, and occasionally one is a firefly. A round (range of samples) adds the sum of its samples,
+// which is drawn at once (sums of gamma variables are gamma variables, counts of fireflies binomial), so that
+// a thousand jobs take seconds. Tiles stop by the farm's own rule and error estimate.
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ struct SyntheticPixel {
   }
 };
 
-// Channels are grey, with these factors.
+// A pixel's channels are its grey value times these factors.
 inline constexpr double kGrey[3] = {1, .8, .6};
 
 class SyntheticFilm {
@@ -64,7 +64,8 @@ class SyntheticFilm {
       sum += relative_variance(t) * static_cast<double>(tile(t).size());
     return sum / static_cast<double>(pixels());
   }
-  // The mean over channels of square / (truth^2 + 0.01), where `square` is that of a difference of grey 1.
+  // The mean over channels of square / (truth^2 + 0.01), where `square` is the square of a difference in the
+  // grey value. Each channel multiplies difference and truth by its factor.
   static double relative(const SyntheticPixel& p, double square) {
     double sum = 0;
     for (const double w : kGrey) sum += w * w * square / (w * w * p.truth() * p.truth() + .01);
@@ -87,7 +88,8 @@ class SyntheticJob {
         before_(film.grid().count()),
         rounds_(film.grid().count()) {}
 
-  // Folds the tile's next round and returns its relative error sum.
+  // Adds the samples of the tile's next round. Returns the new estimate of the tile's sum of squared relative
+  // errors.
   double fold(TileIndex t) {
     const auto pixels = film_.tile(t);
     auto& sums = sums_[t];
@@ -177,7 +179,7 @@ inline StoppedJob run_to_target(const SyntheticFilm& film, double target, std::u
   return out;
 }
 
-// ---- images ----
+// A synthetic image.
 struct SyntheticScene {
   std::string name;
   std::function<SyntheticPixel(int x, int y)> pixel;

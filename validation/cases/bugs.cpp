@@ -33,8 +33,8 @@ void one_minus_exp(Table& t) {
         {.band = 1e-4});
 }
 
-// A row of purely absorbing voxels, empty or full, without interpolation, in front of a white environment, or
-// between the sun and a white disk.
+// A row of purely absorbing voxels, full or empty, without interpolation. A white environment is seen through
+// it or, with `by_shadow`, the sun shines through it onto a white disk.
 constexpr int kVoxels = 16, kFull = 7;
 SceneBuilder row_of_voxels(float density, double sigma, bool by_shadow) {
   std::vector<float> values(kVoxels, 0);
@@ -56,10 +56,11 @@ SceneBuilder row_of_voxels(float density, double sigma, bool by_shadow) {
   return builder;
 }
 
-// At a tentative collision in a voxel whose density equals the bound of its cell there are no null
-// collisions. If nothing scatters there either, probabilities normalised by "scattered or null" are 0 / 0.
-// This renderer's bounds are 4 ulps above the voxels, so the null share is never exactly 0; but for densities
-// of 2e-32 it is 1e-38, which becomes 0 when denormals are flushed (as in every thread of the renderer).
+// If the density of a voxel equals the bound of its macro cell, tentative collisions in it are never null
+// collisions. If the medium does not scatter either, probabilities normalised by "scattered or null" are 0 /
+// 0. This renderer's bounds are 4 ulps above the voxels, so the null share is never exactly 0; but for
+// densities of 2e-32 it is 1e-38, which becomes 0 when denormals are flushed (as in every thread of the
+// renderer).
 void null_collisions(Table& t) {
   for (const bool by_shadow : {false, true})
     for (const bool tiny : {false, true}) {
@@ -72,8 +73,8 @@ void null_collisions(Table& t) {
              [=] { return row_of_voxels(density, sigma, by_shadow); },
              grey(std::exp(-depth) * (by_shadow ? .5 / kPi : 1)), {.band = tiny ? 3e-4 : .003});
     }
-  // The factor of null collisions in a channel without extinction is 0 to the power of their number: without
-  // any, 0 to the 0th.
+  // In a channel without extinction, null collisions weight a path by 0 to the power of their number. A path
+  // without any has 0 to the power of 0, which must be 1.
   for (const Configuration& configuration : {Configuration{true, false}, Configuration{true, true}})
     t.mean("bug-null-collision-0-to-the-0th" + configuration.name(), "N15 N9 bug",
            "A grid without extinction in red: its light passes, whichever channel decides flights.",

@@ -28,19 +28,19 @@ BsdfIndex plastic(SceneBuilder& builder, const Rgb& base) {
   const TextureIndex b = builder.texture(base), white = builder.texture(rgb(1));
   return builder.bsdf(PlasticBsdf{1.5, 1, true, b, white});
 }
-// Facets this flat mask less than alpha^2 of the light.
+// Rough glass with facets so flat that they mask less than alpha^2 of the light.
 BsdfIndex nearly_smooth(SceneBuilder& builder, Microfacet facets) {
   const TextureIndex white = builder.texture(rgb(1)), alpha = builder.texture(rgb(2e-3));
   return builder.bsdf(RoughDielectricBsdf{facets, alpha, alpha, 1.5, 1, white, white});
 }
 
-// The floor below a sheet of something.
+// The floor of floor_point() below a horizontal sheet of a material.
 SceneBuilder floor_below(auto material) {
   SceneBuilder builder = floor_point();
   builder.shape(RectangleShape{}, translate({0, 0, 1}) * scale(3), material(builder));
   return builder;
 }
-// The sky behind something, along its normal.
+// A white sky behind a shape with this material, seen along the shape's normal.
 SceneBuilder through(const Geometry& g, const Transform& to_world, BsdfIndex (*material)(SceneBuilder&)) {
   SceneBuilder builder;
   builder.shape(g, to_world, material(builder));
@@ -58,7 +58,7 @@ void null_transmission(Table& t) {
            reflected(irradiance), {.channels = true});
   };
   {
-    // Only shadow rays get there: no path finds a point or a direction.
+    // Only shadow rays find the light of a point or a single direction: paths never hit it by chance.
     SceneBuilder builder = floor_below(third);
     builder.scene.emitters.push_back(PointEmitter{{.5, 0, 2}, rgb(3)});
     direct("mask-below-a-point", builder, .7 * 3 * 2 / std::pow(4.25, 1.5));
@@ -118,8 +118,8 @@ void coated(Table& t) {
       2e-4);
 }
 
-// A thin sheet, and a plate of two rough faces as flat as these, before a black wall: light turns by 2e-3 at
-// the plate, and Fresnel's terms change by the square of that.
+// A thin sheet, and a plate with two faces of nearly_smooth(), in front of a black wall. The plate's facets
+// turn light by about alpha = 2e-3 rad, and Fresnel's terms change by the square of that.
 void sheets(Table& t) {
   const auto add = [&](const char* name, SceneBuilder builder, double slack) {
     builder.shape(RectangleShape{}, translate({0, 0, -2}) * scale(20), builder.diffuse(0));
@@ -137,8 +137,8 @@ void sheets(Table& t) {
       1e-4);
 }
 
-// Lit along the normal, seen at 60 degrees from it, where r_s = (cos i - n cos t) / (cos i + n cos t) and so
-// on.
+// Plastic lit along its normal and seen at 60 degrees from it. Fresnel's amplitudes for these 60 degrees are
+// r_s = (cos i - n cos t) / (cos i + n cos t), and r_p likewise.
 void plastic_by_the_sun(Table& t) {
   const double n = 1.5, ci = .5, ct = std::sqrt(1 - .75 / (n * n));
   const double rs = (ci - n * ct) / (ci + n * ct), rp = (n * ci - ct) / (n * ci + ct);
@@ -153,8 +153,8 @@ void plastic_by_the_sun(Table& t) {
          builder, {f(.2), f(.5), f(.8)});
 }
 
-// A grey floor whose normal leans to the light by 36.87 degrees, lit from above: the cosine is .8. Bumps cast
-// no shadows on each other.
+// A grey floor whose shading normal leans by 36.87 degrees, lit from straight above: the cosine is 0.8. The
+// bumps that a normal map stands for cast no shadows.
 void normal_map(Table& t) {
   SceneBuilder builder;
   const BsdfIndex floor = builder.diffuse(.5);
@@ -166,8 +166,8 @@ void normal_map(Table& t) {
   sun.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(1)});
   t.mean("7.6g-normal-map-by-the-sun", "7.6g N37", "A floor whose normals lean: the cosine is theirs.", sun,
          reflected(.8), {.channels = true});
-  // The sphere lies in the normal's direction, all of it above the surface and above the leaning plane: E =
-  // pi r^2 / d^2.
+  // The sphere lies in the direction of the leaning normal, all of it above the floor and above the plane
+  // perpendicular to that normal: E = pi r^2 / d^2.
   builder.lamp(SphereShape{}, translate({1.8, 0, 2.4}));
   t.mean("7.6g-normal-map-by-a-sphere", "7.6g N37", "A floor whose normals lean towards a shining sphere.",
          builder, reflected(kPi / 9), {.channels = true});

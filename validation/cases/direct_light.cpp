@@ -51,7 +51,7 @@ void direct(Table& t) {
     add("direct-spot-falloff", builder, .5 * 2 * cosine * cosine * cosine);
   }
   {
-    // In quarters of two colours: from below as much is seen of one as of the other.
+    // The sphere is checkered in two colours, in quarters; equal parts of both are seen from below.
     SceneBuilder builder = floor_point();
     const TextureIndex dark = builder.texture(rgb(.25)), bright = builder.texture(rgb(1.5));
     builder.lamp(SphereShape{}, translate({0, 0, 2}) * scale(.5)).emitter = AreaEmitter{
@@ -68,9 +68,9 @@ void direct(Table& t) {
   }
 }
 
-// The radiance of a white environment through m plates of n = 1.5 at normal incidence is 1 minus their
-// reflectance: each face reflects r = 0.04, T = (1 - r) / (1 + (2 m - 1) r); for 500, a thousand interfaces,
-// 3 / 128. Half a per cent of R is a fifth of T, and paths have a thousand vertices on average.
+// The reflectance of m plates of n = 1.5 at normal incidence, in front of black: 1 - T with T = (1 - r) / (1
+// + (2 m - 1) r), since each face reflects r = 0.04. For 500 plates, a thousand interfaces, T = 3 / 128. The
+// band, half a per cent of the reflectance, is a fifth of T. Paths have a thousand vertices on average.
 void plates(Table& table, int m) {
   SceneBuilder builder;
   const BsdfIndex glass = builder.glass(1.5), black = builder.diffuse(0);

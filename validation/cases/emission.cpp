@@ -44,8 +44,8 @@ void absorbing(Table& t) {
   add("per-absorption/grid", true, true, {.5, 1, 16});
 }
 
-// Walls of radiance B around a medium of source B that also scatters: B in every direction (an isothermal
-// enclosure). Mirror walls give the same.
+// Walls of radiance B around a medium that also scatters, and whose source radiance is B: an isothermal
+// enclosure, with radiance B in every direction. Mirror walls give the same.
 void enclosures(Table& t) {
   const auto add = [&](const char* name, bool mirrors, auto medium, bool per_absorption) {
     SceneBuilder builder;
@@ -87,8 +87,9 @@ void enclosures(Table& t) {
   add("enclosure-of-mirrors/homogeneous", true, chromatic, true);
 }
 
-// A scattering slab of source 1 in front of black: 1 - R - T (docs/measurements/stability.md 7.6b). Mirrors
-// at the sides make it infinite.
+// A scattering slab with source radiance 1 in front of a black wall. Its radiance is 1 - R - T, with R and T
+// the slab's reflectance and transmittance (docs/measurements/stability.md 7.6b). Mirrors at the sides make
+// it infinite.
 void emitting_slabs(Table& t) {
   const auto add = [&](const char* name, double albedo, double g, double tau, double expected) {
     SceneBuilder builder = column({}, {.albedo = albedo, .g = g, .tau = tau, .wall = .5}, false);

@@ -9,7 +9,7 @@
 namespace ls::cases {
 namespace {
 
-// The radiance outside of a room, so high that a single leak among a million paths shows.
+// The radiance outside of a room, so high that a single leak in a million paths would be noticed.
 constexpr double kOutside = 1e6;
 
 // A room with grey emitting walls, seen from inside: the radiance is 1 / (1 - .5) everywhere.
@@ -40,7 +40,8 @@ void closed(Table& t) {
            return room(CubeShape{}, 1, {1e5, -1e5, 1e5});
          },
          grey(2), {.band = 1e-3});
-  // More than ten million rays: a path has about two from the walls and as many towards the environment.
+  // More than ten million rays in all: each path has about two from wall to wall, and about two towards the
+  // environment (shadow rays).
   t.exact(
       "N39-leaks", "N39", "Of ten million rays in closed boxes of six sizes none gets out.",
       [](const Bench& b) {
@@ -57,8 +58,8 @@ void closed(Table& t) {
 }
 
 // The mean path length of light through a body in uniform light is 4 V / S, however it is scattered (Blanco
-// and Fournier 2003): 4/3 in the unit ball. Emission per length measures it, by rays evenly spread over its
-// disk, which is pi / 4 of the view.
+// and Fournier 2003): 4/3 in the unit ball. A medium that emits 1 per length measures it: the rays of the
+// view are spread evenly over the ball's disk, which fills pi / 4 of the view.
 SceneBuilder ball(bool grid, double sigma_s, double g) {
   SceneBuilder builder;
   MediumIndex m;

@@ -97,10 +97,10 @@ SceneBuilder endless(double albedo, double r, MediumIndex* medium) {
   return builder;
 }
 
-// The fluence of a ball that emits 1 W, whose radius is half the distance; a camera of all directions shows
-// it divided by 4 pi. The source is a ball because estimates for a point light have infinite variance:
-// radiance grows like the inverse of the angle to the point. At albedo 0.999 paths have a thousand segments,
-// so the band is wider.
+// The fluence of a ball that emits 1 W, at a distance of twice its radius. A camera that sees all directions
+// has the mean radiance fluence / (4 pi). The source is a ball because estimates for a point light have
+// infinite variance: radiance grows like the inverse of the angle to the point. At albedo 0.999 paths have a
+// thousand segments, so the band is wider.
 void endless_medium(Table& t) {
   for (const double c : {.3, .5, .8, .9, .99, .999}) {
     for (const double r : {.25, 1., 2., 5.}) {
@@ -127,8 +127,7 @@ void endless_medium(Table& t) {
 }
 
 // A point light, which no camera sees directly: the answer is its fluence without the direct part e^-r / (4
-// pi r^2). The distribution of the estimates has heavier tails at lower albedo, so it is tested where they
-// matter least.
+// pi r^2). The lower the albedo, the heavier the tails of the estimates, so only high albedos are tested.
 void endless_lamp(Table& t) {
   struct Row {
     double c, r;

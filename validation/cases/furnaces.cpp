@@ -47,8 +47,8 @@ void white_sky(Table& t) {
     add("rotated-grid-in-sphere", builder);
   }
   {
-    // Three channels with a density each, and the same in balance with its surroundings: a medium of their
-    // radiance is not seen, whatever its albedo.
+    // Three channels with a density each. And the same, absorbing, in balance with its surroundings: a medium
+    // whose source radiance equals the radiance around it is invisible, whatever its albedo.
     for (const bool warm : {false, true}) {
       SceneBuilder builder;
       const VolumeIndex v = builder.grid({12, 9, 7}, patchy(12 * 9 * 7 * 3, 5), kBox, 3);
@@ -59,7 +59,8 @@ void white_sky(Table& t) {
     }
   }
   {
-    // Cells so dense that their voxels are followed one by one, and others that are tracked.
+    // Some macro cells are so dense that the field is integrated voxel by voxel; in the others a tracker
+    // samples tentative collisions.
     SceneBuilder builder;
     const VolumeIndex v = builder.grid({12, 9, 7}, patchy(12 * 9 * 7, 6), kBox);
     builder.container(CubeShape{}, {}, builder.null(), builder.heterogeneous(v, rgb(1), 30, .8));
@@ -111,8 +112,8 @@ void shining_walls(Table& t) {
   add("shining-cube-forward", CubeShape{}, {}, forward);
   add("shining-cube-grid", CubeShape{}, {}, grid);
   {
-    // Five emitting rectangles, and the environment seen through a window: many lights, of which one is never
-    // sampled.
+    // Five emitting rectangles, and the environment seen through a window. Among these lights the environment
+    // is never sampled: only paths that leave through the window find it.
     SceneBuilder builder;
     const MediumIndex m = builder.homogeneous(rgb(.8), rgb(1), .2);
     const BsdfIndex open = builder.null();

@@ -17,8 +17,9 @@ std::size_t at(const std::array<int, 3>& n, int x, int y, int z) {
   return static_cast<std::size_t>((z * n[1] + y) * n[0] + x);
 }
 
-// The unit cube of a purely absorbing grid, in front of a white environment (tested by flights of camera
-// rays), or between the sun and a floor (by shadow rays). The ray goes through `from` and `to`.
+// The unit cube of a purely absorbing grid. It is in front of a white environment (this tests flights of
+// camera rays) or, with `by_shadow`, between the sun and a white disk (this tests shadow rays). The ray goes
+// through `from` and `to`.
 SceneBuilder seen_through(const std::array<int, 3>& n, const std::vector<float>& values, double sigma,
                           const Vec3& from, const Vec3& to, bool by_shadow) {
   SceneBuilder builder;
@@ -43,14 +44,14 @@ SceneBuilder seen_through(const std::array<int, 3>& n, const std::vector<float>&
   }
   return builder;
 }
-// Returns the radiance for a given transmittance: seen directly, or (`by_shadow`) as light on the floor.
+// Returns the radiance for a given transmittance: seen directly, or (`by_shadow`) as light on the white disk.
 double shown(double transmittance, bool by_shadow) {
   return by_shadow ? transmittance * .5 / kPi : transmittance;
 }
 const char* way_of(bool by_shadow) { return by_shadow ? "/grid/shadow" : "/grid/volpath"; }
 
-// The integral of the trilinear field along a line within the unit cube, from one of its faces to another:
-// between the planes of voxel centres the field is a cubic along it, so Simpson's rule is exact.
+// The integral of the trilinear field along a line within the unit cube, from one of its faces to another.
+// Along the line, the field is a cubic between the planes of voxel centres, so Simpson's rule is exact.
 double depth_along(const std::array<int, 3>& n, const std::vector<float>& values, const Vec3& from,
                    const Vec3& to) {
   const auto value = [&](double s) {
@@ -84,7 +85,7 @@ double depth_along(const std::array<int, 3>& n, const std::vector<float>& values
 
 void bounds_too_high(Table& t) {
   // A grid with sixteen voxels per side of density 1, and one voxel beside the ray that is many times denser.
-  // It lies in macro cells on the ray, whose bound it sets.
+  // The ray crosses macro cells that contain this voxel, which sets their bounds.
   for (const bool shadow : {false, true}) {
     for (const double times : {1., 10., 1e4, 1e6}) {
       t.mean(
@@ -143,9 +144,10 @@ void hot_voxels(Table& t) {
   }
 }
 
-// Thin fog with a dense wall across it that neither the ray, three voxels away, nor the light that reaches it
-// meets; but macro cells on the ray contain part of the wall, and their means would let nothing through. A
-// lamp in the fog, single scattering: the integral over the ray of sigma / (4 pi) e^-(sigma (t + r)) / r^2.
+// Thin fog with a dense wall across it. The camera's ray stays three voxels away from the wall, and the light
+// that reaches it does not meet the wall, either. But macro cells on the ray contain part of the wall; with
+// their mean density nothing would get through. The light comes from a lamp in the fog and is scattered once:
+// the answer is the integral over the ray of sigma / (4 pi) e^-(sigma (t + r)) / r^2.
 void beside_a_wall(Table& t) {
   constexpr int n = 33, wall = 16;
   constexpr double sigma = .5, density = 1e4;
@@ -196,7 +198,7 @@ void along_faces(Table& t) {
                         {"all-but-an-axis", {0, .5, .5}, {1, .5 + 1e-7, .5 - 1e-7}}};
   for (const Line& line : lines) {
     for (const bool shadow : {false, true}) {
-      // The optical depth of a path of unit length is between 0.4 and 0.7 of sigma here.
+      // Per unit length, the optical depth along these lines is between 0.4 and 0.7 of sigma.
       const double tau = depth_along(n, values, line.from, line.to);
       t.mean(
           fmt::format("N12-{}{}", line.name, way_of(shadow)), "N12 N13",
@@ -205,7 +207,8 @@ void along_faces(Table& t) {
           grey(shown(std::exp(-tau), shadow)));
     }
   }
-  // The density x y z over the unit cube, given at its nodes: t^3 along the diagonal of length sqrt(3).
+  // The density x y z over the unit cube, given at the grid's nodes. Along the diagonal, of length sqrt(3),
+  // it is t^3.
   for (const bool shadow : {false, true}) {
     t.mean(
         std::string("N12-corner-grid-diagonal") + way_of(shadow), "N12 7.6a",
@@ -246,8 +249,9 @@ void cut_in_pieces(Table& t) {
           grey(std::exp(-.25)));
     }
     for (const int pieces : {10, 1000}) {
-      // Each piece's length is a difference of float32 positions, and the next piece begins at the same
-      // position, so errors do not add up, but each leaves an ulp of the scene's size.
+      // Each piece's length is a difference of float32 positions. The next piece begins at the position where
+      // it ends, so errors of positions do not add up; but each piece adds a rounding error of an ulp of the
+      // scene's size.
       const double tolerance = 2e-6 + pieces * 0x1p-24;
       t.exact(fmt::format("N13-light-of-{}-pieces{}", pieces, configuration.name()), "N13 N42",
               "Light given off without extinction, summed up over pieces: the whole length.",

@@ -58,7 +58,7 @@ void stacks(Table& t) {
       {.band = .002, .slack = 1e-3, .slow = true});
 }
 
-// Degenerate shapes, and instances.
+// A square as a mesh file. The faces `more` stand between its own two.
 SceneBuilder mesh(const std::string& more) {
   SceneBuilder builder;
   MeshShape m;
@@ -108,7 +108,7 @@ void shapes(Table& t) {
         "A box as an instance, mirrored or squeezed, is the box there.",
         [m = maps[i]] { return placed(true, m); }, [m = maps[i]] { return placed(false, m); },
         {.band = .003});
-  // A scene of size `s`, and a box in it that is squeezed by 1e6.
+  // A scene of size `s`, and then a box in it that is squeezed by 1e6.
   for (const double s : {1e-6, 1e6})
     t.same(
         fmt::format("N44-instance-scaled-{:g}", s), "N44 N4",
@@ -124,7 +124,7 @@ void shapes(Table& t) {
   });
 }
 
-// Textures.
+// A floor with a texture image whose texels all have the value `texel`.
 SceneBuilder painted(float texel, const UvTransform& to_uv = {}, int side = 1) {
   SceneBuilder builder;
   BitmapTexture image;
@@ -184,7 +184,7 @@ void textures(Table& t) {
           });
 }
 
-// Cameras.
+// Compares a cropped frame with the same part of the whole frame: counts the values that differ.
 Figure cropped(const Bench& b, double radius) {
   SceneBuilder whole = placed(false, {});
   whole.scene.film.filter = TentFilter{radius};

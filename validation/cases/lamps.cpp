@@ -14,9 +14,9 @@ namespace {
 constexpr Configuration kAngles{false, true, DistanceSampling::equiangular},
     kAnglesInGrid{true, true, DistanceSampling::equiangular};
 
-// A ray along z through a very thin medium (sigma 1e-12) from 0 to a plate at `length`, and a lamp of 1 W/sr
-// at `distance` D beside z = `where`. The answer is sigma / (4 pi) times the angle that the ray subtends at
-// the lamp, divided by D. Equi-angular sampling gives it without variance.
+// A ray along z through a very thin medium (sigma 1e-12), from 0 to a plate at `length`. A lamp of 1 W/sr
+// stands beside the ray's point z = `where`, at `distance` D from it. The answer is sigma / (4 pi) times the
+// angle that the ray subtends at the lamp, divided by D. Equi-angular sampling gives it without variance.
 SceneBuilder beside(const Configuration& configuration, double length, double where, double distance) {
   SceneBuilder builder;
   configuration.choose(builder);
@@ -42,8 +42,8 @@ void passing_by(Table& t) {
   struct Pass {
     double length, where, distance;
   };
-  // The lamp's position, D and the ray's length are rounded to float32 in units of the world: D is accurate
-  // to 2^-24 of it.
+  // The lamp's position, D and the ray's length are rounded to float32 relative to the size of the world, so
+  // D is accurate to 2^-24 of that size.
   for (const Pass p : {Pass{1, .5, 1e-2}, Pass{1, .5, 1}, Pass{1, .5, 100}, Pass{1, .5, 1e6},
                        Pass{1, -100, .1}, Pass{1, -1e4, 10}, Pass{1e3, 500, 1}}) {
     const double extent = std::max({p.length, std::abs(p.where), 1.});
@@ -74,8 +74,9 @@ void passing_by(Table& t) {
   }
 }
 
-// The ray goes through the lamp itself. The mean of 1 / D over a pixel of half width w about the lamp is 2
-// ln(1 + sqrt 2) / w. The square of 1 / D has no finite mean there, so the band is wide.
+// Rays that pass through the lamp itself or close by; D is a ray's distance from the lamp. Over a pixel of
+// half width w about the lamp, the mean of 1 / D is 2 ln(1 + sqrt 2) / w. The square of 1 / D has no finite
+// mean there, so the band is wide.
 void through_a_lamp(Table& t) {
   for (const Configuration& configuration :
        {Configuration{false, false}, Configuration{false, true}, kAngles, kAnglesInGrid}) {
@@ -132,16 +133,17 @@ void from_afar(Table& t) {
   }
 }
 
-// Lights of radius (or half side) 1e5 at distance 1e7, of fluence 1, over a cube of size 2: in a world of
-// that size float32 coordinates separate the cube's faces only near the origin.
+// Lights of radius (or half side) 1e5 at distance 1e7, of fluence 1, over a cube of size 2. In so large a
+// world, float32 coordinates separate the cube's faces only near the origin.
 void enormous(Table& t) {
   constexpr double kSize = 1e5, kFar = 1e7;
   const double cone = 2 * kPi * (1 - std::sqrt(1 - kSize * kSize / kFar / kFar)),
                disk = 2 * kPi * (1 - kFar / std::hypot(kFar, kSize)),
                square = 4 * std::atan(kSize * kSize / (kFar * std::sqrt(kFar * kFar + 2 * kSize * kSize)));
-  // Rays inclined by q along the view leave the cube through its side where they are within q of it: of their
-  // length 1 a part u is left, int (e^-u - e^-1) du = 1 - 2 / e on average, at both ends of the view. `lean`:
-  // the mean of q where it is positive.
+  // The view is a line along z through the cube. Light that leans by q along it enters through the cube's
+  // side, instead of its top, if it reaches the view within q of that side. Then its path inside is some u <
+  // 1 instead of 1. At each end of the view this adds q int_0^1 (e^-u - e^-1) du = q (1 - 2 / e). `lean` is
+  // the light's mean of q where it is positive.
   const auto leaning = [](double lean) {
     return 1 + lean * (std::exp(1.) - 2) * (1 + std::exp(-2.)) / -std::expm1(-2.);
   };
@@ -196,8 +198,8 @@ void across_boundaries(Table& t) {
             builder.scene.emitters = {PointEmitter{{0, y, 0}, rgb(1 / (4 * kPi))}};
             return builder;
           },
-          // For a lamp above the face, no ray to it leaves the cube through a side, because |z| < 1 is below
-          // y.
+          // A ray from the view to a lamp above the cube always leaves through the cube's top, never through
+          // a side, since it approaches the y axis.
           grey(cube_answer(y, 1)));
     }
   }

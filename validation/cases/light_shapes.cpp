@@ -64,8 +64,9 @@ void huge(Table& t) {
            },
            reflected(below_a_square(1 / height)), {.slack = 1e-5});
   }
-  // The floor at the foot of an emitting wall that is 20 wide and 10 high: the answer is atan(b / c) - c / r
-  // atan(b / r), r^2 = c^2 + h^2.
+  // The floor at the foot of an emitting wall that is 20 wide and 10 high. With b half the width, h the
+  // height and c the distance from the wall, the irradiance is atan(b / c) - c / r atan(b / r), r^2 = c^2 +
+  // h^2.
   constexpr double kFar = 1e-2, kSide = 10, kR = 10.000005;
   t.mean("N27-at-the-foot-of-a-wall", "N27 7.6g", "A floor up to the very edge of a shining wall.",
          [] {
@@ -90,7 +91,7 @@ AssetIndex obj(SceneBuilder& builder, const std::vector<std::array<Vec3, 3>>& tr
 }
 
 void of_nothing(Table& t) {
-  // The lamp is a square of half side 0.8 at height 1.25, made of two triangles, with five degenerate ones
+  // The lamp is a square of half side 0.8 at height 1.25, made of two triangles, with three degenerate ones
   // among them.
   const auto lamp = [](bool degenerate, bool proper) {
     SceneBuilder builder = floor_point();

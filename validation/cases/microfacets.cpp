@@ -15,7 +15,7 @@ namespace {
 constexpr double kSlant = 30;  // angle of the view from the normal, in degrees
 
 // A white metal in z = 0, seen by parallel rays and lit by a directional light. The half vector between view
-// and light is `off` the normal.
+// and light is at the angle `off` from the normal.
 SceneBuilder glint(double alpha, Microfacet d, double off) {
   SceneBuilder builder;
   const TextureIndex a = builder.texture(rgb(alpha));
@@ -39,7 +39,7 @@ double unmasked(double alpha, double view, double light) {
   return 1 / ((1 + lambda(view)) * (1 + lambda(light)));
 }
 
-// The answer is D G / (4 cos) times the light's irradiance.
+// The answer is D G / (4 cos) times the light's irradiance, with the cosine of the view's angle.
 void peaks(Table& t) {
   for (const auto d : {Microfacet::ggx, Microfacet::beckmann})
     for (const double alpha : {2e-3, .01, .1})
@@ -50,8 +50,8 @@ void peaks(Table& t) {
         const double shape =
                          ggx ? std::pow(1 + s2, -2) * unmasked(alpha, view, view + 2 * off) : std::exp(-s2),
                      density = shape * std::pow(1 + tangent * tangent, 2) / (kPi * alpha * alpha);
-        // Directions are accurate to 2^-24. This error counts relative to alpha, and is squared in the
-        // exponent.
+        // Directions are accurate to 2^-24. The error of a slope is this divided by alpha, and the exponent
+        // has the square of the slope.
         const double tolerance = 1e-5 + 2. * slopes * 4 * 0x1p-24 / alpha;
         t.exact(
             fmt::format("N34-{}-alpha-{:g}-{}", ggx ? "ggx" : "beckmann", alpha,

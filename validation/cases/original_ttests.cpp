@@ -1,6 +1,6 @@
-// The five t-tests of light in media (scenes/validate/make_tests.py), with closed forms for each channel: a
-// cube [-1, 1]^3 seen along z through its middle, a path length of 2, by the integrators in their distance
-// sampling modes.
+// The five t-tests of light in media (scenes/validate/make_tests.py), with closed forms for each channel. The
+// scene is a cube [-1, 1]^3 seen along z through its middle, a path length of 2. Both integrators render it,
+// volpath_distant_mis with two ways of sampling distances.
 #include <fmt/format.h>
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// Media within and across each other, and boundaries on each other: splitting a medium, or joining two, must
-// not change the light.
+// Media inside of others, overlapping media, and boundaries in the same place: splitting a medium in parts,
+// or having two in one place, must not change the light.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -39,7 +39,8 @@ void slabs_of_parts(Table& t) {
     add_layer(builder, half);
     add_layer(builder, half);
   });
-  // The integrator that looks for light along segments sees both media, too.
+  // Both integrators, also the one that looks for light along segments (volpath_distant_mis), must see both
+  // media.
   const auto grid_and_constant = [](SceneBuilder& builder) {
     add_layer(builder, builder.homogeneous(rgb(.4), kAlbedo));
     const VolumeIndex v =
@@ -57,14 +58,15 @@ void slabs_of_parts(Table& t) {
           CubeShape{},
           translate({i & 1 ? .3 : -.3, i & 2 ? .3 : -.3, i & 4 ? .75 : .25}) * scale(.3, .3, .25), null, m);
   });
-  // A thinner medium of higher priority takes a layer of the other one, which is thicker to make up for it.
+  // A thinner medium of higher priority replaces the other one in half of the slab. The other is thicker to
+  // make up for it.
   add_slab(t, "by-priority-R", false, {}, [](SceneBuilder& builder) {
     add_layer(builder, builder.homogeneous(rgb(1.5), kAlbedo));
     add_layer(builder, ranked(builder, rgb(.5), kAlbedo, 2), .5);
   });
 }
 
-// Everything scatters and nothing is lost, whatever lies across what.
+// Overlapping media that scatter all light and absorb none, in a white sky: all is white, whatever overlaps.
 void white_crowd(Table& t) {
   SceneBuilder builder;
   const BsdfIndex null = builder.null();
@@ -83,7 +85,7 @@ void white_crowd(Table& t) {
          builder, grey(1), {.channels = true});
 }
 
-// Two media in one box that absorb and emit: (e1 + e2) (1 - e^(-(s1 + s2) d)) / (s1 + s2).
+// Two media in one box that absorb and emit. The radiance is (e1 + e2) (1 - e^(-(s1 + s2) d)) / (s1 + s2).
 void emitting(Table& t, const Configuration& configuration) {
   SceneBuilder builder;
   const Rgb s1{.5, 1, .2}, s2{1, .25, .6}, e1{1, 2, 0}, e2{.5, 1, 3};

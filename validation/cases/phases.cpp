@@ -26,8 +26,9 @@ void phase_peaks(Table& t) {
   }
 }
 
-// The share of singly scattered light that stays within an angle q of its direction, for a sun of that radius
-// behind the medium: found by phase-function sampling, by light sampling, or by both.
+// The share of the light scattered once that stays within an angle q of its direction. It is seen by looking
+// through the medium at a sun of that angular radius; phase-function sampling, light sampling, or both find
+// it.
 double share_within(double g, double degrees) {
   const double h = std::sin(degrees * kPi / 360), x = 2 * h * h;  // 1 - cos q
   return (1 - g) * (1 + g) / (2 * g) * (1 / (1 - g) - 1 / std::sqrt((1 - g) * (1 - g) + 2 * g * x));
@@ -40,8 +41,8 @@ void cones(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     for (const Cone c : {Cone{.9999, .0115}, Cone{.999, .115}, Cone{.99, .6}}) {
       const double radius = c.degrees * kPi / 180, x = 2 * std::pow(std::sin(radius / 2), 2);
-      // Radiance 1: irradiance is the projected solid angle. The path length through the cube is the same for
-      // all angles up to radius^2 / 2, 5.5e-5 at 0.6 degrees.
+      // For radiance 1, the sun's irradiance is its projected solid angle. The path length through the cube
+      // is the same for all angles up to a share of radius^2 / 2, 5.5e-5 at 0.6 degrees.
       const double irradiance = 2 * kPi * x * (1 - x / 2);
       t.mean(fmt::format("N18-cone-g-{:g}{}", c.g, configuration.name()), "N18 N26",
              "A sun of a few thousandths of a degree, seen directly and by light scattered into the view.",

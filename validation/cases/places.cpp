@@ -1,5 +1,5 @@
-// Coincident objects: faces on each other, overlapping media, cameras at a boundary and inside glass, points
-// on lights; and defocus.
+// Coincident objects: faces in the same place, overlapping media, cameras at a boundary and inside glass,
+// points to be lit on the light itself; and defocus.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -19,7 +19,8 @@ void add_box(SceneBuilder& builder, MediumIndex m, const Vec3& lo, const Vec3& h
   builder.container(CubeShape{}, box(lo, hi) * box({.5, .5, .5}, {1, 1, 1}), builder.null(), m);
 }
 
-// The light falls straight down along the edge that the two boxes share.
+// The light that is measured falls straight down the line x = y = 0, along an edge that boxes share or across
+// the face between them.
 void faces_on_each_other(Table& t) {
   for (const Configuration& configuration : both_media()) {
     const auto medium = [configuration](SceneBuilder& builder, double sigma) {
@@ -64,8 +65,8 @@ void faces_on_each_other(Table& t) {
   }
 }
 
-// A pane that absorbs half the light, in the face of a box with a medium: shadow rays hit either surface, and
-// must be attenuated by both.
+// A pane that absorbs half the light, in the same place as the face of a box with a medium. A shadow ray may
+// hit either surface first, and must be attenuated by both pane and medium.
 void panes_on_faces(Table& t) {
   for (const Configuration& configuration : both_media())
     for (const bool first : {false, true})
@@ -87,7 +88,8 @@ void panes_on_faces(Table& t) {
           });
 }
 
-// The answer is L + rho L + rho^2 L ...: sampled directions that hit the wall must find the light on it too.
+// The answer is L + rho L + rho^2 L ... = 2, with L = 1 and rho = 1/2. So sampled directions that hit the
+// wall must also find the light, which is in the same place.
 void lights_on_walls(Table& t) {
   for (const bool first : {false, true})
     t.mean(
@@ -123,7 +125,8 @@ void cameras_at_a_boundary(Table& t) {
                 builder.scene.sensor.near_clip = 1e-9;
                 return every_value(b, builder, 4, grey(1 - std::max(0., x)), 2e-6);
               });
-  // In glass of index n radiance is n^2 times that of the air around it, whatever reflections it took.
+  // In uniform light, the radiance inside glass of index n is n^2 times that in the air outside, however
+  // often the light was reflected inside.
   const auto from_inside = [&](const char* name, const char* about, double expected, bool bubble) {
     t.exact(name, "N43 N64", about, [=](const Bench& b) {
       SceneBuilder builder;
@@ -140,7 +143,7 @@ void cameras_at_a_boundary(Table& t) {
   from_inside("N43-in-a-bubble-in-glass", "A camera in a bubble of air in a ball of glass: 1.", 1, true);
 }
 
-// Points to be lit that are on the light itself.
+// Lights that also reflect: the points to be lit are on the light itself.
 void on_lights(Table& t) {
   const auto alone = [&](const char* name, const Geometry& g) {
     t.exact(fmt::format("N27-on-a-shining-{}", name), "N27",
@@ -157,8 +160,9 @@ void on_lights(Table& t) {
   alone("cube", CubeShape{});
 }
 
-// A small bright disk out of focus. Rays from the part of the lens within a radius of rho / |1 - z / f| hit
-// the disk. The circle of confusion is seen from its middle; its diameter is 2 R |z - f| / z at the focus.
+// A small bright disk of radius rho at distance z, out of focus; the focus distance is f, the lens radius R.
+// In the middle of its circle of confusion, only rays from the part of the lens within rho / |1 - z / f| of
+// its centre hit the disk. The circle's diameter, seen at the focus distance, is 2 R |z - f| / z.
 void out_of_focus(Table& t) {
   constexpr double kAperture = .1, kFocus = 4, kDisk = .02;
   for (const double z : {2., 3., 8.}) {

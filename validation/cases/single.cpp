@@ -49,7 +49,8 @@ SceneBuilder passing_lit(const Setting& s, const Rgb& sigma, const Rgb& albedo) 
   return builder;
 }
 
-// Returns the integral of sigma e^(-sigma (t + 3)) / (4 pi) arriving(t) dt along the ray.
+// Returns the integral of sigma e^(-sigma (t + 3)) / (4 pi) arriving(t) dt along the ray: the radiance of
+// single scattering, if arriving(t) is the light that reaches the point t, from all directions.
 template <class F>
 double along(double sigma, F arriving) {
   return integrate([&](double t) { return sigma * std::exp(-sigma * (t + 3)) / (4 * kPi) * arriving(t); }, -3,
@@ -57,8 +58,8 @@ double along(double sigma, F arriving) {
 }
 
 // The answer for a sphere of radiance 1 and radius r at distance h from the ray: at each point of the ray,
-// the mean over the sphere's solid angle of the light that reaches the point, by quadrature over the cosine
-// to the sphere's centre.
+// the integral over the sphere's solid angle of the light that reaches the point, by quadrature over the
+// cosine of the angle to the sphere's centre.
 double sphere_answer(double h, double r, double sigma) {
   return along(sigma, [=](double t) {
     const double d2 = h * h + t * t, d = std::sqrt(d2), cos_max = std::sqrt(1 - r * r / d2);

@@ -49,8 +49,8 @@ void on_a_floor(Table& t) {
     add("sun-of-one-texel", s, reflected_of({34000, 30000, 20000}, of_sun()));
   }
   {
-    // Sky and sun differ in colour: the case fails if directions are sampled by one channel with the density
-    // of another, instead of by luminance.
+    // Sky and sun differ in colour. Directions must be sampled by luminance: the case fails if they are
+    // sampled by one channel with the density of another.
     const Rgb top{.5, 1, 4}, sun{340, 300, 200};
     SkyImage s = gradient(top, kWidth, kRows);
     const double k = 1 - kSunY / 16.;

@@ -13,7 +13,7 @@
 namespace ls::cases {
 namespace {
 
-constexpr double kDigits = 5e-6;  // half a unit of the tables' last digit, at 0.1
+constexpr double kDigits = 5e-6;  // relative: half a unit of the tables' sixth decimal, in a value of 0.1
 
 void semi_infinite(Table& t) {
   struct Row {
@@ -37,8 +37,8 @@ void semi_infinite(Table& t) {
              grey(row.l_over_e), {.slack = row.digits});
     }
   }
-  // White, of optical depth 64: the half space's 0.336428 minus the transmitted light, (4/3) K^2 / (tau +
-  // 1.42089) / pi with K = sqrt(3) / 4 H(1).
+  // A white slab of optical depth 64: the half space's 0.336428 minus what the slab transmits, (4/3) K^2 /
+  // (tau + 1.42089) / pi with K = sqrt(3) / 4 H(1).
   const double k = std::sqrt(3.) / 4 * 2.907811;
   t.mean("7.1-normal-to-normal-a1/homogeneous/volpath", "7.1 N17", "The same of a white slab of depth 64.",
          [] {
@@ -50,9 +50,9 @@ void semi_infinite(Table& t) {
          {.band = .01, .why_band = "paths of hundreds of scatterings", .slack = 1e-5, .slow = true});
 }
 
-// A white plate this far above a face at `foot`, with a twentieth of that as its radius, seen from below: it
-// sees all of the face, cosine-weighted, so it shows the medium's reflectance for uniform light, except for
-// the part of the environment that it hides.
+// Adds a white disk of radius height / 20, `height` above the face at `foot`, and looks at its underside. The
+// disk gathers the cosine-weighted light of the whole face, so its radiance is the medium's reflectance in
+// uniform light, minus the little light that the disk itself blocks.
 void add_small_plate(SceneBuilder& builder, const Vec3& foot, double height) {
   const double radius = height / 20, x = foot[0], y = foot[1], z = foot[2];
   builder.shape(DiskShape{}, translate({x, y, z + height}) * rotate_x(180) * scale(radius),
@@ -61,9 +61,9 @@ void add_small_plate(SceneBuilder& builder, const Vec3& foot, double height) {
   builder.scene.sensor.near_clip = 1e-9;
 }
 
-// The spherical albedo of a half space. The depth is 40 and the cube's side is 1: the plate is 0.04 mean free
-// paths above the face, and the shadow of (.002)^2 mean free paths is that share of what it sees; past the
-// cube it sees (2 x .001)^2.
+// The spherical albedo of a half space, by a cube of side 1 and optical depth 40. The disk is 0.001 above the
+// face, which is 0.04 mean free paths. Its radius is 0.002 mean free paths, so its shadow takes a share of
+// about (0.002)^2 of what it sees. The share of its view that is beside the cube is (2 x 0.001)^2.
 void spherical(Table& t) {
   struct Row {
     double albedo, reflected;
@@ -92,8 +92,8 @@ std::string named(const char* what, const Slab& s, const char* side, const Confi
   return fmt::format("7.2-{}-a{:g}-tau{:g}-{}{}", what, s.albedo, s.tau, side, configuration.name());
 }
 
-// Deep slabs transmit little light, by long paths only: this is tested to 1 %, in the faster configuration.
-// For the white slab of depth 16, the case of its reflectance R covers the other configuration.
+// Where a slab transmits little light, by long paths only, the light is tested to 1 %. For the white slab of
+// depth 16 this is done in the faster configuration; the case of its reflectance R covers the other one.
 MeanOptions of_little(double through, bool slow) {
   const bool little = through < .3;
   return {.band = little ? .01 : kBand,
@@ -126,8 +126,9 @@ void isotropic(Table& t) {
          grey(.267410), {.slack = kDigits * 10, .slow = true});
 }
 
-// A white plate (1/2) in the column above the slab, which sees it cosine-weighted: with R and T the slab's
-// for diffuse light and the environment below, the plate is lit by B = T + R B / 2, and shows B / 2.
+// A plate of reflectance 1/2 in the column above the slab, with the environment below. It gathers the slab's
+// light, cosine-weighted. With R and T the slab's reflectance and transmittance for diffuse light, the plate
+// is lit by B = T + R B / 2, and its radiance is B / 2.
 SceneBuilder plate_above(const Configuration& configuration, Slab slab) {
   slab.wall = .5;
   SceneBuilder builder = column(configuration, slab, true);
@@ -138,8 +139,8 @@ SceneBuilder plate_above(const Configuration& configuration, Slab slab) {
   return builder;
 }
 
-// The light that the slab reflects from an environment above it, seen by a plate that hides at most (.0025)^2
-// of the environment.
+// The light that the slab reflects from an environment above it, gathered by a small disk that hides at most
+// (0.0025)^2 of the environment.
 SceneBuilder plate_facing(const Configuration& configuration, const Slab& slab) {
   SceneBuilder builder = column(configuration, slab, false);
   add_small_plate(builder, {.1, .15, slab.tau}, .05);
@@ -187,8 +188,8 @@ void dielectric(Table& t) {
          grey(.10931), {.slack = 1e-4, .slow = true});
 }
 
-// The answer for single scattering: R_1 = (a/2) int mu / (1 + mu) (1 - e^(-tau (1 + 1/mu))) dmu, with a the
-// albedo.
+// The answer for single scattering, with a the albedo and mu the cosine of the incident light: R_1 = (a/2)
+// int mu / (1 + mu) (1 - e^(-tau (1 + 1/mu))) dmu.
 double first_order(double albedo, double tau) {
   return albedo / 2 *
          integrate(
@@ -197,9 +198,9 @@ double first_order(double albedo, double tau) {
 }
 
 // Reflection of a white half space along its normal by one to three scatterings: the first terms of 1 -
-// sqrt(1 - a) H(1) as a power series of the albedo. Those of H follow from its equation, H = 1 + a / 2 mu H
-// int H(m) / (mu + m) dm; m = x^2 removes the logarithm at the ends of the integrals, and Simpson's rule is
-// accurate to 1e-8.
+// sqrt(1 - a) H(1) as a power series of the albedo a. The terms of H follow from its equation, H(mu) = 1 + a
+// / 2 mu H(mu) int H(m) / (mu + m) dm. The substitution m = x^2 removes the logarithm at the ends of the
+// integrals, so that Simpson's rule is accurate to 1e-8.
 std::array<double, 3> orders_of_endless() {
   const auto over = [](auto h, double mu) {
     return integrate([&](double x) { return h(x * x) / (mu + x * x) * 2 * x; }, 0, 1, 100);

@@ -22,10 +22,11 @@ constexpr std::array<std::array<double, 2>, 4> kGauss = {{{.06943184420297371, .
                                                           {.66999052179242813, .32607257743127307},
                                                           {.93056815579702629, .17392742256872693}}};
 
-// Sixteen unit cubes, each in a cell of 2 x 2 with black walls, seen along directions of a quadrature over an
-// octant (a cube looks the same from all eight), each as bright as its direction's weight: the frame's mean
-// is that over all directions of the cube's light over its mean projected area, S / 4 = 1.5. One unit of
-// radiance is emitted per length, and none is lost: 4 V / S, the mean path length.
+// Sixteen unit cubes, each in a cell of 2 x 2 with black walls. Each is turned so that it is seen along one
+// direction of a quadrature over an octant (a cube looks the same from all eight), and is as bright as that
+// direction's weight. So the frame's mean is the mean over all directions of a cube's light, divided by its
+// mean projected area, S / 4 = 1.5. The cubes emit 1 per length and absorb nothing, so this is 4 V / S, the
+// mean path length.
 SceneBuilder cubes(const Configuration& configuration, double sigma_s, double g) {
   SceneBuilder builder({16, 16});
   configuration.choose(builder);
@@ -63,13 +64,14 @@ void mean_way_through_a_cube(Table& t) {
     t.mean(fmt::format("7.6d-cube-{:g}-g{:g}{}", r.sigma_s, r.g, r.configuration.name()), "7.6d",
            "Light's mean way through the unit cube is 4 V / S = 2/3, however it is scattered.",
            [=] { return cubes(r.configuration, r.sigma_s, r.g); }, grey(2. / 3),
-           // The quadrature has four points per angle; it is accurate to 1e-3 of what scattering changes,
-           // which is a tenth.
+           // The quadrature has four points per angle. It is accurate to 1e-3 of the part of the answer that
+           // scattering changes, which is a tenth of it.
            {.slack = 2e-4, .slow = r.sigma_s > 2 || r.configuration.grid});
 }
 
-// A ball of albedo 1 - 1e-7 that emits its absorption coefficient times 1e6: its light is the mean path
-// length, 4/3, times that coefficient, 1.6 x 1e-6. An albedo rounded to float32 is off by a fifth of 1e-7.
+// A ball of albedo 1 - 1e-7 with a source radiance of 1e6: per length it emits its absorption coefficient,
+// 1.6e-6, times that source. Its light is the mean path length, 4/3, times this emission. An albedo rounded
+// to float32 would be off by a fifth of 1e-7.
 void bodies_all_but_white(Table& t) {
   constexpr double kDepth = 16, kAbsorbed = 1e-7, kSource = 1e6;
   for (const Configuration& configuration : all_configurations())

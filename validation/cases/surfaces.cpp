@@ -40,9 +40,9 @@ SceneBuilder before_a_wall(SceneBuilder builder) {
   return builder;
 }
 
-// For a white GGX metal seen from this many degrees off its normal: the mean over its visible normals (Heitz
-// 2018) of the shadowing on the way out, 1 / (1 + lambda), by the midpoint rule; masking is separable, as in
-// Mitsuba.
+// For a white GGX metal seen from this many degrees off its normal: the mean of the shadowing on the way out,
+// 1 / (1 + lambda), over the normals visible from there (Heitz 2018), by the midpoint rule. Masking and
+// shadowing are separable, as in Mitsuba.
 double unmasked_at(double degrees, double alpha) {
   constexpr int kSteps = 400;
   const double a = degrees * kPi / 180, l = std::hypot(alpha * std::sin(a), std::cos(a));

@@ -60,7 +60,7 @@ ChiSquare chi_square(std::span<const double> expected, std::span<const double> o
   ChiSquare r;
   if (cells.empty())
     r.impossible = o;
-  else  // too few for a cell of their own
+  else  // the remaining ones are too few for a cell of their own
     cells.back()[0] += e, cells.back()[1] += o;
   for (const auto& [want, got] : cells) r.statistic += (got - want) * (got - want) / want;
   for (std::size_t i = 0; i < expected.size(); ++i)

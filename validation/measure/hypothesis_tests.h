@@ -19,13 +19,13 @@ double student_quantile(double p, double freedom);
 // P(X > x) for chi-square with `freedom` degrees of freedom.
 double chi2_tail(double x, double freedom);
 
-// Pearson's test of counts by cell. `expected` and `observed` have equal sums but for what falls into no
-// cell. Cells with fewer than `least` expected samples are merged, the smallest first: the statistic follows
-// the chi-square distribution if the counts are nearly normal.
+// Pearson's test of the numbers of samples in cells. `expected` and `observed` have equal sums, except for
+// samples that fall into no cell. Cells with fewer than `least` expected samples are merged, the smallest
+// first, since the statistic follows the chi-square distribution only if the numbers are nearly normal.
 struct ChiSquare {
   double statistic = 0, p = 1;
   int freedom = 1;
-  double impossible = 0;  // samples in cells without density, more than `least` of them in one cell
+  double impossible = 0;  // samples in a cell where none is expected, if there are more than `least`
 };
 ChiSquare chi_square(std::span<const double> expected, std::span<const double> observed, double least);
 

@@ -17,15 +17,15 @@ struct ValidateCase {
   // p: the probability that a correct program gives a figure at least as far off. level: the p below which
   // the case fails.
   double p = 1, level = 0;
-  // Statistical cases of the table are judged by two confidence intervals: the one at `band_level` must lie
-  // within the band, the one at `level` must contain the answer.
+  // Statistical cases of the table are judged by two confidence intervals. The one at `band_level` must lie
+  // within the band (the tolerated deviation around the answer), the one at `level` must contain the answer.
   double band_level = 0;
   std::uint64_t nonfinite = 0;  // number of faulty samples; a single one makes the case fail
   double seconds = 0;
   std::string why;  // reason of the failure; empty: the case passed
-  // For the cases of the table: the rows that the case covers, a one-sentence description, and the kind of
-  // test: "statistical", where `band` is the share of the answer that the interval must lie within, or
-  // "exact", where it is the tolerance.
+  // For the cases of the table: the rows of docs/measurements/stability.md that the case covers, a
+  // one-sentence description, and the kind of test. In a "statistical" test `band` is the share of the answer
+  // by which the interval may deviate, in an "exact" one the tolerance.
   std::string rows, about, kind;
   double band = 0;
   std::string why_band;  // reason for a wider band
@@ -36,8 +36,8 @@ struct ValidateCase {
 };
 
 // Judges a case whose figures are known: sets z, p, allowance and why. `freedom` is the degrees of freedom of
-// the standard error. `rounding` is the deviation allowed for float32 rounding, as in a figure whose samples
-// are all equal.
+// the standard error. `rounding` is the deviation allowed for float32 rounding. Without it, a figure whose
+// samples are all equal, with standard error 0, would fail by one ulp.
 void judge(ValidateCase& c, double freedom, double rounding);
 
 // Judges by equivalence, with the standard error's `freedom` degrees of freedom. Both intervals are widened

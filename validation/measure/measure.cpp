@@ -27,8 +27,8 @@ FrameSize enough(FrameSize size) {
   return {size.width * factor, size.height * factor};
 }
 
-// Sums over the pixels of a frame: of their means, of their estimated squared errors, and of the squares of
-// these.
+// Sums over the pixels of a frame: of the pixels' means, of their estimated squared errors, and of the
+// squares of these errors.
 struct Sums {
   double mean = 0, square = 0, fourth = 0;
   void add(double weight, double a, double b) {
@@ -39,8 +39,8 @@ struct Sums {
   }
 };
 
-// Weights of pixels in the mean, by row: the solid angle for a spherical camera, so that it is a mean over
-// directions; otherwise equal. Their mean is 1.
+// Returns the weight of each row's pixels in the mean, 1 on average. For a spherical camera the weight is
+// proportional to the solid angle, so that the mean is over directions; otherwise all are equal.
 std::vector<double> row_weights(const Scene& scene, FrameSize size) {
   std::vector<double> weights(static_cast<std::size_t>(size.height), 1);
   if (scene.sensor.projection != Projection::spherical) return weights;

@@ -1,7 +1,7 @@
-// Measures the mean of a scene's frame (for a spherical camera: over directions), rendered like a job
-// (submitted, sent to a worker, rendered in units), with a standard error that is valid for low-discrepancy
-// sequences: the two halves of every pixel and all pixels are independent, so that (A - B)^2 / 4 estimates
-// each pixel's squared error without bias.
+// Measures the mean of a scene's frame (for a spherical camera: over directions). The scene is treated like a
+// job's: submitted, sent to a worker, rendered in ranges of samples. The standard error is valid for
+// low-discrepancy sequences: the two halves of every pixel's samples are independent, and so are all pixels,
+// so (A - B)^2 / 4, with A and B the means of the halves, estimates each pixel's squared error without bias.
 #pragma once
 
 #include <array>
@@ -40,13 +40,13 @@ struct Measured {
 };
 
 // Renders at least `paths` samples, spread evenly over the frame whatever its filter, and measures their
-// mean. A frame of few pixels is rendered with as many independent pixels as a standard error needs; its mean
-// does not change.
+// mean. If a frame has too few pixels for a standard error, more pixels are rendered; this does not change
+// the mean.
 Result<Measured> measure(const Scene& scene, const render::AssetFiles& files, std::uint64_t paths,
                          std::uint64_t seed, int threads);
 
 // Measures the mean of `frames` (at least 2) such frames, each with its own seeds and its share of `paths`.
-// The standard error is that of the mean of independent figures, with frames - 1 degrees of freedom.
+// The standard error is estimated from the differences of their means, with frames - 1 degrees of freedom.
 Result<Measured> measure_frames(const Scene& scene, const render::AssetFiles& files, std::uint64_t paths,
                                 std::uint64_t seed, int threads, std::uint64_t frames);
 
