@@ -45,8 +45,9 @@ class HealthTable {
   std::map<TileIndex, Health> full_, tails_;
 };
 
-// The CPU cost of an image's units; a unit is one round (range of samples) of one tile. A checkpoint costs
-// what its units cost, even if some tiles already have later rounds.
+// The CPU cost of an image's units; a unit is one round (range of samples) of one tile. A checkpoint (the
+// image with a given number of rounds for each tile) costs what its units cost, even if some tiles already
+// have later rounds.
 class UnitCosts {
  public:
   explicit UnitCosts(TileIndex tiles = 0) : tiles_(tiles) {}
@@ -112,7 +113,8 @@ class Assembly {
   // kMaxPendingPartials, its pixels are dropped and read from the log later.
   void hold(TileIndex tile, RoundIndex round, WaitingPartial waiting);
   std::optional<WaitingPartial> take(TileIndex tile, RoundIndex round, SampleRange samples);
-  void forget_round(RoundIndex round);  // drops waiting partials of a truncated round that was reopened
+  // drops waiting partials of a truncated round that is to be rendered again in full
+  void forget_round(RoundIndex round);
   void forget_waiting();
   void discard(TileIndex tile);  // drops everything about the tile, since it is folded again from round 0
   std::size_t waiting() const { return waiting_.size(); }

@@ -36,7 +36,8 @@ class ReferenceTiles {
   // Called when the tile is to be folded again from round 0
   void discard(TileIndex tile) { tiles_[tile].rounds.clear(); }
   std::optional<std::vector<TilePicture>> latest() const;
-  // Drops pictures that are no longer needed. Later calls of at() must not have fewer rounds for any tile
+  // Drops pictures that no later checkpoint needs. From now on, at() must not be asked for fewer rounds of
+  // any tile than `rounds`.
   void checkpoint_taken(std::span<const RoundIndex> rounds);
 
  private:

@@ -83,8 +83,8 @@ class Reader {
 }  // namespace
 
 // Returns the errors of one tile as bytes: u32 count, then {u32 round, TileError} of each kept round; u32
-// count, then the relative error sums as doubles. Only builds with the same layout can read them: the
-// snapshot contains the name of its format, and other builds ignore it.
+// count, then the relative error sums as doubles. Only builds with the same memory layout can read these
+// bytes. A snapshot contains the name of its format, and other builds ignore it.
 std::vector<std::byte> RoundErrors::save_tile(TileIndex tile) const {
   const Tile& t = tiles_[tile];
   std::vector<std::byte> out;

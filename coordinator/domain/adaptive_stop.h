@@ -18,12 +18,13 @@
 // smaller target continues where a larger one ended, so an extended job has the same bits as one that had the
 // smaller target from the start.
 //
-// The decision to stop after round k uses the errors of the rounds before k and predicts the error at k (the
-// variance falls as 1/n; samplers that converge faster make the image better than requested): the error of a
-// group's own last round would bias the decision towards stopping. The image's error is predicted in the same
-// way. Only when it meets the target are the errors of the last rounds checked, too, and they may make the
-// image continue. Nothing stops before kMinSppBeforeStop. The cost per sample is taken to be equal
-// everywhere: measured times would make pixels depend on the machine. An unknown error (NaN) stops nothing.
+// The decision to stop after round k does not use the error after round k: a group's own last error would
+// bias the decision towards stopping. Instead the error after round k is predicted from the rounds before k,
+// with a variance that falls as 1/n. (Samplers that converge faster make the image better than requested.)
+// The image's error is predicted in the same way. Only when this prediction meets the target are the errors
+// of the last rounds checked, too, and they may make the image continue. No tile stops before
+// kMinSppBeforeStop samples per pixel. The cost per sample is taken to be equal everywhere: measured times
+// would make pixels depend on the machine. An unknown error (NaN) stops nothing.
 //
 // Both this rule and the error estimates that it reads use only +, -, *, / and square roots, which give the
 // same bits on every machine: another coordinator that takes over the job makes the same decisions.
@@ -40,11 +41,11 @@
 
 namespace ls::coordinator {
 
-// Returns the groups of tiles that stop getting samples together: the tiles of each ascending, the groups in
-// the order of their first tiles. Every tile is in exactly one group. A decision to stop that rests on few
-// pixels biases the image, so at least kMinStopPixels pixels decide together: small tiles form blocks, and
-// the remainder at the right and bottom edges joins the neighbouring block. Only an image of fewer pixels
-// forms one smaller group. The groups depend on the tiling alone.
+// Returns the groups of tiles that stop getting samples together. The tiles of a group are ascending, and the
+// groups are in the order of their first tiles. Every tile is in exactly one group. A decision to stop that
+// rests on few pixels biases the image, so at least kMinStopPixels pixels decide together: small tiles form
+// blocks, and the remainder at the right and bottom edges joins the neighbouring block. An image with fewer
+// pixels forms a single group. The groups depend on the tiling alone.
 std::vector<std::vector<TileIndex>> stop_groups(const TileGrid& grid);
 
 // Returns the next level below `gain`: the largest number of the grid {2^(-j/4)}, j any integer, that is less
@@ -53,7 +54,7 @@ double level_below(double gain);
 
 class AdaptiveStop {
  public:
-  // `spp` is the sample limit: the most samples per pixel that any tile gets.
+  // `spp` is the sample limit: no tile gets more samples per pixel.
   AdaptiveStop(const TileGrid& grid, std::uint64_t spp);
 
   // Adds the error of the tile after rounds 0..round, which are now folded. `rel_error_sum` is the sum of the

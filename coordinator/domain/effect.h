@@ -25,8 +25,8 @@ struct Send {
 };
 
 // These units are no longer part of this lease (the list of units that the worker was told to render). If
-// they are still needed and no other lease holds them, they wait for another worker. Under an audit's lease
-// the unit has an accepted result already.
+// they are still needed and no other lease holds them, they wait for another worker. `audit`: the lease was
+// an audit, in which a unit that has an accepted result is rendered again for comparison.
 struct UnitsFreed {
   JobId job;
   LeaseId lease;
@@ -100,8 +100,9 @@ struct CheckDenoised {
   JobId job;
   double spp = 0;
 };
-// A job is extended whose last round `round` was truncated by its old sample count. The round is rendered
-// again in full: the service replaces the part that is folded (the tail), and the round's partials are void.
+// The job has been extended, but its old sample count had truncated its last round, `round`. This round is
+// rendered again in full: the service replaces the part that is folded (the tail), and the round's partials
+// are void.
 struct ReopenRound {
   JobId job;
   RoundIndex round = 0;

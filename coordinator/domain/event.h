@@ -1,7 +1,7 @@
 // Events: the farm's inputs. Every fact on which a decision depends arrives as an event; the farm reads no
 // clock and no file.
 // A unit is one round (range of samples) of one tile; a lease is a set of units that one worker was told to
-// render.
+// render. A numeric class is a set of machines that compute the same bits.
 #pragma once
 
 #include <cstdint>
@@ -41,11 +41,11 @@ struct JobPlan {
   // job for fair shares, and run in order.
   std::string group;
   // Limits of the job, or of all jobs of its group together
-  std::uint32_t max_workers = 0;   // most workers that hold units at the same time; 0: no limit
-  std::uint32_t max_units = 0;     // most units leased at the same time; 0: no limit
-  std::uint64_t memory_bytes = 0;  // the least a worker needs for this job; 0: unknown
-  // The beginning of the hexadecimal digits, or of the platform, of the numeric class that is to render it.
-  // Empty: any class may begin it
+  std::uint32_t max_workers = 0;   // at most this many workers hold units at the same time; 0: no limit
+  std::uint32_t max_units = 0;     // at most this many units are leased at the same time; 0: no limit
+  std::uint64_t memory_bytes = 0;  // memory that a worker needs for this job; 0: unknown
+  // The numeric class that is to render the job: the first of its hexadecimal digits, or the beginning of its
+  // platform's name. Empty: any class may begin the job
   std::string class_asked;
   // Pixels of the frame whose tiles are leased before all other tiles; nullopt: all tiles are treated alike.
   // It changes the order in which units are leased, and nothing about the image.
@@ -148,8 +148,8 @@ struct WorkerJoined {
   // Memory that the worker's renderer may use; 0: unknown, and then any job may go to it
   std::uint64_t memory_bytes = 0;
   std::vector<Digest> blobs_held;  // blobs in its cache, most recently used first
-  // False: it gets units only of jobs that are pinned to its numeric class already, as a worker of another
-  // version than the coordinator's does
+  // False: the worker gets only units of jobs that are already pinned to its numeric class. This holds for
+  // workers of another version than the coordinator's.
   bool may_begin = true;
   std::string platform = {};  // machine and build of its numeric class in words
 };

@@ -1,5 +1,6 @@
-// A job in the farm. A unit is one round (range of samples) of one tile. At every moment each planned unit of
-// the job is done (its result is accepted), leased to a worker, or queued.
+// A job in the farm. A unit is one round (range of samples) of one tile; a lease is a list of units that one
+// worker was told to render. At every moment each planned unit of the job is done (its result is accepted),
+// leased to a worker, or queued.
 #pragma once
 
 #include <algorithm>
@@ -98,7 +99,8 @@ struct Holders {
 
 // Counts the units that are leased at the moment, of one job or of all jobs of a user or group
 struct Load {
-  std::uint32_t units = 0;                                   // copies of units included, audits not
+  // copies of units are counted, audits are not
+  std::uint32_t units = 0;
   std::unordered_map<WorkerIndex, std::uint32_t> leases_at;  // number of leases of each worker that has any
 };
 
@@ -164,13 +166,14 @@ struct Job {
   double checkpoint_spp = 0;  // samples per pixel at the last checkpoint of whole rounds
 
   std::optional<AdaptiveStop> adaptive;  // only for a job with a target error
-  double level_seen = 0;                 // the last level at which the image was judged; 0: none
+  double level_seen = 0;                 // the level at which the image was judged most recently; 0: none
   std::deque<LevelMark> marks;  // levels whose checkpoints are still to be taken, by rising number of samples
   // Only for a job whose target error is that of its denoised layers
   std::optional<DenoisedTarget> denoised;
-  double checking_spp = 0;     // the level whose denoised error the service was asked for; 0: none
-  double predicted_error = 0;  // relMSE of the image itself at which that job will probably end; 0: unknown
-  double marked_spp = 0;       // LevelMark::spp of the last mark made
+  double checking_spp = 0;  // the level whose denoised error the service was asked for; 0: none
+  // relMSE of the image itself (before denoising) at which the job will probably end; 0: unknown
+  double predicted_error = 0;
+  double marked_spp = 0;           // LevelMark::spp of the last mark made
   std::uint64_t predicted_at = 0;  // rounds_seen() at the last call of foresee()
 
   bool ended() const { return is_terminal(state); }
@@ -188,7 +191,7 @@ struct Job {
   double predict(UnitCode code) const { return cost.predict(tile_of(code), pixel_samples(code)); }
   std::uint64_t queued() const { return queue.planned() - units.accepted_count() - out.size(); }
 
-  // True if the tiles' errors decide where the tiles end, and have not decided yet.
+  // True if the tiles' errors decide how many rounds the tiles get, and have not decided it yet.
   bool adaptive_running() const { return adaptive && !stopping; }
   // Starts the stop rule if the plan has a target error, drops it if the plan has none any more, and has the
   // image judged again.

@@ -177,7 +177,7 @@ std::string Farm::audit() const {
     wrong = audit_loads("group", state.groups, leased.groups, limits.units_per_job, limits.workers_per_job);
   if (!wrong.empty()) return wrong;
   // The worker table updates `cores` by additions and subtractions as workers join, leave and are measured.
-  // Each of them has a rounding error of about 2^-52 of the farm's threads.
+  // Each update has a rounding error of about 2^-52 times the farm's threads.
   if (std::abs(cores - state.workers.cores()) > 1e-6 * std::max(threads, 1)) return "cores are counted wrong";
   return threads == state.workers.threads() ? "" : "threads are counted wrong";
 }

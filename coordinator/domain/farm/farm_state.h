@@ -38,13 +38,14 @@ struct Farm::State {
 
   // State of the event being handled
   TimePoint now{};
-  // Time of the last Tick. Whether a worker is still blocked is decided by this time, because blocks are
+  // Time of the latest Tick. Whether a worker is still blocked is decided by this time, because blocks are
   // lifted at ticks, when all workers are checked
   TimePoint ticked{};
   std::vector<Effect> effects;
-  bool work_appeared = false;      // there may be units that any worker could take now
-  bool pinned_for_others = false;  // a job was pinned for which workers wait that may not begin jobs
-  std::set<WorkerIndex> dirty;     // workers whose state has changed, so that they may want more work
+  bool work_appeared = false;  // there may be units that any worker could take now
+  // a job was pinned to a class, and workers of this class that may not begin jobs can now take its units
+  bool pinned_for_others = false;
+  std::set<WorkerIndex> dirty;  // workers whose state has changed, so that they may want more work
 
   // farm_jobs.cpp, farm_changes.cpp
   void on(const JobSubmitted& event);
@@ -129,20 +130,22 @@ struct Farm::State {
   void void_tile(Job& job, TileIndex tile);
   static void steer_anew(Job& job);
 
-  // farm_stop.cpp
+  // farm_stop.cpp. Levels, and groups of tiles that stop together, are those of the stop rule
+  // (adaptive_stop.h).
 
   // Passes the error of the tile after this round, which has just been folded, to the stop rule and acts on
   // its decision.
   void steer(Job& job, TileIndex tile, RoundIndex round);
-  void judge(Job& job);                        // judges the image at every level that all groups have reached
-  AdaptiveStop::Verdict verdict_on(Job& job);  // of the image at the level that all groups have reached
+  void judge(Job& job);  // judges the image at every level that all groups have reached
+  // judges the image at the level that all groups have reached
+  AdaptiveStop::Verdict verdict_on(Job& job);
   AdaptiveStop::Verdict denoised_verdict(Job& job);
   void mark_level(Job& job, bool last);
   void take_marks(Job& job);  // emits a Checkpoint for each mark (job.h) that is folded
   void stop_at_level(Job& job);
   // Decides the last round of each tile from measured unit costs; called shortly before the job's time limit.
   void plan_end(Job& job, TimePoint limit);
-  void give_back_beyond(Job& job);  // takes back units leased beyond the tiles' ends
+  void give_back_beyond(Job& job);  // takes back leased units beyond the tiles' last rounds
   // Returns the lease under which the worker holds the unit; null: it does not
   LeaseRecord* lease_of(const Job& job, UnitCode code, const Worker& worker);
   void count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure);

@@ -24,15 +24,15 @@ double seconds_left(const Job& job, const Worker& worker, TimePoint now) {
 }
 
 // Guided self-scheduling: a worker gets half of what an even split of the waiting units over all threads of
-// the farm (`farm_threads`) would give its threads. So all threads end at about the same time. The lease also
-// ends with the unit that makes its predicted cost reach `seconds`, which is less shortly before a time
-// limit.
+// the farm (`farm_threads`) would give its threads. So all threads end at about the same time. A lease also
+// ends with the unit at which its predicted cost reaches `seconds`, a limit that shrinks shortly before the
+// job's time limit.
 LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, TimePoint now) {
   const std::uint64_t threads = static_cast<std::uint64_t>(worker.threads);
   const std::uint64_t halves = 2 * static_cast<std::uint64_t>(std::max(farm_threads, 1));
   const std::uint64_t waiting = std::min(job.queued(), job.queue.surely_waiting());
-  // `least`: with single-unit leases, a worker with many threads would reach kMaxLeasesPerWorker leases
-  // before all its threads have work.
+  // A lease has at least `least` units: with single-unit leases, a worker with many threads would reach
+  // kMaxLeasesPerWorker leases before all its threads have work.
   const std::uint64_t least = (kUnitsAThread * threads + kMaxLeasesPerWorker - 1) / kMaxLeasesPerWorker;
   const std::uint64_t share = std::max(least, (waiting * threads + halves - 1) / halves);
   const std::uint64_t most =
