@@ -312,7 +312,7 @@ void FarmDriver::on(const Checkpoint& e) {
   entry->assembly->checkpoint_taken(e.rounds);
   entry->stored.totals.doubt = error.verdict;
   entry->stored.totals.few_hits = error.few_hits;
-  // The checkpoint is known from before the restart
+  // The curve has this checkpoint already, from before a restart
   if (!entry->points.empty() && entry->points.back().spp >= error.spp) {
     const bool compared = std::none_of(entry->points.begin(), entry->points.end(), [&](const auto& p) {
       return p.spp == error.spp && !p.reference_error;

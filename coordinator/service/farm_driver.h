@@ -23,7 +23,7 @@ class FarmDriver {
 
   const Farm& farm() const { return farm_; }
   void run(Event first);
-  // Gives a stored job to the farm. Folds that this repeats publish no events.
+  // Gives a stored job to the farm. Folds that were done before and are repeated now publish no events.
   void replay(JobEntry& entry, JobRestored event);
   void quarantine(const std::vector<QuarantinedWorker>& workers);  // `workers` are stored already
   // Unloads an ended job whose files are complete on disk: frees its image in memory and the farm's state of

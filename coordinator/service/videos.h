@@ -22,7 +22,7 @@ class Videos {
   Videos(Guarded<Core>& core, const JobFiles& files, const Pictures& pictures, const Clock& clock)
       : core_(core), files_(files), pictures_(pictures), clock_(clock) {}
 
-  // Has a video made of the frames that are done now. It replaces an earlier video of the sequence.
+  // Requests a video of the frames that are done now. It replaces an earlier video of the sequence.
   Result<VideoView> make(const JobId& sequence, const VideoAsked& asked);
   Result<VideoView> view(const JobId& sequence) const;
   // Returns the file of a video that is ready. failed_precondition: there is none; the message says why.

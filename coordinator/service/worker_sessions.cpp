@@ -145,7 +145,7 @@ void WorkerSessions::handle(Core& core, Connection& from, FromWorker message) {
   if (!from.open || found == core.workers.end()) return;
   found->second.last_seen = clock_.now();
   std::visit(
-      // Handled by connect(); a second WorkerHello is rejected earlier
+      // receive() handles UnitResult, and connect() WorkerHello; a second WorkerHello is rejected earlier
       overloaded{[](const UnitResult&) {}, [](const WorkerHello&) {},
                  [&](const WorkerProgress& m) { note_progress(core, from, found->second, m); },
                  [&](const UnitFailure& m) {

@@ -58,8 +58,9 @@ inline constexpr int kMoreWorkers = 8;  // number of workers that JobView::eta_w
 struct ErrorFigures {  // Estimated errors of the image up to the last round that was complete in all tiles
   double rmse = 0;
   double relmse = 0;
-  double relmse_lo = 0, relmse_hi = 0;  // 95 % intervals for the realised error
-  // Both 0: there is no interval
+  // 95 % interval for the actual relMSE of this image
+  double relmse_lo = 0, relmse_hi = 0;
+  // The same for the RMSE; both 0: it is not known
   double rmse_lo = 0, rmse_hi = 0;
 };
 // Error against a reference image, from which the reference's own noise is subtracted
@@ -121,11 +122,13 @@ struct JobView {
   double progress = 0;    // 0..1
   std::uint64_t spp = 0;  // samples per pixel: requested, or the limit
   bool spp_asked = true;  // false: no number of samples was requested; its target error or its time ends it
-  std::optional<double> target_error;           // relMSE at which the job is to end, if requested
-  TargetLayer target_layer = TargetLayer::raw;  // whose relMSE that is
-  std::optional<DenoisedCheck> denoised_check;  // the last one, if it is that of the denoised layers
-  bool denoise = false;                         // its image also gets denoised layers
-  double spp_done = 0;                          // samples per pixel so far, mean over all pixels
+  std::optional<double> target_error;  // relMSE at which the job is to end, if requested
+  // the layers whose relMSE target_error limits
+  TargetLayer target_layer = TargetLayer::raw;
+  // the latest check of the denoised layers' error, if target_error limits that error
+  std::optional<DenoisedCheck> denoised_check;
+  bool denoise = false;  // its image also gets denoised layers
+  double spp_done = 0;   // samples per pixel so far, mean over all pixels
   std::optional<ErrorFigures> error_now;
   // Error against the reference, at the last checkpoint that was compared
   std::optional<ReferenceError> reference_error;
@@ -163,7 +166,8 @@ struct JobView {
   // The numeric class that it is pinned to, with its platform, and how much of the farm is of that class
   std::optional<Digest> numeric_class;
   std::string platform;
-  std::optional<ClassShare> class_share;  // nullopt: it is pinned to none, has ended, or is a sequence
+  // nullopt: the job is pinned to no class, has ended, or is a sequence
+  std::optional<ClassShare> class_share;
   bool fake = false;  // true if fake workers invented its pixels; for a sequence: the pixels of any frame
   // Set only for a sequence. The other values of its view combine all frames: they are sums or means over
   // pixels, and elapsed_seconds counts from the first ray of any frame to the last fold.
@@ -208,8 +212,8 @@ enum class VideoState { none, waiting, making, ready, failed };
 struct VideoView {
   VideoState state = VideoState::none;
   VideoAsked asked;
-  std::size_t frames = 0, frames_done = 0;  // that the video has, and that are in it
-  std::uint64_t bytes = 0;                  // of a video that is ready
+  std::size_t frames = 0, frames_done = 0;  // number of frames in the video, and of those encoded so far
+  std::uint64_t bytes = 0;                  // size of a video that is ready
   std::string error;                        // why it failed
 };
 

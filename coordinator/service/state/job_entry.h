@@ -38,7 +38,7 @@ struct JobEntry {
   std::optional<Assembly> assembly;  // the image; nullopt once an ended job is on disk
   // Pictures to compare with the reference, if it has one, while there is an assembly
   std::optional<ReferenceTiles> reference_tiles;
-  // Noise of the reference image, estimated by the last comparison; nullopt: unknown
+  // Noise of the reference image, estimated by the latest comparison; nullopt: unknown
   std::optional<ReferenceNoise> reference_noise;
   // The denoised final image, until it is written; null: the job has no denoising, or the image is not made
   // yet
@@ -69,7 +69,7 @@ struct JobEntry {
   double fold_seconds = 0;    // seconds on the job's clock at the last fold
   std::string trouble;        // why the job waits, for the user
   std::uint64_t resumes = 0;  // how often it was resumed
-  // The workers that each leased unit (tile and round) is leased to, for display
+  // For each leased unit (tile and round), the workers that it is leased to; for display
   std::map<std::pair<TileIndex, RoundIndex>, std::vector<WorkerId>> leased;
   // Seconds on the job's clock of each durable result, while a restart replays the results
   std::map<std::pair<TileIndex, RoundIndex>, double> replay_at;

@@ -22,8 +22,8 @@ namespace ls::coordinator {
 
 class CollectedBlobs final : public BlobStore {
  public:
-  // If `keep` is nullopt, blobs are never removed; interrupted uploads are removed after a day. Requires that
-  // no other coordinator uses these blobs.
+  // Blobs are removed after the duration `keep`; `keep` must be nullopt if other coordinators use these
+  // blobs. If it is nullopt, blobs are never removed, and interrupted uploads after a day.
   CollectedBlobs(std::shared_ptr<BlobStore> inner, std::shared_ptr<const Clock> clock,
                  std::optional<Duration> keep)
       : inner_(std::move(inner)), clock_(std::move(clock)), keep_(keep) {}
