@@ -105,7 +105,8 @@ json denoised_of(const ReportFacts& facts) {
   return j;
 }
 
-// Returns the target error that is meant for the image itself, whose errors make the curve.
+// Returns the target error if it is that of the image itself. The convergence curve shows the errors of the
+// image, not those of its denoised layers.
 std::optional<double> target_of_image(const JobSpec& spec) {
   return spec.target_layer == TargetLayer::raw ? spec.target_error : std::nullopt;
 }

@@ -17,8 +17,8 @@ namespace ls::coordinator {
 
 class RoundErrors {
  public:
-  // If `keep_relative`, the relative error sum of every fold is never dropped: the farm's stop rule needs
-  // these sums after a restart.
+  // If `keep_relative`, the relative error sums after all rounds are kept for good: the farm's rule that
+  // stops tiles at a target error needs them after a restart.
   RoundErrors(TileIndex tiles, bool keep_relative) : tiles_(tiles), keep_relative_(keep_relative) {}
 
   // Adds the tile's error after this round. The rounds of a tile come in order. If a truncated round comes
@@ -30,7 +30,7 @@ class RoundErrors {
   TileError at(std::span<const RoundIndex> rounds) const;
   // True if at(rounds) is exact: all errors that it needs are still there.
   bool knows(std::span<const RoundIndex> rounds) const;
-  // Called when the tile is to be folded again from round 0
+  // Called when the tile begins again without samples
   void discard(TileIndex tile) { tiles_[tile] = {}; }
   // Drops errors that no later checkpoint needs. From now on, at() must not be asked for fewer rounds of any
   // tile than `rounds`.

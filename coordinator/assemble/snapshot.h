@@ -1,7 +1,7 @@
-// A snapshot is a file of a job's image so far, tile by tile. Writing or reading it needs memory for one tile
-// besides the film (the image in memory). Each tile is saved in the state in which it was added to the file,
-// so folding (adding rounds of samples to the film) may continue meanwhile. After a restart, rounds that were
-// folded after the snapshot are folded again from the partials (the stored results). Format:
+// A snapshot is a file with a job's image so far, tile by tile. Writing or reading it needs memory for one
+// tile besides the film (the image in memory). Each tile is saved in the state in which it was added to the
+// file, so folding (adding rounds of samples to the film) may continue meanwhile. After a restart, rounds
+// that were folded after the snapshot are folded again from the partials (the stored results). Format:
 //    "LSSNAP2\n", u64 length and name of the format, i32 width, height, tile, u32 AOVs; per tile u32 tile,
 //    u64 lengths of its three parts, and these: film (film_bytes.cpp), error sums, health; u32 2^32 - 1;
 //    SHA-256 of all preceding bytes
@@ -34,7 +34,7 @@ class SnapshotFile {
   // Creates the file under the name `path` followed by `suffix`; commit() gives it the name `path`.
   static Result<SnapshotFile> create(const std::filesystem::path& path, std::string_view suffix,
                                      const TileGrid& grid, AovSet aovs, std::string_view format);
-  Result<void> add(const TileSnapshot& tile);  // adds each tile once; a tile without folded rounds is skipped
+  Result<void> add(const TileSnapshot& tile);  // adds each tile once; a tile without samples is skipped
   // writes the SHA-256 and makes the file durable, still under its temporary name
   Result<void> finish();
   Result<void> commit();  // gives the file its final name; call after finish()
@@ -58,12 +58,12 @@ class SnapshotTiles {
   // returns nullopt for the same reasons as load_snapshot()
   static std::optional<SnapshotTiles> open(const std::filesystem::path& path, const TileGrid& grid,
                                            AovSet aovs, std::string_view format);
-  // Loads the tile's pixels into `film`; leaves `film` unchanged if the tile has no folded rounds.
+  // Loads the tile's pixels into `film`; leaves `film` unchanged if the tile has no samples.
   Result<void> load(TileIndex tile, Film& film) const;
 
  private:
   struct Place {
-    std::uint64_t at = 0, length = 0;  // position in the file; length 0: the tile has no folded rounds
+    std::uint64_t at = 0, length = 0;  // position in the file; length 0: the tile has no samples
   };
   std::filesystem::path path_;
   File file_;

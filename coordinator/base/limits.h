@@ -58,8 +58,8 @@ inline constexpr Duration kMaxVideoTime = std::chrono::hours(1);  // time to mak
 inline constexpr Duration kVideoStallLimit = std::chrono::minutes(2);
 
 // Results. A partial is the encoded result of one unit (one round of one tile). The limits in bytes apply to
-// all jobs together. They are chosen so that a job with a UHD film of 8.3 million pixels at 48 bytes each
-// stays below 600 MB.
+// all jobs together. They are chosen so that the coordinator needs less than 600 MB of memory for a job with
+// a UHD film (8.3 million pixels at 48 bytes each) and some tens of workers.
 
 // Bytes of one partials-NNN.seg file, a segment of a job's log of partials
 inline constexpr std::uint64_t kMaxSegmentBytes = std::uint64_t{64} << 20;

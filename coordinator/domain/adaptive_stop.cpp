@@ -51,9 +51,9 @@ std::vector<std::vector<TileIndex>> stop_groups(const TileGrid& grid) {
 
 namespace {
 
-// The first round that may be a tile's last: the one with which every pixel has kMinSppBeforeStop samples.
+// The earliest round after which a tile may stop: with it every pixel has kMinSppBeforeStop samples.
 constexpr RoundIndex kFirstStop = round_count(kMinSppBeforeStop) - 1;
-// Rounds that every group needs before a forecast; together they have 8 samples per pixel
+// Number of rounds that every group of tiles needs before a forecast; together they have 8 samples per pixel
 constexpr RoundIndex kFirstForecast = 3;
 
 constexpr double samples_after(RoundIndex round) { return static_cast<double>(round_range(round).s1); }

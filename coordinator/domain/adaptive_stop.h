@@ -57,19 +57,19 @@ class AdaptiveStop {
   // `spp` is the sample limit: no tile gets more samples per pixel.
   AdaptiveStop(const TileGrid& grid, std::uint64_t spp);
 
-  // Adds the error of the tile after rounds 0..round, which are now folded. `rel_error_sum` is the sum of the
-  // relative squared error over the tile's pixels and channels (TileError::relative.squares). The rounds of
-  // one tile must come in order; tiles may come in any order.
+  // Adds the error of the tile after rounds 0..round, which are in the image now. `rel_error_sum` is the sum
+  // of the relative squared error over the tile's pixels and channels (TileError::relative.squares). The
+  // rounds of one tile must come in order; tiles may come in any order.
   void folded(TileIndex tile, RoundIndex round, double rel_error_sum);
 
-  // Returns the last round of the tile that is certain to be needed: rounds up to this one may be folded.
-  // Once the image is accepted, this is the tile's last round.
+  // Returns the last round of the tile that is certain to be needed: rounds up to this one may be added to
+  // the image. Once the image is accepted, this is the tile's last round.
   RoundIndex wanted(TileIndex tile) const { return groups_[group_of_[tile]].stop; }
 
   // Returns the tiles of this tile's group, which all stop together. The tile itself is one of them.
   std::span<const TileIndex> neighbours(TileIndex tile) const { return groups_[group_of_[tile]].tiles; }
 
-  // True if all groups have stopped at this level.
+  // True if all groups of tiles have stopped at the current level.
   bool settled() const { return settled_ == groups_.size(); }
   // Whether the image's relMSE at this level is at most `target`. `unknown`: not all groups have stopped, or
   // the error of some group's last round is not known yet.
@@ -123,7 +123,7 @@ class AdaptiveStop {
     RoundIndex predicted_last = 0;  // the round that will probably be its last
     bool settled = false;           // true if `stop` is the group's last round at this level
   };
-  // Variance per sample, estimated from rounds 0..round
+  // Variance per sample, estimated from the error after rounds 0..round
   double variance(const Group& g, RoundIndex round) const;
   // Pixel samples that the group still needs up to the end of round `last`
   double samples_missing(const Group& g, RoundIndex last) const;

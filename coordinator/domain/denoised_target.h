@@ -35,8 +35,8 @@ class DenoisedTarget {
   // `made` are the checks that are stored with the job.
   explicit DenoisedTarget(std::vector<DenoisedCheck> made = {}) : made_(std::move(made)) {}
 
-  // Says whether the job ends at the level with `spp` samples per pixel. Levels come in order, and the last
-  // one may come again, with another target. `check`: the error of the denoised layers must be known first.
+  // Says whether the job ends at the level with `spp` samples per pixel. Levels come in order; the latest one
+  // may come again, with another target. `check`: the error of the denoised layers must be known first.
   enum class Answer { go_on, check, end };
   Answer judge(double spp, double target);
   void add(const DenoisedCheck& check);

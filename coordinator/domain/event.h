@@ -37,8 +37,8 @@ struct JobPlan {
   std::string replay = "lightshaft render SCENE";
   // Limits and fair shares (fair_share.h, docs/design/scheduling.md)
   std::string owner;  // the user (JobView::owner); empty: the administrator, to whom no user limits apply
-  // The sequence whose frame this job is; empty: the job is alone. Jobs of one owner and group count as one
-  // job for fair shares, and run in order.
+  // The sequence (a job with frames) that this job is a frame of; empty: the job is no frame. Jobs of one
+  // owner and group count as one job for fair shares, and run in order.
   std::string group;
   // Limits of the job, or of all jobs of its group together
   std::uint32_t max_workers = 0;   // at most this many workers hold units at the same time; 0: no limit
@@ -73,11 +73,11 @@ struct JobRestored {
   std::optional<StopReason> stopped;    // set for a job that is done
   std::optional<Digest> numeric_class;  // the class that the job is pinned to
   std::vector<Unit> accepted;           // accepted results that still exist after the restart, in any order
-  // For each tile, how many rounds the restored film has folded, a truncated last round included. Empty: no
-  // film was restored. Required for a job that is done.
+  // For each tile, how many rounds the restored image has, a truncated last round included. Empty: no image
+  // was restored. Required for a job that is done.
   std::vector<RoundIndex> folded;
-  // rel_error[round][tile]: UnitFolded::rel_error_sum of each folded round; only for a job with a target
-  // error
+  // rel_error[round][tile]: UnitFolded::rel_error_sum of each round in the image; only for a job with a
+  // target error
   std::vector<std::vector<double>> rel_error;
   double elapsed_seconds = 0;  // from the first ray until the restart
   // An audit (an accepted result that another worker renders again) that was open at the restart

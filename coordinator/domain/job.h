@@ -126,11 +126,11 @@ struct Audit {
 };
 
 // A level of the adaptive stop rule (adaptive_stop.h). A checkpoint of the level's image is taken as soon as
-// all its rounds are folded.
+// the image has all its rounds.
 struct LevelMark {
   std::vector<RoundIndex> rounds;  // for each tile, how many rounds it has at this level
   double spp = 0;                  // samples per pixel, mean over all pixels
-  TileIndex missing = 0;           // number of tiles whose rounds of this level are not all folded yet
+  TileIndex missing = 0;           // number of tiles whose rounds of this level are not all in the image yet
 };
 
 struct Job {
@@ -141,7 +141,7 @@ struct Job {
   std::uint64_t spp;  // samples per pixel: the plan's, or kMaxSppWithoutLimit; always even
   JobState state = JobState::queued;
   // Why the job ends. It is set once the last rounds of all tiles are decided, although some of their units
-  // may still be leased or not folded. It is final once the job is done
+  // may still be leased or not be in the image. It is final once the job is done
   std::optional<StopReason> stopping;
   bool frozen = false;  // stopped by time or user: only results of units leased before are still accepted
   std::optional<Digest> numeric_class;
@@ -173,7 +173,7 @@ struct Job {
   double checking_spp = 0;  // the level whose denoised error the service was asked for; 0: none
   // relMSE of the image itself (before denoising) at which the job will probably end; 0: unknown
   double predicted_error = 0;
-  double marked_spp = 0;           // LevelMark::spp of the last mark made
+  double marked_spp = 0;           // LevelMark::spp of the latest mark
   std::uint64_t predicted_at = 0;  // rounds_seen() at the last call of foresee()
 
   bool ended() const { return is_terminal(state); }
@@ -201,12 +201,12 @@ struct Job {
     if (!denoised) return plan.target_error;
     return predicted_error > 0 ? std::optional(predicted_error) : std::nullopt;
   }
-  // Returns the last round of the tile that may be folded now.
+  // Returns the last round of the tile that may be added to the image now.
   RoundIndex last_foldable(TileIndex tile) const {
     return adaptive_running() ? adaptive->wanted(tile) : std::numeric_limits<RoundIndex>::max();
   }
-  // Sets how far ahead of the folded rounds further rounds may be leased, in a farm whose workers have this
-  // many threads in total.
+  // Sets how far ahead of the rounds in the image further rounds may be leased, in a farm whose workers have
+  // this many threads in total.
   void move_windows(int farm_threads);
   void move_window(TileIndex tile, int farm_threads);
   // Sets the end of each tile to ends[tile] rounds, unless it ends earlier already, and forgets accepted

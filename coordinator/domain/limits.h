@@ -36,7 +36,8 @@ inline constexpr std::uint32_t kUnitsAThread = 2;
 inline constexpr double kSpeculativeSeconds = .05;
 inline constexpr std::uint32_t kMaxLeasesPerWorker = 64;  // applies near the end of a job, when a lease is a
                                                           // single unit
-// A lease's deadline is this many times its predicted duration after its grant, plus the slacks below
+// A lease's deadline is this many times its predicted duration after it was granted, plus kDeadlineSlack and
+// perhaps kLoadSlack
 inline constexpr double kDeadlineFactor = 3.0;
 inline constexpr Duration kDeadlineSlack = 10s;  // added to every lease's deadline
 // Also added until the worker has finished a unit of the job: it may have to load the world
@@ -78,7 +79,7 @@ inline constexpr Duration kAuditAfterRestart = 60s;
 // At most this many pairs of unit and worker are remembered per job: VoterTable
 inline constexpr std::size_t kMaxVoters = 65'536;
 
-// Rounds that may be leased ahead of the folded ones
+// Number of rounds that may be leased ahead of those in the image
 inline constexpr RoundIndex kRoundsAhead = 64;  // bounds how many results wait to be folded
 
 // Failures

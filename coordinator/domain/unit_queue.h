@@ -169,7 +169,7 @@ class UnitQueue {
  private:
   static constexpr RoundIndex kNoWindow = std::numeric_limits<RoundIndex>::max();
 
-  // The round set by set_wanted(), per tile. Not used while no tile has speculative units.
+  // Per tile, the arguments of the latest set_wanted(). Not used while no tile has speculative units.
   struct Wanted {
     RoundIndex before = kNoWindow;
     float weight = 0;
@@ -209,8 +209,8 @@ class UnitQueue {
   Line& line_of(TileIndex t) { return lines_[focus_.empty() || focus_[t] ? 0 : 1]; }
   const Line& line_of(TileIndex t) const { return lines_[focus_.empty() || focus_[t] ? 0 : 1]; }
   std::size_t surely_returned() const { return lines_[0].returned.size() + lines_[1].returned.size(); }
-  // The heads of the two lines and perhaps_ together hold the next unit of every open tile, and outdated
-  // entries, which head() and perhaps_head() drop.
+  // The heads of the two lines and perhaps_ together hold the next unit of every tile that has one to lease.
+  // They also hold outdated entries, which head() and perhaps_head() drop.
   void offer(TileIndex tile) {
     if (!open(tile)) return;
     const UnitCode code = unit_code(next_[tile], tile);

@@ -60,7 +60,7 @@ struct Worker {
   int threads = 1;
   std::vector<std::string> tags;   // sorted
   std::uint64_t memory_bytes = 0;  // 0: unknown
-  // head_of() of the digests of the blobs that the worker reports to hold, sorted
+  // For each blob that the worker reports to hold, the first 8 bytes of its digest (head_of()), sorted
   std::vector<std::uint64_t> blobs;
   bool quarantined = false;  // it rendered wrong pixels
   bool may_begin = true;     // false: it gets no units of jobs without a numeric class

@@ -1,5 +1,5 @@
-// Writes the files of a running job, on the writer thread: open audits, snapshots from time to time, and at
-// the end the final image and the report.
+// Writes the files of a job, on the writer thread: the list of open audits (units that are rendered again for
+// comparison), snapshots from time to time, and at the end the final image and the report.
 #pragma once
 
 #include "common/base/guarded.h"
@@ -39,7 +39,7 @@ class ImageWriter {
   void retire(Core&, const EntryPtr& entry);
 
  private:
-  struct Folded {  // a cheap copy of the folded image, for use outside the lock
+  struct Folded {  // a cheap copy of the job's image so far, for use outside the lock
     Film film;
     RoundErrors errors;
     HealthTable health;

@@ -142,8 +142,8 @@ Result<std::vector<std::byte>> Pictures::pixels(const JobId& id, const PixelsAsk
     return mosaic.bytes();
   }
   if ((*entry)->assembly) {
-    // Only the requested tiles are shared with the film, so that folding may free all others while these are
-    // read.
+    // Only the requested tiles are shared with the film. So while they are read, memory of all other tiles
+    // can be freed.
     std::vector<TileRow> rows;
     for (int row = wanted.y0 / grid.tile; row * grid.tile < wanted.y1; ++row)
       rows.push_back({row, (*entry)->assembly->film().row(row)});

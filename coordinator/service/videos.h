@@ -1,7 +1,6 @@
 // Videos of sequences, made on request: ffmpeg gets the tone-mapped pictures of the frames that are done. One
 // video is made at a time, on a thread of its own; a few more requests wait. A video lies in the folder of
-// its sequence's first frame and is removed with it. What was asked for is not remembered across restarts.
-// Thread-safe.
+// its sequence's first frame and is removed with it. Requests are forgotten at a restart. Thread-safe.
 #pragma once
 
 #include <filesystem>

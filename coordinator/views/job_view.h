@@ -28,7 +28,7 @@
 namespace ls::coordinator {
 
 // How the time of a job was spent, in core seconds of the workers (`merge`: of the coordinator). If the
-// coordinator is killed, all parts except `render` lose the time since the job was last stored.
+// coordinator is killed, the time since the job was last stored is lost, except for `render`.
 struct TimeSplit {
   double load = 0;      // fetching files
   double build = 0;     // parsing files, building worlds
@@ -107,7 +107,7 @@ struct FrameView {
 struct FramesView {
   FrameRange range;
   std::uint32_t total = 0, done = 0, running = 0, failed = 0, cancelled = 0;
-  // The frame to show: the first one that is being rendered, else the last one with samples
+  // The frame to show: the first one that is being rendered; if there is none, the last one with samples
   std::uint32_t current = 0;
   std::vector<FrameView> all;  // all frames, ascending; filled in by Coordinator::job() only
 };
@@ -161,7 +161,8 @@ struct JobView {
   double elapsed_seconds = 0, core_seconds = 0;
   TimeSplit time;
   double submitted_unix = 0;  // time of submission by the wall clock, for display
-  Health health;  // numeric health of its folded units (rounds of tiles); for a sequence only the totals
+  // Numeric health of the units in its image (rounds of tiles); for a sequence only the totals
+  Health health;
   std::vector<HealthNote> notes;  // the numeric health as sentences for users; empty: no problems
   // The numeric class that it is pinned to, with its platform, and how much of the farm is of that class
   std::optional<Digest> numeric_class;
@@ -170,7 +171,8 @@ struct JobView {
   std::optional<ClassShare> class_share;
   bool fake = false;  // true if fake workers invented its pixels; for a sequence: the pixels of any frame
   // Set only for a sequence. The other values of its view combine all frames: they are sums or means over
-  // pixels, and elapsed_seconds counts from the first ray of any frame to the last fold.
+  // pixels, and elapsed_seconds counts from the first ray of any frame until the last result was added to an
+  // image.
   std::optional<FramesView> frames;
 };
 
@@ -179,7 +181,7 @@ struct JobChange {
   std::optional<JobState> state;  // the new state: paused, running or cancelled
   std::optional<int> priority;
   std::optional<std::uint64_t> spp;  // the new total of samples per pixel
-  // The new target error; only for a job that has one and was not stopped for another reason. A smaller
+  // The new target error; only for a job that has one, and that was not ended by anything else. A smaller
   // target resumes a job that reached the larger one
   std::optional<double> target_error;
   // Pixels whose tiles are rendered before the others from now on; the inner nullopt ends that

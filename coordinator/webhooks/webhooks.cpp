@@ -141,9 +141,9 @@ class Webhooks::Impl {
     for (const JobId& job : open) {
       const auto view = coordinator.job(job);
       const std::string word(view ? to_string(view->state) : "");
-      // The previous run may have stored the notification of the job's end, and crashed before it recorded
-      // that the job has ended. The notification is then still pending, so the end is recorded and not
-      // reported again. It is also only recorded for a job that no longer exists.
+      // If the previous run crashed after it had stored the notification of the job's end, but before it
+      // recorded that the job has ended, the notification is still pending. Then the end is only recorded,
+      // not reported again. The same for a job that no longer exists.
       if (!view || kept_.contains(job.value + "/" + word)) {
         const auto state = state_.lock();
         state->mark_ended(job);

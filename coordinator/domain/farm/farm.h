@@ -59,7 +59,7 @@ struct JobFigures {
   std::uint64_t units_leased = 0;  // units leased to workers, each counted once even if a copy is leased, too
   std::uint64_t units_queued = 0;  // units that wait for a worker: units_total - units_done - units_leased
   std::uint64_t units_folded = 0;
-  RoundIndex rounds_complete = 0;  // number of rounds that are folded in all tiles
+  RoundIndex rounds_complete = 0;  // number of rounds that the image has of every tile
   int priority = 0;
   // Predicted CPU seconds of the units that are not done, from measured cost. 0: nothing has been measured
   // yet, or the end of an adaptive job (one with a target error) is not predicted yet.

@@ -167,7 +167,7 @@ void Farm::State::freeze(Job& job, StopReason reason) {
   for (TileIndex t = 0; t < begun.size(); ++t)
     begun[t] = std::max({job.queue.next(t), job.units.end_of_accepted(t), RoundIndex{1}});
   job.cut_off(begun, reason);
-  // This also folds accepted results that the stop rule of a target error has held back
+  // This also adds accepted results to the image that the stop rule of a target error has held back
   for (TileIndex t = 0; t < begun.size(); ++t) issue_folds(job, t);
   finish_if_complete(job);
   refresh(job);
@@ -175,7 +175,8 @@ void Farm::State::freeze(Job& job, StopReason reason) {
 
 void Farm::State::finish_if_complete(Job& job) {
   if (job.ended() || !job.complete()) return;
-  // Open audits must end first: they decide whether the image is right
+  // Open audits (units that are rendered again for comparison) must end first: they decide whether the image
+  // is right
   if (!job.audits.empty()) return refresh(job);
   if (!job.stopping) job.stopping = StopReason::spp;
   set_state(job, JobState::done);

@@ -67,7 +67,7 @@ struct Farm::State {
   Job& add(JobPlan plan);
   void set_state(Job& job, JobState to);
   // Tells FairShare whether the job has units to lease. Must be called after any change of the job's queue,
-  // state or window
+  // state or window (how far ahead rounds may be leased)
   void refresh(Job& job);
   void restore_tile(Job& job, TileIndex tile, const JobRestored& event);
   void freeze(Job& job, StopReason reason);
@@ -107,7 +107,7 @@ struct Farm::State {
   void compare(Job& job, UnitCode code, const UnitAccepted& event);
   void restore_audits(Job& job, const JobRestored& event);
   void consider_audit(Job& job, UnitCode code, WorkerIndex first);
-  // Returns an audit of the job that this worker may do; nullopt if there is none.
+  // Returns a unit of the job that this worker may render again for an audit; nullopt if there is none.
   std::optional<UnitCode> audit_for(const Job& job, const Worker& worker) const;
   bool audit_from(Job& job, Worker& worker);
   // True if this worker was told to render this unit, so that its result counts as a vote.
@@ -133,15 +133,15 @@ struct Farm::State {
   // farm_stop.cpp. Levels, and groups of tiles that stop together, are those of the stop rule
   // (adaptive_stop.h).
 
-  // Passes the error of the tile after this round, which has just been folded, to the stop rule and acts on
-  // its decision.
+  // Passes the error of the tile after this round, which has just been added to the image, to the stop rule
+  // and acts on its decision.
   void steer(Job& job, TileIndex tile, RoundIndex round);
   void judge(Job& job);  // judges the image at every level that all groups have reached
   // judges the image at the level that all groups have reached
   AdaptiveStop::Verdict verdict_on(Job& job);
   AdaptiveStop::Verdict denoised_verdict(Job& job);
   void mark_level(Job& job, bool last);
-  void take_marks(Job& job);  // emits a Checkpoint for each mark (job.h) that is folded
+  void take_marks(Job& job);  // emits a Checkpoint for each mark (job.h) whose rounds are all in the image
   void stop_at_level(Job& job);
   // Decides the last round of each tile from measured unit costs; called shortly before the job's time limit.
   void plan_end(Job& job, TimePoint limit);

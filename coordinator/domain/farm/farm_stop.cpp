@@ -101,8 +101,8 @@ void Farm::State::take_marks(Job& job) {
 }
 
 void Farm::State::stop_at_level(Job& job) {
-  // Folds that were requested cannot be undone. If the target was raised, more rounds may be folded than the
-  // level needs.
+  // Rounds whose addition to the image was requested stay in it. So if the target was raised, the image may
+  // have more rounds than the level needs.
   std::vector<RoundIndex> ends = job.adaptive->ends();
   for (TileIndex t = 0; t < job.units.tiles(); ++t) ends[t] = std::max(ends[t], job.units.issued(t));
   job.cut_off(ends, StopReason::error);

@@ -294,7 +294,7 @@ void Farm::State::void_results(Job& job, WorkerIndex faulty) {
   refresh(job);
 }
 
-// Rebuilds the stop rule from the rounds that are still folded.
+// Rebuilds the stop rule from the rounds that are still in the image.
 void Farm::State::steer_anew(Job& job) {
   job.adaptive.reset();
   job.steer();

@@ -133,7 +133,7 @@ void Farm::State::on(const Tick&) {
     if (!job->leasable() || job->frozen) continue;
     const auto limit = job->time_limit(now);
     if (limit && now >= *limit) freeze(*job, StopReason::time);
-    // The end is planned before the first lease could extend beyond the limit
+    // The end is planned before any lease could extend beyond the limit
     else if (limit && seconds(*limit - now) <= 2 * kTimePlanned)
       plan_end(*job, *limit);
   }

@@ -63,10 +63,10 @@ struct JobEntry {
   std::optional<TimePoint> clock_zero;     // zero of the job's clock, while it runs
   // Since when its clock is stopped, because the job is paused; nullopt: it runs
   std::optional<TimePoint> still_since;
-  // Wall clock of the end of its rendering; the record has it from the moment at which the job's end is
+  // Wall clock of the end of its rendering, in seconds since 1970. The record gets it when the job's end is
   // stored
   double ended_unix = 0;
-  double fold_seconds = 0;    // seconds on the job's clock at the last fold
+  double fold_seconds = 0;    // seconds on the job's clock when a result was last added to the image
   std::string trouble;        // why the job waits, for the user
   std::uint64_t resumes = 0;  // how often it was resumed
   // For each leased unit (tile and round), the workers that it is leased to; for display

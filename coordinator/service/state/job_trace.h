@@ -1,6 +1,6 @@
-// The spans of one job that the coordinator records: the job from its submission to its end, the leases by
-// which its units go to workers, and steps such as a fold or the final image. A job that is not traced has no
-// JobTrace.
+// The trace spans that the coordinator records for one job: the job from its submission to its end, the
+// leases (lists of units that a worker was told to render), and steps such as adding a result to the image or
+// writing the final image. A job that is not traced has no JobTrace.
 //
 // The ids of trace, job and leases are derived from the job's record and the lease's id, so that another
 // coordinator, or this one after a restart, continues the same trace.

@@ -39,8 +39,8 @@ class Records {
 
   void log(const JobId& id, std::string text);
   void add_point(const EntryPtr& entry, const ConvergencePoint& point);
-  // Drops the curve's points, which are of wrong or lost pixels. Checkpoints are taken again as tiles are
-  // folded again.
+  // Drops the curve's points, which are of wrong or lost pixels. Checkpoints are taken again as the tiles'
+  // results are added to the image again.
   void forget_curve(JobEntry& entry);
   // Drops the curve's points and the errors of denoised layers, which are of wrong pixels.
   void forget_wrong_pixels(JobEntry& entry);
