@@ -24,9 +24,9 @@
 
 namespace ls::coordinator {
 
-// Numeric health (counts of invalid values) of a job's folded units; a unit is one round (range of samples)
-// of one tile. It depends only on the units in the film (the image): a unit that was rendered twice counts
-// once, and one that is not folded does not count.
+// Numeric health (counts of invalid values) of the units in a job's film (its image); a unit is one round
+// (range of samples) of one tile. A unit that was rendered twice counts once, and one that is not in the film
+// does not count.
 class HealthTable {
  public:
   // Adds the health of a unit that was added to the film. The health of a truncated round is kept separately:

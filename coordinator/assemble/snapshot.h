@@ -47,7 +47,7 @@ class SnapshotFile {
 };
 
 // Reads a snapshot. nullopt if the file is missing, damaged or of another grid, AOV set or format. The caller
-// then folds the image again from the partials (the stored results).
+// then sums up the image again from the partials (the stored results).
 std::optional<Assembly> load_snapshot(const std::filesystem::path& path, const TileGrid& grid,
                                       bool keep_relative, std::string_view format, AovSet aovs = {});
 

@@ -77,9 +77,9 @@ inline constexpr int kVerifyThreads = 2;
 inline constexpr std::size_t kMaxWorkers = 16'384;
 inline constexpr std::size_t kMaxTags = 64;
 
-// Snapshots of a job's image. A snapshot is taken when kSnapshotUnits units have been folded (added to the
-// image) since the previous one, or when kSnapshotSeconds have passed. Folding that many units again after a
-// crash takes about 2 s
+// Snapshots of a job's image. A snapshot is taken when kSnapshotUnits units have been added to the image
+// since the previous one, or when kSnapshotSeconds have passed. Adding that many units again after a crash
+// takes about 2 s
 inline constexpr std::uint64_t kSnapshotUnits = 8192;
 inline constexpr double kSnapshotSeconds = 60;
 

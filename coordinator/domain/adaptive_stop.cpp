@@ -218,8 +218,9 @@ void AdaptiveStop::foresee(double target) {
   const auto samples = [&](double variance, double root_level) {
     return std::clamp(std::sqrt(variance) / root_level, least, most);
   };
-  // The error of the image grows with the level, so the level for `target` is found by bisection on its
-  // exponent. The midpoint is a square root, which has the same bits on every machine.
+  // The error of the image grows with the level (the threshold at which groups of tiles stop), so the level
+  // for `target` is found by bisection on its exponent. The midpoint is a square root, which has the same
+  // bits on every machine.
   double low = 0x1p-100, high = 0x1p40;
   for (int i = 0; i < 40; ++i) {
     const double middle = std::sqrt(low * high);

@@ -48,8 +48,8 @@ namespace ls::coordinator {
 // pixels forms a single group. The groups depend on the tiling alone.
 std::vector<std::vector<TileIndex>> stop_groups(const TileGrid& grid);
 
-// Returns the next level below `gain`: the largest number of the grid {2^(-j/4)}, j any integer, that is less
-// than `gain`. Returns 0 for 0.
+// Returns the next level (threshold for stopping) below `gain`: the largest number of the grid {2^(-j/4)}, j
+// any integer, that is less than `gain`. Returns 0 for 0.
 double level_below(double gain);
 
 class AdaptiveStop {
@@ -66,22 +66,23 @@ class AdaptiveStop {
   // the image. Once the image is accepted, this is the tile's last round.
   RoundIndex wanted(TileIndex tile) const { return groups_[group_of_[tile]].stop; }
 
-  // Returns the tiles of this tile's group, which all stop together. The tile itself is one of them.
+  // Returns the group of tiles that stop together with this tile, including the tile itself.
   std::span<const TileIndex> neighbours(TileIndex tile) const { return groups_[group_of_[tile]].tiles; }
 
   // True if all groups of tiles have stopped at the current level.
   bool settled() const { return settled_ == groups_.size(); }
-  // Whether the image's relMSE at this level is at most `target`. `unknown`: not all groups have stopped, or
-  // the error of some group's last round is not known yet.
+  // Whether the image's relMSE at the current level is at most `target`. `unknown`: not all groups of tiles
+  // have stopped, or the error of some group's last round is not known yet.
   enum class Verdict { unknown, no, yes };
   Verdict judge(double target) const;
-  // Returns the relMSE of the image at this level, predicted from the rounds before each tile's last.
+  // Returns the relMSE of the image at the current level, predicted from the rounds before each tile's last.
   // Requires settled().
   double predicted() const;
-  // True if every group has reached the sample limit, so that no group can continue.
+  // True if every group of tiles has reached the sample limit, so that none can continue.
   bool exhausted() const;
-  // Goes to the next level. Requires settled() and not exhausted(). If no group's gain is known to be
-  // positive, all groups continue to the sample limit.
+  // Goes to the next lower level (threshold for stopping), at which some groups of tiles may continue.
+  // Requires settled() and not exhausted(). If no group's gain (the error that one more round removes per
+  // sample) is known to be positive, all groups continue to the sample limit.
   void lower();
   double level() const { return level_; }
 
@@ -89,10 +90,10 @@ class AdaptiveStop {
   std::vector<RoundIndex> ends() const;
   double mean_spp() const;  // samples per pixel at this level, mean over all pixels
 
-  // True if at least one group has reached the sample limit.
+  // True if at least one group of tiles has reached the sample limit.
   bool bound() const;
-  // Raises the sample limit to `spp` samples per pixel. Requires !bound(): a group that reached the old limit
-  // might have continued under a higher one.
+  // Raises the sample limit to `spp` samples per pixel. Requires !bound(): a group of tiles that reached the
+  // old limit might have continued under a higher one.
   void extend(std::uint64_t spp);
 
   // Speculation: the functions below predict which rounds will probably be needed, so that workers can render
@@ -110,7 +111,7 @@ class AdaptiveStop {
   // before foresee() has predicted them.
   std::optional<double> samples_left() const;
   double samples_to_limit() const;  // how many pixel samples are still to be taken up to the sample limit
-  // Number of rounds added so far, summed over all groups
+  // Number of rounds added so far, summed over all groups of tiles
   std::uint64_t rounds_seen() const { return rounds_seen_; }
   std::size_t groups() const { return groups_.size(); }
 

@@ -21,7 +21,7 @@
 
 namespace ls::coordinator {
 
-// The error of the denoised layers at one level of the stop rule.
+// The error of the denoised layers at one level of the stop rule (adaptive_stop.h).
 struct DenoisedCheck {
   double spp = 0;     // samples per pixel at this level, mean over all pixels; identifies the level
   double relmse = 0;  // estimated; noise can bring it below 0

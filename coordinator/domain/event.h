@@ -183,8 +183,9 @@ struct LeaseCameBack {
 
 // Units
 
-// A verified result of this numeric class is about to be made durable. If the job is pinned to no class yet,
-// it is pinned to this one, so that its log never holds results of two classes.
+// A verified result of this numeric class is about to be made durable. If the job has no class yet, it is
+// pinned to this one: from now on only workers of this class may render it. So its log never holds results of
+// two classes.
 struct ClassChosen {
   JobId job;
   Digest numeric_class;
@@ -200,8 +201,8 @@ struct UnitAccepted {
   // Seconds that the rendering thread waited for a core or for memory while it rendered the unit: CoreShare
   double wait_seconds = 0;
 };
-// The result of a unit (one tile, one range of its samples) has been added to the image, as the farm asked
-// with a Fold (effect.h).
+// The result of a unit (one tile, one range of its samples) has been added to the image, as the effect Fold
+// (effect.h) requested.
 struct UnitFolded {
   UnitKey unit;
   SampleRange samples;  // the same as in the Fold
@@ -209,8 +210,8 @@ struct UnitFolded {
   // TileError::relative.squares of common/image/error/error_estimate.h.
   double rel_error_sum = 0;
 };
-// The error of the denoised layers at a level of the stop rule, which the farm asked for with a CheckDenoised
-// (effect.h). It is stored already.
+// The error of the denoised layers at a level of the stop rule, which the effect CheckDenoised (effect.h)
+// requested. It is stored already.
 struct DenoisedChecked {
   JobId job;
   DenoisedCheck check;

@@ -193,8 +193,8 @@ struct Job {
 
   // True if the tiles' errors decide how many rounds the tiles get, and have not decided it yet.
   bool adaptive_running() const { return adaptive && !stopping; }
-  // Starts the stop rule if the plan has a target error, drops it if the plan has none any more, and has the
-  // image judged again.
+  // Starts the adaptive stop rule if the plan has a target error, drops the rule if the plan has none any
+  // more, and has the image judged again.
   void steer();
   // The relMSE of the image (before denoising) at which the job will probably end; nullopt: unknown
   std::optional<double> predicted_target() const {

@@ -61,9 +61,9 @@ inline double plausible_seconds(double reported) {
 }
 // Core seconds charged for a unit until a cost is measured for its job
 inline constexpr double kAssumedUnitSeconds = 1.0;
-// A worker may continue a job whose world it has loaded instead of loading the world of the job in turn, as
-// long as the lag (fair_share.h) of the former exceeds that of the latter by at most this many seconds times
-// the farm's threads.
+// A worker that has loaded the world (scene) of another job than the one in turn may get units of that other
+// job, as long as its lag (fair_share.h) exceeds that of the job in turn by at most this many seconds times
+// the farm's threads. This saves loading worlds.
 inline constexpr double kLocalitySeconds = 5.0;
 // at most this many jobs are checked to find one whose world the worker has loaded
 inline constexpr std::uint32_t kJobsLookedAt = 64;

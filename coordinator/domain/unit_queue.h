@@ -179,7 +179,7 @@ class UnitQueue {
     std::priority_queue<UnitCode, std::vector<UnitCode>, std::greater<>> heads;
     std::set<UnitCode> returned;
   };
-  // A speculative unit, with the error that it removes per sample.
+  // A unit that may turn out not to be needed, with the error that it removes per sample.
   struct Perhaps {
     float gain;
     UnitCode code;

@@ -56,13 +56,13 @@ class UnitTable {
 
   // Folding
 
-  // If the tile's next round to be folded has an accepted result and is below `end` and at most `limit`,
-  // returns this round and counts it as issued. Otherwise returns nullopt.
+  // If the tile's next round to be added to the image has an accepted result and is below `end` and at most
+  // `limit`, returns this round and counts it in issued(). Otherwise returns nullopt.
   std::optional<RoundIndex> issue_fold(TileIndex tile, RoundIndex limit, RoundIndex end);
   // Number of rounds whose addition to the image was requested
   RoundIndex issued(TileIndex tile) const { return issued_[tile]; }
-  // Notes that the tile's round is in the image. If it is not the round whose addition was requested next,
-  // returns false and changes nothing.
+  // Notes that the tile's round is in the image. If it is not the next one of the tile's requested
+  // rounds, returns false and changes nothing.
   bool fold(TileIndex tile, RoundIndex round, double rel_error_sum);
   void restore_folded(TileIndex tile, RoundIndex rounds);
   void restore_error(RoundIndex round, TileIndex tile, double rel_error_sum);

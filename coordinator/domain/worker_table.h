@@ -77,7 +77,7 @@ struct Worker {
   std::uint64_t units_done = 0;
   CoreShare core_share;
   std::set<JobSeq> briefed;  // jobs whose settings (JobBrief) were sent on this stream
-  // Jobs whose world it has loaded: it has finished a unit of them on this stream
+  // Jobs whose world (loaded scene) it has: it has finished a unit of them on this stream
   std::set<JobSeq> warmed_up;
   std::map<JobSeq, WorkerFailures> failures;
 

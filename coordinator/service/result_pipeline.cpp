@@ -122,7 +122,8 @@ std::vector<ResultPipeline::Stored> ResultPipeline::prepare(const std::vector<Ch
     // does not name.
     if (accept && sound && !wanted.pinned)
       core->driver.run(ClassChosen{a.result.unit.job, a.from->numeric_class});
-    // A job that is pinned by a fake worker is marked as fake, whatever numeric class the worker claims.
+    // A job that accepts a result of a fake worker (which invents pixels, for tests) is marked as fake,
+    // whatever numeric class the worker claims.
     if (a.from->fake && accept && !std::exchange(a.job->stored.fake, true)) a.job->pin_unsaved = true;
     if (const auto saved = core->records.put_pin(a.job); !saved) stored.error = saved.error();
     if (const auto saved = core->records.put_quarantined(); !saved) stored.error = saved.error();

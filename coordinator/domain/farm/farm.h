@@ -134,12 +134,13 @@ class Farm {
   };
   std::vector<Shares> shares() const;
   AuditFigures audits() const;
-  // Returns the job's open audits. The service must store them: otherwise a faulty worker would no longer be
-  // suspected after a restart.
+  // Returns the job's open audits (units that are rendered again for comparison). The service must store
+  // them: otherwise a faulty worker would no longer be suspected after a restart.
   std::vector<JobRestored::Audit> open_audits(const JobId& id) const;
   std::vector<JobId> take_changed_audits();  // jobs whose open audits may have changed since the last call
   bool quarantined(const WorkerId& worker) const;
-  // True if a job without a numeric class may be pinned to this worker's class.
+  // True if a job that has no numeric class yet may be pinned to that of this worker, so that only workers of
+  // this class render it.
   bool may_pin(const JobId& id, const WorkerId& worker) const;
   double cores_connected() const;  // sum over connected workers: threads times core share (CoreShare)
   int workers_connected() const;

@@ -187,8 +187,9 @@ struct Farm::State {
   void pin(Job& job, const Digest& numeric_class);  // does nothing if the job is pinned already
   bool lease_from(Job& job, Worker& worker);
   std::optional<UnitCode> next_for(Job& job, const Worker& worker);
-  // True if the unit is speculative and the worker should not get it yet, because it still has enough to do.
-  // `units` and `cost` (predicted CPU seconds) are what the lease being made adds to what the worker holds.
+  // True if the unit is speculative (may turn out not to be needed) and the worker should not get it yet,
+  // because it still has enough to do. `units` and `cost` (predicted CPU seconds) are what the lease being
+  // made adds to what the worker holds.
   bool too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units, double cost) const;
   // True if a connected worker other than `but` may take units of the job and has not failed on this one.
   bool others_may_take(const Job& job, UnitCode code, const Worker& but) const;

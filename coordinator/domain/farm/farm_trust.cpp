@@ -50,8 +50,8 @@ void Farm::State::consider_audit(Job& job, UnitCode code, WorkerIndex first) {
   work_appeared = true;
 }
 
-// Audits that were open at the restart continue. No worker is connected yet, so these audits get a deadline
-// that leaves workers time to come back.
+// Audits (units that are rendered again for comparison) that were open at the restart continue. No worker is
+// connected yet, so these audits get a deadline that leaves workers time to come back.
 void Farm::State::restore_audits(Job& job, const JobRestored& event) {
   for (const JobRestored::Audit& open : event.audits) {
     const UnitCode code = unit_code(open.round, open.tile);
@@ -294,7 +294,7 @@ void Farm::State::void_results(Job& job, WorkerIndex faulty) {
   refresh(job);
 }
 
-// Rebuilds the stop rule from the rounds that are still in the image.
+// Rebuilds the job's stop rule (adaptive_stop.h) from the rounds that are still in the image.
 void Farm::State::steer_anew(Job& job) {
   job.adaptive.reset();
   job.steer();

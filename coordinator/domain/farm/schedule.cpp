@@ -115,7 +115,7 @@ LeaseRecord* Farm::State::longest_waiting_for(const Worker& idle) {
   for (auto it = leases.all().rbegin(); it != leases.all().rend() && ++looked_at <= kSpeculationScan; ++it) {
     LeaseRecord& lease = it->second;
     const Job& job = *lease.job;
-    // The idle worker must be able to begin immediately: it has loaded the job's world, and every rule allows
+    // The idle worker must be able to begin immediately: it has loaded the job's world, and nothing forbids
     // it these units.
     if (lease.audit || lease.worker == &idle || !idle.warmed_up.contains(job.seq) ||
         !may_serve(job, idle, ticked) || !job.leasable() || room(job, idle) < lease.remaining)
@@ -149,8 +149,9 @@ Farm::State::Takes Farm::State::takes(Job& job, const Worker& worker) {
   return too_early(job, worker, *code, 0, 0) ? Takes::later : Takes::now;
 }
 
-// A worker that is alone in its numeric class cannot be audited. So, if some class has several workers that
-// fit the job, the job may be pinned only to such a class. Without audits any class will do.
+// A worker that is alone in its numeric class (machines that compute the same bits) cannot be audited: no
+// other worker can check its results. So, if some class has several workers that fit the job, the job may be
+// pinned only to such a class. Without audits any class will do.
 bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
   if (job.numeric_class || options.audit_rate <= 0 || workers.of_class(worker.numeric_class).workers > 1)
     return true;
@@ -201,8 +202,8 @@ std::optional<UnitCode> Farm::State::next_for(Job& job, const Worker& worker) {
   return code && !out_of_time(job, worker, *code, now) ? code : std::nullopt;
 }
 
-// If a speculative unit were leased early, it would delay units that turn out to be needed, and it would more
-// likely be dropped.
+// If a speculative unit (one that may turn out not to be needed) were leased early, it would delay units that
+// turn out to be needed, and it would more likely be dropped.
 bool Farm::State::too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units,
                             double cost) const {
   return !job.queue.wanted(code) &&

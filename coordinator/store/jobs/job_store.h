@@ -134,7 +134,7 @@ class JobStore {
   virtual Result<void> remove_jobs(std::span<const JobId> jobs) = 0;  // removes all jobs or none
 
   virtual Result<void> add_point(const JobId& job, const ConvergencePoint& point) = 0;
-  // Sets the reference error of the point with these samples, replacing an earlier one.
+  // Sets the reference error of the curve's point with these samples, replacing an earlier one.
   virtual Result<void> set_reference_error(const JobId& job, double spp,
                                            const ReferenceError& reference_error) = 0;
   virtual Result<std::vector<ConvergencePoint>> points(const JobId& job) const = 0;

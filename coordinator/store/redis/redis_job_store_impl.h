@@ -246,7 +246,8 @@ class RedisJobStore final : public JobStore {
     bool idle() const { return due.empty() && counters.empty() && quarantined_due.empty() && !all_due; }
 
     std::map<JobId, std::uint64_t> revisions;  // latest revision of every job
-    // Fence of every job (see redis_members.h); 0: the job was never shared
+    // Fence of every job, a number that increases with every new owner (redis_members.h); 0: the job was
+    // never shared
     std::map<JobId, std::uint64_t> fences;
     std::set<JobId> lost;  // jobs that others own now: their updates are not stored
     Moved moved;           // the result of the next call of moved()
