@@ -39,7 +39,7 @@ void RoundErrors::checkpoint_taken(std::span<const RoundIndex> rounds) {
     auto& kept = tiles_[i].rounds;
     const auto later =
         std::find_if(kept.begin(), kept.end(), [&](const auto& r) { return r.first >= rounds[i]; });
-    // the error before `later` is the only earlier one that is still needed
+    // of the errors before `later`, only the latest is still needed
     if (later - kept.begin() > 1) kept.erase(kept.begin(), later - 1);
   }
 }

@@ -99,8 +99,8 @@ class AdaptiveStop {
   // Speculation: the functions below predict which rounds will probably be needed, so that workers can render
   // them ahead. They affect no pixel.
   //
-  // foresee() predicts the level at which the image will meet `target`. It does nothing until every group has
-  // kFirstForecast rounds.
+  // foresee() predicts the level (threshold for stopping) at which the image will meet `target`. It does
+  // nothing until every group of tiles has kFirstForecast rounds.
   void foresee(double target);
   // Returns how many rounds of the tile will probably be needed; never fewer than are certain to be needed.
   RoundIndex predicted_last(TileIndex tile) const;

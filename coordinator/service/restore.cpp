@@ -36,7 +36,7 @@ void set_aside(JobEntry& entry, const Error& why) {
   entry.stored.state = JobState::failed;
   entry.stored.error = entry.broken;
   entry.free_image();
-  // dropped without its end: the trace continues when the job has been repaired
+  // the trace is not ended here: it continues when the job has been repaired
   entry.trace.reset();
   log_error(fmt::format("job={}", entry.stored.id.value), entry.broken);
 }

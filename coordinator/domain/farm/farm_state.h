@@ -133,8 +133,8 @@ struct Farm::State {
   // farm_stop.cpp. Levels, and groups of tiles that stop together, are those of the stop rule
   // (adaptive_stop.h).
 
-  // Passes the error of the tile after this round, which has just been added to the image, to the stop rule
-  // and acts on its decision.
+  // Passes the error of the tile after this round, which has just been added to the image, to the stop rule,
+  // which decides how many rounds tiles get. Then acts on its decision.
   void steer(Job& job, TileIndex tile, RoundIndex round);
   void judge(Job& job);  // judges the image at every level that all groups have reached
   // judges the image at the level that all groups have reached
@@ -157,8 +157,8 @@ struct Farm::State {
   void leave_load(Job& job, const Worker& worker);  // subtracts one of the job's leases from the worker's
                                                     // count
   // Returns how many more of the job's units the worker may be leased under the limits on workers and units.
-  // Audits are exempt: the farm orders them, not the user, and an audit that waited for the user's other work
-  // would delay the end of a finished job.
+  // Audits (second renderings, for comparison) are exempt: the farm orders them, not the user, and an audit
+  // that waited for the user's other work would delay the end of a finished job.
   std::uint32_t room(const Job& job, const Worker& worker) const;
   bool limited(const Job& job) const;
   static bool has(const LeaseRecord& lease, UnitCode code);  // true if the unit is still leased under it

@@ -166,10 +166,10 @@ bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
   return true;
 }
 
-// Returns the next job for this worker: the first in turn, or a later one whose world the worker has loaded
-// (loading a world costs time), unless the later one is far ahead of its fair share. A first job that no
-// worker renders is never passed over in this way. Null if there is no job. Null also if the worker will get
-// units of the first job, but not yet: leases of another job would delay those.
+// Returns the job whose units this worker gets next. This is the first job in turn, or a later one whose
+// world (loaded scene) the worker has, since loading costs time. But a later job must not be far ahead of its
+// fair share, and a first job that no worker renders is never passed over. Null if there is no job. Null also
+// if the worker will get units of the first job, but not yet: leases of another job would delay those.
 Job* Farm::State::choose(const Worker& worker) {
   Job* fair = nullptr;
   Job* chosen = nullptr;

@@ -36,7 +36,7 @@ class CollectedBlobs final : public BlobStore {
   // removed.
   Result<Swept> sweep(const std::set<Digest>& needed);
   Result<Swept> sweep_unfinished();
-  // Hold this from a submission's first check for a blob until its job counts as needing it.
+  // Hold this lock from a submission's first check for a blob until the new job counts as needing the blob.
   std::shared_lock<std::shared_mutex> in_use() const { return std::shared_lock(using_); }
 
   bool has(const Digest& digest) const override;

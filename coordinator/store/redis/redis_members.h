@@ -82,7 +82,8 @@ struct TakenJob {
 
 struct LostJob {
   JobId id;
-  // The new owner's fence. If this node has a higher one, it has become the owner again since.
+  // The fence (a number that increases with every new owner) of the new owner. If this node has a higher one,
+  // it has become the owner again since.
   std::uint64_t fence = 0;
   bool operator==(const LostJob&) const = default;
 };

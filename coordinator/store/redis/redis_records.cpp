@@ -166,7 +166,8 @@ Result<RedisJob> parse_redis_job(const RedisReply& fields) {
   auto job = parse_stored_job(values["record"]);
   if (!job) return tl::unexpected(job.error());
   RedisJob read{std::move(*job), {}, {}, values["owner"], values["from"], 0};
-  // The record contains the fence of its last write; the hash contains the current owner's fence.
+  // The record contains the fence (number of the owner) of its last write; the hash contains that of the
+  // current owner.
   std::from_chars(values["fence"].data(), values["fence"].data() + values["fence"].size(), read.fence);
   read.job.fence = std::max(read.job.fence, read.fence);
   try {
