@@ -9,7 +9,7 @@ namespace ls::wire {
 namespace {
 
 // Returns the number of bytes of the UTF-8 character at `i` (RFC 3629: shortest forms, no surrogates, up to
-// U+10FFFF); 0 if the bytes there are no such character.
+// U+10FFFF); 0 if there is no such character at `i`.
 std::size_t character_length(const std::string& text, std::size_t i) {
   const auto byte = [&](std::size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0U; };
   const unsigned first = byte(i);

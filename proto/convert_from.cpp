@@ -125,8 +125,8 @@ Result<Health> health_from(const pb::UnitResult& in) {
     return Health{};
   auto health = parse_health(in.health().empty() ? "{}" : in.health());
   if (!health) return wrong("result.health", health.error().message);
-  // A sender that knows no causes sends only three counts. The excess of each count over `health` is added
-  // below under a cause of its own.
+  // A sender that knows no causes sends only the three counts. If a count exceeds the sum of its causes in
+  // `health`, the excess is added under a cause of its own.
   const auto rest = [](std::uint64_t stated, std::uint64_t named) {
     return stated > named ? stated - named : 0;
   };

@@ -24,7 +24,8 @@
 namespace ls::coordinator {
 namespace {
 
-// Most pruned items that are listed: further ones would hardly add information, and records stay small
+// At most this many of the scene's items that are left out of the rendering are listed, so that a job's
+// record stays small
 constexpr std::size_t kMostListed = 64;
 
 // Returns the total bytes of the files that only this part of the renderer reads.

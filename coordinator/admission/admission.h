@@ -31,9 +31,9 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
 tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitRequest& request,
                                                               const BlobStore& blobs);
 
-// Returns a job with the scene, settings and files of `before`, without id, owner and time. If `changes` has
-// any of spp, target_error and time, it replaces all three; its seed and priority also apply, and its other
-// members are ignored. failed_precondition: a file of the scene is gone.
+// Returns a new job with the scene, settings and files of the job `before`, but without id, owner and time.
+// If `changes` has any of spp, target_error and time, it replaces all three. The seed and priority of
+// `changes` also apply; its other members are ignored. failed_precondition: a file of the scene is gone.
 Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, const BlobStore& blobs);
 
 // Reads the job's reference image, for an image of this size. Errors: failed_precondition if its blob is

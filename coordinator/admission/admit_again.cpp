@@ -1,4 +1,4 @@
-// Submits the scene of an earlier job again, with other samples.
+// Makes a new job from the scene of an earlier job, with other samples per pixel, target error, time or seed.
 #include <fmt/format.h>
 
 #include "coordinator/admission/admission.h"

@@ -30,8 +30,9 @@ Health HealthTable::total() const {
   return all;
 }
 
-// Returns one line for each tile that has full rounds, then one for each tile with a truncated last round
-// (tail). A line is "f" or "t", the tile and its health.
+// Returns the health (counts of invalid values) as text: one line for the full rounds of each tile, then one
+// for each tile whose last round was truncated. A line is "f" (full) or "t" (truncated), the tile and its
+// health.
 std::string HealthTable::save() const {
   std::string text;
   for (const auto& [tile, health] : full_)

@@ -24,15 +24,15 @@
 
 namespace ls::coordinator {
 
-// Numeric health (counts of invalid values) of a job's folded units; a unit is one round (range of samples)
-// of one tile. It depends only on the units in the film (the image): a unit that was rendered twice counts
-// once, and one that is not folded does not count.
+// Numeric health (counts of invalid values) of the units in a job's film (its image); a unit is one round
+// (range of samples) of one tile. A unit that was rendered twice counts once, and one that is not in the film
+// does not count.
 class HealthTable {
  public:
-  // Adds the health of a folded unit. The health of a truncated round is kept separately: if the round is
-  // folded again with more samples, its new health replaces the old one, as its pixels do.
+  // Adds the health of a unit that was added to the film. The health of a truncated round is kept separately:
+  // if the round comes again with more samples, its new health replaces the old one, as its pixels do.
   void folded(TileIndex tile, RoundIndex round, const SampleRange& samples, const Health& health);
-  void discard(TileIndex tile);  // removes the tile's health, since the tile is folded again from round 0
+  void discard(TileIndex tile);  // removes the tile's health, since the tile begins again without samples
   Health total() const;
 
   std::string save() const;
@@ -41,12 +41,13 @@ class HealthTable {
   bool operator==(const HealthTable&) const = default;
 
  private:
-  // Health of full rounds and of truncated last rounds; only of tiles with problems
+  // Health of full rounds and of truncated last rounds; tiles without problems are left out
   std::map<TileIndex, Health> full_, tails_;
 };
 
-// The CPU cost of an image's units; a unit is one round (range of samples) of one tile. A checkpoint costs
-// what its units cost, even if some tiles already have later rounds.
+// The CPU cost of an image's units; a unit is one round (range of samples) of one tile. A checkpoint (the
+// image with a given number of rounds for each tile) costs what its units cost, even if some tiles already
+// have later rounds.
 class UnitCosts {
  public:
   explicit UnitCosts(TileIndex tiles = 0) : tiles_(tiles) {}
@@ -67,8 +68,8 @@ class UnitCosts {
   double sum_ = 0;
 };
 
-// An accepted partial that is not folded yet. If `partial` is empty, its pixels are read from `place` in the
-// log.
+// An accepted partial (encoded pixel sums of a unit) that is not in the film yet. If `partial` is empty, its
+// pixels are read from `place` in the log.
 struct WaitingPartial {
   std::optional<Partial> partial;
   std::optional<PartialLog::Place> place;
@@ -112,9 +113,10 @@ class Assembly {
   // kMaxPendingPartials, its pixels are dropped and read from the log later.
   void hold(TileIndex tile, RoundIndex round, WaitingPartial waiting);
   std::optional<WaitingPartial> take(TileIndex tile, RoundIndex round, SampleRange samples);
-  void forget_round(RoundIndex round);  // drops waiting partials of a truncated round that was reopened
+  // drops waiting partials of a truncated round that is to be rendered again in full
+  void forget_round(RoundIndex round);
   void forget_waiting();
-  void discard(TileIndex tile);  // drops everything about the tile, since it is folded again from round 0
+  void discard(TileIndex tile);  // drops everything about the tile, since it begins again without samples
   std::size_t waiting() const { return waiting_.size(); }
   bool holds(TileIndex tile, RoundIndex round) const { return waiting_.contains({tile, round}); }
 
@@ -123,10 +125,10 @@ class Assembly {
   const Film& film() const { return film_; }
   const RoundErrors& errors() const { return errors_; }
   const HealthTable& health() const { return health_; }
-  UnitCosts& costs() { return costs_; }  // costs of accepted units, folded or not
+  UnitCosts& costs() { return costs_; }  // costs of accepted units, whether or not they are in the film
   void checkpoint_taken(std::span<const RoundIndex> rounds) { errors_.checkpoint_taken(rounds); }
-  // Returns for each tile how many folded rounds a job of `spp` samples per pixel can use. A truncated last
-  // round (tail) that was cut for fewer samples does not count.
+  // Returns for each tile how many of its rounds in the film a job of `spp` samples per pixel can use. A
+  // truncated last round that was cut for fewer samples does not count.
   std::vector<RoundIndex> rounds_for(std::uint64_t spp) const;
   std::uint64_t folds_since_snapshot = 0;
 

@@ -105,7 +105,8 @@ json denoised_of(const ReportFacts& facts) {
   return j;
 }
 
-// Returns the target error that is meant for the image itself, whose errors make the curve.
+// Returns the target error if it is that of the image itself. The convergence curve shows the errors of the
+// image, not those of its denoised layers.
 std::optional<double> target_of_image(const JobSpec& spec) {
   return spec.target_layer == TargetLayer::raw ? spec.target_error : std::nullopt;
 }
@@ -119,8 +120,8 @@ json checks_of(const std::vector<DenoisedCheck>& checks) {
   return all;
 }
 
-// Returns a forecast of the cost of reaching the job's target error. If there is none, or it is reached, the
-// forecast is for half of the present error.
+// Returns a forecast of the cost of reaching the job's target error. If the job has no target error or has
+// reached it, the forecast is for half of the present error.
 json forecast(const ReportFacts& facts) {
   if (facts.convergence.empty()) return {};
   const double now = facts.convergence.back().error.relmse;
@@ -293,7 +294,7 @@ std::string report_json(const ReportFacts& facts) {
          {"stopped", job.stopped ? json(to_string(*job.stopped)) : json()},
          {"warnings", job.warnings},
          {"convergence", std::move(curve)}};
-  // This program has written both texts; older records have none.
+  // Both texts were written by this program. Jobs stored by older versions have none.
   j["needs"] = job.needs.empty() ? json() : json::parse(job.needs, nullptr, false);
   j["analysis"] = job.analysis.empty() ? json() : json::parse(job.analysis, nullptr, false);
   j["techniques"] = json::parse(techniques_json(job.techniques, job.settings.integrator));

@@ -41,7 +41,7 @@ void ReferenceTiles::checkpoint_taken(std::span<const RoundIndex> rounds) {
     auto& kept = tiles_[t].rounds;
     const auto later =
         std::find_if(kept.begin(), kept.end(), [&](const auto& r) { return r.first >= rounds[t]; });
-    // the picture before `later` is the only earlier one that is still needed
+    // of the pictures before `later`, only the latest is still needed
     if (later - kept.begin() > 1) kept.erase(kept.begin(), later - 1);
   }
 }

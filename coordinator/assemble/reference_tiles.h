@@ -24,19 +24,20 @@ struct TilePicture {
 
 class ReferenceTiles {
  public:
-  // Starts with the picture of each tile in `film`. If tiles are partly folded already (after a restart),
-  // their earlier pictures are unknown.
+  // Starts with the picture of each tile in `film`. If `film` has rounds already (after a restart), the
+  // tiles' earlier pictures are unknown.
   explicit ReferenceTiles(const Film& film);
 
-  // Keeps the tile's picture after this round. Call after each fold, when `film` includes it.
+  // Keeps the tile's picture after this round. Call it each time a round was added to `film`.
   void folded(TileIndex tile, RoundIndex round, const Film& film);
   // Returns the picture of each tile after `rounds[tile]` rounds. A tile with fewer rounds gives its latest
   // picture. nullopt: the picture of some tile is lost, because the coordinator was restarted meanwhile.
   std::optional<std::vector<TilePicture>> at(std::span<const RoundIndex> rounds) const;
-  // Called when the tile is to be folded again from round 0
+  // Called when the tile begins again without samples
   void discard(TileIndex tile) { tiles_[tile].rounds.clear(); }
   std::optional<std::vector<TilePicture>> latest() const;
-  // Drops pictures that are no longer needed. Later calls of at() must not have fewer rounds for any tile
+  // Drops pictures that no later checkpoint needs. From now on, at() must not be asked for fewer rounds of
+  // any tile than `rounds`.
   void checkpoint_taken(std::span<const RoundIndex> rounds);
 
  private:

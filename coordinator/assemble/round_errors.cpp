@@ -39,7 +39,7 @@ void RoundErrors::checkpoint_taken(std::span<const RoundIndex> rounds) {
     auto& kept = tiles_[i].rounds;
     const auto later =
         std::find_if(kept.begin(), kept.end(), [&](const auto& r) { return r.first >= rounds[i]; });
-    // the error before `later` is the only earlier one that is still needed
+    // of the errors before `later`, only the latest is still needed
     if (later - kept.begin() > 1) kept.erase(kept.begin(), later - 1);
   }
 }
@@ -83,8 +83,8 @@ class Reader {
 }  // namespace
 
 // Returns the errors of one tile as bytes: u32 count, then {u32 round, TileError} of each kept round; u32
-// count, then the relative error sums as doubles. Only builds with the same layout can read them: the
-// snapshot contains the name of its format, and other builds ignore it.
+// count, then the relative error sums as doubles. Only builds with the same memory layout can read these
+// bytes. A snapshot contains the name of its format, and other builds ignore it.
 std::vector<std::byte> RoundErrors::save_tile(TileIndex tile) const {
   const Tile& t = tiles_[tile];
   std::vector<std::byte> out;

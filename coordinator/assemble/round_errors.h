@@ -17,26 +17,27 @@ namespace ls::coordinator {
 
 class RoundErrors {
  public:
-  // If `keep_relative`, the relative error sum of every fold is never dropped: the farm's stop rule needs
-  // these sums after a restart.
+  // If `keep_relative`, the relative error sums after all rounds are kept for good: the farm's rule that
+  // stops tiles at a target error needs them after a restart.
   RoundErrors(TileIndex tiles, bool keep_relative) : tiles_(tiles), keep_relative_(keep_relative) {}
 
   // Adds the tile's error after this round. The rounds of a tile come in order. If a truncated round comes
   // again in full, its new error replaces the old one.
   void folded(TileIndex tile, RoundIndex round, const TileError& error);
   // Returns the sum of all tiles' errors, in tile order, each after `rounds[tile]` rounds. A tile that has
-  // fewer rounds counts with its last. If only later rounds of a tile are kept, because it was ahead at an
-  // earlier checkpoint, it counts with the first of these.
+  // fewer rounds counts with the error after its latest round. If only later rounds of a tile are kept,
+  // because it was ahead at an earlier checkpoint, the first of these counts.
   TileError at(std::span<const RoundIndex> rounds) const;
   // True if at(rounds) is exact: all errors that it needs are still there.
   bool knows(std::span<const RoundIndex> rounds) const;
-  // Called when the tile is to be folded again from round 0
+  // Called when the tile begins again without samples
   void discard(TileIndex tile) { tiles_[tile] = {}; }
-  // Drops errors that are no longer needed. Later calls of at() must not have fewer rounds for any tile
+  // Drops errors that no later checkpoint needs. From now on, at() must not be asked for fewer rounds of any
+  // tile than `rounds`.
   void checkpoint_taken(std::span<const RoundIndex> rounds);
 
-  // Returns the relative error sums as [round][tile]; empty unless they are kept. The sum is 0 for tiles that
-  // have not reached a round.
+  // Returns the relative error sums as [round][tile]; empty unless `keep_relative`. The sum is 0 for tiles
+  // that have not reached a round.
   std::vector<std::vector<double>> relative() const;
 
   std::vector<std::byte> save_tile(TileIndex tile) const;

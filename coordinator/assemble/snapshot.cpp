@@ -12,7 +12,8 @@ namespace {
 static_assert(std::endian::native == std::endian::little);
 constexpr std::string_view kMagic = "LSSNAP2\n";
 constexpr std::uint32_t kEnd = ~std::uint32_t{0};
-constexpr std::uint64_t kMostPart = std::uint64_t{1} << 32;  // most bytes of one part of one tile
+// at most this many bytes in one of the three parts (film, errors, health) of a tile
+constexpr std::uint64_t kMostPart = std::uint64_t{1} << 32;
 
 struct TileHead {
   std::uint32_t tile = 0;

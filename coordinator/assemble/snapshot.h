@@ -1,7 +1,7 @@
-// A snapshot is a file of a job's folded image, tile by tile. Writing or reading it needs memory for one tile
-// besides the film (the image in memory). Each tile is saved in the state in which it was added, so folding
-// may continue meanwhile. After a restart, rounds that were folded later are folded again from the partials
-// (the stored results of units). Format:
+// A snapshot is a file with a job's image so far, tile by tile. Writing or reading it needs memory for one
+// tile besides the film (the image in memory). Each tile is saved in the state in which it was added to the
+// file, so folding (adding rounds of samples to the film) may continue meanwhile. After a restart, rounds
+// that were folded after the snapshot are folded again from the partials (the stored results). Format:
 //    "LSSNAP2\n", u64 length and name of the format, i32 width, height, tile, u32 AOVs; per tile u32 tile,
 //    u64 lengths of its three parts, and these: film (film_bytes.cpp), error sums, health; u32 2^32 - 1;
 //    SHA-256 of all preceding bytes
@@ -34,8 +34,9 @@ class SnapshotFile {
   // Creates the file under the name `path` followed by `suffix`; commit() gives it the name `path`.
   static Result<SnapshotFile> create(const std::filesystem::path& path, std::string_view suffix,
                                      const TileGrid& grid, AovSet aovs, std::string_view format);
-  Result<void> add(const TileSnapshot& tile);  // adds each tile once; tiles without folds are skipped
-  Result<void> finish();  // writes the seal and makes the file durable, still under its temporary name
+  Result<void> add(const TileSnapshot& tile);  // adds each tile once; a tile without samples is skipped
+  // writes the SHA-256 and makes the file durable, still under its temporary name
+  Result<void> finish();
   Result<void> commit();  // gives the file its final name; call after finish()
 
  private:
@@ -45,24 +46,24 @@ class SnapshotFile {
   Sha256 hash_;
 };
 
-// Reads a snapshot. nullopt if the file is missing, damaged or of another grid, AOV set or format: then the
-// image is folded again from the partials (the stored results of units).
+// Reads a snapshot. nullopt if the file is missing, damaged or of another grid, AOV set or format. The caller
+// then sums up the image again from the partials (the stored results).
 std::optional<Assembly> load_snapshot(const std::filesystem::path& path, const TileGrid& grid,
                                       bool keep_relative, std::string_view format, AovSet aovs = {});
 
-// Finds the tiles in a snapshot, so that only some of them need to be read. The seal of the file is not
-// checked: each tile has its own checksum.
+// Finds the tiles in a snapshot, so that only some of them need to be read. The SHA-256 of the whole file is
+// not checked: each tile has its own checksum.
 class SnapshotTiles {
  public:
   // returns nullopt for the same reasons as load_snapshot()
   static std::optional<SnapshotTiles> open(const std::filesystem::path& path, const TileGrid& grid,
                                            AovSet aovs, std::string_view format);
-  // Loads the tile's pixels into `film`; leaves `film` unchanged if the tile has no folded rounds.
+  // Loads the tile's pixels into `film`; leaves `film` unchanged if the tile has no samples.
   Result<void> load(TileIndex tile, Film& film) const;
 
  private:
   struct Place {
-    std::uint64_t at = 0, length = 0;  // position in the file; length 0: the tile has no folded rounds
+    std::uint64_t at = 0, length = 0;  // position in the file; length 0: the tile has no samples
   };
   std::filesystem::path path_;
   File file_;

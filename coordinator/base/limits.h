@@ -1,4 +1,5 @@
-// All limits of the coordinator's service, store and assembler.
+// All limits of the coordinator's service, store and assembler. A constant kMax... is the largest value
+// allowed.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +14,8 @@ namespace ls::coordinator::limits {
 
 // Bytes of one file of a scene: 64 GiB
 inline constexpr std::uint64_t kMaxBlobBytes = std::uint64_t{1} << 36;
-inline constexpr std::uint64_t kMaxBlobRead = std::uint64_t{256} << 20;  // most bytes that one read() returns
-// Most interrupted uploads that are kept so that they can be resumed
+inline constexpr std::uint64_t kMaxBlobRead = std::uint64_t{256} << 20;  // bytes that one read() returns
+// Interrupted uploads that are kept so that they can be resumed
 inline constexpr std::size_t kMaxUnfinishedUploads = 1024;
 // Bytes of one file that a scene includes
 inline constexpr std::uint64_t kMaxIncludeBytes = std::uint64_t{32} << 20;
@@ -23,12 +24,12 @@ inline constexpr Duration kMissingBlobLook = std::chrono::seconds(1);
 
 // Submission
 inline constexpr std::size_t kMaxSceneText = std::size_t{32} << 20;
-inline constexpr std::size_t kMaxAssets = 100'000;  // most files that one submission may name
+inline constexpr std::size_t kMaxAssets = 100'000;  // files that one submission may name
 inline constexpr std::size_t kMaxWarnings = 100;    // warnings kept per job
 // Longer names of jobs and workers are cut to this many bytes
 inline constexpr std::size_t kMaxShownName = 256;
 inline constexpr std::size_t kMaxJobs = 100'000;       // jobs kept; every frame of a sequence counts as one
-inline constexpr std::size_t kMaxJobsOfUser = 25'000;  // most jobs of one user among the kMaxJobs
+inline constexpr std::size_t kMaxJobsOfUser = 25'000;  // how many of the kMaxJobs one user may have
 using ls::kMaxFramePixels;
 using ls::kMaxFrameSide;
 using ls::kMaxSpp;
@@ -41,9 +42,9 @@ inline constexpr std::size_t kMaxSequenceText = std::size_t{512} << 20;
 // Tiles of all frames together; each takes 24 bytes of memory from the start
 inline constexpr std::uint64_t kMaxSequenceTiles = std::uint64_t{1} << 24;
 inline constexpr std::size_t kMaxSequenceFiles = std::size_t{1} << 20;  // asset files of all frames together
-// Most pixels of all finished frames together that one change of a sequence may resume at once
+// Pixels, in total, of the finished frames of a sequence that one change may resume together
 inline constexpr std::uint64_t kMaxWokenPixels = std::uint64_t{1} << 26;
-// Sequences with more frames send progress events less often
+// Sequences with more frames than this send progress events less often
 inline constexpr std::size_t kFramesPerEvent = 2500;
 
 // Videos of sequences
@@ -52,13 +53,13 @@ inline constexpr double kMaxVideoStops = 32;  // exposure, positive or negative
 inline constexpr int kMaxVideoSide = 3840;    // pixels; larger images are shown at half the size, and so on
 inline constexpr std::uint64_t kMaxVideoBytes = std::uint64_t{2} << 30;
 inline constexpr std::size_t kMaxVideosWaiting = 8;               // videos that wait while one is made
-inline constexpr Duration kMaxVideoTime = std::chrono::hours(1);  // to make one video
+inline constexpr Duration kMaxVideoTime = std::chrono::hours(1);  // time to make one video
 // ffmpeg is killed when it takes no pixels, or does not end after the last ones, for this long
 inline constexpr Duration kVideoStallLimit = std::chrono::minutes(2);
 
 // Results. A partial is the encoded result of one unit (one round of one tile). The limits in bytes apply to
-// all jobs together. They are chosen so that a job with a UHD film of 8.3 million pixels at 48 bytes each
-// stays below 600 MB.
+// all jobs together. They are chosen so that the coordinator needs less than 600 MB of memory for a job with
+// a UHD film (8.3 million pixels at 48 bytes each) and some tens of workers.
 
 // Bytes of one partials-NNN.seg file, a segment of a job's log of partials
 inline constexpr std::uint64_t kMaxSegmentBytes = std::uint64_t{64} << 20;
@@ -69,16 +70,16 @@ inline constexpr std::size_t kMaxResultsWaiting = std::size_t{32} << 20;
 // Bytes of decoded partials that wait for an earlier round of their tile; above this, partials are dropped
 // from memory and read from the segments when they are needed
 inline constexpr std::size_t kMaxPendingPartials = std::size_t{32} << 20;
-inline constexpr std::size_t kMaxCommitBatch = 256;  // most results made durable by one fdatasync
+inline constexpr std::size_t kMaxCommitBatch = 256;  // results made durable by one fdatasync
 inline constexpr int kVerifyThreads = 2;
 
 // Workers
 inline constexpr std::size_t kMaxWorkers = 16'384;
 inline constexpr std::size_t kMaxTags = 64;
 
-// Snapshots of a job's image. A snapshot is taken when kSnapshotUnits units have been folded (added to the
-// image) since the last one, or when kSnapshotSeconds have passed. Folding that many units again after a
-// crash takes about 2 s
+// Snapshots of a job's image. A snapshot is taken when kSnapshotUnits units have been added to the image
+// since the previous one, or when kSnapshotSeconds have passed. Adding that many units again after a crash
+// takes about 2 s
 inline constexpr std::uint64_t kSnapshotUnits = 8192;
 inline constexpr double kSnapshotSeconds = 60;
 

@@ -51,9 +51,9 @@ std::vector<std::vector<TileIndex>> stop_groups(const TileGrid& grid) {
 
 namespace {
 
-// The first round that may be a tile's last: the one with which every pixel has kMinSppBeforeStop samples.
+// The earliest round after which a tile may stop: with it every pixel has kMinSppBeforeStop samples.
 constexpr RoundIndex kFirstStop = round_count(kMinSppBeforeStop) - 1;
-// Rounds that every group needs before a forecast; together they have 8 samples per pixel
+// Number of rounds that every group of tiles needs before a forecast; together they have 8 samples per pixel
 constexpr RoundIndex kFirstForecast = 3;
 
 constexpr double samples_after(RoundIndex round) { return static_cast<double>(round_range(round).s1); }
@@ -218,8 +218,9 @@ void AdaptiveStop::foresee(double target) {
   const auto samples = [&](double variance, double root_level) {
     return std::clamp(std::sqrt(variance) / root_level, least, most);
   };
-  // The error of the image grows with the level, so the level for `target` is found by bisection on its
-  // exponent. The midpoint is a square root, which has the same bits on every machine.
+  // The error of the image grows with the level (the threshold at which groups of tiles stop), so the level
+  // for `target` is found by bisection on its exponent. The midpoint is a square root, which has the same
+  // bits on every machine.
   double low = 0x1p-100, high = 0x1p40;
   for (int i = 0; i < 40; ++i) {
     const double middle = std::sqrt(low * high);

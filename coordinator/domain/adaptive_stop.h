@@ -18,12 +18,13 @@
 // smaller target continues where a larger one ended, so an extended job has the same bits as one that had the
 // smaller target from the start.
 //
-// The decision to stop after round k uses the errors of the rounds before k and predicts the error at k (the
-// variance falls as 1/n; samplers that converge faster make the image better than requested): the error of a
-// group's own last round would bias the decision towards stopping. The image's error is predicted in the same
-// way. Only when it meets the target are the errors of the last rounds checked, too, and they may make the
-// image continue. Nothing stops before kMinSppBeforeStop. The cost per sample is taken to be equal
-// everywhere: measured times would make pixels depend on the machine. An unknown error (NaN) stops nothing.
+// The decision to stop after round k does not use the error after round k: a group's own last error would
+// bias the decision towards stopping. Instead the error after round k is predicted from the rounds before k,
+// with a variance that falls as 1/n. (Samplers that converge faster make the image better than requested.)
+// The image's error is predicted in the same way. Only when this prediction meets the target are the errors
+// of the last rounds checked, too, and they may make the image continue. No tile stops before
+// kMinSppBeforeStop samples per pixel. The cost per sample is taken to be equal everywhere: measured times
+// would make pixels depend on the machine. An unknown error (NaN) stops nothing.
 //
 // Both this rule and the error estimates that it reads use only +, -, *, / and square roots, which give the
 // same bits on every machine: another coordinator that takes over the job makes the same decisions.
@@ -40,47 +41,48 @@
 
 namespace ls::coordinator {
 
-// Returns the groups of tiles that stop getting samples together: the tiles of each ascending, the groups in
-// the order of their first tiles. Every tile is in exactly one group. A decision to stop that rests on few
-// pixels biases the image, so at least kMinStopPixels pixels decide together: small tiles form blocks, and
-// the remainder at the right and bottom edges joins the neighbouring block. Only an image of fewer pixels
-// forms one smaller group. The groups depend on the tiling alone.
+// Returns the groups of tiles that stop getting samples together. The tiles of a group are ascending, and the
+// groups are in the order of their first tiles. Every tile is in exactly one group. A decision to stop that
+// rests on few pixels biases the image, so at least kMinStopPixels pixels decide together: small tiles form
+// blocks, and the remainder at the right and bottom edges joins the neighbouring block. An image with fewer
+// pixels forms a single group. The groups depend on the tiling alone.
 std::vector<std::vector<TileIndex>> stop_groups(const TileGrid& grid);
 
-// Returns the next level below `gain`: the largest number of the grid {2^(-j/4)}, j any integer, that is less
-// than `gain`. Returns 0 for 0.
+// Returns the next level (threshold for stopping) below `gain`: the largest number of the grid {2^(-j/4)}, j
+// any integer, that is less than `gain`. Returns 0 for 0.
 double level_below(double gain);
 
 class AdaptiveStop {
  public:
-  // `spp` is the sample limit: the most samples per pixel that any tile gets.
+  // `spp` is the sample limit: no tile gets more samples per pixel.
   AdaptiveStop(const TileGrid& grid, std::uint64_t spp);
 
-  // Adds the error of the tile after rounds 0..round, which are now folded. `rel_error_sum` is the sum of the
-  // relative squared error over the tile's pixels and channels (TileError::relative.squares). The rounds of
-  // one tile must come in order; tiles may come in any order.
+  // Adds the error of the tile after rounds 0..round, which are in the image now. `rel_error_sum` is the sum
+  // of the relative squared error over the tile's pixels and channels (TileError::relative.squares). The
+  // rounds of one tile must come in order; tiles may come in any order.
   void folded(TileIndex tile, RoundIndex round, double rel_error_sum);
 
-  // Returns the last round of the tile that is certain to be needed: rounds up to this one may be folded.
-  // Once the image is accepted, this is the tile's last round.
+  // Returns the last round of the tile that is certain to be needed: rounds up to this one may be added to
+  // the image. Once the image is accepted, this is the tile's last round.
   RoundIndex wanted(TileIndex tile) const { return groups_[group_of_[tile]].stop; }
 
-  // Returns the tiles of this tile's group, which all stop together. The tile itself is one of them.
+  // Returns the group of tiles that stop together with this tile, including the tile itself.
   std::span<const TileIndex> neighbours(TileIndex tile) const { return groups_[group_of_[tile]].tiles; }
 
-  // True if all groups have stopped at this level.
+  // True if all groups of tiles have stopped at the current level.
   bool settled() const { return settled_ == groups_.size(); }
-  // Whether the image's relMSE at this level is at most `target`. `unknown`: not all groups have stopped, or
-  // the error of some group's last round is not known yet.
+  // Whether the image's relMSE at the current level is at most `target`. `unknown`: not all groups of tiles
+  // have stopped, or the error of some group's last round is not known yet.
   enum class Verdict { unknown, no, yes };
   Verdict judge(double target) const;
-  // Returns the relMSE of the image at this level, predicted from the rounds before each tile's last.
+  // Returns the relMSE of the image at the current level, predicted from the rounds before each tile's last.
   // Requires settled().
   double predicted() const;
-  // True if every group has reached the sample limit, so that no group can continue.
+  // True if every group of tiles has reached the sample limit, so that none can continue.
   bool exhausted() const;
-  // Goes to the next level. Requires settled() and not exhausted(). If no group's gain is known to be
-  // positive, all groups continue to the sample limit.
+  // Goes to the next lower level (threshold for stopping), at which some groups of tiles may continue.
+  // Requires settled() and not exhausted(). If no group's gain (the error that one more round removes per
+  // sample) is known to be positive, all groups continue to the sample limit.
   void lower();
   double level() const { return level_; }
 
@@ -88,17 +90,17 @@ class AdaptiveStop {
   std::vector<RoundIndex> ends() const;
   double mean_spp() const;  // samples per pixel at this level, mean over all pixels
 
-  // True if at least one group has reached the sample limit.
+  // True if at least one group of tiles has reached the sample limit.
   bool bound() const;
-  // Raises the sample limit to `spp` samples per pixel. Requires !bound(): a group that reached the old limit
-  // might have continued under a higher one.
+  // Raises the sample limit to `spp` samples per pixel. Requires !bound(): a group of tiles that reached the
+  // old limit might have continued under a higher one.
   void extend(std::uint64_t spp);
 
   // Speculation: the functions below predict which rounds will probably be needed, so that workers can render
   // them ahead. They affect no pixel.
   //
-  // foresee() predicts the level at which the image will meet `target`. It does nothing until every group has
-  // kFirstForecast rounds.
+  // foresee() predicts the level (threshold for stopping) at which the image will meet `target`. It does
+  // nothing until every group of tiles has kFirstForecast rounds.
   void foresee(double target);
   // Returns how many rounds of the tile will probably be needed; never fewer than are certain to be needed.
   RoundIndex predicted_last(TileIndex tile) const;
@@ -109,7 +111,7 @@ class AdaptiveStop {
   // before foresee() has predicted them.
   std::optional<double> samples_left() const;
   double samples_to_limit() const;  // how many pixel samples are still to be taken up to the sample limit
-  // Number of rounds added so far, summed over all groups
+  // Number of rounds added so far, summed over all groups of tiles
   std::uint64_t rounds_seen() const { return rounds_seen_; }
   std::size_t groups() const { return groups_.size(); }
 
@@ -122,7 +124,7 @@ class AdaptiveStop {
     RoundIndex predicted_last = 0;  // the round that will probably be its last
     bool settled = false;           // true if `stop` is the group's last round at this level
   };
-  // Variance per sample, estimated from rounds 0..round
+  // Variance per sample, estimated from the error after rounds 0..round
   double variance(const Group& g, RoundIndex round) const;
   // Pixel samples that the group still needs up to the end of round `last`
   double samples_missing(const Group& g, RoundIndex last) const;

@@ -7,10 +7,10 @@
 // kDenoisedCheckGrowth. Which levels these are depends neither on the target nor on earlier checks, so a job
 // that is given a smaller target continues as if it had had it from the start.
 //
-// The job ends when at two checks in succession the upper end of the interval is at most the target. An
-// estimate that happens to be low at one check is so likely not low at the next one, which has other samples
-// too. A check without an interval meets no target. An image without noise ends at the first check that meets
-// the target: its pixels will not change any more.
+// The job ends when at two successive checks the upper end of the error's 95 % interval is at most the
+// target. One check is not enough, since its estimate may be low by chance; the next check includes further
+// samples. A check without an interval meets no target. An image without noise ends at the first check that
+// meets the target: its pixels will not change any more.
 //
 // A denoiser may give different results on different machines. So each check is made once, by the
 // coordinator, and stored with the job: after a restart, or at another coordinator, the stored values decide.
@@ -21,7 +21,7 @@
 
 namespace ls::coordinator {
 
-// The error of the denoised layers at one level of the stop rule.
+// The error of the denoised layers at one level of the stop rule (adaptive_stop.h).
 struct DenoisedCheck {
   double spp = 0;     // samples per pixel at this level, mean over all pixels; identifies the level
   double relmse = 0;  // estimated; noise can bring it below 0
@@ -35,14 +35,14 @@ class DenoisedTarget {
   // `made` are the checks that are stored with the job.
   explicit DenoisedTarget(std::vector<DenoisedCheck> made = {}) : made_(std::move(made)) {}
 
-  // Says whether the job ends at the level with `spp` samples per pixel. Levels come in order, and the last
-  // one may come again, with another target. `check`: the error of the denoised layers must be known first.
+  // Says whether the job ends at the level with `spp` samples per pixel. Levels come in order; the latest one
+  // may come again, with another target. `check`: the error of the denoised layers must be known first.
   enum class Answer { go_on, check, end };
   Answer judge(double spp, double target);
   void add(const DenoisedCheck& check);
-  // True if the last check meets the target.
+  // True if the error was checked at the latest level at which judge() wanted a check, and meets the target.
   bool met(double target) const;
-  // True if the last level that judge() was asked about is checked, or is to be.
+  // True if the level with `spp` samples per pixel is the latest one at which judge() wanted a check.
   bool due(double spp) const { return spp == due_; }
 
   // Predicts by which factor the image's own error is still to fall before the job ends. Affects no pixel.

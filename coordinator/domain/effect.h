@@ -25,8 +25,8 @@ struct Send {
 };
 
 // These units are no longer part of this lease (the list of units that the worker was told to render). If
-// they are still needed and no other lease holds them, they wait for another worker. Under an audit's lease
-// the unit has an accepted result already.
+// they are still needed and no other lease holds them, they wait for another worker. `audit`: the lease was
+// an audit, in which a unit that has an accepted result is rendered again for comparison.
 struct UnitsFreed {
   JobId job;
   LeaseId lease;
@@ -45,8 +45,8 @@ struct RecordUnit {
   WorkerId worker;
 };
 
-// Fold this unit's accepted partial into the film, then raise the event UnitFolded. The farm requests the
-// rounds of a tile in order, each once, and never one after the tile's last round.
+// Add this unit's accepted partial (pixel sums) to the film (the image), then raise the event UnitFolded. The
+// farm requests the rounds of a tile in order, each once, and never one after the tile's last round.
 struct Fold {
   UnitKey unit;
   SampleRange samples;
@@ -83,10 +83,10 @@ struct JobStateChanged {
   JobState from = JobState::queued;
   JobState to = JobState::queued;
 };
-// Every tile has at least as many rounds folded as `rounds` gives for it. The service adds a point to the
-// convergence curve and may take a snapshot. With a target error, tiles have different numbers of rounds:
-// those of one level of the stop rule (coordinator/domain/adaptive_stop.h). The checkpoints and their order
-// do not depend on the order in which results arrive.
+// The image has at least `rounds[tile]` rounds of each tile. The service adds a point to the convergence
+// curve and may take a snapshot. With a target error, tiles have different numbers of rounds: those of one
+// level of the stop rule (coordinator/domain/adaptive_stop.h). The checkpoints and their order do not depend
+// on the order in which results arrive.
 struct Checkpoint {
   JobId job;
   std::vector<RoundIndex> rounds;  // for each tile, how many of its rounds the checkpoint includes
@@ -100,8 +100,9 @@ struct CheckDenoised {
   JobId job;
   double spp = 0;
 };
-// A job is extended whose last round `round` was truncated by its old sample count. The round is rendered
-// again in full: the service replaces the part that is folded (the tail), and the round's partials are void.
+// The job has been extended, but its old sample count had truncated its last round, `round`. This round is
+// rendered again in full: the service replaces the part that is in the image (the tail), and the round's
+// partials are void.
 struct ReopenRound {
   JobId job;
   RoundIndex round = 0;
@@ -139,8 +140,8 @@ struct WorkerFoundFaulty {
   UnitKey unit;  // the unit whose differing results revealed it
   std::string evidence;
 };
-// The film of this tile is void, since a quarantined worker rendered part of it. The tile is folded again
-// from round 0, and none of its earlier results count.
+// The pixels of this tile are void, since a quarantined worker rendered part of them. The tile is summed up
+// again from round 0, and none of its earlier results count.
 struct TileDiscarded {
   JobId job;
   TileIndex tile = 0;

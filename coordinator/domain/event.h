@@ -1,7 +1,7 @@
 // Events: the farm's inputs. Every fact on which a decision depends arrives as an event; the farm reads no
 // clock and no file.
 // A unit is one round (range of samples) of one tile; a lease is a set of units that one worker was told to
-// render.
+// render. A numeric class is a set of machines that compute the same bits.
 #pragma once
 
 #include <cstdint>
@@ -37,15 +37,15 @@ struct JobPlan {
   std::string replay = "lightshaft render SCENE";
   // Limits and fair shares (fair_share.h, docs/design/scheduling.md)
   std::string owner;  // the user (JobView::owner); empty: the administrator, to whom no user limits apply
-  // The sequence whose frame this job is; empty: the job is alone. Jobs of one owner and group count as one
-  // job for fair shares, and run in order.
+  // The sequence (a job with frames) that this job is a frame of; empty: the job is no frame. Jobs of one
+  // owner and group count as one job for fair shares, and run in order.
   std::string group;
   // Limits of the job, or of all jobs of its group together
-  std::uint32_t max_workers = 0;   // most workers that hold units at the same time; 0: no limit
-  std::uint32_t max_units = 0;     // most units leased at the same time; 0: no limit
-  std::uint64_t memory_bytes = 0;  // the least a worker needs for this job; 0: unknown
-  // The beginning of the hexadecimal digits, or of the platform, of the numeric class that is to render it.
-  // Empty: any class may begin it
+  std::uint32_t max_workers = 0;   // at most this many workers hold units at the same time; 0: no limit
+  std::uint32_t max_units = 0;     // at most this many units are leased at the same time; 0: no limit
+  std::uint64_t memory_bytes = 0;  // memory that a worker needs for this job; 0: unknown
+  // The numeric class that is to render the job: the first of its hexadecimal digits, or the beginning of its
+  // platform's name. Empty: any class may begin the job
   std::string class_asked;
   // Pixels of the frame whose tiles are leased before all other tiles; nullopt: all tiles are treated alike.
   // It changes the order in which units are leased, and nothing about the image.
@@ -73,11 +73,11 @@ struct JobRestored {
   std::optional<StopReason> stopped;    // set for a job that is done
   std::optional<Digest> numeric_class;  // the class that the job is pinned to
   std::vector<Unit> accepted;           // accepted results that still exist after the restart, in any order
-  // For each tile, how many rounds the restored film has folded, a truncated last round included. Empty: no
-  // film was restored. Required for a job that is done.
+  // For each tile, how many rounds the restored image has, a truncated last round included. Empty: no image
+  // was restored. Required for a job that is done.
   std::vector<RoundIndex> folded;
-  // rel_error[round][tile]: UnitFolded::rel_error_sum of each folded round; only for a job with a target
-  // error
+  // rel_error[round][tile]: UnitFolded::rel_error_sum of each round in the image; only for a job with a
+  // target error
   std::vector<std::vector<double>> rel_error;
   double elapsed_seconds = 0;  // from the first ray until the restart
   // An audit (an accepted result that another worker renders again) that was open at the restart
@@ -148,8 +148,8 @@ struct WorkerJoined {
   // Memory that the worker's renderer may use; 0: unknown, and then any job may go to it
   std::uint64_t memory_bytes = 0;
   std::vector<Digest> blobs_held;  // blobs in its cache, most recently used first
-  // False: it gets units only of jobs that are pinned to its numeric class already, as a worker of another
-  // version than the coordinator's does
+  // False: the worker gets only units of jobs that are already pinned to its numeric class. This holds for
+  // workers of another version than the coordinator's.
   bool may_begin = true;
   std::string platform = {};  // machine and build of its numeric class in words
 };
@@ -183,8 +183,9 @@ struct LeaseCameBack {
 
 // Units
 
-// A verified result of this numeric class is about to be made durable. If the job is pinned to no class yet,
-// it is pinned to this one, so that its log never holds results of two classes.
+// A verified result of this numeric class is about to be made durable. If the job has no class yet, it is
+// pinned to this one: from now on only workers of this class may render it. So its log never holds results of
+// two classes.
 struct ClassChosen {
   JobId job;
   Digest numeric_class;
@@ -200,8 +201,8 @@ struct UnitAccepted {
   // Seconds that the rendering thread waited for a core or for memory while it rendered the unit: CoreShare
   double wait_seconds = 0;
 };
-// The result of a unit (one tile, one range of its samples) has been added to the image, as the farm asked
-// with a Fold (effect.h).
+// The result of a unit (one tile, one range of its samples) has been added to the image, as the effect Fold
+// (effect.h) requested.
 struct UnitFolded {
   UnitKey unit;
   SampleRange samples;  // the same as in the Fold
@@ -209,8 +210,8 @@ struct UnitFolded {
   // TileError::relative.squares of common/image/error/error_estimate.h.
   double rel_error_sum = 0;
 };
-// The error of the denoised layers at a level of the stop rule, which the farm asked for with a CheckDenoised
-// (effect.h). It is stored already.
+// The error of the denoised layers at a level of the stop rule, which the effect CheckDenoised (effect.h)
+// requested. It is stored already.
 struct DenoisedChecked {
   JobId job;
   DenoisedCheck check;

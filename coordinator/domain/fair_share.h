@@ -38,7 +38,7 @@ class FairShare {
   void charge(Job& job, double seconds);
   void spend(Job& job, double seconds);
   // Forgets users and groups that have no work and whose share is not greater than the clock (the share of
-  // the one served last). If they come back, they start at the clock anyway.
+  // the user or group served most recently). If they come back, they start at the clock anyway.
   void tidy();
   // leave() must be called before the job's priority changes, and enter() afterwards, which adds the core
   // seconds of its leases at the new priority. The caller then offers the job again.

@@ -58,8 +58,8 @@ struct FarmFigures {
   // Results that could not be stored: the disk was full or the storage failed otherwise
   std::uint64_t not_stored = 0;
   // Folding
-  std::uint64_t folded = 0;                 // units whose result was added to the image
-  double fold_lag_seconds = 0;              // from a result's arrival to its fold, summed over `folded`
+  std::uint64_t folded = 0;     // units whose result was added to the image
+  double fold_lag_seconds = 0;  // from a result's arrival to its addition to the image, summed over `folded`
   std::uint64_t arrived_now = 0;            // results that are being verified and stored
   std::uint64_t arrived_bytes = 0;          // bytes of memory that these results occupy
   std::uint64_t waiting_now = 0;            // accepted results that wait for an earlier round of their tile

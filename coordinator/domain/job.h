@@ -1,5 +1,6 @@
-// A job in the farm. A unit is one round (range of samples) of one tile. At every moment each planned unit of
-// the job is done (its result is accepted), leased to a worker, or queued.
+// A job in the farm. A unit is one round (range of samples) of one tile; a lease is a list of units that one
+// worker was told to render. At every moment each planned unit of the job is done (its result is accepted),
+// leased to a worker, or queued.
 #pragma once
 
 #include <algorithm>
@@ -98,7 +99,8 @@ struct Holders {
 
 // Counts the units that are leased at the moment, of one job or of all jobs of a user or group
 struct Load {
-  std::uint32_t units = 0;                                   // copies of units included, audits not
+  // copies of units are counted, audits are not
+  std::uint32_t units = 0;
   std::unordered_map<WorkerIndex, std::uint32_t> leases_at;  // number of leases of each worker that has any
 };
 
@@ -124,11 +126,11 @@ struct Audit {
 };
 
 // A level of the adaptive stop rule (adaptive_stop.h). A checkpoint of the level's image is taken as soon as
-// all its rounds are folded.
+// the image has all its rounds.
 struct LevelMark {
   std::vector<RoundIndex> rounds;  // for each tile, how many rounds it has at this level
   double spp = 0;                  // samples per pixel, mean over all pixels
-  TileIndex missing = 0;           // number of tiles whose rounds of this level are not all folded yet
+  TileIndex missing = 0;           // number of tiles whose rounds of this level are not all in the image yet
 };
 
 struct Job {
@@ -139,7 +141,7 @@ struct Job {
   std::uint64_t spp;  // samples per pixel: the plan's, or kMaxSppWithoutLimit; always even
   JobState state = JobState::queued;
   // Why the job ends. It is set once the last rounds of all tiles are decided, although some of their units
-  // may still be leased or not folded. It is final once the job is done
+  // may still be leased or not be in the image. It is final once the job is done
   std::optional<StopReason> stopping;
   bool frozen = false;  // stopped by time or user: only results of units leased before are still accepted
   std::optional<Digest> numeric_class;
@@ -164,13 +166,14 @@ struct Job {
   double checkpoint_spp = 0;  // samples per pixel at the last checkpoint of whole rounds
 
   std::optional<AdaptiveStop> adaptive;  // only for a job with a target error
-  double level_seen = 0;                 // the last level at which the image was judged; 0: none
+  double level_seen = 0;                 // the level at which the image was judged most recently; 0: none
   std::deque<LevelMark> marks;  // levels whose checkpoints are still to be taken, by rising number of samples
   // Only for a job whose target error is that of its denoised layers
   std::optional<DenoisedTarget> denoised;
-  double checking_spp = 0;     // the level whose denoised error the service was asked for; 0: none
-  double predicted_error = 0;  // relMSE of the image itself at which that job will probably end; 0: unknown
-  double marked_spp = 0;       // LevelMark::spp of the last mark made
+  double checking_spp = 0;  // the level whose denoised error the service was asked for; 0: none
+  // relMSE of the image itself (before denoising) at which the job will probably end; 0: unknown
+  double predicted_error = 0;
+  double marked_spp = 0;           // LevelMark::spp of the latest mark
   std::uint64_t predicted_at = 0;  // rounds_seen() at the last call of foresee()
 
   bool ended() const { return is_terminal(state); }
@@ -188,22 +191,22 @@ struct Job {
   double predict(UnitCode code) const { return cost.predict(tile_of(code), pixel_samples(code)); }
   std::uint64_t queued() const { return queue.planned() - units.accepted_count() - out.size(); }
 
-  // True if the tiles' errors decide where the tiles end, and have not decided yet.
+  // True if the tiles' errors decide how many rounds the tiles get, and have not decided it yet.
   bool adaptive_running() const { return adaptive && !stopping; }
-  // Starts the stop rule if the plan has a target error, drops it if the plan has none any more, and has the
-  // image judged again.
+  // Starts the adaptive stop rule if the plan has a target error, drops the rule if the plan has none any
+  // more, and has the image judged again.
   void steer();
   // The relMSE of the image (before denoising) at which the job will probably end; nullopt: unknown
   std::optional<double> predicted_target() const {
     if (!denoised) return plan.target_error;
     return predicted_error > 0 ? std::optional(predicted_error) : std::nullopt;
   }
-  // Returns the last round of the tile that may be folded now.
+  // Returns the last round of the tile that may be added to the image now.
   RoundIndex last_foldable(TileIndex tile) const {
     return adaptive_running() ? adaptive->wanted(tile) : std::numeric_limits<RoundIndex>::max();
   }
-  // Sets how far ahead of the folded rounds further rounds may be leased, in a farm whose workers have this
-  // many threads in total.
+  // Sets how far ahead of the rounds in the image further rounds may be leased, in a farm whose workers have
+  // this many threads in total.
   void move_windows(int farm_threads);
   void move_window(TileIndex tile, int farm_threads);
   // Sets the end of each tile to ends[tile] rounds, unless it ends earlier already, and forgets accepted

@@ -15,7 +15,7 @@ using namespace std::chrono_literals;
 
 // Jobs
 
-// Most samples per pixel of a job that gives only a target error or a time
+// The sample limit, per pixel, of a job that gives only a target error or a time
 inline constexpr std::uint64_t kMaxSppWithoutLimit = 65536;
 
 // Digits of a numeric class in messages
@@ -25,7 +25,7 @@ inline constexpr std::size_t kClassDigits = 12;
 inline constexpr double kLeaseSeconds = 2.0;  // work that a lease should give to all threads of a worker
 // Lower bound for the share of a core that a worker's thread gets
 inline constexpr double kLeastCoreShare = 1.0 / 64;
-// Most units in one lease. It keeps the message that assigns the lease well below 1 MiB
+// A lease has at most this many units, so that the message that assigns it stays well below 1 MiB
 inline constexpr std::uint32_t kMaxLeaseUnits = 1024;
 // Leases that a worker holds: one that it renders, and two that wait
 inline constexpr std::uint32_t kQueuedLeases = 3;
@@ -36,7 +36,8 @@ inline constexpr std::uint32_t kUnitsAThread = 2;
 inline constexpr double kSpeculativeSeconds = .05;
 inline constexpr std::uint32_t kMaxLeasesPerWorker = 64;  // applies near the end of a job, when a lease is a
                                                           // single unit
-// A lease's deadline is this many times its predicted duration after its grant, plus the slacks below
+// A lease's deadline is this many times its predicted duration after it was granted, plus kDeadlineSlack and
+// perhaps kLoadSlack
 inline constexpr double kDeadlineFactor = 3.0;
 inline constexpr Duration kDeadlineSlack = 10s;  // added to every lease's deadline
 // Also added until the worker has finished a unit of the job: it may have to load the world
@@ -50,7 +51,7 @@ inline constexpr Duration kTakeBackAfter = 20ms;
 // kSpeculateSlack
 inline constexpr double kSpeculateAfter = 1.5;
 inline constexpr Duration kSpeculateSlack = 1s;
-// Most leases that are checked when an idle worker looks for units to copy or take over
+// At most this many leases are checked when an idle worker looks for units to copy or take over
 inline constexpr std::uint32_t kSpeculationScan = 64;
 
 // Fair shares
@@ -60,25 +61,25 @@ inline double plausible_seconds(double reported) {
 }
 // Core seconds charged for a unit until a cost is measured for its job
 inline constexpr double kAssumedUnitSeconds = 1.0;
-// A worker may continue a job whose world it has loaded instead of loading the world of the job in turn, as
-// long as the lag (fair_share.h) of the former exceeds that of the latter by at most this many seconds times
-// the farm's threads.
+// A worker that has loaded the world (scene) of another job than the one in turn may get units of that other
+// job, as long as its lag (fair_share.h) exceeds that of the job in turn by at most this many seconds times
+// the farm's threads. This saves loading worlds.
 inline constexpr double kLocalitySeconds = 5.0;
-inline constexpr std::uint32_t kJobsLookedAt = 64;  // most jobs checked to find one whose world the worker
-                                                    // has loaded
-// Most blobs remembered per worker, of those that it reports to hold
+// at most this many jobs are checked to find one whose world the worker has loaded
+inline constexpr std::uint32_t kJobsLookedAt = 64;
+// At most this many blobs are remembered per worker, of those that it reports to hold
 inline constexpr std::size_t kBlobsRemembered = 1024;
 
-// Audits
+// Audits. In an audit another worker renders the unit of an accepted result again, for comparison.
 
-// most audits open at the same time per job; no further one begins then
+// At most this many audits are open at the same time per job; no further one begins then
 inline constexpr std::size_t kMaxAuditsOpen = 64;
 // Time for workers to reconnect before a restored audit is dropped
 inline constexpr Duration kAuditAfterRestart = 60s;
-// Most pairs of unit and worker remembered per job: VoterTable
+// At most this many pairs of unit and worker are remembered per job: VoterTable
 inline constexpr std::size_t kMaxVoters = 65'536;
 
-// Rounds that may be leased ahead of the folded ones
+// Number of rounds that may be leased ahead of those in the image
 inline constexpr RoundIndex kRoundsAhead = 64;  // bounds how many results wait to be folded
 
 // Failures
@@ -91,13 +92,13 @@ inline constexpr std::uint32_t kUnitFailureAttempts = 2;
 inline constexpr std::uint32_t kWorkerFailuresPerJob = 3;
 // A worker that is blocked from this many jobs is unhealthy: it gets no work at all
 inline constexpr std::uint32_t kUnhealthyJobs = 2;
-// A worker's failures are forgiven this long after the last one
+// A worker's failures are forgiven this long after the latest of them
 inline constexpr Duration kForgiveAfter = 1800s;
 inline constexpr Duration kForgetWorkerAfter = 3600s;  // a worker is forgotten this long after it was lost
 // Number of names of departed workers that are kept before unused ones are dropped
 // (WorkerTable::has_many_names)
 inline constexpr std::size_t kNamesKept = 256;
-inline constexpr std::uint32_t kMaxNamedWorkers = 8;  // most workers that one message names
+inline constexpr std::uint32_t kMaxNamedWorkers = 8;  // one message names at most this many workers
 
 // Stopping
 
@@ -107,10 +108,11 @@ inline constexpr int kMinStopPixels = 1024;  // fewest pixels in a group of tile
 // Seconds of work that the leases of a worker hold. The end of a job is planned when its time limit is less
 // than twice this away.
 inline constexpr double kTimePlanned = kQueuedLeases * kLeaseSeconds;
-// Smallest ratio of the samples of two consecutive levels of the stop rule that make checkpoints
+// The next checkpoint is made at a level of the stop rule with at least this many times the samples of the
+// previous checkpoint's level (except at the last level)
 inline constexpr double kCheckpointGrowth = 1.15;
-// The same of two levels at which the error of the denoised layers is checked: denoising takes as long as a
-// few samples per pixel
+// The same for levels at which the error of the denoised layers is checked: denoising takes as long as a few
+// samples per pixel
 inline constexpr double kDenoisedCheckGrowth = 1.4;
 
 }  // namespace ls::coordinator

@@ -116,9 +116,9 @@ class UnitQueue {
   }
 
   // Returns the first waiting unit that may be leased; nullopt if there is none. Certain units of the focus
-  // go first, then the other certain ones, then speculative ones; within each of the three those that came
-  // back go first. `excluded` is asked only about units that came back, and those for which it is true are
-  // skipped.
+  // go first, then the other certain ones, then speculative ones. Within each of these three, units that were
+  // leased and came back go first. `excluded` is asked only about units that came back; those for which it is
+  // true are skipped.
   template <class Excluded>
   std::optional<UnitCode> front(const UnitTable& units, Excluded&& excluded) {
     const auto first_of = [&](const std::set<UnitCode>& returned) {
@@ -169,17 +169,17 @@ class UnitQueue {
  private:
   static constexpr RoundIndex kNoWindow = std::numeric_limits<RoundIndex>::max();
 
-  // The round set by set_wanted(), per tile. Not used while no tile has speculative units.
+  // Per tile, the arguments of the latest set_wanted(). Not used while no tile has speculative units.
   struct Wanted {
     RoundIndex before = kNoWindow;
     float weight = 0;
   };
-  // Certain units, in the order in which they go; those in `returned` go before those in `heads`
+  // Units that are certain to be needed; those in `returned` go before those in `heads`
   struct Line {
     std::priority_queue<UnitCode, std::vector<UnitCode>, std::greater<>> heads;
     std::set<UnitCode> returned;
   };
-  // A speculative unit, with the error that it removes per sample.
+  // A unit that may turn out not to be needed, with the error that it removes per sample.
   struct Perhaps {
     float gain;
     UnitCode code;
@@ -209,8 +209,8 @@ class UnitQueue {
   Line& line_of(TileIndex t) { return lines_[focus_.empty() || focus_[t] ? 0 : 1]; }
   const Line& line_of(TileIndex t) const { return lines_[focus_.empty() || focus_[t] ? 0 : 1]; }
   std::size_t surely_returned() const { return lines_[0].returned.size() + lines_[1].returned.size(); }
-  // The heads of the two lines and perhaps_ together hold the next unit of every open tile, and outdated
-  // entries, which head() and perhaps_head() drop.
+  // The heads of the two lines and perhaps_ together hold the next unit of every tile that has one to lease.
+  // They also hold outdated entries, which head() and perhaps_head() drop.
   void offer(TileIndex tile) {
     if (!open(tile)) return;
     const UnitCode code = unit_code(next_[tile], tile);
@@ -260,8 +260,9 @@ class UnitQueue {
 
   std::vector<RoundIndex> next_, end_, window_;
   std::uint64_t planned_, surely_;
-  std::vector<bool> focus_;    // by tile; empty: there is no focus
-  std::array<Line, 2> lines_;  // the tiles of the focus (all tiles if there is no focus), and the others
+  std::vector<bool> focus_;  // by tile; empty: there is no focus
+  // [0]: the tiles of the focus (all tiles if there is no focus); [1]: the other tiles
+  std::array<Line, 2> lines_;
   std::priority_queue<Perhaps> perhaps_;
   std::vector<Wanted> wanted_;  // by tile; empty: all units are certain
   std::set<UnitCode> returned_perhaps_;

@@ -26,7 +26,7 @@ inline constexpr WorkerIndex kNoWorker = ~WorkerIndex{0};
 class UnitTable {
  public:
   struct Result {
-    Digest digest;  // all zero: unknown (folded before a restart that lost the record)
+    Digest digest;  // all zero: unknown (added to the image before a restart that lost the record)
     WorkerIndex worker = kNoWorker;
   };
 
@@ -41,32 +41,34 @@ class UnitTable {
   std::uint64_t accepted_count() const { return accepted_count_; }
   // One past the tile's last round that has an accepted result
   RoundIndex end_of_accepted(TileIndex tile) const;
-  // Forgets the tile's accepted results of rounds from `end` on; none of these may be folded
+  // Forgets the tile's accepted results of rounds from `end` on; none of these may be in the image
   void truncate(TileIndex tile, RoundIndex end);
-  // Forgets round `round` of all tiles, accepted or folded. Requires that no later round has results
+  // Forgets round `round` of all tiles, whether accepted or in the image. Requires that no later round has
+  // results
   void reopen(RoundIndex round);
-  // Forgets all results and folds of the tile. Returns the units that had an accepted result, ascending.
+  // Forgets all results of the tile, also those in the image. Returns the units that had an accepted result,
+  // ascending.
   std::vector<UnitCode> void_tile(TileIndex tile);
   // Returns the tiles with an accepted result of this worker, ascending
   std::vector<TileIndex> tiles_of(WorkerIndex worker) const;
   void mark_workers(std::vector<bool>& used) const;  // sets used[worker] for the workers of accepted results
-  void forget_results();  // for a failed job: frees the memory, keeps the fold counts
+  void forget_results();  // for a failed job: frees the memory, keeps the numbers of folded rounds
 
   // Folding
 
-  // If the tile's next round to be folded has an accepted result and is below `end` and at most `limit`,
-  // returns this round and counts it as issued. Otherwise returns nullopt.
+  // If the tile's next round to be added to the image has an accepted result and is below `end` and at most
+  // `limit`, returns this round and counts it in issued(). Otherwise returns nullopt.
   std::optional<RoundIndex> issue_fold(TileIndex tile, RoundIndex limit, RoundIndex end);
-  // Number of rounds whose fold was requested
+  // Number of rounds whose addition to the image was requested
   RoundIndex issued(TileIndex tile) const { return issued_[tile]; }
-  // Notes that the tile's round is folded. If it is not the next issued round, returns false and changes
-  // nothing.
+  // Notes that the tile's round is in the image. If it is not the next one of the tile's requested
+  // rounds, returns false and changes nothing.
   bool fold(TileIndex tile, RoundIndex round, double rel_error_sum);
   void restore_folded(TileIndex tile, RoundIndex rounds);
   void restore_error(RoundIndex round, TileIndex tile, double rel_error_sum);
   RoundIndex folded(TileIndex tile) const { return folded_[tile]; }
   std::uint64_t folded_count() const { return folded_count_; }
-  // Number of rounds that are folded in all tiles
+  // Number of rounds that the image has of every tile
   RoundIndex rounds_complete() const { return rounds_complete_; }
   double error(RoundIndex round, TileIndex tile) const;  // rel_error_sum after this round; NaN: unknown
 

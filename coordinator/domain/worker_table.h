@@ -1,5 +1,6 @@
 // All known workers: their connection, leases and failures. A unit is one round (range of samples) of one
-// tile; a lease is a list of units that one worker was told to render.
+// tile; a lease is a list of units that one worker was told to render. A numeric class is a set of machines
+// that compute the same bits.
 #pragma once
 
 #include <algorithm>
@@ -59,7 +60,7 @@ struct Worker {
   int threads = 1;
   std::vector<std::string> tags;   // sorted
   std::uint64_t memory_bytes = 0;  // 0: unknown
-  // head_of() of the digests of the blobs that the worker reports to hold, sorted
+  // For each blob that the worker reports to hold, the first 8 bytes of its digest (head_of()), sorted
   std::vector<std::uint64_t> blobs;
   bool quarantined = false;  // it rendered wrong pixels
   bool may_begin = true;     // false: it gets no units of jobs without a numeric class
@@ -76,7 +77,7 @@ struct Worker {
   std::uint64_t units_done = 0;
   CoreShare core_share;
   std::set<JobSeq> briefed;  // jobs whose settings (JobBrief) were sent on this stream
-  // Jobs whose world it has loaded: it has finished a unit of them on this stream
+  // Jobs whose world (loaded scene) it has: it has finished a unit of them on this stream
   std::set<JobSeq> warmed_up;
   std::map<JobSeq, WorkerFailures> failures;
 
@@ -90,9 +91,9 @@ struct Worker {
     const auto it = failures.find(job);
     return it != failures.end() && it->second.blocked_at(now);
   }
-  // True if the worker should get another lease. It should while it holds fewer than kUnitsAThread units per
-  // thread. Beyond that, it should while it holds fewer than kQueuedLeases leases and its work takes less
-  // time than that many full leases. It never holds more than kMaxLeasesPerWorker leases.
+  // True if the worker should get another lease. This is so while it holds fewer than kUnitsAThread units per
+  // thread. It is also so while it holds fewer than kQueuedLeases leases and they take it less time than that
+  // many full leases (kLeaseSeconds each). It never holds more than kMaxLeasesPerWorker leases.
   bool wants_more() const {
     if (leases.size() >= kMaxLeasesPerWorker) return false;
     if (units_out < kUnitsAThread * static_cast<std::uint32_t>(threads)) return true;
@@ -119,7 +120,7 @@ class WorkerTable {
   // Accepts also ids from stored records of workers that never connected to this farm
   WorkerIndex index_of(const WorkerId& id);
   void forget(Worker& worker);
-  // True if it is time for keep_names(). A name outlives its worker, since results refer to it, and
+  // True if it is time for keep_names(). Names accumulate: results refer to workers that are gone, and
   // preemptible workers bring new names every hour.
   bool has_many_names() const { return index_.size() > 2 * kept_ + kNamesKept; }
   std::size_t names() const { return index_.size(); }
@@ -160,7 +161,7 @@ class WorkerTable {
   int threads_ = 0, connected_ = 0;
   double cores_ = 0;
   void count(const Worker& worker, bool yes);
-  std::map<Digest, Count> classes_;  // without empty ones
+  std::map<Digest, Count> classes_;  // classes without workers are left out
 };
 
 // Returns the first 8 bytes of a digest, as in Worker::blobs
@@ -168,7 +169,7 @@ std::uint64_t head_of(const Digest& digest);
 // True if the worker has loaded the job's world, or at least reports to hold its scene file.
 bool holds(const Job& job, const Worker& worker);
 
-// True if the worker's numeric class is the one that the job asks for, if it does.
+// True if the job asks for no numeric class, or for that of this worker (JobPlan::class_asked).
 bool of_class_asked(const Job& job, const Worker& worker);
 // True if the worker has the job's numeric class (or may begin the job, if it has none yet) and tags, has
 // enough memory, and is not quarantined. Whether the worker is busy does not matter.

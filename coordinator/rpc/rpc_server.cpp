@@ -22,14 +22,14 @@ namespace pb = ::lightshaft::farm::v1;
 
 namespace {
 
-// Most workers connected at the same time; the same as kMaxWorkers
+// At most this many workers are connected at the same time; the same as kMaxWorkers
 constexpr int kWorkStreams = 16'384;
-// Most blob transfers in progress; further ones are refused, and workers retry them
+// At most this many blob transfers are in progress; further ones are refused, and workers retry them
 constexpr int kFetches = 512;
-// Number of threads that read blobs for these transfers. There are many, because most of them may be waiting
-// for blobs that the coordinator must first fetch from another machine
+// Number of threads that read blobs for these transfers. There are many, because most of the threads may be
+// waiting for blobs that the coordinator must first fetch from another machine
 constexpr int kReadThreads = 64;
-// Most bytes that a worker may send before the coordinator reads them.
+// A worker may send at most this many bytes before the coordinator reads them.
 constexpr int kUnreadBytes = 64 << 10;
 constexpr int kHelloSeconds = 20;  // seconds after opening its stream in which a worker must send its hello
 constexpr int kHandshakeMs = 10'000;

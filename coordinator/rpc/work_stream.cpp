@@ -8,8 +8,8 @@
 
 namespace ls::coordinator::rpc {
 namespace {
-// Most messages that may wait for a worker that does not read them; the worker is disconnected if there are
-// more
+// At most this many messages wait for a worker that does not read them; if there are more, the worker is
+// disconnected
 constexpr std::size_t kQueuedMessages = 8192;
 }  // namespace
 
@@ -74,7 +74,7 @@ void WorkStream::OnReadDone(bool ok) {
     end(grpc::Status::OK);
     return;
   }
-  // A message type from a newer version: ignored, since newer workers must not rely on it
+  // A message of a kind that only newer versions know is ignored: newer workers must not rely on it
   if (greeted_ && !wire::known(incoming_)) {
     StartRead(&incoming_);
     return;

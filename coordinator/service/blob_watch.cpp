@@ -13,7 +13,8 @@ namespace ls::coordinator {
 namespace {
 
 constexpr Duration kLongestPause = std::chrono::hours(1);
-// Sweeps per keep_unused, so that an unused blob stays for at most 1.25 times keep_unused
+// Number of searches for unused blobs during the time keep_unused; so an unused blob stays for at most 1.25
+// times keep_unused
 constexpr int kSweepsPerTime = 4;
 // Number of jobs whose needed blobs are collected before the lock is released and taken again
 constexpr std::size_t kJobsAtOnce = 256;
@@ -98,7 +99,8 @@ void BlobWatch::look_for(const std::set<Digest>& digests) {
   std::set<Digest> here;
   for (const Digest& digest : digests) {
     const auto found = blobs_.find(digest);
-    if (!found) break;  // the store is unavailable: the lookup is repeated at its next time
+    // the store is unavailable: the lookup is repeated when it is due again
+    if (!found) break;
     if (*found) here.insert(digest);
   }
   if (here.empty()) return;

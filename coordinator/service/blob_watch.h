@@ -36,7 +36,7 @@ class BlobWatch {
   void look_loop(const std::stop_token& token);
 
   // Checks whether the blob store is available. Requests of workers do not suffice to notice an outage, since
-  // hours may pass between two.
+  // hours may pass between two requests.
   void check_store();
   // Returns why the store is unavailable; empty: it is available.
   const std::string& trouble(Core&) const { return trouble_; }
@@ -54,7 +54,7 @@ class BlobWatch {
   const std::optional<Duration> keep_unused_;
   const Clock& clock_;
   WorkQueue<std::set<Digest>> looks_;
-  TimePoint last_look_{};  // last_look_ and trouble_ are guarded by the lock
+  TimePoint last_look_{};  // last_look_ and trouble_ are guarded by the lock of Core
   std::string trouble_;
 };
 

@@ -59,7 +59,7 @@ std::uint64_t random_number() {
 
 }  // namespace
 
-// The parts of the coordinator, each with its own state, in the order in which they need one another.
+// The parts of the coordinator, each with its own state. A part mostly uses parts above it.
 struct Coordinator::Parts {
   Parts(Options o, std::shared_ptr<BlobStore> inner, std::shared_ptr<JobStore> s, File l, std::uint64_t n)
       : options(std::move(o)),

@@ -41,9 +41,9 @@ class Coordinator {
     std::string join_token;   // empty: any worker may join
     JoinCheck may_join;       // if set, decides which workers may join, instead of join_token
     bool allow_fake = false;  // true: fake workers, which invent their pixels, may join (for tests)
-    // Version of this program. Workers of another one finish the jobs of their numeric class and begin none,
-    // so that jobs that come during an upgrade are not left to workers that are about to go. Empty: any
-    // worker begins jobs.
+    // Version of this program. Workers of another version finish the jobs of their numeric class (machines
+    // that compute the same bits) but begin none, so that jobs submitted during an upgrade are not left to
+    // workers that are about to go. Empty: any worker begins jobs.
     std::string version;
     ShareLimits limits;
     double audit_rate = 0.01;  // fraction of the results that are audited: another worker renders them again

@@ -1,5 +1,5 @@
 // Denoised images of jobs. Denoising takes seconds, gigabytes and all cores, so one image is denoised at a
-// time. The last result is cached, since report, image and preview of one state of a job need the same one.
+// time. The latest image is kept, since report, image and preview of one state of a job need the same one.
 // Thread-safe.
 #pragma once
 

@@ -118,8 +118,9 @@ void FarmDriver::on(const RecordUnit& e) {
     entry->stored.totals.began_unix = unix_now() - entry->elapsed(clock_.now());
 }
 
-// Returns the accepted partial (the encoded pixel sums of one unit) that is to be folded. Reads it from the
-// log if it is not in memory, because it arrived before a restart or because too many partials wait.
+// Returns the accepted partial (the encoded pixel sums of one unit) that is to be added to the image. Reads
+// it from the log if it is not in memory, because it arrived before a restart or because too many partials
+// wait.
 Result<WaitingPartial> FarmDriver::partial_for(JobEntry& entry, const Fold& e) const {
   auto waiting = entry.assembly->take(e.unit.tile, e.unit.round, e.samples);
   if (!waiting) return fail(Errc::internal, "an accepted partial is not at hand");
@@ -144,7 +145,8 @@ void FarmDriver::on(const Fold& e) {
   const auto error =
       waiting ? entry->assembly->fold(e.unit.tile, e.unit.round, *waiting) : tl::unexpected(waiting.error());
   if (!error) {
-    // If the partial cannot be read, the tile stops and the job waits: a wrong pixel must never be folded.
+    // If the partial cannot be read, the tile stops and the job waits: a wrong pixel must never get into the
+    // image.
     entry->trouble =
         fmt::format("tile {} round {} cannot be folded: {}; restart the coordinator to render it again",
                     e.unit.tile, e.unit.round, error.error().message);
@@ -163,7 +165,8 @@ void FarmDriver::on(const Fold& e) {
   todo_.push_back(UnitFolded{e.unit, e.samples, error->relative.squares});
   const TimePoint end = clock_.now();
   entry->stored.totals.time.merge += seconds(end - begin);
-  if (core_.publisher.quiet()) return;  // a fold that repeats an earlier one publishes nothing
+  // a result that was in the image before a restart publishes nothing when it is added again
+  if (core_.publisher.quiet()) return;
   failpoint("result-folded");
   if (entry->trace)
     entry->trace->step(
@@ -236,7 +239,7 @@ void FarmDriver::on(const JobPinned& e) {
 // The state `done` is published and stored only after the final image is written: see ImageWriter.
 void FarmDriver::on(const JobStateChanged& e) {
   const auto entry = core_.jobs.find(e.job);
-  // A removed job continues at another coordinator or not at all.
+  // If the job was removed here, another coordinator continues it, or nobody does.
   if (!entry || entry->removed || e.to == JobState::done) return;
   entry->stored.state = e.to;
   entry->stored.stopped.reset();
@@ -312,7 +315,7 @@ void FarmDriver::on(const Checkpoint& e) {
   entry->assembly->checkpoint_taken(e.rounds);
   entry->stored.totals.doubt = error.verdict;
   entry->stored.totals.few_hits = error.few_hits;
-  // The checkpoint is known from before the restart
+  // The curve has this checkpoint already, from before a restart
   if (!entry->points.empty() && entry->points.back().spp >= error.spp) {
     const bool compared = std::none_of(entry->points.begin(), entry->points.end(), [&](const auto& p) {
       return p.spp == error.spp && !p.reference_error;
@@ -320,8 +323,8 @@ void FarmDriver::on(const Checkpoint& e) {
     if (!compared) comparer_.compare(core_, entry, e.rounds, error.spp);
     return;
   }
-  // If the errors are not exact, some tile is being rendered again and earlier errors of the other tiles are
-  // lost: this checkpoint gets no point.
+  // If the errors are not exact, the convergence curve gets no point for this checkpoint: some tile is being
+  // rendered again, and earlier errors of the other tiles are lost.
   if (!exact) return;
   core_.records.add_point(
       entry, {entry->fold_seconds, entry->assembly->costs().until(e.rounds), error.spp, figures_of(error)});

@@ -23,7 +23,7 @@ class FarmDriver {
 
   const Farm& farm() const { return farm_; }
   void run(Event first);
-  // Gives a stored job to the farm. Folds that this repeats publish no events.
+  // Gives a stored job to the farm. Results that are added to the image again publish no events.
   void replay(JobEntry& entry, JobRestored event);
   void quarantine(const std::vector<QuarantinedWorker>& workers);  // `workers` are stored already
   // Unloads an ended job whose files are complete on disk: frees its image in memory and the farm's state of
@@ -62,7 +62,7 @@ class FarmDriver {
   ImageWriter& images_;
   ReferenceComparer& comparer_;
   std::deque<Event> todo_;        // events raised by effects, to be handled next
-  std::vector<EntryPtr> folded_;  // jobs whose units were folded by the events that are being handled
+  std::vector<EntryPtr> folded_;  // jobs to whose images the events being handled have added units
 };
 
 }  // namespace ls::coordinator

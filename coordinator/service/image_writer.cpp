@@ -82,9 +82,9 @@ void ImageWriter::snapshot_if_due(Core&, const EntryPtr& entry) {
   writes_.push([this, entry] { take_snapshot(entry); });
 }
 
-// Takes a snapshot while folding continues. Rounds that are folded into a tile after the tile was copied are
-// folded again after a restart. The convergence points that the snapshot includes must be stored before it;
-// they are in the writer's queue already, so the snapshot is queued behind them.
+// Takes a snapshot while results are added to the image. Those that are added to a tile after it was copied
+// are added again after a restart. The convergence points that the snapshot includes must be stored before
+// it; they are in the writer's queue already, so the snapshot is queued behind them.
 void ImageWriter::take_snapshot(const EntryPtr& entry) {
   const auto done = [this, entry](const Result<void>& written) {
     if (!written) log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
@@ -127,7 +127,7 @@ Result<SnapshotFile> ImageWriter::copy_folded(const EntryPtr& entry) {
   return file;
 }
 
-// Writes a snapshot of a film that is no longer changing.
+// Writes a snapshot of a film (an image in memory) that no longer changes.
 Result<void> ImageWriter::write_snapshot(const EntryPtr& entry, const Folded& folded) {
   auto file = files_.create_snapshot(entry->stored, entry->grid, ".tmp");
   if (!file) return tl::unexpected(file.error());
@@ -185,8 +185,8 @@ void ImageWriter::finish_again(Core&, const EntryPtr& entry) {
   writes_.push([this, entry, number = last_final_] { write_final(entry, number); });
 }
 
-// Denoises the final image of a job before it is written. Runs on the comparing thread, not the writer
-// thread.
+// Denoises the final image of a job before it is written. Runs on the ReferenceComparer's thread, not the
+// writer thread.
 void ImageWriter::denoise(const EntryPtr& entry, std::uint64_t number) {
   auto core = core_.lock();
   if (entry->finishing != number || !entry->assembly) return;

@@ -1,5 +1,5 @@
-// Writes the files of a running job, on the writer thread: open audits, snapshots from time to time, and at
-// the end the final image and the report.
+// Writes the files of a job, on the writer thread: the list of open audits (units that are rendered again for
+// comparison), snapshots from time to time, and at the end the final image and the report.
 #pragma once
 
 #include "common/base/guarded.h"
@@ -28,22 +28,24 @@ class ImageWriter {
 
   void keep_audits(Core&, const EntryPtr& entry, const std::vector<JobRestored::Audit>& audits);
   void snapshot_if_due(Core&, const EntryPtr& entry);
-  // Has the job's film denoised as it is now, at `spp` samples per pixel; then the error of its denoised
-  // layers is stored and the farm is told. If that fails, the job is paused and says why.
+  // Starts to denoise the job's film as it is now, at `spp` samples per pixel. Afterwards the error of its
+  // denoised layers is stored and reported to the farm. If denoising fails, the job is paused and says why.
   void check_denoised(Core&, const EntryPtr& entry, double spp);
-  // Has the final image of a job written that the farm has finished. The job is done when that has succeeded.
+  // Starts to write the final image of a job that the farm has finished. The job is done when the image is
+  // written.
   void finish(Core&, const EntryPtr& entry);
   void finish_again(Core&, const EntryPtr& entry);  // repeats finish() after it failed
   // Starts writing the current image of a failed or cancelled job, and frees the job's memory afterwards.
   void retire(Core&, const EntryPtr& entry);
 
  private:
-  struct Folded {  // a cheap copy of the folded image, for use outside the lock
+  struct Folded {  // a cheap copy of the job's image so far, for use outside the lock
     Film film;
     RoundErrors errors;
     HealthTable health;
   };
-  // All of these run on the writer thread, denoise() and note_check() on the comparing thread
+  // These run on the writer thread, except denoise() and note_check(), which run on the thread of the
+  // ReferenceComparer
   void take_snapshot(const EntryPtr& entry);
   Result<SnapshotFile> copy_folded(const EntryPtr& entry);
   Result<void> write_snapshot(const EntryPtr& entry, const Folded& folded);

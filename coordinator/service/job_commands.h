@@ -1,5 +1,5 @@
-// Carries out users' commands: changes and removals of jobs and sequences. Every change is checked completely
-// before any part of it is applied.
+// Carries out users' commands: changes and removals of jobs and sequences (jobs with frames). Every change is
+// checked completely before any part of it is applied.
 #pragma once
 
 #include <functional>

@@ -52,8 +52,8 @@ class Pictures {
     Film film;
     ReportFacts facts;
   };
-  // The denoised image of a job as viewers see it. That of a running job is made again only when it is old in
-  // comparison to the time that this takes, so that several requests get the same one.
+  // The denoised image of a job as viewers see it. For a running job an older image is shown again, unless
+  // its age is large compared to the time that denoising took. So several requests get the same image.
   struct DenoisedView {
     std::string key;  // names the image
     TimePoint made{};

@@ -1,4 +1,4 @@
-// Pixels of one layer of an image, as numbers: Pictures::layers() and pixels().
+// Pixels of one layer of an image, as numbers: Pictures::layers_json() and pixels().
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -54,14 +54,14 @@ int level_for(FrameSize frame, int most_side) {
 
 PixelRect whole(FrameSize size) { return {0, 0, size.width, size.height}; }
 
-// The denoised image as a layer: like the colour, at full size.
+// The denoised image as a layer, in the format of the layer "rgb".
 PixelLayer denoised_layer() {
   PixelLayer layer = pixel_layer({}, "rgb").value();
   layer.name = "denoised";
   return layer;
 }
 
-// How many times as old as the time that it takes to make it a running job's denoised image may get.
+// A running job's denoised image is shown until it is this many times as old as the time that making it took.
 constexpr int kDenoisedAge = 4;
 
 std::vector<std::uint8_t> tone_mapped(const PixelLayer& rgb, const LayerMosaic& mosaic, double stops) {
@@ -142,8 +142,8 @@ Result<std::vector<std::byte>> Pictures::pixels(const JobId& id, const PixelsAsk
     return mosaic.bytes();
   }
   if ((*entry)->assembly) {
-    // Only the requested tiles are shared with the film, so that folding may free all others while these are
-    // read.
+    // Only the requested tiles are shared with the film. So while they are read, memory of all other tiles
+    // can be freed.
     std::vector<TileRow> rows;
     for (int row = wanted.y0 / grid.tile; row * grid.tile < wanted.y1; ++row)
       rows.push_back({row, (*entry)->assembly->film().row(row)});

@@ -11,8 +11,8 @@
 
 namespace ls::coordinator {
 namespace {
-// Most comparisons that wait; each holds a picture. Beyond this number, only the last checkpoint of a job is
-// compared
+// At most this many comparisons of checkpoints wait, since each holds a picture. Above this number further
+// checkpoints are not compared; the final image always is.
 constexpr std::size_t kMaxComparisons = 64;
 
 // True if FLIP (the perceived error) should be computed for this checkpoint. It takes about a second per
@@ -50,8 +50,8 @@ void ReferenceComparer::compare_last(Core&, const EntryPtr& entry) {
   });
 }
 
-// Returns the job's reference. Only the reference of the last comparison is kept in memory, so waiting jobs
-// cost no memory.
+// Returns the job's reference image. Only the one used most recently is kept in memory, so the references of
+// waiting jobs need no memory.
 std::shared_ptr<const Reference> ReferenceComparer::reference_of(const StoredJob& job) {
   const Digest& digest = *job.spec.reference;
   if (reference_ && reference_digest_ == digest && reference_->size == job.settings.size) return reference_;

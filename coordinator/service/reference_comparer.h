@@ -1,6 +1,6 @@
-// Compares pictures of jobs that have a reference image with this image. The picture of every checkpoint is
-// compared on a separate thread, since a comparison takes longer than a checkpoint. A job's final image and
-// report wait for its comparisons.
+// Compares pictures of jobs with their reference images, if they have any. The picture of every checkpoint is
+// compared on a separate thread, the comparing thread, since a comparison takes longer than a checkpoint. A
+// job's final image and report wait for its comparisons.
 #pragma once
 
 #include <functional>
@@ -40,7 +40,7 @@ class ReferenceComparer {
   Guarded<Core>& core_;
   const BlobStore& blobs_;
   WorkQueue<std::function<void()>> tasks_;
-  // Reference of the last comparison; used by the comparing thread only
+  // The reference used most recently; only the comparing thread uses it
   std::shared_ptr<const Reference> reference_;
   Digest reference_digest_;
 };

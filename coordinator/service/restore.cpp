@@ -36,7 +36,8 @@ void set_aside(JobEntry& entry, const Error& why) {
   entry.stored.state = JobState::failed;
   entry.stored.error = entry.broken;
   entry.free_image();
-  entry.trace.reset();  // a repair continues it
+  // the trace is not ended here: it continues when the job has been repaired
+  entry.trace.reset();
   log_error(fmt::format("job={}", entry.stored.id.value), entry.broken);
 }
 
@@ -134,7 +135,7 @@ Result<void> Restore::load(Core& core, JobEntry& entry) const {
     if (!log) return tl::unexpected(log.error());
     entry.log = std::move(*log);
   }
-  // The snapshot may be older than the discovery that a worker is faulty. In this case the image is folded
+  // The snapshot may be older than the discovery that a worker is faulty. In this case the image is summed up
   // again from the results of the other workers.
   if (has_quarantined(core.driver.farm(), entry))
     entry.begin_image();
@@ -165,7 +166,7 @@ void Restore::take_up_records(Core& core, JobEntry& entry, JobRestored& event) c
   const std::uint64_t spp = entry.stored.spp.value_or(kMaxSppWithoutLimit);
   JobTotals& totals = entry.stored.totals;
   totals.core_seconds = 0;
-  // Units that have been seen. A unit of a full round is identified by its code alone, since there may be
+  // Units that the loop has met. A unit of a full round is identified by its code alone, since there may be
   // millions; a unit of a truncated round by its code and the end of its sample range.
   std::unordered_set<UnitCode> seen;
   std::set<std::pair<UnitCode, std::uint64_t>> seen_cut;

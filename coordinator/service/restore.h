@@ -31,7 +31,7 @@ class Restore {
 
  private:
   Result<void> take_up(Core& core, JobEntry& entry, const Result<std::vector<BlobRef>>& missing) const;
-  // Opens the job's log and loads its folded image, without the results of quarantined workers.
+  // Opens the job's log and loads its image so far, without the results of quarantined workers.
   Result<void> load(Core& core, JobEntry& entry) const;
   JobRestored restored(Core& core, JobEntry& entry, JobState state) const;
   void take_up_records(Core& core, JobEntry& entry, JobRestored& event) const;

@@ -13,7 +13,7 @@
 namespace ls::coordinator {
 namespace {
 
-// Background writes that may wait for the disk; above this number, results wait, too
+// If more background writes than this wait for the disk, results wait, too
 constexpr std::size_t kMaxBackgroundWrites = 4096;
 
 using Verdict = Wanted::Verdict;
@@ -122,7 +122,8 @@ std::vector<ResultPipeline::Stored> ResultPipeline::prepare(const std::vector<Ch
     // does not name.
     if (accept && sound && !wanted.pinned)
       core->driver.run(ClassChosen{a.result.unit.job, a.from->numeric_class});
-    // A job that is pinned by a fake worker is marked as fake, whatever numeric class the worker claims.
+    // A job that accepts a result of a fake worker (which invents pixels, for tests) is marked as fake,
+    // whatever numeric class the worker claims.
     if (a.from->fake && accept && !std::exchange(a.job->stored.fake, true)) a.job->pin_unsaved = true;
     if (const auto saved = core->records.put_pin(a.job); !saved) stored.error = saved.error();
     if (const auto saved = core->records.put_quarantined(); !saved) stored.error = saved.error();
@@ -179,7 +180,8 @@ void ResultPipeline::accept(Core& core, Checked& item, std::optional<PartialLog:
   core.records.set_trouble("");
   const Wanted wanted = core.driver.farm().wanted(r.unit, a.from->numeric_class);
   const bool accepted = wanted.verdict == Verdict::yes;
-  const bool lost = entry.log && !place;  // the other copy was accepted but not stored, by a race
+  // this copy is not in the log, because the farm did not want it when storing began
+  const bool lost = entry.log && !place;
   if (accepted && wanted.samples == a.expected.samples && !lost) {
     ++core.figures.accepted;
     entry.stored.totals.core_seconds += r.cpu_seconds;
@@ -193,10 +195,10 @@ void ResultPipeline::accept(Core& core, Checked& item, std::optional<PartialLog:
           {std::move(std::get<Partial>(item.verified)), place, a.expected.samples, r.digest, r.health, a.at});
     }
   }
-  // The farm compares duplicates that it knows. Two results are only taken off their lease: a copy that a
-  // race left unstored (the stored copy stands, and further copies are compared with it), and a result of
-  // another numeric class (the farm knows only the worker's present class, which may be the job's if the
-  // worker has joined again meanwhile).
+  // The farm compares duplicates. Two kinds of results are only taken off their lease. One is a copy that the
+  // farm wants now, but that was not stored, since the farm did not want it when storing began. The other is
+  // a result of another numeric class: the farm knows only the worker's present class, which may be the job's
+  // if the worker has joined again meanwhile.
   if ((accepted && lost) || wanted.verdict == Verdict::other_class)
     core.driver.run(LeaseCameBack{a.from->worker, {r.lease, {r.unit}}});
   else

@@ -52,7 +52,7 @@ class ResultPipeline {
   // The outcome of storing a result
   struct Stored {
     std::shared_ptr<PartialLog> log;  // the log to store it in; null: it is not stored
-    double at_seconds = 0;            // time of storing on the job's clock
+    double at_seconds = 0;            // time of storing, in seconds on the job's clock
     std::uint64_t resumes = 0;        // the job's JobEntry::resumes when storing began
     std::optional<PartialLog::Place> place;
     std::optional<Error> error;

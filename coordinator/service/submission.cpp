@@ -20,7 +20,7 @@ tl::expected<std::vector<Admission>, Rejected> admit_all(const SubmitRequest& re
   return all;
 }
 
-// Empty if the header is none.
+// Returns the header `traceparent` (W3C Trace Context) in its normal form; empty if it is malformed.
 std::string clean_traceparent(const std::string& header) {
   const auto parent = trace::parse_traceparent(header);
   return parent ? to_traceparent(*parent) : "";

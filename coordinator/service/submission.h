@@ -21,8 +21,7 @@ class Submission {
   tl::expected<JobId, Rejected> submit(const SubmitRequest& request);
 
   // Submits the scene of job `before`, which must not be a sequence, once more. Returns the id of the new
-  // job.
-  // `traceparent`: as in SubmitRequest.
+  // job. `traceparent`: as in SubmitRequest.
   Result<JobId> submit_again(const JobId& before, const JobSpec& changes, const std::string& owner,
                              const std::string& traceparent = {});
 

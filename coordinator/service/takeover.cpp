@@ -63,7 +63,7 @@ void Takeover::take_over(Inheritance inheritance) {
     return;
   }
   if (core->jobs.find(id)) return;
-  // The folder is outdated: it dates from a time when this coordinator owned the job before
+  // The folder is outdated: it is from a time when this coordinator owned the job before
   files_.remove_folder(id);
   restore_.reopen_if_image_is_lost(job);
   const auto entry = restore_.add(*core, std::move(job), missing);

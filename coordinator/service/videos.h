@@ -1,7 +1,6 @@
 // Videos of sequences, made on request: ffmpeg gets the tone-mapped pictures of the frames that are done. One
 // video is made at a time, on a thread of its own; a few more requests wait. A video lies in the folder of
-// its sequence's first frame and is removed with it. What was asked for is not remembered across restarts.
-// Thread-safe.
+// its sequence's first frame and is removed with it. Requests are forgotten at a restart. Thread-safe.
 #pragma once
 
 #include <filesystem>
@@ -22,7 +21,7 @@ class Videos {
   Videos(Guarded<Core>& core, const JobFiles& files, const Pictures& pictures, const Clock& clock)
       : core_(core), files_(files), pictures_(pictures), clock_(clock) {}
 
-  // Has a video made of the frames that are done now. It replaces an earlier video of the sequence.
+  // Requests a video of the frames that are done now. It replaces an earlier video of the sequence.
   Result<VideoView> make(const JobId& sequence, const VideoAsked& asked);
   Result<VideoView> view(const JobId& sequence) const;
   // Returns the file of a video that is ready. failed_precondition: there is none; the message says why.

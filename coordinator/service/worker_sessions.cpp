@@ -89,8 +89,8 @@ Result<std::unique_ptr<WorkerSession>> WorkerSessions::connect(const WorkerHello
   WorkerTable& workers = core->workers;
   WorkerId id = hello.previous_id;
   const auto known = workers.find(id);
-  // Two workers may have the same id if a folder was copied. The id stays with the worker that uses it
-  // already, and the other one gets a new id.
+  // Two workers may name the same id, if the folder in which a worker keeps its id was copied. The id stays
+  // with the worker that uses it already, and the other one gets a new id.
   const bool taken = known != workers.end() && known->second.hello.name != hello.name;
   if (id.empty() || !well_formed(id) || taken)
     id.value = new_worker_id(options_.start, last_epoch_ & 0xffffffff);
@@ -145,7 +145,7 @@ void WorkerSessions::handle(Core& core, Connection& from, FromWorker message) {
   if (!from.open || found == core.workers.end()) return;
   found->second.last_seen = clock_.now();
   std::visit(
-      // Handled by connect(); a second WorkerHello is rejected earlier
+      // receive() handles UnitResult, and connect() WorkerHello; a second WorkerHello is rejected earlier
       overloaded{[](const UnitResult&) {}, [](const WorkerHello&) {},
                  [&](const WorkerProgress& m) { note_progress(core, from, found->second, m); },
                  [&](const UnitFailure& m) {

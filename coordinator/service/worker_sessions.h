@@ -13,7 +13,7 @@ class WorkerSessions {
   struct Options {
     JoinCheck may_join;
     bool allow_fake = false;
-    std::string version;       // of the workers that may begin jobs; empty: any
+    std::string version;       // version of the workers that may begin jobs; empty: any
     std::uint64_t start = 0;   // number of this start of the coordinator
     std::string lease_prefix;  // first part of the farm's lease ids
   };
@@ -25,7 +25,8 @@ class WorkerSessions {
         last_epoch_(options_.start << 32) {}
 
   Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink);
-  // Tells the farm which workers have results that wait here for room, so that they do not count as late.
+  // Tells the farm which workers have results that wait for memory in the coordinator, so that they do not
+  // count as late.
   void report_held_back(Core& core) const;
   // Sessions may outlive this object. After abandon() their functions do nothing; close() closes their
   // streams.

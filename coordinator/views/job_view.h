@@ -28,7 +28,7 @@
 namespace ls::coordinator {
 
 // How the time of a job was spent, in core seconds of the workers (`merge`: of the coordinator). If the
-// coordinator is killed, all parts except `render` lose the time since the job was last stored.
+// coordinator is killed, the time since the job was last stored is lost, except for `render`.
 struct TimeSplit {
   double load = 0;      // fetching files
   double build = 0;     // parsing files, building worlds
@@ -58,8 +58,9 @@ inline constexpr int kMoreWorkers = 8;  // number of workers that JobView::eta_w
 struct ErrorFigures {  // Estimated errors of the image up to the last round that was complete in all tiles
   double rmse = 0;
   double relmse = 0;
-  double relmse_lo = 0, relmse_hi = 0;  // 95 % intervals for the realised error
-  // Both 0: there is no interval
+  // 95 % interval for the actual relMSE of this image
+  double relmse_lo = 0, relmse_hi = 0;
+  // The same for the RMSE; both 0: it is not known
   double rmse_lo = 0, rmse_hi = 0;
 };
 // Error against a reference image, from which the reference's own noise is subtracted
@@ -106,7 +107,7 @@ struct FrameView {
 struct FramesView {
   FrameRange range;
   std::uint32_t total = 0, done = 0, running = 0, failed = 0, cancelled = 0;
-  // The frame to show: the first one that is being rendered, else the last one with samples
+  // The frame to show: the first one that is being rendered; if there is none, the last one with samples
   std::uint32_t current = 0;
   std::vector<FrameView> all;  // all frames, ascending; filled in by Coordinator::job() only
 };
@@ -121,11 +122,13 @@ struct JobView {
   double progress = 0;    // 0..1
   std::uint64_t spp = 0;  // samples per pixel: requested, or the limit
   bool spp_asked = true;  // false: no number of samples was requested; its target error or its time ends it
-  std::optional<double> target_error;           // relMSE at which the job is to end, if requested
-  TargetLayer target_layer = TargetLayer::raw;  // whose relMSE that is
-  std::optional<DenoisedCheck> denoised_check;  // the last one, if it is that of the denoised layers
-  bool denoise = false;                         // its image also gets denoised layers
-  double spp_done = 0;                          // samples per pixel so far, mean over all pixels
+  std::optional<double> target_error;  // relMSE at which the job is to end, if requested
+  // the layers whose relMSE target_error limits
+  TargetLayer target_layer = TargetLayer::raw;
+  // the latest check of the denoised layers' error, if target_error limits that error
+  std::optional<DenoisedCheck> denoised_check;
+  bool denoise = false;  // its image also gets denoised layers
+  double spp_done = 0;   // samples per pixel so far, mean over all pixels
   std::optional<ErrorFigures> error_now;
   // Error against the reference, at the last checkpoint that was compared
   std::optional<ReferenceError> reference_error;
@@ -158,15 +161,18 @@ struct JobView {
   double elapsed_seconds = 0, core_seconds = 0;
   TimeSplit time;
   double submitted_unix = 0;  // time of submission by the wall clock, for display
-  Health health;  // numeric health of its folded units (rounds of tiles); for a sequence only the totals
+  // Numeric health of the units in its image (rounds of tiles); for a sequence only the totals
+  Health health;
   std::vector<HealthNote> notes;  // the numeric health as sentences for users; empty: no problems
   // The numeric class that it is pinned to, with its platform, and how much of the farm is of that class
   std::optional<Digest> numeric_class;
   std::string platform;
-  std::optional<ClassShare> class_share;  // nullopt: it is pinned to none, has ended, or is a sequence
+  // nullopt: the job is pinned to no class, has ended, or is a sequence
+  std::optional<ClassShare> class_share;
   bool fake = false;  // true if fake workers invented its pixels; for a sequence: the pixels of any frame
   // Set only for a sequence. The other values of its view combine all frames: they are sums or means over
-  // pixels, and elapsed_seconds counts from the first ray of any frame to the last fold.
+  // pixels, and elapsed_seconds counts from the first ray of any frame until the last result was added to an
+  // image.
   std::optional<FramesView> frames;
 };
 
@@ -175,7 +181,7 @@ struct JobChange {
   std::optional<JobState> state;  // the new state: paused, running or cancelled
   std::optional<int> priority;
   std::optional<std::uint64_t> spp;  // the new total of samples per pixel
-  // The new target error; only for a job that has one and was not stopped for another reason. A smaller
+  // The new target error; only for a job that has one, and that was not ended by anything else. A smaller
   // target resumes a job that reached the larger one
   std::optional<double> target_error;
   // Pixels whose tiles are rendered before the others from now on; the inner nullopt ends that
@@ -208,8 +214,8 @@ enum class VideoState { none, waiting, making, ready, failed };
 struct VideoView {
   VideoState state = VideoState::none;
   VideoAsked asked;
-  std::size_t frames = 0, frames_done = 0;  // that the video has, and that are in it
-  std::uint64_t bytes = 0;                  // of a video that is ready
+  std::size_t frames = 0, frames_done = 0;  // number of frames in the video, and of those encoded so far
+  std::uint64_t bytes = 0;                  // size of a video that is ready
   std::string error;                        // why it failed
 };
 

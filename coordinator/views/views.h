@@ -20,8 +20,8 @@ std::string video_json(const VideoView& video);
 std::string tiles_json(const std::vector<TileView>& tiles);                // returns {"tiles": [...]}
 std::string convergence_csv(const std::vector<ConvergencePoint>& points);  // starts with a header line
 
-// The functions below return the data of events for clients. `state` of a tile is "leased", "folded" or
-// "free".
+// The functions below return the data of events for clients. `state` of a tile is "leased", "folded" (a
+// result was added to the image) or "free".
 std::string tile_event_json(const JobId& job, TileIndex tile, const PixelRect& rect, std::string_view state,
                             std::uint64_t spp, std::string_view worker);
 std::string worker_gone_json(const WorkerId& worker);

@@ -34,8 +34,8 @@ struct Delivery {            // a notification that waits to be sent
 };
 
 // One receiver's deliveries, in order, and the times of its retries. Later deliveries wait until the first is
-// accepted or dropped, so that "done" never arrives before "running". A Line depends only on the deliveries
-// added, the outcomes reported and the times passed in. Not thread-safe.
+// accepted or dropped, so that "done" never arrives before "running". The state of a Line is a function of
+// the deliveries added, the outcomes reported and the times passed in. Not thread-safe.
 class Line {
  public:
   // Returns the delivery that was dropped because too many wait, else nullopt.

@@ -141,7 +141,9 @@ class Webhooks::Impl {
     for (const JobId& job : open) {
       const auto view = coordinator.job(job);
       const std::string word(view ? to_string(view->state) : "");
-      // The job's end may already be among the pending deliveries, if the crash came between the two writes.
+      // If the previous run crashed after it had stored the notification of the job's end, but before it
+      // recorded that the job has ended, the notification is still pending. Then the end is only recorded,
+      // not reported again. The same for a job that no longer exists.
       if (!view || kept_.contains(job.value + "/" + word)) {
         const auto state = state_.lock();
         state->mark_ended(job);

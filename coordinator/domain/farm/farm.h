@@ -59,7 +59,7 @@ struct JobFigures {
   std::uint64_t units_leased = 0;  // units leased to workers, each counted once even if a copy is leased, too
   std::uint64_t units_queued = 0;  // units that wait for a worker: units_total - units_done - units_leased
   std::uint64_t units_folded = 0;
-  RoundIndex rounds_complete = 0;  // number of rounds that are folded in all tiles
+  RoundIndex rounds_complete = 0;  // number of rounds that the image has of every tile
   int priority = 0;
   // Predicted CPU seconds of the units that are not done, from measured cost. 0: nothing has been measured
   // yet, or the end of an adaptive job (one with a target error) is not predicted yet.
@@ -134,12 +134,13 @@ class Farm {
   };
   std::vector<Shares> shares() const;
   AuditFigures audits() const;
-  // Returns the job's open audits. The service must store them: otherwise a faulty worker would no longer be
-  // suspected after a restart.
+  // Returns the job's open audits (units that are rendered again for comparison). The service must store
+  // them: otherwise a faulty worker would no longer be suspected after a restart.
   std::vector<JobRestored::Audit> open_audits(const JobId& id) const;
   std::vector<JobId> take_changed_audits();  // jobs whose open audits may have changed since the last call
   bool quarantined(const WorkerId& worker) const;
-  // True if a job without a numeric class may be pinned to this worker's class.
+  // True if a job that has no numeric class yet may be pinned to that of this worker, so that only workers of
+  // this class render it.
   bool may_pin(const JobId& id, const WorkerId& worker) const;
   double cores_connected() const;  // sum over connected workers: threads times core share (CoreShare)
   int workers_connected() const;

@@ -69,7 +69,8 @@ std::string audit_load(const std::string& whose, const Load& kept, const Load& c
   return "";
 }
 
-// Units and charges of each job, group and user, summed up from the leases to check the running totals
+// Leased units and charged core seconds of each job, group and user, summed up from the leases to check the
+// running totals
 struct Leased {
   std::map<JobSeq, Load> jobs;
   std::map<std::string, Load> users, groups;
@@ -97,7 +98,8 @@ std::string audit_job_load(const Job& job, Leased& leased, const ShareLimits& li
   const double charge = leases == leased.charges.end() ? 0 : leases->second;
   if (std::abs(job.charge_out - charge) > 1e-6 * (1 + charge))
     return fmt::format("{}: charged with {} s, leased {} s", name, job.charge_out, charge);
-  // Without any lease the charge must be exactly 0, so that rounding errors cannot accumulate.
+  // Without any lease the core seconds charged to the job must be exactly 0, so that rounding errors cannot
+  // accumulate.
   if (leases == leased.charges.end() && job.charge_out != 0)
     return fmt::format("{}: charged with {} s though nothing is leased", name, job.charge_out);
   const bool alone = plan.group.empty();  // The limits of a job in a group apply to the whole group
@@ -177,7 +179,7 @@ std::string Farm::audit() const {
     wrong = audit_loads("group", state.groups, leased.groups, limits.units_per_job, limits.workers_per_job);
   if (!wrong.empty()) return wrong;
   // The worker table updates `cores` by additions and subtractions as workers join, leave and are measured.
-  // Each of them has a rounding error of about 2^-52 of the farm's threads.
+  // Each update has a rounding error of about 2^-52 times the farm's threads.
   if (std::abs(cores - state.workers.cores()) > 1e-6 * std::max(threads, 1)) return "cores are counted wrong";
   return threads == state.workers.threads() ? "" : "threads are counted wrong";
 }

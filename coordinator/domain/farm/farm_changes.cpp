@@ -41,8 +41,9 @@ Result<void> Farm::State::may_extend(const Job& job, std::uint64_t spp) {
   if (is_closed(job.state))
     return ls::fail(Errc::failed_precondition,
                     fmt::format("job {} is {}: it cannot be extended", id, to_string(job.state)));
-  // now_spp is the job's current total of samples per pixel. If the samples decided the job's end, this is
-  // the requested number; otherwise it is the number that the tile with the most rounds ends with.
+  // now_spp is the job's current total of samples per pixel. It is the requested number, unless a target
+  // error, a time limit or the user ends the job early; then it is the number of the tile with the most
+  // rounds.
   const RoundIndex rounds = job.queue.longest();
   const bool cut_short = job.stopping && *job.stopping != StopReason::spp;
   const std::uint64_t now_spp = !cut_short ? job.spp : rounds == 0 ? 0 : cut_range(rounds - 1, job.spp).s1;

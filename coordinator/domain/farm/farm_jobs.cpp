@@ -30,7 +30,7 @@ void Farm::State::set_state(Job& job, JobState to) {
 
 void Farm::State::refresh(Job& job) {
   const bool units = job.leasable() && !job.queue.empty(job.units);
-  // The job may have been offered already, because of an audit that only some workers can do
+  // FairShare may have the job already, because of an audit that only some workers can do
   work_appeared |= units && !job.has_units;
   job.has_units = units;
   if (units || (job.leasable() && job.audit_waits()))
@@ -104,8 +104,8 @@ void Farm::State::on(const JobPaused& event) {
   Job* job = find(event.job);
   if (job == nullptr || !job->leasable()) return;
   set_state(*job, JobState::paused);
-  // A lease that a worker has begun is finished; the others are taken back now. The newest lease goes first,
-  // since whether a lease has begun is derived from the worker's earlier leases.
+  // A worker finishes a lease that it has begun; leases that are not begun are taken back now. The newest
+  // lease goes first, since whether a lease has begun is derived from the worker's earlier leases.
   const std::vector<LeaseSeq> out = leases_of(*job);
   for (auto seq = out.rbegin(); seq != out.rend(); ++seq)
     if (untouched(*leases.find(*seq))) free_lease(*seq, FreedCause::paused, true);
@@ -116,7 +116,8 @@ void Farm::State::on(const JobResumed& event) {
   Job* job = find(event.job);
   if (job == nullptr || job->state != JobState::paused) return;
   set_state(*job, job->numeric_class ? JobState::running : JobState::queued);
-  job->checking_spp = 0;  // the check may have failed, which paused the job: it is made again
+  // if a failed check of the denoised error paused the job, the check is made again
+  job->checking_spp = 0;
   if (job->adaptive) judge(*job);
   refresh(*job);
 }
@@ -166,7 +167,7 @@ void Farm::State::freeze(Job& job, StopReason reason) {
   for (TileIndex t = 0; t < begun.size(); ++t)
     begun[t] = std::max({job.queue.next(t), job.units.end_of_accepted(t), RoundIndex{1}});
   job.cut_off(begun, reason);
-  // This also folds results that were held back by the target error
+  // This also adds accepted results to the image that the stop rule of a target error has held back
   for (TileIndex t = 0; t < begun.size(); ++t) issue_folds(job, t);
   finish_if_complete(job);
   refresh(job);
@@ -174,7 +175,8 @@ void Farm::State::freeze(Job& job, StopReason reason) {
 
 void Farm::State::finish_if_complete(Job& job) {
   if (job.ended() || !job.complete()) return;
-  // Open audits must end first: they decide whether the image is right
+  // Open audits (units that are rendered again for comparison) must end first: they decide whether the image
+  // is right
   if (!job.audits.empty()) return refresh(job);
   if (!job.stopping) job.stopping = StopReason::spp;
   set_state(job, JobState::done);

@@ -38,13 +38,14 @@ struct Farm::State {
 
   // State of the event being handled
   TimePoint now{};
-  // Time of the last Tick. Whether a worker is still blocked is decided by this time, because blocks are
+  // Time of the latest Tick. Whether a worker is still blocked is decided by this time, because blocks are
   // lifted at ticks, when all workers are checked
   TimePoint ticked{};
   std::vector<Effect> effects;
-  bool work_appeared = false;      // there may be units that any worker could take now
-  bool pinned_for_others = false;  // a job was pinned for which workers wait that may not begin jobs
-  std::set<WorkerIndex> dirty;     // workers whose state has changed, so that they may want more work
+  bool work_appeared = false;  // there may be units that any worker could take now
+  // a job was pinned to a class, and workers of this class that may not begin jobs can now take its units
+  bool pinned_for_others = false;
+  std::set<WorkerIndex> dirty;  // workers whose state has changed, so that they may want more work
 
   // farm_jobs.cpp, farm_changes.cpp
   void on(const JobSubmitted& event);
@@ -66,7 +67,7 @@ struct Farm::State {
   Job& add(JobPlan plan);
   void set_state(Job& job, JobState to);
   // Tells FairShare whether the job has units to lease. Must be called after any change of the job's queue,
-  // state or window
+  // state or window (how far ahead rounds may be leased)
   void refresh(Job& job);
   void restore_tile(Job& job, TileIndex tile, const JobRestored& event);
   void freeze(Job& job, StopReason reason);
@@ -106,7 +107,7 @@ struct Farm::State {
   void compare(Job& job, UnitCode code, const UnitAccepted& event);
   void restore_audits(Job& job, const JobRestored& event);
   void consider_audit(Job& job, UnitCode code, WorkerIndex first);
-  // Returns an audit of the job that this worker may do; nullopt if there is none.
+  // Returns a unit of the job that this worker may render again for an audit; nullopt if there is none.
   std::optional<UnitCode> audit_for(const Job& job, const Worker& worker) const;
   bool audit_from(Job& job, Worker& worker);
   // True if this worker was told to render this unit, so that its result counts as a vote.
@@ -129,20 +130,22 @@ struct Farm::State {
   void void_tile(Job& job, TileIndex tile);
   static void steer_anew(Job& job);
 
-  // farm_stop.cpp
+  // farm_stop.cpp. Levels, and groups of tiles that stop together, are those of the stop rule
+  // (adaptive_stop.h).
 
-  // Passes the error of the tile after this round, which has just been folded, to the stop rule and acts on
-  // its decision.
+  // Passes the error of the tile after this round, which has just been added to the image, to the stop rule,
+  // which decides how many rounds tiles get. Then acts on its decision.
   void steer(Job& job, TileIndex tile, RoundIndex round);
-  void judge(Job& job);                        // judges the image at every level that all groups have reached
-  AdaptiveStop::Verdict verdict_on(Job& job);  // of the image at the level that all groups have reached
+  void judge(Job& job);  // judges the image at every level that all groups have reached
+  // judges the image at the level that all groups have reached
+  AdaptiveStop::Verdict verdict_on(Job& job);
   AdaptiveStop::Verdict denoised_verdict(Job& job);
   void mark_level(Job& job, bool last);
-  void take_marks(Job& job);  // emits a Checkpoint for each mark (job.h) that is folded
+  void take_marks(Job& job);  // emits a Checkpoint for each mark (job.h) whose rounds are all in the image
   void stop_at_level(Job& job);
   // Decides the last round of each tile from measured unit costs; called shortly before the job's time limit.
   void plan_end(Job& job, TimePoint limit);
-  void give_back_beyond(Job& job);  // takes back units leased beyond the tiles' ends
+  void give_back_beyond(Job& job);  // takes back leased units beyond the tiles' last rounds
   // Returns the lease under which the worker holds the unit; null: it does not
   LeaseRecord* lease_of(const Job& job, UnitCode code, const Worker& worker);
   void count_failure(Job& job, UnitCode code, Worker& worker, const UnitFailure& failure);
@@ -154,8 +157,8 @@ struct Farm::State {
   void leave_load(Job& job, const Worker& worker);  // subtracts one of the job's leases from the worker's
                                                     // count
   // Returns how many more of the job's units the worker may be leased under the limits on workers and units.
-  // Audits are exempt: the farm orders them, not the user, and an audit that waited for the user's other work
-  // would delay the end of a finished job.
+  // Audits (second renderings, for comparison) are exempt: the farm orders them, not the user, and an audit
+  // that waited for the user's other work would delay the end of a finished job.
   std::uint32_t room(const Job& job, const Worker& worker) const;
   bool limited(const Job& job) const;
   static bool has(const LeaseRecord& lease, UnitCode code);  // true if the unit is still leased under it
@@ -184,8 +187,9 @@ struct Farm::State {
   void pin(Job& job, const Digest& numeric_class);  // does nothing if the job is pinned already
   bool lease_from(Job& job, Worker& worker);
   std::optional<UnitCode> next_for(Job& job, const Worker& worker);
-  // True if the unit is speculative and the worker should not get it yet, because it still has enough to do.
-  // `units` and `cost` (predicted CPU seconds) are what the lease being made adds to what the worker holds.
+  // True if the unit is speculative (may turn out not to be needed) and the worker should not get it yet,
+  // because it still has enough to do. `units` and `cost` (predicted CPU seconds) are what the lease being
+  // made adds to what the worker holds.
   bool too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units, double cost) const;
   // True if a connected worker other than `but` may take units of the job and has not failed on this one.
   bool others_may_take(const Job& job, UnitCode code, const Worker& but) const;

@@ -59,7 +59,8 @@ AdaptiveStop::Verdict Farm::State::denoised_verdict(Job& job) {
     }
     return Verdict::no;
   }
-  // The film can be denoised only while it is exactly that of this level.
+  // The film can be denoised for the check only while it is exactly the image of the stop rule's present
+  // level.
   const std::vector<RoundIndex> ends = rule.ends();
   bool missing = false;
   for (TileIndex t = 0; t < job.units.tiles(); ++t) {
@@ -101,8 +102,8 @@ void Farm::State::take_marks(Job& job) {
 }
 
 void Farm::State::stop_at_level(Job& job) {
-  // Folds that were requested cannot be undone. If the target was raised, more rounds may be folded than the
-  // level needs.
+  // Rounds whose addition to the image was requested stay in it. So if the target was raised, the image may
+  // have more rounds than the level needs.
   std::vector<RoundIndex> ends = job.adaptive->ends();
   for (TileIndex t = 0; t < job.units.tiles(); ++t) ends[t] = std::max(ends[t], job.units.issued(t));
   job.cut_off(ends, StopReason::error);

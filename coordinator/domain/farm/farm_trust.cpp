@@ -50,8 +50,8 @@ void Farm::State::consider_audit(Job& job, UnitCode code, WorkerIndex first) {
   work_appeared = true;
 }
 
-// Audits that were open at the restart continue. No worker is connected yet; their deadline leaves workers
-// time to come back.
+// Audits (units that are rendered again for comparison) that were open at the restart continue. No worker is
+// connected yet, so these audits get a deadline that leaves workers time to come back.
 void Farm::State::restore_audits(Job& job, const JobRestored& event) {
   for (const JobRestored::Audit& open : event.audits) {
     const UnitCode code = unit_code(open.round, open.tile);
@@ -215,9 +215,9 @@ void Farm::State::disagreed(Job& job, UnitCode code, const UnitAccepted& with, b
                outvoted(with.unit, first.digest, workers.name_of(second), with.worker, claimed));
 }
 
-// Handles a differing result from a worker that was not asked for it. The worker has chosen the unit itself,
-// so its result is no vote. But the unit is audited, and if the auditor agrees with the accepted result, the
-// worker that made the claim is faulty.
+// Handles a result that differs from the accepted one and comes from a worker that was not asked for it. The
+// worker has chosen the unit itself, so its result is no vote. But the unit is audited, and if the auditor
+// agrees with the accepted result, the worker that made the claim is faulty.
 void Farm::State::claimed(Job& job, UnitCode code, const UnitAccepted& by) {
   const std::pair claimed{workers.index_of(by.worker), by.digest};
   if (const auto open = job.audits.find(code); open != job.audits.end()) {
@@ -272,7 +272,7 @@ void Farm::State::bar(const WorkerId& id, const std::string& why) {
 
 void Farm::State::void_results(Job& job, WorkerIndex faulty) {
   std::vector<TileIndex> tiles = job.units.tiles_of(faulty);
-  // In an adaptive job the error of one tile affects where all other tiles end.
+  // In an adaptive job the error of one tile affects how many rounds all other tiles get.
   const bool by_error = job.adaptive && (!job.stopping || *job.stopping == StopReason::error);
   if (!tiles.empty() && by_error) {
     tiles.resize(job.units.tiles());
@@ -294,7 +294,7 @@ void Farm::State::void_results(Job& job, WorkerIndex faulty) {
   refresh(job);
 }
 
-// Rebuilds the stop rule from the rounds that are still folded.
+// Rebuilds the job's stop rule (adaptive_stop.h) from the rounds that are still in the image.
 void Farm::State::steer_anew(Job& job) {
   job.adaptive.reset();
   job.steer();

@@ -1,5 +1,5 @@
-// The farm's reaction to results and failures of units (rounds of tiles): when results are folded, and when a
-// job fails.
+// The farm's reaction to results and failures of units (rounds of tiles): when results are folded (added to
+// the image), and when a job fails.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@ void Farm::State::pin(Job& job, const Digest& numeric_class) {
   if (job.numeric_class) return;
   job.numeric_class = numeric_class;
   effects.emplace_back(JobPinned{job.plan.brief.job, numeric_class});
-  // Workers that may not begin a job may take units of it from now on.
+  // Workers that may not begin jobs may take units of this job from now on, since it has a class.
   for (const WorkerIndex index : workers.wanting_work()) {
     const Worker& worker = workers.at(index);
     if (!worker.may_begin && worker.numeric_class == numeric_class) work_appeared = pinned_for_others = true;
@@ -80,7 +80,8 @@ void Farm::State::on(const UnitFolded& event) {
   Job* job = find(event.unit.job);
   if (job == nullptr || job->ended() || event.unit.tile >= job->units.tiles()) return;
   const UnitCode code = unit_code(event.unit.round, event.unit.tile);
-  if (event.samples != job->range(code)) return;  // the round was truncated and has been reopened since
+  // The round was truncated when it was rendered, and needs more samples now
+  if (event.samples != job->range(code)) return;
   const RoundIndex before = job->units.rounds_complete();
   if (!job->units.fold(event.unit.tile, event.unit.round, event.rel_error_sum)) return;
   for (RoundIndex r = before; r < job->units.rounds_complete(); ++r) checkpoint(*job, r);
@@ -89,12 +90,12 @@ void Farm::State::on(const UnitFolded& event) {
   if (job->units.rounds_complete() != before) refresh(*job);
 }
 
-// Takes a checkpoint after a round that is folded in all tiles. In an adaptive job (one with a target error)
-// this function handles only the rounds that every tile gets in any case; later checkpoints are taken at
-// levels of the stop rule.
+// Takes a checkpoint after a round that the image has of every tile. In an adaptive job (one with a target
+// error) this function handles only the rounds that every tile gets in any case; later checkpoints are taken
+// at levels of the stop rule.
 void Farm::State::checkpoint(Job& job, RoundIndex round) {
   const double spp = static_cast<double>(cut_range(round, job.spp).s1);
-  // A truncated round that was reopened is folded a second time, which makes no further checkpoint.
+  // A truncated round that is rendered again in full comes a second time, but makes no further checkpoint.
   if ((!job.adaptive || cut_range(round, job.spp).s1 < std::min(job.spp, kMinSppBeforeStop)) &&
       spp > job.checkpoint_spp) {
     job.checkpoint_spp = spp;

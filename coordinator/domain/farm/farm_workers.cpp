@@ -133,7 +133,7 @@ void Farm::State::on(const Tick&) {
     if (!job->leasable() || job->frozen) continue;
     const auto limit = job->time_limit(now);
     if (limit && now >= *limit) freeze(*job, StopReason::time);
-    // The end is planned before the first lease could extend beyond the limit
+    // The end is planned before any lease could extend beyond the limit
     else if (limit && seconds(*limit - now) <= 2 * kTimePlanned)
       plan_end(*job, *limit);
   }
@@ -148,7 +148,7 @@ void Farm::State::expire_leases() {
     Worker& worker = *lease->worker;
     worker.pause = now - worker.progress_at >= kNoGrowthLimit ? Pause::stuck : Pause::silent;
     workers.settle(worker);
-    // The worker is not told. If it recovers and finishes before the others, its results are welcome.
+    // The worker is not told: if it recovers and finishes before other workers do, its results are welcome.
     free_lease(lease->seq, FreedCause::deadline_passed, false);
   }
 }

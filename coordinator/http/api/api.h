@@ -41,8 +41,8 @@ class Api {
   // route, or a Response that the server sends without calling handle(): a static file, or an error (unknown
   // address, missing or insufficient token, too many requests, body too long).
   std::variant<Response, Match> admit(Request& request);
-  // Returns the greatest allowed length of this request's body in bytes. It also holds without
-  // Content-Length.
+  // Returns the greatest allowed length of this request's body in bytes. The limit also applies to a body
+  // without Content-Length.
   std::uint64_t body_limit(const Route& route, const Request& request) const;
   // Returns how this request's body is to be read: BodyKind::archive if its media type is in Route::unpacks,
   // else Route::body.
@@ -58,7 +58,7 @@ class Api {
   // Returns the sink for a body that is streamed (BodyKind::blob and archive), or the response that rejects
   // the request.
   std::variant<Response, std::unique_ptr<BodySink>> open_upload(const Match& match, const Request& request);
-  // Requests that long work ends at its next step, because the coordinator stops.
+  // Asks long-running work to end at its next step, because the coordinator stops.
   void ask_to_stop() { stop_.request_stop(); }
   std::stop_token stop_token() const { return stop_.get_token(); }
 
@@ -70,7 +70,7 @@ class Api {
   // Sets the function from which /metrics gets the webhook counters; call this before the first request. If
   // it is never called, /metrics has no webhook counters.
   void webhooks(std::function<WebhookFigures()> figures) { webhooks_ = std::move(figures); }
-  // The same for the counters of spans
+  // The same for the counters of trace spans
   void traces(std::function<trace::Figures()> figures) { traces_ = std::move(figures); }
   std::optional<trace::Figures> traces() const { return traces_ ? std::optional(traces_()) : std::nullopt; }
   std::optional<WebhookFigures> webhooks() const {

@@ -82,9 +82,9 @@ std::optional<Response> refuse_priority(const Api& api, const Caller& caller, in
 // body.
 // Keys: spp, target_error, target_layer, time, seed, size, integrator, priority, float, frames, max_workers,
 // max_units, memory, numeric_class, reference, aov and tags (comma lists), define (may be repeated). The key
-// `also` is ignored; any other key, a repeated key, or a wrong value is an error that names the key. Keys
-// that the query lacks keep their values in `base`, the JSON of a spec. The query's definitions are added to
-// those of `base`; for a name in both the query's value holds.
+// named by `also` is ignored; any other key, a repeated key, or a wrong value is an error that names the key.
+// Keys that the query lacks keep their values in `base`, the JSON of a spec. The query's definitions are
+// added to those of `base`; for a name in both the query's value holds.
 Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, const std::string& base = "{}");
 
 }  // namespace ls::http

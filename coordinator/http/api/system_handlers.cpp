@@ -23,7 +23,8 @@ Response event_stream(const Request& request, std::string job) {
   EventStream stream;
   stream.job = std::move(job);
   stream.reader = request.caller;
-  // Browsers send the header Last-Event-ID when they reconnect. Its id is later than the id in the address.
+  // Browsers send the header Last-Event-ID when they reconnect. Its id is later than that of last_event_id in
+  // the address.
   std::string_view text = request.header("last-event-id");
   if (text.empty()) text = request.parameter("last_event_id").value_or("");
   if (!text.empty()) {

@@ -40,7 +40,8 @@ class TokenRegistry {
   // others may write a file (or, for secrets, read it), or a line is invalid; the message has its number.
   static Result<std::unique_ptr<TokenRegistry>> open(const std::filesystem::path& folder);
 
-  // Returns the caller with this token; nullopt: the token is wrong. The duration is the same for both.
+  // Returns the caller with this token; nullopt: the token is wrong. The search takes equally long in both
+  // cases.
   std::optional<Caller> find(std::string_view token) const;
   std::optional<Caller> by_id(std::string_view id) const;
   bool may_join(std::string_view token) const;

@@ -110,7 +110,8 @@ struct ArchiveReader::State {
   Source source;
   ArchiveKind kind = ArchiveKind::zip;
   std::unique_ptr<archive, FreeArchive> reader;
-  std::int64_t data_end = 0;  // offset in the unpacked tar where the data of the last entry end
+  // offset, in the unpacked tar, of the end of the current entry's data
+  std::int64_t data_end = 0;
 
   Error error(std::string_view doing) const;
   std::int64_t position() const { return archive_filter_bytes(reader.get(), 0); }

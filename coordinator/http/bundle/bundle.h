@@ -18,8 +18,8 @@
 namespace ls::http {
 
 struct BundleLimits {
-  std::uint64_t entry_bytes = std::uint64_t{64} << 30;  // most unpacked bytes of one file
-  std::uint64_t total_bytes = std::uint64_t{64} << 30;  // most unpacked bytes of all files together
+  std::uint64_t entry_bytes = std::uint64_t{64} << 30;  // greatest unpacked size of one file
+  std::uint64_t total_bytes = std::uint64_t{64} << 30;  // greatest unpacked size of all files together
 };
 
 struct Bundle {

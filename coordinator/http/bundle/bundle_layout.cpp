@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMostShown = 5;  // most names that a message lists
+constexpr std::size_t kMostShown = 5;  // a message lists at most this many names
 
 std::string shown(std::string_view name) {
   return fmt::format("\"{}\"", plain_text(name.substr(0, kMaxAssetName)));

@@ -162,7 +162,7 @@ void Connection::watch(SteadyClock::time_point until) {
     if (ec || alive.expired() || SteadyClock::now() < deadline_) return;
     timed_out_ = true;
     stream_.cancel();
-    // Once more: an operation of Beast that has just finished one read may start another.
+    // Cancels again later: an operation of Beast that has just finished one read may start another.
     watch(SteadyClock::now() + std::chrono::milliseconds(100));
   });
 }

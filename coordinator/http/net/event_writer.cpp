@@ -13,7 +13,7 @@
 namespace ls::http {
 namespace {
 
-// Cleans up however the stream ends, even if the server is destroyed around it.
+// Its destructor cleans up however the stream ends, even if the server is destroyed while the stream waits.
 struct Undo {
   Shared& shared;
   net::steady_timer*& events_wait;
@@ -28,7 +28,9 @@ struct Undo {
 
 struct Start {
   std::uint64_t after = 0;
-  bool reset = false;  // this coordinator never published the reader's id; it comes from another data folder
+  // true: this coordinator never published the event id that the reader gives; it comes from another data
+  // folder
+  bool reset = false;
 };
 
 }  // namespace

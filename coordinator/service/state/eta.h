@@ -20,13 +20,12 @@ struct EtaInputs {
   // Target error (relMSE) and time budget (seconds since the first ray), if requested
   std::optional<double> target, time;
   double elapsed = 0;  // seconds since the first ray
-  // CPU seconds per wall-clock second that the job's workers give it; if it is not running, that they would
-  // give it
+  // CPU seconds per wall-clock second that the job's workers give it, or would give it if it were running
   double cores = 0;
   // `cores` with kMoreWorkers more workers; not above `cores` if more workers would not help
   double cores_with_more = 0;
   double unit_seconds = 0;   // mean core seconds of a remaining unit; 0: unknown
-  double units_at_once = 0;  // most units that can be rendered at the same time; 0: no limit
+  double units_at_once = 0;  // units that can be rendered at the same time; 0: no limit
 };
 
 struct Eta {

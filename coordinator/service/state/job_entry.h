@@ -38,7 +38,7 @@ struct JobEntry {
   std::optional<Assembly> assembly;  // the image; nullopt once an ended job is on disk
   // Pictures to compare with the reference, if it has one, while there is an assembly
   std::optional<ReferenceTiles> reference_tiles;
-  // Noise of the reference image, estimated by the last comparison; nullopt: unknown
+  // Noise of the reference image, estimated by the latest comparison; nullopt: unknown
   std::optional<ReferenceNoise> reference_noise;
   // The denoised final image, until it is written; null: the job has no denoising, or the image is not made
   // yet
@@ -63,13 +63,13 @@ struct JobEntry {
   std::optional<TimePoint> clock_zero;     // zero of the job's clock, while it runs
   // Since when its clock is stopped, because the job is paused; nullopt: it runs
   std::optional<TimePoint> still_since;
-  // Wall clock of the end of its rendering; the record has it from the moment at which the job's end is
+  // Wall clock of the end of its rendering, in seconds since 1970. The record gets it when the job's end is
   // stored
   double ended_unix = 0;
-  double fold_seconds = 0;    // seconds on the job's clock at the last fold
+  double fold_seconds = 0;    // seconds on the job's clock when a result was last added to the image
   std::string trouble;        // why the job waits, for the user
   std::uint64_t resumes = 0;  // how often it was resumed
-  // The workers that each leased unit (tile and round) is leased to, for display
+  // For each leased unit (tile and round), the workers that it is leased to; for display
   std::map<std::pair<TileIndex, RoundIndex>, std::vector<WorkerId>> leased;
   // Seconds on the job's clock of each durable result, while a restart replays the results
   std::map<std::pair<TileIndex, RoundIndex>, double> replay_at;

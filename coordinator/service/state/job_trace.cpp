@@ -15,12 +15,13 @@ std::int64_t to_ns(double unix_seconds) {
   return static_cast<std::int64_t>(std::llround(std::clamp(unix_seconds, 0., 9e9) * 1e9));
 }
 
-// Two farms that take part in one trace may each have a job of the same id.
+// The id alone does not suffice: two farms that take part in one trace may each have a job of the same id.
 std::string identity_of(const StoredJob& job) {
   return fmt::format("job {} {} {}", job.id.value, job.submitted_unix, job.scene.hex());
 }
 
-// The first span of a job. A job that is extended after its end, when `ended_unix` is set, gets another one.
+// Returns the id of the job's span. A job that is extended after its end, when `ended_unix` is set, gets
+// another span.
 trace::SpanId span_of(const trace::TraceId& trace, const StoredJob& job, double ended_unix) {
   return span_id_of(trace, fmt::format("{} {}", identity_of(job), ended_unix));
 }
@@ -74,7 +75,8 @@ JobTrace::JobTrace(const Tracing& tracing, const StoredJob& job, trace::SpanCont
       start_ns_(to_ns(std::max(job.submitted_unix, job.totals.ended_unix))),
       ended_(is_terminal(job.state)) {}
 
-// A time of this job's spans: none is before the job's own start, although other clocks told that.
+// Converts a time for this job's spans. None of them is before the job's own start, which may come from
+// another clock.
 std::int64_t JobTrace::ns(TimePoint at) const { return std::max(tracing_.tracer->unix_ns(at), start_ns_); }
 
 void JobTrace::event(std::string name, TimePoint at) {
@@ -129,14 +131,14 @@ void JobTrace::result(const UnitResult& r, const WorkerId& worker, TimePoint che
       static_cast<std::int64_t>(std::min<std::uint64_t>(r.held_unix_ns, static_cast<std::uint64_t>(now_ns)));
   auto open = leases_.find(r.lease);
   if (open == leases_.end() && !r.lease.value.starts_with(tracing_.lease_prefix + "-")) {
-    // Lent before the restart by another process, which did not live to record the lease. Their number is
-    // bounded, since a worker that lies can name any lease.
+    // An earlier process of the coordinator granted this lease and did not live to record it. The number of
+    // such leases is bounded, since a lying worker can name any lease.
     if (former_leases_ >= kMaxFormerLeases) return;
     ++former_leases_;
     OpenLease former{.worker = worker.value, .start_ns = held_ns > 0 ? held_ns : ns(checked)};
     open = leases_.emplace(r.lease, std::move(former)).first;
   }
-  // A worker that lies can name another worker's lease, which gets nothing of it.
+  // A lying worker can name another worker's lease. The result is then not counted for that lease.
   const bool foreign = open != leases_.end() && open->second.worker != worker.value;
   if (open != leases_.end() && !foreign) {
     // A worker may have begun the unit for an earlier lease, which ended when its connection broke.
@@ -184,7 +186,7 @@ void JobTrace::units_freed(const UnitsFreed& freed, TimePoint now) {
   }
 }
 
-// One of the lease's units is done or gone.
+// Notes that one of the lease's units is done or was taken back.
 void JobTrace::leave(const LeaseId& id, std::int64_t now_ns) {
   const auto open = leases_.find(id);
   if (open == leases_.end() || --open->second.left > 0) return;
@@ -193,7 +195,8 @@ void JobTrace::leave(const LeaseId& id, std::int64_t now_ns) {
 }
 
 void JobTrace::leases_end(TimePoint now) {
-  // How many units a lease of an earlier process had is not known: it ended with its last result.
+  // The number of units in a lease of an earlier process is not known: its end is the time of its last
+  // result.
   for (const auto& [id, lease] : leases_) record_lease(id, lease, lease.units > 0 ? ns(now) : lease.end_ns);
   leases_.clear();
   holders_.clear();

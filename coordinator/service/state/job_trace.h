@@ -1,6 +1,6 @@
-// The spans of one job that the coordinator records: the job from its submission to its end, the leases by
-// which its units go to workers, and steps such as a fold or the final image. A job that is not traced has no
-// JobTrace.
+// The trace spans that the coordinator records for one job: the job from its submission to its end, the
+// leases (lists of units that a worker was told to render), and steps such as adding a result to the image or
+// writing the final image. A job that is not traced has no JobTrace.
 //
 // The ids of trace, job and leases are derived from the job's record and the lease's id, so that another
 // coordinator, or this one after a restart, continues the same trace.
@@ -21,7 +21,7 @@
 
 namespace ls::coordinator {
 
-// With what the coordinator traces jobs: the tracer, and the prefix of its leases
+// What is needed to trace jobs: the tracer, and the prefix of the coordinator's leases
 struct Tracing {
   std::shared_ptr<trace::Tracer> tracer;  // null: nothing is traced
   std::string lease_prefix;               // of the leases of this start of the coordinator
@@ -43,8 +43,8 @@ class JobTrace {
   // A lease begins. Returns its context, which goes to the worker.
   trace::SpanContext lease_begins(const Lease& lease, const WorkerId& worker, const std::string& worker_name,
                                   TimePoint now);
-  // A result was handled: checked from `checked`, for `check_seconds`, and stored until `now`. After one that
-  // `failed` its unit stays part of all leases, until units_freed().
+  // Records how a result was handled: its check began at `checked` and took `check_seconds`; then it was
+  // stored, until `now`. If it `failed`, its unit stays part of all its leases until units_freed().
   void result(const UnitResult& result, const WorkerId& worker, TimePoint checked, double check_seconds,
               TimePoint now, bool failed);
   void units_freed(const UnitsFreed& freed, TimePoint now);
@@ -60,7 +60,7 @@ class JobTrace {
   struct OpenLease {
     std::string worker, worker_name;
     std::int64_t start_ns = 0;
-    std::int64_t end_ns = 0;  // of its last result
+    std::int64_t end_ns = 0;  // time of its last result
     std::size_t left = 0;     // units without a result
     std::int64_t units = 0, results = 0, samples = 0;
     double core_seconds = 0;
@@ -77,7 +77,7 @@ class JobTrace {
 
   const Tracing tracing_;
   const std::string job_;
-  const std::string identity_;  // unlike that of any other job, also of other farms
+  const std::string identity_;  // text that no other job has, not even a job of another farm
   const std::optional<trace::SpanId> parent_;
   trace::SpanContext context_;
   std::int64_t start_ns_ = 0;

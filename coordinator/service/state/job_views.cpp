@@ -37,7 +37,7 @@ Eta JobViews::eta(const JobEntry& entry, const JobFigures& figures, const JobVie
   facts.core_seconds = v.core_seconds;
   facts.core_left = figures.core_seconds_left;
   facts.core_to_limit = figures.core_seconds_to_limit;
-  // The curve is that of the image itself: it says nothing of when the denoised layers reach a target.
+  // The curve is that of the image itself: it does not show when the denoised layers reach a target.
   if (job.spec.target_layer == TargetLayer::raw) facts.target = job.spec.target_error;
   facts.time = job.spec.time;
   facts.elapsed = v.elapsed_seconds;

@@ -7,7 +7,7 @@
 
 namespace ls::coordinator {
 namespace {
-// Writes that wait for the disk; above this number, log lines are dropped
+// If more writes than this wait for the disk, log lines are dropped
 constexpr std::size_t kMaxLogWrites = 1024;
 }  // namespace
 

@@ -26,9 +26,9 @@ class Records {
   // have thousands of frames.
   Result<void> put_together(const std::function<void()>& changes);
   bool puts_together() const { return together_ != nullptr; }
-  // Stores the numeric class that the job is pinned to, if it is not stored yet. After a restart a class that
-  // was not stored would be forgotten, and the job could be pinned to another one. So until it is stored, the
-  // job waits and none of its results is accepted.
+  // Stores the numeric class (machines that compute the same bits) that the job is pinned to, if it is not
+  // stored yet. After a restart a class that was not stored would be forgotten, and the job could be pinned
+  // to another one. So until it is stored, the job waits and none of its results is accepted.
   Result<void> put_pin(const EntryPtr& entry);
   void add_quarantined(QuarantinedWorker worker) { quarantined_.push_back(std::move(worker)); }
   // Stores the quarantined workers that are not stored yet. Until they are, no result may be stored.
@@ -39,8 +39,8 @@ class Records {
 
   void log(const JobId& id, std::string text);
   void add_point(const EntryPtr& entry, const ConvergencePoint& point);
-  // Drops the curve's points, which are of wrong or lost pixels. Checkpoints are taken again as tiles are
-  // folded again.
+  // Drops the curve's points, which are of wrong or lost pixels. Checkpoints are taken again as the tiles'
+  // results are added to the image again.
   void forget_curve(JobEntry& entry);
   // Drops the curve's points and the errors of denoised layers, which are of wrong pixels.
   void forget_wrong_pixels(JobEntry& entry);

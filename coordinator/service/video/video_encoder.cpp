@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::size_t kMostReported = 2000;  // bytes kept of the program's messages
 
-// True for the variables that the loader reads.
+// True for environment variables that ffmpeg gets: those that the dynamic loader reads.
 bool inherits(std::string_view variable) { return variable.starts_with("LD_"); }
 
 std::vector<std::string> command(const VideoEncoder::Asked& asked) {
@@ -110,7 +110,7 @@ void VideoEncoder::hear() {
                                             kMostReported - std::min(kMostReported, reported_.size())));
 }
 
-// Waits until the program takes pixels, or until it has closed its messages, which it does at its end.
+// Waits until the program takes pixels, or until it has closed its standard error, which it does at its end.
 Result<void> VideoEncoder::wait_for(int fd, short events) {
   const std::stop_callback kill_it(stop_, [pid = *program_] { ::kill(pid, SIGKILL); });
   const TimePoint stalled_at = clock_.now() + asked_.stall_limit;
@@ -162,7 +162,7 @@ Result<void> VideoEncoder::add(std::span<const std::uint8_t> rgb) {
 
 Result<void> VideoEncoder::finish() {
   ::shutdown(pixels_, SHUT_WR);
-  // At its end the program closes its messages
+  // At its end the program closes its standard error
   if (auto closed = wait_for(errors_, POLLHUP); !closed) return closed;
   hear();
   const int status = end();

@@ -32,7 +32,7 @@ class VideoEncoder {
     double fps = 24;
     std::uint64_t most_bytes = 0;  // the file gets no larger
     TimePoint until{};             // the program is killed at this time
-    Duration stall_limit{};        // ... and when it takes no pixels for this long
+    Duration stall_limit{};        // it is also killed when it takes no pixels for this long
   };
   // Starts the program. It is killed as soon as `stop` is requested.
   static Result<std::unique_ptr<VideoEncoder>> start(const Asked& asked, const Clock& clock,

@@ -22,8 +22,8 @@ namespace ls::coordinator {
 
 class CollectedBlobs final : public BlobStore {
  public:
-  // If `keep` is nullopt, blobs are never removed; interrupted uploads are removed after a day. Requires that
-  // no other coordinator uses these blobs.
+  // Blobs are removed after the duration `keep`; `keep` must be nullopt if other coordinators use these
+  // blobs. If it is nullopt, blobs are never removed, and interrupted uploads after a day.
   CollectedBlobs(std::shared_ptr<BlobStore> inner, std::shared_ptr<const Clock> clock,
                  std::optional<Duration> keep)
       : inner_(std::move(inner)), clock_(std::move(clock)), keep_(keep) {}
@@ -36,7 +36,7 @@ class CollectedBlobs final : public BlobStore {
   // removed.
   Result<Swept> sweep(const std::set<Digest>& needed);
   Result<Swept> sweep_unfinished();
-  // Hold this from a submission's first check for a blob until its job counts as needing it.
+  // Hold this lock from a submission's first check for a blob until the new job counts as needing the blob.
   std::shared_lock<std::shared_mutex> in_use() const { return std::shared_lock(using_); }
 
   bool has(const Digest& digest) const override;

@@ -16,11 +16,11 @@ namespace ls::coordinator {
 namespace {
 
 constexpr long kConnectSeconds = 10;
-constexpr long kStallSeconds = 30;              // a transfer without a byte for this long is ended
-constexpr long kAnswerSeconds = 5;              // the store counts as unavailable if answers() takes longer
-constexpr std::size_t kMaxText = 8u << 20;      // most bytes of an answer that is a list or an error
-constexpr std::size_t kShownText = 300;         // most bytes of such an answer that a message quotes
-constexpr std::size_t kMaxListed = 10'000'000;  // most keys in a list
+constexpr long kStallSeconds = 30;          // a transfer without a byte for this long is ended
+constexpr long kAnswerSeconds = 5;          // the store counts as unavailable if answers() takes longer
+constexpr std::size_t kMaxText = 8u << 20;  // greatest size of an answer that is a list or an error, in bytes
+constexpr std::size_t kShownText = 300;     // a message quotes at most this many bytes of such an answer
+constexpr std::size_t kMaxListed = 10'000'000;  // keys in a list, at most
 
 struct CloseFile {
   void operator()(std::FILE* file) const { std::fclose(file); }

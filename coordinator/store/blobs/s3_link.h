@@ -27,7 +27,7 @@ struct S3Address {
   std::string endpoint, region;
   // Larger files are sent in parts of this size; 5 MiB to 5 GiB
   std::uint64_t part_bytes = std::uint64_t{64} << 20;
-  std::uint64_t copies_bytes = 0;  // most bytes of local copies; 0: no limit
+  std::uint64_t copies_bytes = 0;  // limit on the bytes of all local copies; 0: no limit
   std::string shown() const;       // the address for messages and logs
 };
 Result<S3Address> parse_s3_url(std::string_view url);
@@ -41,7 +41,8 @@ Result<S3Keys> s3_keys_from_environment();
 struct S3Options {
   S3Address address;
   S3Keys keys;
-  int attempts = 6;  // most attempts for a request that fails in a way that may pass: no answer, 429, 5xx
+  // attempts, at most, of a request that fails for a reason that may pass: no answer, 429, 5xx
+  int attempts = 6;
   Duration first_pause = std::chrono::milliseconds(100), longest_pause = std::chrono::seconds(5);
 };
 

@@ -12,7 +12,7 @@
 namespace ls::coordinator {
 namespace {
 
-constexpr std::uint64_t kMostParts = 10'000;  // most parts of an object, by the protocol
+constexpr std::uint64_t kMostParts = 10'000;  // the protocol's limit on the parts of an object
 constexpr std::uint64_t kChunk = 1u << 20;
 
 Result<Digest> digest_of(const std::filesystem::path& path, std::uint64_t offset, std::uint64_t bytes) {

@@ -28,7 +28,8 @@ struct S3Link::Answer {
 };
 
 // Returns the text of the first XML element with this name at or after position *at, and sets *at to the end
-// of that element (npos: there is none). Understands just enough XML for the answers of S3.
+// of that element. If there is none, returns an empty text and sets *at to npos. Understands just enough XML
+// for the answers of S3.
 std::string xml_element(std::string_view xml, std::string_view name, std::size_t* at = nullptr);
 // Escapes the text for use as a value in a query string.
 std::string query_value(std::string_view text);

@@ -1,6 +1,6 @@
-// Stores everything about jobs except their pixels, which are in the partial log (store/log). There are two
-// basic implementations: SQLite, and memory (for `lightshaft render`). Thread-safe. With SQLite, data survive
-// kill -9 and power loss once a put or add has returned.
+// Stores everything about jobs except their pixels, which are in the log of partials (store/log). There are
+// two basic implementations: SQLite, and memory (for `lightshaft render`). Thread-safe. With SQLite, data
+// survive kill -9 and power loss once a put or add has returned.
 #pragma once
 
 #include <cstdint>
@@ -85,11 +85,13 @@ struct StoredJob {
   std::optional<StopReason> stopped;
   std::string error;
   std::optional<Digest> numeric_class;
-  // Build of the worker whose class the job was pinned to, and platform of the class (WorkerHello)
+  // Build of the worker to whose numeric class (machines that compute the same bits) the job is pinned, and
+  // platform of that class (WorkerHello)
   std::string build, platform;
   bool fake = false;  // true if pinned to a fake worker; then only fake workers may render its units
   JobTotals totals;
-  TechniqueSet techniques;  // that its workers used, as far as they have said
+  // techniques that its workers used, as far as they have reported them
+  TechniqueSet techniques;
   // Errors of the denoised layers on which the end of the job was or will be decided
   // (domain/denoised_target.h)
   std::vector<DenoisedCheck> denoised_checks;
@@ -132,7 +134,7 @@ class JobStore {
   virtual Result<void> remove_jobs(std::span<const JobId> jobs) = 0;  // removes all jobs or none
 
   virtual Result<void> add_point(const JobId& job, const ConvergencePoint& point) = 0;
-  // Sets the reference error of the point with these samples, replacing an earlier one.
+  // Sets the reference error of the curve's point with these samples, replacing an earlier one.
   virtual Result<void> set_reference_error(const JobId& job, double spp,
                                            const ReferenceError& reference_error) = 0;
   virtual Result<std::vector<ConvergencePoint>> points(const JobId& job) const = 0;

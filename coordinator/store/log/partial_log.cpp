@@ -133,7 +133,8 @@ std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::
   return raw;
 }
 
-// Returns the unit's health from the record at `offset`; nullopt: the health text is damaged.
+// Returns the unit's health (counts of bad samples) from the record at `offset`; nullopt: its text is
+// damaged.
 std::optional<Health> health_at(const File& file, std::uint64_t offset, const RawHeader& raw,
                                 const std::filesystem::path& path) {
   Health health;

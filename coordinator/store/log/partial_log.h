@@ -63,8 +63,8 @@ class PartialLog {
 
   // On an error the file is unchanged.
   Result<Place> append(const PartialRecord& record, std::span<const std::byte> exr);
-  // Makes the records appended so far durable. Error: no record appended since the last successful sync() is
-  // durable; the caller may append them again.
+  // Makes the records appended so far durable. Error: the records appended since the last successful sync()
+  // may be lost in a crash; the caller may append them again.
   Result<void> sync();
   Result<std::vector<std::byte>> read(const Place& place) const;  // verifies the checksum
 

@@ -1,5 +1,6 @@
 // The class behind redis_job_store.h. redis_job_store.cpp opens the store, redis_job_store_send.cpp contains
-// the thread that updates Redis, and this header the functions that the coordinator's other threads call.
+// the thread that updates Redis, and this header the functions that the coordinator's other threads call. A
+// node is one of several coordinators that share the Redis; the members' thread is that of RedisMembers.
 #pragma once
 
 #include <fmt/format.h>
@@ -163,8 +164,8 @@ class RedisJobStore final : public JobStore {
       job.fence = one.fence;
       auto kept = keep_inherited(*local_, one.job);
       const auto state = state_.lock();
-      // Redis says that this node owns the job. If it cannot be stored now, the members' thread will repeat
-      // this.
+      // Redis says that this node owns the job. If it cannot be stored now, the members' thread calls this
+      // function again with it.
       if (!kept) {
         if (state->not_kept.empty())
           log_error(fmt::format("job={}", job.id.value),
@@ -245,14 +246,15 @@ class RedisJobStore final : public JobStore {
     bool idle() const { return due.empty() && counters.empty() && quarantined_due.empty() && !all_due; }
 
     std::map<JobId, std::uint64_t> revisions;  // latest revision of every job
-    // Fence of every job (see redis_members.h); 0: the job was never shared
+    // Fence of every job, a number that increases with every new owner (redis_members.h); 0: the job was
+    // never shared
     std::map<JobId, std::uint64_t> fences;
     std::set<JobId> lost;  // jobs that others own now: their updates are not stored
     Moved moved;           // the result of the next call of moved()
     std::map<JobId, Due> due;
     // Number of jobs that are being sent to Redis: they have left `due` but are not in Redis yet.
     std::size_t sending = 0;
-    JobId sent_last;  // last job sent from `due`; the next batch starts after it
+    JobId sent_last;  // the job sent most recently; the next batch starts after it
     std::map<std::string, std::uint64_t> counters;
     std::map<WorkerId, std::string> quarantined;  // all known quarantined workers
     std::set<WorkerId> quarantined_due;

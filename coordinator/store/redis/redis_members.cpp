@@ -11,7 +11,8 @@
 namespace ls::coordinator {
 namespace {
 
-constexpr const char* kHeirMilliseconds = "15000";  // longer than it takes to take over a batch of jobs
+// lifetime of heir:NODE; longer than it takes to take over a batch of jobs
+constexpr const char* kHeirMilliseconds = "15000";
 
 // Sends a node's heartbeat. ARGV: node, addresses, lease in ms, start, number of lost jobs handled. Returns
 // {lost jobs, node, alive, node, alive, ...}.
@@ -81,7 +82,8 @@ Result<RedisLink*> RedisMembers::link() {
   if (!link_ || link_->broken()) {
     link_.reset();
     absence_.begin_again();
-    own_unclear_ = true;    // it is unknown whether Redis has carried out the last commands
+    // it is unknown whether Redis has carried out the last commands of the old connection
+    own_unclear_ = true;
     quarantined_seen_ = 0;  // the new connection may lead to another Redis
     auto fresh = RedisLink::connect(options_.address, options_.timeouts);
     if (!fresh) return tl::unexpected(fresh.error());

@@ -82,7 +82,8 @@ struct TakenJob {
 
 struct LostJob {
   JobId id;
-  // The new owner's fence. If this node has a higher one, it has become the owner again since.
+  // The fence (a number that increases with every new owner) of the new owner. If this node has a higher one,
+  // it has become the owner again since.
   std::uint64_t fence = 0;
   bool operator==(const LostJob&) const = default;
 };
@@ -92,8 +93,8 @@ class RedisMembers {
   struct Callbacks {  // functions called on the members' thread; the same loss may be reported twice
     std::function<void(std::vector<TakenJob>)> taken;
     std::function<void(const std::vector<LostJob>&)> lost;
-    // Called with all workers that any coordinator has quarantined, whenever their number has grown; it
-    // precedes `taken`.
+    // Called with all workers that any coordinator has quarantined, whenever their number has grown, and
+    // before `taken` is called.
     std::function<void(const std::vector<QuarantinedWorker>&)> quarantined = {};
     // Gets the jobs that this node owns according to Redis, and must return those that this node does not
     // have. If it is not set, this check is skipped.

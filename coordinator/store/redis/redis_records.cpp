@@ -16,8 +16,9 @@ using nlohmann::json;
 
 // Writes a job's changes if they are newer than the data in Redis, in one atomic step: no other write can
 // come between reading the revision and writing. ARGV: revision, id, fence, node, sequence or '', fields ...
-// If Redis has a higher fence than this, a later owner has written the job. If it has a lower one, Redis has
-// lost data or an earlier owner wrote the job, and the revision in Redis does not count.
+// The fence is a number that increases with every new owner of the job. If Redis has a higher fence than
+// this, a later owner has written the job. If it has a lower one, Redis has lost data or an earlier owner
+// wrote the job, and the revision in Redis does not count.
 constexpr const char* kPut = R"(
 local fence = tonumber(redis.call('HGET', KEYS[1], 'fence') or '0')
 local mine = tonumber(ARGV[3])
@@ -165,7 +166,8 @@ Result<RedisJob> parse_redis_job(const RedisReply& fields) {
   auto job = parse_stored_job(values["record"]);
   if (!job) return tl::unexpected(job.error());
   RedisJob read{std::move(*job), {}, {}, values["owner"], values["from"], 0};
-  // The record contains the fence of its last write; the hash contains the current owner's fence.
+  // The record contains the fence (number of the owner) of its last write; the hash contains that of the
+  // current owner.
   std::from_chars(values["fence"].data(), values["fence"].data() + values["fence"].size(), read.fence);
   read.job.fence = std::max(read.job.fence, read.fence);
   try {

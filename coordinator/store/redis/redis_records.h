@@ -14,7 +14,8 @@ inline constexpr const char* kRedisJobs = "lightshaft:jobs";
 inline constexpr const char* kRedisMemory = "lightshaft:memory";
 inline constexpr const char* kRedisCounters = "lightshaft:counters";
 inline constexpr const char* kRedisQuarantined = "lightshaft:barred";  // hash: worker -> evidence
-inline constexpr std::size_t kAskedAtOnce = 256;  // most commands sent without waiting for an answer
+// At most this many commands are sent without waiting for an answer
+inline constexpr std::size_t kAskedAtOnce = 256;
 std::string redis_job_key(const JobId& id);
 std::uint64_t counter_of(const std::string& text);  // returns 0 for a text that is not a number
 // True if the text has the form of a job's id. Ids become names of folders, so other texts found in Redis
