@@ -20,7 +20,7 @@ from exr_layers import read  # noqa: E402
 from local_farm import LocalFarm, bin_dir, wait_until  # noqa: E402
 
 IN_ROOT = ROOT / "tests/mixed/in_root.sh"
-PAGE = ROOT / "docs" / "measurements" / "mixed-farms.md"
+PAGES = ROOT / "docs" / "measurements"
 BENCH = ROOT / "build/bench"
 PATIENCE = 1800  # qemu is slow
 SCENES = ("shafts", "fogbox", "cloud", "spotfog", "tint", "surface")
@@ -188,9 +188,10 @@ def programs(systems, folder):
 
 def page(systems, commit):
     here = systems[0]
+    arm_alone = [s.name for s in systems[1:]] == ["arm64"]
     cpu = re.search(r"model name\s*:\s*(.*)", pathlib.Path("/proc/cpuinfo").read_text()).group(1)
     emulated = f"; the ARM programs run under qemu {qemu()}" if systems[-1].name == "arm64" else ""
-    lines = ["# Pixels of unlike machines", "",
+    lines = ["# Pixels of a machine with ARM" if arm_alone else "# Pixels of unlike machines", "",
              f"Made by `tests/mixed/run.sh --write {' '.join(s.name for s in systems[1:])}` of commit {commit} on {cpu}{emulated}. What a farm does with "
              "such machines: [the guide](../guide/mixed-farms.md).", "", "## What each is built with", "",
              "| | " + " | ".join(s.words for s in systems) + " |", "|---|" + "---|" * len(systems)]
@@ -211,7 +212,7 @@ def page(systems, commit):
               f"rendered by the two, and says that 4 of {4 + len(systems) - 1} threads can take it; one that asks for a class by its platform has the bits of "
               "`lightshaft render` on that system. The coordinator of each system merges the same pixels from this machine's worker, keeps "
               "them through kill -9, and goes on. The script checks it.", ""]
-    PAGE.write_text("\n".join(lines))
+    (PAGES / ("mixed-farms-arm64.md" if arm_alone else "mixed-farms.md")).write_text("\n".join(lines))
 
 
 def qemu():

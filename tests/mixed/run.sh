@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # A farm of machines that are not alike: builds the programs on Debian 13 and Ubuntu 24.04 and for 64-bit ARM, compares the
 # pixels of all of them with those of this machine's build, and runs a farm of all of them and a coordinator of each. Writes
-# its page of measurements with --write.
+# its page of measurements with --write; arm64 alone has a page of its own.
 #   tests/mixed/run.sh [--write] [SYSTEM...]
 # SYSTEM: trixie, noble or arm64; all three where none is named.
 # As root, on Debian 12 with Linux 6.7, with the packages mmdebstrap and qemu-user-static and 6 GB of disk in $LIGHTSHAFT_MIXED
