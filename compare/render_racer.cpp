@@ -162,8 +162,8 @@ class RenderRacer final : public Racer {
     return keep(file("b"), means(1, 2, spp / 2));
   }
 
-  // Returns the mean image of the halves [from, to), which have this many samples per pixel: 0 is half A, 1
-  // half B.
+  // Returns the mean image of the halves [from, to), where 0 is half A and 1 half B. Together they have
+  // `samples` samples per pixel.
   Pixels means(std::size_t from, std::size_t to, std::uint64_t samples) const {
     Pixels out(values());
     for (std::size_t i = 0; i < out.size(); ++i) {

@@ -29,7 +29,7 @@ struct FarmFlags {
   std::string id, frame, spp, target_error, out, report, html, region, fps, exposure;
   bool quiet = false, none = false, denoised = false;
 };
-constexpr std::chrono::milliseconds kVideoPause(500);  // between two requests whether the video is ready
+constexpr std::chrono::milliseconds kVideoPause(500);  // between two checks whether the video is ready
 using Run = int (*)(FarmApi& api, const FarmFlags& flags);
 
 int show_answer(const FarmApi::Answer<json>& answer, const FarmFlags& flags,

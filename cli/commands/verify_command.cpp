@@ -1,5 +1,5 @@
-// lightshaft verify: checks that an image is the result of its scene. An image's *seal* is a hash over all
-// its layers and headers, stored in it.
+// lightshaft verify: checks that an image is the result of its scene. An image's *seal*, one of its headers,
+// contains the digest of each layer and of each other header.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 

@@ -36,7 +36,7 @@ VerifiedTile verify_tile(const render::World& world, const SealedImage& image, T
 
 // Returns, as "header NAME", the headers in the image that contradict its settings or the names in the scene.
 // If `tiles` has all tiles of the image, also returns headers that contradict the tiles' samples. The other
-// headers (seconds, health, ...) are protected by the seal only (a hash over all layers and headers).
+// headers (seconds, health, ...) are protected by the seal only (the digests of all layers and headers).
 std::vector<std::string> wrong_headers(const SealedImage& image, const CryptomatteManifests& names,
                                        const std::vector<VerifiedTile>& tiles);
 

@@ -184,7 +184,7 @@ Result<json> pod_like(const json& deployment, const KubernetesOptions& options, 
   pod["metadata"]["labels"][kFarmLabel] = options.farm;
   pod["metadata"]["labels"][kWorkerLabel] = id;
   // An autoscaler of nodes does not remove a node that runs a pod without a controller, such as this one,
-  // unless it is marked so.
+  // unless the pod is marked as safe to evict.
   pod["metadata"]["annotations"]["cluster-autoscaler.kubernetes.io/safe-to-evict"] = "true";
   pod["spec"]["restartPolicy"] = "Never";
   pod["spec"]["terminationGracePeriodSeconds"] = options.drain_seconds;

@@ -121,8 +121,8 @@ int Scaler::affordable(std::span<const EngineWorker> workers, double spent) cons
                   static_cast<int>(std::min<double>(limits_.most_workers, left / (limits_.threads * each))));
 }
 
-// Returns for how many seconds, at most, a worker still costs after a check has decided to end it: the time
-// to drain, and two intervals between checks (until it is told to drain, and until its end is seen).
+// Returns for how many seconds, at most, a worker still costs if the next check ends it: the interval until
+// that check, the time to drain, and another interval until its end is seen.
 double Scaler::seconds_to_end() const { return limits_.drain_seconds + 2 * limits_.poll_seconds; }
 
 void Scaler::drain(const EngineWorker& worker, ScaleActions& out, TimePoint now) {

@@ -61,7 +61,7 @@ class Scaler {
 
   // A worker is started only if it can run for at least this many seconds within the budget.
   static constexpr double kWorthStarting = 60;
-  // Seconds that pass until the next attempt to start workers: after the first failure, and at most
+  // Pause in seconds before the next attempt to start workers: after the first failure, and at most
   static constexpr double kFirstPause = 5, kLongestPause = 600;
 
  private:

@@ -12,7 +12,7 @@
 namespace ls::report {
 namespace {
 
-constexpr std::size_t kMostRows = 256;  // table rows; if there are more, the last ones are shown
+constexpr std::size_t kMostRows = 256;  // the table has at most this many rows, the last ones
 
 struct Clock {
   const char* key;

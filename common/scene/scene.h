@@ -37,8 +37,7 @@ struct BitmapTexture {
   // For a texture that is used as an opacity. If true, the value is the image's alpha channel if that is
   // below 1/2 in some pixel, otherwise the image's colour.
   bool alpha = false;
-  // One channel: the value is that channel's number, without sRGB decoding; a channel that the image lacks is
-  // 1.
+  // One channel: the value is that channel's number, without sRGB decoding; a missing alpha channel is 1.
   Channel channel = Channel::all;
   bool operator==(const BitmapTexture&) const = default;
 };
@@ -304,7 +303,7 @@ using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, 
                              ProjectorEmitter>;
 
 // Integrator.
-inline constexpr int kUsualPathReuse = 16;  // number of pixels that share paths, if path_reuse is automatic
+inline constexpr int kUsualPathReuse = 16;  // pixels that share paths, if path_reuse 0 chooses to share
 struct IntegratorSettings {
   // Our name: "volpath", "volpath_distant_mis", "path" or "whitted".
   std::string name = "volpath";

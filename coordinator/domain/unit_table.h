@@ -61,8 +61,8 @@ class UnitTable {
   std::optional<RoundIndex> issue_fold(TileIndex tile, RoundIndex limit, RoundIndex end);
   // Number of rounds whose addition to the image was requested
   RoundIndex issued(TileIndex tile) const { return issued_[tile]; }
-  // Notes that the tile's round is in the image. If it is not the next one of the tile's requested
-  // rounds, returns false and changes nothing.
+  // Notes that the tile's round is in the image. If it is not the next of the tile's requested rounds,
+  // returns false and changes nothing.
   bool fold(TileIndex tile, RoundIndex round, double rel_error_sum);
   void restore_folded(TileIndex tile, RoundIndex rounds);
   void restore_error(RoundIndex round, TileIndex tile, double rel_error_sum);

@@ -89,8 +89,8 @@ Result<std::unique_ptr<WorkerSession>> WorkerSessions::connect(const WorkerHello
   WorkerTable& workers = core->workers;
   WorkerId id = hello.previous_id;
   const auto known = workers.find(id);
-  // Two workers may name the same id, if the folder in which a worker keeps its id was copied. The id stays
-  // with the worker that uses it already, and the other one gets a new id.
+  // If a worker of another name has this id already (as after a running machine was copied), the id stays
+  // with that worker, and this one gets a new id.
   const bool taken = known != workers.end() && known->second.hello.name != hello.name;
   if (id.empty() || !well_formed(id) || taken)
     id.value = new_worker_id(options_.start, last_epoch_ & 0xffffffff);

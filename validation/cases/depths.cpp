@@ -132,8 +132,8 @@ void opaque(Table& t) {
 void shadows(Table& t) {
   for (const double tau : {20., 30., 80.}) {
     const double expected = std::exp(-tau) / (2 * kPi);
-    // The first term is for the factors. The second is the effect on e^-tau of rounding the exponent by 2^-24
-    // of it.
+    // The first term is for the factors. The second is the effect on e^-tau of a relative rounding error of
+    // the exponent of 2^-24.
     const double tolerance = kTenRoundings + 2 * tau * 0x1p-24;
     for (const Configuration& configuration : both_media()) {
       t.exact(fmt::format("N05-shadow-{:g}{}", tau, configuration.name()), "N5 N60",

@@ -143,7 +143,7 @@ void enormous(Table& t) {
   // The view is a line along z through the cube. Light that leans by q along it enters through the cube's
   // side, instead of its top, if it reaches the view within q of that side. Then its path inside is some u <
   // 1 instead of 1. At each end of the view this adds q int_0^1 (e^-u - e^-1) du = q (1 - 2 / e). `lean` is
-  // the light's mean of q where it is positive.
+  // the mean of max(q, 0) over the light.
   const auto leaning = [](double lean) {
     return 1 + lean * (std::exp(1.) - 2) * (1 + std::exp(-2.)) / -std::expm1(-2.);
   };

@@ -1,5 +1,5 @@
-// Media inside of others, overlapping media, and boundaries in the same place: splitting a medium in parts,
-// or having two in one place, must not change the light.
+// Media inside others, overlapping media, and boundaries in the same place: splitting a medium into parts
+// that touch, or into thinner media in the same place, must not change the light.
 #include <fmt/format.h>
 
 #include <cmath>

@@ -45,7 +45,7 @@ void Agent::Impl::trace_sent(const UnitKey& unit) {
   {
     const std::lock_guard lock(mutex);
     const auto found = unsent.find(unit);
-    if (found == unsent.end()) return;  // the result was sent and its span recorded before
+    if (found == unsent.end()) return;  // the lease is not traced, or the result was sent before
     sent = found->second;
     unsent.erase(found);
   }

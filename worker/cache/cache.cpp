@@ -34,8 +34,8 @@ class LockedFile final : public BlobFile {
   int fd_;
 };
 
-// Gives an error of a transfer a code after which the agent tries again later, since the coordinator's
-// problem (a blob that is missing, damaged or denied there) may pass.
+// Makes an error of a transfer one after which the agent tries again later, since the coordinator's problem
+// (a blob that is missing, damaged or denied there) may pass.
 Error passing(Error error) {
   const bool temporary = error.code == Errc::unavailable || error.code == Errc::resource_exhausted;
   if (!temporary) error.code = Errc::internal;

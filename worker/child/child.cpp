@@ -23,11 +23,11 @@ using child::Reply;
 using child::Request;
 using child::Slot;
 
-// If the child dies because of one unit, the other units that it was rendering are rendered again. A unit
-// that was rendered again this many times in a row is reported as failed all the same. Each death of the
-// child also fails the unit that caused it, and after three failures the farm gives this worker no more units
-// of that job. So the limit is high enough that the farm stops the units at fault before an innocent one
-// reaches it.
+// If the child dies because of one unit, the other units that it was rendering are rendered again. A unit to
+// which this happens this many times in a row is reported as failed all the same. Each death of the child
+// also fails the unit that caused it, and after three failures the farm gives this worker no more units of
+// that job. So the limit is high enough that the farm stops the units at fault before an innocent one reaches
+// it.
 constexpr int kInnocentDeaths = 64;
 
 std::size_t floats_of(const LocalJob& job, const LeaseUnit& unit) {

@@ -27,8 +27,8 @@ struct ChildOptions {
   // Number of units rendered at the same time: the caller's number of threads
   int slots = 1;
   Duration hang_limit = std::chrono::minutes(5);      // longest time that a thread may take for one sample
-  Duration prepare_limit = std::chrono::minutes(30);  // longest time to build one scene
-  Duration forget_limit = std::chrono::minutes(1);    // longest time to free one scene
+  Duration prepare_limit = std::chrono::minutes(30);  // longest time to make a scene ready to render
+  Duration forget_limit = std::chrono::minutes(1);    // longest time to free such a scene
   // Longest time from the child's start to its hello. This includes the computations that determine the
   // numeric class (machines of one class render the same bits)
   Duration start_limit = std::chrono::minutes(2);

@@ -96,7 +96,7 @@ struct NoiseSums {
   double edge_channel_fourth = 0, edge_pixel_fourth = 0;
   double flat_pairs = 0;  // sum over pixels of 1 - g^2 times the mean of (D(p) . D(q))^2
   double largest = 0;     // largest sum over channels of D^2 of one pixel
-  // These give tr(V^2); only if the last round cannot be used, the sums above do
+  // These give tr(V^2). If the last round cannot be used, they are computed from the sums above
   ChangeSums changes;
   void add(const NoiseSums& other);
   bool operator==(const NoiseSums&) const = default;

@@ -64,9 +64,9 @@ struct Reference {
   std::vector<float> error;  // standard error of each value; empty: unknown
   ReferenceOrigin origin = {};
 };
-// Reads a reference image. invalid_argument: it is not an image, has another size than `size`, or has values
-// that are not finite. It is also invalid_argument if an error layer has a value that is negative or not
-// finite. `name` is for messages.
+// Reads a reference image. invalid_argument: it is not an image, has another size than `size`, has values
+// that are not finite, or has values in an error layer that are negative or not finite. `name` is for
+// messages.
 Result<Reference> read_reference(std::span<const std::byte> exr, const std::string& name, FrameSize size,
                                  const ExrLimits& limits = {});
 

@@ -102,7 +102,7 @@ void place_texture(Element& e) {
 }
 
 // Upgrades a bitmap texture. A gamma of -1 means that of the image's file; 1 means linear, which is now
-// `raw`. The wrap modes for u and v become one for both.
+// `raw`. If the wrap modes for u and v are equal, they become one for both.
 void upgrade_bitmap(Element& e) {
   if (const Element* gamma = child(e, "gamma")) {
     const auto value = parse_number(gamma->get("value"));

@@ -22,8 +22,9 @@ namespace ls::coordinator {
 
 class CollectedBlobs final : public BlobStore {
  public:
-  // Blobs are removed after the duration `keep`; `keep` must be nullopt if other coordinators use these
-  // blobs. If it is nullopt, blobs are never removed, and interrupted uploads after a day.
+  // Blobs that no job needs, and interrupted uploads, are removed after the duration `keep`. It must be
+  // nullopt if other coordinators use these blobs: then blobs are never removed, and interrupted uploads
+  // after a day.
   CollectedBlobs(std::shared_ptr<BlobStore> inner, std::shared_ptr<const Clock> clock,
                  std::optional<Duration> keep)
       : inner_(std::move(inner)), clock_(std::move(clock)), keep_(keep) {}

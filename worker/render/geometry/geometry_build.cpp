@@ -108,8 +108,8 @@ bool is_sheet(const LocalMesh& mesh) {
 
 // Normals from a file decide which side of a triangle emits and is lit, even against its winding; but the
 // winding decides on which side each medium is. So the winding is made to follow the normals, and the media
-// swap sides with it. A mesh between different media of which only some triangles wind against their normals
-// stays unchanged.
+// swap sides with it. A mesh between different media stays unchanged if only some of its triangles wind
+// against their normals.
 void follow_normals(const LocalMesh& mesh, SurfaceInfo& info, std::vector<std::uint32_t>& indices) {
   const auto opposes = [&](std::size_t i) {
     const std::uint32_t a = indices[i], b = indices[i + 1], c = indices[i + 2];
