@@ -18,7 +18,7 @@ constexpr std::array kStatus = {
     Row{Errc::internal, 500},
 };
 
-Response from_json(int status, const nlohmann::ordered_json& json) {
+Response problem_of(int status, const nlohmann::ordered_json& json) {
   // Texts may quote bytes of a scene. Invalid UTF-8 is replaced, so that dump() never throws.
   Response response =
       text_response(status, "application/problem+json",
@@ -41,7 +41,7 @@ int status_of(Errc code) {
 }
 
 Response problem(int status, std::string_view detail) {
-  return from_json(status, base(status, "about:blank", detail));
+  return problem_of(status, base(status, "about:blank", detail));
 }
 
 Response too_many(int wait_seconds, std::string_view detail) {
@@ -65,7 +65,7 @@ Response problem(const Error& error, std::span<const Diagnostic> diagnostics) {
                     {"text", d.text},
                     {"source_line", d.source_line},
                     {"length", d.length}});
-  return from_json(status, json);
+  return problem_of(status, json);
 }
 
 }  // namespace ls::http
