@@ -28,8 +28,8 @@ void put_unit(float* out, const Vec3& v) {
   for (std::size_t k = 0; k < 3; ++k) out[k] = static_cast<float>(length > 0 ? v[k] / length : v[k]);
 }
 
-// Returns the matrix that transforms normals: a multiple of the inverse transpose of the linear part, whose
-// columns are cross products of the columns of that.
+// Transforms the normal n by m, and normalises it. Normals are transformed by the inverse transpose of m's
+// linear part; the cross products of the linear part's columns are the columns of a multiple of that matrix.
 void turn_normal(const Transform& m, float* n) {
   const auto column = [&](std::size_t i) { return Vec3{{m.m[i], m.m[4 + i], m.m[8 + i]}}; };
   const Vec3 x = column(0), y = column(1), z = column(2);

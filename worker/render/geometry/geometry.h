@@ -27,7 +27,8 @@ struct SurfaceInfo {  // properties of a surface; a surface is one shape of the 
   std::uint32_t light = kNone;                       // index into Lights
   std::uint32_t interior = kNone, exterior = kNone;  // indices of media
   bool transition = false;                           // true if the media on its two sides differ
-  // True if `transition` is, or if the surface coincides with others (coincident_reach > 0)
+  // True if a ray that crosses the surface may enter another medium: the media on its two sides differ, or it
+  // coincides with other surfaces (coincident_reach > 0), which may bound media of their own
   bool borders = false;
   // True if the surface neither emits light nor lets it pass straight through, as most surfaces
   bool plain = false;

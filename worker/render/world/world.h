@@ -66,8 +66,8 @@ class World {
   // With Features::connected:
   Lights::Directional sun;  // the light whose light vertices paths are connected to
   SunMap sun_map;
-  // The number of light vertices among which a connection chooses, over the mean number of light vertices
-  // that a ray of the sun has
+  // The number of light vertices from which a connection chooses one, divided by the mean number of light
+  // vertices that one ray of the sun leaves. A weight of multiple importance sampling needs the ratio.
   float connections_per_ray = 1;
   float faint = 0;  // connections that would add less than this are made at random (Russian roulette)
   mutable LightVertexCache light_vertices;  // safe from several threads
