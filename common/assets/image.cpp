@@ -6,6 +6,16 @@
 #include "common/image/exr/exr_file.h"
 
 namespace ls {
+namespace {
+
+bool ends_in_tga(std::string_view name) {
+  constexpr std::string_view kEnd = ".tga";
+  return name.size() >= kEnd.size() &&
+         std::equal(kEnd.begin(), kEnd.end(), name.end() - kEnd.size(),
+                    [](char a, char b) { return a == (b >= 'A' && b <= 'Z' ? b - 'A' + 'a' : b); });
+}
+
+}  // namespace
 
 Result<ImageData> decode_image(std::string_view name, std::span<const std::byte> file,
                                std::uint64_t max_pixels) {
@@ -15,9 +25,14 @@ Result<ImageData> decode_image(std::string_view name, std::span<const std::byte>
   if (head.starts_with("BM")) return decode_bmp(name, file, max_pixels);
   if (head.starts_with("\x76\x2f\x31\x01")) return decode_exr(name, file, max_pixels);
   if (head.starts_with("#?RADIANCE") || head.starts_with("#?RGBE")) return decode_hdr(name, file, max_pixels);
-  return fail(
-      Errc::invalid_argument,
-      fmt::format("'{}': is no PNG, JPEG, BMP, OpenEXR or Radiance HDR image (by its first bytes)", name));
+  if (head.starts_with("qoif")) return decode_qoi(name, file, max_pixels);
+  for (const std::string_view pfm : {"PF ", "PF\n", "PF\r", "Pf ", "Pf\n", "Pf\r"})
+    if (head.starts_with(pfm)) return decode_pfm(name, file, max_pixels);
+  if (ends_in_tga(name)) return decode_tga(name, file, max_pixels);
+  return fail(Errc::invalid_argument,
+              fmt::format("'{}': is no PNG, JPEG, BMP, QOI, OpenEXR, Radiance HDR or PFM image (by its first "
+                          "bytes), and its name does not end in .tga",
+                          name));
 }
 
 Result<ImageData> load_image(const std::filesystem::path& path, std::string_view name,

@@ -1,5 +1,6 @@
-// Decodes PNG, JPEG, BMP, OpenEXR and Radiance HDR, recognised by their first bytes. An image of more than
-// max_pixels is rejected (resource_exhausted) before memory is allocated for it.
+// Decodes PNG, JPEG, BMP, QOI, OpenEXR, Radiance HDR and PFM, recognised by their first bytes, and TGA, which
+// has none that are its own, by the ending of its name. An image of more than max_pixels is rejected
+// (resource_exhausted) before memory is allocated for it.
 #pragma once
 
 #include <cstddef>
@@ -27,11 +28,20 @@ Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> 
 // BMP: 24 and 32 bits; alpha is ignored.
 Result<ImageData> decode_bmp(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
+// TGA: 15 to 32 bits of colour, 8 of grey, colour maps; alpha if the file says that it has any.
+Result<ImageData> decode_tga(std::string_view name, std::span<const std::byte> file,
+                             std::uint64_t max_pixels = kMaxImagePixels);
+// QOI: colour and alpha, 8 bits, sRGB or linear.
+Result<ImageData> decode_qoi(std::string_view name, std::span<const std::byte> file,
+                             std::uint64_t max_pixels = kMaxImagePixels);
 // OpenEXR: R G B A, or Y; half and float.
 Result<ImageData> decode_exr(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
 // Radiance HDR: RGBE.
 Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> file,
+                             std::uint64_t max_pixels = kMaxImagePixels);
+// PFM: grey or colour, float32 in either byte order.
+Result<ImageData> decode_pfm(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
 
 // Returns the error for an image of more than max_pixels, which all these decoders use.

@@ -278,25 +278,33 @@ struct SpotEmitter {  // a spot light at the origin of to_world, which emits alo
   std::optional<TextureIndex> texture;  // image by which the light is multiplied, projected as in Mitsuba
   bool operator==(const SpotEmitter&) const = default;
 };
-// Radiance from all directions, given by an image in latitude-longitude form. In its own space the top row is
-// +y; on the horizon the left edge is -z, a quarter further +x, the middle +z (Mitsuba 3). The first and last
-// rows are the poles; columns wrap around. to_world may only rotate and mirror.
+// How an environment map's image covers the directions, in the map's own space.
+// latlong: the top row is +y; on the horizon the left edge is -z, a quarter further +x, the middle +z
+// (Mitsuba 3). The first and last rows are the poles; columns wrap around. equal_area: a square whose texels
+// have the same solid angle each (pbrt-v4). Its centre is +z, its corners are -z, the middles of its right
+// and its lower edge +x and +y.
+enum class SkyMapping { latlong, equal_area };
+
+// Radiance from all directions, given by an image. to_world may only rotate and mirror.
 struct EnvmapEmitter {
   AssetIndex file;
   double scale = 1;
   Transform to_world;
+  SkyMapping mapping = SkyMapping::latlong;
   bool operator==(const EnvmapEmitter&) const = default;
 };
 
 // An inverse camera at the origin of to_world, which looks along its +z axis with +y up. It projects an image
 // in the way in which a camera with that field of view and the image's aspect ratio would see it. On the
-// plane one scene unit ahead, the irradiance is pi * scale times the image's value.
+// plane one scene unit ahead, the irradiance is pi * scale times the image's value; if `as_intensity` is set,
+// scale times the image's value is instead the radiant intensity in the texel's direction [W/sr] (pbrt).
 struct ProjectorEmitter {
   TextureIndex irradiance;
   double scale = 1;
   Transform to_world;
   double fov = 50;
   FovAxis fov_axis = FovAxis::x;
+  bool as_intensity = false;
   bool operator==(const ProjectorEmitter&) const = default;
 };
 using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, SpotEmitter, EnvmapEmitter,

@@ -83,6 +83,23 @@ std::string bmp() {
   return b + std::string(16, '\x55');
 }
 
+// 2 x 2 pixels: of three bytes, plain and in runs, and numbers of a map.
+std::vector<std::string> tgas() {
+  const auto tga = [](char type, std::uint16_t map, char bits, const std::string& rest) {
+    std::string b{'\0', static_cast<char>(map > 0), type};
+    put(b, std::uint16_t{0}), put(b, map), put(b, static_cast<std::uint8_t>(map > 0 ? 24 : 0));
+    put(b, std::uint32_t{0}), put(b, std::uint16_t{2}), put(b, std::uint16_t{2});
+    return b + bits + '\x20' + rest;
+  };
+  return {tga(2, 0, 24, std::string(12, '\x55')), tga(2, 0, 16, std::string(8, '\x55')),
+          tga(10, 0, 32,
+              "\x82"
+              "abcd"
+              "\x01"
+              "efgh"),
+          tga(3, 0, 8, "abcd"), tga(9, 2, 8, std::string("abcdef\x81\0\x81\1", 10))};
+}
+
 std::string deflated(const std::string& raw) {
   uLongf n = compressBound(raw.size());
   std::string z(n, '\0');
@@ -188,7 +205,8 @@ const std::string& grid_of(std::uint8_t choice, bool whole_file) {
 }  // namespace
 
 void image(Bytes input) {
-  const auto data = decode_image("fuzz", bytes_of(input), kMostPixels);
+  // A TGA image is told by its name, and all others by their first bytes.
+  const auto data = decode_image("fuzz.tga", bytes_of(input), kMostPixels);
   if (!data) return must(!data.error().message.empty(), "what is refused is told why");
   const std::size_t values = std::size_t{data->width} * data->height * data->channels;
   must(data->u8.size() + data->f32.size() == values, "an image has all of its values, in one form");
@@ -202,12 +220,22 @@ Seeds image_seeds() {
   for (const char* c : {"R", "G", "B"}) exr.channels[c] = ExrHalf{std::vector<float>(15, .5f)};
   ExrPicture grey{{5, 3}, {}, {}};
   grey.channels["Y"] = ExrFloat{std::vector<float>(15, .5f)};
-  return {text_of(preview_png(film, 0).value()),
-          text_of(write_exr(exr).value()),
-          text_of(write_exr(grey).value()),
-          jpeg(),
-          bmp(),
-          "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 2\n" + std::string(16, '\x40')};
+  Seeds seeds{text_of(preview_png(film, 0).value()),
+              text_of(write_exr(exr).value()),
+              text_of(write_exr(grey).value()),
+              jpeg(),
+              bmp(),
+              "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 2\n" + std::string(16, '\x40'),
+              "PF\n1 2\n-1.0\n" + std::string(24, '\x40'),
+              "Pf\n2 1\n2.5\n" + std::string(8, '\x40'),
+              std::string("qoif\0\0\0\3\0\0\0\2\4\0", 14) +
+                  "\xfe"
+                  "abc"
+                  "\x72\xaa\x0f\xc1\xff"
+                  "abcd"
+                  "\x09"};
+  for (std::string& tga : tgas()) seeds.push_back(std::move(tga));
+  return seeds;
 }
 
 void mesh(Bytes input) {

@@ -156,8 +156,9 @@ Asset random_image(Dice& dice, RandomAssets& assets, double wild) {
   }
 }
 
-Asset random_environment(Dice& dice, RandomAssets& assets, double wild) {
-  const int w = 2 + static_cast<int>(dice.below(6)), h = 3 + static_cast<int>(dice.below(5));
+Asset random_environment(Dice& dice, RandomAssets& assets, double wild, SkyMapping mapping) {
+  const int w = 2 + static_cast<int>(dice.below(6)), other = 3 + static_cast<int>(dice.below(5));
+  const int h = mapping == SkyMapping::equal_area ? w : other;
   if (dice.chance(.4)) return assets.add(".hdr", hdr(dice, w, h));
   return assets.add(".exr", exr(dice, assets, w, h, wild));
 }

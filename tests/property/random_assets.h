@@ -30,8 +30,9 @@ class RandomAssets final : public AssetSource {
 };
 
 // `wild`: how probable extreme values are, each.
-Asset random_image(Dice& dice, RandomAssets& assets, double wild);        // .hdr, .exr or .bmp
-Asset random_environment(Dice& dice, RandomAssets& assets, double wild);  // at least 2 x 3
+Asset random_image(Dice& dice, RandomAssets& assets, double wild);  // .hdr, .exr or .bmp
+// At least 2 x 3; of equal_area a square.
+Asset random_environment(Dice& dice, RandomAssets& assets, double wild, SkyMapping mapping);
 Asset random_obj(Dice& dice, RandomAssets& assets, double wild);
 Asset random_ply(Dice& dice, RandomAssets& assets, double wild);
 Asset random_serialized(Dice& dice, RandomAssets& assets, double wild);

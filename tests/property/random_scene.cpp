@@ -139,8 +139,8 @@ class Composer {
         spot->texture.reset();
       aim(spot->to_world);
     } else if (auto* env = std::get_if<EnvmapEmitter>(&e)) {
-      env->file = SceneBuilder::push<AssetTag>(scene_.assets,
-                                               random_environment(dice_, out_.assets, out_.choice.wild));
+      env->file = SceneBuilder::push<AssetTag>(
+          scene_.assets, random_environment(dice_, out_.assets, out_.choice.wild, env->mapping));
       env->to_world = dice_.chance(.5) ? Transform{} : rigid();
     } else if (auto* p = std::get_if<ProjectorEmitter>(&e)) {
       aim(p->to_world);

@@ -120,10 +120,12 @@ class SettingsTranslator {
     Params& p = *s_.integrator;
     const std::string_view type = p.row().type;
     if (type != "path" && type != "volpath")
-      t_.report.warning(p.at(),
-                        fmt::format("{} is read as \"volpath\", which gives the same picture by other "
-                                    "means",
-                                    p.title()));
+      t_.report.warning(
+          p.at(),
+          fmt::format("{} is read as \"volpath\", which gives the same picture by other means{}", p.title(),
+                      type == "sppm" ? ", but for its maxdepth: there it counts what the light and "
+                                       "what the camera sends each"
+                                     : ""));
     Element out = made("integrator", type == "path" ? "path" : "volpath", p.at());
     const int depth = p.integer("maxdepth", 5);
     if (depth < 0 || depth > 1'000'000)
@@ -163,13 +165,8 @@ class SettingsTranslator {
     Element out = made("sensor", radius > 0 ? "thinlens" : "perspective", p.at());
     add(out, "fov", p.number("fov", 90), p.at());
     add(out, "string", "fov_axis", "smaller", p.at());
-    Transform world = s_.camera_ctm.from;
     // A uniform scale only changes the size of the lens.
-    double scale = std::cbrt(std::abs(determinant3(world)));
-    if (!std::isnormal(scale) || !is_similarity(world) || std::abs(scale - 1) < 1e-9) scale = 1;
-    if (scale != 1)
-      for (std::size_t i = 0; i < 12; ++i)
-        if (i % 4 != 3) world.m[i] /= scale;
+    const auto [world, scale] = without_scale(s_.camera_ctm.from);
     const double focus = p.number("focaldistance", 1e6);
     if (radius > 0) {
       add(out, "aperture_radius", radius * scale, p.at());

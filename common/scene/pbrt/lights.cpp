@@ -25,7 +25,8 @@ class LightTranslator {
     if (type == "point") return point();
     if (type == "spot") return spot();
     if (type == "distant") return distant();
-    return infinite();
+    if (type == "projection") return projection();
+    return p_.has("filename") || p_.has("mapname") ? image() : constant();
   }
 
  private:
@@ -81,24 +82,53 @@ class LightTranslator {
     return out;
   }
 
-  Element infinite() {
-    const bool is_image = p_.has("mapname");
-    Element out = made("emitter", is_image ? "envmap" : "constant", p_.at());
-    // The power of an image would depend on its pixels, so finish() rejects this parameter for images.
-    const Rgb c =
-        times(colour("L"), !is_image && p_.has("illuminance") ? p_.number("illuminance", kPi) / kPi : 1);
-    if (!is_image) {
-      add(out, "radiance", c, p_.at());
-      return out;
-    }
-    add(out, "string", "filename", p_.text("mapname", ""), p_.at());
+  Element constant() {
+    Element out = made("emitter", "constant", p_.at());
+    const double brightness = p_.has("illuminance") ? p_.number("illuminance", kPi) / kPi : 1;
+    add(out, "radiance", times(colour("L"), brightness), p_.at());
+    return out;
+  }
+
+  Element image() {
+    Element out = made("emitter", "envmap", p_.at());
+    if (p_.has("illuminance") && p_.take("illuminance"))
+      p_.error(p_.at(), fmt::format("{} has an illuminance, which depends on its image's pixels: give scale",
+                                    p_.title()));
+    // Only pbrt-v3 multiplies the image by L. finish() rejects the parameter beside a filename, as pbrt-v4
+    // does, and a mapname beside it.
+    const bool is_square = p_.has("filename");
+    const Rgb c = is_square ? times({1, 1, 1}, p_.number("scale", 1) * t_.exposure) : colour("L");
+    add(out, "string", "filename", p_.text(is_square ? "filename" : "mapname", ""), p_.at());
     add(out, "scale", c[0], p_.at());
     if (c[0] != c[1] || c[1] != c[2])
       p_.error(p_.at(), fmt::format("{} tints its image by L: do that to the image itself", p_.title()));
+    if (is_square) {
+      add(out, "string", "mapping", "equal_area", p_.at());
+      place(out, ctm_.to, p_.at());
+      return out;
+    }
     // Maps pbrt's axes to ours. In pbrt the top row is +z, the left edge +x, and a quarter further is +y; in
     // our maps these are +y, -z and +x.
     const Transform axes{{0, 0, -1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1}};
     place(out, multiply(ctm_.to, axes), p_.at());
+    return out;
+  }
+
+  // As the camera's, our projector's own x points to the left.
+  Element projection() {
+    Element out = made("emitter", "projector", p_.at()), image = made("texture", "bitmap", p_.at());
+    const std::string file = p_.text("filename", "");
+    if (file.empty()) p_.missing("filename");
+    set(image, "name", "irradiance", p_.at());
+    add(image, "string", "filename", file, p_.at());
+    add(image, "string", "filter_type", "nearest", p_.at());
+    add(image, "string", "wrap_mode", "clamp", p_.at());
+    add(out, std::move(image));
+    add(out, "scale", p_.number("scale", 1) * t_.exposure, p_.at());
+    add(out, "fov", p_.number("fov", 90), p_.at());
+    add(out, "string", "fov_axis", "smaller", p_.at());
+    add(out, "boolean", "as_intensity", "true", p_.at());
+    place(out, multiply(without_scale(ctm_.to).rigid, scaled(Vec3{{-1, 1, 1}}).to), p_.at());
     return out;
   }
 
@@ -117,11 +147,13 @@ void add_light(Translation& t, Params& p, const Placed& ctm) {
 
 AreaLight area_light(Translation& t, Params& p) {
   const Rgb c = times(light_colour(t, p, "L"), p.number("scale", 1) * t.exposure);
+  std::optional<double> power;
+  if (p.has("power")) power = p.number("power", 0);
   if (p.boolean("twosided", false))
     p.error(p.at(), fmt::format("{} shines from both sides, which no light does here: {}", p.title(),
                                 p.row().find("twosided")->meaning));
   p.finish();
-  return {c, p.at()};
+  return {c, power, p.at()};
 }
 
 }  // namespace ls::scene::pbrt

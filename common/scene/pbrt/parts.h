@@ -25,6 +25,12 @@ Placed scaled(const Vec3& by);
 Placed turned(double degrees, const Vec3& axis);
 std::optional<Placed> looking(const Vec3& eye, const Vec3& target, const Vec3& up);
 std::optional<Placed> of_columns(const std::vector<double>& m);  // from 16 numbers, column by column
+// A transform without its scale, if that is the same along all axes; otherwise as it is, with scale 1.
+struct Unscaled {
+  Transform rigid;
+  double scale = 1;
+};
+Unscaled without_scale(const Transform& t);
 
 // A named texture: a constant, or a reference to the element with that id.
 struct Texture {
@@ -36,7 +42,8 @@ struct Material {
   bool transmits = false, null = false;
 };
 struct AreaLight {
-  Rgb radiance;
+  Rgb radiance;  // if `power` is given, of a shape of the area power / pi
+  std::optional<double> power;
   Span at;
 };
 

@@ -102,6 +102,16 @@ std::optional<Placed> looking(const Vec3& eye, const Vec3& target, const Vec3& u
   return p;
 }
 
+Unscaled without_scale(const Transform& t) {
+  Unscaled out{t};
+  const double scale = std::cbrt(std::abs(determinant3(t)));
+  if (!std::isnormal(scale) || !is_similarity(t) || std::abs(scale - 1) < 1e-9) return out;
+  out.scale = scale;
+  for (std::size_t i = 0; i < 12; ++i)
+    if (i % 4 != 3) out.rigid.m[i] /= scale;
+  return out;
+}
+
 std::optional<Placed> of_columns(const std::vector<double>& m) {
   Placed p;
   for (std::size_t i = 0; i < 16; ++i) p.to.m[4 * (i % 4) + i / 4] = m[i];

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "common/scene/pbrt/parts.h"
 #include "common/scene/xml/transform_element.h"
@@ -45,7 +46,9 @@ class ShapeTranslator {
   Element sphere() {
     need_whole();
     Element out = made("shape", "sphere", p_.at());
-    add(out, "radius", p_.number("radius", 1), p_.at());
+    const double radius = p_.number("radius", 1);
+    areas_ = {4 * std::numbers::pi * radius * radius};
+    add(out, "radius", radius, p_.at());
     return out;
   }
 
@@ -54,6 +57,7 @@ class ShapeTranslator {
     if (p_.number("innerradius", 0) != 0)
       p_.error(p_.at(), fmt::format("{} has a hole: {}", p_.title(), p_.row().find("innerradius")->meaning));
     const double radius = p_.number("radius", 1);
+    areas_ = {std::numbers::pi * radius * radius};
     to_world_ =
         then(then(a_.ctm, moved(Vec3{{0, 0, p_.number("height", 0)}})), scaled(Vec3{{radius, radius, 1}}));
     return made("shape", "disk", p_.at());
@@ -62,9 +66,11 @@ class ShapeTranslator {
   Element cylinder() {
     need_whole();
     Element out = made("shape", "cylinder", p_.at());
-    add(out, "point", "p0", fmt::format("0 0 {}", p_.number("zmin", -1)), p_.at());
-    add(out, "point", "p1", fmt::format("0 0 {}", p_.number("zmax", 1)), p_.at());
-    add(out, "radius", p_.number("radius", 1), p_.at());
+    const double low = p_.number("zmin", -1), high = p_.number("zmax", 1), radius = p_.number("radius", 1);
+    areas_ = {2 * std::numbers::pi * radius * std::abs(high - low)};
+    add(out, "point", "p0", fmt::format("0 0 {}", low), p_.at());
+    add(out, "point", "p1", fmt::format("0 0 {}", high), p_.at());
+    add(out, "radius", radius, p_.at());
     return out;
   }
 
@@ -115,6 +121,22 @@ class ShapeTranslator {
            std::vector<double>{};
   }
 
+  // The areas in the world of what gives light by itself in pbrt: of each `size` triangles.
+  void measure(const Mesh& mesh, std::size_t size) {
+    const auto corner = [&](std::size_t i) {
+      const std::size_t at = 3 * static_cast<std::size_t>(mesh.indices[i]);
+      return transform_point(to_world_.to,
+                             Vec3{{mesh.positions[at], mesh.positions[at + 1], mesh.positions[at + 2]}});
+    };
+    for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+      const Vec3 a = corner(i), b = corner(i + 1), c = corner(i + 2);
+      const Vec3 normal =
+          cross(Vec3{{b[0] - a[0], b[1] - a[1], b[2] - a[2]}}, Vec3{{c[0] - a[0], c[1] - a[1], c[2] - a[2]}});
+      if (i / 3 % size == 0) areas_.push_back(0);
+      areas_.back() += .5 * std::sqrt(dot(normal, normal));
+    }
+  }
+
   std::optional<Element> kept(const Mesh& mesh) {
     const std::string file = keep_mesh(t_, p_.at(), mesh);
     return file.empty() ? std::nullopt : std::optional(ply(file));
@@ -140,6 +162,7 @@ class ShapeTranslator {
       *list = p->numbers;
     }
     has_normals_ = !mesh.normals.empty();
+    if (a_.light && a_.light->power) measure(mesh, 1);
     return mesh.indices.empty() ? std::nullopt : kept(mesh);
   }
 
@@ -166,6 +189,7 @@ class ShapeTranslator {
                      fmt::format("{} is bent, and only flat patches are read: give a plymesh", p_.title()));
       for (const std::size_t k : {0, 1, 3, 0, 3, 2}) mesh.indices.push_back(four[i + k]);
     }
+    if (a_.light && a_.light->power) measure(mesh, 2);
     return kept(mesh);
   }
 
@@ -198,7 +222,7 @@ class ShapeTranslator {
     }
     if (a_.light) {
       Element area = made("emitter", "area", a_.light->at);
-      add(area, "radiance", a_.light->radiance, a_.light->at);
+      add(area, "radiance", radiance(*a_.light), a_.light->at);
       add(out, std::move(area));
     }
     if (a_.inside == a_.outside) return;
@@ -206,11 +230,29 @@ class ShapeTranslator {
     if (!a_.outside.empty()) refer(out, "exterior", medium_id(a_.outside), p_.at());
   }
 
+  // A Lambertian emitter of the area A and the radiance L gives pi A L.
+  Rgb radiance(const AreaLight& light) {
+    if (!light.power) return light.radiance;
+    const auto [least, most] = std::minmax_element(areas_.begin(), areas_.end());
+    // The tolerance allows for corners in single precision, as in patches().
+    if (areas_.empty() || !(*least > 0) || *most > *least * (1 + 1e-4)) {
+      p_.error(light.at,
+               fmt::format("the power of this light can't be spread over {}: {}; give L, which is power / "
+                           "(pi area)",
+                           p_.title(),
+                           areas_.empty() ? "its area is in its file" : "its triangles differ in area"));
+      return light.radiance;
+    }
+    const double factor = *light.power / (std::numbers::pi * *most);
+    return {light.radiance[0] * factor, light.radiance[1] * factor, light.radiance[2] * factor};
+  }
+
   Translation& t_;
   Params& p_;
   const Attributes& a_;
   Placed to_world_;
   bool has_normals_ = false;
+  std::vector<double> areas_;  // of what gives light by itself; empty if they are not known
 };
 
 }  // namespace

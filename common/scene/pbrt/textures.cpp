@@ -51,10 +51,9 @@ Element image(Params& p) {
   Element out = made("texture", "bitmap", p.at());
   const std::string file = p.text("filename", "");
   if (file.empty()) p.missing("filename");
-  for (const std::string_view end : {".tga", ".TGA", ".pfm", ".qoi", ".ptx"})
-    if (file.ends_with(end))
-      p.error(p.at(),
-              fmt::format("images that end in {} are not read: turn \"{}\" into a PNG or an EXR", end, file));
+  if (file.ends_with(".ptx"))
+    p.error(p.at(),
+            fmt::format("images that end in .ptx are not read: turn \"{}\" into a PNG or an EXR", file));
   add(out, "string", "filename", file, p.at());
   if (p.text("filter", "bilinear") == "point") add(out, "string", "filter_type", "nearest", p.at());
   const std::string wrap = p.text("wrap", "repeat");

@@ -164,8 +164,28 @@ void add_settings(std::vector<Row>& r) {
   r.push_back({"Integrator", "path", true, "`path`", integrator_words()});
   for (const auto type : {"simplepath", "simplevolpath", "bdpt", "lightpath"})
     r.push_back({"Integrator", type, true, kOtherMethod, integrator_words()});
-  for (const auto type :
-       {"sppm", "mlt", "ao", "ambientocclusion", "randomwalk", "function", "directlighting", "whitted"})
+  r.push_back({"Integrator", "mlt", true, kOtherMethod,
+               Words{{"bootstrapsamples", "integer", "100000", kSampling, kIgnored},
+                     {"chains", "integer", "1000", kSampling, kIgnored},
+                     {"mutationsperpixel", "integer", "100", kSampling, kIgnored},
+                     {"largestepprobability", "float", "0.3", kSampling, kIgnored},
+                     {"sigma", "float", "0.01", kSampling, kIgnored}} +
+                   integrator_words()});
+  r.push_back(
+      {"Integrator", "sppm", true,
+       "`volpath`, with a warning: sppm's maxdepth counts what the light and what the camera sends each",
+       Words{{"photonsperiteration", "integer", "", kSampling, kIgnored},
+             {"radius", "float", "1", "light is not blurred by it", kIgnored},
+             {"seed", "integer", "0", kSampling, kIgnored}} +
+           integrator_words()});
+  for (const auto type : {"ao", "ambientocclusion", "function"})
+    r.push_back({"Integrator", type, false, "it shows no light: write \"volpath\" or \"path\" for it", {}});
+  r.push_back({"Integrator",
+               "randomwalk",
+               false,
+               "it leaves out mirrors, glass and lights without a size: write \"volpath\" for it",
+               {}});
+  for (const auto type : {"directlighting", "whitted"})
     r.push_back({"Integrator", type, false, "write \"volpath\" or \"path\" for it", {}});
 }
 
@@ -258,8 +278,7 @@ void add_materials(std::vector<Row>& r) {
 }
 
 void add_textures(std::vector<Row>& r) {
-  r.push_back({"Texture", "imagemap", true,
-               "a `bitmap`; .tga, .pfm and .qoi are refused: turn them into PNG or EXR",
+  r.push_back({"Texture", "imagemap", true, "a `bitmap`: PNG, JPEG, BMP, TGA, QOI, EXR, HDR or PFM",
                Words{{"filename", "string", "needed", "the image"},
                      {"filter", "string", "bilinear", "point is `nearest`, all others `bilinear`"},
                      {"wrap", "string", "repeat", "or clamp; black is refused"},
@@ -305,29 +324,37 @@ void add_lights(std::vector<Row>& r) {
        light_words("L") + Words{{"from", "point3", "0 0 0", "light travels from here"},
                                 {"to", "point3", "0 0 1", "to here"},
                                 {"illuminance", "float", "", "in place of the colour's brightness"}}});
-  r.push_back({"LightSource", "infinite", true, "a `constant`, or of a mapname an `envmap`",
-               light_words("L") +
-                   Words{{"illuminance", "float", "", "in place of the colour's brightness"},
-                         {"mapname", "string", "", "an image in latitude-longitude form (pbrt-v3), +z above"},
-                         {"filename", "string", "",
-                          "pbrt-v4's square maps are not read: turn it into latitude-longitude form (+z in "
-                          "the top row, "
-                          "+x at the left edge, +y a quarter further) and name that by \"string mapname\"",
-                          kRefused},
-                         {"portal", "point3", "", "leave it out: all of the map gives light here", kRefused},
-                         {"samples", "integer", "", kSampling, kIgnored},
-                         {"nsamples", "integer", "", kSampling, kIgnored}}});
-  r.push_back({"LightSource", "projection", false, "write it in XML as \"projector\"", {}});
+  r.push_back(
+      {"LightSource", "infinite", true,
+       "a `constant`, or an `envmap` of an image: of a filename with the mapping `equal_area`, of a "
+       "mapname in latitude-longitude form",
+       light_words("L") +
+           Words{{"illuminance", "float", "", "in place of the colour's brightness; refused with an image"},
+                 {"filename", "string", "", "a square equal-area image, +z in its centre; without L"},
+                 {"mapname", "string", "", "an image in latitude-longitude form (pbrt-v3), +z above"},
+                 {"portal", "point3", "", "leave it out: all of the map gives light here", kRefused},
+                 {"samples", "integer", "", kSampling, kIgnored},
+                 {"nsamples", "integer", "", kSampling, kIgnored}}});
+  r.push_back({"LightSource", "projection", true, "a `projector` with `as_intensity`",
+               Words{{"filename", "string", "needed", "the image, upright with +y above and +x on its right"},
+                     {"fov", "float", "90", "degrees, along the shorter side of the image"},
+                     {"scale", "float", "1", "factor"},
+                     {"power", "float", "", "it depends on the image's pixels: give scale", kRefused}}});
   r.push_back({"LightSource", "goniometric", false, "lights by measured tables are not known here", {}});
   for (const auto type : {"diffuse", "area"})
     r.push_back(
         {"AreaLightSource", type, true, "an `area` in each shape that follows",
          light_words("L") +
-             Words{{"twosided", "bool", "false", "give the back a shape of its own with ReverseOrientation"},
-                   {"power", "float", "", "give L, which is power / (pi area)", kRefused},
-                   {"filename", "string", "", "a light's image is not read", kRefused},
-                   {"samples", "integer", "", kSampling, kIgnored},
-                   {"nsamples", "integer", "", kSampling, kIgnored}}});
+             Words{
+                 {"twosided", "bool", "false", "give the back a shape of its own with ReverseOrientation"},
+                 {"power", "float", "",
+                  "luminous power of each sphere, disk, cylinder, patch or triangle: L is multiplied by "
+                  "power / "
+                  "(pi area). Of a quadric the area is that without its transform, as in pbrt; triangles of "
+                  "different areas, and plymesh, are refused"},
+                 {"filename", "string", "", "a light's image is not read", kRefused},
+                 {"samples", "integer", "", kSampling, kIgnored},
+                 {"nsamples", "integer", "", kSampling, kIgnored}}});
 }
 
 void add_media(std::vector<Row>& r) {

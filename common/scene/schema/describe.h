@@ -155,6 +155,11 @@ struct NamesOf<FovAxis> {
                                            {"larger", FovAxis::larger}};
 };
 template <>
+struct NamesOf<SkyMapping> {
+  static constexpr Named<SkyMapping> all[] = {{"latlong", SkyMapping::latlong},
+                                              {"equal_area", SkyMapping::equal_area}};
+};
+template <>
 struct NamesOf<DistanceSampling> {
   static constexpr Named<DistanceSampling> all[] = {{"exponential", DistanceSampling::exponential},
                                                     {"equiangular", DistanceSampling::equiangular},

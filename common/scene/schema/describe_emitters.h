@@ -86,17 +86,23 @@ void describe(V& v, T& e) {
   v.field({.name = "texture", .doc = "an image projected by the light", .range = kNonNegative}, e.texture);
 }
 
-LS_TYPE(
-    EnvmapEmitter, "emitter", "envmap", "",
-    "light from everywhere around by an image in latitude-longitude form (EXR or HDR; PNG and JPEG, too). "
-    "Before `to_world` its top row is +y and its bottom row -y; of the horizon the left edge is -z, a "
-    "quarter of the width further +x, the middle +z, three quarters -x, as in Mitsuba 3. It takes 2 x 3 "
-    "to 2^25 pixels (8192 x 4096); negative values become 0")
+LS_TYPE(EnvmapEmitter, "emitter", "envmap", "",
+        "light from everywhere around by an image in latitude-longitude form (EXR, HDR or PFM; others, too). "
+        "Before `to_world` its top row is +y and its bottom row -y; of the horizon the left edge is -z, a "
+        "quarter of the width further +x, the middle +z, three quarters -x, as in Mitsuba 3. It takes 2 x 3 "
+        "to 2^25 pixels (8192 x 4096); negative values become 0")
 template <class V, Of<EnvmapEmitter> T>
 void describe(V& v, T& e) {
   v.field({.name = "filename", .doc = "the image", .required = true}, e.file);
   v.field({.name = "scale", .doc = "multiplies the image's values", .range = kNonNegative}, e.scale);
   v.field({.name = "to_world", .doc = "turns or mirrors the map; moving it changes nothing"}, e.to_world);
+  v.field(
+      {.name = "mapping",
+       .doc = "`equal_area` is the square map of pbrt-v4, each of whose texels is one radiance from 4 pi / "
+              "texels steradians: before `to_world` its centre is +z, its corners -z, the middle of its "
+              "right edge +x, of its lower edge +y. Not in Mitsuba",
+       .elided = true},
+      e.mapping);
 }
 
 LS_TYPE(ProjectorEmitter, "emitter", "projector", "",
@@ -114,6 +120,12 @@ void describe(V& v, T& e) {
            .range = {0, 180, true, true}},
           e.fov);
   v.field({.name = "fov_axis", .doc = "what fov measures"}, e.fov_axis);
+  v.field(
+      {.name = "as_intensity",
+       .doc = "scale times the image is a radiant intensity in W/sr, as in pbrt, instead of that irradiance. "
+              "Not in Mitsuba",
+       .elided = true},
+      e.as_intensity);
 }
 
 }  // namespace ls::scene

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "worker/render/base/work_counters.h"
+#include "worker/render/math/equal_area.h"
 #include "worker/render/math/transform.h"
 
 namespace ls::render {
@@ -76,13 +77,18 @@ Result<void> check_values(std::string_view name, const Texels& t, float scale) {
 }  // namespace
 
 Result<EnvironmentMap> EnvironmentMap::build(std::string_view name, ImageData image, double scale,
-                                             const Transform& to_world) {
+                                             const Transform& to_world, SkyMapping mapping) {
   if (std::uint64_t{image.width} * image.height > kMaxEnvironmentPixels)
     return fail(Errc::resource_exhausted,
                 fmt::format("environment map '{}' has {} x {} pixels; scale it down to 8192 x 4096 ({} "
                             "pixels) or less",
                             name, image.width, image.height, kMaxEnvironmentPixels));
-  if (image.width < 2 || image.height < 3)
+  if (mapping == SkyMapping::equal_area && image.width != image.height)
+    return fail(Errc::invalid_argument,
+                fmt::format("environment map '{}' has {} x {} pixels; an equal-area map is square: if it is "
+                            "in latitude-longitude form, say so",
+                            name, image.width, image.height));
+  if (mapping == SkyMapping::latlong && (image.width < 2 || image.height < 3))
     return fail(Errc::invalid_argument,
                 fmt::format("environment map '{}' has {} x {} pixels; it takes at least 2 x 3", name,
                             image.width, image.height));
@@ -100,6 +106,7 @@ Result<EnvironmentMap> EnvironmentMap::build(std::string_view name, ImageData im
   if (!texels) return tl::unexpected(texels.error());
   EnvironmentMap map;
   map.scale_ = static_cast<float>(scale);
+  map.mapping_ = mapping;
   if (auto ok = check_values(name, *texels, map.scale_); !ok) return tl::unexpected(ok.error());
   map.texels_ = std::move(*texels);
   map.frame_ = Frame(V3(turn->vector({1, 0, 0})), V3(turn->vector({0, 1, 0})), V3(turn->vector({0, 0, 1})));
@@ -108,7 +115,7 @@ Result<EnvironmentMap> EnvironmentMap::build(std::string_view name, ImageData im
 }
 
 void EnvironmentMap::build_table() {
-  const std::uint32_t n = texels_.height - 1;
+  const std::uint32_t n = is_square() ? texels_.height : texels_.height - 1;
   rows_.resize(n);
   first_.resize(std::size_t{n} * texels_.width);
   std::vector<double> cells(texels_.width + 1), before(n + 1, 0.);
@@ -116,7 +123,8 @@ void EnvironmentMap::build_table() {
     // The height, a difference of cosines, is computed without cancellation as cos a - cos b = 2 sin((a + b)
     // / 2) sin((b - a) / 2).
     rows_[j].top = std::cos(kPiD * j / n);
-    rows_[j].height = 2 * std::sin(kPiD * (2. * j + 1) / (2. * n)) * std::sin(kPiD / (2. * n));
+    rows_[j].height =
+        is_square() ? 2. / n : 2 * std::sin(kPiD * (2. * j + 1) / (2. * n)) * std::sin(kPiD / (2. * n));
     before[j + 1] = before[j] + build_row(j, cells) * rows_[j].height;
   }
   const double cell_width = 2 * kPiD / texels_.width;
@@ -132,13 +140,15 @@ void EnvironmentMap::build_table() {
   }
 }
 
-// Returns the sum, over the cells of a row, of the mean luminance of their corners. `before` receives the
-// cumulative sums.
+double EnvironmentMap::cell_luminance(std::uint32_t column, std::uint32_t row) const {
+  if (is_square()) return luminance(texels_.texel(column, row));
+  const Corners c = corners(column, row);
+  return .25 * (double{c.l00} + double{c.l10} + double{c.l01} + double{c.l11});
+}
+
+// Returns the sum of the luminances of the cells of a row. `before` receives the cumulative sums.
 double EnvironmentMap::build_row(std::uint32_t row, std::vector<double>& before) {
-  for (std::uint32_t i = 0; i < texels_.width; ++i) {
-    const Corners c = corners(i, row);
-    before[i + 1] = before[i] + .25 * (double{c.l00} + double{c.l10} + double{c.l01} + double{c.l11});
-  }
+  for (std::uint32_t i = 0; i < texels_.width; ++i) before[i + 1] = before[i] + cell_luminance(i, row);
   if (!(before.back() > 0)) return 0;
   for (std::uint32_t i = 0; i < texels_.width; ++i) {
     const auto first = first_word(before, i);
@@ -166,6 +176,7 @@ float EnvironmentMap::cell_share(std::uint32_t row, std::uint32_t cell) const {
 EnvironmentMap::Light EnvironmentMap::at(const V3& direction) const {
   LS_COUNT(environment_map);
   const V3 d = frame_.to_local(direction);
+  if (is_square()) return at_square(d);
   const float across = std::atan2(d.x, -d.z) * kInvTwoPi * static_cast<float>(texels_.width) - .5f;
   const float column = std::floor(across), x = across - column;
   auto i = static_cast<std::int64_t>(column);
@@ -190,6 +201,16 @@ EnvironmentMap::Light EnvironmentMap::at(const V3& direction) const {
   return light;
 }
 
+EnvironmentMap::Light EnvironmentMap::at_square(const V3& d) const {
+  const V2 place = equal_area_place(d);
+  const std::uint32_t side = texels_.width;
+  const auto texel = [side](float s) {
+    return std::min(static_cast<std::uint32_t>(s * static_cast<float>(side)), side - 1);
+  };
+  const std::uint32_t i = texel(place.x), j = texel(place.y);
+  return {texels_.texel(i, j) * scale_, j < used_rows_ ? rows_[j].density * cell_share(j, i) : 0};
+}
+
 V3 EnvironmentMap::sample(std::uint32_t x, std::uint32_t y) const {
   LS_COUNT(environment_map);
   // `row` is the last row whose words begin at or before the word y. The position of y among the row's words
@@ -208,15 +229,23 @@ V3 EnvironmentMap::sample(std::uint32_t x, std::uint32_t y) const {
   const std::uint32_t* cell = std::upper_bound(cells, cells + row->used, x) - 1;
   const auto i = static_cast<std::uint32_t>(cell - cells);
   const float u = place(x, *cell, i + 1 < row->used ? cell[1] : kEnd);
+  return normalize(frame_.to_world(within_cell(i, j, u, v)));
+}
 
+// Returns the direction, in the map's own space, that the random numbers u and v choose in a cell.
+V3 EnvironmentMap::within_cell(std::uint32_t i, std::uint32_t j, float u, float v) const {
+  if (is_square()) {
+    const auto side = static_cast<float>(texels_.width);
+    return equal_area_direction({(static_cast<float>(i) + u) / side, (static_cast<float>(j) + v) / side});
+  }
   const Corners c = corners(i, j);
   const float t = sample_linear(c.l00 + c.l10, c.l01 + c.l11, v);
   const float s = sample_linear(lerp(c.l00, c.l01, t), lerp(c.l10, c.l11, t), u);
-  const double z = row->top - row->height * double{t};
+  const double z = rows_[j].top - rows_[j].height * double{t};
   const auto radius = static_cast<float>(safe_sqrt((1 - z) * (1 + z)));
   const float turns = (static_cast<float>(i) + .5f + s) / static_cast<float>(texels_.width);
   const V2 circle = unit_circle(turns > 1 ? turns - 1 : turns);
-  return normalize(frame_.to_world({circle.y * radius, static_cast<float>(z), -circle.x * radius}));
+  return {circle.y * radius, static_cast<float>(z), -circle.x * radius};
 }
 
 std::uint64_t EnvironmentMap::bytes() const {

@@ -1,8 +1,7 @@
-// An environment map: light from infinitely far away, whose radiance in each direction is given by an image
-// in latitude-longitude form.
+// An environment map: light from infinitely far away, whose radiance in each direction is given by an image.
 //
-// Mitsuba 3's convention (its plugin `envmap`). In the map's own space +y is up; u, from the left edge of the
-// image, and v, from its top, both in [0, 1], correspond to the direction
+// latlong, Mitsuba 3's convention (its plugin `envmap`). In the map's own space +y is up; u, from the left
+// edge of the image, and v, from its top, both in [0, 1], correspond to the direction
 //
 //   d = (sin(2 pi u) sin(pi v), cos(pi v), -cos(2 pi u) sin(pi v)),
 //
@@ -20,6 +19,10 @@
 //
 // with t = (z_j - z) / (z_j - z_j+1), which is exactly the distribution of the samples. As solid angle is
 // uniform in z, p is nearly proportional to the luminance of the map: t and v differ only next to the poles.
+//
+// equal_area, pbrt-v4's convention. A direction's place in the square image is that of equal_area.h, and its
+// radiance that of the texel there, unfiltered. A cell is a texel, its solid angle 4 pi / texels, and the
+// density within it constant.
 #pragma once
 
 #include <cstdint>
@@ -41,11 +44,11 @@ class EnvironmentMap {
  public:
   // Makes the map from `image`, with radiances multiplied by `scale`. `name` is for messages. Negative values
   // become 0 and are counted. Fails with invalid_argument on a value that is not finite or that, scaled,
-  // exceeds the largest radiance that a sample may have, on an image of fewer than 2 x 3 pixels, and on a
-  // to_world other than a rotation, reflection, translation and uniform scale. Fails with resource_exhausted
-  // on more than kMaxEnvironmentPixels.
+  // exceeds the largest radiance that a sample may have, on an image of fewer than 2 x 3 pixels, or of
+  // equal_area one that is not square, and on a to_world other than a rotation, reflection, translation and
+  // uniform scale. Fails with resource_exhausted on more than kMaxEnvironmentPixels.
   static Result<EnvironmentMap> build(std::string_view name, ImageData image, double scale,
-                                      const Transform& to_world);
+                                      const Transform& to_world, SkyMapping mapping = SkyMapping::latlong);
 
   struct Light {
     C3 radiance;
@@ -58,15 +61,15 @@ class EnvironmentMap {
 
   bool black() const { return used_rows_ == 0; }
   // The luminance integrated over all directions, as approximated by the sampling table: the sum over cells
-  // of the mean luminance at a cell's corners times its solid angle.
+  // of the mean luminance at a cell's corners (of equal_area its luminance) times its solid angle.
   double flux() const { return flux_; }
   std::uint64_t clamped() const { return texels_.clamped; }
   std::uint64_t bytes() const;
 
  private:
   struct Row {                // a row of cells
-    double top = 1;           // cosine at its upper edge
-    double height = 0;        // difference of the cosines at its edges
+    double top = 1;           // cosine at its upper edge; latlong only
+    double height = 0;        // solid angle of a cell, divided by 2 pi / width: the difference of the cosines
     float density = 0;        // share of the words, divided by the solid angle of one cell
     std::uint32_t first = 0;  // first of the words that choose this row; they end where the next row's begin
     std::uint32_t used = 0;   // number of cells up to the last one that has a word
@@ -77,12 +80,17 @@ class EnvironmentMap {
 
   void build_table();
   double build_row(std::uint32_t row, std::vector<double>& before);
+  double cell_luminance(std::uint32_t column, std::uint32_t row) const;
+  bool is_square() const { return mapping_ == SkyMapping::equal_area; }
+  Light at_square(const V3& d) const;
+  V3 within_cell(std::uint32_t column, std::uint32_t row, float u, float v) const;
   std::uint32_t right_of(std::uint32_t x) const { return x + 1 == texels_.width ? 0 : x + 1; }
   Corners corners(std::uint32_t x, std::uint32_t y) const;
   float cell_share(std::uint32_t row, std::uint32_t cell) const;
 
   Texels texels_;
   float scale_ = 1;
+  SkyMapping mapping_ = SkyMapping::latlong;
   Frame frame_;  // axes of the map in the world: a rotation or a reflection
   std::vector<Row> rows_;
   std::vector<std::uint32_t> first_;  // for each cell, row by row, the first of the words that choose it

@@ -81,7 +81,9 @@ struct SpotLight : Punctual<SpotLight> {
 };
 
 struct ProjectorLight : Punctual<ProjectorLight> {
-  C3 value;  // irradiance on the plane at distance 1 for a texel value of 1
+  // For a texel value of 1, the irradiance on the plane at distance 1, or the intensity if `even` is set.
+  C3 value;
+  bool even = false;
   TextureIndex image;
   V3 axis_u, axis_v, axis;
   float tan_x = 0, tan_y = 0;  // tangents of half its two fields of view
@@ -107,7 +109,8 @@ struct ProjectorLight : Punctual<ProjectorLight> {
     if (!(std::abs(x) <= 1) || !(std::abs(y) <= 1)) return {0, 0, 0};
     // As for cameras, x points to the left and y up, and uv is measured from the upper left corner of the
     // image.
-    return value * world.textures.eval(image, {.5f - .5f * x, .5f - .5f * y}) / (z * z * z);
+    const C3 v = value * world.textures.eval(image, {.5f - .5f * x, .5f - .5f * y});
+    return even ? v : v / (z * z * z);
   }
 };
 
@@ -148,7 +151,8 @@ inline ProjectorLight make_light(const ProjectorEmitter& e, const LightWorld& wo
   set_axes(l, e.to_world, world);
   l.image = e.irradiance;
   const double s = world.geometry.scale;
-  l.value = C3(static_cast<float>(kPiD * e.scale * s * s));
+  l.value = C3(static_cast<float>((e.as_intensity ? 1 : kPiD) * e.scale * s * s));
+  l.even = e.as_intensity;
   const double aspect = world.textures.aspect(e.irradiance),
                tan_x = tan_half_fov_x(e.fov, e.fov_axis, aspect);
   l.tan_x = static_cast<float>(tan_x);

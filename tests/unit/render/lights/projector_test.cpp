@@ -100,6 +100,22 @@ TEST(Projector, LightsAPlaneAsTheImageIs) {
   EXPECT_EQ(arriving(b, {0, 0, 0}), C3(0)) << "in it";
 }
 
+TEST(Projector, AsIntensityIsEvenInAllDirections) {
+  ProjectorEmitter e;
+  e.to_world = test::look_at({0, 0, 0}, {0, 0, 1}, {0, 1, 0});
+  e.fov = 90;
+  e.scale = 3;
+  e.as_intensity = true;
+  test::SkyImage grey(1, 1, .25f);
+  const LightBench b(projecting(grey, e));
+  for (const double distance : {.5, 1., 8.})
+    for (const double x : {-.9, 0., .6}) {
+      const V3d at = V3d(x, .3, 1) * distance;
+      const double want = .75 / at.dot(at);  // float32, of the squared distance
+      EXPECT_NEAR(arriving(b, at).x, want, 3e-6 * want);
+    }
+}
+
 TEST(Projector, StandsUpright) {
   ProjectorEmitter e;
   e.to_world = test::look_at({0, 0, 0}, {0, 0, 1}, {0, 1, 0});  // its left is +x

@@ -154,6 +154,89 @@ TEST(Pbrt, PowerOfAPointIsFourPiTimesItsIntensity) {
   EXPECT_DOUBLE_EQ(point.intensity[0], 8 / (4 * std::numbers::pi));
 }
 
+// The radiance is power / (pi area): of a quadric in its own space, of a mesh in the world, of each of its
+// triangles.
+TEST(Pbrt, PowerOfAnAreaIsSpreadOverIt) {
+  const auto radiance = [](std::string_view world) {
+    KeepingAssets assets;
+    const ReadResult r = read_scene(
+        "t.pbrt",
+        pbrt_scene(fmt::format(
+            "AreaLightSource \"diffuse\" \"rgb L\" [ 1 2 4 ] \"float power\" 8 Scale 3 3 3 {}", world)),
+        assets);
+    EXPECT_TRUE(r.scene) << messages(r);
+    if (!r.scene) return Rgb{};
+    const auto& light = r.scene->shapes.at(0).emitter;
+    return std::get<ConstantTexture>(r.scene->textures.at(light->radiance.value)).value;
+  };
+  const auto expect = [](const Rgb& got, double area) {
+    for (std::size_t i = 0; i < 3; ++i)
+      EXPECT_NEAR(got[i] * area, (1 << i) * 8 / std::numbers::pi, 1e-5) << area;
+  };
+  expect(radiance("Shape \"sphere\" \"float radius\" 2"), 16 * std::numbers::pi);
+  expect(radiance("Shape \"disk\" \"float radius\" 2"), 4 * std::numbers::pi);
+  expect(radiance("Shape \"cylinder\" \"float radius\" 2 \"float zmax\" 0"), 4 * std::numbers::pi);
+  expect(radiance(
+             "Shape \"trianglemesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 0 ] \"integer indices\" [ 0 1 2 2 "
+             "1 3 ]"),
+         4.5);
+  expect(radiance("Shape \"bilinearmesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 0 ]"), 9);
+}
+
+TEST(Pbrt, SquareMapsKeepTheirAxes) {
+  const ReadResult r = read_pbrt(
+      R"(Film "rgb" "float iso" 200 Camera "perspective" WorldBegin
+Rotate 90 1 0 0 LightSource "infinite" "string filename" "wood.png" "float scale" 3 Shape "sphere")");
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  const auto& map = std::get<EnvmapEmitter>(r.scene->emitters.at(0));
+  EXPECT_EQ(map.mapping, SkyMapping::equal_area);
+  EXPECT_EQ(map.scale, 6);
+  EXPECT_NEAR(map.to_world.m[6], -1, 1e-15) << "its +z, the image's centre, becomes -y";
+  EXPECT_NEAR(map.to_world.m[0], 1, 1e-15);
+}
+
+TEST(Pbrt, MapsByLatitudeHaveTheirTopAtZ) {
+  const Scene s =
+      pbrt("LightSource \"infinite\" \"string mapname\" \"wood.png\" \"rgb L\" [ 2 2 2 ] Shape \"sphere\"");
+
+  const auto& map = std::get<EnvmapEmitter>(s.emitters.at(0));
+  EXPECT_EQ(map.mapping, SkyMapping::latlong);
+  EXPECT_EQ(map.scale, 2);
+  EXPECT_EQ(map.to_world.m[9], 1) << "its +y becomes +z";
+}
+
+TEST(Pbrt, ProjectionsAreOfTheSameIntensityAtAllAngles) {
+  const Scene s = pbrt(
+      "Translate 1 2 3 Scale 2 2 2 LightSource \"projection\" \"string filename\" \"wood.png\" \"float fov\" "
+      "40 "
+      "\"float scale\" 5 Shape \"sphere\"");
+
+  const auto& light = std::get<ProjectorEmitter>(s.emitters.at(0));
+  EXPECT_TRUE(light.as_intensity);
+  EXPECT_EQ(light.scale, 5);
+  EXPECT_EQ(light.fov, 40);
+  EXPECT_EQ(light.fov_axis, FovAxis::smaller);
+  const std::array<double, 16> want{-1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1};
+  for (std::size_t i = 0; i < 16; ++i) EXPECT_NEAR(light.to_world.m[i], want[i], 1e-15) << i;
+  const auto& image = std::get<BitmapTexture>(s.textures.at(light.irradiance.value));
+  EXPECT_EQ(image.filter, TextureFilter::nearest);
+}
+
+TEST(Pbrt, IntegratorsOfTheSameLightAreRead) {
+  for (const std::string_view type : {"simplepath", "simplevolpath", "bdpt", "lightpath", "mlt", "sppm"}) {
+    const ReadResult r = read_pbrt(
+        pbrt_scene("Shape \"sphere\"",
+                   fmt::format(R"(Camera "perspective" Integrator "{}" "integer maxdepth" 7)", type)));
+    ASSERT_TRUE(r.scene) << messages(r);
+    EXPECT_EQ(r.scene->integrator.name, "volpath");
+    EXPECT_EQ(r.scene->integrator.max_depth, 8);
+    EXPECT_NE(messages(r).find(fmt::format("Integrator \"{}\" is read as \"volpath\"", type)),
+              std::string::npos);
+    EXPECT_EQ(messages(r).find("what the light and") != std::string::npos, type == "sppm");
+  }
+}
+
 TEST(Pbrt, DistantLightTravelsFromItsFirstPoint) {
   const Scene s = pbrt(
       "LightSource \"distant\" \"point3 from\" [ 0 5 0 ] \"point3 to\" [ 0 0 0 ] \"rgb L\" [ 2 2 2 ] Shape "

@@ -34,6 +34,15 @@ TEST(EnvmapScenes, DefaultsAreScaleOneAndNoTurn) {
   EXPECT_EQ(e.to_world, Transform{});
 }
 
+TEST(EnvmapScenes, AMapMayBeASquareOfEqualAreas) {
+  const Scene s = must_read(with_sensor(sky("<string name=\"mapping\" value=\"equal_area\"/>")));
+  EXPECT_EQ(std::get<EnvmapEmitter>(s.emitters.at(0)).mapping, SkyMapping::equal_area);
+  EXPECT_EQ(deserialize_scene(serialize(s)).value(), s);
+  const auto wrong = read(with_sensor(sky("<string name=\"mapping\" value=\"cube\"/>")));
+  EXPECT_FALSE(wrong.scene);
+  EXPECT_THAT(messages(wrong), HasSubstr("latlong"));
+}
+
 TEST(EnvmapScenes, OldFilesMayTurnThemByToWorld) {
   const Scene s = must_read(
       "<scene version=\"0.6.0\"><emitter type=\"envmap\"><transform name=\"toWorld\"><matrix "
