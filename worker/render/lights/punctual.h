@@ -111,7 +111,41 @@ struct ProjectorLight : Punctual<ProjectorLight> {
   }
 };
 
-using PunctualKinds = Kinds<PointLight, SpotLight, ProjectorLight>;
+// Returns the point of the unit square for the direction w by Clarberg's equal-area octahedral mapping ("Fast
+// Equal-Area Mapping of the (Hemi)Sphere using SIMD", 2008): the middle of the square is +z, its corners are
+// -z. On the square [-1, 1]^2 the upper hemisphere is |x| + |y| <= 1. There a direction at the height z has
+// |x| + |y| = r = sqrt(1 - z), so that areas are alike, and |y| / r is its angle from the x axis over a right
+// angle. The lower hemisphere is the mirror image of the upper one, folded out over the square's edges.
+inline V2 octahedral_square(const V3& w) {
+  const float x = std::abs(w.x), y = std::abs(w.y), z = std::abs(w.z);
+  const float r = std::sqrt((x * x + y * y) / (1 + z));  // sqrt(1 - z) without its cancellation
+  float v = r * std::atan2(y, x) * (2 * kInvPi), u = r - v;
+  if (w.z < 0) {
+    const float folded = 1 - u;
+    u = 1 - v;
+    v = folded;
+  }
+  return {.5f + .5f * std::copysign(u, w.x), .5f + .5f * std::copysign(v, w.y)};
+}
+
+struct GoniometricLight : Punctual<GoniometricLight> {
+  C3 intensity;
+  V3 axis_u, axis_v, axis;
+  TextureIndex image;
+
+  // Equal areas of the image are equal solid angles.
+  C3 mean_intensity(const LightWorld& world) const { return intensity * world.textures.mean(image); }
+
+  bool dark(const LightWorld& world) const { return is_black(mean_intensity(world)); }
+  double power(const LightWorld& world) const { return luminance(mean_intensity(world)) * 4 * kPiD; }
+  LightBounds bounds(const LightWorld& world) const { return bounds_of(mean_intensity(world)); }
+  C3 towards(const LightWorld& world, const V3& w) const {
+    const V2 at = octahedral_square({dot(w, axis_u), dot(w, axis_v), dot(w, axis)});
+    return intensity * world.textures.eval(image, at);
+  }
+};
+
+using PunctualKinds = Kinds<PointLight, SpotLight, ProjectorLight, GoniometricLight>;
 
 inline PointLight make_light(const PointEmitter& e, const LightWorld& world) {
   PointLight l;
@@ -153,6 +187,14 @@ inline ProjectorLight make_light(const ProjectorEmitter& e, const LightWorld& wo
                tan_x = tan_half_fov_x(e.fov, e.fov_axis, aspect);
   l.tan_x = static_cast<float>(tan_x);
   l.tan_y = static_cast<float>(tan_x / aspect);
+  return l;
+}
+
+inline GoniometricLight make_light(const GoniometricEmitter& e, const LightWorld& world) {
+  GoniometricLight l;
+  set_axes(l, e.to_world, world);
+  l.intensity = color(e.intensity) * static_cast<float>(world.scale2());
+  l.image = e.texture;
   return l;
 }
 
