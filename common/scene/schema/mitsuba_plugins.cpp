@@ -76,8 +76,8 @@ constexpr PluginRow kPlugins[] = {
     {"bsdf", "pplastic", kRefused, "polarisation is not followed; use \"plastic\" or \"roughplastic\""},
     {"bsdf", "principled", kRead, ""},
     {"bsdf", "principledthin", kRefused,
-     "use a \"blendbsdf\" of \"roughthindielectric\", which is its spec_trans, and "
-     "\"diffusetransmission\", which is its diff_trans"},
+     "use a \"blendbsdf\" of \"roughthindielectric\" for its spec_trans and \"diffusetransmission\" for its "
+     "diff_trans"},
     {"bsdf", "retarder", kRefused, kPolarised},
     {"bsdf", "roughconductor", kInPart,
      "`eta` and `k` are colours, the same everywhere; not every metal by its name"},

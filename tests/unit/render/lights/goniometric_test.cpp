@@ -11,6 +11,7 @@ namespace ls::render {
 namespace {
 
 using test::SceneBuilder;
+using test::operator*;
 
 constexpr int kSide = 4;
 
