@@ -84,6 +84,12 @@ struct DiffuseBsdf {
   TextureIndex reflectance;
   bool operator==(const DiffuseBsdf&) const = default;
 };
+// A thin sheet that scatters light ideally on both sides, such as a leaf or paper. At every point the sum of
+// the two is at most 1: where textures exceed it, both are divided by it.
+struct DiffuseTransmissionBsdf {
+  TextureIndex reflectance, transmittance;
+  bool operator==(const DiffuseTransmissionBsdf&) const = default;
+};
 struct ConductorBsdf {
   Rgb eta{0, 0, 0}, k{1, 1, 1};  // eta = 0, k = 1 reflects everything (Mitsuba's `none`)
   TextureIndex specular_reflectance;
@@ -115,6 +121,16 @@ struct ThinDielectricBsdf {
   double int_ior = 1.5046, ext_ior = 1.000277;
   TextureIndex specular_reflectance, specular_transmittance;
   bool operator==(const ThinDielectricBsdf&) const = default;
+};
+// A thin sheet with rough sides, both sides in one surface. The lobe of transmitted light is that of the
+// reflected light, mirrored at the sheet.
+struct RoughThinDielectricBsdf {
+  Microfacet distribution = Microfacet::beckmann;
+  TextureIndex alpha_u, alpha_v;
+  double int_ior = 1.5046, ext_ior = 1.000277;
+  TextureIndex specular_reflectance, specular_transmittance;
+  bool multiple_scattering = false;
+  bool operator==(const RoughThinDielectricBsdf&) const = default;
 };
 struct PlasticBsdf {
   double int_ior = 1.49, ext_ior = 1.000277;
@@ -178,7 +194,8 @@ struct PrincipledBsdf {
 };
 using Bsdf = std::variant<DiffuseBsdf, ConductorBsdf, RoughConductorBsdf, DielectricBsdf, RoughDielectricBsdf,
                           ThinDielectricBsdf, PlasticBsdf, RoughPlasticBsdf, NullBsdf, TwoSidedBsdf, MaskBsdf,
-                          BlendBsdf, NormalMapBsdf, BumpMapBsdf, PrincipledBsdf>;
+                          BlendBsdf, NormalMapBsdf, BumpMapBsdf, PrincipledBsdf, DiffuseTransmissionBsdf,
+                          RoughThinDielectricBsdf>;
 
 // Volumes and media.
 //
@@ -307,8 +324,18 @@ struct ProjectorEmitter {
   bool as_intensity = false;
   bool operator==(const ProjectorEmitter&) const = default;
 };
+// A light at the origin of to_world, whose intensity is multiplied by an image of all directions: a square in
+// Clarberg's equal-area octahedral form (2008). In its own space +z is the middle of the square and -z its
+// corners; +x is to the right and +y below. to_world may only move, turn, mirror and scale, and scaling has
+// no effect.
+struct GoniometricEmitter {
+  Transform to_world;
+  Rgb intensity{1, 1, 1};  // W/sr where the image is 1
+  TextureIndex texture;
+  bool operator==(const GoniometricEmitter&) const = default;
+};
 using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, SpotEmitter, EnvmapEmitter,
-                             ProjectorEmitter>;
+                             ProjectorEmitter, GoniometricEmitter>;
 
 // Integrator.
 inline constexpr int kUsualPathReuse = 16;  // pixels that share paths, if path_reuse 0 chooses to share

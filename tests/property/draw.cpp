@@ -79,6 +79,7 @@ BsdfIndex Draw::bsdf(int depth) {
     const auto* share = std::get_if<ConstantTexture>(&scene_.textures[p->spec_trans->value]);
     if (share && share->value == Rgb{0, 0, 0}) p->spec_trans.reset();
   }
+  if (auto* sheet = std::get_if<DiffuseTransmissionBsdf>(&b)) share_light(*sheet);
   constexpr Rgb kGreys[] = {{.1, .1, .1}, {.4, .4, .4}, {1, 1, 1}};
   // Energy that facets pass on to each other is tabulated for one roughness, which takes a while to build.
   std::visit(
@@ -100,6 +101,16 @@ BsdfIndex Draw::bsdf(int depth) {
   }
   depth_ = outer;
   return SceneBuilder::push<BsdfTag>(scene_.bsdfs, b);
+}
+
+// Makes a sheet whose colours are constant send on no more light than it gets.
+void Draw::share_light(DiffuseTransmissionBsdf& sheet) {
+  const auto* back = std::get_if<ConstantTexture>(&scene_.textures[sheet.reflectance.value]);
+  const auto* through = std::get_if<ConstantTexture>(&scene_.textures[sheet.transmittance.value]);
+  if (!back || !through) return;
+  ConstantTexture rest;
+  for (std::size_t i = 0; i < 3; ++i) rest.value[i] = (1 - back->value[i]) * through->value[i];
+  sheet.transmittance = SceneBuilder::push<TextureTag>(scene_.textures, rest);
 }
 
 VolumeIndex Draw::volume(GridKind kind) {

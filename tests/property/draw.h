@@ -58,6 +58,7 @@ class Draw {
   static void emplace(V& x, std::size_t i, std::index_sequence<Is...>) {
     ((Is == i ? static_cast<void>(x.template emplace<Is>()) : void()), ...);
   }
+  void share_light(DiffuseTransmissionBsdf& sheet);
   void draw(const scene::Field& f, double& x) { x = number(f.range); }
   void draw(const scene::Field& f, int& x) { x = static_cast<int>(number(f.range)); }
   void draw(const scene::Field& f, std::uint64_t& x) { x = static_cast<std::uint64_t>(number(f.range)); }

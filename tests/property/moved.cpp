@@ -127,7 +127,8 @@ bool can_be_permuted(const Scene& s) {
   const auto weighs = [](const Bsdf& b) {
     return std::holds_alternative<MaskBsdf>(b) || std::holds_alternative<BlendBsdf>(b) ||
            std::holds_alternative<NormalMapBsdf>(b) || std::holds_alternative<PrincipledBsdf>(b) ||
-           std::holds_alternative<RoughConductorBsdf>(b) || std::holds_alternative<RoughDielectricBsdf>(b);
+           std::holds_alternative<RoughConductorBsdf>(b) || std::holds_alternative<RoughDielectricBsdf>(b) ||
+           std::holds_alternative<RoughThinDielectricBsdf>(b);
   };
   const auto glows = [](const Medium& m) {
     const auto* h = std::get_if<HeterogeneousMedium>(&m);

@@ -144,6 +144,8 @@ class Composer {
       env->to_world = dice_.chance(.5) ? Transform{} : rigid();
     } else if (auto* p = std::get_if<ProjectorEmitter>(&e)) {
       aim(p->to_world);
+    } else if (auto* g = std::get_if<GoniometricEmitter>(&e)) {
+      aim(g->to_world);
     }
   }
   Vec3 around(double distance) {

@@ -68,6 +68,24 @@ SceneBuilder surfaces() {
   builder.scene.sensor.focus_distance = 5;
   return builder;
 }
+// A leaf, a rough pane before fog, and a lamp with an intensity by direction behind both.
+SceneBuilder sheets() {
+  SceneBuilder builder = lit_room();
+  const TextureIndex rough = builder.texture({.25, .25, .25}), white = builder.texture({1, 1, 1});
+  builder.shape(DiskShape{}, translate({-1, -.5, 0}) * rotate_x(70) * scale(.75),
+                builder.bsdf(DiffuseTransmissionBsdf{builder.texture({.25, .5, .25}),
+                                                     builder.texture({.25, .375, .125})}));
+  builder.container(
+      CubeShape{}, translate({1, 0, 0}) * rotate_x(20) * scale(.5),
+      builder.bsdf(RoughThinDielectricBsdf{Microfacet::ggx, rough, rough, 1.5, 1, white, white}),
+      builder.homogeneous({.5, 1, 2}, {.9, .7, .5}));
+  const TextureIndex dim = builder.texture({2, 2, 2}), bright = builder.texture({8, 6, 4});
+  builder.scene.textures.push_back(CheckerboardTexture{dim, bright, {{2, 0, 0, 0, 2, 0, 0, 0, 1}}});
+  const TextureIndex board{static_cast<std::uint32_t>(builder.scene.textures.size() - 1)};
+  builder.scene.emitters.push_back(
+      GoniometricEmitter{translate({0, 1, 1}) * rotate_x(30), {1, .75, .5}, board});
+  return builder;
+}
 SceneBuilder flame() {
   SceneBuilder builder = lit_room();
   HeterogeneousMedium m;
@@ -87,6 +105,7 @@ std::vector<NamedScene> different_scenes() {
                               {"coloured fog", coloured_fog()},
                               {"milk in glass", milk_in_glass()},
                               {"surfaces", surfaces()},
+                              {"sheets", sheets()},
                               {"a flame", flame()}};
   SceneBuilder distant = cloud();
   distant.scene.integrator.name = "volpath_distant_mis";

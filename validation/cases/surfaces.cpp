@@ -165,11 +165,88 @@ void indices(Table& t) {
           });
 }
 
+BsdfIndex leaf(SceneBuilder& builder, const Rgb& reflectance, const Rgb& transmittance) {
+  return builder.bsdf(DiffuseTransmissionBsdf{builder.texture(reflectance), builder.texture(transmittance)});
+}
+BsdfIndex pane(SceneBuilder& builder, double alpha, bool multiple_scattering = false) {
+  const TextureIndex a = builder.texture(rgb(alpha)), white = builder.texture(rgb(1));
+  return builder.bsdf(
+      RoughThinDielectricBsdf{Microfacet::ggx, a, a, 1.5, 1, white, white, multiple_scattering});
+}
+
+void diffuse_sheets(Table& t) {
+  t.exact("N64-leaf-in-white", "N64 7.6c",
+          "A grey sheet that sends on all light, in a white sky: 1 in every sample.", [](const Bench& b) {
+            return every_value(
+                b, in_white(sheet(30, [](SceneBuilder& k) { return leaf(k, rgb(.25), rgb(.75)); })), 64,
+                grey(1), 2e-6);
+          });
+  t.mean(
+      "N64-coloured-leaf-in-white", "N64 7.6c",
+      "A sheet that reflects one colour and lets the rest through is as bright as a white sky.",
+      [] {
+        return in_white(sheet(30, [](SceneBuilder& k) { return leaf(k, {.125, .75, .5}, {.875, .25, .5}); }));
+      },
+      grey(1), {.channels = true});
+  // A lamp of intensity 3 two units off: the irradiance is 3/4, and the sheet shows R or T of it over pi.
+  for (const bool behind : {false, true})
+    t.exact(behind ? "7.6g-leaf-before-a-lamp" : "7.6g-leaf-under-a-lamp", "7.6g",
+            behind ? "A leaf with a point light behind it: T E / pi in every sample."
+                   : "A leaf with a point light before it: R E / pi in every sample.",
+            [behind](const Bench& b) {
+              SceneBuilder builder = sheet(40, [](SceneBuilder& k) { return leaf(k, rgb(.25), rgb(.625)); });
+              builder.scene.emitters.push_back(PointEmitter{{0, 0, behind ? -2. : 2.}, rgb(3)});
+              // The frame is 1e-4 wide on the sheet, of the distance 2: the cosine and the distance differ by
+              // 1e-9, and float32 by some 1e-6.
+              return every_value(b, builder, 4, grey((behind ? .625 : .25) * .75 / kPi), 1e-5);
+            });
+  // The wall of a ball is lit by a lamp in its middle through fog that absorbs, and is black to what comes
+  // back: seen from outside it shows T / pi times the light that is left.
+  t.exact("7.6g-lampshade-full-of-smoke", "7.6g",
+          "A ball of paper around a lamp in smoke that absorbs: T I e^-sigma / pi from outside, in every "
+          "sample.",
+          [](const Bench& b) {
+            SceneBuilder builder;
+            builder.container(SphereShape{}, {}, leaf(builder, rgb(0), rgb(.5)),
+                              builder.homogeneous(rgb(.75), rgb(0)));
+            builder.scene.emitters.push_back(PointEmitter{{0, 0, 0}, rgb(2)});
+            builder.look({0, -5, 0}, {0, 0, 0}, 10);
+            return every_value(b, builder, 4, grey(.5 * 2 * std::exp(-.75) / kPi), 1e-5);
+          });
+}
+
+void rough_sheets(Table& t) {
+  for (const double alpha : {.1, .5, 1.})
+    t.mean(fmt::format("N64-rough-sheet-in-white-{:g}", alpha), "N64 N38 7.6c",
+           "A sheet of clear rough glass that loses nothing is as bright as a white sky.",
+           [=] { return in_white(sheet(30, [=](SceneBuilder& k) { return pane(k, alpha, true); })); },
+           // kEnergyTolerance of the tables (worker/render/bsdf/microfacet_energy.h)
+           grey(1), {.slack = 5e-4});
+  for (const double alpha : {.3, 1.})
+    t.mean(fmt::format("N38-rough-sheet-{:g}", alpha), "N38",
+           "A sheet of clear rough glass, scattered once: what a rough white metal leaves of a white sky, by "
+           "quadrature.",
+           [=] { return in_white(sheet(30, [=](SceneBuilder& k) { return pane(k, alpha); })); },
+           // As for N35-grazing-rough.
+           grey(unmasked_at(30, alpha)), {.slack = 2e-5});
+  t.exact("N33-rough-sheet-alpha-0", "N33",
+          "A rough sheet of roughness 5e-4 is the smooth sheet, bit for bit.", [](const Bench& b) {
+            const SceneBuilder smooth = before_a_wall(sheet(0, [](SceneBuilder& k) {
+              const TextureIndex white = k.texture(rgb(1));
+              return k.bsdf(ThinDielectricBsdf{1.5, 1, white, white});
+            }));
+            return same_bits(b, before_a_wall(sheet(0, [](SceneBuilder& k) { return pane(k, 5e-4); })),
+                             smooth, 16);
+          });
+}
+
 }  // namespace
 
 void add_surfaces(Table& t) {
   microfacets(t);
   indices(t);
+  diffuse_sheets(t);
+  rough_sheets(t);
 }
 
 }  // namespace ls::cases

@@ -30,8 +30,8 @@ class MaterialTranslator {
 
   Element bsdf(Material& out) {
     if (m_.extension("KHR_materials_unlit").given()) return unlit(out);
-    if (transmission_.is(0) || metallic_.is(1)) return masked(mapped_opaque(out));
-    return masked(is_body() ? mapped(body(out), out) : sheet(out));
+    if (transmission_.is(0) || metallic_.is(1)) return masked(mapped_opaque(metallic_, out));
+    return masked(has_volume() ? mapped(body(out), out) : sheet(out));
   }
 
   std::optional<Element> light() {
@@ -77,12 +77,7 @@ class MaterialTranslator {
     seen_ior_ = factor == 1 ? ior_ : std::max((1 + std::sqrt(f0)) / (1 - std::sqrt(f0)), 1.001);
   }
 
-  // True if the glass is read as a solid body, not as a thin sheet: it has a volume, or it is rough and so
-  // blurs what is behind it, as a sheet cannot.
-  bool is_body() const {
-    const double alpha = roughness_.factor[0] * roughness_.factor[0];
-    return !roughness_.is_constant() || alpha >= kSmooth || has_volume();
-  }
+  // True if the glass is a solid body, not a thin sheet.
   bool has_volume() const { return m_.extension("KHR_materials_volume")["thicknessFactor"].number(0) > 0; }
 
   // An unlit material (KHR_materials_unlit) emits its colour and reflects nothing.
@@ -103,11 +98,13 @@ class MaterialTranslator {
     return out;
   }
 
-  Element mapped_opaque(Material& out) { return two_sided(mapped(opaque(), out), at_); }
+  Element mapped_opaque(const Source& metallic, Material& out) {
+    return two_sided(mapped(opaque(metallic), out), at_);
+  }
 
-  Element opaque() {
-    if (!roughness_.is_constant() || !coat_.is(0)) return burley(metallic_, Source{{0, 0, 0}, {}});
-    if (metallic_.is(1)) return burley(metallic_, Source{{0, 0, 0}, {}});
+  Element opaque(const Source& metallic) {
+    if (!roughness_.is_constant() || !coat_.is(0)) return burley(metallic, Source{{0, 0, 0}, {}});
+    if (metallic.is(1)) return burley(metallic, Source{{0, 0, 0}, {}});
     Element coated = made("bsdf", "roughplastic", at_);
     const double alpha = std::clamp(roughness_.factor[0], 0., 1.);
     add(coated, "string", "distribution", "ggx", at_);
@@ -116,12 +113,8 @@ class MaterialTranslator {
     add(coated, "ext_ior", 1., at_);
     give(coated, "diffuse_reflectance", base_, at_);
     add(coated, "boolean", "multiple_scattering", "true", at_);
-    if (metallic_.is(0)) return coated;
-    Element blend = made("bsdf", "blendbsdf", at_);
-    give(blend, "weight", metallic_, at_);
-    add(blend, std::move(coated));
-    add(blend, burley(Source{}, Source{{0, 0, 0}, {}}));
-    return blend;
+    if (metallic.is(0)) return coated;
+    return blend(metallic, std::move(coated), burley(Source{}, Source{{0, 0, 0}, {}}));
   }
 
   Element burley(const Source& metallic, const Source& transmission) {
@@ -149,13 +142,7 @@ class MaterialTranslator {
 
   // A solid body of glass, with the medium inside of it.
   Element body(Material& out) {
-    if (has_volume())
-      out.interior = interior();
-    else
-      t_.warn_once(
-          m_.extension("KHR_materials_transmission"),
-          "a rough thin surface (one without KHR_materials_volume) is read as the boundary of a body: "
-          "light is bent there, and what is behind its front is seen 1 / ior^2 as bright");
+    out.interior = interior();
     const bool plain =
         transmission_.is(1) && metallic_.is(0) && roughness_.is_constant() && base_.is_constant();
     if (!plain) return burley(metallic_, transmission_);
@@ -199,18 +186,48 @@ class MaterialTranslator {
     return id;
   }
 
-  // A smooth transmitting surface without a volume is a thin sheet: light passes straight through.
+  // A transmitting surface without a volume is a thin sheet. What is metal does not transmit.
   Element sheet(Material& out) {
-    Element glass = made("bsdf", "thindielectric", at_);
+    if (!coat_.is(0) && transmission_.is(1))
+      t_.warn_once(m_.extension("KHR_materials_clearcoat"), "a clear coat has no effect on a sheet of glass");
+    Element clear = sheet_of_glass(out);
+    const Source none{{0, 0, 0}, {}};
+    if (!transmission_.is(1)) clear = blend(transmission_, mapped_opaque(none, out), std::move(clear));
+    if (metallic_.is(0)) return clear;
+    return blend(metallic_, std::move(clear), mapped_opaque(Source{}, out));
+  }
+
+  Element blend(const Source& weight, Element first, Element second) {
+    Element out = made("bsdf", "blendbsdf", at_);
+    give(out, "weight", weight, at_);
+    add(out, std::move(first));
+    add(out, std::move(second));
+    return out;
+  }
+
+  Element sheet_of_glass(Material& out) {
+    const double alpha = roughness_.factor[0] * roughness_.factor[0];
+    const bool smooth = roughness_.is_constant() && alpha < kSmooth;
+    Element glass = made("bsdf", smooth ? "thindielectric" : "roughthindielectric", at_);
     add(glass, "int_ior", ior_, at_);
     add(glass, "ext_ior", 1., at_);
     give(glass, "specular_transmittance", base_, at_);
-    if (transmission_.is(1) && metallic_.is(0)) return glass;
-    Element blend = made("bsdf", "blendbsdf", at_);
-    give(blend, "weight", transmission_, at_);
-    add(blend, mapped_opaque(out));
-    add(blend, std::move(glass));
-    return blend;
+    if (smooth) return glass;
+    add(glass, "string", "distribution", "ggx", at_);
+    if (roughness_.is_constant()) {
+      add(glass, "alpha", std::min(alpha, 1.), at_);
+      add(glass, "boolean", "multiple_scattering", "true", at_);
+    } else {
+      give(glass, "alpha", squared(roughness_), at_);
+    }
+    return mapped(std::move(glass), out);
+  }
+
+  static Source squared(Source s) {
+    for (double& x : s.factor) x *= x;
+    const std::vector<Element> images = s.images;
+    s.images.insert(s.images.end(), images.begin(), images.end());
+    return s;
   }
 
   Element mapped(Element inner, Material& out) {

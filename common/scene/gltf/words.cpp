@@ -86,9 +86,8 @@ constexpr Row kExtensions[] = {
      "textures "
      "have no effect, which is a warning"},
     {"", "KHR_materials_transmission", kRead,
-     "with a volume a body of glass; a smooth surface without one is a sheet, `thindielectric`, and a rough "
-     "one is "
-     "read as the boundary of a body, with a warning"},
+     "with a volume a body of glass; without one a sheet, `thindielectric`, or `roughthindielectric` where "
+     "it is rough"},
     {"", "KHR_materials_unlit", kRead, "the base colour shines, and nothing is reflected"},
     {"", "KHR_materials_variants", kIgnored, "the material that a primitive names itself is taken"},
     {"", "KHR_materials_volume", kRead,

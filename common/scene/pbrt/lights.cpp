@@ -26,6 +26,7 @@ class LightTranslator {
     if (type == "spot") return spot();
     if (type == "distant") return distant();
     if (type == "projection") return projection();
+    if (type == "goniometric") return goniometric();
     return p_.has("filename") || p_.has("mapname") ? image() : constant();
   }
 
@@ -79,6 +80,23 @@ class LightTranslator {
     const Vec3 way = transform_vector(ctm_.to, Vec3{{to[0] - from[0], to[1] - from[1], to[2] - from[2]}});
     add(out, "vector", "direction", text_of(way), p_.at());
     add(out, "irradiance", times(colour("L"), p_.number("illuminance", 1)), p_.at());
+    return out;
+  }
+
+  Element goniometric() {
+    Element out = made("emitter", "goniometric", p_.at());
+    // pbrt's image has the y axis of the light in its middle.
+    const Transform axes{{1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 1}};
+    place(out, multiply(ctm_.to, axes), p_.at());
+    add(out, "intensity", colour("I"), p_.at());
+    const std::string file = p_.text("filename", "");
+    if (file.empty()) p_.missing("filename");
+    Element image = made("texture", "bitmap", p_.at());
+    set(image, "name", "texture", p_.at());
+    add(image, "string", "filename", file, p_.at());
+    add(image, "string", "filter_type", "nearest", p_.at());
+    add(image, "string", "wrap_mode", "clamp", p_.at());
+    add(out, std::move(image));
     return out;
   }
 

@@ -37,6 +37,7 @@ class MaterialTranslator {
     if (type == "mix") return mix(m);
     m.transmits = true;
     if (type == "dielectric") return shaped(dielectric());
+    if (type == "diffusetransmission") return shaped(diffuse_transmission());
     if (type == "thindielectric") return shaped(with_eta(made("bsdf", "thindielectric", p_.at())));
     m.null = true;
     return made("bsdf", "null", p_.at());
@@ -49,6 +50,14 @@ class MaterialTranslator {
     add_value(t_, out, p_, {old ? "Kd" : "reflectance", "reflectance"}, {.5, .5, .5});
     if (old && p_.number("sigma", 0) != 0)
       t_.report.warning(p_.at(), "'sigma' of Material \"matte\" is read as 0: an ideally rough surface");
+    return out;
+  }
+
+  Element diffuse_transmission() {
+    Element out = made("bsdf", "diffusetransmission", p_.at());
+    const double scale = p_.number("scale", 1);
+    for (const std::string_view name : {"reflectance", "transmittance"})
+      add_scaled_value(t_, out, p_, name, {.25, .25, .25}, scale);
     return out;
   }
 

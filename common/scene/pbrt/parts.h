@@ -84,6 +84,9 @@ struct Names {
 };
 // Adds the parameter to `parent`, as a value or as a reference to a texture.
 void add_value(Translation& t, Element& parent, Params& p, Names names, const Rgb& fallback);
+// The same, multiplied by `scale`; the name is the same in both languages.
+void add_scaled_value(Translation& t, Element& parent, Params& p, std::string_view name, const Rgb& fallback,
+                      double scale);
 void refer(Element& parent, std::string_view name, std::string id, const Span& at);
 void place(Element& parent, const Transform& to_world, const Span& at);
 

@@ -133,4 +133,20 @@ void add_value(Translation& t, Element& parent, Params& p, Names names, const Rg
   if (const auto texture = texture_of(t, *given)) give(parent, names.ours, *texture, given->at);
 }
 
+void add_scaled_value(Translation& t, Element& parent, Params& p, std::string_view name, const Rgb& fallback,
+                      double scale) {
+  const Param* given = p.take(name);
+  auto texture = given ? texture_of(t, *given) : Texture{fallback, {}};
+  if (!texture) return;
+  const Span at = given ? given->at : p.at();
+  if (texture->value)
+    for (double& x : *texture->value) x *= scale;
+  if (texture->value || scale == 1) return give(parent, name, *texture, at);
+  Element product = made("texture", "product", at);
+  set(product, "name", std::string(name), at);
+  add(product, "first", scale, at);
+  give(product, "second", *texture, at);
+  add(parent, std::move(product));
+}
+
 }  // namespace ls::scene::pbrt

@@ -266,7 +266,12 @@ void add_materials(std::vector<Row>& r) {
                      {"amount", kNumber, "0.5", "share of the second"}}});
   for (const auto type : {"interface", "none", ""})
     r.push_back({"Material", type, true, "`null`: only the boundary of a medium", {}});
-  r.push_back({"Material", "diffusetransmission", false, "light through leaves is not known here", {}});
+  r.push_back({"Material", "diffusetransmission", true,
+               "`diffusetransmission`; reflectance and transmittance may sum up to 1",
+               Words{{"reflectance", kTextured, "0.25", "colour of the light sent back"},
+                     {"transmittance", kTextured, "0.25", "colour of the light that passes"},
+                     {"scale", "float", "1", "factor on both"}} +
+                   material_words()});
   r.push_back({"Material", "coatedconductor", false, "write it as \"conductor\" without the coat", {}});
   r.push_back({"Material", "subsurface", false, "write a \"dielectric\" with a medium inside", {}});
   for (const auto type : {"hair", "measured"})
@@ -340,7 +345,11 @@ void add_lights(std::vector<Row>& r) {
                      {"fov", "float", "90", "degrees, along the shorter side of the image"},
                      {"scale", "float", "1", "factor"},
                      {"power", "float", "", "it depends on the image's pixels: give scale", kRefused}}});
-  r.push_back({"LightSource", "goniometric", false, "lights by measured tables are not known here", {}});
+  r.push_back({"LightSource", "goniometric", true,
+               "a `goniometric`; a coloured image keeps its colours, of which pbrt takes the mean",
+               light_words("I") +
+                   Words{{"filename", "string", "needed", "a square image in pbrt-v4's equal-area form"},
+                         {"power", "float", "", "give I: what it means depends on the image", kRefused}}});
   for (const auto type : {"diffuse", "area"})
     r.push_back(
         {"AreaLightSource", type, true, "an `area` in each shape that follows",

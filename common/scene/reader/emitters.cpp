@@ -101,6 +101,22 @@ void Reader::read_emitter_as<SpotEmitter>(const Element& e) {
   scene_.emitters.emplace_back(emitter);
 }
 
+template <>
+void Reader::read_emitter_as<GoniometricEmitter>(const Element& e) {
+  Params p(*this, e);
+  GoniometricEmitter emitter;
+  if (!p.has("texture"))
+    report_.error(e.at, "emitter \"goniometric\" needs 'texture': the image of its directions");
+  bind(p, emitter);
+  refuse_attributes(e, emitter.texture, "texture");
+  p.finish();
+  if (!invertible(emitter.to_world) || !is_similarity(emitter.to_world))
+    report_.error(e.at,
+                  "to_world of a goniometric light may move, turn and mirror it, not stretch or "
+                  "flatten it");
+  scene_.emitters.emplace_back(emitter);
+}
+
 void Reader::read_emitter(const Element& e) {
   const std::string_view type = e.get("type");
   if (type == "area") return report_.error(e.at, "an emitter \"area\" stands in the shape that shines");

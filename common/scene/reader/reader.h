@@ -85,6 +85,8 @@ class Reader {
   TextureIndex old_number(const Element& e, TextureIndex t);
   void check_multiple_scattering(const Element& e, TextureIndex alpha_u, TextureIndex alpha_v);
   bool read_heights(Params& p, BumpMapBsdf& b);
+  void check_sum(const Element& e, const DiffuseTransmissionBsdf& b);
+  std::optional<BsdfIndex> read_difftrans(const Element& e);
   std::optional<std::vector<BsdfIndex>> read_inner_bsdfs(Params& p, std::size_t at_least,
                                                          std::size_t at_most);
   std::optional<BsdfIndex> add_bsdf(const Element& e, const Bsdf& bsdf);

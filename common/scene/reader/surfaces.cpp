@@ -100,7 +100,7 @@ std::optional<BsdfIndex> Reader::add_bsdf(const Element& e, const Bsdf& bsdf) {
 const BsdfTraits& Reader::traits(BsdfIndex bsdf) {
   // A bsdf's inner bsdfs precede it in the list.
   for (std::size_t i = bsdf_traits_.size(); i < scene_.bsdfs.size(); ++i)
-    bsdf_traits_.push_back(traits_of(scene_.bsdfs[i], bsdf_traits_));
+    bsdf_traits_.push_back(traits_of(scene_.bsdfs[i], bsdf_traits_, scene_.textures));
   return bsdf_traits_[bsdf.value];
 }
 
@@ -154,6 +154,57 @@ std::optional<BsdfIndex> Reader::read_bsdf_as<RoughDielectricBsdf>(const Element
   RoughDielectricBsdf b;
   bind_rough(p, b);
   p.finish();
+  return add_bsdf(e, b);
+}
+
+template <>
+std::optional<BsdfIndex> Reader::read_bsdf_as<RoughThinDielectricBsdf>(const Element& e) {
+  Params p(*this, e);
+  RoughThinDielectricBsdf b;
+  bind_rough(p, b);
+  p.finish();
+  return add_bsdf(e, b);
+}
+
+// Checks that a sheet sends back no more light than it gets, as far as its two colours are constant.
+void Reader::check_sum(const Element& e, const DiffuseTransmissionBsdf& b) {
+  // Two shares that are written with six digits sum up to 1.000001 at most, and to a bit more in binary.
+  constexpr double kMost = 1 + 1.5e-6;
+  const auto constant = [&](TextureIndex t) {
+    return t.value < scene_.textures.size() ? std::get_if<ConstantTexture>(&scene_.textures[t.value])
+                                            : nullptr;  // nullptr: already reported
+  };
+  const auto *back = constant(b.reflectance), *through = constant(b.transmittance);
+  if (!back || !through) return;
+  double most = 0;
+  for (std::size_t i = 0; i < 3; ++i) most = std::max(most, back->value[i] + through->value[i]);
+  if (most > kMost)
+    report_.error(e.at, fmt::format("reflectance and transmittance of bsdf \"{}\" sum up to {:.9g}: a "
+                                    "surface sends on at most 1, all of its light, so lower one of them",
+                                    e.get("type"), most));
+}
+
+template <>
+std::optional<BsdfIndex> Reader::read_bsdf_as<DiffuseTransmissionBsdf>(const Element& e) {
+  Params p(*this, e);
+  DiffuseTransmissionBsdf b;
+  bind(p, b);
+  p.finish();
+  check_sum(e, b);
+  return add_bsdf(e, b);
+}
+
+// Reads Mitsuba 0.6's `difftrans`, which reflects nothing.
+std::optional<BsdfIndex> Reader::read_difftrans(const Element& e) {
+  Params p(*this, e);
+  DiffuseTransmissionBsdf b;
+  const Field field{.name = "transmittance", .doc = "", .range = kUnit, .fallback = {.5, .5, .5}};
+  if (const Element* given = p.take(field.name))
+    p.convert(field, *given, b.transmittance);
+  else
+    p.absent(field, b.transmittance);
+  p.finish();
+  b.reflectance = add_constant_texture({0, 0, 0});
   return add_bsdf(e, b);
 }
 
@@ -348,6 +399,7 @@ std::optional<BsdfIndex> Reader::read_bsdf_as<PrincipledBsdf>(const Element& e) 
 }
 
 std::optional<BsdfIndex> Reader::read_bsdf(const Element& e) {
+  if (e.get("type") == "difftrans") return read_difftrans(e);
   std::optional<BsdfIndex> read;
   if (!with_kind_named<Bsdf>(e.get("type"), [&]<class Kind>() { read = read_bsdf_as<Kind>(e); }))
     unknown_plugin(e, report_);

@@ -14,6 +14,7 @@ namespace {
 
 constexpr Renamed kRenamed[] = {
     {"bsdf", "diffuse", "diffuseReflectance", "reflectance"},
+    {"bsdf", "difftrans", "diffuseTransmittance", "transmittance"},
     {"medium", "heterogeneous", "density", "sigma_t"},
 };
 

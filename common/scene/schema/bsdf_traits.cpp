@@ -28,7 +28,20 @@ std::array<std::optional<BsdfIndex>, 2> nested_bsdfs(const Bsdf& bsdf) {
                     bsdf);
 }
 
-BsdfTraits traits_of(const Bsdf& bsdf, const std::vector<BsdfTraits>& known) {
+namespace {
+
+// True if the number that `t` gives may be at most kStraightAlpha at some point. A colour counts as a mean of
+// its channels.
+bool may_be_straight(TextureIndex t, const std::vector<Texture>& textures) {
+  if (t.value >= textures.size()) return true;
+  const auto* constant = std::get_if<ConstantTexture>(&textures[t.value]);
+  return !constant || std::ranges::any_of(constant->value, [](double x) { return x <= kStraightAlpha; });
+}
+
+}  // namespace
+
+BsdfTraits traits_of(const Bsdf& bsdf, const std::vector<BsdfTraits>& known,
+                     const std::vector<Texture>& textures) {
   BsdfTraits t;
   for (const auto& inner : nested_bsdfs(bsdf)) {
     if (!inner || inner->value >= known.size()) continue;
@@ -41,8 +54,12 @@ BsdfTraits traits_of(const Bsdf& bsdf, const std::vector<BsdfTraits>& known) {
   t.two_sided = std::holds_alternative<TwoSidedBsdf>(bsdf);
   t.passes = t.passes || std::holds_alternative<NullBsdf>(bsdf) || std::holds_alternative<MaskBsdf>(bsdf) ||
              std::holds_alternative<ThinDielectricBsdf>(bsdf);
+  const auto* sheet = std::get_if<RoughThinDielectricBsdf>(&bsdf);
+  t.passes = t.passes || (sheet && may_be_straight(sheet->alpha_u, textures) &&
+                          may_be_straight(sheet->alpha_v, textures));
   const auto* principled = std::get_if<PrincipledBsdf>(&bsdf);
-  t.transmits = t.transmits || t.passes || (principled && principled->spec_trans) ||
+  t.transmits = t.transmits || t.passes || sheet || (principled && principled->spec_trans) ||
+                std::holds_alternative<DiffuseTransmissionBsdf>(bsdf) ||
                 std::holds_alternative<DielectricBsdf>(bsdf) ||
                 std::holds_alternative<RoughDielectricBsdf>(bsdf);
   t.black_behind = t.black_behind && !t.transmits && !t.two_sided;
@@ -59,7 +76,7 @@ std::optional<std::vector<BsdfTraits>> bsdf_traits(const Scene& scene) {
   for (int round = 0; round <= kMaxBsdfNesting; ++round) {
     bool changed = false;
     for (std::size_t i = 0; i < traits.size(); ++i) {
-      const BsdfTraits t = traits_of(scene.bsdfs[i], traits);
+      const BsdfTraits t = traits_of(scene.bsdfs[i], traits, scene.textures);
       if (t.depth > kMaxBsdfNesting) return std::nullopt;
       changed |= !(t == traits[i]);
       traits[i] = t;

@@ -23,9 +23,14 @@ struct BsdfTraits {
 // Returns the bsdfs that `bsdf` contains directly.
 std::array<std::optional<BsdfIndex>, 2> nested_bsdfs(const Bsdf& bsdf);
 
+// Where both roughnesses of a rough thin sheet are below this, light passes straight through it. The renderer
+// uses a value that is not larger.
+inline constexpr double kStraightAlpha = 1e-3;
+
 // Returns the traits of `bsdf`. `known` contains the traits of other bsdfs of the scene, at least of those
-// that `bsdf` contains.
-BsdfTraits traits_of(const Bsdf& bsdf, const std::vector<BsdfTraits>& known);
+// that `bsdf` contains, and `textures` the scene's textures.
+BsdfTraits traits_of(const Bsdf& bsdf, const std::vector<BsdfTraits>& known,
+                     const std::vector<Texture>& textures);
 
 // Returns the traits of every bsdf. nullopt: a bsdf refers to one that does not exist, or bsdfs contain each
 // other in a cycle or more than kMaxBsdfNesting deep.

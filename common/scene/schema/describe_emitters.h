@@ -128,4 +128,22 @@ void describe(V& v, T& e) {
       e.as_intensity);
 }
 
+LS_TYPE(GoniometricEmitter, "emitter", "goniometric", "",
+        "light from a point, the origin of `to_world`, with an intensity by direction as of a measured lamp: "
+        "`texture` is a square image of all directions in the equal-area octahedral form of Clarberg (2008) "
+        "and pbrt-v4. Before `to_world` its middle is +z and its corners are -z; right is +x and down +y. "
+        "Its filter is best `nearest`: others blend what lies on different sides of the square's edge")
+template <class V, Of<GoniometricEmitter> T>
+void describe(V& v, T& e) {
+  v.field({.name = "to_world", .doc = "places, turns and mirrors the light; scaling it has no effect"},
+          e.to_world);
+  v.field({.name = "intensity",
+           .doc = "radiant intensity where the image is 1",
+           .unit = "W/sr",
+           .range = kNonNegative},
+          e.intensity);
+  v.field({.name = "texture", .doc = "the image, which multiplies the intensity", .range = kNonNegative},
+          e.texture);
+}
+
 }  // namespace ls::scene

@@ -23,6 +23,23 @@ void describe(V& v, T& b) {
       b.reflectance);
 }
 
+LS_TYPE(DiffuseTransmissionBsdf, "bsdf", "diffusetransmission", "",
+        "an ideally rough thin sheet, such as a leaf, paper or cloth: light leaves it on both sides")
+template <class V, Of<DiffuseTransmissionBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "reflectance",
+           .doc = "share of light sent back; with the transmittance at most 1. Where images exceed that, "
+                  "both are divided by the sum",
+           .range = kUnit,
+           .fallback = {.25, .25, .25}},
+          b.reflectance);
+  v.field({.name = "transmittance",
+           .doc = "share of light that leaves on the other side",
+           .range = kUnit,
+           .fallback = {.25, .25, .25}},
+          b.transmittance);
+}
+
 LS_TYPE(ConductorBsdf, "bsdf", "conductor", "", "smooth metal")
 template <class V, Of<ConductorBsdf> T>
 void describe(V& v, T& b) {
@@ -115,6 +132,36 @@ void describe(V& v, T& b) {
           b.specular_reflectance);
   v.field({.name = "specular_transmittance", .doc = "factor on what passes", .range = kUnit},
           b.specular_transmittance);
+}
+
+LS_TYPE(RoughThinDielectricBsdf, "bsdf", "roughthindielectric", "",
+        "a sheet of glass with rough sides as one surface, reflections within the sheet included: light that "
+        "passes leaves in the directions of reflected light, mirrored at the sheet. `alpha` sets both "
+        "alpha_u and alpha_v. Where both are below a thousandth it is a `thindielectric`")
+template <class V, Of<RoughThinDielectricBsdf> T>
+void describe(V& v, T& b) {
+  v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
+  v.field({.name = "alpha_u",
+           .doc = "roughness along u",
+           .range = kPositive,
+           .fallback = {.1, .1, .1},
+           .number = true},
+          b.alpha_u);
+  v.field({.name = "alpha_v",
+           .doc = "roughness along v",
+           .range = kPositive,
+           .fallback = {.1, .1, .1},
+           .number = true},
+          b.alpha_v);
+  v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
+          b.int_ior);
+  v.field({.name = "ext_ior", .doc = "index of refraction around", .range = kPositive, .named_ior = true},
+          b.ext_ior);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+  v.field({.name = "specular_transmittance", .doc = "factor on what passes", .range = kUnit},
+          b.specular_transmittance);
+  describe_multiple_scattering(v, b);
 }
 
 LS_TYPE(PlasticBsdf, "bsdf", "plastic", "", "diffuse base under a smooth dielectric coat")

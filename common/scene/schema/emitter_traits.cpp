@@ -29,6 +29,10 @@ struct TraitsOfEmitter {
   EmitterTraits operator()(const ProjectorEmitter& e) const {
     return {.dark = e.scale == 0 || black(e.irradiance), .delta = true, .position = origin_of(e.to_world)};
   }
+  EmitterTraits operator()(const GoniometricEmitter& e) const {
+    return {
+        .dark = all_zero(e.intensity) || black(e.texture), .delta = true, .position = origin_of(e.to_world)};
+  }
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Surfaces give back no more than they get, and light goes both ways alike.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -135,6 +136,16 @@ Scene random_plastic(Dice& d) {
   const double n = 1.05 + d.uniform(), a = d.alpha();
   return rough_plastic(d.facets(), a, n, 1, d.uniform() < .5, d.rgb(), d.rgb());
 }
+Scene random_leaf(Dice& d) {
+  const Rgb back = d.rgb();
+  const double rest = 1 - std::max({back[0], back[1], back[2]});
+  const Rgb through = d.rgb();
+  return leaf(back, {rest * through[0], rest * through[1], rest * through[2]});
+}
+Scene random_sheet(Dice& d) {
+  const double a = d.alpha(), b = d.uniform() < .5 ? a : d.alpha(), n = d.ior();
+  return rough_sheet(d.facets(), a, b, n, d.rgb(), d.rgb());
+}
 // Beckmann's masking is a fit that exceeds the exact one by up to .35 % (see microfacet.h).
 constexpr double kFit = .0035;
 const Kind kKinds[] = {
@@ -143,6 +154,8 @@ const Kind kKinds[] = {
     {"glass", random_glass, true, kFit},
     {"smooth glass", [](Dice& d) { return glass(d.ior(), 1); }, true, 0},
     {"thin glass", [](Dice& d) { return thin_glass(d.ior(), d.rgb(), d.rgb()); }, true, 0},
+    {"leaf", random_leaf, true, 0},
+    {"sheet", random_sheet, true, kFit},
     // Coat and base are coupled by the dialect's tables, whose internal reflectance is a plain mean (see
     // rough_plastic_table.h): a base may give back up to 1.5 % more than the coat lets in.
     {"plastic", random_plastic, false, .015},

@@ -97,6 +97,18 @@ inline Scene thin_glass(double ior, const Rgb& reflectance = {1, 1, 1},
   add(s, ThinDielectricBsdf{ior, 1, texture(s, reflectance), texture(s, transmittance)});
   return s;
 }
+inline Scene leaf(const Rgb& reflectance, const Rgb& transmittance) {
+  Scene s;
+  add(s, DiffuseTransmissionBsdf{texture(s, reflectance), texture(s, transmittance)});
+  return s;
+}
+inline Scene rough_sheet(Microfacet d, double au, double av, double ior, const Rgb& reflectance = {1, 1, 1},
+                         const Rgb& transmittance = {1, 1, 1}) {
+  Scene s;
+  add(s, RoughThinDielectricBsdf{d, texture(s, au), texture(s, av), ior, 1, texture(s, reflectance),
+                                 texture(s, transmittance)});
+  return s;
+}
 // Burley's, by the dialect's parameters.
 struct PrincipledValues {
   double roughness = .5, anisotropic = 0, metallic = 0, spec_trans = 0, eta = 1.5, spec_tint = 0, sheen = 0,

@@ -13,7 +13,7 @@
 namespace ls::render::test {
 namespace {
 
-constexpr int kMaterials = 42;
+constexpr int kMaterials = 50;
 const double kViewCosines[] = {.98, .5, .1};
 const double kViewCosinesFromBehind[] = {-.95, -.6, -.2};
 
@@ -49,6 +49,15 @@ void add_more(std::vector<Named>& all) {
   one_sided("diffuse and metal",
             blend(diffuse({.2, .6, .4}),
                   rough_metal(Microfacet::beckmann, .3, .3, {1.5, 1.5, 1.5}, {0, 0, 0}), .4));
+  wide("leaf", leaf({.2, .5, .1}, {.3, .4, .9}));
+  wide("leaf that only transmits", leaf({0, 0, 0}, {.5, .5, .5}));
+  for (const auto& [d, name] :
+       {std::pair{Microfacet::beckmann, "beckmann"}, std::pair{Microfacet::ggx, "ggx"}}) {
+    for (const double a : {.1, .5})
+      wide(fmt::format("rough sheet {} {}", name, a), rough_sheet(d, a, a, 1.5, {.9, .8, .7}, {.5, .6, .7}));
+  }
+  wide("rough sheet .4 x .1", rough_sheet(Microfacet::ggx, .4, .1, 1.33));
+  wide("rough sheet that scatters often", with_compensation(rough_sheet(Microfacet::ggx, .6, .6, 1.5)));
   wide("glass under a normal map",
        turned(rough_glass(Microfacet::beckmann, .3, .3, 1.5, 1), direction(.95, 1)));
 }
@@ -177,6 +186,14 @@ TEST(Sampling, StretchesTheSquareByOneOverTheDensity) {
     const V3 wo = direction(mu, .7);
     const auto paper = bench(diffuse({.5, .5, .5}));
     ls::test::expect_jacobian(fmt::format("diffuse at {}", mu), lobe(*paper, wo, .5f, always));
+    const auto green = bench(leaf({.25, .25, .25}, {.75, .75, .75}));
+    for (const bool out : {true, false}) {
+      const V3 o(wo.x, wo.y, out ? wo.z : -wo.z);
+      const auto chance = [=](const V3& wi) { return wi.z * o.z > 0 ? .25 : .75; };
+      ls::test::expect_jacobian(fmt::format("reflected by a leaf at {}", o.z), lobe(*green, o, 0, chance));
+      ls::test::expect_jacobian(fmt::format("transmitted by a leaf at {}", o.z),
+                                lobe(*green, o, 1 - 0x1p-24f, chance));
+    }
     for (const auto& [d, name] :
          {std::pair{Microfacet::beckmann, "beckmann"}, std::pair{Microfacet::ggx, "ggx"}}) {
       for (const double a : {.1, .3, 1.}) {
@@ -200,6 +217,20 @@ TEST(Sampling, StretchesTheSquareByOneOverTheDensity) {
         if (out)  // from inside most facets of grazing light reflect all of it
           ls::test::expect_jacobian(fmt::format("refracted by glass {} at {}", name, o.z),
                                     lobe(*window, o, 1 - 0x1p-24f, fresnel));
+      }
+      const auto pane = bench(rough_sheet(d, .3, .3, 1.5));
+      for (const bool out : {true, false}) {
+        const V3 o(wo.x, wo.y, out ? wo.z : -wo.z);
+        const auto both_sides = [=](const V3& wi) {
+          const bool reflected = wi.z * o.z > 0;
+          const V3 h = normalize(o + V3(wi.x, wi.y, reflected ? wi.z : -wi.z));
+          const double r = fresnel_dielectric(std::abs(dot(o, h)), 1.5).reflectance, R = 2 * r / (1 + r);
+          return reflected ? R : 1 - R;
+        };
+        ls::test::expect_jacobian(fmt::format("reflected by a rough sheet {} at {}", name, o.z),
+                                  lobe(*pane, o, 0, both_sides));
+        ls::test::expect_jacobian(fmt::format("transmitted by a rough sheet {} at {}", name, o.z),
+                                  lobe(*pane, o, 1 - 0x1p-24f, both_sides));
       }
     }
   }

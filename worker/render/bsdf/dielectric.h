@@ -10,6 +10,14 @@
 //   density of a refracted wi: (1 - F) D V dot(wo, m) eta^2 |dot(wi, m)| / q^2
 //   value f |cos wi|:          (1 - F) D G dot(wo, m) |dot(wi, m)| / (cos wo q^2)
 // where 1 / eta^2, for radiance, cancels the eta^2 of the value.
+//
+// A rough sheet has the lobe of a rough mirror on both sides: transmitted light leaves in the directions of
+// reflected light, mirrored at the sheet, as in Burley 2015 ("Extending the Disney BRDF to a BSDF with
+// Integrated Subsurface Scattering") and KHR_materials_transmission of glTF. A facet reflects the share R of
+// a sheet, all reflections between its two sides included, and lets 1 - R through. Both sides have the same
+// index, so radiance has no factor. With wi' the direction wi, mirrored to the side of wo, and m = wo + wi',
+// normalised:
+//   value f |cos wi|:          (R or 1 - R) D G / (4 cos wo),       density (R or 1 - R) D pdf_over_D(wo)
 #pragma once
 
 #include "worker/render/bsdf/material_builder.h"
@@ -152,6 +160,63 @@ struct RoughDielectric : Dielectric {
   };
 };
 
+// A thin sheet with rough sides. Where it is not rough it is a ThinDielectric, and light passes straight on.
+struct RoughThinDielectric : ThinDielectric {
+  static constexpr bool kSmooth = true;
+  Roughness roughness;
+  const MicrofacetEnergy* energy = nullptr;  // of a rough mirror; only with multiple_scattering
+
+  bool reads_uv() const { return any_texture(reflectance, transmittance, roughness.u, roughness.v); }
+  bool anisotropic() const { return !roughness.same_along_both(); }
+
+  BsdfEval eval(const Lookup& look, const V3& wo, const V3& wi) const {
+    const auto rough = look.roughness(roughness);
+    if (rough.mirror || wo.z == 0 || wi.z == 0) return {};
+    const V3 o = above(wo), in = above(wi), m = normalize(o + in);
+    const Lobe lobe = lobe_at(look, dot(o, m), (wo.z > 0) == (wi.z > 0));
+    const float D = rough.facets.D(m);
+    const float G = rough.facets.G1_over_cos(o) * rough.facets.G1_over_cos(in) * in.z;
+    BsdfEval e{lobe.tint * (lobe.share * .25f * D * G), lobe.share * D * rough.facets.pdf_over_D(o)};
+    if (energy) e.f_cos *= energy->factor(o.z, true);
+    return e;
+  }
+  std::optional<BsdfSample> sample(const Lookup& look, const V3& wo, float u_lobe, const V2& u) const {
+    if (wo.z == 0) return std::nullopt;
+    const auto rough = look.roughness(roughness);
+    if (rough.mirror) return ThinDielectric::sample(look, wo, u_lobe, u);
+    const V3 o = above(wo), m = rough.facets.sample_normal(o, u);
+    const float cos = dot(o, m);
+    const bool reflected = u_lobe < sheet_reflectance(cos);
+    const Lobe lobe = lobe_at(look, cos, reflected);
+    const float pdf_over_D = rough.facets.pdf_over_D(o);
+    BsdfSample s;
+    s.wi = normalize(reflect(o, m));
+    s.pdf = lobe.share * rough.facets.D(m) * pdf_over_D;
+    if (!(s.wi.z > 0) || !(s.pdf > 0)) return std::nullopt;
+    const float ratio = .25f * rough.facets.G1_over_cos(o) / pdf_over_D;
+    s.weight = lobe.tint * (rough.facets.G1_over_cos(s.wi) * s.wi.z * ratio);
+    if (energy) s.weight *= energy->factor(o.z, true);
+    if ((wo.z > 0) != reflected) s.wi.z = -s.wi.z;
+    s.transmitted = !reflected;
+    return s;
+  }
+  NullTransmission null_transmission(const Lookup& look, const V3& w) const {
+    return look.roughness(roughness).mirror ? ThinDielectric::null_transmission(look, w) : NullTransmission{};
+  }
+
+ private:
+  static V3 above(const V3& w) { return {w.x, w.y, std::abs(w.z)}; }
+  struct Lobe {
+    float share;  // of the light at a facet seen at the cosine `cos`
+    C3 tint;
+  };
+  Lobe lobe_at(const Lookup& look, float cos, bool reflected) const {
+    const float R = sheet_reflectance(cos);
+    return {reflected ? R : 1 - R, look.reflectance(reflected ? reflectance : transmittance)};
+  }
+};
+static_assert(kSpecularAlpha <= static_cast<float>(scene::kStraightAlpha));
+
 // An index-matched boundary: light passes unchanged.
 struct NullBoundary : MaterialKind {
   static constexpr bool kFrontOnly = false;
@@ -167,7 +232,7 @@ struct NullBoundary : MaterialKind {
   static NullTransmission null_transmission(const Lookup&, const V3&) { return {C3(1), 1}; }
 };
 
-using DielectricKinds = Kinds<Dielectric, ThinDielectric, RoughDielectric, NullBoundary>;
+using DielectricKinds = Kinds<Dielectric, ThinDielectric, RoughDielectric, NullBoundary, RoughThinDielectric>;
 
 template <class Description>
 void set_dielectric(DielectricKind& m, const Description& b, MaterialBuilder& builder) {
@@ -199,6 +264,16 @@ inline std::variant<Dielectric, RoughDielectric> make_material(const RoughDielec
   if (b.multiple_scattering)
     m.energy = builder.energy(MaterialBuilder::EnergyOf::dielectric, m.roughness,
                               builder.index(b.int_ior, b.ext_ior));
+  return m;
+}
+inline std::variant<ThinDielectric, RoughThinDielectric> make_material(const RoughThinDielectricBsdf& b,
+                                                                       MaterialBuilder& builder) {
+  RoughThinDielectric m;
+  set_dielectric(m, b, builder);
+  m.roughness = builder.roughness(b.distribution, b.alpha_u, b.alpha_v);
+  if (m.roughness.always_mirror()) return static_cast<const ThinDielectric&>(m);
+  // Whether light is reflected or passes, the same share of it is masked.
+  if (b.multiple_scattering) m.energy = builder.energy(MaterialBuilder::EnergyOf::conductor, m.roughness, 1);
   return m;
 }
 inline NullBoundary make_material(const NullBsdf&, MaterialBuilder&) { return {}; }

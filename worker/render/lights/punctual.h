@@ -3,6 +3,7 @@
 
 #include "worker/render/camera/fov.h"
 #include "worker/render/lights/light_kind.h"
+#include "worker/render/math/equal_area.h"
 
 namespace ls::render {
 
@@ -114,7 +115,24 @@ struct ProjectorLight : Punctual<ProjectorLight> {
   }
 };
 
-using PunctualKinds = Kinds<PointLight, SpotLight, ProjectorLight>;
+struct GoniometricLight : Punctual<GoniometricLight> {
+  C3 intensity;
+  V3 axis_u, axis_v, axis;
+  TextureIndex image;
+
+  // Equal areas of the image are equal solid angles.
+  C3 mean_intensity(const LightWorld& world) const { return intensity * world.textures.mean(image); }
+
+  bool dark(const LightWorld& world) const { return is_black(mean_intensity(world)); }
+  double power(const LightWorld& world) const { return luminance(mean_intensity(world)) * 4 * kPiD; }
+  LightBounds bounds(const LightWorld& world) const { return bounds_of(mean_intensity(world)); }
+  C3 towards(const LightWorld& world, const V3& w) const {
+    const V2 at = equal_area_place({dot(w, axis_u), dot(w, axis_v), dot(w, axis)});
+    return intensity * world.textures.eval(image, at);
+  }
+};
+
+using PunctualKinds = Kinds<PointLight, SpotLight, ProjectorLight, GoniometricLight>;
 
 inline PointLight make_light(const PointEmitter& e, const LightWorld& world) {
   PointLight l;
@@ -157,6 +175,14 @@ inline ProjectorLight make_light(const ProjectorEmitter& e, const LightWorld& wo
                tan_x = tan_half_fov_x(e.fov, e.fov_axis, aspect);
   l.tan_x = static_cast<float>(tan_x);
   l.tan_y = static_cast<float>(tan_x / aspect);
+  return l;
+}
+
+inline GoniometricLight make_light(const GoniometricEmitter& e, const LightWorld& world) {
+  GoniometricLight l;
+  set_axes(l, e.to_world, world);
+  l.intensity = color(e.intensity) * static_cast<float>(world.scale2());
+  l.image = e.texture;
   return l;
 }
 

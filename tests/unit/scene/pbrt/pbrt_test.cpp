@@ -259,6 +259,42 @@ TEST(Pbrt, SpotsAimAtTheirTarget) {
   EXPECT_NEAR(spot.to_world.m[7], 5, 1e-12);
 }
 
+TEST(Pbrt, GoniometricLightsHaveTheirYAxisInTheMiddleOfTheImage) {
+  const Scene s = pbrt(
+      "Translate 1 2 3\nLightSource \"goniometric\" \"string filename\" \"wood.png\" \"rgb I\" [ 1 2 3 ] "
+      "\"float scale\" 2 Shape \"sphere\"");
+
+  const auto& light = std::get<GoniometricEmitter>(s.emitters.at(0));
+  EXPECT_EQ(light.intensity, (Rgb{2, 4, 6}));
+  const auto& m = light.to_world.m;
+  EXPECT_EQ((Vec3{m[2], m[6], m[10]}), (Vec3{0, 1, 0})) << "where +z goes";
+  EXPECT_EQ((Vec3{m[1], m[5], m[9]}), (Vec3{0, 0, 1}));
+  EXPECT_EQ((Vec3{m[3], m[7], m[11]}), (Vec3{1, 2, 3}));
+  const auto& image = std::get<BitmapTexture>(s.textures.at(light.texture.value));
+  EXPECT_EQ(image.filter, TextureFilter::nearest);
+  EXPECT_EQ(image.wrap, Wrap::clamp);
+}
+
+TEST(Pbrt, LeavesReflectAndTransmit) {
+  const Scene s = pbrt(R"(Texture "t" "spectrum" "imagemap" "string filename" "wood.png"
+Material "diffusetransmission" Shape "sphere"
+Material "diffusetransmission" "rgb reflectance" [ 0.1 0.2 0.3 ] "rgb transmittance" [ 0.4 0.3 0.2 ] "float scale" 2 Shape "sphere"
+Material "diffusetransmission" "texture transmittance" "t" "float scale" 0.5 Shape "sphere")");
+
+  const auto leaf = [&](std::size_t shape) {
+    return std::get<DiffuseTransmissionBsdf>(s.bsdfs.at(s.shapes.at(shape).bsdf.value));
+  };
+  const auto of = [&](TextureIndex t) { return std::get<ConstantTexture>(s.textures.at(t.value)).value; };
+  EXPECT_EQ(of(leaf(0).reflectance), (Rgb{.25, .25, .25}));
+  EXPECT_EQ(of(leaf(0).transmittance), (Rgb{.25, .25, .25}));
+  EXPECT_EQ(of(leaf(1).reflectance), (Rgb{.2, .4, .6}));
+  EXPECT_EQ(of(leaf(1).transmittance), (Rgb{.8, .6, .4}));
+  EXPECT_EQ(of(leaf(2).reflectance), (Rgb{.125, .125, .125}));
+  const auto& product = std::get<ProductTexture>(s.textures.at(leaf(2).transmittance.value));
+  EXPECT_EQ(of(product.first), (Rgb{.5, .5, .5}));
+  EXPECT_TRUE(std::holds_alternative<BitmapTexture>(s.textures.at(product.second.value)));
+}
+
 TEST(Pbrt, RoughnessIsRemappedByItsRoot) {
   const Scene s = pbrt(R"(
 Material "conductor" "float roughness" 0.25 "spectrum eta" "metal-Au-eta" "spectrum k" "metal-Au-k" Shape "sphere"

@@ -106,5 +106,29 @@ TEST(Emitters, AProjectorNeedsAnImageAndIsNotStretched) {
               HasSubstr("gives both fov and focal_length"));
 }
 
+TEST(Emitters, AGoniometricLightNeedsAnImageAndIsNotStretched) {
+  const std::string image =
+      "<texture type=\"bitmap\" name=\"texture\"><string name=\"filename\" value=\"wood.png\"/></texture>";
+  const auto plain = emitter<GoniometricEmitter>(image, "goniometric");
+  EXPECT_EQ(plain.intensity, (Rgb{1, 1, 1}));
+  const std::string larger =
+      "<transform name=\"to_world\"><scale value=\"-2\"/><translate x=\"1\"/></transform>";
+  EXPECT_EQ(emitter<GoniometricEmitter>(image + larger, "goniometric").to_world.m[3], 1);
+  const Scene s = must_read(with_sensor("<emitter type=\"goniometric\">" + image +
+                                        "<rgb name=\"intensity\" "
+                                        "value=\"1 2 3\"/>" +
+                                        larger + "</emitter>"));
+  EXPECT_EQ(must_read(write_xml(s)), s);
+  EXPECT_EQ(deserialize_scene(serialize(s)).value(), s);
+
+  EXPECT_THAT(refusal("<emitter type=\"goniometric\"/>"), HasSubstr("needs 'texture'"));
+  EXPECT_THAT(refusal("<emitter type=\"goniometric\">" + image +
+                      "<transform name=\"to_world\"><scale x=\"2\"/></transform></emitter>"),
+              HasSubstr("not stretch or flatten it"));
+  EXPECT_THAT(refusal("<emitter type=\"goniometric\">" + image +
+                      "<transform name=\"to_world\"><scale value=\"0\"/></transform></emitter>"),
+              HasSubstr("not stretch or flatten it"));
+}
+
 }  // namespace
 }  // namespace ls

@@ -73,6 +73,90 @@ TEST(Surfaces, RoughGlassTakesOneRoughnessOrTwoAndNamesOfMaterials) {
               HasSubstr("gives both alpha and alpha_u"));
 }
 
+TEST(Surfaces, ADiffuseSheetHasPbrtsDefaultsAndDifftransMitsubas) {
+  const Scene sheet = scene_with_bsdf("<bsdf type=\"diffusetransmission\"/>");
+  const auto& s = surface_bsdf<DiffuseTransmissionBsdf>(sheet);
+  EXPECT_EQ(surface_colour(sheet, s.reflectance), (Rgb{.25, .25, .25}));
+  EXPECT_EQ(surface_colour(sheet, s.transmittance), (Rgb{.25, .25, .25}));
+  EXPECT_EQ(must_read(write_xml(sheet)), sheet);
+
+  const Scene older = scene_with_bsdf("<bsdf type=\"difftrans\"/>");
+  const auto& d = surface_bsdf<DiffuseTransmissionBsdf>(older);
+  EXPECT_EQ(surface_colour(older, d.reflectance), (Rgb{0, 0, 0}));
+  EXPECT_EQ(surface_colour(older, d.transmittance), (Rgb{.5, .5, .5}));
+  for (const char* name : {"transmittance", "diffuseTransmittance"}) {
+    const Scene given = must_read(fmt::format(
+        "<scene version=\"0.6.0\"><shape type=\"sphere\"><bsdf type=\"difftrans\"><rgb name=\"{}\" "
+        "value=\".1 .2 .3\"/></bsdf></shape>{}</scene>",
+        name, kSensor));
+    EXPECT_EQ(surface_colour(given, surface_bsdf<DiffuseTransmissionBsdf>(given).transmittance),
+              (Rgb{.1, .2, .3}))
+        << name;
+  }
+  EXPECT_THAT(surface_error("<bsdf type=\"difftrans\"><float name=\"reflectance\" value=\".5\"/></bsdf>"),
+              HasSubstr("has no parameter 'reflectance'"));
+}
+
+TEST(Surfaces, ASheetSendsOnNoMoreThanAllLight) {
+  const auto sheet = [](const char* reflectance, const char* transmittance) {
+    return fmt::format(
+        "<bsdf type=\"diffusetransmission\"><rgb name=\"reflectance\" value=\"{}\"/><rgb "
+        "name=\"transmittance\" value=\"{}\"/></bsdf>",
+        reflectance, transmittance);
+  };
+  EXPECT_EQ(surface_error(sheet(".1 .9 .333334", ".9 .1 .666667")), "") << "rounded to six digits";
+  EXPECT_THAT(surface_error(sheet(".1 .5 .2", ".3 .75 .2")),
+              HasSubstr("reflectance and transmittance of bsdf \"diffusetransmission\" sum up to 1.25"));
+  EXPECT_THAT(surface_error(sheet(".1 .5 .2", ".3 .75 .2")), HasSubstr("test.xml:2:"));
+  EXPECT_THAT(surface_error(sheet("0", "2")), HasSubstr("out of its range"));
+}
+
+TEST(Surfaces, ARoughSheetTakesOneRoughnessOrTwo) {
+  const Scene plain = scene_with_bsdf("<bsdf type=\"roughthindielectric\"/>");
+  const auto& p = surface_bsdf<RoughThinDielectricBsdf>(plain);
+  EXPECT_EQ(p.int_ior, 1.5046);
+  EXPECT_EQ(surface_colour(plain, p.alpha_u), (Rgb{.1, .1, .1}));
+  EXPECT_EQ(must_read(write_xml(plain)), plain);
+  const Scene one = scene_with_bsdf(
+      "<bsdf type=\"roughthindielectric\"><float name=\"alpha\" value=\".3\"/><string name=\"int_ior\" "
+      "value=\"water\"/><string name=\"distribution\" value=\"ggx\"/></bsdf>");
+  const auto& b = surface_bsdf<RoughThinDielectricBsdf>(one);
+  EXPECT_EQ(b.alpha_u, b.alpha_v);
+  EXPECT_EQ(surface_colour(one, b.alpha_u), (Rgb{.3, .3, .3}));
+  EXPECT_EQ(b.int_ior, 1.333);
+  EXPECT_THAT(surface_error("<bsdf type=\"roughthindielectric\"><float name=\"alpha\" value=\".3\"/><float "
+                            "name=\"alpha_u\" value=\".3\"/></bsdf>"),
+              HasSubstr("gives both alpha and alpha_u"));
+  EXPECT_THAT(surface_error("<bsdf type=\"roughthindielectric\"><boolean name=\"multiple_scattering\" "
+                            "value=\"true\"/><float name=\"alpha_u\" value=\".3\"/></bsdf>"),
+              HasSubstr("needs the same roughness both ways"));
+}
+
+// Light passes straight through a rough sheet only where it may be smooth.
+TEST(Surfaces, ASheetPassesLightStraightOnIfItMayBeSmooth) {
+  const auto traits = [](const std::string& alpha) {
+    const Scene s = scene_with_bsdf("<bsdf type=\"roughthindielectric\">" + alpha + "</bsdf>");
+    return scene::bsdf_traits(s)->at(s.shapes.at(0).bsdf.value);
+  };
+  const auto number = [](const char* name, const char* value) {
+    return fmt::format("<float name=\"{}\" value=\"{}\"/>", name, value);
+  };
+  const std::string image =
+      "<texture type=\"bitmap\" name=\"alpha\"><string name=\"filename\" value=\"wood.png\"/></texture>";
+  EXPECT_FALSE(traits(number("alpha", ".1")).passes);
+  EXPECT_FALSE(traits(number("alpha_u", ".0005")).passes) << "it is rough along v";
+  EXPECT_TRUE(traits(number("alpha", ".0005")).passes);
+  EXPECT_TRUE(traits(image).passes);
+  for (const auto& one : {number("alpha", ".1"), number("alpha", ".0005"), image}) {
+    EXPECT_TRUE(traits(one).transmits);
+    EXPECT_FALSE(traits(one).black_behind);
+  }
+  const Scene leaf = scene_with_bsdf("<bsdf type=\"diffusetransmission\"/>");
+  const auto of_leaf = scene::bsdf_traits(leaf)->at(0);
+  EXPECT_TRUE(of_leaf.transmits);
+  EXPECT_FALSE(of_leaf.passes || of_leaf.black_behind);
+}
+
 TEST(Surfaces, AnOpacityTakesAlphaFromItsImageAndOthersStillItsColour) {
   const Scene s = scene_with_bsdf(
       "<bsdf type=\"mask\"><texture type=\"bitmap\" name=\"opacity\" id=\"leaf\"><string name=\"filename\" "
@@ -104,7 +188,7 @@ TEST(Surfaces, WhatCannotBeNestedIsRefusedWithItsPlace) {
   EXPECT_THAT(surface_error("<bsdf type=\"mask\"/>"), HasSubstr("needs one nested bsdf, not 0"));
   EXPECT_THAT(surface_error(fmt::format("<bsdf type=\"blendbsdf\">{}</bsdf>", kDiffuse)),
               HasSubstr("needs two nested bsdfs, not 1"));
-  for (const char* type : {"roughdielectric", "thindielectric"})
+  for (const char* type : {"roughdielectric", "thindielectric", "roughthindielectric", "diffusetransmission"})
     EXPECT_THAT(surface_error(fmt::format("<bsdf type=\"twosided\"><bsdf type=\"{}\"/></bsdf>", type)),
                 HasSubstr("it can't stand in \"twosided\""));
   EXPECT_THAT(

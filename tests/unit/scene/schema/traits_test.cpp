@@ -66,6 +66,11 @@ TEST(EmitterTraits, SayWhatIsDarkWithoutExtentAndWhere) {
   EXPECT_FALSE(traits(EnvmapEmitter{}).delta);
   EXPECT_TRUE(traits(EnvmapEmitter{.scale = 0}).dark);
   EXPECT_TRUE(traits(ProjectorEmitter{.irradiance = TextureIndex{0}}).dark);
+  EXPECT_TRUE(traits(GoniometricEmitter{.texture = TextureIndex{0}}).dark);
+  EXPECT_FALSE(traits(GoniometricEmitter{.texture = TextureIndex{1}}).dark);
+  EXPECT_TRUE(traits(GoniometricEmitter{.intensity = kBlack, .texture = TextureIndex{1}}).dark);
+  EXPECT_EQ(traits(GoniometricEmitter{.to_world = there, .texture = TextureIndex{1}}).position,
+            (Vec3{1, 2, 3}));
 }
 
 }  // namespace
