@@ -220,6 +220,9 @@ struct GridVolume {
   bool use_grid_bbox = false;
   // true: the outermost values are on the faces of the box (Mitsuba 0.x); not for VDB
   bool node_centred = false;
+  // true: the box ends at the inner faces of the outermost voxels, whose values only take part in the
+  // interpolation; only for a `.vol` with values at cell centres
+  bool border = false;
   bool raw = true;
   Transform to_world;
   GridOrder order = GridOrder::x_fastest;  // order of the values in a `.bin`
@@ -248,11 +251,12 @@ struct HomogeneousMedium {
   int priority = 0;              // where media overlap, only those of the highest priority are in effect
   bool operator==(const HomogeneousMedium&) const = default;
 };
-// At most one of emission, source_radiance and temperature is set.
+// At most one of emission, source_radiance and temperature is set. The extinction is sigma_t * scale * tint.
 struct HeterogeneousMedium {
   VolumeIndex sigma_t;
   VolumeIndex albedo;
   double scale = 1;
+  Rgb tint{1, 1, 1};  // grey if sigma_t is a grid of three channels
   PhaseIndex phase;
   std::optional<VolumeIndex> emission;         // radiance per scene unit, independent of extinction
   std::optional<VolumeIndex> source_radiance;  // emission per length is sigma_a times this
@@ -261,6 +265,8 @@ struct HeterogeneousMedium {
   std::optional<VolumeIndex> temperature;
   double emission_scale = 1;  // factor on the emission
   double temperature_scale = 1, temperature_offset = 0;
+  bool peak_one = false;  // true: the spectrum of a black body is divided by its largest value
+  std::optional<VolumeIndex> emission_weight;  // factor on the light of `temperature`
   int priority = 0;  // where media overlap, only those of the highest priority are in effect
   bool operator==(const HeterogeneousMedium&) const = default;
 };

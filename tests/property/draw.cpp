@@ -129,6 +129,8 @@ VolumeIndex Draw::volume(GridKind kind) {
                                                            : random_vol(dice_, assets_, choice_.wild, kind));
   if (!bin) g.order = GridOrder::x_fastest;
   if (bin) g.raw = true;
+  // A border takes three values along each axis, which random grids may not have.
+  g.border = false;
   if (bin || g.node_centred) g.wrap = Wrap::clamp;
   if (dice_.chance(.7)) g.to_world = translate({-1, -1, -1}) * ls::test::scale(2);
   return SceneBuilder::push<VolumeTag>(scene_.volumes, g);
@@ -147,7 +149,11 @@ MediumIndex Draw::medium() {
     if (!h->temperature) {
       h->temperature_scale = 1;
       h->temperature_offset = 0;
+      h->peak_one = false;
+      h->emission_weight.reset();
     }
+    // A density of three channels has colours of its own.
+    if (std::holds_alternative<GridVolume>(scene_.volumes[h->sigma_t.value])) h->tint = {1, 1, 1};
   }
   return SceneBuilder::push<MediumTag>(scene_.media, m);
 }

@@ -78,7 +78,7 @@ void Pruner::drop_dark_sources() {
   for (Medium& medium : s_.media) {
     auto* m = std::get_if<HeterogeneousMedium>(&medium);
     if (!m || !(m->emission || m->source_radiance || m->temperature) || m->emission_scale != 0) continue;
-    m->emission = m->source_radiance = m->temperature = std::nullopt;
+    m->emission = m->source_radiance = m->temperature = m->emission_weight = std::nullopt;
     ++dark;
   }
   note("light given off by a medium", "its strength is 0", dark);

@@ -32,7 +32,7 @@ class ObjectReader {
     if (it == json_.end()) return f.elided ? void() : fail(f.name, "is missing");
     read(f, *it, value);
     // Equal scenes have only one form: a default that the writer omits must not be present.
-    if (f.elided && wrong_.empty() && value == T{}) fail(f.name, "has the value that is left out");
+    if (wrong_.empty() && f.leaves_out(value)) fail(f.name, "has the value that is left out");
   }
 
   std::string type() {

@@ -42,7 +42,7 @@ class JsonWriter {
  public:
   template <class T>
   void field(const Field& f, T& value) {
-    if (f.elided && value == std::remove_const_t<T>{}) return;
+    if (f.leaves_out(value)) return;
     write(members_[std::string(f.name)], value);
   }
   void type(std::string_view name) { write_string(members_["type"], name); }

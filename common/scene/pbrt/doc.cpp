@@ -25,7 +25,7 @@ what is refused says what to do instead.
 
 - **Files** are found from the folder of the main file. An absolute name is used as it is on the command line; a coordinator
   knows only what was sent along.
-- **Meshes and grids in the text** (`trianglemesh`, `bilinearmesh`, `uniformgrid`, `rgbgrid`) are written as files, which `submit`
+- **Meshes and grids in the text** (`trianglemesh`, `bilinearmesh`, `uniformgrid`, `rgbgrid`, `cloud`) are written as files, which `submit`
   sends along and `convert` puts beside its XML. Over HTTP the sender does that.
 - **Camera**: pbrt has +x on the right, our sensors on the left, so `to_world` is the inverse of the transform before `Camera` times
   scale(-1, 1, 1). Coordinates of the world stay as they are. A camera that is scaled alike along all axes keeps its picture, and its
@@ -37,7 +37,20 @@ what is refused says what to do instead.
   is grey. Metals by name are those of [the scene format](scene-format.md#names). Spectra are not followed beyond red, green, blue.
 - **Roughness**: `remaproughness` is true by default, and alpha then the square root of the roughness; the distribution is GGX.
 - **Grids** in the text lie at the centres of their voxels and fade to 0 in the outermost half voxel, as in pbrt: the file has a layer
-  of zeros around them.
+  of zeros around them, which is the `border` of the volume.
+- **Light of media** is sigma_a times Le in pbrt, where sigma_a is that at the point, with its density and `scale`. Black bodies of
+  `temperature` have kelvin (value - temperatureoffset) * temperaturescale; the spectrum of each is divided by its largest value
+  (`peak_one` of ours) and not scaled to luminance 1, so that a body's luminance is the integral of the CIE observer's y with that
+  spectrum, over nm: 106.857 times what `peak_one` gives, which is the factor that `emission_scale` has. Exact are the map of
+  temperatures, the interpolation of grids, and black bodies as the CIE observer sees them (1e-4); colours outside of sRGB are cut
+  off at 0. pbrt renders bodies from 100 K on, this program from 200 K; light in between is below 1e-27 of the peak.
+- **Spectra of media**: sigma_a, sigma_s and Le are red, green and blue here. Where extinction differs by wavelength within one of
+  them, pbrt's colours of thick media differ.
+- **Rgbgrid**: if the albedo is the same in all voxels, the medium is that of pbrt. If it differs, it is interpolated between voxels,
+  where pbrt interpolates absorption and scattering: a warning says so, and values at the centres of voxels are the same.
+- **Clouds** by formula become a grid from face to face of their box, of 4 nodes along a cell of their finest noise: of frequency times
+  15.7 cells per unit or, with wispiness, 19.9. One grid has at most 2^24 nodes, those of a file 2^25: a finer cloud gets fewer
+  nodes a cell, with a warning, and is refused below 2.
 - **Depth**: `maxdepth` counts scatterings; `max_depth` of ours is one more. `thindielectric` does not count here.
 - **Sides**: a shape that gives light, bounds a medium or lets light through, and is mirrored by its transform, is refused unless it is a
   mesh without normals in the text: which way its normal points is not the same everywhere in pbrt itself.

@@ -1,213 +1,151 @@
-// Translates media and their grids.
+// Translates media; those of grids are in grids.cpp and cloud_medium.cpp.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
-#include "common/scene/pbrt/parts.h"
+#include "common/base/suggest.h"
+#include "common/scene/pbrt/media_parts.h"
+#include "common/scene/pbrt/substances.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene::pbrt {
 namespace {
 
-constexpr int kMaxSide = 4096;
-constexpr std::size_t kMaxVoxels = std::size_t{1} << 24;  // includes the layer of zeros around the grid
+constexpr double kHottest = 1e6;  // the largest temperature_offset of a medium
 
-class MediumTranslator {
- public:
-  MediumTranslator(Translation& t, Params& p, const Placed& ctm) : t_(t), p_(p), ctm_(ctm) {}
+Rgb one(MediumSource& m, std::string_view name) {
+  const Param* p = m.p.take(name);
+  return p ? surface_colour(m.t, *p).value_or(Rgb{1, 1, 1}) : Rgb{1, 1, 1};
+}
 
-  std::optional<Element> run() {
-    const std::string_view type = p_.row().type;
-    Element out = made("medium", type == "homogeneous" ? "homogeneous" : "heterogeneous", p_.at());
-    const bool fine = type == "homogeneous" ? homogeneous(out)
-                      : type == "nanovdb"   ? nanovdb(out)
-                      : type == "rgbgrid"   ? rgb_grid(out)
-                                            : uniform_grid(out);
-    if (const double g = p_.number("g", 0); g != 0) {
-      Element hg = made("phase", "hg", p_.at());
-      add(hg, "g", g, p_.at());
-      add(out, std::move(hg));
-    }
-    p_.finish();
-    return fine ? std::optional(std::move(out)) : std::nullopt;
+bool homogeneous(MediumSource& m, Element& out) {
+  Coefficients c;
+  if (const std::string name = m.p.text("preset", ""); !name.empty()) {
+    const Substance* substance = find_substance(name);
+    if (!substance)
+      return m.wrong(m.p.at(), fmt::format("{} has a preset \"{}\" that is not known{}", m.p.title(), name,
+                                           suggestion(name, substance_names())));
+    c = coefficients(substance->absorption, substance->scattering);
+  } else {
+    c = coefficients(m);
   }
+  add(out, "sigma_t", c.extinction, m.p.at());
+  add_albedo(m, out, c.albedo);
+  add(out, "scale", m.p.number("scale", 1), m.p.at());
+  const double scale = m.p.number("Lescale", 1) * m.t.exposure;
+  if (!m.p.has("Le")) return true;
+  Rgb light = light_colour(m.t, m.p, "Le");
+  for (double& x : light) x *= scale;
+  if (!all_zero(light)) add(out, "source_radiance", light, m.p.at());
+  return true;
+}
 
- private:
-  struct Coefficients {
-    Rgb extinction{}, albedo{};
-    bool is_grey() const { return extinction[0] == extinction[1] && extinction[1] == extinction[2]; }
-  };
+void add_file_grid(MediumSource& m, Element& out, const char* name, const std::string& file,
+                   const std::string& grid_name) {
+  Element grid = made("volume", "gridvolume", m.p.at());
+  set(grid, "name", name, m.p.at());
+  add(grid, "string", "filename", file, m.p.at());
+  add(grid, "string", "grid_name", grid_name, m.p.at());
+  place(grid, m.ctm.to, m.p.at());
+  add(out, std::move(grid));
+}
 
-  Rgb one(std::string_view name) {
-    const Param* p = p_.take(name);
-    return p ? surface_colour(t_, *p).value_or(Rgb{1, 1, 1}) : Rgb{1, 1, 1};
-  }
-
-  Coefficients coefficients() {
-    const Rgb a = one("sigma_a"), s = one("sigma_s");
-    Coefficients c;
-    for (std::size_t i = 0; i < 3; ++i) {
-      c.extinction[i] = a[i] + s[i];
-      c.albedo[i] = c.extinction[i] > 0 ? s[i] / c.extinction[i] : 0;
-    }
-    return c;
-  }
-
-  bool homogeneous(Element& out) {
-    const Coefficients c = coefficients();
-    add(out, "sigma_t", c.extinction, p_.at());
-    add(out, "albedo", c.albedo, p_.at());
-    add(out, "scale", p_.number("scale", 1), p_.at());
-    const double scale = p_.number("Lescale", 1) * t_.exposure;
-    if (!p_.has("Le")) return true;
-    Rgb light = light_colour(t_, p_, "Le");
-    for (double& x : light) x *= scale;
-    if (!all_zero(light)) add(out, "source_radiance", light, p_.at());
+bool nanovdb(MediumSource& m, Element& out) {
+  const Coefficients c = coefficients(m);
+  const std::string file = m.p.text("filename", "");
+  if (file.empty()) m.p.missing("filename");
+  add_file_grid(m, out, "sigma_t", file, m.p.text("gridname", "density"));
+  add_albedo(m, out, c.albedo);
+  add_extinction(m, out, c.extinction);
+  const auto light = {"temperaturename",  "Lescale",           "LeScale",
+                      "temperaturescale", "temperatureoffset", "temperaturecutoff"};
+  const bool emits = std::any_of(light.begin(), light.end(), [&](const char* name) { return m.p.has(name); });
+  if (!emits) {
+    m.t.warn_once(m.p.at(),
+                  "a file of \"nanovdb\" gives light here only if the scene says so: if it has a grid of "
+                  "temperatures, name it by \"string temperaturename\"");
     return true;
   }
-
-  bool nanovdb(Element& out) {
-    const Coefficients c = coefficients();
-    Element grid = made("volume", "gridvolume", p_.at());
-    set(grid, "name", "sigma_t", p_.at());
-    const std::string file = p_.text("filename", "");
-    if (file.empty()) p_.missing("filename");
-    add(grid, "string", "filename", file, p_.at());
-    add(grid, "string", "grid_name", p_.text("gridname", "density"), p_.at());
-    place(grid, ctm_.to, p_.at());
-    add(out, std::move(grid));
-    add(out, "albedo", c.albedo, p_.at());
-    add(out, "scale", p_.number("scale", 1) * c.extinction[0], p_.at());
-    t_.warn_once(p_.at(),
-                 "if this file has a grid \"temperature\", the light that pbrt gives off there is left "
-                 "out");
-    if (c.is_grey()) return true;
-    p_.error(p_.at(), fmt::format("{}: sigma_a + sigma_s differs by channel, which a file's grid can't here",
-                                  p_.title()));
-    return false;
-  }
-
-  // Returns false if the bounds are wrong, which was reported.
-  bool read_box() {
-    for (std::size_t i = 0; i < 3; ++i) {
-      sides_[i] = p_.integer(std::array{"nx", "ny", "nz"}[i], 1);
-      if (sides_[i] < 1 || sides_[i] > kMaxSide)
-        return p_.error(p_.at(), fmt::format("{} has {} values along a side; 1 to {} are read", p_.title(),
-                                             sides_[i], kMaxSide)),
-               false;
-    }
-    if ((std::size_t(sides_[0]) + 2) * (std::size_t(sides_[1]) + 2) * (std::size_t(sides_[2]) + 2) >
-        kMaxVoxels)
-      return p_.error(p_.at(), fmt::format("{} has more than {} voxels: give a file of \"nanovdb\"",
-                                           p_.title(), kMaxVoxels)),
-             false;
-    low_ = p_.triple("p0", Vec3{{0, 0, 0}});
-    high_ = p_.triple("p1", Vec3{{1, 1, 1}});
-    for (std::size_t i = 0; i < 3; ++i)
-      if (!(low_[i] < high_[i]))
-        return p_.error(p_.at(), fmt::format("{}: p0 is not below p1 along all axes", p_.title())), false;
+  const std::string temperature = m.p.text("temperaturename", "temperature");
+  const double scale = m.p.number("Lescale", m.p.number("LeScale", 1));
+  if (scale == 0) {
+    for (const char* name : light) m.p.take(name);
     return true;
   }
-
-  std::size_t count() const {
-    return std::size_t(sides_[0]) * std::size_t(sides_[1]) * std::size_t(sides_[2]);
-  }
-
-  // Surrounds the grid by a layer of zeros. In pbrt values are at the centres of voxels, and values outside
-  // of the grid count as 0, so the density fades out over the last half voxel. The layer has the same effect.
-  template <class F>
-  MadeGrid padded(int channels, F value) const {
-    MadeGrid g{{sides_[0] + 2, sides_[1] + 2, sides_[2] + 2}, channels, {}};
-    const std::size_t c = std::size_t(channels);
-    g.values.resize(std::size_t(g.sides[0]) * std::size_t(g.sides[1]) * std::size_t(g.sides[2]) * c);
-    for (int z = 0; z < sides_[2]; ++z)
-      for (int y = 0; y < sides_[1]; ++y)
-        for (int x = 0; x < sides_[0]; ++x) {
-          const std::size_t from =
-              (std::size_t(z) * std::size_t(sides_[1]) + std::size_t(y)) * std::size_t(sides_[0]) +
-              std::size_t(x);
-          const std::size_t to = ((std::size_t(z) + 1) * std::size_t(g.sides[1]) + std::size_t(y) + 1) *
-                                     std::size_t(g.sides[0]) +
-                                 std::size_t(x) + 1;
-          for (std::size_t k = 0; k < c; ++k) g.values[to * c + k] = static_cast<float>(value(from, k));
-        }
-    return g;
-  }
-
-  bool add_grid(Element& out, const char* name, const MadeGrid& grid) {
-    const std::string file = keep_grid(t_, p_.at(), grid);
-    Element volume = made("volume", "gridvolume", p_.at());
-    set(volume, "name", name, p_.at());
-    add(volume, "string", "filename", file, p_.at());
-    Vec3 size, low;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const double voxel = (high_[i] - low_[i]) / sides_[i];
-      size[i] = voxel * grid.sides[i];
-      low[i] = low_[i] - voxel * (grid.sides[i] - sides_[i]) / 2;
-    }
-    place(volume, multiply(ctm_.to, multiply(moved(low).to, scaled(size).to)), p_.at());
-    add(out, std::move(volume));
-    return !file.empty();
-  }
-
-  bool uniform_grid(Element& out) {
-    const Coefficients c = coefficients();
-    const Param* density = p_.take("density");
-    if (!density) p_.missing("density");
-    if (!read_box() || !density) return false;
-    if (density->numbers.size() != count())
-      return p_.error(density->at,
-                      fmt::format("{} values, but nx * ny * nz is {}", density->numbers.size(), count())),
-             false;
-    const int channels = c.is_grey() ? 1 : 3;
-    const MadeGrid grid = padded(channels, [&](std::size_t i, std::size_t k) {
-      return density->numbers[i] * (channels == 1 ? 1 : c.extinction[k]);
-    });
-    add(out, "albedo", c.albedo, p_.at());
-    add(out, "scale", p_.number("scale", 1) * (channels == 1 ? c.extinction[0] : 1), p_.at());
-    return add_grid(out, "sigma_t", grid);
-  }
-
-  bool rgb_grid(Element& out) {
-    const Param *a = p_.take("sigma_a"), *s = p_.take("sigma_s");
-    if (!a && !s) p_.missing("sigma_s");
-    if (!read_box() || (!a && !s)) return false;
-    for (const Param* p : {a, s})
-      if (p && p->numbers.size() != 3 * count())
-        return p_.error(p->at, fmt::format("{} numbers, but 3 * nx * ny * nz is {}", p->numbers.size(),
-                                           3 * count())),
-               false;
-    const auto at = [](const Param* p, std::size_t i) { return p ? p->numbers[i] : 1; };
-    const MadeGrid extinction =
-        padded(3, [&](std::size_t i, std::size_t k) { return at(a, 3 * i + k) + at(s, 3 * i + k); });
-    MadeGrid albedo{sides_, 3, std::vector<float>(3 * count())};
-    for (std::size_t i = 0; i < albedo.values.size(); ++i) {
-      const double sum = at(a, i) + at(s, i);
-      albedo.values[i] = static_cast<float>(sum > 0 ? at(s, i) / sum : 0);
-    }
-    t_.warn_once(p_.at(),
-                 "of an \"rgbgrid\" extinction and albedo are interpolated between voxels, in pbrt "
-                 "absorption and scattering");
-    add(out, "scale", p_.number("scale", 1), p_.at());
-    return add_grid(out, "sigma_t", extinction) && add_grid(out, "albedo", albedo);
-  }
-
-  Translation& t_;
-  Params& p_;
-  const Placed& ctm_;
-  std::array<int, 3> sides_{};
-  Vec3 low_, high_;
-};
+  add_file_grid(m, out, "temperature", file, temperature);
+  return add_black_bodies(m, out, scale);
+}
 
 }  // namespace
+
+Coefficients coefficients(const Rgb& absorption, const Rgb& scattering) {
+  Coefficients c;
+  for (std::size_t i = 0; i < 3; ++i) {
+    c.extinction[i] = absorption[i] + scattering[i];
+    c.albedo[i] = c.extinction[i] > 0 ? scattering[i] / c.extinction[i] : 0;
+  }
+  return c;
+}
+
+Coefficients coefficients(MediumSource& m) {
+  const Rgb absorption = one(m, "sigma_a");
+  return coefficients(absorption, one(m, "sigma_s"));
+}
+
+void add_albedo(MediumSource& m, Element& out, const Rgb& albedo) { add(out, "albedo", albedo, m.p.at()); }
+
+void add_extinction(MediumSource& m, Element& out, const Rgb& extinction) {
+  const bool is_grey = extinction[0] == extinction[1] && extinction[1] == extinction[2];
+  // A cloud has no scale.
+  const double scale = m.p.row().find("scale") ? m.p.number("scale", 1) : 1;
+  add(out, "scale", is_grey ? scale * extinction[0] : scale, m.p.at());
+  if (!is_grey) add(out, "tint", extinction, m.p.at());
+}
+
+bool add_black_bodies(MediumSource& m, Element& out, double factor) {
+  const double scale = m.p.number("temperaturescale", 1);
+  const double offset = m.p.number("temperatureoffset", m.p.number("temperaturecutoff", 0));
+  if (!(scale >= 0)) return m.wrong(m.p.at(), fmt::format("{}: temperaturescale is negative", m.p.title()));
+  if (!(std::abs(scale * offset) <= kHottest))
+    return m.wrong(m.p.at(), fmt::format("{}: temperatureoffset times temperaturescale is {} K, beyond {} K",
+                                         m.p.title(), scale * offset, kHottest));
+  if (!(factor >= 0)) return m.wrong(m.p.at(), fmt::format("{}: Lescale is negative", m.p.title()));
+  add(out, "temperature_scale", scale, m.p.at());
+  add(out, "temperature_offset", -scale * offset, m.p.at());
+  add(out, "boolean", "peak_one", "true", m.p.at());
+  add(out, "emission_scale", factor * kPhotometric * m.t.exposure, m.p.at());
+  return true;
+}
 
 std::string medium_id(const std::string& name) { return fmt::format("medium {}", name); }
 
 void add_medium(Translation& t, const std::string& name, Params& p, const Placed& ctm) {
-  auto medium = MediumTranslator(t, p, ctm).run();
-  if (!medium) return;
-  set(*medium, "id", medium_id(name), p.at());
-  add(t.scene, std::move(*medium));
+  using Translate = bool (*)(MediumSource&, Element&);
+  struct Type {
+    std::string_view name;
+    Translate translate;
+  };
+  static constexpr Type kTypes[] = {{"homogeneous", homogeneous},
+                                    {"uniformgrid", uniform_grid},
+                                    {"rgbgrid", rgb_grid},
+                                    {"nanovdb", nanovdb},
+                                    {"cloud", cloud}};
+  MediumSource m{t, p, ctm};
+  const std::string_view type = p.row().type;
+  Element out = made("medium", type == "homogeneous" ? "homogeneous" : "heterogeneous", p.at());
+  bool is_right = false;
+  for (const Type& row : kTypes)
+    if (row.name == type) is_right = row.translate(m, out);
+  if (const double g = p.number("g", 0); g != 0) {
+    Element hg = made("phase", "hg", p.at());
+    add(hg, "g", g, p.at());
+    add(out, std::move(hg));
+  }
+  p.finish();
+  if (!is_right) return;
+  set(out, "id", medium_id(name), p.at());
+  add(t.scene, std::move(out));
 }
 
 }  // namespace ls::scene::pbrt

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/scene/made_files.h"
+#include "common/scene/pbrt/cloud.h"
 #include "common/scene/pbrt/params.h"
 #include "common/scene/read.h"
 #include "common/scene/xml/make_element.h"
@@ -56,6 +57,13 @@ struct Attributes {
   std::string inside, outside;  // names of media; empty: none
 };
 
+// The grid that was made of a cloud, and how many nodes it has.
+struct MadeCloud {
+  Cloud cloud;
+  std::size_t nodes;
+  std::string file;
+};
+
 // The scene as translated so far.
 struct Translation {
   AssetSource& assets;
@@ -64,6 +72,7 @@ struct Translation {
   double exposure = 1;  // factor on all light
   std::map<std::string, Texture> textures;
   std::map<std::string, Material> materials;
+  std::vector<MadeCloud> clouds;
   std::vector<std::string> warned;  // warnings that are given only once per file
 
   void warn_once(const Span& at, std::string text);

@@ -69,17 +69,18 @@ Words light_words(std::string_view colour) {
 }
 const Word kPower{"power", "float", "", "luminous power in place of the colour's brightness"};
 
-Words medium_words() {
+Words coefficient_words() {
   return {{"sigma_a", kColour, "1", "absorption per scene unit"},
           {"sigma_s", kColour, "1", "scattering per scene unit"},
-          {"scale", "float", "1", "factor on both"},
           {"g", "float", "0", "mean cosine of Henyey-Greenstein"}};
 }
-Words no_emission() {
-  return {{"Lescale", "float", "", "glowing grids: write the medium in XML with `temperature`", kRefused},
-          {"temperaturescale", "float", "", "see Lescale", kRefused},
-          {"temperatureoffset", "float", "", "see Lescale", kRefused},
-          {"temperaturecutoff", "float", "", "see Lescale", kRefused}};
+Words medium_words() {
+  return coefficient_words() + Words{{"scale", "float", "1", "factor on sigma_a and sigma_s"}};
+}
+Words temperature_words() {
+  return {{"temperaturescale", "float", "1", "factor on a temperature less temperatureoffset, at least 0"},
+          {"temperatureoffset", "float", "temperaturecutoff", "subtracted from the values of the grid"},
+          {"temperaturecutoff", "float", "0", "another name of temperatureoffset"}};
 }
 Words box_words() {
   return {{"nx", "integer", "1", "values along x, which runs fastest"},
@@ -367,34 +368,53 @@ void add_lights(std::vector<Row>& r) {
 }
 
 void add_media(std::vector<Row>& r) {
-  r.push_back({"MakeNamedMedium", "homogeneous", true, "a `homogeneous` medium",
-               medium_words() +
-                   Words{{"Le", kColour, "0", "light given off: sigma_a times this"},
-                         {"Lescale", "float", "1", "factor on Le"},
-                         {"preset", "string", "", "give sigma_a and sigma_s of the substance", kRefused}}});
+  r.push_back(
+      {"MakeNamedMedium", "homogeneous", true, "a `homogeneous` medium",
+       medium_words() +
+           Words{{"Le", kColour, "0", "light given off: sigma_a times this"},
+                 {"Lescale", "float", "1", "factor on Le"},
+                 {"preset", "string", "",
+                  "a substance by name in place of sigma_a and sigma_s, which are then per mm: `scale` is "
+                  "the length of a scene unit in mm"}}});
   r.push_back({"MakeNamedMedium", "uniformgrid", true,
-               "a `heterogeneous` medium; its grid is a `.vol` that is written of its numbers",
+               "a `heterogeneous` medium; its grids are each a `.vol` that is written of its numbers",
                medium_words() + box_words() +
-                   Words{{"density", "float", "needed", "values"},
-                         {"temperature", "float", "", "see Lescale", kRefused},
-                         {"Le", kColour, "0", "see Lescale", kRefused}} +
-                   no_emission()});
-  r.push_back({"MakeNamedMedium", "rgbgrid", true, "likewise, with a colour a voxel",
-               box_words() +
-                   Words{{"sigma_a", "rgb", "", "absorption; 1 if it is not given"},
-                         {"sigma_s", "rgb", "", "scattering; 1 if it is not given"},
-                         {"scale", "float", "1", "factor on both"},
-                         {"g", "float", "0", "mean cosine of Henyey-Greenstein"},
-                         {"Le", "rgb", "", "see Lescale", kRefused}} +
-                   no_emission()});
-  r.push_back({"MakeNamedMedium", "nanovdb", true,
-               "a `heterogeneous` medium of that file, with a warning: a grid of temperatures is left out",
+                   Words{{"density", "float", "needed", "factor on sigma_a and sigma_s, a value a voxel"},
+                         {"Le", kColour, "0", "light given off: sigma_a times density times this"},
+                         {"Lescale", "float", "",
+                          "factor on Le or on the light of temperature, a value a voxel; if it is not given, "
+                          "1 in the middle of the box, falling to 1/2 in the middles of its faces and to 1/8 "
+                          "in its corners, as pbrt has it"},
+                         {"temperature", "float", "", "in place of Le: black bodies, a value a voxel"}} +
+                   temperature_words()});
+  r.push_back(
+      {"MakeNamedMedium", "rgbgrid", true, "likewise, with a colour a voxel",
+       box_words() + Words{{"sigma_a", "rgb", "", "absorption; 1 if it is not given"},
+                           {"sigma_s", "rgb", "", "scattering; 1 if it is not given"},
+                           {"scale", "float", "1", "factor on both"},
+                           {"g", "float", "0", "mean cosine of Henyey-Greenstein"},
+                           {"Le", "rgb", "",
+                            "light given off: sigma_a times 106.857 times this, as pbrt does not scale it to "
+                            "the white's luminance; it needs sigma_a"},
+                           {"Lescale", "float", "1", "factor on Le"}}});
+  r.push_back({"MakeNamedMedium", "nanovdb", true, "a `heterogeneous` medium of that file",
                medium_words() +
                    Words{{"filename", "string", "needed", "a NanoVDB file"},
                          {"gridname", "string", "density", "the grid of densities"},
-                         {"temperaturename", "string", "", "see Lescale", kRefused}} +
-                   no_emission()});
-  r.push_back({"MakeNamedMedium", "cloud", false, "clouds by formula are not known here: give a grid", {}});
+                         {"temperaturename", "string", "temperature",
+                          "the grid of temperatures: black bodies. It is read if this parameter, Lescale, or "
+                          "one of the next three is given, and must be there then"},
+                         {"Lescale", "float", "1", "factor on the light of black bodies"},
+                         {"LeScale", "float", "1", "its name in older scenes"}} +
+                   temperature_words()});
+  r.push_back({"MakeNamedMedium", "cloud", true,
+               "a `heterogeneous` medium; its density, a formula, is written as a `.vol`",
+               coefficient_words() +
+                   Words{{"density", "float", "1", "factor on the noise"},
+                         {"wispiness", "float", "1", "how far points are moved before the noise is asked"},
+                         {"frequency", "float", "5", "cells of the coarsest noise per unit"},
+                         {"p0", "point3", "0 0 0", "corner of the box"},
+                         {"p1", "point3", "1 1 1", "corner of the box"}}});
 }
 
 }  // namespace

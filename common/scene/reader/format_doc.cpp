@@ -241,7 +241,9 @@ to the same bits, files named by SHA-256. Objects that nothing uses are left out
 - A `heterogeneous` medium gives off light by one of `emission` (radiance per length), `source_radiance` (sigma_a times it) and
   `temperature` (sigma_a times the radiance of a black body). A black body of spectral radiance 1 W/(m^2 sr nm) at all wavelengths
   would have luminance 1: at 1500 K it is (0.35, 0.046, 0), at 6500 K (4.4e4, 4.1e4, 4.4e4); `emission_scale` brings it to
-  the scene's units. Colours outside of sRGB are cut off at 0. Such light counts like that of an emitter that a path meets:
+  the scene's units. With `peak_one` the spectrum of each body is divided by its largest value, so that its colour stays and its
+  brightness is that of a body whose spectrum reaches 1. `emission_weight` is a factor on it that varies in space, a grid of one
+  number a voxel or a colour. Colours outside of sRGB are cut off at 0. Such light counts like that of an emitter that a path meets:
   `max_depth` 1 shows it, `hide_emitters` hides it where the camera looks straight at it. It lights the scene where paths come by:
   next-event estimation does not look for it.
 

@@ -53,8 +53,12 @@ void need_inverse(const Transform& to_world, const Element& e, Report& report) {
 // parameters are taken.
 struct Factors {
   explicit Factors(const Params& p)
-      : light(p.has("emission_scale")), heat(p.has("temperature_scale") || p.has("temperature_offset")) {}
+      : light(p.has("emission_scale")), heat(p.has("temperature_scale") || p.has("temperature_offset")) {
+    for (const char* name : {"peak_one", "emission_weight"})
+      if (p.has(name)) of_heat.emplace_back(name);
+  }
   bool light, heat;
+  std::vector<std::string> of_heat;
 };
 
 void check_medium(const Params& p, const Factors& given, const HeterogeneousMedium& m, Report& report) {
@@ -67,6 +71,9 @@ void check_medium(const Params& p, const Factors& given, const HeterogeneousMedi
     report.error(
         p.object().at,
         fmt::format("{} gives temperature_scale or temperature_offset, but no temperature", p.title()));
+  for (const std::string& name : given.of_heat)
+    if (!m.temperature)
+      report.error(p.object().at, fmt::format("{} gives {}, but no temperature", p.title(), name));
   if (given.light && sources == 0)
     report.error(p.object().at,
                  fmt::format("{} gives emission_scale, but none of emission, source_radiance and temperature",
@@ -98,6 +105,10 @@ std::optional<VolumeIndex> Reader::read_volume(const Element& e) {
     if (volume.node_centred && volume.wrap != Wrap::clamp)
       report_.error(e.at,
                     "a grid with node_centred ends at its outermost nodes: 'wrap_mode' can only be clamp");
+    if (volume.border && (!file.ends_with(".vol") || volume.node_centred || volume.wrap != Wrap::clamp))
+      report_.error(e.at,
+                    "'border' is of .vol files with values at the centres of voxels: it goes neither with "
+                    "node_centred nor with a wrap_mode other than clamp");
     need_inverse(volume.to_world, e, report_);
     scene_.volumes.emplace_back(volume);
   } else {
@@ -173,8 +184,10 @@ void Reader::unbound_constant_density(const Element& e) {
     return report_.error(e.at,
                          "the density of this medium is the same everywhere: write it as a medium "
                          "\"homogeneous\" to give it an emission");
+  Rgb sigma_t = *density;
+  for (std::size_t i = 0; i < 3; ++i) sigma_t[i] *= medium.tint[i];
   scene_.media.back() =
-      HomogeneousMedium{*density, *albedo, medium.scale, medium.phase, {}, {}, medium.priority};
+      HomogeneousMedium{sigma_t, *albedo, medium.scale, medium.phase, {}, {}, medium.priority};
 }
 
 }  // namespace ls::scene

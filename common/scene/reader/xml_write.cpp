@@ -141,7 +141,7 @@ class Writer {
   void field(const Field& f, const T& value) {
     if (f.derived && f.given_as.empty()) return;  // the field is derived from others
     if constexpr (std::equality_comparable<T>)
-      if (f.elided && value == T{}) return;
+      if (f.leaves_out(value)) return;
     const std::string_view name = f.given_as.starts_with('<') ? "" : f.name;
     constexpr bool is_object = requires { nested(name, value); };
     constexpr bool is_property = requires { property(f, value); };

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <concepts>
 #include <limits>
 #include <string_view>
@@ -50,9 +51,18 @@ struct Field {
   double unwritten = std::numeric_limits<double>::quiet_NaN();
   bool number = false;  // true: a texture that is read as a scalar, not as a colour
   // True for fields that were added when scenes already had digests, or that Mitsuba does not have. If such a
-  // field has its type's initial value (false, 0, empty), it is written neither in files nor in JSON, so it
-  // may be missing there.
+  // field has its type's initial value (false, 0, empty), or as a colour the value `unwritten`, it is written
+  // neither in files nor in JSON, so it may be missing there.
   bool elided = false;
+
+  // Returns whether this field is written neither in files nor in JSON if it has this value.
+  template <class T>
+  bool leaves_out(const T& value) const {
+    if (!elided) return false;
+    if constexpr (std::is_same_v<T, Rgb>)
+      if (!std::isnan(unwritten)) return value == Rgb{unwritten, unwritten, unwritten};
+    return value == T{};
+  }
 };
 
 struct TypeInfo {

@@ -39,6 +39,11 @@ void describe(V& v, T& s) {
        .doc = "the outermost values sit on the faces of the box instead of half a voxel inside it; true in "
               "files of version 0.x; not for `.vdb`"},
       s.node_centred);
+  v.field({.name = "border",
+           .doc = "the box ends at the inner faces of the outermost voxels, which only take part in the "
+                  "interpolation; of a `.vol` alone. Not in Mitsuba",
+           .elided = true},
+          s.border);
   v.field({.name = "raw", .doc = "no colour conversion; without effect, as volumes are linear RGB here"},
           s.raw);
   v.field({.name = "to_world", .doc = "places the grid's box in the world"}, s.to_world);
@@ -114,6 +119,13 @@ void describe(V& v, T& m) {
            .fallback = {.75, .75, .75}},
           m.albedo);
   v.field({.name = "scale", .doc = "factor on sigma_t", .range = kNonNegative}, m.scale);
+  v.field({.name = "tint",
+           .doc = "factor on sigma_t by colour; not for a grid of three channels. Not in Mitsuba",
+           .range = kNonNegative,
+           .constvolume = true,
+           .unwritten = 1,
+           .elided = true},
+          m.tint);
   v.field({.name = "phase",
            .doc = "how light is scattered; `isotropic` if there is none",
            .derived = true,
@@ -149,6 +161,16 @@ void describe(V& v, T& m) {
   v.field(
       {.name = "temperature_offset", .doc = "added to it", .unit = "K", .range = {-1e6, 1e6}, .unwritten = 0},
       m.temperature_offset);
+  v.field({.name = "peak_one",
+           .doc = "divides the spectrum of each black body by its largest value, as pbrt does: `temperature` "
+                  "then gives the colour, and `emission_scale` the brightness. Not in Mitsuba",
+           .elided = true},
+          m.peak_one);
+  v.field({.name = "emission_weight",
+           .doc = "factor on the light of `temperature`; a grid ends at its box. Not in Mitsuba",
+           .range = kNonNegative,
+           .elided = true},
+          m.emission_weight);
   describe_priority(v, m.priority);
 }
 

@@ -23,13 +23,16 @@ struct TraitsOfMedium {
   }
   MediumTraits operator()(const HeterogeneousMedium& m) const {
     MediumTraits t;
-    t.extinguishes = m.scale != 0 && !zero(m.sigma_t);
+    t.extinguishes = m.scale != 0 && !all_zero(m.tint) && !zero(m.sigma_t);
     t.scatters = t.extinguishes && !zero(m.albedo);
     t.emits =
         m.emission_scale != 0 &&
         ((m.emission && !zero(*m.emission)) ||
          (t.extinguishes && ((m.source_radiance && !zero(*m.source_radiance)) || m.temperature.has_value())));
-    t.chromatic = constant(m.sigma_t) && !grey(constant(m.sigma_t)->value);
+    Rgb sigma_t = m.tint;
+    if (const ConstVolume* c = constant(m.sigma_t))
+      for (std::size_t i = 0; i < 3; ++i) sigma_t[i] *= c->value[i];
+    t.chromatic = !grey(sigma_t);
     t.grids = true;
     t.density_file = !constant(m.sigma_t);
     return t;

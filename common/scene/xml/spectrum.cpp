@@ -12,6 +12,10 @@ namespace {
 
 using Xyz = std::array<double, 3>;
 
+// The constants of Planck's law, 2 h c^2 and h c / k (CODATA 2018, exact), for wavelengths in nm: W nm^4 /
+// (m^2 sr), and nm K.
+constexpr double kFirst = 1.191042972397188e-16 * 1e36, kSecond = 1.438776877503933e7;
+
 // Converts XYZ to linear sRGB by the inverse of the matrix of BT.709's primaries (x, y) = (.64, .33), (.30,
 // .60), (.15, .06) and its white (.3127, .3290), to six digits as is usual.
 Rgb srgb_of(const Xyz& c) {
@@ -80,9 +84,14 @@ Rgb linear_srgb(const SpectralCurve& curve, Illuminant illuminant) {
 
 Rgb linear_srgb(const std::array<double, 3>& xyz) { return srgb_of(xyz); }
 
+// Planck's law has its peak where h c / (lambda k T) = 4.965..., the root of x = 5 (1 - e^-x): Wien's
+// displacement law. There it is 2 h c^2 (x k T / (h c))^5 / (e^x - 1).
+double black_body_peak(double kelvin) {
+  constexpr double kAtPeak = 4.965114231744276;
+  return kFirst * std::pow(kAtPeak * kelvin / kSecond, 5) / std::expm1(kAtPeak);
+}
+
 std::array<double, 3> black_body_xyz(double kelvin) {
-  // 2 h c^2 and h c / k (CODATA 2018, exact), for wavelengths in nm: W nm^4 / (m^2 sr), and nm K.
-  constexpr double kFirst = 1.191042972397188e-16 * 1e36, kSecond = 1.438776877503933e7;
   SpectralCurve curve;
   for (double nm = kCieFirst; nm <= kCieLast; nm += 1) {
     curve.nm.push_back(nm);

@@ -31,6 +31,9 @@ Rgb linear_srgb(const std::array<double, 3>& xyz);
 // linear_srgb(): a radiance of 1 at all wavelengths gives X = Y = Z = 1.
 std::array<double, 3> black_body_xyz(double kelvin);
 
+// Returns the largest spectral radiance of a black body over all wavelengths [W/(m^2 sr nm)].
+double black_body_peak(double kelvin);
+
 // Returns the linear sRGB of light with the same power at all wavelengths and luminance 1: X = Y = Z = 1,
 // which is not white.
 Rgb equal_energy_srgb();

@@ -11,6 +11,10 @@ namespace ls::render {
 // error below 1e-4. 0 below 200 K and for NaN; proportional to the temperature above 1e6 K (Rayleigh-Jeans).
 C3 black_body_radiance(float kelvin);
 
+// The same divided by the largest spectral radiance of that body over all wavelengths, so that its spectrum
+// has the peak 1.
+C3 black_body_of_peak_one(float kelvin);
+
 // The temperature [K] below which black_body_radiance() is 0.
 inline constexpr float kColdest = 200;
 

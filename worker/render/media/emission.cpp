@@ -119,11 +119,17 @@ class EmissionWalk {
     V3d e(m_.emission);
     if (!emitter_) return e;
     const V3 q = emitter_->index(t);
-    if (m_.emission_kind == EmissionKind::black_body)
-      return e *
-             V3d(black_body_radiance(m_.kelvin_offset + m_.kelvin_scale * m_.emitter[0]->value_anywhere(q)));
+    if (m_.emission_kind == EmissionKind::black_body) {
+      const float kelvin = m_.kelvin_offset + m_.kelvin_scale * m_.emitter[0]->value_anywhere(q);
+      return e * V3d(m_.peak_one ? black_body_of_peak_one(kelvin) : black_body_radiance(kelvin)) * weight(t);
+    }
     for (int c = 0; c < 3; ++c) e[c] *= m_.emitter[c]->value_anywhere(q);
     return e;
+  }
+  double weight(double t) const {
+    if (!m_.weight) return 1;
+    const V3 q = m_.weight->to_index(o_ + d_ * static_cast<float>(t));
+    return m_.weight->in_domain(q) ? m_.weight->value_anywhere(q) : 0;
   }
   double density_at(double t) const { return m_.density->value_anywhere(density_.index(t)); }
   double depth(double a, double b) const { return density_.pass(*m_.density, a, b).integral; }

@@ -97,6 +97,11 @@ class Grid {
     return macro_[(static_cast<std::size_t>(z) * cells_[1] + y) * cells_[0] + x];
   }
   const MacroCell& cell(std::size_t number) const { return macro_[number]; }
+  bool in_domain(const V3& index) const {
+    for (int i = 0; i < 3; ++i)
+      if (!(index[i] >= lo_[i] && index[i] <= hi_[i])) return false;
+    return true;
+  }
   V3 domain_lo() const { return lo_; }
   V3 domain_hi() const { return hi_; }
   float max_value() const { return max_value_; }

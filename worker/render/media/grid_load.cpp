@@ -72,7 +72,13 @@ Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d
                     "along each axis",
                     files.name(v.file), n[0], n[1], n[2]));
   }
-  const double margin = node_centred ? 0 : .5;
+  if (v.border && (node_centred || v.wrap != Wrap::clamp || std::min({n[0], n[1], n[2]}) < 3))
+    return fail(Errc::invalid_argument,
+                fmt::format("{}: a grid with a border has three voxels or more along each axis, their values "
+                            "at their centres, and does not wrap",
+                            files.name(v.file)));
+  // How far the box reaches beyond the outermost values, in voxels.
+  const double margin = node_centred ? 0 : v.border ? -.5 : .5;
   const V3d last(n[0] - 1, n[1] - 1, n[2] - 1), steps = last + V3d(2 * margin);
   Affine to_nodes;
   to_nodes.a = {steps.x, 0, 0, 0, steps.y, 0, 0, 0, steps.z};

@@ -56,7 +56,9 @@ struct Medium {
   C3 emission{0, 0, 0};
   std::array<const Grid*, 3> emitter{};  // null: the value is 1 everywhere
   float kelvin_scale = 1, kelvin_offset = 0;
-  int priority = 0;  // where media overlap, only those of the highest priority are in effect
+  bool peak_one = false;         // for black_body: spectra are divided by their peak
+  const Grid* weight = nullptr;  // for black_body: a factor on the emission, 0 outside of this grid
+  int priority = 0;              // where media overlap, only those of the highest priority are in effect
   bool chromatic() const { return sigma_t.x != sigma_t.y || sigma_t.y != sigma_t.z || by_channel[0]; }
 
   // Returns the scattering coefficients per unit of density at the world point p of a grid.

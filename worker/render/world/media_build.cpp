@@ -79,12 +79,19 @@ Result<Medium> homogeneous(const Scene& scene, const HomogeneousMedium& m, doubl
   return out;
 }
 
+// As the density_to_sigma of an emitter's grid this forces small macro cells, so that those without emission
+// can be skipped.
+constexpr double kFine = 1e30;
+// More than any component of a black body of peak 1: its XYZ are at most 1 each, and the positive elements of
+// a row of the matrix from XYZ to linear sRGB add up to less than this.
+constexpr double kBrightestOfPeakOne = 3.25;
+
 struct HeteroBuilder {
   const Scene& scene;
   const HeterogeneousMedium& m;
   const AssetLoader& files;
   World& w;
-  double per_unit;  // factor of the density, per world unit
+  double per_unit;  // factor of the density without the tint, per world unit
   Medium out;
   Rgb sigma{};  // out.sigma_t before rounding to float32
 
@@ -101,19 +108,21 @@ struct HeteroBuilder {
   Result<void> albedo();
   Result<void> set_emission();
   Result<void> medium_emission_of(EmissionKind kind, const Volume& source);
+  Result<void> black_bodies(const Volume& temperature);
+  Result<LoadedVolume> one_channel(const Volume& volume, std::string_view what) const;
 };
 
 Result<void> HeteroBuilder::density() {
   const Volume& volume = scene.volumes.at(m.sigma_t.value);
-  sigma = {per_unit, per_unit, per_unit};
+  sigma = times(m.tint, per_unit);
   Volume shape = volume;
   if (auto* c = std::get_if<ConstVolume>(&shape)) {
     // A constant density, which may be a colour, is multiplied into the coefficients; the grid is then 1
     // inside the medium.
-    sigma = times(c->value, per_unit);
+    sigma = times(c->value, sigma);
     c->value = {1, 1, 1};
   }
-  auto loaded = load(shape, per_unit);
+  auto loaded = load(shape, per_unit * std::max({m.tint[0], m.tint[1], m.tint[2]}));
   if (!loaded) return tl::unexpected(loaded.error());
   std::vector<Grid>& grids = loaded->channels;
   if (grids.size() == 3 && grids[0].same_values(grids[1]) && grids[0].same_values(grids[2])) grids.resize(1);
@@ -125,6 +134,10 @@ Result<void> HeteroBuilder::density() {
   }
   if (auto ok = check_extinction(sigma, largest, w.geometry.scale); !ok) return tl::unexpected(ok.error());
   if (grids.size() == 3) {
+    if (sigma[0] != sigma[1] || sigma[1] != sigma[2])
+      return fail(Errc::invalid_argument,
+                  fmt::format("{}: a density of three channels has colours of its own: leave out 'tint'",
+                              files.name(std::get<GridVolume>(volume).file)));
     for (Grid& g : grids)
       if (g.cell_size() != cells) g.use_cells(cells);
     Grid mean = Grid::mean(grids[0], grids[1], grids[2]);
@@ -157,38 +170,64 @@ Result<void> HeteroBuilder::set_emission() {
   if (m.emission) return medium_emission_of(EmissionKind::per_length, scene.volumes.at(m.emission->value));
   if (m.source_radiance)
     return medium_emission_of(EmissionKind::per_absorption, scene.volumes.at(m.source_radiance->value));
-  if (m.temperature)
-    return medium_emission_of(EmissionKind::black_body, scene.volumes.at(m.temperature->value));
+  if (m.temperature) return black_bodies(scene.volumes.at(m.temperature->value));
   return {};
 }
 
 Result<void> HeteroBuilder::medium_emission_of(EmissionKind kind, const Volume& source) {
   const double k = m.emission_scale / (kind == EmissionKind::per_length ? w.geometry.scale : 1);
-  const auto kelvin = [&](double value) {
-    return static_cast<float>(m.temperature_offset + m.temperature_scale * value);
-  };
-  if (const auto* c = std::get_if<ConstVolume>(&source)) {
-    if (kind != EmissionKind::black_body) return shine(out, kind, times(c->value, k), 1);
-    const C3 b = black_body_radiance(kelvin(c->value[0]));
-    return shine(out, EmissionKind::per_absorption, {k * b.x, k * b.y, k * b.z}, 1);
-  }
-  // This density_to_sigma forces small macro cells, so that those without emission can be skipped.
-  constexpr double kFine = 1e30;
+  if (const auto* c = std::get_if<ConstVolume>(&source)) return shine(out, kind, times(c->value, k), 1);
   auto loaded = load(source, kFine);
   if (!loaded) return tl::unexpected(loaded.error());
   double largest = 0;
   for (const Grid& g : loaded->channels) largest = std::max<double>(largest, g.max_value());
-  if (kind == EmissionKind::black_body) {
-    if (loaded->channels.size() != 1)
-      return fail(Errc::invalid_argument,
-                  fmt::format("{}: a temperature grid has one channel, this one has {}",
-                              files.name(std::get<GridVolume>(source).file), loaded->channels.size()));
-    out.kelvin_scale = static_cast<float>(m.temperature_scale);
-    out.kelvin_offset = static_cast<float>(m.temperature_offset);
-    largest = max_component(black_body_radiance(kelvin(largest)));
-  }
   out.emitter = keep(*loaded);
   return shine(out, kind, {k, k, k}, largest);
+}
+
+Result<LoadedVolume> HeteroBuilder::one_channel(const Volume& volume, std::string_view what) const {
+  auto loaded = load(volume, kFine);
+  if (loaded && loaded->channels.size() != 1)
+    return fail(Errc::invalid_argument,
+                fmt::format("{}: {} grid has one channel, this one has {}",
+                            files.name(std::get<GridVolume>(volume).file), what, loaded->channels.size()));
+  return loaded;
+}
+
+Result<void> HeteroBuilder::black_bodies(const Volume& temperature) {
+  Rgb k{m.emission_scale, m.emission_scale, m.emission_scale};
+  const Grid* weight = nullptr;
+  if (m.emission_weight) {
+    const Volume& volume = scene.volumes.at(m.emission_weight->value);
+    if (const auto* c = std::get_if<ConstVolume>(&volume)) {
+      k = times(k, c->value);
+    } else {
+      auto loaded = one_channel(volume, "an emission_weight");
+      if (!loaded) return tl::unexpected(loaded.error());
+      weight = keep(*loaded)[0];
+    }
+  }
+  const double heaviest = weight ? weight->max_value() : 1;
+  const auto light = [&](double value) {
+    const auto kelvin = static_cast<float>(m.temperature_offset + m.temperature_scale * value);
+    return m.peak_one ? black_body_of_peak_one(kelvin) : black_body_radiance(kelvin);
+  };
+  if (const auto* c = std::get_if<ConstVolume>(&temperature)) {
+    const C3 b = light(c->value[0]);
+    if (weight) out.emitter = {weight, weight, weight};
+    return shine(out, EmissionKind::per_absorption, {k[0] * b.x, k[1] * b.y, k[2] * b.z}, heaviest);
+  }
+  auto loaded = one_channel(temperature, "a temperature");
+  if (!loaded) return tl::unexpected(loaded.error());
+  out.emitter = keep(*loaded);
+  out.kelvin_scale = static_cast<float>(m.temperature_scale);
+  out.kelvin_offset = static_cast<float>(m.temperature_offset);
+  out.peak_one = m.peak_one;
+  out.weight = weight;
+  // The hottest of the bodies of peak 1 need not be the brightest, so the bound for all of them is used.
+  const C3 hottest = light(out.emitter[0]->max_value());
+  const double largest = is_black(hottest) ? 0 : m.peak_one ? kBrightestOfPeakOne : max_component(hottest);
+  return shine(out, EmissionKind::black_body, k, largest * heaviest);
 }
 
 Result<Medium> heterogeneous(const Scene& scene, const HeterogeneousMedium& m, const AssetLoader& files,

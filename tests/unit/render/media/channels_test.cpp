@@ -263,5 +263,40 @@ TEST(Channels, AFileOfThreeChannelsIsReadInOrder) {
   EXPECT_LT(e.standard_error[1], .01);
 }
 
+// Likewise of one channel and a tint: absorption alone, and no light but the environment's.
+TEST(Channels, ATintIsAFactorByChannel) {
+  const std::vector<float> one(60, 1);
+  SceneBuilder builder = lit_box(one, 1);
+  builder.scene.emitters.clear();
+  builder.environment();
+  auto& medium = std::get<HeterogeneousMedium>(builder.scene.media[0]);
+  medium.albedo = builder.constant({0, 0, 0});
+  medium.tint = {0, .5, 2};
+  builder.look({-5, 0, 0}, {0, 0, 0}, 1e-3);
+
+  EXPECT_TRUE(test::world_of(builder)->need.chromatic);
+  const test::Estimate e = test::estimate(builder, 64);
+
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double expected = std::exp(-1.5 * 2 * medium.tint[c]);
+    EXPECT_NEAR(e.mean[c], expected, 5 * e.standard_error[c] + 1e-5) << c;
+  }
+}
+
+TEST(Channels, ATintOfADensityOfThreeChannelsIsRefused) {
+  std::vector<float> three;
+  for (int i = 0; i < 180; ++i) three.push_back(static_cast<float>(i % 5));
+  SceneBuilder builder = lit_box(three, 3);
+  auto& medium = std::get<HeterogeneousMedium>(builder.scene.media[0]);
+  medium.tint = {.5, .5, .5};
+  EXPECT_TRUE(build_world(builder.scene, test::settings_of(builder.scene), builder.files, 1));
+  medium.tint = {.5, 1, .5};
+
+  const auto world = build_world(builder.scene, test::settings_of(builder.scene), builder.files, 1);
+
+  ASSERT_FALSE(world);
+  EXPECT_NE(world.error().message.find("leave out 'tint'"), std::string::npos) << world.error().message;
+}
+
 }  // namespace
 }  // namespace ls::render

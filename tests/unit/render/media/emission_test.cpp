@@ -213,6 +213,43 @@ TEST(MediumEmission, OfTwoGridsAgreesWithQuadrature) {
   }
 }
 
+// Density, temperatures and weights in different places, and the ray passes out of the weights' box where
+// there is still a density. 5 standard errors and 1e-3 of the quadrature, as above.
+TEST(MediumEmission, OfBodiesOfPeakOneIsWeighted) {
+  const Grid density = unit_grid({9, 9, 9}, random_values({9, 9, 9}, 5), 0, 3);
+  const Grid fire({11, 8, 9}, random_values({11, 8, 9}, 8), Affine::scale_translate(1.7, V3d(1, 2, 1.5)),
+                  V3d(0), V3d(10, 7, 8), 1);
+  const Grid weight({3, 3, 3}, random_values({3, 3, 3}, 9), Affine::scale_translate(.5, V3d(1, 1, 1)), V3d(0),
+                    V3d(2, 2, 2), 1);
+  const V3 o(-1, .3f, 1.1f), d = normalize(V3(9, 7.1f, 6.2f));
+  const auto inside = [](const Grid& g, const V3& p) {
+    const V3 q = g.to_index(p);
+    return g.in_domain(q) ? static_cast<double>(g.value_anywhere(q)) : 0.;
+  };
+  const C3 sigma(.2f, 1, 6);
+  Medium m = of_grid(density, sigma, EmissionKind::black_body);
+  m.kelvin_scale = 3000;
+  m.kelvin_offset = 500;
+  m.peak_one = true;
+  m.weight = &weight;
+  emit(m, fire);
+
+  const Mean r = mean_of(m, o, d, 20000);
+
+  for (int c = 0; c < 3; ++c) {
+    const auto e = [&](const V3& p) {
+      const double value = inside(fire, p);
+      return value > 0 ? kEmission[c] * sigma[c] * inside(density, p) * inside(weight, p) *
+                             black_body_of_peak_one(static_cast<float>(500 + 3000 * value))[c]
+                       : 0.;
+    };
+    const double expected = quadrature(density, sigma[c], e, o, d, 25);
+    ASSERT_GT(expected, 0);
+    EXPECT_NEAR(r.mean[c], expected, 5 * r.error[c] + 1e-3 * expected) << c;
+    EXPECT_LE(r.error[c], .02 * expected) << c;
+  }
+}
+
 TEST(MediumEmission, OfGridsWithoutInterpolationAgreesToo) {
   const Grid density = voxel_grid({7, 7, 7}, random_values({7, 7, 7}, 5), kNearest, Wrap::clamp, 3);
   const Medium m = of_grid(density, C3(1), EmissionKind::per_absorption);
@@ -248,6 +285,33 @@ TEST(BlackBody, HasTheColourAndLuminanceOfItsTemperature) {
   EXPECT_NEAR(y / (x + y + z), .40745, 2e-4);
   // Its blue is outside of sRGB and made 0, which adds less than .1 % of the luminance.
   EXPECT_NEAR(luminance(black_body_radiance(2041.4f)) * 683.002 * 106.857 / 600000, 1, .006);
+}
+
+// Planck's law by its constants, and its largest value found by trying: steps of 1e-4 of the wavelength are
+// off the peak by at most (5e-5)^2 / 2 times its bend, which is below 20 there.
+TEST(BlackBody, OfPeakOneIsDividedByItsLargestValue) {
+  const double h = 6.62607015e-34, c = 299792458, k = 1.380649e-23;
+  for (const double t : {250., 1500., 2856., 6500., 30000.}) {
+    double largest = 0;
+    for (double nm = 2e6 / t; nm < 4e6 / t; nm *= 1.0001) {
+      const double m = nm * 1e-9;
+      largest = std::max(largest, 2 * h * c * c / std::pow(m, 5) / std::expm1(h * c / (m * k * t)) * 1e-9);
+    }
+    const C3 whole = black_body_radiance(static_cast<float>(t)),
+             one = black_body_of_peak_one(static_cast<float>(t));
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(one[i] * largest, whole[i], 1e-6 * whole[i]) << t << " " << i;
+  }
+}
+
+// No component is above the bound that media_build.cpp checks emission with, and cold bodies are dark.
+TEST(BlackBody, OfPeakOneIsBounded) {
+  EXPECT_EQ(black_body_of_peak_one(199), C3(0));
+  EXPECT_EQ(black_body_of_peak_one(std::numeric_limits<float>::quiet_NaN()), C3(0));
+  for (float t = 200; t < 1e12f; t *= 1.07f) {
+    const C3 b = black_body_of_peak_one(t);
+    EXPECT_TRUE(is_finite(b)) << t;
+    EXPECT_LE(max_component(b), 3.25f) << t;
+  }
 }
 
 TEST(BlackBody, IsDarkWhereItIsColdAndNeverMoreThanRayleighAndJeans) {

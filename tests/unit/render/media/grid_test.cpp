@@ -169,6 +169,40 @@ TEST(Grid, NodesReachFromFaceToFaceAndNothingIsBeyond) {
       << flat.error().message;
 }
 
+// Four voxels along x, of which the two in the middle fill the box.
+TEST(Grid, ABorderOnlyTakesPartInTheInterpolation) {
+  const auto load = [](const std::array<int, 3>& size, Wrap wrap, bool node_centred) {
+    test::SceneBuilder builder({1, 1});
+    std::vector<float> values;
+    for (int i = 0; i < size[0] * size[1] * size[2]; ++i)
+      values.push_back(std::array{0.f, 2.f, 6.f, 0.f}[static_cast<std::size_t>(i % size[0])]);
+    const VolumeIndex v = builder.grid(size, values, Transform());
+    auto& volume = std::get<GridVolume>(builder.scene.volumes[v.value]);
+    volume.border = true;
+    volume.wrap = wrap;
+    volume.node_centred = node_centred;
+    return load_volume(volume, AssetLoader{builder.scene, builder.files}, V3d(0), 1, 1);
+  };
+  const auto loaded = load({4, 3, 3}, Wrap::clamp, false);
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  const Grid& g = loaded->channels.at(0);
+  EXPECT_FLOAT_EQ(value_at(g, {0, .5f, .5f}), 1);
+  EXPECT_FLOAT_EQ(value_at(g, {.25f, .5f, .5f}), 2);
+  EXPECT_FLOAT_EQ(value_at(g, {.5f, .5f, .5f}), 4);
+  EXPECT_FLOAT_EQ(value_at(g, {.75f, .5f, .5f}), 6);
+  EXPECT_FLOAT_EQ(value_at(g, {1, .5f, .5f}), 3);
+  EXPECT_TRUE(g.in_domain(g.to_index({0, 0, 0})));
+  EXPECT_TRUE(g.in_domain(g.to_index({1, 1, 1})));
+  EXPECT_FALSE(g.in_domain(g.to_index({1.001f, .5f, .5f})));
+  EXPECT_FALSE(g.in_domain(g.to_index({.5f, -.001f, .5f})));
+  // Nothing is outside of the box: trapezoids of widths 1/4, 1/2 and 1/4.
+  EXPECT_NEAR(g.exact_integral(V3d(-3, .5, .5), V3d(1, 0, 0), 0, 9), .25 * 1.5 + .5 * 4 + .25 * 4.5, 1e-6);
+
+  EXPECT_FALSE(load({4, 2, 3}, Wrap::clamp, false));
+  EXPECT_FALSE(load({4, 3, 3}, Wrap::repeat, false));
+  EXPECT_FALSE(load({4, 3, 3}, Wrap::clamp, true));
+}
+
 TEST(Grid, AConstantVolumeFillsTheCubeThatItsTransformMoves) {
   const test::SceneBuilder builder({1, 1});
   using test::operator*;

@@ -403,8 +403,9 @@ MediumInterface "smoke" "" Material "interface" Shape "sphere")"),
   const auto& medium = std::get<HeterogeneousMedium>(r.scene->media.at(0));
   EXPECT_EQ(medium.scale, 2);
   const auto& grid = std::get<GridVolume>(r.scene->volumes.at(medium.sigma_t.value));
-  const Transform want{{4, 0, 0, -1, 0, 3, 0, -1, 0, 0, 3, -1, 0, 0, 0, 1}};
+  const Transform want{{2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
   EXPECT_EQ(grid.to_world, want);
+  EXPECT_TRUE(grid.border);
   const std::string bytes = assets.memory.files.at(r.scene->assets.at(grid.file.value).name);
   ASSERT_EQ(bytes.size(), 48u + 4 * 4 * 3 * 3);
   const auto value = [&](int x, int y, int z) {

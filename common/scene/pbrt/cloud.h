@@ -1,0 +1,38 @@
+// The density of pbrt's medium "cloud": noise that is thinned out with height and clamped to [0, 1]
+// (CloudMedium::Density in pbrt-v4's src/pbrt/media.h).
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "common/scene/made_files.h"
+#include "common/scene/scene.h"
+
+namespace ls::scene::pbrt {
+
+struct Cloud {
+  double density = 1, wispiness = 1, frequency = 5;
+  Vec3 low{{0, 0, 0}}, high{{1, 1, 1}};  // its box
+  bool operator==(const Cloud&) const = default;
+};
+
+// Returns the density at a point of the medium's own coordinates, without regard to the box.
+double density_at(const Cloud& cloud, const Vec3& p);
+
+// The nodes of a grid from face to face of the cloud's box, and how many of them are in a cell of its finest
+// noise, along an axis.
+struct CloudNodes {
+  std::array<int, 3> sides{};
+  double per_cell = 0;
+  std::size_t count() const { return std::size_t(sides[0]) * std::size_t(sides[1]) * std::size_t(sides[2]); }
+};
+// The number of nodes that resolves the noise well, and the least number that resolves it at all.
+inline constexpr double kWantedPerCell = 4, kLeastPerCell = 2;
+
+// Returns the finest grid of at most kWantedPerCell nodes in a cell and of at most `most` nodes. nullopt:
+// even kLeastPerCell in a cell are more nodes than that.
+std::optional<CloudNodes> nodes_for(const Cloud& cloud, std::size_t most);
+
+MadeGrid cloud_grid(const Cloud& cloud, const CloudNodes& nodes);
+
+}  // namespace ls::scene::pbrt

@@ -1,0 +1,63 @@
+// What the translations of pbrt's media share. Each is a function that adds to the element of a medium, and
+// returns false if the medium is wrong, which was reported.
+#pragma once
+
+#include "common/scene/pbrt/parts.h"
+
+namespace ls::scene::pbrt {
+
+// A MakeNamedMedium with the state that it stands in.
+struct MediumSource {
+  Translation& t;
+  Params& p;
+  const Placed& ctm;
+
+  bool wrong(const Span& at, std::string text) const {
+    p.error(at, std::move(text));
+    return false;
+  }
+};
+
+// Absorption and scattering in our terms.
+struct Coefficients {
+  Rgb extinction{}, albedo{};
+};
+Coefficients coefficients(const Rgb& absorption, const Rgb& scattering);
+Coefficients coefficients(MediumSource& m);  // from sigma_a and sigma_s
+void add_albedo(MediumSource& m, Element& out, const Rgb& albedo);
+// Adds the factor on the density of a `heterogeneous` medium: a number, and a tint if it differs by channel.
+void add_extinction(MediumSource& m, Element& out, const Rgb& extinction);
+
+// The integral of the CIE observer's y over wavelengths in nm, as pbrt-v4 has it (CIE_Y_integral in
+// src/pbrt/util/spectrum.h). pbrt scales the spectrum of a light so that its integral with y is 1, but
+// neither black bodies in media nor the Le of "rgbgrid" (GridMedium, NanoVDBMedium and RGBGridMedium in
+// src/pbrt/media.h). So their luminance is this times the luminance that the same spectrum has here, where
+// equal energy 1 at all wavelengths has luminance 1.
+inline constexpr double kPhotometric = 106.856895;
+
+// Adds what turns the values of a `temperature` into light as pbrt does: a body of (value -
+// temperatureoffset)
+// * temperaturescale kelvin, whose spectrum has the peak 1, times `factor`.
+bool add_black_bodies(MediumSource& m, Element& out, double factor);
+
+// The grids' box in the medium's own coordinates.
+struct Box {
+  Vec3 low{{0, 0, 0}}, high{{1, 1, 1}};
+};
+bool read_box(MediumSource& m, Box& box);  // from p0 and p1
+// What of a grid fills its box: its voxels but the outermost, or its nodes from face to face.
+enum class Filling { border, nodes };
+void add_volume(MediumSource& m, Element& out, const char* name, const std::string& file, const Box& box,
+                Filling filling);
+// Keeps the grid as a file and adds it as a volume.
+bool add_grid(MediumSource& m, Element& out, const char* name, const MadeGrid& grid, const Box& box,
+              Filling filling);
+
+// grids.cpp
+bool uniform_grid(MediumSource& m, Element& out);
+bool rgb_grid(MediumSource& m, Element& out);
+
+// cloud_medium.cpp
+bool cloud(MediumSource& m, Element& out);
+
+}  // namespace ls::scene::pbrt
