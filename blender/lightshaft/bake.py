@@ -3,21 +3,21 @@
 import bpy
 
 from .nodes import Place, constant, output_node
-from .textures import bake_key
+from .textures import bake_key, exported_as_it_is
 
 INPUTS = ("Base Color", "Color", "Roughness", "Metallic", "Alpha", "Transmission Weight", "Emission Color")
 SHADERS = {"BSDF_PRINCIPLED", "BSDF_DIFFUSE", "BSDF_GLOSSY", "EMISSION"}
 
 
 def procedural_inputs(material):
-    """(node, input) of each shader that nodes other than an image feed; those in groups can't be baked apart."""
+    """(node, input) of each shader that is fed by what can't be exported as it is; those in groups can't be baked apart."""
     for node in material.node_tree.nodes if material.node_tree else ():
         if node.type in SHADERS:
             place = Place(node)
             for socket in node.inputs:
                 if socket.name in INPUTS and socket.is_linked and constant(place, socket) is None:
-                    source, _ = place.source(socket)
-                    if source is not None and source.node.type != "TEX_IMAGE":
+                    source, output = place.source(socket)
+                    if source is not None and not exported_as_it_is(source, output):
                         yield node, socket
 
 

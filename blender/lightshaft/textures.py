@@ -11,6 +11,7 @@ from .nodes import constant
 READ_AS_THEY_ARE = {".png", ".jpg", ".jpeg", ".bmp", ".exr", ".hdr"}
 UPSIDE_DOWN = np.array([[1, 0, 0, 0], [0, -1, 0, 1], [0, 0, 1, 0], [0, 0, 0, 1]], float)
 WRAP = {"REPEAT": "repeat", "EXTEND": "clamp", "MIRROR": "mirror"}
+CHECKER_OUTPUTS = ("Color", "Fac", "Factor")
 
 
 class Textures:
@@ -27,13 +28,13 @@ class Textures:
             return fixed
         source, output = place.source(socket)
         node = source.node if source else None
+        baked = baked_image(owner.material, place.node, socket)
+        if baked is not None and not exported_as_it_is(source, output):
+            return self.bitmap(baked, owner)
         if node and node.type == "TEX_IMAGE":
             return self.image_node(source, output, owner)
-        if node and node.type == "TEX_CHECKER" and output.name in ("Color", "Fac", "Factor"):
+        if node and node.type == "TEX_CHECKER" and output.name in CHECKER_OUTPUTS:
             return self.checker(source, output, owner, number=socket.type == "VALUE")
-        baked = baked_image(owner.material, place.node, socket)
-        if baked is not None:
-            return self.bitmap(baked, owner)
         title = source.title if source else socket.name
         self.problems.error(
             f"{owner}, node '{title}': '{place.title}' > {name} is procedural. "
@@ -180,7 +181,8 @@ class Textures:
         )
         if source is None or not isinstance(scale, float):
             self.problems.error(
-                f"{where}: a checker needs UV coordinates and one scale. Link Texture Coordinate > UV to its Vector"
+                f"{where}: a checker needs UV coordinates and one scale. "
+                "Link Texture Coordinate > UV to its Vector, or press Bake Procedural Textures in Render Properties > Lightshaft"
             )
             return None
         mapping = self.mapping(place, where)
@@ -191,6 +193,30 @@ class Textures:
         # Blender's first square has Color2. Where a number is wanted, Lightshaft's colours change places.
         first, second = colours if number else colours[::-1]
         return element("texture", "checkerboard", None, color0=first, color1=second, to_uv=to_uv)
+
+
+def exported_as_it_is(place, output):
+    """Whether a texture node needs no baking: an image, or a checker of one scale and fixed colours, looked up by UV."""
+    if place is None:
+        return False
+    node = place.node
+    if node.type == "TEX_IMAGE":
+        return node.projection == "FLAT" and by_uv(place)
+    if node.type == "TEX_CHECKER":
+        fixed = all(constant(place, place.input(name)) is not None for name in ("Scale", "Color1", "Color2"))
+        linked = place.source(place.input("Vector"))[0] is not None
+        return output.name in CHECKER_OUTPUTS and fixed and linked and by_uv(place)
+    return False
+
+
+def by_uv(place):
+    """Whether the coordinates of a texture come from UV, through mappings that do not vary; what is not linked is UV."""
+    source, output = place.source(place.input("Vector"))
+    if source is None:
+        return True
+    if source.node.type == "MAPPING":
+        return mapping_matrix(source) is not None and by_uv(source)
+    return source.node.type == "UVMAP" or (source.node.type == "TEX_COORD" and output.name == "UV")
 
 
 def mapping_matrix(place):

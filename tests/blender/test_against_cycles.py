@@ -272,3 +272,22 @@ def test_baked_procedural_textures(stage):
         stage.render()
     bpy.ops.lightshaft.bake(size=256)
     differ(stage, EXACT, 16)
+
+
+@pytest.mark.parametrize("kind", ["checker", "image"])
+def test_textures_by_other_coordinates_than_uv_are_baked(stage, kind):
+    from stage import bpy, feed, image, material
+
+    stage.sky(1)
+    painted = material("Painted", "ShaderNodeBsdfDiffuse")
+    if kind == "checker":
+        feed(painted, "Color", "ShaderNodeTexChecker")  # by generated coordinates, as nothing is linked
+    else:
+        texture = feed(painted, "Color", "ShaderNodeTexImage", image=image("gradient", gradient()))
+        where = painted.node_tree.nodes.new("ShaderNodeTexCoord")
+        painted.node_tree.links.new(where.outputs["Object"], texture.inputs[0])
+    stage.plane(painted)
+    with pytest.raises(RuntimeError, match="'Painted'.*Bake Procedural Textures"):
+        stage.render()
+    bpy.ops.lightshaft.bake(size=256)
+    differ(stage, EXACT, 16)
