@@ -200,6 +200,17 @@ def test_an_image_turned_scaled_and_moved(stage):
     differ(stage, EXACT, 16)
 
 
+@pytest.mark.parametrize("metallic", [0.5, 1.0])
+def test_an_image_on_metal(stage, metallic):
+    from stage import feed, image, principled
+
+    stage.sky(1)
+    painted = principled("Painted", Metallic=metallic, Roughness=0.3)
+    feed(painted, "Base Color", "ShaderNodeTexImage", image=image("gradient", gradient()))
+    stage.plane(painted)
+    differ(stage, COATED, 16)
+
+
 def test_checkers(stage):
     from stage import feed, material
 
