@@ -11,6 +11,13 @@ from .nodes import constant
 READ_AS_THEY_ARE = {".png", ".jpg", ".jpeg", ".bmp", ".exr", ".hdr"}
 UPSIDE_DOWN = np.array([[1, 0, 0, 0], [0, -1, 0, 1], [0, 0, 1, 0], [0, 0, 0, 1]], float)
 WRAP = {"REPEAT": "repeat", "EXTEND": "clamp", "MIRROR": "mirror"}
+SHARES = {  # inputs of shaders that are shares of light or of a mix
+    "BSDF_PRINCIPLED": {"Base Color", "Metallic", "Roughness", "Transmission Weight", "Alpha"},
+    "BSDF_DIFFUSE": {"Color"},
+    "BSDF_GLOSSY": {"Color", "Roughness"},
+    "BSDF_GLASS": {"Color", "Roughness"},
+    "MIX_SHADER": {"Fac", "Factor"},
+}
 CHECKER_OUTPUTS = ("Color", "Fac", "Factor")
 
 
@@ -23,9 +30,10 @@ class Textures:
     def value(self, place, name, owner):
         """An input as a number, a colour or a texture element; None, with an error told, if it is nothing of these."""
         socket = place.input(name)
+        share = place.node.type in SHARES and name in SHARES[place.node.type]
         fixed = constant(place, socket)
         if fixed is not None:
-            return fixed
+            return self.within_one(fixed, place, name, owner) if share else fixed
         source, output = place.source(socket)
         node = source.node if source else None
         baked = baked_image(owner.material, place.node, socket)
@@ -34,13 +42,21 @@ class Textures:
         if node and node.type == "TEX_IMAGE":
             return self.image_node(source, output, owner)
         if node and node.type == "TEX_CHECKER" and output.name in CHECKER_OUTPUTS:
-            return self.checker(source, output, owner, number=socket.type == "VALUE")
+            return self.checker(source, output, owner, number=socket.type == "VALUE", share=share)
         title = source.title if source else socket.name
         self.problems.error(
             f"{owner}, node '{title}': '{place.title}' > {name} is procedural. "
             "Press Bake Procedural Textures in Render Properties > Lightshaft"
         )
         return None
+
+    def within_one(self, value, place, name, owner):
+        """A share of light, of which nothing reflects more than comes; Blender's fields take more."""
+        values = value if isinstance(value, list) else [value]
+        if max(values) > 1.001 or min(values) < -0.001:
+            self.problems.warning(f"{owner}, node '{place.title}': {name} is rendered as if within 0 and 1")
+        values = [min(max(v, 0.0), 1.0) for v in values]
+        return values if isinstance(value, list) else values[0]
 
     def image_node(self, place, output, owner, raw=None):
         node = place.node
@@ -170,7 +186,7 @@ class Textures:
         )
         return None
 
-    def checker(self, place, output, owner, number):
+    def checker(self, place, output, owner, number, share):
         where = f"{owner}, node '{place.title}'"
         source, _ = place.source(place.input("Vector"))
         scale = constant(place, place.input("Scale"))
@@ -188,6 +204,11 @@ class Textures:
         mapping = self.mapping(place, where)
         if mapping is None or any(colour is None for colour in colours):
             return None
+        if share:
+            colours = [
+                self.within_one(colour, place, f"Color{i}", owner) if isinstance(colour, list) else colour
+                for i, colour in enumerate(colours, 1)
+            ]
         # A checkerboard's period is two of Blender's squares.
         to_uv = np.diag([scale / 2, scale / 2, 1, 1]) @ mapping @ UPSIDE_DOWN
         # Blender's first square has Color2. Where a number is wanted, Lightshaft's colours change places.
