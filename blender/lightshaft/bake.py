@@ -3,21 +3,23 @@
 import bpy
 
 from .nodes import Place, constant, output_node
-from .textures import bake_key
+from .textures import bake_key, exported_as_it_is
 
-INPUTS = ("Base Color", "Color", "Roughness", "Metallic", "Alpha", "Transmission Weight", "Emission Color")
-SHADERS = {"BSDF_PRINCIPLED", "BSDF_DIFFUSE", "BSDF_GLOSSY", "EMISSION"}
+INPUTS = {
+    "Base Color", "Color", "Roughness", "Metallic", "Alpha", "Transmission Weight", "Emission Color", "Fac", "Factor",
+}  # fmt: skip
+SHADERS = {"BSDF_PRINCIPLED", "BSDF_DIFFUSE", "BSDF_GLOSSY", "EMISSION", "MIX_SHADER"}
 
 
 def procedural_inputs(material):
-    """(node, input) of each shader that nodes other than an image feed; those in groups can't be baked apart."""
+    """(node, input) of each shader that is fed by what can't be exported as it is; those in groups can't be baked apart."""
     for node in material.node_tree.nodes if material.node_tree else ():
         if node.type in SHADERS:
             place = Place(node)
             for socket in node.inputs:
                 if socket.name in INPUTS and socket.is_linked and constant(place, socket) is None:
-                    source, _ = place.source(socket)
-                    if source is not None and source.node.type != "TEX_IMAGE":
+                    source, output = place.source(socket)
+                    if source is not None and not exported_as_it_is(source, output):
                         yield node, socket
 
 
@@ -38,21 +40,28 @@ class LIGHTSHAFT_OT_bake(bpy.types.Operator):
             context.selected_objects,
         )
         scene.render.engine, scene.cycles.samples = "CYCLES", 1
+        done, failed = set(), {}
         try:
-            done = set()
             for item in [o for o in context.view_layer.objects if o.type == "MESH" and not o.hide_render]:
-                for slot in item.material_slots:
-                    if slot.material and slot.material not in done:
-                        for node, socket in list(procedural_inputs(slot.material)):
-                            self.bake(context, item, slot.material, node, socket)
+                for material in dict.fromkeys(slot.material for slot in item.material_slots if slot.material):
+                    if material in done:
+                        continue
+                    try:
+                        for node, socket in list(procedural_inputs(material)):
+                            self.bake(context, item, material, node, socket)
                             baked += 1
-                        done.add(slot.material)
-        except RuntimeError as error:
-            self.report({"ERROR"}, f"object '{item.name}': {error}")
-            return {"CANCELLED"}
+                        done.add(material)
+                    except RuntimeError as error:  # another object that has it may do
+                        why = str(error).strip().removeprefix("Error: ")
+                        failed.setdefault(material, f"object '{item.name}', material '{material.name}': {why}")
         finally:
             scene.render.engine, scene.cycles.samples = engine, samples
             select(context, active, selected)
+        for material in [m for m in failed if m not in done]:
+            self.report(
+                {"WARNING"},
+                f"{failed[material]}. What is hidden in the viewport or linked cannot be baked: show it, or make it local",
+            )
         self.report({"INFO"}, f"{baked} inputs baked")
         return {"FINISHED"}
 

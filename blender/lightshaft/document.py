@@ -20,8 +20,10 @@ def element(kind, plugin, name=None, *children, **values):
 def parameter(name, value):
     """A parameter by the type of its value: an element as it is, three numbers a colour, 4 x 4 a transform."""
     if isinstance(value, ElementTree.Element):
-        value.set("name", name)
-        return value
+        # Another element: a texture can be a parameter of several objects, under another name in each.
+        named = ElementTree.Element(value.tag, {**value.attrib, "name": name})
+        named.extend(value)
+        return named
     if isinstance(value, bool):
         return ElementTree.Element("boolean", name=name, value=str(value).lower())
     if isinstance(value, int):

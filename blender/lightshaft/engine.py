@@ -83,7 +83,8 @@ class LightshaftEngine(bpy.types.RenderEngine):
         settings, chosen = scene.lightshaft, preferences()
         spec = {
             "spp": settings.samples,
-            "seed": settings.seed + (scene.frame_current if settings.animate_seed else 0),
+            # Frames can be negative; a seed can't.
+            "seed": (settings.seed + (scene.frame_current if settings.animate_seed else 0)) % (1 << 32),
         }
         aov = sorted({row[3] for name, row in self.passes.items() if name not in ("Noise", "Denoised")})
         if aov:

@@ -11,6 +11,14 @@ from .nodes import constant
 READ_AS_THEY_ARE = {".png", ".jpg", ".jpeg", ".bmp", ".exr", ".hdr"}
 UPSIDE_DOWN = np.array([[1, 0, 0, 0], [0, -1, 0, 1], [0, 0, 1, 0], [0, 0, 0, 1]], float)
 WRAP = {"REPEAT": "repeat", "EXTEND": "clamp", "MIRROR": "mirror"}
+SHARES = {  # inputs of shaders that are shares of light or of a mix
+    "BSDF_PRINCIPLED": {"Base Color", "Metallic", "Roughness", "Transmission Weight", "Alpha"},
+    "BSDF_DIFFUSE": {"Color"},
+    "BSDF_GLOSSY": {"Color", "Roughness"},
+    "BSDF_GLASS": {"Color", "Roughness"},
+    "MIX_SHADER": {"Fac", "Factor"},
+}
+CHECKER_OUTPUTS = ("Color", "Fac", "Factor")
 
 
 class Textures:
@@ -22,24 +30,33 @@ class Textures:
     def value(self, place, name, owner):
         """An input as a number, a colour or a texture element; None, with an error told, if it is nothing of these."""
         socket = place.input(name)
+        share = place.node.type in SHARES and name in SHARES[place.node.type]
         fixed = constant(place, socket)
         if fixed is not None:
-            return fixed
+            return self.within_one(fixed, place, name, owner) if share else fixed
         source, output = place.source(socket)
         node = source.node if source else None
+        baked = baked_image(owner.material, place.node, socket)
+        if baked is not None and not exported_as_it_is(source, output):
+            return self.bitmap(baked, owner)
         if node and node.type == "TEX_IMAGE":
             return self.image_node(source, output, owner)
-        if node and node.type == "TEX_CHECKER" and output.name in ("Color", "Fac", "Factor"):
-            return self.checker(source, output, owner, number=socket.type == "VALUE")
-        baked = baked_image(owner.material, place.node, socket)
-        if baked is not None:
-            return self.bitmap(baked, owner)
+        if node and node.type == "TEX_CHECKER" and output.name in CHECKER_OUTPUTS:
+            return self.checker(source, output, owner, number=socket.type == "VALUE", share=share)
         title = source.title if source else socket.name
         self.problems.error(
             f"{owner}, node '{title}': '{place.title}' > {name} is procedural. "
             "Press Bake Procedural Textures in Render Properties > Lightshaft"
         )
         return None
+
+    def within_one(self, value, place, name, owner):
+        """A share of light, of which nothing reflects more than comes; Blender's fields take more."""
+        values = value if isinstance(value, list) else [value]
+        if max(values) > 1.001 or min(values) < -0.001:
+            self.problems.warning(f"{owner}, node '{place.title}': {name} is rendered as if within 0 and 1")
+        values = [min(max(v, 0.0), 1.0) for v in values]
+        return values if isinstance(value, list) else values[0]
 
     def image_node(self, place, output, owner, raw=None):
         node = place.node
@@ -169,7 +186,7 @@ class Textures:
         )
         return None
 
-    def checker(self, place, output, owner, number):
+    def checker(self, place, output, owner, number, share):
         where = f"{owner}, node '{place.title}'"
         source, _ = place.source(place.input("Vector"))
         scale = constant(place, place.input("Scale"))
@@ -180,17 +197,47 @@ class Textures:
         )
         if source is None or not isinstance(scale, float):
             self.problems.error(
-                f"{where}: a checker needs UV coordinates and one scale. Link Texture Coordinate > UV to its Vector"
+                f"{where}: a checker needs UV coordinates and one scale. "
+                "Link Texture Coordinate > UV to its Vector, or press Bake Procedural Textures in Render Properties > Lightshaft"
             )
             return None
         mapping = self.mapping(place, where)
         if mapping is None or any(colour is None for colour in colours):
             return None
+        if share:
+            colours = [
+                self.within_one(colour, place, f"Color{i}", owner) if isinstance(colour, list) else colour
+                for i, colour in enumerate(colours, 1)
+            ]
         # A checkerboard's period is two of Blender's squares.
         to_uv = np.diag([scale / 2, scale / 2, 1, 1]) @ mapping @ UPSIDE_DOWN
         # Blender's first square has Color2. Where a number is wanted, Lightshaft's colours change places.
         first, second = colours if number else colours[::-1]
         return element("texture", "checkerboard", None, color0=first, color1=second, to_uv=to_uv)
+
+
+def exported_as_it_is(place, output):
+    """Whether a texture node needs no baking: an image, or a checker of one scale and fixed colours, looked up by UV."""
+    if place is None:
+        return False
+    node = place.node
+    if node.type == "TEX_IMAGE":
+        return node.projection == "FLAT" and by_uv(place)
+    if node.type == "TEX_CHECKER":
+        fixed = all(constant(place, place.input(name)) is not None for name in ("Scale", "Color1", "Color2"))
+        linked = place.source(place.input("Vector"))[0] is not None
+        return output.name in CHECKER_OUTPUTS and fixed and linked and by_uv(place)
+    return False
+
+
+def by_uv(place):
+    """Whether the coordinates of a texture come from UV, through mappings that do not vary; what is not linked is UV."""
+    source, output = place.source(place.input("Vector"))
+    if source is None:
+        return True
+    if source.node.type == "MAPPING":
+        return mapping_matrix(source) is not None and by_uv(source)
+    return source.node.type == "UVMAP" or (source.node.type == "TEX_COORD" and output.name == "UV")
 
 
 def mapping_matrix(place):

@@ -200,6 +200,33 @@ def test_an_image_turned_scaled_and_moved(stage):
     differ(stage, EXACT, 16)
 
 
+@pytest.mark.parametrize("metallic", [0.5, 1.0])
+def test_an_image_on_metal(stage, metallic):
+    from stage import feed, image, principled
+
+    stage.sky(1)
+    painted = principled("Painted", Metallic=metallic, Roughness=0.3)
+    feed(painted, "Base Color", "ShaderNodeTexImage", image=image("gradient", gradient()))
+    stage.plane(painted)
+    differ(stage, COATED, 16)
+
+
+def test_a_bump(stage):
+    from stage import feed, image, material
+
+    stage.light("SUN", 3, rotation=(0.9, 0.2, 0))
+    painted = material("Painted", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.8))
+    bump = feed(painted, "Normal", "ShaderNodeBump", "Normal")
+    bump.inputs["Distance"].default_value = 0.3
+    y, x = np.mgrid[0:256, 0:256] / 256
+    heights = 0.5 + 0.5 * np.sin(6 * np.pi * x) * np.cos(4 * np.pi * y)
+    texture = painted.node_tree.nodes.new("ShaderNodeTexImage")
+    texture.image = image("waves", np.stack([heights] * 3 + [np.ones_like(x)], axis=2), "Non-Color")
+    painted.node_tree.links.new(texture.outputs["Color"], bump.inputs["Height"])
+    stage.plane(painted)
+    differ(stage, EXACT, 16)
+
+
 def test_checkers(stage):
     from stage import feed, material
 
@@ -272,3 +299,59 @@ def test_baked_procedural_textures(stage):
         stage.render()
     bpy.ops.lightshaft.bake(size=256)
     differ(stage, EXACT, 16)
+
+
+@pytest.mark.parametrize("kind", ["checker", "image"])
+def test_textures_by_other_coordinates_than_uv_are_baked(stage, kind):
+    from stage import bpy, feed, image, material
+
+    stage.sky(1)
+    painted = material("Painted", "ShaderNodeBsdfDiffuse")
+    if kind == "checker":
+        feed(painted, "Color", "ShaderNodeTexChecker")  # by generated coordinates, as nothing is linked
+    else:
+        texture = feed(painted, "Color", "ShaderNodeTexImage", image=image("gradient", gradient()))
+        where = painted.node_tree.nodes.new("ShaderNodeTexCoord")
+        painted.node_tree.links.new(where.outputs["Object"], texture.inputs[0])
+    stage.plane(painted)
+    with pytest.raises(RuntimeError, match="'Painted'.*Bake Procedural Textures"):
+        stage.render()
+    bpy.ops.lightshaft.bake(size=256)
+    differ(stage, EXACT, 16)
+
+
+def test_the_share_of_a_mix_of_shaders_is_baked(stage):
+    from stage import bpy, material
+
+    stage.sky(1)
+    painted = material("Painted", "ShaderNodeMixShader")
+    tree = painted.node_tree
+    mix = next(node for node in tree.nodes if node.type == "MIX_SHADER")
+    for socket, colour in zip(list(mix.inputs)[1:], ((0.8, 0.1, 0.1, 1), (0.1, 0.1, 0.8, 1))):
+        paint = tree.nodes.new("ShaderNodeBsdfDiffuse")
+        paint.inputs["Color"].default_value = colour
+        tree.links.new(paint.outputs[0], socket)
+    noise = tree.nodes.new("ShaderNodeTexNoise")
+    noise.inputs["Scale"].default_value = 2
+    tree.links.new(noise.outputs[0], mix.inputs[0])
+    stage.plane(painted)
+    with pytest.raises(RuntimeError, match="'Mix Shader'.*Bake Procedural Textures"):
+        stage.render()
+    bpy.ops.lightshaft.bake(size=256)
+    differ(stage, EXACT, 16)
+
+
+def test_one_that_cannot_be_baked_leaves_the_others(stage):
+    from stage import bpy, feed, material
+
+    hidden, seen = (material(name, "ShaderNodeBsdfDiffuse") for name in ("Hidden", "Seen"))
+    for painted in (hidden, seen):
+        feed(painted, "Color", "ShaderNodeTexNoise", "Color")
+    stage.ball(hidden).hide_set(True)
+    stage.plane(seen)
+
+    bpy.ops.lightshaft.bake(size=16)
+
+    with pytest.raises(RuntimeError) as error:
+        stage.render(samples=1)
+    assert "'Hidden'" in str(error.value) and "'Seen'" not in str(error.value)

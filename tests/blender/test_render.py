@@ -126,6 +126,34 @@ def test_each_frame_of_an_animation_is_that_frame(stage):
     assert bpy.context.scene.frame_current == 2
 
 
+def test_a_negative_frame_is_rendered(stage):
+    stage.sky(1)
+    stage.scene.frame_set(-10)
+
+    assert stage.render(samples=1).mean() > 0.9
+
+
+@pytest.mark.parametrize("kind", ["number", "checker"])
+def test_colours_above_one_are_rendered_as_one(stage, kind):
+    from stage import feed, material
+
+    def shown(brightness):
+        painted = material("Painted", "ShaderNodeBsdfDiffuse", Color=(brightness, 0.5, 0.5))
+        if kind == "checker":
+            checker = feed(painted, "Color", "ShaderNodeTexChecker")
+            checker.inputs["Color1"].default_value = checker.inputs["Color2"].default_value = (brightness, 0.5, 0.5, 1)
+            where = painted.node_tree.nodes.new("ShaderNodeTexCoord")
+            painted.node_tree.links.new(where.outputs["UV"], checker.inputs["Vector"])
+        plane.data.materials.clear()
+        plane.data.materials.append(painted)
+        return stage.render(samples=1)
+
+    stage.sky(1)
+    plane = stage.plane(None)
+
+    assert np.array_equal(shown(2.0), shown(1.0))
+
+
 def refused(stage):
     with pytest.raises(RuntimeError) as error:
         stage.render(samples=1)
@@ -202,10 +230,11 @@ def test_the_denoised_pass_is_that_of_the_finished_image(stage, on_farm):
 
     simple(stage)
     stage.settings.denoise = True
+    before = {job["id"] for job in on_farm.get("/api/v1/jobs")["jobs"]}
 
     stage.render(samples=8)
 
-    job = on_farm.get("/api/v1/jobs")["jobs"][0]["id"]
+    (job,) = {job["id"] for job in on_farm.get("/api/v1/jobs")["jobs"]} - before
     exr = sys.modules["bl_ext.user_default.lightshaft.exr"]
     layers = exr.read(on_farm.request("GET", f"/api/v1/jobs/{job}/image.exr"))
     for channel in "RGB":
