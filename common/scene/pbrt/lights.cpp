@@ -33,10 +33,16 @@ class LightTranslator {
     return times(light_colour(t_, p_, name), p_.number("scale", 1) * t_.exposure);
   }
 
+  // pbrt ignores a value of 0 or less.
+  double above_zero(std::string_view name, double fallback) {
+    const double x = p_.number(name, fallback);
+    return x > 0 ? x : fallback;
+  }
+
   // Returns the intensity. `emitted` is the power of a light of intensity 1.
   Rgb intensity(double emitted) {
     const Rgb c = colour("I");
-    return p_.has("power") ? times(c, p_.number("power", 0) / emitted) : c;
+    return times(c, above_zero("power", emitted) / emitted);
   }
 
   Element point() {
@@ -77,7 +83,7 @@ class LightTranslator {
     const Vec3 from = p_.triple("from", Vec3{{0, 0, 0}}), to = p_.triple("to", Vec3{{0, 0, 1}});
     const Vec3 way = transform_vector(ctm_.to, Vec3{{to[0] - from[0], to[1] - from[1], to[2] - from[2]}});
     add(out, "vector", "direction", text_of(way), p_.at());
-    add(out, "irradiance", times(colour("L"), p_.number("illuminance", 1)), p_.at());
+    add(out, "irradiance", times(colour("L"), above_zero("illuminance", 1)), p_.at());
     return out;
   }
 
@@ -85,8 +91,7 @@ class LightTranslator {
     const bool is_image = p_.has("mapname");
     Element out = made("emitter", is_image ? "envmap" : "constant", p_.at());
     // The power of an image would depend on its pixels, so finish() rejects this parameter for images.
-    const Rgb c =
-        times(colour("L"), !is_image && p_.has("illuminance") ? p_.number("illuminance", kPi) / kPi : 1);
+    const Rgb c = times(colour("L"), is_image ? 1 : above_zero("illuminance", kPi) / kPi);
     if (!is_image) {
       add(out, "radiance", c, p_.at());
       return out;

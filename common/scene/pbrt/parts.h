@@ -34,6 +34,7 @@ struct Texture {
 struct Material {
   std::string id;
   bool transmits = false, null = false;
+  bool has_texture = false;  // an image or a pattern depends on the uv of the shape
 };
 struct AreaLight {
   Rgb radiance;

@@ -258,17 +258,17 @@ void add_materials(std::vector<Row>& r) {
 }
 
 void add_textures(std::vector<Row>& r) {
-  r.push_back({"Texture", "imagemap", true,
-               "a `bitmap`; .tga, .pfm and .qoi are refused: turn them into PNG or EXR",
-               Words{{"filename", "string", "needed", "the image"},
-                     {"filter", "string", "bilinear", "point is `nearest`, all others `bilinear`"},
-                     {"wrap", "string", "repeat", "or clamp; black is refused"},
-                     {"encoding", "string", "sRGB", "of 8-bit files: sRGB or linear"},
-                     {"scale", "float", "1", "only 1 is read"},
-                     {"invert", "bool", "false", "only false is read"},
-                     {"maxanisotropy", "float", "8", "it is not filtered over pixels", kIgnored},
-                     {"trilinear", "bool", "false", "it is not filtered over pixels", kIgnored}} +
-                   mapping_words()});
+  r.push_back(
+      {"Texture", "imagemap", true, "a `bitmap`; .tga, .pfm and .qoi are refused: turn them into PNG or EXR",
+       Words{{"filename", "string", "needed", "the image"},
+             {"filter", "string", "bilinear", "point is `nearest`, all others `bilinear`"},
+             {"wrap", "string", "repeat", "or clamp; black is refused"},
+             {"encoding", "string", "sRGB", "of PNG files: sRGB or linear; other 8-bit files are sRGB"},
+             {"scale", "float", "1", "only 1 is read"},
+             {"invert", "bool", "false", "only false is read"},
+             {"maxanisotropy", "float", "8", "it is not filtered over pixels", kIgnored},
+             {"trilinear", "bool", "false", "it is not filtered over pixels", kIgnored}} +
+           mapping_words()});
   r.push_back({"Texture",
                "constant",
                true,
@@ -404,8 +404,9 @@ std::span<const Plain> plain_directives() {
       {"WorldEnd", "nothing (pbrt-v3)"},
       {"AttributeBegin", "keeps transform, material, light, media and orientation until AttributeEnd"},
       {"AttributeEnd", "see AttributeBegin"},
-      {"TransformBegin", "keeps the transform until TransformEnd"},
-      {"TransformEnd", "see TransformBegin"},
+      {"TransformBegin",
+       "as AttributeBegin: in pbrt-v4 it keeps all of that, in pbrt-v3 the transform alone"},
+      {"TransformEnd", "as AttributeEnd"},
       {"Identity", "transform"},
       {"Translate", "transform"},
       {"Scale", "transform"},
