@@ -55,6 +55,9 @@ what is refused says what to do instead.
 - **Sides**: a shape that gives light, bounds a medium or lets light through, and is mirrored by its transform, is refused unless it is a
   mesh without normals in the text: which way its normal points is not the same everywhere in pbrt itself.
 - **Meshes** without normals are flat, in the text and in files.
+- **Texture coordinates** are those of pbrt: on spheres v is 1 at +z, for which a sphere with a texture is mirrored along its axis; a
+  patch goes from (0, 0) to (1, 1); a triangle without any has (0, 0), (1, 0) and (1, 1). Two differ: on a `disk` u is the distance from the centre
+  and v the angle, which is a warning, and a `plymesh` whose file has none is laid out by its triangles otherwise.
 - **The filter** is a Gaussian of sigma 0.5, cut off at 4 sigma; pbrt cuts it off at radius 1.5.
 )";
 

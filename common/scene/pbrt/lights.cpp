@@ -35,10 +35,16 @@ class LightTranslator {
     return times(light_colour(t_, p_, name), p_.number("scale", 1) * t_.exposure);
   }
 
+  // pbrt ignores a value of 0 or less.
+  double above_zero(std::string_view name, double fallback) {
+    const double x = p_.number(name, fallback);
+    return x > 0 ? x : fallback;
+  }
+
   // Returns the intensity. `emitted` is the power of a light of intensity 1.
   Rgb intensity(double emitted) {
     const Rgb c = colour("I");
-    return p_.has("power") ? times(c, p_.number("power", 0) / emitted) : c;
+    return times(c, above_zero("power", emitted) / emitted);
   }
 
   Element point() {
@@ -79,7 +85,7 @@ class LightTranslator {
     const Vec3 from = p_.triple("from", Vec3{{0, 0, 0}}), to = p_.triple("to", Vec3{{0, 0, 1}});
     const Vec3 way = transform_vector(ctm_.to, Vec3{{to[0] - from[0], to[1] - from[1], to[2] - from[2]}});
     add(out, "vector", "direction", text_of(way), p_.at());
-    add(out, "irradiance", times(colour("L"), p_.number("illuminance", 1)), p_.at());
+    add(out, "irradiance", times(colour("L"), above_zero("illuminance", 1)), p_.at());
     return out;
   }
 
@@ -102,14 +108,13 @@ class LightTranslator {
 
   Element constant() {
     Element out = made("emitter", "constant", p_.at());
-    const double brightness = p_.has("illuminance") ? p_.number("illuminance", kPi) / kPi : 1;
-    add(out, "radiance", times(colour("L"), brightness), p_.at());
+    add(out, "radiance", times(colour("L"), above_zero("illuminance", kPi) / kPi), p_.at());
     return out;
   }
 
   Element image() {
     Element out = made("emitter", "envmap", p_.at());
-    if (p_.has("illuminance") && p_.take("illuminance"))
+    if (above_zero("illuminance", 0) > 0)
       p_.error(p_.at(), fmt::format("{} has an illuminance, which depends on its image's pixels: give scale",
                                     p_.title()));
     // Only pbrt-v3 multiplies the image by L. finish() rejects the parameter beside a filename, as pbrt-v4
@@ -166,7 +171,8 @@ void add_light(Translation& t, Params& p, const Placed& ctm) {
 AreaLight area_light(Translation& t, Params& p) {
   const Rgb c = times(light_colour(t, p, "L"), p.number("scale", 1) * t.exposure);
   std::optional<double> power;
-  if (p.has("power")) power = p.number("power", 0);
+  // pbrt ignores a value of 0 or less.
+  if (const double given = p.has("power") ? p.number("power", 0) : 0; given > 0) power = given;
   if (p.boolean("twosided", false))
     p.error(p.at(), fmt::format("{} shines from both sides, which no light does here: {}", p.title(),
                                 p.row().find("twosided")->meaning));

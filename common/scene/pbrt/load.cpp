@@ -273,30 +273,24 @@ class Loader {
     systems_["world"] = {};
   }
   void world_end(const Token&) {}
-  void attribute_begin(const Token& d) { push(d, true); }
-  void attribute_end(const Token& d) { pop(d, true); }
-  void transform_begin(const Token& d) { push(d, false); }
-  void transform_end(const Token& d) { pop(d, false); }
+  void attribute_begin(const Token& d) { push(d); }
+  void attribute_end(const Token& d) { pop(d); }
 
   struct Saved {
     Attributes attributes;
-    bool all;
     Span at;
   };
-  void push(const Token& d, bool all) {
+  void push(const Token& d) {
     if (saved_.size() >= kMaxPbrtNesting) {
       lost_ = true;
       return report_.error(d.at, fmt::format("attributes are nested more than {} deep", kMaxPbrtNesting));
     }
-    saved_.push_back({now_, all, d.at});
+    saved_.push_back({now_, d.at});
   }
-  void pop(const Token& d, bool all) {
-    if (saved_.size() <= floor_ || saved_.back().all != all)
+  void pop(const Token& d) {
+    if (saved_.size() <= floor_)
       return report_.error(d.at, fmt::format("this {} ends nothing that was begun", d.text));
-    if (all)
-      now_ = std::move(saved_.back().attributes);
-    else
-      now_.ctm = saved_.back().attributes.ctm;
+    now_ = std::move(saved_.back().attributes);
     saved_.pop_back();
   }
 
@@ -453,7 +447,7 @@ class Loader {
     const auto name = quoted(d);
     if (!name) return;
     if (group_) return report_.error(d.at, "an ObjectBegin within an ObjectBegin");
-    push(d, true);
+    push(d);
     group_ = made("shape", "shapegroup", last_);
     set(*group_, "id", object_id(*name), last_);
   }
@@ -461,7 +455,7 @@ class Loader {
     if (!group_) return report_.error(d.at, "this ObjectEnd ends nothing that was begun");
     add(t_.scene, std::move(*group_));
     group_.reset();
-    pop(d, true);
+    pop(d);
   }
   void object_instance(const Token& d) {
     need_world(d);
@@ -494,11 +488,11 @@ class Loader {
     const auto file = opened(name, std::move(*text), &at);
     if (!file) return;
     including_.push_back(name);
-    if (apart) push(d, true);
+    if (apart) push(d);
     const std::size_t floor = std::exchange(floor_, apart ? saved_.size() : floor_);
     parse(*file);
     floor_ = floor;
-    if (apart && !report_.has_errors()) pop(d, true);
+    if (apart && !report_.has_errors()) pop(d);
     including_.pop_back();
     lost_ = false;
   }
@@ -566,8 +560,8 @@ const std::map<std::string_view, Loader::Directive>& Loader::directives() {
       {"Shape", &Loader::shape_},
       {"Texture", &Loader::texture},
       {"Transform", &Loader::transform},
-      {"TransformBegin", &Loader::transform_begin},
-      {"TransformEnd", &Loader::transform_end},
+      {"TransformBegin", &Loader::attribute_begin},
+      {"TransformEnd", &Loader::attribute_end},
       {"TransformTimes", &Loader::transform_times},
       {"Translate", &Loader::translate},
       {"WorldBegin", &Loader::world_begin},

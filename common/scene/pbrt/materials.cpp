@@ -155,6 +155,7 @@ class MaterialTranslator {
         return std::nullopt;
       }
       m.transmits |= found->second.transmits;
+      m.has_texture |= found->second.has_texture;
       refer(out, "", found->second.id, names->at);
     }
     return out;
@@ -254,6 +255,12 @@ class MaterialTranslator {
   Params& p_;
 };
 
+// True if a texture is in the element or is referred to by name.
+bool has_texture(const Element& e) {
+  if (e.tag == "texture" || (e.tag == "ref" && e.find("name"))) return true;
+  return std::any_of(e.children.begin(), e.children.end(), has_texture);
+}
+
 }  // namespace
 
 std::optional<Material> add_material(Translation& t, const std::string& id, Params& p) {
@@ -261,6 +268,7 @@ std::optional<Material> add_material(Translation& t, const std::string& id, Para
   auto bsdf = MaterialTranslator(t, p).run(m);
   p.finish();
   if (!bsdf) return std::nullopt;
+  m.has_texture |= has_texture(*bsdf);
   set(*bsdf, "id", id, p.at());
   add(t.scene, std::move(*bsdf));
   return m;

@@ -41,6 +41,7 @@ struct Texture {
 struct Material {
   std::string id;
   bool transmits = false, null = false;
+  bool has_texture = false;  // an image or a pattern depends on the uv of the shape
 };
 struct AreaLight {
   Rgb radiance;  // if `power` is given, of a shape of the area power / pi

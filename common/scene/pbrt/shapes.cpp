@@ -37,6 +37,8 @@ class ShapeTranslator {
     return type == "trianglemesh" ? triangles() : patches();
   }
 
+  bool needs_uv() const { return a_.material.has_texture || p_.has("alpha"); }
+
   void need_whole() {
     if (p_.number("phimax", 360) != 360)
       p_.error(p_.at(),
@@ -45,6 +47,9 @@ class ShapeTranslator {
 
   Element sphere() {
     need_whole();
+    // v of our spheres is 0 at the north pole, in pbrt at the south pole. A mirror along the axis exchanges
+    // the poles, and orient() turns the normals back.
+    if (needs_uv()) to_world_ = then(a_.ctm, scaled(Vec3{{1, 1, -1}}));
     Element out = made("shape", "sphere", p_.at());
     const double radius = p_.number("radius", 1);
     areas_ = {4 * std::numbers::pi * radius * radius};
@@ -56,6 +61,10 @@ class ShapeTranslator {
     need_whole();
     if (p_.number("innerradius", 0) != 0)
       p_.error(p_.at(), fmt::format("{} has a hole: {}", p_.title(), p_.row().find("innerradius")->meaning));
+    if (a_.material.has_texture)
+      t_.warn_once(p_.at(),
+                   "a texture lies otherwise on a disk than in pbrt: here u is the distance from the centre "
+                   "and v the angle, in pbrt u is the angle and v is 1 at the centre");
     const double radius = p_.number("radius", 1);
     areas_ = {std::numbers::pi * radius * radius};
     to_world_ =
@@ -163,7 +172,22 @@ class ShapeTranslator {
     }
     has_normals_ = !mesh.normals.empty();
     if (a_.light && a_.light->power) measure(mesh, 1);
-    return mesh.indices.empty() ? std::nullopt : kept(mesh);
+    if (mesh.indices.empty()) return std::nullopt;
+    return kept(mesh.uvs.empty() && needs_uv() ? with_default_uv(mesh) : mesh);
+  }
+
+  // Gives each triangle corners of its own, with the uv that pbrt gives to triangles without any.
+  static Mesh with_default_uv(const Mesh& mesh) {
+    Mesh out;
+    for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
+      const auto first = 3 * static_cast<std::ptrdiff_t>(mesh.indices[i]);
+      for (const auto& [from, to] :
+           {std::pair{&mesh.positions, &out.positions}, {&mesh.normals, &out.normals}})
+        if (!from->empty()) to->insert(to->end(), from->begin() + first, from->begin() + first + 3);
+      out.uvs.insert(out.uvs.end(), {i % 3 == 0 ? 0. : 1., i % 3 == 2 ? 1. : 0.});
+      out.indices.push_back(static_cast<double>(i));
+    }
+    return out;
   }
 
   std::optional<Element> patches() {
@@ -175,7 +199,8 @@ class ShapeTranslator {
     const std::vector<double>& x = corners->numbers;
     const std::vector<double> four = indices(x.size() / 3, 4);
     if (four.empty()) return std::nullopt;
-    Mesh mesh{x, {}, {}, {}};
+    // Each patch has corners of its own, as its uv go from 0 to 1.
+    Mesh mesh;
     for (std::size_t i = 0; i < four.size(); i += 4) {
       std::array<Vec3, 3> side;  // vectors from corner 0 to the corners 1, 2 and 3
       for (std::size_t k = 0; k < 3; ++k)
@@ -187,16 +212,22 @@ class ShapeTranslator {
       if (std::abs(dot(normal, side[2])) > 1e-5 * size)
         return wrong(p_.at(),
                      fmt::format("{} is bent, and only flat patches are read: give a plymesh", p_.title()));
-      for (const std::size_t k : {0, 1, 3, 0, 3, 2}) mesh.indices.push_back(four[i + k]);
+      for (const std::size_t k : {0, 1, 3, 0, 3, 2}) mesh.indices.push_back(static_cast<double>(i + k));
+      for (std::size_t k = 0; k < 4; ++k) {
+        const auto corner = x.begin() + 3 * static_cast<std::ptrdiff_t>(four[i + k]);
+        mesh.positions.insert(mesh.positions.end(), corner, corner + 3);
+        mesh.uvs.insert(mesh.uvs.end(), {k % 2 == 0 ? 0. : 1., k < 2 ? 0. : 1.});
+      }
     }
     if (a_.light && a_.light->power) measure(mesh, 2);
     return kept(mesh);
   }
 
   // In pbrt ReverseOrientation flips the normal, and mirroring a mesh leaves its normal on the original side.
-  // Our meshes without normals follow the order of corners, which mirroring reverses.
+  // Our meshes without normals follow the order of corners, which mirroring reverses, and our mirrored
+  // spheres are inside out.
   void orient(Element& out) {
-    const bool mirrored = determinant3(to_world_.to) < 0;
+    const bool mirrored = determinant3(a_.ctm.to) < 0;
     const std::string_view type = p_.row().type;
     const bool by_corners = (type == "trianglemesh" && !has_normals_) || type == "bilinearmesh";
     const bool has_sides = a_.light || a_.inside != a_.outside || a_.material.transmits;
@@ -206,7 +237,9 @@ class ShapeTranslator {
                            "bounds a medium or lets light through: leave the mirror out (and turn "
                            "ReverseOrientation round if it is on)",
                            p_.title()));
-    if (a_.reversed != (mirrored && by_corners)) add(out, "boolean", "flip_normals", "true", p_.at());
+    const bool turned_round =
+        type == "sphere" ? mirrored != (determinant3(to_world_.to) < 0) : mirrored && by_corners;
+    if (a_.reversed != turned_round) add(out, "boolean", "flip_normals", "true", p_.at());
   }
 
   void surface(Element& out) {
@@ -220,7 +253,14 @@ class ShapeTranslator {
     } else {
       refer(out, "", a_.material.id, p_.at());
     }
-    if (a_.light) {
+    if (a_.light && is_masked)
+      t_.warn_once(
+          p_.at(),
+          "a shape's alpha does not mask its light here; in pbrt it does, and with alpha 0 the shape "
+          "is unseen and gives all of its light");
+    if (a_.light && a_.material.null)
+      t_.warn_once(p_.at(), "shapes of Material \"interface\" give no light, in pbrt neither");
+    if (a_.light && !a_.material.null) {
       Element area = made("emitter", "area", a_.light->at);
       add(area, "radiance", radiance(*a_.light), a_.light->at);
       add(out, std::move(area));

@@ -1,6 +1,7 @@
 // Translates textures, and parameters that may be textures.
 #include <fmt/format.h>
 
+#include "common/scene/file_names.h"
 #include "common/scene/pbrt/parts.h"
 #include "common/scene/xml/transform_element.h"
 
@@ -59,7 +60,8 @@ Element image(Params& p) {
   const std::string wrap = p.text("wrap", "repeat");
   if (wrap != "repeat") add(out, "string", "wrap_mode", wrap, p.at());
   const std::string encoding = p.text("encoding", "sRGB");
-  if (encoding == "linear") add(out, "boolean", "raw", "true", p.at());
+  // pbrt decodes all other 8-bit files as sRGB, whatever the scene says.
+  if (encoding == "linear" && has_ending(file, {".png"})) add(out, "boolean", "raw", "true", p.at());
   if (encoding != "linear" && encoding != "sRGB")
     p.error(p.at(),
             fmt::format("{} has the encoding \"{}\": convert the image to sRGB", p.title(), encoding));

@@ -237,6 +237,62 @@ TEST(Pbrt, IntegratorsOfTheSameLightAreRead) {
   }
 }
 
+// pbrt multiplies by these only if they are above 0, and exporters write 0 or -1 for "not given".
+TEST(Pbrt, PowerAndIlluminanceOfZeroOrLessAreNotGiven) {
+  const Scene s = pbrt(R"(LightSource "point" "rgb I" [ 1 2 3 ] "float power" 0
+LightSource "distant" "rgb L" [ 1 2 3 ] "float illuminance" -1
+LightSource "infinite" "rgb L" [ 1 2 3 ] "float illuminance" -1 Shape "sphere")");
+
+  EXPECT_EQ(std::get<PointEmitter>(s.emitters.at(0)).intensity, (Rgb{1, 2, 3}));
+  EXPECT_EQ(std::get<DirectionalEmitter>(s.emitters.at(1)).irradiance, (Rgb{1, 2, 3}));
+  EXPECT_EQ(std::get<ConstantEmitter>(s.emitters.at(2)).radiance, (Rgb{1, 2, 3}));
+}
+
+TEST(Pbrt, WarnsWhereTexturesAndAlphaDifferFromPbrt) {
+  const std::string pattern =
+      R"(Texture "t" "spectrum" "checkerboard" Material "diffuse" "texture reflectance" "t")";
+
+  const auto told = [](const std::string& world) { return messages(read_pbrt(pbrt_scene(world))); };
+
+  EXPECT_TRUE(says(told(pattern + " Shape \"disk\""), "lies otherwise on a disk"));
+  EXPECT_FALSE(says(told("Shape \"disk\""), "lies otherwise"));
+  EXPECT_TRUE(
+      says(told(R"(AreaLightSource "diffuse" Shape "sphere" "float alpha" 0)"), "does not mask its light"));
+}
+
+TEST(Pbrt, InterfacesGiveNoLight) {
+  const std::string lamp = "AreaLightSource \"diffuse\" Shape \"sphere\" ";
+  EXPECT_TRUE(pbrt(lamp).shapes.at(0).emitter);
+
+  const ReadResult r = read_pbrt(pbrt_scene("Material \"interface\" " + lamp));
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  EXPECT_FALSE(r.scene->shapes.at(0).emitter);
+  EXPECT_TRUE(says(messages(r), "give no light"));
+}
+
+// pbrt takes the encoding of PNG files alone from the scene.
+TEST(Pbrt, TakesTheEncodingOfPngFilesAlone) {
+  const auto is_raw = [](std::string_view file) {
+    KeepingAssets assets;
+    assets.memory.files[std::string(file)] = "pixels";
+    const ReadResult r =
+        read_pbrt(pbrt_scene(fmt::format(R"(Texture "t" "spectrum" "imagemap" "string filename" "{}"
+"string encoding" "linear" Material "diffuse" "texture reflectance" "t" Shape "sphere")",
+                                         file)),
+                  assets);
+    EXPECT_TRUE(r.scene) << messages(r);
+    if (!r.scene) return false;
+    const auto& all = r.scene->textures;
+    const auto found = std::find_if(
+        all.begin(), all.end(), [](const Texture& t) { return std::holds_alternative<BitmapTexture>(t); });
+    return found != all.end() && std::get<BitmapTexture>(*found).raw;
+  };
+
+  EXPECT_TRUE(is_raw("wood.png"));
+  EXPECT_FALSE(is_raw("wood.jpg"));
+}
+
 TEST(Pbrt, DistantLightTravelsFromItsFirstPoint) {
   const Scene s = pbrt(
       "LightSource \"distant\" \"point3 from\" [ 0 5 0 ] \"point3 to\" [ 0 0 0 ] \"rgb L\" [ 2 2 2 ] Shape "
@@ -348,6 +404,27 @@ Material "diffuse" "texture reflectance" "t" Shape "sphere")");
   EXPECT_FALSE(std::get<BitmapTexture>(*found).raw);
 }
 
+// In pbrt v of a sphere is 1 at its north pole, which is +z; in Mitsuba's format v is 0 there. Image rows are
+// turned already (ImagesStandUpright), so a mirror along z is left.
+TEST(Pbrt, ImagesStandUprightOnSpheres) {
+  const std::string image = R"(Texture "t" "spectrum" "imagemap" "string filename" "wood.png"
+Material "diffuse" "texture reflectance" "t" Scale 2 2 2 Shape "sphere" ReverseOrientation Shape "sphere"
+MakeNamedMaterial "image" "string type" "diffuse" "texture reflectance" "t"
+MakeNamedMaterial "grey" "string type" "diffuse"
+Material "mix" "string materials" [ "grey" "image" ] Shape "sphere" NamedMaterial "grey" Shape "sphere")";
+
+  const Scene s = pbrt(image);
+
+  const Transform mirrored{{2, 0, 0, 0, 0, 2, 0, 0, 0, 0, -2, 0, 0, 0, 0, 1}};
+  EXPECT_EQ(s.shapes.at(0).to_world, mirrored);
+  EXPECT_TRUE(s.shapes.at(0).flip_normals);  // a mirrored sphere is inside out
+  EXPECT_EQ(s.shapes.at(1).to_world, mirrored);
+  EXPECT_FALSE(s.shapes.at(1).flip_normals);
+  EXPECT_EQ(s.shapes.at(2).to_world, mirrored);
+  EXPECT_EQ(s.shapes.at(3).to_world.m[10], 2);
+  EXPECT_TRUE(s.shapes.at(3).flip_normals);  // by ReverseOrientation
+}
+
 TEST(Pbrt, NamedObjectsAreInstanced) {
   const Scene s = pbrt(R"(ObjectBegin "ball" Translate 1 0 0 Shape "sphere" ObjectEnd
 Translate 0 5 0 ObjectInstance "ball" ObjectInstance "ball")");
@@ -366,6 +443,17 @@ TransformBegin Translate 0 1 0 Shape "sphere" TransformEnd Shape "sphere" Attrib
   EXPECT_TRUE(s.shapes.at(1).flip_normals);
   EXPECT_EQ(s.shapes.at(2).to_world, Transform{});
   EXPECT_FALSE(s.shapes.at(2).flip_normals);
+}
+
+// pbrt-v4 takes TransformBegin for AttributeBegin, and each of the two ends for the other's.
+TEST(Pbrt, TransformEndEndsAttributesToo) {
+  const Scene s = pbrt(R"(TransformBegin Translate 1 0 0 ReverseOrientation TransformBegin AttributeEnd
+Shape "sphere" TransformEnd Shape "sphere")");
+
+  EXPECT_EQ(s.shapes.at(0).to_world.m[3], 1);
+  EXPECT_TRUE(s.shapes.at(0).flip_normals);
+  EXPECT_EQ(s.shapes.at(1).to_world, Transform{});
+  EXPECT_FALSE(s.shapes.at(1).flip_normals);
 }
 
 TEST(Pbrt, CameraMediumIsTheOneOutside) {
@@ -433,6 +521,53 @@ TEST(Pbrt, FlatPatchesAreTriangles) {
   const std::string flat = R"(Shape "bilinearmesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 1 1 0 ])";
   EXPECT_EQ(pbrt(flat).shapes.size(), 1u);
   EXPECT_TRUE(says(refusal(R"(Shape "bilinearmesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 1 1 1 ])"), "is bent"));
+}
+
+// The corners are (0, 0), (1, 0), (0, 1) and (1, 1) of each patch, also where two patches share them.
+TEST(Pbrt, PatchesHaveTheirOwnUv) {
+  KeepingAssets assets;
+  const ReadResult r =
+      read_scene("t.pbrt", pbrt_scene(R"(Shape "bilinearmesh" "integer indices" [ 0 1 2 3 1 4 3 5 ]
+"point3 P" [ 0 0 0 1 0 0 0 1 0 1 1 0 2 0 0 2 1 0 ])"),
+                 assets);
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  const std::string& bytes = assets.memory.files.at(r.scene->assets.at(0).name);
+  const std::size_t begin = bytes.find("end_header\n") + 11;
+  constexpr std::size_t kCorner = 5 * sizeof(float);  // x y z u v
+  EXPECT_NE(bytes.find("element vertex 8\n"), std::string::npos);
+  for (std::size_t i = 0; i < 8; ++i) {
+    EXPECT_EQ(float_at(bytes, begin + i * kCorner), static_cast<float>(i / 4 + i % 2));
+    EXPECT_EQ(float_at(bytes, begin + i * kCorner + 12), static_cast<float>(i % 2));
+    EXPECT_EQ(float_at(bytes, begin + i * kCorner + 16), static_cast<float>(i % 4 / 2));
+  }
+}
+
+// In pbrt the corners of a triangle without uv have (0, 0), (1, 0) and (1, 1), which matters to a texture
+// alone.
+TEST(Pbrt, TrianglesWithoutUvHaveThoseOfPbrt) {
+  const auto corners = [](std::string_view material) {
+    KeepingAssets assets;
+    const std::string mesh = fmt::format(R"({} Shape "trianglemesh" "integer indices" [ 0 1 2 2 1 3 ]
+"point3 P" [ 0 0 0 1 0 0 0 1 0 1 1 0 ])",
+                                         material);
+    const ReadResult r = read_scene("t.pbrt", pbrt_scene(mesh), assets);
+    EXPECT_TRUE(r.scene) << messages(r);
+    return assets.memory.files.at(r.scene->assets.at(0).name);
+  };
+  EXPECT_NE(corners("Material \"diffuse\"").find("element vertex 4\n"), std::string::npos);
+
+  const std::string bytes = corners(R"(Texture "t" "spectrum" "checkerboard"
+Material "diffuse" "texture reflectance" "t")");
+
+  const std::size_t begin = bytes.find("end_header\n") + 11;
+  constexpr std::size_t kCorner = 5 * sizeof(float);  // x y z u v
+  ASSERT_NE(bytes.find("element vertex 6\n"), std::string::npos);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(float_at(bytes, begin + i * kCorner + 12), i % 3 == 0 ? 0 : 1);
+    EXPECT_EQ(float_at(bytes, begin + i * kCorner + 16), i % 3 == 2 ? 1 : 0);
+  }
+  EXPECT_EQ(float_at(bytes, begin + 3 * kCorner + 4), 1);  // corner 2
 }
 
 TEST(Pbrt, IncludesAreReadInPlace) {

@@ -86,7 +86,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"ObjectBegin \"x\" Shape \"sphere\"", "the ObjectEnd of this is missing"},
         Case{"AttributeBegin", "this is begun and not ended"},
         Case{"AttributeEnd", "ends nothing that was begun"},
-        Case{"AttributeBegin TransformEnd", "ends nothing that was begun"},
+        Case{"AttributeBegin TransformEnd TransformEnd", "ends nothing that was begun"},
         Case{"Scale 0 1 1 Shape \"sphere\"", "can't be inverted"},
         Case{"LookAt 0 0 0 0 0 0 0 1 0", "has its eye at its target"},
         Case{"Translate 1 2", "Translate wants 3 numbers"},
