@@ -10,6 +10,7 @@ without a note differs, is refused, or has more than one block in ten out. Needs
 """
 import argparse
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -27,7 +28,8 @@ def images(command, out, seeds):
     for seed in range(1, seeds + 1):
         done = subprocess.run([str(c) for c in command(out, seed)], capture_output=True, text=True, errors="replace")
         if done.returncode:
-            told = [line for line in (done.stderr + done.stdout).splitlines() if "rror:" in line]
+            plain = re.sub("\x1b\\[[0-9;]*m", "", done.stderr + done.stdout)
+            told = [line for line in plain.splitlines() if "rror:" in line]
             return (told or [f"exit {done.returncode}"])[0].split("rror:")[-1].strip()
         found.append(load(out))
     return found
