@@ -184,7 +184,17 @@ class SettingsTranslator {
 
 }  // namespace
 
-double exposure_of(Params& film) { return film.number("exposuretime", 1) * film.number("iso", 100) / 100; }
+double exposure_of(Settings& s) {
+  double factor = 1;
+  if (s.film) factor = s.film->number("exposuretime", 1) * s.film->number("iso", 100) / 100;
+  if (!s.camera) return factor;
+  const double opens = s.camera->number("shutteropen", 0), closes = s.camera->number("shutterclose", 1);
+  if (!(opens < closes))
+    s.camera->error(
+        s.camera->at(),
+        fmt::format("the shutter closes at {} and opens at {}: let it close later", closes, opens));
+  return factor * (closes - opens);
+}
 
 void add_settings(Translation& t, Settings& s, const Span& file) { SettingsTranslator(t, s, file).run(); }
 

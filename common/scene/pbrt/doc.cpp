@@ -31,8 +31,8 @@ what is refused says what to do instead.
   scale(-1, 1, 1). Coordinates of the world stay as they are. A camera that is scaled alike along all axes keeps its picture, and its
   lens is scaled. It sees from 1e-4 to 1e7 scene units.
 - **Light**: `rgb` is relative to the white of sRGB; a `blackbody`, a `spectrum` by pairs, and one in a file (.spd) are scaled to
-  luminance 1, as in pbrt; `stdillum-D65` is white. `scale`, `power` and `illuminance` multiply that. `exposuretime * iso / 100`
-  of the film multiplies all light.
+  luminance 1, as in pbrt; `stdillum-D65` is white. `scale`, `power` and `illuminance` multiply that. `iso / 100` of the film
+  and `shutterclose - shutteropen` of the camera multiply all light.
 - **Surfaces and media**: `rgb` is linear sRGB; pairs are what the CIE observer sees of them under D65, and the same value everywhere
   is grey. Metals by name are those of [the scene format](scene-format.md#names). Spectra are not followed beyond red, green, blue.
 - **Roughness**: `remaproughness` is true by default, and alpha then the square root of the roughness; the distribution is GGX.

@@ -99,7 +99,7 @@ class GridLight {
     if (!c) return false;
     if (all_zero(*c)) return true;
     const bool grey = is_grey(*c);
-    add(out, "emission_scale", m_.t.exposure * (grey ? (*c)[0] : 1), m_.p.at());
+    add(out, "emission_scale", m_.t.exposure() * (grey ? (*c)[0] : 1), m_.p.at());
     return add_scales(out, "source_radiance", grey ? 1 : 3,
                       [&](std::size_t k) { return grey ? 1 : (*c)[k]; });
   }
@@ -195,7 +195,7 @@ bool add_colours(MediumSource& m, Element& out, const Param& light, const std::a
                  const Box& box) {
   const double scale = m.p.number("Lescale", 1);
   if (scale == 0) return true;
-  add(out, "emission_scale", scale * kPhotometric * m.t.exposure, m.p.at());
+  add(out, "emission_scale", scale * kPhotometric * m.t.exposure(), m.p.at());
   const MadeGrid grid =
       padded(sides, 3, [&](std::size_t i, std::size_t k) { return light.numbers[3 * i + k]; });
   return add_grid(m, out, "source_radiance", grid, box, Filling::border);

@@ -32,7 +32,7 @@ class LightTranslator {
 
  private:
   Rgb colour(std::string_view name) {
-    return times(light_colour(t_, p_, name), p_.number("scale", 1) * t_.exposure);
+    return times(light_colour(t_, p_, name), p_.number("scale", 1) * t_.exposure());
   }
 
   // pbrt ignores a value of 0 or less.
@@ -120,7 +120,7 @@ class LightTranslator {
     // Only pbrt-v3 multiplies the image by L. finish() rejects the parameter beside a filename, as pbrt-v4
     // does, and a mapname beside it.
     const bool is_square = p_.has("filename");
-    const Rgb c = is_square ? times({1, 1, 1}, p_.number("scale", 1) * t_.exposure) : colour("L");
+    const Rgb c = is_square ? times({1, 1, 1}, p_.number("scale", 1) * t_.exposure()) : colour("L");
     add(out, "string", "filename", p_.text(is_square ? "filename" : "mapname", ""), p_.at());
     add(out, "scale", c[0], p_.at());
     if (c[0] != c[1] || c[1] != c[2])
@@ -147,7 +147,7 @@ class LightTranslator {
     add(image, "string", "filter_type", "nearest", p_.at());
     add(image, "string", "wrap_mode", "clamp", p_.at());
     add(out, std::move(image));
-    add(out, "scale", p_.number("scale", 1) * t_.exposure, p_.at());
+    add(out, "scale", p_.number("scale", 1) * t_.exposure(), p_.at());
     add(out, "fov", p_.number("fov", 90), p_.at());
     add(out, "string", "fov_axis", "smaller", p_.at());
     add(out, "boolean", "as_intensity", "true", p_.at());
@@ -169,7 +169,7 @@ void add_light(Translation& t, Params& p, const Placed& ctm) {
 }
 
 AreaLight area_light(Translation& t, Params& p) {
-  const Rgb c = times(light_colour(t, p, "L"), p.number("scale", 1) * t.exposure);
+  const Rgb c = times(light_colour(t, p, "L"), p.number("scale", 1) * t.exposure());
   std::optional<double> power;
   // pbrt ignores a value of 0 or less.
   if (const double given = p.has("power") ? p.number("power", 0) : 0; given > 0) power = given;

@@ -228,13 +228,22 @@ class Loader {
   }
   void film(const Token& d) {
     setting(d, settings_.film);
-    if (settings_.film) t_.exposure = exposure_of(*settings_.film);
+    expose(d);
+  }
+  void expose(const Token& d) {
+    const double factor = exposure_of(settings_);
+    if (t_.lit && factor != t_.exposure_factor)
+      report_.error(
+          d.at,
+          fmt::format("{} changes the exposure of media that stand before it: put it before them", d.text));
+    t_.exposure_factor = factor;
   }
   void pixel_filter(const Token& d) { setting(d, settings_.filter); }
   void sampler(const Token& d) { setting(d, settings_.sampler); }
   void integrator(const Token& d) { setting(d, settings_.integrator); }
   void camera(const Token& d) {
     setting(d, settings_.camera);
+    expose(d);
     settings_.camera_ctm = now_.ctm;
     settings_.camera_medium = now_.outside;
     Placed world = now_.ctm;

@@ -33,10 +33,10 @@ bool homogeneous(MediumSource& m, Element& out) {
   add(out, "sigma_t", c.extinction, m.p.at());
   add_albedo(m, out, c.albedo);
   add(out, "scale", m.p.number("scale", 1), m.p.at());
-  const double scale = m.p.number("Lescale", 1) * m.t.exposure;
+  const double scale = m.p.number("Lescale", 1);
   if (!m.p.has("Le")) return true;
   Rgb light = light_colour(m.t, m.p, "Le");
-  for (double& x : light) x *= scale;
+  for (double& x : light) x *= scale * m.t.exposure();
   if (!all_zero(light)) add(out, "source_radiance", light, m.p.at());
   return true;
 }
@@ -114,7 +114,7 @@ bool add_black_bodies(MediumSource& m, Element& out, double factor) {
   add(out, "temperature_scale", scale, m.p.at());
   add(out, "temperature_offset", -scale * offset, m.p.at());
   add(out, "boolean", "peak_one", "true", m.p.at());
-  add(out, "emission_scale", factor * kPhotometric * m.t.exposure, m.p.at());
+  add(out, "emission_scale", factor * kPhotometric * m.t.exposure(), m.p.at());
   return true;
 }
 

@@ -70,7 +70,14 @@ struct Translation {
   AssetSource& assets;
   Report& report;
   Element scene;
-  double exposure = 1;  // factor on all light
+  // The factor on all light, by the film and the camera's shutter. `lit` is true once light has been
+  // multiplied by it.
+  double exposure_factor = 1;
+  bool lit = false;
+  double exposure() {
+    lit = true;
+    return exposure_factor;
+  }
   std::map<std::string, Texture> textures;
   std::map<std::string, Material> materials;
   std::vector<MadeCloud> clouds;
@@ -120,7 +127,7 @@ struct Settings {
   Placed camera_ctm;
   std::string camera_medium;
 };
-double exposure_of(Params& film);  // returns the factor on all light
+double exposure_of(Settings& s);  // returns the factor on all light
 void add_settings(Translation& t, Settings& s, const Span& file);
 
 // In made_files.cpp: files made of numbers in the scene's text. The returned name is derived from the file's

@@ -19,8 +19,9 @@ Words operator+(Words a, const Words& b) {
 }
 
 Words camera_words() {
-  return {{"shutteropen", "float", "0", "motion is not rendered", kIgnored},
-          {"shutterclose", "float", "1", "motion is not rendered", kIgnored},
+  return {{"shutteropen", "float", "0", "see shutterclose"},
+          {"shutterclose", "float", "1",
+           "all light is multiplied by shutterclose - shutteropen; motion is not rendered"},
           {"frameaspectratio", "float", "", "give the film that shape instead", kRefused},
           {"screenwindow", "float", "", "give the film that shape, or a crop, instead", kRefused}};
 }
@@ -31,8 +32,8 @@ Words film_words() {
       {"yresolution", "integer", "720", "pixels"},
       {"cropwindow", "float", "the whole frame", "x0 x1 y0 y1 as shares of the frame"},
       {"pixelbounds", "integer", "the whole frame", "x0 x1 y0 y1 in pixels"},
-      {"iso", "float", "100", "all light is multiplied by exposuretime * iso / 100"},
-      {"exposuretime", "float", "1", "see iso"},
+      {"iso", "float", "100", "all light is multiplied by iso / 100"},
+      {"exposuretime", "float", "1", "a factor on all light; not in today's pbrt-v4"},
       {"sensor", "string", "cie1931", "another name is a warning: colours stay those of the CIE observer"},
       {"whitebalance", "float", "0", "balance the image afterwards", kRefused},
       {"maxcomponentvalue", "float", "", "samples are not clamped, as that darkens the image", kIgnored},
@@ -284,16 +285,17 @@ void add_materials(std::vector<Row>& r) {
 }
 
 void add_textures(std::vector<Row>& r) {
-  r.push_back({"Texture", "imagemap", true, "a `bitmap`: PNG, JPEG, BMP, TGA, QOI, EXR, HDR or PFM",
-               Words{{"filename", "string", "needed", "the image"},
-                     {"filter", "string", "bilinear", "point is `nearest`, all others `bilinear`"},
-                     {"wrap", "string", "repeat", "or clamp; black is refused"},
-                     {"encoding", "string", "sRGB", "of PNG files: sRGB or linear; other 8-bit files are sRGB"},
-                     {"scale", "float", "1", "only 1 is read"},
-                     {"invert", "bool", "false", "only false is read"},
-                     {"maxanisotropy", "float", "8", "it is not filtered over pixels", kIgnored},
-                     {"trilinear", "bool", "false", "it is not filtered over pixels", kIgnored}} +
-                   mapping_words()});
+  r.push_back(
+      {"Texture", "imagemap", true, "a `bitmap`: PNG, JPEG, BMP, TGA, QOI, EXR, HDR or PFM",
+       Words{{"filename", "string", "needed", "the image"},
+             {"filter", "string", "bilinear", "point is `nearest`, all others `bilinear`"},
+             {"wrap", "string", "repeat", "or clamp; black is refused"},
+             {"encoding", "string", "sRGB", "of PNG files: sRGB or linear; other 8-bit files are sRGB"},
+             {"scale", "float", "1", "only 1 is read"},
+             {"invert", "bool", "false", "only false is read"},
+             {"maxanisotropy", "float", "8", "it is not filtered over pixels", kIgnored},
+             {"trilinear", "bool", "false", "it is not filtered over pixels", kIgnored}} +
+           mapping_words()});
   r.push_back({"Texture",
                "constant",
                true,

@@ -135,6 +135,38 @@ AreaLightSource "diffuse" "rgb L" [ 1 1 1 ] Shape "sphere")");
   EXPECT_EQ(std::get<ConstantTexture>(r.scene->textures.at(area->radiance.value)).value, (Rgb{6, 6, 6}));
 }
 
+// pbrt multiplies by the time that the shutter is open: half of it here.
+TEST(Pbrt, AShorterShutterDarkensAllLight) {
+  const ReadResult r = read_pbrt(
+      R"(Camera "perspective" "float shutteropen" 0.25 "float shutterclose" 0.75 Film "rgb" "float iso" 400
+WorldBegin
+MakeNamedMedium "glow" "string type" "homogeneous" "rgb Le" [ 1 2 4 ] "rgb sigma_a" [ 1 1 1 ] "rgb sigma_s" [ 0 0 0 ]
+LightSource "infinite" "rgb L" [ 1 2 4 ] MediumInterface "glow" "" Material "interface" Shape "sphere")");
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  EXPECT_EQ(std::get<ConstantEmitter>(r.scene->emitters.at(0)).radiance, (Rgb{2, 4, 8}));
+  const auto& medium = std::get<HomogeneousMedium>(r.scene->media.at(0));
+  EXPECT_EQ(medium.source_radiance, (Rgb{2, 4, 8}));
+}
+
+TEST(Pbrt, ExposureStandsBeforeWhatItMultiplies) {
+  const std::string medium = R"(MakeNamedMedium "glow" "string type" "homogeneous" "rgb Le" [ 1 2 4 ] )",
+                    camera = R"(Camera "perspective" "float shutterclose" 0.5 )";
+
+  const ReadResult late = read_pbrt(medium + camera + "WorldBegin Shape \"sphere\"");
+  EXPECT_FALSE(late.scene);
+  EXPECT_TRUE(says(messages(late), "Camera changes the exposure of media that stand before it"));
+  EXPECT_TRUE(read_pbrt(camera + medium + "WorldBegin Shape \"sphere\"").scene);
+}
+
+TEST(Pbrt, AShutterThatNeverOpensIsRefused) {
+  const ReadResult r =
+      read_pbrt("Camera \"perspective\" \"float shutteropen\" 1 WorldBegin Shape \"sphere\"");
+
+  EXPECT_FALSE(r.scene);
+  EXPECT_TRUE(says(messages(r), "the shutter closes at 1 and opens at 1"));
+}
+
 TEST(Pbrt, BlackBodiesHaveLuminanceOne) {
   const Scene s = pbrt("LightSource \"infinite\" \"blackbody L\" 3000 Shape \"sphere\"");
 
