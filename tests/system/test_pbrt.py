@@ -158,6 +158,6 @@ def test_a_damaged_file_of_nanovdb_is_an_error(tmp_path):
         scene = tmp_path / f"{name}.pbrt"
         scene.write_text(GLOW.format(medium=f'"string type" "nanovdb" "string filename" "{name}.nvdb" "float Lescale" 1'))
 
-        said = lightshaft("render", scene, "-o", tmp_path / "x.exr", code=1).stderr
+        said = lightshaft("render", scene, "-o", tmp_path / "x.exr", code=2).stderr
 
         assert f"{name}.nvdb" in said and "NanoVDB" in said, said
