@@ -44,6 +44,7 @@ class RecordedFolder final : public AssetSource {
     texts_ += *text;
     return text;
   }
+  bool keeps() const override { return true; }
   Result<Asset> keep(std::string_view name, const std::string& bytes) override {
     auto asset = folder_.keep(name, bytes);
     if (!asset) return asset;

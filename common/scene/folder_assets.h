@@ -39,6 +39,7 @@ class FolderAssets final : public AssetSource {
   // Writes the file to a temporary folder. From then on find() returns it instead of any file of that name in
   // the scene's own folder, which is not changed.
   Result<Asset> keep(std::string_view name, const std::string& bytes) override;
+  bool keeps() const override { return true; }
 
   // Returns the folder of the files that keep() stored; null if there are none.
   std::shared_ptr<const KeptFolder> kept() const { return kept_; }

@@ -64,7 +64,9 @@ Result<std::string> keep_made(AssetSource& assets, const MadeMesh& mesh) {
   return keep_made(assets, "mesh", ".ply", out);
 }
 
-Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid) {
+namespace {
+
+std::string bytes_of(const MadeGrid& grid) {
   std::string out("VOL\3", 4);
   put(out, 1);  // float32
   for (const int n : grid.sides) put(out, n);
@@ -72,7 +74,19 @@ Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid) {
   for (const float x : {0.f, 0.f, 0.f, 1.f, 1.f, 1.f}) put(out, x);
   out.reserve(out.size() + 4 * grid.values.size());
   for (const float x : grid.values) put(out, x);
-  return keep_made(assets, "grid", ".vol", out);
+  return out;
+}
+
+}  // namespace
+
+Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid) {
+  return keep_made(assets, "grid", ".vol", bytes_of(grid));
+}
+
+Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid, const std::string& name) {
+  const auto kept = assets.keep(name, bytes_of(grid));
+  if (!kept) return tl::unexpected<Error>(kept.error());
+  return name;
 }
 
 }  // namespace ls::scene

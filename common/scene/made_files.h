@@ -29,6 +29,8 @@ struct MadeGrid {
 // bytes.
 Result<std::string> keep_made(AssetSource& assets, const MadeMesh& mesh);
 Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid);
+// Keeps a grid under this name.
+Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid, const std::string& name);
 // Keeps a file with these bytes; its name begins with `kind` ("image") and ends in `ending` (".png").
 Result<std::string> keep_made(AssetSource& assets, std::string_view kind, std::string_view ending,
                               const std::string& bytes);

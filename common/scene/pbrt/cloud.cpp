@@ -52,9 +52,7 @@ std::optional<CloudNodes> nodes_of(const Cloud& cloud, double per_cell, std::siz
 }  // namespace
 
 double density_at(const Cloud& cloud, const Vec3& p) {
-  // Up to height 0 and from height 1 on the noise makes no difference.
-  if (p[1] <= 0) return 1;
-  if (p[1] >= 1) return 0;
+  if (p[1] <= 0) return 1;  // whatever the noise is
   Vec3 q = times(cloud.frequency, p);
   if (cloud.wispiness > 0) {
     double strength = 0.05 * cloud.wispiness, frequency = kWarpFrequency;

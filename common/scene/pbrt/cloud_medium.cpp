@@ -1,8 +1,10 @@
 // Translates pbrt's medium "cloud", whose density is a formula, to a grid.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
+#include "common/base/digest.h"
 #include "common/scene/pbrt/cloud.h"
 #include "common/scene/pbrt/media_parts.h"
 
@@ -11,6 +13,15 @@ namespace {
 
 // The most nodes of one grid, and of all grids of clouds of a file.
 constexpr std::size_t kMaxNodes = std::size_t{1} << 24, kMaxNodesOfAll = std::size_t{1} << 25;
+
+// Returns the name of the grid's file. It is made of the formula's parameters, so that a grid that is there
+// already, such as one that was sent to a coordinator, need not be computed: that takes seconds.
+std::string name_of(const Cloud& c, const CloudNodes& nodes) {
+  const std::string formula =
+      fmt::format("cloud {} {} {} {} {} {}", c.density, c.wispiness, c.frequency, fmt::join(c.low, " "),
+                  fmt::join(c.high, " "), fmt::join(nodes.sides, " "));
+  return fmt::format("cloud-{}.vol", sha256(formula).hex().substr(0, 16));
+}
 
 // Returns the grid's file. Empty: it would be too large or could not be kept, which was reported.
 std::string file_of(MediumSource& m, const Cloud& cloud) {
@@ -35,7 +46,18 @@ std::string file_of(MediumSource& m, const Cloud& cloud) {
         fmt::format("a \"cloud\" is a grid here; of {} x {} x {} nodes this one has {:.1f} along a "
                     "cell of its finest noise, where {} would be more exact",
                     nodes->sides[0], nodes->sides[1], nodes->sides[2], nodes->per_cell, kWantedPerCell));
-  std::string file = keep_grid(m.t, m.p.at(), cloud_grid(cloud, *nodes));
+  const std::string file = name_of(cloud, *nodes);
+  if (!m.t.assets.find(file)) {
+    if (!m.t.assets.keeps()) {
+      m.wrong(m.p.at(), fmt::format("the grid of {} is a file \"{}\", which `lightshaft submit` sends along",
+                                    m.p.title(), file));
+      return {};
+    }
+    if (const auto kept = keep_made(m.t.assets, cloud_grid(cloud, *nodes), file); !kept) {
+      m.wrong(m.p.at(), kept.error().message);
+      return {};
+    }
+  }
   made.push_back({cloud, nodes->count(), file});
   return file;
 }

@@ -35,7 +35,14 @@ bool read_sides(MediumSource& m, std::array<int, 3>& sides) {
 // Checks that the parameter, if it is there, has `channels` numbers a voxel.
 bool fits(MediumSource& m, const Param* p, int channels, const std::array<int, 3>& sides) {
   const std::size_t wanted = std::size_t(channels) * product(sides);
-  if (!p || p->numbers.size() == wanted) return true;
+  if (!p) return true;
+  // Sums and products of two of them stay within float32's range, in which grids are stored.
+  constexpr double kLargest = 1e18;
+  const auto large =
+      std::find_if(p->numbers.begin(), p->numbers.end(), [](double x) { return !(std::abs(x) <= kLargest); });
+  if (large != p->numbers.end())
+    return m.wrong(p->at, fmt::format("'{}' has the value {}, beyond {}", p->name, *large, kLargest));
+  if (p->numbers.size() == wanted) return true;
   return m.wrong(p->at, fmt::format("'{}' has {} numbers, but {}nx * ny * nz is {}", p->name,
                                     p->numbers.size(), channels == 1 ? "" : "3 * ", wanted));
 }

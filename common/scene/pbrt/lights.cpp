@@ -44,7 +44,11 @@ class LightTranslator {
   // Returns the intensity. `emitted` is the power of a light of intensity 1.
   Rgb intensity(double emitted) {
     const Rgb c = colour("I");
-    return times(c, above_zero("power", emitted) / emitted);
+    const double power = above_zero("power", 0);
+    if (!(power > 0)) return c;
+    if (!(emitted > 0))
+      p_.error(p_.at(), fmt::format("{} is too narrow to have a power: give I", p_.title()));
+    return emitted > 0 ? times(c, power / emitted) : c;
   }
 
   Element point() {

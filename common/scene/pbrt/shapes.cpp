@@ -173,7 +173,18 @@ class ShapeTranslator {
     has_normals_ = !mesh.normals.empty();
     if (a_.light && a_.light->power) measure(mesh, 1);
     if (mesh.indices.empty()) return std::nullopt;
-    return kept(mesh.uvs.empty() && needs_uv() ? with_default_uv(mesh) : mesh);
+    if (!mesh.uvs.empty() || !needs_uv()) return kept(mesh);
+    if (mesh.indices.size() > kMaxOwnCorners) return too_many_corners();
+    return kept(with_default_uv(mesh));
+  }
+
+  // The largest number of corners that are made of a shape's list of indices. The text of such a list takes 2
+  // bytes each, and a corner up to 200 in memory on the way to its file.
+  static constexpr std::size_t kMaxOwnCorners = std::size_t{1} << 22;
+  std::optional<Element> too_many_corners() {
+    return wrong(p_.at(), fmt::format("{} has more than {} corners that need uv of their own: give uv, or a "
+                                      "plymesh",
+                                      p_.title(), kMaxOwnCorners));
   }
 
   // Gives each triangle corners of its own, with the uv that pbrt gives to triangles without any.
@@ -199,6 +210,7 @@ class ShapeTranslator {
     const std::vector<double>& x = corners->numbers;
     const std::vector<double> four = indices(x.size() / 3, 4);
     if (four.empty()) return std::nullopt;
+    if (four.size() > kMaxOwnCorners) return too_many_corners();
     // Each patch has corners of its own, as its uv go from 0 to 1.
     Mesh mesh;
     for (std::size_t i = 0; i < four.size(); i += 4) {
@@ -266,8 +278,12 @@ class ShapeTranslator {
       add(out, std::move(area));
     }
     if (a_.inside == a_.outside) return;
-    if (!a_.inside.empty()) refer(out, "interior", medium_id(a_.inside), p_.at());
-    if (!a_.outside.empty()) refer(out, "exterior", medium_id(a_.outside), p_.at());
+    // A mirrored sphere of ours keeps its interior inside, whichever way its normals point. In pbrt the
+    // inside is where normals point away from.
+    const bool swapped = a_.reversed && determinant3(a_.ctm.to) * determinant3(to_world_.to) < 0;
+    const std::string &inside = swapped ? a_.outside : a_.inside, &outside = swapped ? a_.inside : a_.outside;
+    if (!inside.empty()) refer(out, "interior", medium_id(inside), p_.at());
+    if (!outside.empty()) refer(out, "exterior", medium_id(outside), p_.at());
   }
 
   // A Lambertian emitter of the area A and the radiance L gives pi A L.

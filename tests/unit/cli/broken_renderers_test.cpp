@@ -53,6 +53,7 @@ constexpr Blind kBlind[] = {
     {"N32-lengths-of", kTwoPictures, false, true, "N22-passing-a-lamp"},
     {"N33-alpha-0", kTwoPictures, false, true, "N38-furnace"},
     {"N33-principled-roughness-0", kTwoPictures, false, true, "N38-furnace"},
+    {"N33-rough-sheet-alpha-0", kTwoPictures, false, true, "N38-rough-sheet"},
     {"N36-index-matched", kTwoPictures, false, true, "N36-fresnel-normal"},
     {"N40-degenerate-triangles", kTwoPictures, false, true, "N28-triangles-without-area"},
     {"N42-null-interfaces", kTwoPictures, false, true, "N42-plates"},

@@ -59,6 +59,14 @@ Result<void> Lights::add_emitter(const Scene& scene, const Emitter& emitter, con
                                  return {};
                                },
                                [&](const EnvmapEmitter& e) { return add_map(scene, e, images); },
+                               [&](const GoniometricEmitter& e) -> Result<void> {
+                                 if (textures_->aspect(e.texture) != 1)
+                                   return fail(Errc::invalid_argument,
+                                               "the image of a goniometric light is not square: turn one in "
+                                               "latitude and longitude into the equal-area form");
+                                 add(make_light(e, world()));
+                                 return {};
+                               },
                                [&](const auto& e) -> Result<void> {
                                  add(make_light(e, world()));
                                  return {};

@@ -91,7 +91,11 @@ struct ProjectorLight : Punctual<ProjectorLight> {
 
   bool dark(const LightWorld& world) const { return is_black(value) || is_black(world.textures.mean(image)); }
   double power(const LightWorld& world) const {
-    return luminance(value * world.textures.mean(image)) * 4 * tan_x * tan_y;
+    // The area of the image on the plane at distance 1, or its solid angle
+    const double x2 = tan_x * tan_x, y2 = tan_y * tan_y;
+    const double extent =
+        even ? 4 * std::asin(std::sqrt(x2 * y2 / ((1 + x2) * (1 + y2)))) : double{4 * tan_x * tan_y};
+    return luminance(value * world.textures.mean(image)) * extent;
   }
   LightBounds bounds(const LightWorld& world) const {
     LightBounds b = bounds_of(value * world.textures.mean(image));

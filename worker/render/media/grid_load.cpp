@@ -99,6 +99,7 @@ Result<LoadedVolume> vdb_file(const GridVolume& v, const AssetLoader& files, V3d
   auto path = files.path(v.file);
   if (!path) return tl::unexpected(path.error());
   const std::string& name = files.name(v.file);
+  if (v.border) return fail(Errc::invalid_argument, fmt::format("{}: only a `.vol` has a border", name));
   const auto file = VdbFile::read(*path, v.grid_name, kMaxGridValues);
   if (!file) return fail(file.error().code, fmt::format("{}: {}", name, file.error().message));
   const LsVdbGrid& raw = file->grid();

@@ -212,7 +212,16 @@ Result<void> HeteroBuilder::black_bodies(const Volume& temperature) {
     const auto kelvin = static_cast<float>(m.temperature_offset + m.temperature_scale * value);
     return m.peak_one ? black_body_of_peak_one(kelvin) : black_body_radiance(kelvin);
   };
+  const auto too_hot = [&](double value) {
+    // The radiance of a hotter body would leave the range of float32.
+    constexpr double kHottest = 1e30;
+    return !(m.temperature_offset + m.temperature_scale * value <= kHottest);
+  };
+  const auto refused = [] {
+    return fail(Errc::invalid_argument, "a medium has a temperature above 1e30 K: lower temperature_scale");
+  };
   if (const auto* c = std::get_if<ConstVolume>(&temperature)) {
+    if (m.peak_one && too_hot(c->value[0])) return refused();
     const C3 b = light(c->value[0]);
     if (weight) out.emitter = {weight, weight, weight};
     return shine(out, EmissionKind::per_absorption, {k[0] * b.x, k[1] * b.y, k[2] * b.z}, heaviest);
@@ -220,6 +229,7 @@ Result<void> HeteroBuilder::black_bodies(const Volume& temperature) {
   auto loaded = one_channel(temperature, "a temperature");
   if (!loaded) return tl::unexpected(loaded.error());
   out.emitter = keep(*loaded);
+  if (m.peak_one && too_hot(out.emitter[0]->max_value())) return refused();
   out.kelvin_scale = static_cast<float>(m.temperature_scale);
   out.kelvin_offset = static_cast<float>(m.temperature_offset);
   out.peak_one = m.peak_one;

@@ -1,9 +1,10 @@
 // pbrt's files: what each directive becomes.
-#include "tests/unit/scene/pbrt/pbrt_testing.h"
-
 #include <cmath>
 #include <cstring>
 #include <numbers>
+
+#include "common/scene/xml/transform_element.h"
+#include "tests/unit/scene/pbrt/pbrt_testing.h"
 
 namespace ls {
 namespace {
@@ -323,6 +324,27 @@ TEST(Pbrt, TakesTheEncodingOfPngFilesAlone) {
 
   EXPECT_TRUE(is_raw("wood.png"));
   EXPECT_FALSE(is_raw("wood.jpg"));
+}
+
+// A texture mirrors the sphere for its uv, which must not move the media.
+TEST(Pbrt, ASphereKeepsItsMediaWithATexture) {
+  for (const std::string_view reversed : {"", "ReverseOrientation "}) {
+    const auto media = [&](std::string_view alpha) {
+      const Scene s = pbrt(fmt::format(
+          R"(MakeNamedMedium "fog" "string type" "homogeneous" {}MediumInterface "fog" "" Material "dielectric"
+Shape "sphere" {})",
+          reversed, alpha));
+      const Shape& shape = s.shapes.at(0);
+      // The renderer keeps the interior of a mirrored sphere inside, and swaps that of one with flipped
+      // normals.
+      const bool mirrored = scene::determinant3(shape.to_world) < 0;
+      const bool swapped = !mirrored && shape.flip_normals;
+      return std::pair{(swapped ? shape.exterior : shape.interior).has_value(),
+                       (swapped ? shape.interior : shape.exterior).has_value()};
+    };
+    EXPECT_EQ(media(R"("float alpha" 1)"), media("")) << reversed;
+    EXPECT_NE(media("").first, media("").second);
+  }
 }
 
 TEST(Pbrt, DistantLightTravelsFromItsFirstPoint) {

@@ -22,6 +22,7 @@ class KeepingAssets final : public AssetSource {
   MemoryAssets memory;
   Result<Asset> find(std::string_view name) override { return memory.find(name); }
   Result<std::string> text(std::string_view name) override { return memory.text(name); }
+  bool keeps() const override { return true; }
   Result<Asset> keep(std::string_view name, const std::string& bytes) override {
     memory.files[std::string(name)] = bytes;
     return memory.find(name);
