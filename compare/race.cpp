@@ -77,8 +77,8 @@ class Sum {
   double weights_ = 0;
 };
 
-// Of the entrants that render everything, returns the one whose final images have the smallest estimated
-// error.
+// Returns the entrant with the smallest estimated error of its final images. Entrants that did not render
+// everything do not count.
 std::optional<std::size_t> best_of(const Race& race, const Lanes& lanes, std::size_t seeds) {
   std::optional<std::size_t> best;
   double least = std::numeric_limits<double>::infinity();

@@ -27,7 +27,7 @@ struct MachineFacts {
   int cpus = 0;
   double cpu_quota = 0;  // number of CPUs that the control group allows; 0: no limit
   std::uint64_t file_limit = 0;
-  // What the sandbox restricts, when entered on this machine; nullopt: the attempt failed
+  // The restrictions that the sandbox puts in place on this machine; nullopt: entering it failed
   std::optional<worker::child::Sandboxed> sandbox;
   std::filesystem::path vdb_program;
   bool vdb_found = false;

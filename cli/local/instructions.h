@@ -34,8 +34,8 @@ class InstructionCounter {
   int fd_;
 };
 
-// What one variant gave for a small image. The same image is rendered with each variant that has the scene's
-// features, which shows whether all of them give the same bits, and what each costs.
+// The result of one variant for a small image. Every variant that has the scene's features renders the same
+// image, to compare their bits and their costs.
 struct VariantBits {
   std::string name;
   Digest sums;

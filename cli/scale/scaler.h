@@ -15,7 +15,7 @@
 
 namespace ls::cli {
 
-// What the coordinator's jobs need, and which workers it has, as its HTTP interface reports it.
+// The coordinator's open work and its workers, as its HTTP interface reports them.
 struct Demand {
   int open_jobs = 0;    // queued or running, with something left of their budgets
   int unpaid_jobs = 0;  // queued or running, but nothing is left of their budgets

@@ -71,7 +71,7 @@ class AdaptiveStop {
 
   // True if all groups of tiles have stopped at the current level.
   bool settled() const { return settled_ == groups_.size(); }
-  // Whether the image's relMSE at the current level is at most `target`. `unknown`: not all groups of tiles
+  // Tells if the image's relMSE at the current level is at most `target`. `unknown`: not all groups of tiles
   // have stopped, or the error of some group's last round is not known yet.
   enum class Verdict { unknown, no, yes };
   Verdict judge(double target) const;

@@ -4,7 +4,7 @@ import collections
 import numpy as np
 from PIL import Image
 
-# What stands before WorldBegin: film, camera and integrator, each of which a scene may replace.
+# The lines before WorldBegin. A scene may replace each of them.
 FILM = 'Film "rgb" "integer xresolution" {size} "integer yresolution" {size} "string filename" "small.exr" {film}'
 CAMERA = 'LookAt 1 1.5 -4  0.1 0.2 0  0 1 0\nCamera "perspective" "float fov" 40'
 INTEGRATOR = 'Integrator "volpath" "integer maxdepth" 6'

@@ -1,5 +1,5 @@
-// What the translations of pbrt's media share. Each is a function that adds to the element of a medium, and
-// returns false if the medium is wrong, which was reported.
+// Shared by the functions that translate pbrt's media. Each of them adds to the element of a medium, and
+// returns false after it has reported an error of the medium.
 #pragma once
 
 #include "common/scene/pbrt/parts.h"
@@ -45,7 +45,8 @@ struct Box {
   Vec3 low{{0, 0, 0}}, high{{1, 1, 1}};
 };
 bool read_box(MediumSource& m, Box& box);  // from p0 and p1
-// What of a grid fills its box: its voxels but the outermost, or its nodes from face to face.
+// border: a grid's voxels fill its box, except for the outermost layer. nodes: the outermost values lie on
+// the faces of the box.
 enum class Filling { border, nodes };
 void add_volume(MediumSource& m, Element& out, const char* name, const std::string& file, const Box& box,
                 Filling filling);

@@ -49,8 +49,8 @@ void need_inverse(const Transform& to_world, const Element& e, Report& report) {
     report.error(e.at, "to_world flattens this volume or leaves the range of numbers: it can't be inverted");
 }
 
-// Whether parameters are given that have an effect only together with another one. Must be constructed before
-// parameters are taken.
+// The given parameters that need another one to have an effect. It must be constructed before parameters are
+// taken.
 struct Factors {
   explicit Factors(const Params& p)
       : light(p.has("emission_scale")), heat(p.has("temperature_scale") || p.has("temperature_offset")) {

@@ -21,7 +21,7 @@
 
 namespace ls::coordinator {
 
-// What is needed to trace jobs: the tracer, and the prefix of the coordinator's leases
+// The tracer of jobs, and the prefix of the coordinator's leases
 struct Tracing {
   std::shared_ptr<trace::Tracer> tracer;  // null: nothing is traced
   std::string lease_prefix;               // of the leases of this start of the coordinator

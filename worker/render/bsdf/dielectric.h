@@ -272,7 +272,7 @@ inline std::variant<ThinDielectric, RoughThinDielectric> make_material(const Rou
   set_dielectric(m, b, builder);
   m.roughness = builder.roughness(b.distribution, b.alpha_u, b.alpha_v);
   if (m.roughness.always_mirror()) return static_cast<const ThinDielectric&>(m);
-  // Whether light is reflected or passes, the same share of it is masked.
+  // Masking takes the same share of reflected and of transmitted light.
   if (b.multiple_scattering) m.energy = builder.energy(MaterialBuilder::EnergyOf::conductor, m.roughness, 1);
   return m;
 }

@@ -178,9 +178,9 @@ TEST(EqualArea, AHemisphereHasTheIrradiancePi) {
 }
 
 TEST(EqualArea, ACosineHasTwoThirdsOfPi) {
-  // Of a texel of the side h = 2 / side in s the centre's z is above its mean by h^2 / 6, and the mean of z^2
-  // above the square of the mean z by 2 r^2 h^2 / 3 (z = 1 - r^2 has the slope 2 r along each axis). In all
-  // the irradiance is 2 pi / side^2 below that of the smooth map.
+  // A texel has the side h = 2 / side in s. The z of its centre exceeds its mean z by h^2 / 6. Its mean z^2
+  // exceeds the square of its mean z by 2 r^2 h^2 / 3, because z = 1 - r^2 has the slope 2 r along each axis.
+  // In all, the irradiance is 2 pi / side^2 below that of the smooth map.
   constexpr int kSide = 32;
   SkyImage s(kSide, kSide);
   for (int y = 0; y < kSide; ++y)
