@@ -136,6 +136,18 @@ AreaLightSource "diffuse" "rgb L" [ 1 1 1 ] Shape "sphere")");
   EXPECT_EQ(std::get<ConstantTexture>(r.scene->textures.at(area->radiance.value)).value, (Rgb{6, 6, 6}));
 }
 
+// A source that keeps no files, as a coordinator's, is not made to compute a grid that was not sent.
+TEST(Pbrt, ACloudIsNotComputedForASourceThatKeepsNothing) {
+  const std::string scene = pbrt_scene(
+      R"(MakeNamedMedium "c" "string type" "cloud" MediumInterface "c" "" Material "interface" Shape "sphere")");
+  MemoryAssets nothing;
+
+  const ReadResult r = read_scene("t.pbrt", scene, nothing);
+
+  EXPECT_FALSE(r.scene);
+  EXPECT_NE(messages(r).find("which `lightshaft submit` sends along"), std::string::npos) << messages(r);
+}
+
 // pbrt multiplies by the time that the shutter is open: half of it here.
 TEST(Pbrt, AShorterShutterDarkensAllLight) {
   const ReadResult r = read_pbrt(

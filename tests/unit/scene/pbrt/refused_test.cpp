@@ -55,6 +55,11 @@ INSTANTIATE_TEST_SUITE_P(
              "give scale"},
         Case{"Scale 1 2 1 LightSource \"infinite\" \"string filename\" \"wood.png\"", "may turn and mirror"},
         Case{"LightSource \"projection\"", "needs 'filename'"},
+        Case{"LightSource \"spot\" \"float coneangle\" 1e-7 \"float conedeltaangle\" 0 \"float power\" 1",
+             "is too narrow to have a power"},
+        Case{"MakeNamedMedium \"c\" \"string type\" \"uniformgrid\" \"integer nx\" 1 \"integer ny\" 1 "
+             "\"integer nz\" 1 \"float density\" 1e19",
+             "beyond 1e+18"},
         Case{"LightSource \"projection\" \"string filename\" \"wood.png\" \"float power\" 2", "give scale"},
         Case{"AreaLightSource \"diffuse\" \"float power\" 2 Shape \"plymesh\" \"string filename\" "
              "\"mesh.ply\"",
