@@ -15,9 +15,11 @@ if(LIGHTSHAFT_ARCH STREQUAL "x86-64-v3" AND NOT LIGHTSHAFT_SANITIZE)
 endif()
 if(LIGHTSHAFT_SANITIZE)
   # Not asked of the undefined-behaviour sanitizer: null pointers and objects' sizes, which AddressSanitizer traps when they
-  # are used, and virtual tables. These checks are half of what it costs to compile.
-  target_compile_options(ls_flags INTERFACE -fsanitize=${LIGHTSHAFT_SANITIZE} -fno-sanitize=null,object-size,vptr
-                         -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  # are used, virtual tables, and, but for ls_reads_bytes, alignment and the arithmetic of pointers. These checks are more
+  # than half of what it costs to compile. Of the folder, not of ls_flags: options of a target come after it and change it.
+  add_compile_options(-fsanitize=${LIGHTSHAFT_SANITIZE} -fno-sanitize=null,object-size,vptr
+                      -fno-sanitize=alignment,pointer-overflow,nonnull-attribute,returns-nonnull-attribute
+                      -fno-omit-frame-pointer -fno-sanitize-recover=all)
   target_link_options(ls_flags INTERFACE -fsanitize=${LIGHTSHAFT_SANITIZE})
   find_program(MOLD mold)
   if(MOLD)
@@ -48,6 +50,14 @@ function(ls_optimise_under_sanitizers target)
   endif()
 endfunction()
 
+# Code that looks at others' bytes through pointers of its own types: nothing but UndefinedBehaviorSanitizer finds a read
+# that is not aligned. Also for a test that compiles such code itself.
+function(ls_reads_bytes target)
+  if(LIGHTSHAFT_SANITIZE MATCHES undefined)
+    target_compile_options(${target} PRIVATE -fsanitize=undefined -fno-sanitize=null,object-size,vptr)
+  endif()
+endfunction()
+
 # Code that waits for people, disks and sockets: compiled at -O1 where the rest is at -O3, in two thirds of the time.
 function(ls_seldom_run target)
   if(CMAKE_BUILD_TYPE STREQUAL "Release")
@@ -70,12 +80,13 @@ function(ls_library name)
   endif()
 endfunction()
 
-# ls_test(NAME [LOOPS] [BOTH] [LINK libs...] [LABELS labels...]): a GoogleTest binary of all *_test.cpp files in this folder and its rooms.
+# ls_test(NAME [LOOPS] [BOTH [SANITIZED filter]] [LINK libs...] [LABELS labels...]): a GoogleTest binary of all *_test.cpp files in this folder and its rooms.
 # LOOPS: the tests' own loops take most of their time. The target tests-LABEL builds all tests of a label. Unit tests that a
 # whole test run asks under AddressSanitizer (asan) are not asked again in the release build, which has the label `release`
-# for the others, unless BOTH: what they test is arithmetic, which depends on how it was optimised.
+# for the others, unless BOTH: what they test is arithmetic, which depends on how it was optimised. SANITIZED: of the tests
+# asked in BOTH, those that a sanitizer's build is asked (GoogleTest's filter); the others' loops would take minutes there.
 function(ls_test name)
-  cmake_parse_arguments(ARG "LOOPS;BOTH" "" "LINK;LABELS;SOURCES" ${ARGN})
+  cmake_parse_arguments(ARG "LOOPS;BOTH" "SANITIZED" "LINK;LABELS;SOURCES" ${ARGN})
   if("unit" IN_LIST ARG_LABELS AND (ARG_BOTH OR NOT "asan" IN_LIST ARG_LABELS))
     list(APPEND ARG_LABELS release)
   endif()
@@ -94,7 +105,11 @@ function(ls_test name)
     if(LIGHTSHAFT_SANITIZE MATCHES undefined)
       target_compile_options(${name} PRIVATE -fno-sanitize=undefined)  # of the tests' own code; a third of its compile time
     endif()
-    add_test(NAME ${name} COMMAND ${name})
+    set(filter)
+    if(ARG_SANITIZED AND LIGHTSHAFT_SANITIZE)
+      set(filter "--gtest_filter=${ARG_SANITIZED}")
+    endif()
+    add_test(NAME ${name} COMMAND ${name} ${filter})
     set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT 3600)
     foreach(label ${ARG_LABELS})
       if(NOT TARGET tests-${label})

@@ -29,7 +29,7 @@ rm -rf "$logs"
 mkdir -p "$logs"
 counts=$logs/counts times=$logs/times.csv
 : >"$counts"
-echo "step,begins,seconds" >"$times"
+echo "step,begins,seconds,processor_seconds" >"$times"
 
 count() { echo "$1 $2 $3" >>"$counts"; }  # passed failed skipped
 total() { awk -v column="$1" '{ n += $column } END { print n + 0 }' "$counts"; }
@@ -37,12 +37,21 @@ summary() { echo "$(total 1) passed, $(total 2) failed, $(total 3) skipped"; }
 # Ends a lane, or the whole run: what comes after needs what failed.
 give_up() { printf '\n%s\n' "$1"; count 0 1 0; summary; exit 1; }
 
-step() {  # name, command...: with its seconds
-  local name="$1" begins=$((SECONDS - started)); shift
+# Sets `used`: seconds of the processors that what this lane has waited for took.
+count_processor_seconds() {
+  local file="$logs/times.$BASHPID"
+  times >"$file"  # not by a pipe: in a subshell all of them are zero
+  used=$(awk -F'[ms ]' 'NR == 2 { printf "%d", 60 * $1 + $2 + 60 * $4 + $5 }' "$file")
+}
+
+step() {  # name, command...: with its seconds by the clock and of the processors
+  local name="$1" begins=$((SECONDS - started)) used_before used; shift
+  count_processor_seconds; used_before=$used
   "$@"
+  count_processor_seconds
   local took=$((SECONDS - started - begins))
-  echo "$name,$begins,$took" >>"$times"
-  printf '== %s: %d s, ended after %d s\n' "$name" "$took" $((SECONDS - started))
+  echo "$name,$begins,$took,$((used - used_before))" >>"$times"
+  printf '== %s: %d s, %d s of the processors, ended after %d s\n' "$name" "$took" $((used - used_before)) $((SECONDS - started))
 }
 
 build() {  # preset, targets...

@@ -13,7 +13,7 @@ import sys
 
 import pytest
 from cli_kit import bin_dir, lightshaft, write_fog
-from local_farm import PATIENCE, ROOT
+from local_farm import PATIENCE, ROOT, wait_until
 
 from racing import adapter, program
 from racing.adapter import Cost, Made, RaceError
@@ -328,11 +328,11 @@ def test_wrong_use_is_told_before_anything_is_rendered(tmp_path):
 def test_interrupting_keeps_what_was_done_and_ends_the_program(tmp_path):
     scene, out, pid = write_fog(tmp_path), tmp_path / "out", tmp_path / "pid"
     shutil.copy(scene, tmp_path / "long.xml")
-    os.mkfifo(pid)
-    path = adapter_file(tmp_path, ["sh", "-c", f"echo $$ > {pid}; exec tail -f /dev/null", "{scene}", "{spp}", "{image}"], scenes=["long"])
+    path = adapter_file(tmp_path, ["sh", "-c", f"echo $$ > {pid}.new; mv {pid}.new {pid}; exec tail -f /dev/null", "{scene}", "{spp}", "{image}"], scenes=["long"])
     run = subprocess.Popen(race_command(tmp_path, scene, tmp_path / "long.xml", "--size", "48x32", "--time", "1", "--seeds", "2", "--program", path),
                            stderr=subprocess.PIPE, text=True, env={**os.environ, "LIGHTSHAFT_BIN": str(bin_dir()), "TMPDIR": str(tmp_path)},
                            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))  # what a shell starts in the background ignores it
+    wait_until(lambda: pid.exists() or run.poll() is not None, "the program has begun")
     hanging = int(pid.read_text())
     run.send_signal(signal.SIGINT)
     rest = run.stderr.read()

@@ -57,6 +57,7 @@ inline ReadResult read(std::string_view text, const ReadOptions& options = {}) {
   return read_scene("test.xml", text, assets, options);
 }
 
+inline std::string first(const ReadResult& r) { return r.diagnostics.empty() ? "" : r.diagnostics[0].text; }
 inline std::string messages(const ReadResult& r) { return format_diagnostics(r.diagnostics); }
 
 inline Scene must_read(std::string_view text, const ReadOptions& options = {}) {

@@ -92,4 +92,13 @@ inline Scene gltf(const GltfFile& file, const ReadOptions& options = {}) {
   return r.scene ? *r.scene : Scene{};
 }
 
+// What is said of a file that is refused.
+inline std::string said_of(std::string_view text, const ReadOptions& options = {}) {
+  KeepingAssets assets;
+  const ReadResult r = read_gltf(text, assets, options);
+  EXPECT_FALSE(r.scene);
+  for (const Diagnostic& d : r.diagnostics) EXPECT_GT(d.place.line, 0);
+  return messages(r);
+}
+
 }  // namespace ls

@@ -111,14 +111,6 @@ TEST(Pbrt, EveryMessageHasAPlace) {
   }
 }
 
-TEST(Pbrt, SizeIsLimited) {
-  std::string many, grouped = "ObjectBegin \"o\" ";
-  for (std::size_t i = 0; i <= scene::kMaxElements / 3; ++i) many += "Shape \"sphere\" ";
-
-  EXPECT_NE(refusal(many).find("the scene is too large"), std::string::npos);
-  EXPECT_NE(refusal(grouped + many).find("the scene is too large"), std::string::npos);
-}
-
 TEST(Pbrt, NestingIsLimited) {
   std::string deep;
   for (std::size_t i = 0; i <= scene::kMaxPbrtNesting; ++i) deep += "AttributeBegin ";
