@@ -114,5 +114,13 @@ TEST(Goniometric, OfABlackImageIsLeftOut) {
   EXPECT_EQ(b.world->lights.left_out(), 1u);
 }
 
+TEST(Goniometric, WantsASquareImage) {
+  const SceneBuilder builder = shining(test::SkyImage(4, 2));
+  const auto world = build_world(builder.scene, test::settings_of(builder.scene), builder.files, 1);
+  ASSERT_FALSE(world);
+  EXPECT_NE(world.error().message.find("the image of a goniometric light is not square"), std::string::npos)
+      << world.error().message;
+}
+
 }  // namespace
 }  // namespace ls::render

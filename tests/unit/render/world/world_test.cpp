@@ -343,6 +343,24 @@ TEST(World, RefusesExtinctionsBeyondFloat32) {
   EXPECT_EQ(error_of(with_density(1e10f, 1e10)), "");
 }
 
+TEST(World, RefusesBodiesOfPeakOneWhoseRadianceIsBeyondFloat32) {
+  const auto with_kelvin = [](bool grid, double scale) {
+    return with_medium([&](SceneBuilder& k) {
+      const MediumIndex m = k.heterogeneous(k.constant({1, 1, 1}), {.5, .5, .5});
+      auto& medium = std::get<HeterogeneousMedium>(k.scene.media[m.value]);
+      medium.temperature =
+          grid ? k.grid({2, 2, 2}, std::vector<float>(8, 1000), kBox) : k.constant({1000, 1000, 1000});
+      medium.temperature_scale = scale;
+      medium.peak_one = true;
+      return m;
+    });
+  };
+  for (const bool grid : {false, true}) {
+    EXPECT_THAT(error_of(with_kelvin(grid, 1e28)), HasSubstr("a temperature above 1e30 K")) << grid;
+    EXPECT_EQ(error_of(with_kelvin(grid, 1e26)), "") << grid;
+  }
+}
+
 TEST(World, LoadsNothingOfAMediumThatNothingContains) {
   SceneBuilder builder = room();
   builder.heterogeneous(builder.grid({2, 2, 2}, std::vector<float>(8, 1), kBox), {1, 1, 1});

@@ -29,5 +29,15 @@ MediumInterface "m" "" Material "interface" Shape "sphere")"),
   EXPECT_GT(nodes, std::size_t{1} << 23);
 }
 
+TEST(Pbrt, CornersOfTheirOwnAreLimited) {
+  std::string corners = R"(Texture "t" "spectrum" "imagemap" "string filename" "wood.png"
+Material "diffuse" "texture reflectance" "t"
+Shape "trianglemesh" "point3 P" [ 0 0 0  1 0 0  0 1 0 ] "integer indices" [ )";
+  for (std::size_t i = 0; i <= (std::size_t{1} << 22) / 3; ++i) corners += "0 1 2 ";
+
+  EXPECT_NE(refusal(corners + "]").find("more than 4194304 corners that need uv of their own"),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace ls
