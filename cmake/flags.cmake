@@ -35,9 +35,12 @@ target_compile_options(ls_hot_flags INTERFACE -fno-semantic-interposition -fvisi
 # Where CMAKE_UNITY_BUILD is on (the presets but dev and fuzz), all files of a target are compiled as one: most of a build's
 # time is reading and instantiating the same headers again. The price: names in unnamed namespaces of one target may not
 # clash. A target whose names do clash is compiled eight files at a time (ls_few_files_together).
-# The renderer's loops stay by themselves, so that what is inlined into one file does not depend on its neighbours.
+# The renderer's loops stay by themselves, so that what is inlined into one file does not depend on its neighbours; in a
+# sanitizer's build nobody counts instructions.
 function(ls_each_file_by_itself target)
-  set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)
+  if(NOT LIGHTSHAFT_SANITIZE)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)
+  endif()
 endfunction()
 function(ls_few_files_together target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE 8)

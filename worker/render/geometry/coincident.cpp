@@ -11,7 +11,7 @@ namespace ls::render {
 namespace {
 
 // The largest number of pairs of shapes or flat pieces that are compared; this takes about half a second.
-constexpr std::uint64_t kMaxPairs = std::uint64_t{1} << 27;
+constexpr std::uint64_t kMaxSurfacePairs = std::uint64_t{1} << 27;
 
 struct Piece {  // a triangle, or half of the square about a disk
   V3d a, b, c;
@@ -100,7 +100,7 @@ class Finder {
     s.reach = std::max(s.reach, s.coincident_reach);
   }
   bool spent(std::uint64_t pairs) {
-    if (!spent_ && (pairs_ += pairs) > kMaxPairs) mark_all();
+    if (!spent_ && (pairs_ += pairs) > kMaxSurfacePairs) mark_all();
     return spent_;
   }
   void mark_all() {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -14,7 +15,6 @@
 namespace ls::render {
 namespace {
 
-constexpr double kPiD = 3.14159265358979323846;
 constexpr double kWords = 0x1p32;
 // The largest radiance of a texel. It equals the largest radiance of a sample (render_tile.cpp), since larger
 // samples cannot be summed.
@@ -122,12 +122,13 @@ void EnvironmentMap::build_table() {
   for (std::uint32_t j = 0; j < n; ++j) {
     // The height, a difference of cosines, is computed without cancellation as cos a - cos b = 2 sin((a + b)
     // / 2) sin((b - a) / 2).
-    rows_[j].top = std::cos(kPiD * j / n);
-    rows_[j].height =
-        is_square() ? 2. / n : 2 * std::sin(kPiD * (2. * j + 1) / (2. * n)) * std::sin(kPiD / (2. * n));
+    rows_[j].top = std::cos(std::numbers::pi * j / n);
+    rows_[j].height = is_square() ? 2. / n
+                                  : 2 * std::sin(std::numbers::pi * (2. * j + 1) / (2. * n)) *
+                                        std::sin(std::numbers::pi / (2. * n));
     before[j + 1] = before[j] + build_row(j, cells) * rows_[j].height;
   }
-  const double cell_width = 2 * kPiD / texels_.width;
+  const double cell_width = 2 * std::numbers::pi / texels_.width;
   flux_ = before.back() * cell_width * static_cast<double>(scale_);
   if (!(flux_ > 0)) return;
   for (std::uint32_t j = 0; j < n; ++j) {

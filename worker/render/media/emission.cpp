@@ -11,7 +11,7 @@
 namespace ls::render {
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr double kNoBoundary = std::numeric_limits<double>::infinity();
 
 // The maximum length of an interval that gets one emission sample, in voxels of the density or the emission
 // grid.
@@ -34,7 +34,7 @@ class Steps {
   bool inside(double at) const { return more_ && begin() <= at; }
   // The distance from the ray's origin at which the next cell begins if `at` lies before it, or the current
   // one ends.
-  double boundary(double at) const { return !more_ ? kInf : begin() <= at ? end() : begin(); }
+  double boundary(double at) const { return !more_ ? kNoBoundary : begin() <= at ? end() : begin(); }
   double longest() const { return longest_; }
   const MacroCell& cell() const { return walk_.cell(); }
   // local() converts a distance from the ray's origin to a distance from the point of entry into the grid;
@@ -42,7 +42,7 @@ class Steps {
   float local(double t) const { return static_cast<float>(t - walk_.entry()); }
   double distance(float local) const { return walk_.entry() + local; }
   V3 index(double t) const { return walk_.index(local(t)); }
-  Passage pass(const Grid& grid, double a, double b, double wanted = kInf) const {
+  Passage pass(const Grid& grid, double a, double b, double wanted = kNoBoundary) const {
     return grid.pass(walk_.origin(), walk_.direction(), local(a), local(b), wanted);
   }
 
@@ -52,7 +52,7 @@ class Steps {
 
   CellWalk walk_;
   bool more_ = false;
-  double longest_ = kInf;
+  double longest_ = kNoBoundary;
 };
 
 class EmissionWalk {

@@ -7,8 +7,6 @@
 namespace ls::render {
 namespace {
 
-constexpr float kInf = std::numeric_limits<float>::infinity();
-
 // Bounds of a cell are multiplied by kInflate, because interpolation between eight float32 numbers can exceed
 // their maximum by a few ulps (docs/measurements/stability.md N09).
 constexpr float kInflate = 1 + 4 * 0x1p-23f;
@@ -148,7 +146,7 @@ MacroCell Grid::bound_cell(int x, int y, int z) const {
     a[k] = std::clamp(static_cast<int>(std::floor(lo - .01f)), 0, size_[k] - 1);
     b[k] = std::clamp(static_cast<int>(std::ceil(hi + .01f)), 0, size_[k] - 1);
   }
-  float mn = kInf, mx = 0;
+  float mn = std::numeric_limits<float>::infinity(), mx = 0;
   double sum = 0;
   std::uint64_t n = 0;
   for (int k = a[2]; k <= b[2]; ++k)

@@ -14,8 +14,8 @@ namespace {
 
 // The largest number of pairs of boxes to examine. Boxes are sorted by their start along x. Pairs that
 // overlap along x are examined until one touches, which takes n log n time unless many boxes overlap along x.
-// If there are more than kMaxPairs such pairs, some are assumed to touch.
-constexpr std::size_t kMaxPairs = std::size_t{1} << 24;
+// If there are more than kMaxBoxPairs such pairs, some are assumed to touch.
+constexpr std::size_t kMaxBoxPairs = std::size_t{1} << 24;
 
 bool any_touch(std::vector<SurfaceBox> boxes) {
   std::sort(boxes.begin(), boxes.end(),
@@ -23,7 +23,7 @@ bool any_touch(std::vector<SurfaceBox> boxes) {
   std::size_t pairs = 0;
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     for (std::size_t k = i + 1; k < boxes.size() && boxes[k].lo.x <= boxes[i].hi.x; ++k) {
-      if (boxes[i].touches(boxes[k]) || ++pairs > kMaxPairs) return true;
+      if (boxes[i].touches(boxes[k]) || ++pairs > kMaxBoxPairs) return true;
     }
   }
   return false;
