@@ -83,11 +83,11 @@ function(ls_library name)
   endif()
 endfunction()
 
-# ls_test(NAME [LOOPS] [BOTH [SANITIZED filter]] [LINK libs...] [LABELS labels...]): a GoogleTest binary of all *_test.cpp files in this folder and its rooms.
+# ls_test(NAME [LOOPS] [BOTH] [SANITIZED filter] [LINK libs...] [LABELS labels...]): a GoogleTest binary of all *_test.cpp files in this folder and its rooms.
 # LOOPS: the tests' own loops take most of their time. The target tests-LABEL builds all tests of a label. Unit tests that a
 # whole test run asks under AddressSanitizer (asan) are not asked again in the release build, which has the label `release`
 # for the others, unless BOTH: what they test is arithmetic, which depends on how it was optimised. SANITIZED: of the tests
-# asked in BOTH, those that a sanitizer's build is asked (GoogleTest's filter); the others' loops would take minutes there.
+# of the target, those that a sanitizer's build is asked (GoogleTest's filter); the others' loops would take minutes there.
 function(ls_test name)
   cmake_parse_arguments(ARG "LOOPS;BOTH" "SANITIZED" "LINK;LABELS;SOURCES" ${ARGN})
   if("unit" IN_LIST ARG_LABELS AND (ARG_BOTH OR NOT "asan" IN_LIST ARG_LABELS))
