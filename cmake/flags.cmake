@@ -14,9 +14,10 @@ if(LIGHTSHAFT_ARCH STREQUAL "x86-64-v3" AND NOT LIGHTSHAFT_SANITIZE)
   add_link_options(-Wl,-z,x86-64-v3)
 endif()
 if(LIGHTSHAFT_SANITIZE)
-  # Not asked of the undefined-behaviour sanitizer: null pointers and objects' sizes, which AddressSanitizer traps when they
-  # are used, virtual tables, and, but for ls_reads_bytes, alignment and the arithmetic of pointers. These checks are more
-  # than half of what it costs to compile. Of the folder, not of ls_flags: options of a target come after it and change it.
+  # UndefinedBehaviorSanitizer does not check null pointers and object sizes, which AddressSanitizer traps when they are used,
+  # nor virtual tables. It checks alignment, pointer arithmetic and null arguments only in targets with ls_reads_bytes: for all
+  # targets, these checks would make one compile 1.4 times as long (docs/decisions/0025-files-compiled-together.md).
+  # The options belong to the directory, not to ls_flags, so that the options of a target come later and override them.
   add_compile_options(-fsanitize=${LIGHTSHAFT_SANITIZE} -fno-sanitize=null,object-size,vptr
                       -fno-sanitize=alignment,pointer-overflow,nonnull-attribute,returns-nonnull-attribute
                       -fno-omit-frame-pointer -fno-sanitize-recover=all)
@@ -53,8 +54,8 @@ function(ls_optimise_under_sanitizers target)
   endif()
 endfunction()
 
-# Code that looks at others' bytes through pointers of its own types: nothing but UndefinedBehaviorSanitizer finds a read
-# that is not aligned. Also for a test that compiles such code itself.
+# For targets that read files of others through pointers to numbers: nothing but UndefinedBehaviorSanitizer finds a
+# misaligned read. A test that compiles such sources itself needs it, too.
 function(ls_reads_bytes target)
   if(LIGHTSHAFT_SANITIZE MATCHES undefined)
     target_compile_options(${target} PRIVATE -fsanitize=undefined -fno-sanitize=null,object-size,vptr)
@@ -86,8 +87,8 @@ endfunction()
 # ls_test(NAME [LOOPS] [BOTH] [SANITIZED filter] [LINK libs...] [LABELS labels...]): a GoogleTest binary of all *_test.cpp files in this folder and its rooms.
 # LOOPS: the tests' own loops take most of their time. The target tests-LABEL builds all tests of a label. Unit tests that a
 # whole test run asks under AddressSanitizer (asan) are not asked again in the release build, which has the label `release`
-# for the others, unless BOTH: what they test is arithmetic, which depends on how it was optimised. SANITIZED: of the tests
-# of the target, those that a sanitizer's build is asked (GoogleTest's filter); the others' loops would take minutes there.
+# for the others, unless BOTH: what they test is arithmetic, which depends on how it was optimised. SANITIZED: the
+# GoogleTest filter of the tests that a sanitizer build runs; the loops of the others would take minutes there.
 function(ls_test name)
   cmake_parse_arguments(ARG "LOOPS;BOTH" "SANITIZED" "LINK;LABELS;SOURCES" ${ARGN})
   if("unit" IN_LIST ARG_LABELS AND (ARG_BOTH OR NOT "asan" IN_LIST ARG_LABELS))

@@ -92,7 +92,7 @@ inline Scene gltf(const GltfFile& file, const ReadOptions& options = {}) {
   return r.scene ? *r.scene : Scene{};
 }
 
-// What is said of a file that is refused.
+// Reads a file that must be refused, and returns its messages.
 inline std::string said_of(std::string_view text, const ReadOptions& options = {}) {
   KeepingAssets assets;
   const ReadResult r = read_gltf(text, assets, options);

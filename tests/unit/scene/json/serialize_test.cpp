@@ -30,7 +30,7 @@ TEST(SceneJson, ReadsBackToTheSameScene) {
 TEST(SceneJson, KeepsEveryBitOfEveryNumber) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> mantissa(.5, 1);
-  for (int i = 0; i < 200; ++i) {
+  for (int i = 0; i < 1000; ++i) {
     Scene s = must_read(kExample);
     s.shapes[0].to_world.m[3] = std::ldexp(mantissa(random), static_cast<int>(random() % 600) - 300);
     s.shapes[0].to_world.m[7] = std::numeric_limits<double>::denorm_min();

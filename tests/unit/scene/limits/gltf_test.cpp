@@ -1,4 +1,4 @@
-// glTF's files of the largest size, and beyond.
+// glTF files at and beyond the size limits.
 #include "common/scene/limits.h"
 #include "tests/unit/scene/gltf/gltf_testing.h"
 

@@ -1,4 +1,4 @@
-// pbrt's files of the largest size, and beyond.
+// pbrt files at and beyond the size limits.
 #include "common/scene/limits.h"
 #include "tests/unit/scene/pbrt/pbrt_testing.h"
 

@@ -6,7 +6,6 @@
 
 #include "common/scene/limits.h"
 #include "common/scene/xml/source_text.h"
-#include "tests/unit/scene/nori_testing.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
