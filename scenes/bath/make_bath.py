@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Makes the bath: bath.xml with its meshes, textures and steam, in one folder.
 
-usage: make_bath.py FOLDER [--setting sketch|small|full]
+usage: make_bath.py FOLDER [--setting sketch|small|full] [--grid vdb|vol]
 
 The same setting gives the same bytes every time. Needs python3-numpy only.
 """
@@ -29,6 +29,7 @@ def main():
     args = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     args.add_argument("folder", type=pathlib.Path, help="made if it is not there")
     args.add_argument("--setting", choices=SETTINGS, default="small", help="sketch: for tests and quick looks; full: for the picture in the README")
+    args.add_argument("--grid", choices=("vdb", "vol"), default="vdb", help="format of the steam: OpenVDB, or Mitsuba's own for races against it")
     options = args.parse_args()
     setting, folder = SETTINGS[options.setting], options.folder
     folder.mkdir(parents=True, exist_ok=True)
@@ -39,8 +40,8 @@ def main():
     for name in scene.GROUPS:
         groups[name].write(folder / f"{name}.ply")
     textures.write_all(folder, setting["detail"])
-    steam.write(folder / "steam.vdb", setting["voxel"], setting["cells_high"])
-    (folder / "bath.xml").write_text(scene.scene(setting["width"], setting["height"], setting["spp"]))
+    steam.write(folder / f"steam.{options.grid}", setting["voxel"], setting["cells_high"])
+    (folder / "bath.xml").write_text(scene.scene(setting["width"], setting["height"], setting["spp"], options.grid))
     print(f"{folder / 'bath.xml'}: {sum(len(t) for g in groups.values() for t in g.triangles)} triangles")
 
 

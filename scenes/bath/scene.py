@@ -15,17 +15,18 @@ COATED = {
 }
 
 
-def scene(width, height, spp):
+def scene(width, height, spp, grid):
     out = '<scene version="3.0.0">\n'
     for name, value in (("spp", spp), ("width", width), ("height", height)):
         out += f'  <default name="{name}" value="{value}"/>\n'
     out += '  <integrator type="volpath"><integer name="max_depth" value="14"/><integer name="rr_depth" value="5"/></integrator>\n'
-    return out + steam() + materials() + shapes() + light() + camera() + '</scene>\n'
+    return out + steam(grid) + materials() + shapes() + light() + camera() + '</scene>\n'
 
 
-def steam():
+def steam(grid):
+    box = '<boolean name="use_grid_bbox" value="true"/>' if grid == "vol" else ""
     return ('  <medium type="heterogeneous" id="steam">\n'
-            '    <volume type="gridvolume" name="sigma_t"><string name="filename" value="steam.vdb"/></volume>\n'
+            '    <volume type="gridvolume" name="sigma_t"><string name="filename" value="steam.' + grid + f'"/>{box}</volume>\n'
             '    <float name="scale" value="1"/><rgb name="albedo" value="0.985, 0.985, 0.985"/>\n'
             '    <phase type="hg"><float name="g" value="0.55"/></phase>\n  </medium>\n')
 

@@ -15,6 +15,7 @@ from furniture import TUB, TUB_A, TUB_B, WATER
 from hall import BACK, FRONT, HEIGHT, LEFT, RIGHT
 from images import fractal, mix, smoothstep
 from vdb import write_vdb
+from vol import write_vol
 
 ORIGIN = np.array((LEFT, 0.0, BACK))
 SIZE = np.array((RIGHT - LEFT, HEIGHT, FRONT - BACK))
@@ -199,4 +200,9 @@ def density(voxel, cells_high, seconds=13.0, remembered=2.8):
 
 
 def write(path, voxel, cells_high):
-    write_vdb(path, density(voxel, cells_high), "density", ORIGIN + voxel / 2, voxel)
+    """Writes the steam as OpenVDB or, if the path ends in .vol, for Mitsuba."""
+    values = density(voxel, cells_high)
+    if path.suffix == ".vol":
+        write_vol(path, values, ORIGIN, ORIGIN + voxel * np.array(values.shape))
+    else:
+        write_vdb(path, values, "density", ORIGIN + voxel / 2, voxel)

@@ -8,22 +8,14 @@ The same bytes every time. Needs python3-numpy only. The scenes are described in
 """
 import argparse
 import pathlib
-import struct
 import sys
 
 import grids
 import scenes
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "bath"))
-import vdb  # noqa: E402: the bath's writer lies in a folder that has to be named first
-
-
-def write_vol(path, grid):
-    """Mitsuba's binary grid, version 3: float32, x fastest, one channel, with the corners of its box."""
-    lo, hi = grid.box()
-    with open(path, "wb") as file:
-        file.write(b"VOL\x03" + struct.pack("<5i6f", 1, *reversed(grid.values.shape), 1, *lo, *hi))
-        file.write(grid.values.tobytes())
+import vdb  # noqa: E402: the bath's writers lie in a folder that has to be named first
+import vol  # noqa: E402
 
 
 def main():
@@ -33,7 +25,7 @@ def main():
     folder.mkdir(parents=True, exist_ok=True)
     for name, make in grids.ALL.items():
         grid = make()
-        write_vol(folder / f"{name}.vol", grid)
+        vol.write_vol(folder / f"{name}.vol", grid.values.transpose(2, 1, 0), *grid.box())
         centre = [edge + grid.voxel / 2 for edge in grid.corner]
         vdb.write_vdb(folder / f"{name}.vdb", grid.values.transpose(2, 1, 0), "density", centre, grid.voxel, half=False)
     for name, make in scenes.ALL.items():

@@ -1,7 +1,7 @@
 #!/bin/bash
 # Makes docs/measurements/benchmarks anew: races against other programs, and curves of our own with predicted against actual times.
 #
-# usage: benchmarks.sh [SCENES] [--clock wall|cpu] [--time S] [--seeds K] [--seed N] [--only races|curves] [--out DIR]
+# usage: benchmarks.sh [SCENES] [--clock wall|cpu] [--time S] [--seeds K] [--seed N] [--only races|curves|bath] [--out DIR]
 # SCENES is a folder with NAME.xml and, for the races, refs/NAME.0.exr and refs/NAME.1.exr: two independent references. Without it
 # the scenes and references are those of scenes/bench.
 # Entrants of the races are Mitsuba 3 and Cycles, as far as `python3` has the packages mitsuba (and there is an LLVM library for it)
@@ -9,6 +9,7 @@
 # The curves are those of SCENES and, on a page of its own, of the bath, made here if it is not there; they are counted by CPU
 # seconds, and so may be made while others use the machine. The races want a quiet one, or --clock cpu. Races in docs/measurements/benchmarks
 # give README.md its table of figures (measured.py).
+# --only bath races Mitsuba 3 on the bath at 240x180, against two of our renders of 1,024 samples each, which it makes: a quarter of an hour.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 BIN=${LIGHTSHAFT_BIN:-build/release/bin}
@@ -39,7 +40,16 @@ add_programs() {  # PACKAGE ADAPTER...
   for adapter in "$@"; do programs+=(--program "$ADAPTERS/$adapter.json"); done
 }
 
-if [ "$only" != curves ]; then
+# Of what a build's name is made of.
+sources=(common worker/render worker/CMakeLists.txt CMakeLists.txt cmake)
+note_run() {  # FILE: the command, and the commit that last touched the renderer, whatever pages are committed after it
+  local commit
+  commit=$(git log -1 --format=%h -- "${sources[@]}")
+  git diff --quiet HEAD -- "${sources[@]}" || commit="$commit, changed"
+  printf '{"commit": "%s", "command": "%s"}\n' "$commit" "${command% }" >"$1"
+}
+
+if [ -z "$only" ] || [ "$only" = races ]; then
   if [ "$out" = docs/measurements/benchmarks ] && ! { /usr/bin/python3 "$ADAPTERS/llvm_library.py" && python3 -c 'import mitsuba, bpy'; } >/dev/null 2>&1; then
     echo "benchmarks.sh: the races of $out need an LLVM library, and a python3 with mitsuba and bpy (pip install mitsuba bpy); with --out DIR the races are made without what is missing" >&2
     exit 2
@@ -48,13 +58,10 @@ if [ "$only" != curves ]; then
   add_programs bpy cycles
   /usr/bin/python3 tests/bench/race.py "$scenes"/*.xml --references "$references" --integrators volpath "${programs[@]}" \
     --time "$time" --seeds "$seeds" --seed "$seed" --clock "$clock" --report "$out/races" || status=$?
-  # The commit that last touched what the build's name is made of: it stays the renderer's, whatever pages are committed after it.
-  commit=$(git log -1 --format=%h -- common worker/render worker/CMakeLists.txt CMakeLists.txt cmake)
-  git diff --quiet HEAD -- common worker/render worker/CMakeLists.txt CMakeLists.txt cmake || commit="$commit, changed"
-  printf '{"commit": "%s", "command": "%s"}\n' "$commit" "${command% }" >"$out/races/run.json"
+  note_run "$out/races/run.json"
   [ "$out" != docs/measurements/benchmarks ] || /usr/bin/python3 tests/bench/measured.py --write README.md
 fi
-if [ "$only" != races ]; then
+if [ -z "$only" ] || [ "$only" = curves ]; then
   bath=build/benchmarks/bath
   [ -f "$bath/bath.xml" ] || /usr/bin/python3 scenes/bath/make_bath.py "$bath" >&2
   race() {  # FOLDER SCENE...
@@ -63,5 +70,19 @@ if [ "$only" != races ]; then
   }
   race curves "$scenes"/*.xml
   race bath "$bath/bath.xml"
+fi
+if [ "$only" = bath ]; then
+  bath=build/benchmarks/bath_vol size=240x180
+  [ -f "$bath/bath.xml" ] || /usr/bin/python3 scenes/bath/make_bath.py "$bath" --grid vol >&2
+  mkdir -p "$bath/references"
+  for k in 0 1; do  # of seeds that no race has
+    [ -f "$bath/references/bath.$k.exr" ] ||
+      "$BIN/lightshaft" render "$bath/bath.xml" --size $size --spp 1024 --seed $((770000 + k)) --float --quiet -o "$bath/references/bath.$k.exr"
+  done
+  /usr/bin/python3 "$ADAPTERS/llvm_library.py" || { echo "benchmarks.sh: --only bath needs an LLVM library" >&2; exit 2; }
+  add_programs mitsuba mitsuba3_volpath mitsuba3_volpathmis
+  /usr/bin/python3 tests/bench/race.py "$bath/bath.xml" --references "$bath/references" --size $size --integrators volpath "${programs[@]}" \
+    --time "$time" --seeds "$seeds" --seed "$seed" --clock "$clock" --report "$out/bath-race" || status=$?
+  note_run "$out/bath-race/run.json"
 fi
 exit $status

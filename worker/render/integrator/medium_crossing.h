@@ -17,28 +17,47 @@
 namespace ls::render {
 
 template <Features F, template <Features> class Light>
-auto PathTracer<F, Light>::fly(const SurfaceHit* end, float reach) -> Step {
+auto PathTracer<F, Light>::fly(const SurfaceHit* end, float reach, const std::optional<Flight>& flown)
+    -> Step {
   if constexpr (F.overlaps) {
     if (medium_.several()) return fly_through_several(end, reach);
   }
-  return fly_through(world_.media[medium_.one()], end, reach);
+  return fly_through(world_.media[medium_.one()], end, reach, flown);
 }
 
 template <Features F, template <Features> class Light>
-auto PathTracer<F, Light>::fly_through(const Medium& medium, const SurfaceHit* end, float reach) -> Step {
+auto PathTracer<F, Light>::fly_through(const Medium& medium, const SurfaceHit* end, float reach,
+                                       [[maybe_unused]] const std::optional<Flight>& flown) -> Step {
   const float t_max = end ? ray_.length_to(*end) : reach;
   const Segment segment{t_max, ray_.lead(), end};
+  if constexpr (kFliesFirst) {
+    // It is the same flight: a second one, drawn because the first one went too far, would be another and
+    // biased
+    if (flown)
+      return collide(medium, segment, {}, flown->scattered && flown->t < t_max ? *flown : Flight{.t = t_max});
+  }
   if constexpr (F.emission) add_medium_emission(medium, t_max);
   const auto plan = Light<F>::ahead(*this, medium, segment);
-  const Group numbers = stream_.group(segment_, Purpose::flight);
-  const bool past_lamps = F.aimed && world_.lamp_flights && !medium.grid && std::isfinite(t_max);
-  const Flight flight = past_lamps
-                            ? fly_past_lamps(medium, hero_, numbers, ray_.start, ray_.d, t_max, world_.lamps)
-                            : free_flight<F>(medium, hero_, numbers.bits[0], ray_.start, ray_.d, t_max,
-                                             stream_.stream(segment_, Purpose::track_flight), counters_);
+  const Flight flight = flight_through(medium, t_max);
   if constexpr (F.reuse) {
     if (looks_for_second()) sharing_.tail.depth += medium.sigma_t * (flight.scattered ? flight.t : t_max);
   }
+  return collide(medium, segment, plan, flight);
+}
+
+template <Features F, template <Features> class Light>
+Flight PathTracer<F, Light>::flight_through(const Medium& medium, float t_max) {
+  const Group numbers = stream_.group(segment_, Purpose::flight);
+  if (F.aimed && world_.lamp_flights && !medium.grid && std::isfinite(t_max))
+    return fly_past_lamps(medium, hero_, numbers, ray_.start, ray_.d, t_max, world_.lamps);
+  return free_flight<F>(medium, hero_, numbers.bits[0], ray_.start, ray_.d, t_max,
+                        stream_.stream(segment_, Purpose::track_flight), counters_);
+}
+
+// Scatters the path where the flight ends, if it ends in the medium.
+template <Features F, template <Features> class Light>
+auto PathTracer<F, Light>::collide(const Medium& medium, Segment segment, const typename Light<F>::Plan& plan,
+                                   const Flight& flight) -> Step {
   if (!flight.scattered) {
     apply(flight);
     return {Collision::escaped};

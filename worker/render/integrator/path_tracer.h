@@ -128,11 +128,26 @@ class PathTracer {
     float roulette = 1;  // random number for Russian roulette, if scattered
   };
   using Within = std::conditional_t<F.overlaps, MediaState, OneMedium>;
+  // True if flights may be sampled before rays are traced: the strategies of other paths need to know where a
+  // segment ends.
+  static constexpr bool kFliesFirst =
+      F.media && !F.aimed && !F.reuse && std::is_same_v<Light<F>, VertexNee<F>>;
 
   // Samples a free flight up to the surface hit at `end`, or, if `end` is null, up to the distance `reach`.
-  Step fly(const SurfaceHit* end, float reach);
-  Step fly_through(const Medium& medium, const SurfaceHit* end, float reach);
+  // `flown` is the flight if it was sampled before, without an end.
+  Step fly(const SurfaceHit* end, float reach, const std::optional<Flight>& flown);
+  Step fly_through(const Medium& medium, const SurfaceHit* end, float reach,
+                   const std::optional<Flight>& flown);
   Step fly_through_several(const SurfaceHit* end, float reach);
+  Flight flight_through(const Medium& medium, float t_max);
+  Step collide(const Medium& medium, Segment segment, const typename Light<F>::Plan& plan,
+               const Flight& flight);
+  // The medium if the ray starts in its clear region, else null.
+  const Medium* clear_medium() const {
+    if (!medium_.any() || medium_.several()) return nullptr;
+    const Medium& m = world_.media[medium_.one()];
+    return m.clear && m.clear->contains(ray_.start) ? &m : nullptr;
+  }
   void begin_vertex(Segment segment, const Flight& flight);
   Step scatter_by_phase(const Medium& medium);
   void light_vertex(const Medium& medium, const V3& p, const V3& d);
@@ -294,6 +309,18 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
   if constexpr (F.chromatic) hero_ = std::min(2, static_cast<int>(3 * stream_.group(0, Purpose::hero).u(0)));
   float t_max = ray.t_max;
   for (segment_ = 0; segment_ < kMaxSegments; ++segment_, t_max = kInfinity) {
+    std::optional<Flight> flown;
+    if constexpr (kFliesFirst) {
+      const Medium* const medium = std::isfinite(t_max) ? nullptr : clear_medium();
+      if (medium) {
+        flown = flight_through(*medium, kInfinity);
+        if (flown->scattered && medium->clear->contains(ray_.start + ray_.d * flown->t)) {
+          const Step step = collide(*medium, {kInfinity, ray_.lead(), nullptr}, {}, *flown);
+          if (step.collision == Collision::absorbed || !survives(step.roulette)) break;
+          continue;
+        }
+      }
+    }
     SurfaceHit hit;
     const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, t_max);
     const bool met = primitive && world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit);
@@ -302,7 +329,7 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
     }
     if constexpr (F.media) {
       if (medium_.any()) {
-        const Step step = fly(met ? &hit : nullptr, t_max);
+        const Step step = fly(met ? &hit : nullptr, t_max, flown);
         if (step.collision == Collision::scattered) {
           if (!survives(step.roulette)) break;
           continue;

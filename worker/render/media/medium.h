@@ -16,6 +16,7 @@
 
 #include "worker/render/base/features.h"
 #include "worker/render/base/work_counters.h"
+#include "worker/render/geometry/clear_region.h"
 #include "worker/render/math/math.h"
 #include "worker/render/math/random.h"
 #include "worker/render/math/sampler.h"
@@ -58,7 +59,10 @@ struct Medium {
   float kelvin_scale = 1, kelvin_offset = 0;
   bool peak_one = false;         // for black_body: spectra are divided by their peak
   const Grid* weight = nullptr;  // for black_body: a factor on the emission, 0 outside of this grid
-  int priority = 0;              // where media overlap, only those of the highest priority are in effect
+  // Where no surface lies inside the medium; null: not known. Set where flights may be sampled before it is
+  // known how far they can go: if light is looked for at vertices alone, and the medium does not glow.
+  const ClearRegion* clear = nullptr;
+  int priority = 0;  // where media overlap, only those of the highest priority are in effect
   bool chromatic() const { return sigma_t.x != sigma_t.y || sigma_t.y != sigma_t.z || by_channel[0]; }
 
   // Returns the scattering coefficients per unit of density at the world point p of a grid.

@@ -33,6 +33,7 @@ class World {
   BsdfTable bsdfs;
   std::deque<Grid> grids;  // a deque, since media point at its elements
   std::vector<Medium> media;
+  std::deque<ClearRegion> clear_regions;  // a deque, since media point at its elements
   Lights lights;
   Accel accel;
   Camera camera;

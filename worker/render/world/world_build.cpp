@@ -9,6 +9,7 @@
 #include "common/image/aov/cryptomatte.h"
 #include "common/scene/schema/integrators.h"
 #include "worker/render/geometry/coincident.h"
+#include "worker/render/geometry/surface_boxes.h"
 #include "worker/render/world/aim.h"
 #include "worker/render/world/media_build.h"
 #include "worker/render/world/overlap.h"
@@ -100,6 +101,30 @@ bool a_point_shines_in_a_grid(const World& w) {
       return true;
     });
   });
+}
+
+// Finds where no surface lies inside media through which flights may be sampled before rays are traced. With
+// coloured extinction that would be wrong, since the weight of a flight that reaches a surface depends on the
+// distance.
+void find_clear_regions(World& w) {
+  // Each try looks at all triangles and boxes, and with so many bodies each of them is a small part of the
+  // scene.
+  constexpr int kMostBodies = 64;
+  const auto wanted = [&](const SurfaceInfo& s) {
+    if (!s.transition || s.interior == kNone || s.sheet || w.need.chromatic) return false;
+    const Medium& m = w.media[s.interior];
+    return !m.clear && m.emission_kind == EmissionKind::none && m.equiangular_mode == EquiangularMode::none;
+  };
+  const auto& surfaces = w.geometry.surfaces;
+  const auto bodies = std::ranges::count_if(surfaces, wanted);
+  if (bodies == 0 || bodies > kMostBodies) return;
+  const auto boxes = surface_boxes(w.geometry, [](const SurfaceInfo&) { return true; });
+  if (!boxes) return;
+  for (std::uint32_t i = 0; i < surfaces.size(); ++i) {
+    if (!wanted(surfaces[i])) continue;
+    if (const auto region = ClearRegion::inside(w.geometry, i, *boxes))
+      w.media[surfaces[i].interior].clear = &w.clear_regions.emplace_back(*region);
+  }
 }
 
 // Sets the camera and the position of the image in the full frame; returns the size of the full frame. A crop
@@ -237,6 +262,7 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
     if (m.grid ? w.equiangular_points : w.equiangular)
       m.equiangular_mode = m.grid ? EquiangularMode::points : EquiangularMode::places;
   }
+  find_clear_regions(w);
   // Equi-angular sampling chooses a light before the shading point is known. Multiple importance sampling
   // needs the same probability of the light at vertices. So for points in media the tree is used only if no
   // segments are sampled.

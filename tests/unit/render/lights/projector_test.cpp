@@ -46,7 +46,7 @@ const OracleRow kOracle[] = {
 };
 
 // 3 x 2 texels: (1 + x + 3 y, (x + 1) / 2, (y + 1) / 4).
-test::SkyImage image() {
+test::SkyImage slide() {
   test::SkyImage s(3, 2);
   for (int y = 0; y < 2; ++y)
     for (int x = 0; x < 3; ++x) s.set(x, y, {1. + x + 3 * y, .5 * (x + 1), .25 * (y + 1)});
@@ -63,7 +63,7 @@ SceneBuilder projecting(const test::SkyImage& s, const ProjectorEmitter& how, do
   builder.shape(RectangleShape{}, test::scale(size), builder.diffuse(.5));
   return builder;
 }
-C3 arriving(const LightBench& b, const V3d& p) {
+C3 arriving_through(const LightBench& b, const V3d& p) {
   const auto s = b.world->lights.sample(b.world->lights.choose(numbers(.5f, .5f, .5f)), b.at(p));
   return s ? s->radiance / s->pdf : C3(0);
 }
@@ -76,8 +76,8 @@ TEST(Projector, ArrivesAsInMitsuba) {
       e.fov = kFov;
       e.fov_axis = row.axis;
       e.scale = kScale;
-      const LightBench b(projecting(image(), e, size));
-      const C3 got = arriving(b, row.p);
+      const LightBench b(projecting(slide(), e, size));
+      const C3 got = arriving_through(b, row.p);
       // Float32 on both sides: 1e-7 of the distance to the texels' edges is far from any of these points.
       for (int c = 0; c < 3; ++c) EXPECT_NEAR(got[c], row.value[c], 3e-6 * row.value[c]) << row.p.x;
     }
@@ -95,9 +95,9 @@ TEST(Projector, LightsAPlaneAsTheImageIs) {
         const auto at = b.irradiance(V3d(x, y, 1) * distance, {0, 0, -1}, 2);
         EXPECT_NEAR(at.mean, M_PI / 4 / (distance * distance), 1e-6 * M_PI / 4 / (distance * distance));
       }
-  EXPECT_EQ(arriving(b, {1.01, 0, 1}), C3(0));
-  EXPECT_EQ(arriving(b, {0, 0, -1}), C3(0)) << "behind it";
-  EXPECT_EQ(arriving(b, {0, 0, 0}), C3(0)) << "in it";
+  EXPECT_EQ(arriving_through(b, {1.01, 0, 1}), C3(0));
+  EXPECT_EQ(arriving_through(b, {0, 0, -1}), C3(0)) << "behind it";
+  EXPECT_EQ(arriving_through(b, {0, 0, 0}), C3(0)) << "in it";
 }
 
 TEST(Projector, AsIntensityIsEvenInAllDirections) {
@@ -112,7 +112,7 @@ TEST(Projector, AsIntensityIsEvenInAllDirections) {
     for (const double x : {-.9, 0., .6}) {
       const V3d at = V3d(x, .3, 1) * distance;
       const double want = .75 / at.dot(at);  // float32, of the squared distance
-      EXPECT_NEAR(arriving(b, at).x, want, 3e-6 * want);
+      EXPECT_NEAR(arriving_through(b, at).x, want, 3e-6 * want);
     }
 }
 
@@ -123,9 +123,9 @@ TEST(Projector, StandsUpright) {
   test::SkyImage corner(2, 2);
   corner.set(0, 0, {1, 1, 1});
   const LightBench b(projecting(corner, e));
-  EXPECT_GT(arriving(b, {.5, .5, 1}).x, 0) << "the upper left corner";
-  EXPECT_EQ(arriving(b, {-.5, .5, 1}), C3(0));
-  EXPECT_EQ(arriving(b, {.5, -.5, 1}), C3(0));
+  EXPECT_GT(arriving_through(b, {.5, .5, 1}).x, 0) << "the upper left corner";
+  EXPECT_EQ(arriving_through(b, {-.5, .5, 1}), C3(0));
+  EXPECT_EQ(arriving_through(b, {.5, -.5, 1}), C3(0));
 }
 
 TEST(Projector, OfABlackImageIsLeftOut) {

@@ -1,0 +1,129 @@
+// Regions in which no surface lies: which bodies have one, which points are in it, and that flights that end
+// in it change no pixel.
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/support/render_check.h"
+#include "worker/render/geometry/clear_region.h"
+#include "worker/render/world/world.h"
+#include "worker/render/world/world_build.h"
+
+namespace ls::render {
+namespace {
+
+using test::operator*;
+using test::SceneBuilder;
+using test::translate;
+
+// A body of grey medium under a sun and a sky, above a floor.
+SceneBuilder body(const ls::Geometry& g, const Transform& to_world, bool grid = false) {
+  SceneBuilder b({12, 8});
+  std::vector<float> values;
+  for (int i = 0; i < 8 * 8 * 8; ++i) values.push_back(static_cast<float>(i * 7919 % 11) / 5);
+  const MediumIndex m =
+      grid ? b.heterogeneous(b.grid({8, 8, 8}, values, to_world * translate({-1, -1, -1}) * test::scale(2)),
+                             {.99, .9, .8}, 4, .5)
+           : b.homogeneous({4, 4, 4}, {.99, .9, .8}, .5);
+  b.container(g, to_world, b.null(), m);
+  b.shape(RectangleShape{}, translate({0, 0, -3}) * test::scale(9), b.diffuse(.5));
+  b.scene.emitters.push_back(DirectionalEmitter{{.3, .2, -1}, {1, 2, 3}});
+  b.environment(.5);
+  b.look({0, -6, 1}, {0, 0, 0}, 30);
+  return b;
+}
+const ClearRegion* region_of(const World& w) { return w.media.at(0).clear; }
+std::shared_ptr<World> made(const SceneBuilder& b) {
+  return make_world(b.scene, test::settings_of(b.scene), b.files, 1).value();
+}
+// The world's coordinates of a point of the scene.
+V3 in_world(const World& w, const Vec3& p) {
+  return V3((V3d(p[0], p[1], p[2]) - w.geometry.center) * w.geometry.scale);
+}
+
+TEST(ClearRegion, IsTheInsideOfASphereAndOfATurnedBox) {
+  const Transform turned = test::rotate_x(20) * test::rotate_y(35) * test::scale(1, .5, .7);
+  const auto corner = [&](double x, double y, double z) {
+    const auto& m = turned.m;
+    return Vec3{m[0] * x + m[1] * y + m[2] * z, m[4] * x + m[5] * y + m[6] * z,
+                m[8] * x + m[9] * y + m[10] * z};
+  };
+  struct Case {
+    SceneBuilder scene;
+    std::vector<Vec3> in, out;
+  };
+  const Case cases[] = {
+      {body(SphereShape{{.3, 0, 0}, .5}, {}),
+       {{.3, 0, 0}, {.79, 0, 0}, {.3, -.49, 0}},
+       {{.81, 0, 0}, {.3, 0, -.51}, {.7, .4, 0}}},
+      {body(CubeShape{}, {}), {{0, 0, 0}, {.99, .99, -.99}}, {{1.01, 0, 0}, {0, -1.01, 0}, {0, 0, 1.01}}},
+      {body(CubeShape{}, turned),
+       {corner(.99, .99, .99), corner(-.99, .99, 0)},
+       {corner(1.01, 0, 0), corner(0, -1.01, 0), corner(0, 0, 1.01)}},
+  };
+  for (const Case& c : cases) {
+    const auto w = made(c.scene);
+    ASSERT_TRUE(region_of(*w));
+    for (const Vec3& p : c.in)
+      EXPECT_TRUE(region_of(*w)->contains(in_world(*w, p))) << p[0] << ' ' << p[1] << ' ' << p[2];
+    for (const Vec3& p : c.out)
+      EXPECT_FALSE(region_of(*w)->contains(in_world(*w, p))) << p[0] << ' ' << p[1] << ' ' << p[2];
+    const float bad = std::numeric_limits<float>::quiet_NaN(), far = std::numeric_limits<float>::infinity();
+    EXPECT_FALSE(region_of(*w)->contains({bad, 0, 0}));
+    EXPECT_FALSE(region_of(*w)->contains({far, 0, 0}));
+  }
+}
+
+TEST(ClearRegion, IsNotWhereAnotherSurfaceMayBe) {
+  const auto changed = [](auto&& change) {
+    SceneBuilder b = body(CubeShape{}, {});
+    change(b);
+    return region_of(*made(b)) != nullptr;
+  };
+  EXPECT_TRUE(changed([](SceneBuilder&) {}));
+  EXPECT_FALSE(changed([](SceneBuilder& b) {
+    b.shape(SphereShape{{0, 0, 0}, .1}, {}, b.diffuse(.5));
+  })) << "inside";
+  EXPECT_FALSE(changed([](SceneBuilder& b) { b.shape(RectangleShape{}, test::scale(5), b.diffuse(.5)); }))
+      << "through it";
+  EXPECT_FALSE(changed([](SceneBuilder& b) {
+    b.shape(RectangleShape{}, translate({0, 0, 1}), b.null());
+  })) << "on its face";
+  EXPECT_TRUE(changed([](SceneBuilder& b) {
+    b.shape(SphereShape{{0, 0, 1.5}, .1}, {}, b.diffuse(.5));
+  })) << "beside it";
+}
+
+TEST(ClearRegion, IsNotWhereAFlightHasToKnowItsEnd) {
+  const auto changed = [](auto&& change) {
+    SceneBuilder b = body(SphereShape{}, {});
+    change(b);
+    return region_of(*made(b)) != nullptr;
+  };
+  EXPECT_TRUE(changed([](SceneBuilder&) {}));
+  EXPECT_FALSE(changed([](SceneBuilder& b) {
+    std::get<HomogeneousMedium>(b.scene.media[0]).sigma_t = {1, 2, 3};
+  })) << "colours";
+  EXPECT_FALSE(changed([](SceneBuilder& b) {
+    std::get<HomogeneousMedium>(b.scene.media[0]).emission = {1, 1, 1};
+  })) << "glows";
+  EXPECT_FALSE(changed([](SceneBuilder& b) {
+    b.lamp(SphereShape{}, translate({0, 0, 3}) * test::scale(.1));
+  })) << "points are sampled about the lamp";
+}
+
+TEST(ClearRegion, ChangesNoPixel) {
+  for (const bool grid : {false, true})
+    for (const bool cube : {false, true}) {
+      const auto w = made(
+          body(cube ? ls::Geometry(CubeShape{}) : ls::Geometry(SphereShape{}), test::rotate_x(20), grid));
+      ASSERT_TRUE(region_of(*w));
+      const auto pixels = [&] { return render_tile(*w, {0, 0, 12, 8}, {0, 32}, nullptr, nullptr).sums; };
+      const auto with = pixels();
+      w->media[0].clear = nullptr;
+      EXPECT_EQ(with, pixels()) << (grid ? "grid in a " : "fog in a ") << (cube ? "cube" : "sphere");
+    }
+}
+
+}  // namespace
+}  // namespace ls::render
