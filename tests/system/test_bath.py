@@ -1,6 +1,7 @@
 """The demo scene `scenes/bath`: its generator, its own OpenVDB writer, and that the command takes what they make."""
 
 import json
+import struct
 import subprocess
 import sys
 
@@ -75,6 +76,23 @@ def test_the_written_vdb_is_what_openvdb_reads(vdb_writer, tmp_path):
     assert grid.gridClass == openvdb.GridClass.FOG_VOLUME
     assert grid.transform.indexToWorld((0, 0, 0)) == (1, -2, 3)
     assert grid.transform.indexToWorld((4, 2, 1)) == (2, -1.5, 3.25)
+
+
+def test_its_steam_is_the_same_in_mitsubas_format(bath, tmp_path):
+    openvdb = pytest.importorskip("pyopenvdb", reason="python3-openvdb is not installed")
+    scene = make(tmp_path / "vol", "--grid", "vol")
+    assert lightshaft("inspect", scene, "--strict").stderr == ""
+    data = (scene.parent / "steam.vol").read_bytes()
+    counts, box = struct.unpack_from("<3i", data, 8), numpy.array(struct.unpack_from("<6f", data, 24))
+    values = numpy.frombuffer(data, "<f4", offset=48).reshape(counts[::-1]).transpose(2, 1, 0)
+
+    grid = openvdb.read(str(bath.parent / "steam.vdb"), "density")
+
+    back = numpy.zeros(values.shape, numpy.float32)  # not like values, whose axes are turned
+    grid.copyToArray(back)
+    assert (back == values.astype(numpy.float16)).all() and back.any()
+    voxel = (box[3:] - box[:3]) / counts
+    assert grid.transform.indexToWorld((0, 0, 0)) == pytest.approx(box[:3] + voxel / 2, abs=1e-6), "values are at the centres of cells"
 
 
 def test_the_vdb_writer_says_what_is_too_large(vdb_writer, tmp_path):
