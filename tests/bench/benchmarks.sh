@@ -17,7 +17,7 @@ ADAPTERS=tests/bench/adapters
 clock=wall time=4 seeds=3 seed=0 only= out=docs/measurements/benchmarks
 command="tests/bench/benchmarks.sh $*"
 if [ $# -ge 1 ] && [ "${1#--}" = "$1" ]; then
-  [ -d "$1" ] || { sed -n '4,11s/^# \?//p' "$0" >&2; exit 2; }
+  [ -d "$1" ] || { sed -n '4,12s/^# \?//p' "$0" >&2; exit 2; }
   scenes=$1 references=$1/refs; shift
 else
   scenes=build/bench references=scenes/bench/references
@@ -31,6 +31,7 @@ while [ $# -ge 2 ]; do
   shift 2
 done
 [ $# -eq 0 ] || { echo "benchmarks.sh: $1 needs a value" >&2; exit 2; }
+case $only in ''|races|curves|bath) ;; *) echo "benchmarks.sh: --only $only: it takes races, curves or bath" >&2; exit 2 ;; esac
 
 status=0
 programs=()
@@ -72,14 +73,14 @@ if [ -z "$only" ] || [ "$only" = curves ]; then
   race bath "$bath/bath.xml"
 fi
 if [ "$only" = bath ]; then
+  { /usr/bin/python3 "$ADAPTERS/llvm_library.py" && python3 -c 'import mitsuba'; } >/dev/null 2>&1 || {
+    echo "benchmarks.sh: --only bath needs an LLVM library, and a python3 with mitsuba (pip install mitsuba)" >&2; exit 2; }
   bath=build/benchmarks/bath_vol size=240x180
-  [ -f "$bath/bath.xml" ] || /usr/bin/python3 scenes/bath/make_bath.py "$bath" --grid vol >&2
+  /usr/bin/python3 scenes/bath/make_bath.py "$bath" --grid vol >&2
   mkdir -p "$bath/references"
   for k in 0 1; do  # of seeds that no race has
-    [ -f "$bath/references/bath.$k.exr" ] ||
-      "$BIN/lightshaft" render "$bath/bath.xml" --size $size --spp 1024 --seed $((770000 + k)) --float --quiet -o "$bath/references/bath.$k.exr"
+    "$BIN/lightshaft" render "$bath/bath.xml" --size $size --spp 1024 --seed $((770000 + k)) --float --quiet -o "$bath/references/bath.$k.exr"
   done
-  /usr/bin/python3 "$ADAPTERS/llvm_library.py" || { echo "benchmarks.sh: --only bath needs an LLVM library" >&2; exit 2; }
   add_programs mitsuba mitsuba3_volpath mitsuba3_volpathmis
   /usr/bin/python3 tests/bench/race.py "$bath/bath.xml" --references "$bath/references" --size $size --integrators volpath "${programs[@]}" \
     --time "$time" --seeds "$seeds" --seed "$seed" --clock "$clock" --report "$out/bath-race" || status=$?

@@ -18,6 +18,19 @@ std::vector<std::uint32_t> triangles_of(const Geometry& g, std::uint32_t surface
   return found;
 }
 
+// True if each edge belongs to exactly two triangles. `corners` are three for each triangle.
+bool is_closed(const std::vector<V3d>& corners) {
+  const auto start = [&](std::size_t edge) { return corners[edge]; };
+  const auto end = [&](std::size_t edge) { return corners[edge % 3 == 2 ? edge - 2 : edge + 1]; };
+  for (std::size_t a = 0; a < corners.size(); ++a) {
+    int triangles = 0;
+    for (std::size_t b = 0; b < corners.size(); ++b)
+      triangles += (start(a) == start(b) && end(a) == end(b)) || (start(a) == end(b) && end(a) == start(b));
+    if (triangles != 2) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 std::optional<ClearRegion> ClearRegion::inside(const Geometry& g, std::uint32_t surface,
@@ -45,26 +58,37 @@ std::optional<ClearRegion> ClearRegion::inside(const Geometry& g, std::uint32_t 
       corners.emplace_back(g.vertex(t, k));
       middle = middle + corners.back();
     }
+  if (!is_closed(corners)) return std::nullopt;
   middle = middle * (1. / static_cast<double>(corners.size()));
+  struct Plane {
+    V3d n;
+    double distance;
+    double height(const V3d& p) const { return n.dot(p) - distance; }
+  };
+  std::vector<Plane> planes;
+  const double flat = kFlat * reach;
   for (std::size_t i = 0; i < corners.size(); i += 3) {
-    V3d n = (corners[i + 1] - corners[i]).cross(corners[i + 2] - corners[i]);
+    const auto corner = [&](std::size_t k) { return corners[i + k]; };
+    const auto is_of = [&](const Plane& p) {
+      return std::abs(p.height(corner(0))) <= flat && std::abs(p.height(corner(1))) <= flat &&
+             std::abs(p.height(corner(2))) <= flat;
+    };
+    if (std::ranges::any_of(planes, is_of)) continue;
+    V3d n = (corner(1) - corner(0)).cross(corner(2) - corner(0));
     if (!(n.length() > 0)) return std::nullopt;
     n = n.normalized();
-    if (n.dot(middle - corners[i]) > 0) n = -n;
-    const double distance = n.dot(corners[i]);
-    for (const V3d& c : corners)
-      if (n.dot(c) > distance + kFlat * reach) return std::nullopt;  // not convex
-    if (!region.add_plane(n, distance - kMargin * reach)) return std::nullopt;
+    if (n.dot(middle - corner(0)) > 0) n = -n;
+    const Plane plane{n, n.dot(corner(0))};
+    if (std::ranges::any_of(corners, [&](const V3d& c) { return plane.height(c) > flat; }))
+      return std::nullopt;
+    planes.push_back(plane);
+    if (!region.add_plane(n, plane.distance - kMargin * reach)) return std::nullopt;
   }
   return region.contains(V3(middle)) ? std::optional(region) : std::nullopt;
 }
 
-// Adds a plane unless it is there already. Returns false if there are too many.
+// Returns false if there are too many planes.
 bool ClearRegion::add_plane(const V3d& n, double distance) {
-  for (std::size_t i = 0; i < planes_; ++i)
-    if (dot(normal_[i], V3(n)) > 1 - 1e-6f &&
-        std::abs(distance_[i] - distance) <= 1e-6 * (1 + std::abs(distance)))
-      return true;
   if (planes_ == kMostPlanes) return false;
   normal_[planes_] = V3(n);
   distance_[planes_++] = static_cast<float>(distance);

@@ -31,8 +31,8 @@ auto PathTracer<F, Light>::fly_through(const Medium& medium, const SurfaceHit* e
   const float t_max = end ? ray_.length_to(*end) : reach;
   const Segment segment{t_max, ray_.lead(), end};
   if constexpr (kFliesFirst) {
-    // It is the same flight: a second one, drawn because the first one went too far, would be another and
-    // biased
+    // The flight is cut off. One sampled again up to t_max may differ in a dense cell that t_max shortens
+    // (kExactDepth), and to choose between the two would be a bias.
     if (flown)
       return collide(medium, segment, {}, flown->scattered && flown->t < t_max ? *flown : Flight{.t = t_max});
   }

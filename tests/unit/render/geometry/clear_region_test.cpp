@@ -94,6 +94,32 @@ TEST(ClearRegion, IsNotWhereAnotherSurfaceMayBe) {
   })) << "beside it";
 }
 
+// Meshes of these corners, with faces as polygons that are divided into triangles from their first corners.
+bool has_region(const std::string& corners, const std::string& faces) {
+  SceneBuilder b = body(CubeShape{}, {});
+  b.scene.shapes[0].geometry = MeshShape{b.asset("body.obj", corners + faces), MeshFormat::obj};
+  return region_of(*made(b)) != nullptr;
+}
+
+TEST(ClearRegion, IsInClosedConvexMeshesOfAFewFaces) {
+  const std::string below = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\n",
+                    above = "v -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n", ends = "f 1 4 3 2\nf 5 6 7 8\n",
+                    sides = "f 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+  EXPECT_TRUE(has_region(below + above, ends + sides)) << "a cube";
+  EXPECT_TRUE(has_region("v -1 0 0\nv 1 0 0\nv 0 0 1\nv -1 2 0\nv 1 2 0\nv 0 2 1\n",
+                         "f 1 2 3\nf 4 6 5\nf 1 4 5 2\nf 2 5 6 3\nf 3 6 4 1\n"))
+      << "a roof";
+  EXPECT_FALSE(has_region(below + above, ends)) << "two sides of a layer without an edge";
+  EXPECT_FALSE(has_region(below + above, sides)) << "a tube";
+  EXPECT_FALSE(has_region(below + above, sides + "f 1 4 3 2\n")) << "a box without a lid";
+  EXPECT_FALSE(has_region(below + "v -1 -1 1\nv 1 -1 .999\nv 1 1 1\nv -1 1 .999\n", ends + sides))
+      << "a lid with a fold, of seven faces";
+  EXPECT_FALSE(
+      has_region("v 0 1 0\nv -1 -1 0\nv 0 -.3 0\nv 1 -1 0\nv 0 1 1\nv -1 -1 1\nv 0 -.3 1\nv 1 -1 1\n",
+                 "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"))
+      << "six faces that are not convex";
+}
+
 TEST(ClearRegion, IsNotWhereAFlightHasToKnowItsEnd) {
   const auto changed = [](auto&& change) {
     SceneBuilder b = body(SphereShape{}, {});
@@ -117,12 +143,26 @@ TEST(ClearRegion, ChangesNoPixel) {
     for (const bool cube : {false, true}) {
       const auto w = made(
           body(cube ? ls::Geometry(CubeShape{}) : ls::Geometry(SphereShape{}), test::rotate_x(20), grid));
-      ASSERT_TRUE(region_of(*w));
+      ASSERT_TRUE(region_of(*w) && !w->need.aimed && !w->need.reuse)
+          << "the path tracer samples flights first";
       const auto pixels = [&] { return render_tile(*w, {0, 0, 12, 8}, {0, 32}, nullptr, nullptr).sums; };
       const auto with = pixels();
       w->media[0].clear = nullptr;
       EXPECT_EQ(with, pixels()) << (grid ? "grid in a " : "fog in a ") << (cube ? "cube" : "sphere");
     }
+}
+
+TEST(ClearRegion, IsNotUsedBeyondTheCamerasFarClip) {
+  SceneBuilder b = body(SphereShape{}, {});
+  b.look({0, -.5, 0}, {0, 0, 0}, 30);
+  b.scene.sensor.medium = MediumIndex{0};
+  b.scene.sensor.far_clip = .05;
+  const auto w = made(b);
+  const auto pixels = [&] { return render_tile(*w, {0, 0, 12, 8}, {0, 32}, nullptr, nullptr).sums; };
+  const auto with = pixels();
+  ASSERT_TRUE(region_of(*w));
+  w->media[0].clear = nullptr;
+  EXPECT_EQ(with, pixels());
 }
 
 }  // namespace
