@@ -10,8 +10,8 @@ std::shared_ptr<WorkCall> WorkCall::start(pb::Farm::Stub& stub, const WorkerHell
                                           std::shared_ptr<LinkObserver> observer) {
   std::shared_ptr<WorkCall> call(new WorkCall(std::move(observer)));
   call->self_ = call;
-  call->context_.set_wait_for_ready(false);
-  stub.async()->Work(&call->context_, call.get());
+  call->context_->set_wait_for_ready(false);
+  stub.async()->Work(&*call->context_, call.get());
   call->AddHold();  // keeps the call open for writes that are started outside of gRPC's callbacks
   call->StartRead(&call->incoming_);
   call->send(hello);
@@ -49,9 +49,11 @@ void WorkCall::close(Duration at_most) {
   auto state = state_.lock();
   state->closing = true;
   pump(*state);
-  if (done_changed_.wait_for(state, at_most, [&] { return state->done; })) return;
-  context_.TryCancel();
+  const auto done = [&] { return state->done; };
+  if (done_changed_.wait_for(state, at_most, done)) return;
+  context_->TryCancel();
   release_hold(*state);
+  done_changed_.wait(state, done);
 }
 
 void WorkCall::OnReadDone(bool ok) {
@@ -71,7 +73,7 @@ void WorkCall::OnReadDone(bool ok) {
     const auto state = state_.lock();
     state->broken = message.error();
     state->closing = true;
-    context_.TryCancel();
+    context_->TryCancel();
     if (!state->writing) release_hold(*state);
     return;
   }
@@ -93,16 +95,16 @@ void WorkCall::OnWriteDone(bool ok) {
 }
 
 void WorkCall::OnDone(const grpc::Status& status) {
-  std::shared_ptr<WorkCall> self;
   Error why = status.ok() ? Error{Errc::unavailable, "the coordinator ended the stream"} : to_error(status);
-  {
-    const auto state = state_.lock();
-    if (state->broken) why = *state->broken;
-    state->done = true;
-    self = std::move(self_);
-    done_changed_.notify_all();
-  }
+  if (const auto state = state_.lock(); state->broken) why = *state->broken;
   observer_->lost(std::move(why));
+  const std::shared_ptr<WorkCall> self = std::move(self_);
+  const auto state = state_.lock();
+  // The context shares ownership of the channel. gRPC joins its threads when the last owner lets go, so that
+  // must not be this thread, which is one of them: close() returns to its caller only afterwards.
+  context_.reset();
+  state->done = true;
+  done_changed_.notify_all();
 }
 
 }  // namespace ls::worker

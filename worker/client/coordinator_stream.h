@@ -6,6 +6,7 @@
 #include <condition_variable>
 #include <deque>
 #include <memory>
+#include <optional>
 
 #include "common/base/clock.h"
 #include "common/base/guarded.h"
@@ -21,8 +22,8 @@ class WorkCall final
                                          std::shared_ptr<LinkObserver> observer);
 
   void send(const FromWorker& message);
-  // Sends the queued messages, ends the stream and waits until it has ended. If that takes longer than
-  // `at_most`, the stream is cancelled. Must not be called from one of the On... functions below.
+  // Sends the queued messages, ends the stream and waits until it has ended and the observer has been told.
+  // If that takes longer than `at_most`, the stream is cancelled. Must not be called by the observer.
   void close(Duration at_most);
 
   void OnReadDone(bool ok) override;
@@ -40,8 +41,8 @@ class WorkCall final
   void release_hold(State& state);
 
   const std::shared_ptr<LinkObserver> observer_;
-  std::shared_ptr<WorkCall> self_;  // owns this object until OnDone
-  grpc::ClientContext context_;
+  std::shared_ptr<WorkCall> self_;                             // owns this object until OnDone
+  std::optional<grpc::ClientContext> context_{std::in_place};  // nullopt once the stream has ended
   lightshaft::farm::v1::ToWorker incoming_;
 
   Guarded<State> state_;

@@ -183,5 +183,36 @@ TEST_F(GrpcFarm, AWorkerWithAWrongTokenIsToldAndEnds) {
   EXPECT_EQ(ended.error().code, Errc::unauthenticated);
 }
 
+// An observer that is slow to hear that its connection was lost: until close() has returned, or for a while.
+struct SlowToHear final : worker::LinkObserver {
+  void received(ToWorker) override { answered.store(true); }
+  void lost(Error) override {
+    const auto give_up = std::chrono::steady_clock::now() + std::chrono::milliseconds(100);
+    while (!closed.load() && std::chrono::steady_clock::now() < give_up) std::this_thread::yield();
+    heard.store(true);
+  }
+  std::atomic<bool> answered = false, closed = false, heard = false;
+};
+
+// gRPC joins its threads when the last owner of a channel lets go of it. If that were one of these threads
+// (in OnDone, whose call owns the channel, too), it would join itself and use what it has just freed.
+TEST_F(GrpcFarm, NoThreadOfGrpcUsesALinkThatIsClosed) {
+  for (int i = 0; i < 5; ++i) {
+    auto link = worker::make_grpc_link(address_, kToken);
+    const auto observer = std::make_shared<SlowToHear>();
+    WorkerHello hello;
+    hello.name = "brief";
+    hello.join_token = kToken;
+    ASSERT_TRUE(link->connect(hello, observer));
+    wait_for([&] { return observer->answered.load(); });
+
+    link->close();
+
+    EXPECT_TRUE(observer->heard.load());
+    observer->closed.store(true);
+    link.reset();
+  }
+}
+
 }  // namespace
 }  // namespace ls::coordinator
