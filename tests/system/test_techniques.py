@@ -68,3 +68,14 @@ def test_the_script_tells_what_each_technique_costs_and_brings(scene):
 
     assert [row["technique"] for row in rows] == USED
     assert all(row["error"][0] > 0 and row["seconds"][0] > 0 and row["off"]["parameter"] in page for row in rows)
+
+
+def test_the_script_tells_what_learning_costs(scene):
+    script = [sys.executable, ROOT / "tests/bench/learning.py", f"{scene}@16x12", "--runs", "2"]
+    *_, row = subprocess.run(script, check=True, capture_output=True, text=True).stdout.splitlines()
+    name, techniques, load, learning, *shares = row.strip("| ").split(" | ")
+
+    assert (name, techniques) == ("lamp, 16x12", ", ".join(USED))
+    assert float(load) > 0 and learning.count("to") == 1
+    ten, sixty, six_hundred = (float(share.removesuffix(" %")) for share in shares)
+    assert ten >= sixty >= six_hundred >= 0
