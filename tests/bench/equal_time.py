@@ -2,13 +2,14 @@
 """Pictures of the bench scenes after equal times, side by side: Lightshaft, Blender Cycles and Mitsuba 3.
 
 usage: equal_time.py [--scenes DIR] [--names a,b,c] [--times 5,15,60] [--clock wall|cpu] [--threads N] [--seed N] [--size WxH] [--out DIR]
-       [--program ADAPTER.json]...
+       [--page PAGE.md] [--program ADAPTER.json]...
 DIR holds NAME.xml and refs/NAME.0.exr, refs/NAME.1.exr (two independent references); without, the bench scenes are made and rendered.
 Each program renders each scene for each of the times, by the adapter with which it races in race.py (tests/bench/adapters;
 docs/reference/compare.md): seconds count from the first ray, --clock cpu counts CPU seconds over threads, for a machine that others
 use. In DIR (build/equal_time) it writes sheet.png (a row for each scene and time, a column for each program, and the reference), the
 single pictures, and index.html, with the samples and the relMSE of each picture: (x - ref0)(x - ref1) / (ref^2 + 0.01), the mean over
-pixels. All pictures of a scene have the same exposure. With another --size than the references' there is no relMSE, nor a column for
+pixels. --page also writes a page of Markdown with the sheet of each scene as images/equal-time-NAME.jpg in the folder above the page's.
+All pictures of a scene have the same exposure. With another --size than the references' there is no relMSE, nor a column for
 the reference. Runs in the order of scenes and times, each entrant alone; a program that fails has an empty cell, and the exit code is 1.
 Needs numpy, Pillow and the OpenEXR package of PyPI, and what the adapters need (docs/guide/compare.md): run it by the Python that has
 the packages mitsuba and bpy.
@@ -24,6 +25,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 import bench_scenes
+from denoised import publish
 from efficiency import BIN, NAMES, ROOT, load, relmse
 from racing import adapter
 from racing.adapter import RaceError
@@ -86,6 +88,20 @@ def page(rows, columns, about):
             f"</tr>\n{body}</table></html>\n")
 
 
+def write_page(page, scenes, columns, about):
+    """scenes: {name: [(title, cells, files)]}. Cells beyond the columns hold the reference."""
+    images = page.parent.parent / "images"
+    images.mkdir(parents=True, exist_ok=True)
+    lines = ["| scene | " + " | ".join(columns) + " |", "|---" * (1 + len(columns)) + "|"]
+    for title, cells, _ in sum(scenes.values(), []):
+        lines.append(f"| {title} | " + " | ".join(text for _, text in cells[:len(columns)]) + " |")
+    for name, rows in scenes.items():
+        file = images / f"equal-time-{name}.jpg"
+        sheet([(title, cells) for title, cells, _ in rows], [*columns, "reference"]).save(file, quality=80)
+        lines += ["", f"![{name} after equal times](../images/{file.name})"]
+    publish("Pictures after equal times", f"{{made}}. {about}", lines, page)
+
+
 def entrants(options, scene, seconds, size, folder):
     """For each program: (image, text); image is None if it failed or cannot render this scene."""
     for number, one in enumerate(options.adapters):
@@ -141,6 +157,7 @@ def read_options():
     args.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)))
     args.add_argument("--seed", type=int, default=0)
     args.add_argument("--size", type=lambda text: tuple(map(int, text.split("x"))))
+    args.add_argument("--page", type=pathlib.Path)
     args.add_argument("--program", type=pathlib.Path, action="append", help="instead of Lightshaft, Cycles and Mitsuba 3")
     args.add_argument("--out", type=pathlib.Path, default=ROOT / "build" / "equal_time")
     options = args.parse_args()
@@ -154,17 +171,20 @@ def main():
     os.environ["PATH"] = os.pathsep.join([str(BIN), str(pathlib.Path(sys.executable).parent), os.environ["PATH"]])
     folder = bench_scenes.scenes(options.scenes)
     options.out.mkdir(parents=True, exist_ok=True)
-    rows, columns = [], [one.name for one in options.adapters]
+    scenes, programs = {}, [one.name for one in options.adapters]
     with tempfile.TemporaryDirectory(prefix="lightshaft-equal-time-") as made:
         for name in options.names.split(","):
-            rows += rows_of(options, folder / f"{name}.xml", pathlib.Path(made))
+            scenes[name] = list(rows_of(options, folder / f"{name}.xml", pathlib.Path(made)))
+    rows, columns = sum(scenes.values(), []), list(programs)
     if any(len(cells) > len(columns) for _, cells, _ in rows):
         columns.append("reference")
     if any(picture for _, cells, _ in rows for picture, _ in cells):
         sheet([(title, cells) for title, cells, _ in rows if any(p for p, _ in cells)], columns).save(options.out / "sheet.png")
     about = (f"Each program rendered each picture for the time at its left, on {options.threads} threads, counted by "
-             f"{'the clock' if options.clock == 'wall' else 'CPU seconds over threads'} from its first ray. Made by tests/bench/equal_time.py.")
+             f"{'the clock' if options.clock == 'wall' else 'CPU seconds over threads'} from its first ray.")
     (options.out / "index.html").write_text(page(rows, columns, about))
+    if options.page:
+        write_page(options.page, scenes, programs, about)
     print(f"written: {options.out / 'index.html'}")
     return 1 if options.failed else 0
 

@@ -106,7 +106,7 @@ class PathTracer {
   void follow_light(const SunMap::Ray& ray, const Keep& keep);
   // With F.reuse: adds to each path the light that all paths found from their second vertices on. The paths
   // must have been traced and belong to different pixels.
-  static void share(std::span<PathTracer* const> group);
+  static void share(std::span<PathTracer> group);
   const SampleOutcome& outcome() const { return outcome_; }
 
  private:

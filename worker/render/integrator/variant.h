@@ -3,8 +3,8 @@
 #pragma once
 
 #include <array>
+#include <boost/container/static_vector.hpp>
 #include <cstdint>
-#include <optional>
 #include <span>
 
 #include "worker/render/base/features.h"
@@ -54,17 +54,17 @@ constexpr Variant variant(const char* name) {
 template <Features F>
 void group_with(const World& w, std::span<const PixelAt> pixels, std::uint64_t sample,
                 std::span<LightSplit> splits, std::span<SampleOutcome> outcomes) {
-  std::array<std::optional<SampleStream>, kMostSharing> streams;
-  std::array<std::optional<PathTracer<F>>, kMostSharing> paths;
-  std::array<PathTracer<F>*, kMostSharing> group;
+  // Not arrays of optionals: the compiler would clear all of their bytes for each group
+  boost::container::static_vector<SampleStream, kMostSharing> streams;
+  boost::container::static_vector<PathTracer<F>, kMostSharing> paths;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const int x = pixels[i].x + w.origin_x, y = pixels[i].y + w.origin_y;
-    streams[i].emplace(w.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), sample);
-    group[i] = &paths[i].emplace(w, *streams[i], splits.empty() ? nullptr : &splits[i]);
-    (void)group[i]->trace(camera_ray(w, *streams[i], x, y));
+    streams.emplace_back(w.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), sample);
+    paths.emplace_back(w, streams.back(), splits.empty() ? nullptr : &splits[i]);
+    (void)paths.back().trace(camera_ray(w, streams.back(), x, y));
   }
-  PathTracer<F>::share(std::span(group).first(pixels.size()));
-  for (std::size_t i = 0; i < pixels.size(); ++i) outcomes[i] = group[i]->outcome();
+  PathTracer<F>::share(paths);
+  for (std::size_t i = 0; i < pixels.size(); ++i) outcomes[i] = paths[i].outcome();
 }
 template <Features F>
 constexpr Variant group_variant(const char* name) {
