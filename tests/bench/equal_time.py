@@ -162,6 +162,8 @@ def read_options():
     args.add_argument("--out", type=pathlib.Path, default=ROOT / "build" / "equal_time")
     options = args.parse_args()
     options.adapters, options.failed = [adapter.read(path) for path in options.program or ADAPTERS], False
+    if not options.program:
+        options.adapters[0] = options.adapters[0]._replace(name="Lightshaft")
     return options
 
 
