@@ -16,7 +16,8 @@ class LinkObserver {
  public:
   virtual ~LinkObserver() = default;
   virtual void received(ToWorker message) = 0;  // called from any thread, in order
-  virtual void lost(Error why) = 0;  // called once per connection; afterwards connect() may be called again
+  // Called once per connection. connect() and close() wait for it to return, so it must not call them.
+  virtual void lost(Error why) = 0;
 };
 
 // A request for the bytes of a blob from `offset` to its end.

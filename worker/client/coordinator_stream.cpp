@@ -53,7 +53,7 @@ void WorkCall::close(Duration at_most) {
   if (done_changed_.wait_for(state, at_most, done)) return;
   context_->TryCancel();
   release_hold(*state);
-  done_changed_.wait(state, done);
+  done_changed_.wait(state, done);  // ends: keepalive closes connections that no longer answer (client.cpp)
 }
 
 void WorkCall::OnReadDone(bool ok) {
@@ -98,10 +98,11 @@ void WorkCall::OnDone(const grpc::Status& status) {
   Error why = status.ok() ? Error{Errc::unavailable, "the coordinator ended the stream"} : to_error(status);
   if (const auto state = state_.lock(); state->broken) why = *state->broken;
   observer_->lost(std::move(why));
+  observer_.reset();
   const std::shared_ptr<WorkCall> self = std::move(self_);
   const auto state = state_.lock();
-  // The context shares ownership of the channel. gRPC joins its threads when the last owner lets go, so that
-  // must not be this thread, which is one of them: close() returns to its caller only afterwards.
+  // The context shares ownership of the channel. When the last channel of a process ends, gRPC joins its
+  // threads, and this may be one of them. So only the link may own the channel once `done` is true.
   context_.reset();
   state->done = true;
   done_changed_.notify_all();

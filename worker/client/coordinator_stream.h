@@ -1,6 +1,6 @@
 // One gRPC stream to the coordinator. Messages to the coordinator are queued; the size of the agent's outbox
 // bounds the queue. Messages from the coordinator are passed to the observer. The object keeps itself alive
-// from StartCall to OnDone, so that the link may drop its pointer at any time.
+// from StartCall to OnDone. The link must call close() before it lets go of the channel.
 #pragma once
 
 #include <condition_variable>
@@ -40,7 +40,7 @@ class WorkCall final
   void pump(State& state);  // starts the next write, or ends the writes
   void release_hold(State& state);
 
-  const std::shared_ptr<LinkObserver> observer_;
+  std::shared_ptr<LinkObserver> observer_;                     // null once the stream has ended
   std::shared_ptr<WorkCall> self_;                             // owns this object until OnDone
   std::optional<grpc::ClientContext> context_{std::in_place};  // nullopt once the stream has ended
   lightshaft::farm::v1::ToWorker incoming_;
