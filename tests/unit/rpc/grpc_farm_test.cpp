@@ -194,9 +194,8 @@ struct SlowToHear final : worker::LinkObserver {
   std::atomic<bool> answered = false, closed = false, heard = false;
 };
 
-// gRPC joins its threads when the last owner of a channel lets go of it. If that were one of these threads
-// (in OnDone, whose call owns the channel, too), it would join itself and use what it has just freed.
-TEST_F(GrpcFarm, NoThreadOfGrpcUsesALinkThatIsClosed) {
+// Otherwise the call, which owns the channel too, could outlive the link on a thread of gRPC.
+TEST_F(GrpcFarm, ALinkIsClosedOnlyAfterItsObserverWasTold) {
   for (int i = 0; i < 5; ++i) {
     auto link = worker::make_grpc_link(address_, kToken);
     const auto observer = std::make_shared<SlowToHear>();
@@ -205,6 +204,22 @@ TEST_F(GrpcFarm, NoThreadOfGrpcUsesALinkThatIsClosed) {
     hello.join_token = kToken;
     ASSERT_TRUE(link->connect(hello, observer));
     wait_for([&] { return observer->answered.load(); });
+
+    link->close();
+
+    EXPECT_TRUE(observer->heard.load());
+    observer->closed.store(true);
+    link.reset();
+  }
+}
+
+// When the last channel of a process ends, gRPC joins its threads. If one of them ended it, it would join
+// itself and use what it has just freed. There is no server here, whose channels would keep the threads.
+TEST(GrpcLink, ToACoordinatorThatIsNotThereEndsCleanly) {
+  for (int i = 0; i < 5; ++i) {
+    auto link = worker::make_grpc_link("127.0.0.1:1", kToken);  // a port where no coordinator listens
+    const auto observer = std::make_shared<SlowToHear>();
+    ASSERT_TRUE(link->connect(WorkerHello{}, observer));
 
     link->close();
 
