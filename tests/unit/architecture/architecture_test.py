@@ -87,6 +87,8 @@ class Rules(unittest.TestCase):
     def test_doors(self):
         self.assert_finds(architecture.doors, {
             "worker/render/world.cpp": "#include <embree3/rtcore.h>\n",
+            "worker/render/integrator/a.h": "#include <boost/container/static_vector.hpp>\n",
+            "worker/render/media/a.h": "#include <boost/container/static_vector.hpp>\n",
             "worker/render/geometry/embree.h": "#include <embree3/rtcore.h>\n#include <embree4/rtcore.h>\n",
             "coordinator/rpc/a.cpp": "#include <boost/asio.hpp>\n#include <grpcpp/grpcpp.h>\n",
             "coordinator/http/net/a.cpp": "#include <boost/asio.hpp>\n",
@@ -99,7 +101,7 @@ class Rules(unittest.TestCase):
             "coordinator/store/redis.cpp": "#include <hiredis/hiredis.h>\n",
             "common/base/error.cpp": "#include <spdlog/spdlog.h>\n",
             "tests/unit/x_test.cpp": "#include <ImfHeader.h>\n",
-        }, "worker/render/world.cpp", "boost/asio.hpp", "validation/measure/judge.cpp", "validation/nori_test_run.cpp", "sqlite3.h", "archive_entry.h", "ImfHeader.h", "hiredis", "spdlog")
+        }, "worker/render/world.cpp", "worker/render/media/a.h", "boost/asio.hpp", "validation/measure/judge.cpp", "validation/nori_test_run.cpp", "sqlite3.h", "archive_entry.h", "ImfHeader.h", "hiredis", "spdlog")
 
     def test_library_types(self):
         self.assert_finds(architecture.library_types_stay_behind_their_doors, {
