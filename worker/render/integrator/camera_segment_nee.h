@@ -42,7 +42,7 @@ class CameraSegmentNee {
 
   template <class Path>
   static Plan ahead(Path& path, const Medium& medium, Segment segment) {
-    if (path.depth_ == 0 && path.world_.camera_points > 0)
+    if (path.last_.delta && path.world_.camera_points > 0)
       return {Points::ahead(path, medium, segment, path.world_.camera_points), {}};
     return {std::nullopt, Single::ahead(path, medium, segment)};
   }
