@@ -12,6 +12,7 @@
 #include "tests/property/compare.h"
 #include "tests/property/random_scene.h"
 #include "tests/property/watch.h"
+#include "tests/support/sunny_room.h"
 
 namespace ls::test {
 namespace {
@@ -136,6 +137,26 @@ TEST(Lamps, GiveTheSameImageWhetherDirectionsAreAimedAtThemOrNot) {
     // Without the aim a second moment is infinite, so the plain image gets no closer than this
     const Comparison c = look(aimed, plain, 31 + grid, tests.level(3), {1024, 16384});
     EXPECT_NE(c.verdict, Verdict::different) << c.told;
+  }
+  tests.close();
+}
+
+// Fog in a sunny room of which the camera sees much in a mirror.
+SceneBuilder mirror_in_fog(int light_vertices, int camera_points) {
+  SceneBuilder b = SunnyRoom{.fog = .3, .light_vertices = light_vertices}.builder();
+  b.scene.integrator.camera_points = camera_points;
+  b.shape(RectangleShape{}, translate({0, 0, -.95}) * scale(.8), b.mirror());
+  return b;
+}
+
+TEST(Mirrors, ShowTheSameFogWhetherLightIsSampledAtPointsOfItOrNot) {
+  Tests tests("property/mirrors");
+  for (const int light_vertices : {-1, 1}) {
+    const SceneBuilder points = mirror_in_fog(light_vertices, 2), none = mirror_in_fog(light_vertices, -1);
+    ASSERT_THAT(render::describe(*world_of(points)).variant, testing::HasSubstr("aimed"));
+    ASSERT_THAT(render::describe(*world_of(none)).variant, testing::Not(testing::HasSubstr("aimed")));
+    const Comparison c = look(points, none, 41 + static_cast<std::uint64_t>(light_vertices), tests.level(3));
+    EXPECT_EQ(c.verdict, Verdict::alike) << c.told;
   }
   tests.close();
 }

@@ -78,6 +78,7 @@ inline constexpr std::array kShares = {Share{Family::chi_square, "bsdf/sampling"
                                        Share{Family::coverage, "coverage/denominators", 24},
                                        Share{Family::scenes, "property/agreement", 180},
                                        Share{Family::scenes, "property/lamps", 6},
+                                       Share{Family::scenes, "property/mirrors", 6},
                                        Share{Family::scenes, "property/connections", 18},
                                        Share{Family::scenes, "property/lit_disk", 1},
                                        Share{Family::scenes, "property/path_reuse", 72},

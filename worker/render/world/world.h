@@ -63,7 +63,7 @@ class World {
   // With Features::aimed:
   Lamps lamps;                // lights without extent, near which directions are also sampled
   bool lamp_flights = false;  // a share of the flights through homogeneous media end near lamps
-  int camera_points = 0;      // number of points on a camera segment at which light is sampled; 0: none
+  int camera_points = 0;      // number of points on a segment (camera_segment_nee.h); 0: none
   // With Features::connected:
   Lights::Directional sun;  // the light whose light vertices paths are connected to
   SunMap sun_map;
