@@ -17,8 +17,10 @@
 // the second vertex is not sampled equi-angularly: its density would have to be known for all k.
 #pragma once
 
+#include <algorithm>
 #include <boost/container/static_vector.hpp>
 #include <cmath>
+#include <utility>
 
 #include "worker/render/world/world.h"
 
@@ -169,30 +171,44 @@ BsdfEval PathTracer<F, Light>::scattered_at(const PathVertex& y, const V3& d, co
                            y.hit.shading.to_local(-d), y.hit.shading.to_local(w));
 }
 
+// Sorts the paths by what their first vertices can see of each other's second vertices: those in media by
+// their depth along the ray, then those on surfaces, then those that share nothing. The order of first
+// vertices on surfaces is kept: sorted, the same neighbours would always share, and their common errors would
+// show as spots. The depths of neighbours in media differ from sample to sample.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::sort_to_share(std::span<PathTracer*> paths) {
+  const auto key = [](const PathTracer* path) {
+    const FirstVertex& first = path->sharing_.first;
+    if (!first.usable) return std::pair(2, 0.f);
+    return first.at.medium ? std::pair(0, dot(first.at.p, first.d)) : std::pair(1, 0.f);
+  };
+  std::ranges::stable_sort(paths, {}, key);
+}
+
 // Adds to each path of the group the light of the tails of all paths of the group.
 template <Features F, template <Features> class Light>
-void PathTracer<F, Light>::share(std::span<PathTracer> group) {
+void PathTracer<F, Light>::share(std::span<PathTracer* const> group) {
   struct Seen {
     Look look;
     C3 lit, onward;  // BSDF or phase function towards this path, for light from the light source and from the
                      // tail
   };
   boost::container::static_vector<Seen, kMostSharing> seen(group.size());
-  for (PathTracer& giver : group) {
-    const SharedTail& tail = giver.sharing_.tail;
+  for (PathTracer* const giver : group) {
+    const SharedTail& tail = giver->sharing_.tail;
     if (!tail.usable || !tail.brings_light()) continue;
     float lit = 0, scattered = 0, emitted = 0;  // sums of densities
     for (std::size_t k = 0; k < group.size(); ++k) {
       Seen& s = seen[k];
-      s.look = group[k].look_at(tail, &group[k] == &giver);
+      s.look = group[k]->look_at(tail, group[k] == giver);
       if (!(s.look.density > 0)) continue;
       if (tail.light_pdf > 0) {
-        const BsdfEval eval = giver.scattered_at(tail.at, s.look.w, tail.to_light);
+        const BsdfEval eval = giver->scattered_at(tail.at, s.look.w, tail.to_light);
         s.lit = eval.f_cos;
         lit += s.look.density * (tail.light_is_delta ? tail.light_pdf : tail.light_pdf + eval.pdf);
       }
       if (tail.goes_on) {
-        const BsdfEval eval = giver.scattered_at(tail.at, s.look.w, tail.onward);
+        const BsdfEval eval = giver->scattered_at(tail.at, s.look.w, tail.onward);
         s.onward = eval.f_cos;
         scattered += s.look.density * eval.pdf;
         emitted += s.look.density * (eval.pdf + tail.hit_pdf);
@@ -205,13 +221,13 @@ void PathTracer<F, Light>::share(std::span<PathTracer> group) {
       if (lit > 0) light += s.lit * tail.light / lit;
       if (scattered > 0) light += s.onward * tail.scattered / scattered;
       if (emitted > 0) light += s.onward * tail.emitted / emitted;
-      group[k].add_shared(s.look.value * light);
+      group[k]->add_shared(s.look.value * light);
     }
   }
   // If a path was cut off, its tail is missing in all pixels of the group, so all samples are rejected
-  for (const PathTracer& giver : group) {
-    if (giver.outcome_.cut_off == HealthCause::none) continue;
-    for (PathTracer& path : group) path.outcome_.reject(giver.outcome_.cut_off);
+  for (const PathTracer* giver : group) {
+    if (giver->outcome_.cut_off == HealthCause::none) continue;
+    for (PathTracer* path : group) path->outcome_.reject(giver->outcome_.cut_off);
   }
 }
 

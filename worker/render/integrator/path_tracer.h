@@ -104,9 +104,11 @@ class PathTracer {
   // With F.connected: follows a ray of the sun, and calls keep(vertex) for each light vertex on its way.
   template <class Keep>
   void follow_light(const SunMap::Ray& ray, const Keep& keep);
-  // With F.reuse: adds to each path the light that all paths found from their second vertices on. The paths
-  // must have been traced and belong to different pixels.
-  static void share(std::span<PathTracer> group);
+  // With F.reuse: share() adds to each path the light that all paths found from their second vertices on. The
+  // paths must have been traced and belong to different pixels. sort_to_share() puts those that gain most
+  // from each other side by side.
+  static void sort_to_share(std::span<PathTracer*> paths);
+  static void share(std::span<PathTracer* const> group);
   const SampleOutcome& outcome() const { return outcome_; }
 
  private:

@@ -145,18 +145,18 @@ class Samples {
     if (v_.covers.split) r.splits.resize(r.outcomes.size());
     for (std::uint64_t s = range_.s0; s < range_.s1; ++s) {
       const std::size_t begin = (s - range_.s0) * block.pixels();
-      block.for_each_group(s, [&](std::span<const PixelAt> group) {
-        if (crumb_) mark(group.front(), s);
-        std::array<SampleOutcome, kMostSharing> outcomes;
-        std::array<LightSplit, kMostSharing> splits;
-        for (LightSplit& split : splits) split.fill(C3(0));
-        v_.group(w_, group, s, v_.covers.split ? std::span(splits) : std::span<LightSplit>(), outcomes);
-        for (std::size_t k = 0; k < group.size(); ++k) {
-          const std::size_t i = begin + block.index(group[k]);
-          r.outcomes[i] = outcomes[k];
-          if (v_.covers.split) r.splits[i] = splits[k];
-        }
-      });
+      const SharingBlock::Pixels pixels = block.in_order_of(s);
+      if (crumb_) mark(pixels.front(), s);
+      std::array<SampleOutcome, kMostTogether> outcomes;
+      LightSplit black;
+      black.fill(C3(0));
+      std::vector<LightSplit> splits(v_.covers.split ? pixels.size() : 0, black);
+      v_.group(w_, pixels, s, splits, outcomes);
+      for (std::size_t k = 0; k < pixels.size(); ++k) {
+        const std::size_t i = begin + block.index(pixels[k]);
+        r.outcomes[i] = outcomes[k];
+        if (v_.covers.split) r.splits[i] = splits[k];
+      }
     }
   }
 

@@ -65,10 +65,8 @@ class Pilot {
       return static_cast<int>(places_.next() % static_cast<std::uint64_t>(n));
     };
     const PixelAt somewhere{among(w_.frame.width) - w_.origin_x, among(w_.frame.height) - w_.origin_y};
-    std::vector<PixelAt> group;
-    SharingBlock(w_, somewhere).for_each_group(dealing, [&](std::span<const PixelAt> pixels) {
-      if (group.empty()) group.assign(pixels.begin(), pixels.end());
-    });
+    SharingBlock::Pixels group = SharingBlock(w_, somewhere).in_order_of(dealing);
+    if (group.size() > kSharing) group.resize(kSharing);
     std::array<Halves, kSharing> shared, alone;
     shared.fill({V3d(0), V3d(0)});
     alone = shared;

@@ -1,13 +1,13 @@
 // Chooses the pixels whose paths share their tails (path_reuse.h). The full frame is cut into squares
-// (blocks). For each sample the pixels of a block are divided into groups at random, so that two pixels are
-// rarely in the same group and their errors are nearly independent. Blocks begin at the corner of the full
-// frame and do not depend on tiles, so the pixels of a tile or crop are the same as those of the whole image.
+// (blocks). For each sample the pixels of a block are put in random order, of which groups are made, so that
+// two pixels are rarely in the same group and their errors are nearly independent. Blocks begin at the corner
+// of the full frame and do not depend on tiles, so the pixels of a tile or crop are the same as those of the
+// whole image.
 #pragma once
 
 #include <algorithm>
-#include <array>
+#include <boost/container/static_vector.hpp>
 #include <cstdint>
-#include <span>
 #include <utility>
 
 #include "common/scene/scene.h"
@@ -25,6 +25,7 @@ void share_tails(const IntegratorSettings& settings, World& w);
 class SharingBlock {
  public:
   static constexpr int kSide = 16;  // pixels
+  static_assert(kSide * kSide <= kMostTogether);
 
   // The block of a pixel of the image.
   SharingBlock(const World& w, PixelAt pixel) : w_(w) {
@@ -40,19 +41,17 @@ class SharingBlock {
     return static_cast<std::size_t>((p.y + w_.origin_y - row_ * kSide) * width_ + p.x + w_.origin_x -
                                     column_ * kSide);
   }
-  // Calls f(pixels) for each group of the sample. Pixels of the block may be outside the image.
-  template <class F>
-  void for_each_group(std::uint64_t sample, const F& f) const {
-    std::array<PixelAt, kSide * kSide> order;
-    std::size_t n = 0;
+  using Pixels = boost::container::static_vector<PixelAt, kMostTogether>;
+  // The pixels of the block in the order of the sample. They may be outside the image.
+  Pixels in_order_of(std::uint64_t sample) const {
+    Pixels order;
     for (int y = 0; y < height_; ++y)
       for (int x = 0; x < width_; ++x)
-        order[n++] = {column_ * kSide + x - w_.origin_x, row_ * kSide + y - w_.origin_y};
+        order.push_back({column_ * kSide + x - w_.origin_x, row_ * kSide + y - w_.origin_y});
     const auto corner = (static_cast<std::uint64_t>(row_) << 32) | static_cast<std::uint64_t>(column_);
     RandomStream dice(combine(combine(combine(w_.seed, kDealing), corner), sample));
-    for (std::size_t i = n; i > 1; --i) std::swap(order[i - 1], order[dice.next() % i]);
-    const auto size = static_cast<std::size_t>(w_.reuse);
-    for (std::size_t i = 0; i < n; i += size) f(std::span(order).subspan(i, std::min(size, n - i)));
+    for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[dice.next() % i]);
+    return order;
   }
 
  private:

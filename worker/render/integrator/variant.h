@@ -2,6 +2,7 @@
 // integrator. A scene is rendered with a variant that has all features that the scene needs.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <boost/container/static_vector.hpp>
 #include <cstdint>
@@ -18,8 +19,9 @@ namespace ls::render {
 // Features::connected.
 using SampleFn = SampleOutcome (*)(const World&, int, int, std::uint64_t, LightSplit*, Connections);
 
-// Renders sample number `sample` of several pixels, at most kMostSharing, that share what their paths find.
-// `splits` has the light components of each, or is empty.
+// Renders sample number `sample` of several pixels, at most kMostTogether. In groups of World::reuse, they
+// share what their paths find. `splits` has the light components of each, or is empty.
+inline constexpr std::size_t kMostTogether = 256;
 struct PixelAt {
   int x, y;
 };
@@ -55,15 +57,20 @@ template <Features F>
 void group_with(const World& w, std::span<const PixelAt> pixels, std::uint64_t sample,
                 std::span<LightSplit> splits, std::span<SampleOutcome> outcomes) {
   // Not arrays of optionals: the compiler would clear all of their bytes for each group
-  boost::container::static_vector<SampleStream, kMostSharing> streams;
-  boost::container::static_vector<PathTracer<F>, kMostSharing> paths;
+  boost::container::static_vector<SampleStream, kMostTogether> streams;
+  boost::container::static_vector<PathTracer<F>, kMostTogether> paths;
+  boost::container::static_vector<PathTracer<F>*, kMostTogether> sorted;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const int x = pixels[i].x + w.origin_x, y = pixels[i].y + w.origin_y;
     streams.emplace_back(w.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), sample);
     paths.emplace_back(w, streams.back(), splits.empty() ? nullptr : &splits[i]);
     (void)paths.back().trace(camera_ray(w, streams.back(), x, y));
+    sorted.push_back(&paths.back());
   }
-  PathTracer<F>::share(paths);
+  PathTracer<F>::sort_to_share(sorted);
+  const auto group = static_cast<std::size_t>(w.reuse);
+  for (std::size_t i = 0; i < sorted.size(); i += group)
+    PathTracer<F>::share({sorted.data() + i, std::min(group, sorted.size() - i)});
   for (std::size_t i = 0; i < pixels.size(); ++i) outcomes[i] = paths[i].outcome();
 }
 template <Features F>
