@@ -32,8 +32,8 @@ using AssetFiles = std::map<Digest, std::filesystem::path>;
 Result<std::shared_ptr<const World>> build_world(const Scene& scene, const RenderSettings& settings,
                                                  const AssetFiles& files, int threads);
 
-// The pixel and index of the sample that a thread is rendering, for crash reports; where pixels share paths, a
-// pixel of the square of 16 x 16 that is being rendered. The thread writes it with relaxed stores.
+// The pixel and index of the sample that a thread is rendering, for crash reports; where pixels share paths,
+// a pixel of the square of 16 x 16 that is being rendered. The thread writes it with relaxed stores.
 struct Breadcrumb {
   std::atomic<std::int32_t> x{-1}, y{-1};
   std::atomic<std::uint64_t> sample{0};

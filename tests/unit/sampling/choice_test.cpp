@@ -95,7 +95,7 @@ TEST(LightChoice, IsMadeAsOftenAsAHitClaims) {
     for (std::uint32_t k = 0; k < g.triangle_count(); ++k) {
       const V3d a(g.vertex(k, 0)), e1 = V3d(g.vertex(k, 1)) - a, e2 = V3d(g.vertex(k, 2)) - a,
                                    n = e1.cross(e2);
-      const V3d q = V3d(b.world->lights.pivot(c)) - a;
+      const V3d q = V3d(b.world->lights.pivot(c).p) - a;
       const double n2 = n.dot(n), s = q.cross(e2).dot(n) / n2, t = e1.cross(q).dot(n) / n2;
       const double outside = std::max({0., -s, -t, s + t - 1}),
                    off = std::abs(q.dot(n)) / std::sqrt(n2) + outside;

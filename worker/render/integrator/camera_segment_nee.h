@@ -33,11 +33,11 @@ class CameraSegmentNee {
     typename Single::Vertex single;
 
     float found_as_light() const { return by_points ? points.found_as_light() : single.found_as_light(); }
-    float found_as_light(const V3& pivot) const {
+    float found_as_light(const Pivot& pivot) const {
       return by_points ? points.found_as_light(pivot) : single.found_as_light(pivot);
     }
     bool uses_equiangular(bool is_point) const { return single.uses_equiangular(is_point); }
-    float equiangular_ratio(const V3& pivot) const { return single.equiangular_ratio(pivot); }
+    float equiangular_ratio(const Pivot& pivot) const { return single.equiangular_ratio(pivot); }
   };
 
   template <class Path>

@@ -2,13 +2,15 @@
 // proportional to 1 / distance^2, where distance is the distance to the pivot. Positions are offsets x in [a,
 // b] along the segment, measured from the foot of the perpendicular from the pivot. The textbook difference
 // of arctangents cancels when both ends are far from the foot on one side; the forms used here do not (pdf
-// accurate to 4e-7 in float32).
+// accurate to 4e-7 in float32). Of a light that shines into a cone, only the part of the segment inside the
+// cone is sampled.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 
 #include "worker/render/base/work_counters.h"
+#include "worker/render/lights/pivot.h"
 #include "worker/render/math/math.h"
 
 namespace ls::render {
@@ -19,14 +21,15 @@ inline constexpr float kMaxRatio = 1e30f;
 class EquiAngular {
  public:
   // Prepares the segment o + t d, t in [0, length]. d must be of unit length, and length finite and positive.
-  EquiAngular(const V3& o, const V3& d, float length, const V3& pivot) : d_(d) {
+  EquiAngular(const V3& o, const V3& d, float length, const Pivot& pivot) : d_(d) {
     LS_COUNT(equiangular);
-    const float along = dot(pivot - o, d);
+    const float along = dot(pivot.p - o, d);
     foot_ = o + d * along;
-    a_ = -along;
+    start_ = a_ = -along;
     b_ = length - along;
-    const V3 off = pivot - foot_;
+    const V3 off = pivot.p - foot_;
     distance_ = std::max(std::sqrt(dot(off, off)), 1e-7f * std::max(std::abs(a_), std::abs(b_)));
+    if (pivot.cos_reach > 0) keep_lit(pivot, off);
     angle_ = std::atan2(distance_ * (b_ - a_), distance_ * distance_ + a_ * b_);
     uniform_ = !(b_ - a_ > 1e-6f * distance_) || !(angle_ > 0);
   }
@@ -34,9 +37,10 @@ class EquiAngular {
   struct Sample {
     float t;    // from the segment's start
     V3 p;       // computed from the foot of the perpendicular: accurate near the light
-    float pdf;  // density per unit length
+    float pdf;  // density per unit length; 0 if no light reaches the segment
   };
   Sample sample(float xi) const {
+    if (!(b_ > a_)) return {a_ - start_, foot_ + d_ * a_, 0};
     float x;
     if (uniform_) {
       x = a_ + xi * (b_ - a_);
@@ -47,18 +51,45 @@ class EquiAngular {
       const float s = (distance_ * distance_ + a_ * a_) * q / (1 - a_ * q);
       x = a_ + std::clamp(s, 0.f, b_ - a_);
     }
-    return {x - a_, foot_ + d_ * x, density(x)};
+    return {x - start_, foot_ + d_ * x, density(x)};
   }
-  float pdf(float t) const { return density(t + a_); }
+  float pdf(float t) const {
+    const float x = t + start_;
+    if (!limited_) return density(x);
+    return x >= a_ && x <= b_ && b_ > a_ ? density(x) : 0;
+  }
 
  private:
+  // Limits [a, b] to the part inside the light's cone. Seen from the pivot, the segment spans angles of a
+  // half plane. The cone meets it where the cosine to the axis, m cos(angle - mid), is at least cos_reach; m
+  // is the length of the axis' projection onto the plane. Nothing is cut off if the line passes the pivot so
+  // closely that the direction of the foot is lost in rounding.
+  void keep_lit(const Pivot& pivot, const V3& off) {
+    constexpr float kCloseness = 1e-5f, kRightAngle = 1.57079f;  // atan(1 / kCloseness) is smaller
+    const float size = std::max(std::abs(a_), std::abs(b_)), r = std::sqrt(dot(off, off));
+    if (!(r > kCloseness * size)) return;
+    limited_ = true;
+    const float aside = -dot(pivot.axis, off) / r, along = dot(pivot.axis, d_);
+    const float m = std::sqrt(aside * aside + along * along);
+    // Rounding moves the foot by at most 4 ulps of the segment's size
+    const float margin = 1e-6f + 4.8e-7f * size / r;
+    const float half = std::acos(std::min(1.f, pivot.cos_reach / m)) + margin;
+    const float mid = std::atan2(along, aside), lo = mid - half, hi = mid + half;
+    if (m < pivot.cos_reach - margin || lo >= kRightAngle || hi <= -kRightAngle) {
+      b_ = a_;
+      return;
+    }
+    if (lo > -kRightAngle) a_ = std::max(a_, r * std::tan(lo));
+    if (hi < kRightAngle) b_ = std::min(b_, r * std::tan(hi));
+  }
   float density(float x) const {
     return uniform_ ? 1 / (b_ - a_) : distance_ / (angle_ * (distance_ * distance_ + x * x));
   }
 
   V3 d_, foot_;
+  float start_ = 0;  // of the segment; a is larger if the light does not reach it
   float a_ = 0, b_ = 0, distance_ = 0, angle_ = 0;
-  bool uniform_ = false;
+  bool uniform_ = false, limited_ = false;
 };
 
 }  // namespace ls::render

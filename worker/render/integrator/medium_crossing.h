@@ -103,12 +103,14 @@ auto PathTracer<F, Light>::scatter_by_phase(const Medium& medium) -> Step {
   PhaseSample s = medium.phase.sample(ray_.d, u);
   if constexpr (F.connected) last_.sum = densities_.sum(s.pdf);
   if constexpr (F.aimed) {
+    aim_ = 1;
     if (near_lamps_.any()) {
       float choice = direction.u(2);
       if (const auto w = near_lamps_.sample(choice, u)) s = {*w, medium.phase.value(ray_.d, *w)};
       const float own = s.pdf;
       s.pdf = near_lamps_.pdf(own, s.w);
-      beta_ *= own / s.pdf;
+      aim_ = own / s.pdf;
+      beta_ *= aim_;
       if constexpr (F.connected) last_.sum = densities_.sum(own);
     }
   }

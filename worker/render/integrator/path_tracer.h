@@ -173,7 +173,7 @@ class PathTracer {
     return own;
   }
   std::optional<BsdfSample> sample_bsdf(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo,
-                                        const Group& g) const;
+                                        const Group& g);
   void add_emission(const SurfaceHit& hit);
   void add_environment();
   C3 unoccluded(const V3& start, const V3& p, const LightSample& light, const Within& medium,
@@ -296,8 +296,12 @@ class PathTracer {
   Connections connections_;
   SampleOutcome outcome_;
   MediumCounters counters_;
-  // With F.aimed: the distribution of directions near lamps at the current vertex
+  // With F.aimed: the distribution of directions near lamps at the current vertex, and the density of the
+  // BSDF or phase function over that with which the last direction was sampled. Russian roulette leaves this
+  // factor out: the closer to a lamp a direction is aimed, the smaller is the factor and the brighter what is
+  // there.
   LampDirections near_lamps_;
+  float aim_ = 1;
   struct Nothing {};
   std::conditional_t<F.reuse, SharingPath, Nothing> sharing_;
 };
@@ -543,15 +547,17 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
 
 template <Features F, template <Features> class Light>
 std::optional<BsdfSample> PathTracer<F, Light>::sample_bsdf(const SurfaceHit& hit, const SurfaceInfo& surface,
-                                                            const V3& wo, const Group& g) const {
+                                                            const V3& wo, const Group& g) {
   float choice = g.u(2);
   if constexpr (F.aimed) {
+    aim_ = 1;
     if (const auto w = near_lamps_.sample(choice, {g.u(0), g.u(1)})) {
       BsdfSample s;
       s.wi = hit.shading.to_local(*w);
       const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wo, s.wi);
       if (is_black(f.f_cos)) return std::nullopt;
       s.pdf = near_lamps_.pdf(f.pdf, *w);
+      aim_ = f.pdf / s.pdf;
       s.weight = f.f_cos * (1 / s.pdf);
       s.transmitted = (s.wi.z > 0) != (wo.z > 0);
       return s;
@@ -563,7 +569,8 @@ std::optional<BsdfSample> PathTracer<F, Light>::sample_bsdf(const SurfaceHit& hi
     const float own = s->pdf;
     s->pdf = s->delta ? own * near_lamps_.own_share()
                       : near_lamps_.pdf(own, normalize(hit.shading.to_world(s->wi)));
-    s->weight *= own / s->pdf;
+    aim_ = own / s->pdf;
+    s->weight *= aim_;
   }
   return s;
 }
@@ -628,6 +635,7 @@ bool PathTracer<F, Light>::survives(float u) {
   if (depth_ < world_.rr_depth) return true;
   float size = max_component(beta_) * eta_scale_;
   if constexpr (F.reuse) size *= sharing_.survival;
+  if constexpr (F.aimed) size /= std::min(aim_, 1.f);
   if constexpr (F.chromatic) size /= mean(density_);
   const float q = std::min(size, forced_survival(depth_));
   if (q >= 1) return true;

@@ -47,12 +47,12 @@ class SegmentNee {
     float points = 1;  // number of points sampled by depth; one more is sampled by angle
 
     float found_as_light() const { return std::min(points * depth_ratio, kMaxRatio); }
-    float found_as_light(const V3& pivot) const {
+    float found_as_light(const Pivot& pivot) const {
       if (!by_angle) return found_as_light();
       const float ratio = flight_pdf > 0 ? angle_pdf(pivot) / flight_pdf : kMaxRatio;
       return std::min(by_depth ? points * depth_ratio + ratio : ratio, kMaxRatio);
     }
-    float angle_pdf(const V3& pivot) const { return EquiAngular(o, d, length, pivot).pdf(t); }
+    float angle_pdf(const Pivot& pivot) const { return EquiAngular(o, d, length, pivot).pdf(t); }
   };
 
   template <class Path>
@@ -160,7 +160,7 @@ class SegmentNee {
   static void propose(Path& path, const Medium& medium, const Segment& segment, const Plan& plan,
                       const LightChoice& choice, bool by_angle, std::uint32_t bits, RandomStream& stream) {
     const OpticalDepthIn<F>& s = plan.depths;
-    const V3 pivot = choice.has_place ? path.world_.lights.pivot(choice) : V3(0);
+    const Pivot pivot = choice.has_place ? path.world_.lights.pivot(choice) : Pivot(V3(0));
     OpticalDepth::Point at_point;
     V3 p;
     float e_angle = 0;

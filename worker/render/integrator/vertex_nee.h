@@ -60,12 +60,12 @@ class VertexNee {
     }
     // The ratio e / f at this vertex for a light with this pivot. Valid only for lights that are sampled
     // equi-angularly (uses_equiangular).
-    float equiangular_ratio(const V3& pivot) const {
+    float equiangular_ratio(const Pivot& pivot) const {
       return ratio_to_flight(EquiAngular(o, d, length, pivot).pdf(t), flight_pdf);
     }
     // The density of (1) and (3) together over that of the flight, for a light that was hit. Such a light is
     // never a point light.
-    float found_as_light(const V3& pivot) const {
+    float found_as_light(const Pivot& pivot) const {
       return uses_equiangular(false) ? 1 + equiangular_ratio(pivot) : 1.f;
     }
     static float found_as_light() { return 1; }

@@ -4,7 +4,7 @@
 //   bool dark(world)                        true if it emits no light; it is then left out
 //   double power(world)                     determines the probability of choosing it
 //   LightBounds bounds(world)               bounds for the tree; only for lights with a position
-//   V3 pivot(world, numbers)                see lights.h; only for lights with a position
+//   V3 or Pivot pivot(world, numbers)       see lights.h; only for lights with a position
 //   optional<LightSample> sample(world, numbers, x, p)
 //                                           samples the light that arrives at x; p is the probability with
 //                                           which this light was chosen

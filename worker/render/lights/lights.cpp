@@ -104,7 +104,7 @@ std::vector<V3> Lights::points() const {
                    [&](const Light* a, const Light* b) { return power(*a) > power(*b); });
   std::vector<V3> list;
   for (const Light* l : found)
-    list.push_back(pivot({.light = static_cast<std::uint32_t>(l - lights_.data())}));
+    list.push_back(pivot({.light = static_cast<std::uint32_t>(l - lights_.data())}).p);
   return list;
 }
 
@@ -120,8 +120,8 @@ Lights::Directional Lights::strongest_directional() const {
   return best;
 }
 
-V3 Lights::pivot(const LightChoice& choice) const {
-  return with_kind(lights_[choice.light].kind, [&](const auto& l) -> V3 {
+Pivot Lights::pivot(const LightChoice& choice) const {
+  return with_kind(lights_[choice.light].kind, [&](const auto& l) -> Pivot {
     if constexpr (std::decay_t<decltype(l)>::kHasPlace)
       return l.pivot(world(), choice.numbers);
     else
@@ -147,7 +147,7 @@ float Lights::pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const
   return with_area(hit, [&](const auto& l) { return l.pdf(world(), hit, x, direction, p); });
 }
 
-V3 Lights::pivot(const SurfaceHit& hit) const {
+Pivot Lights::pivot(const SurfaceHit& hit) const {
   return with_area(hit, [&](const auto& l) { return l.pivot_of(world(), hit); });
 }
 

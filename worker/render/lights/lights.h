@@ -2,7 +2,8 @@
 //
 // A light with a position has a pivot: the point about which a segment of a path is sampled equi-angularly
 // (equiangular.h). The pivot of an area light is the point that is sampled on it. For a sphere it is the
-// centre, because the point on a sphere is sampled only once the vertex on the segment is known.
+// centre, because the point on a sphere is sampled only once the vertex on the segment is known. Spots and
+// projectors light only a part of a segment, to which the samples are limited.
 #pragma once
 
 #include <memory>
@@ -56,7 +57,7 @@ class Lights {
     return chosen(numbers, alone_ ? only_one() : draw(numbers.light, x, n));
   }
   // The pivot of the chosen light, which must have a position.
-  V3 pivot(const LightChoice& choice) const;
+  Pivot pivot(const LightChoice& choice) const;
   // Samples the light that arrives at x from the chosen light. Returns nullopt if no light can arrive: if x
   // is behind the light or outside its cone, or if the light has zero solid angle.
   std::optional<LightSample> sample(const LightChoice& choice, const V3& x) const;
@@ -67,7 +68,7 @@ class Lights {
   // Density, per steradian at x and including the choice of the light, with which choose(numbers, x, n) and
   // sample() find the point `hit` of a surface light. `direction` points from x to the hit.
   float pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const V3& n = V3(0)) const;
-  V3 pivot(const SurfaceHit& hit) const;
+  Pivot pivot(const SurfaceHit& hit) const;
   // Environment radiance for a path that leaves the scene in this direction (a unit vector), weighted against
   // sampling the environment as a light. `pdf` is the density, per steradian, with which the path sampled the
   // direction. Infinity gives the full radiance, for directions that were not sampled. A constant environment

@@ -3,6 +3,7 @@
 
 #include "worker/render/camera/fov.h"
 #include "worker/render/lights/light_kind.h"
+#include "worker/render/lights/pivot.h"
 #include "worker/render/math/equal_area.h"
 
 namespace ls::render {
@@ -56,6 +57,7 @@ struct SpotLight : Punctual<SpotLight> {
   float cos_cutoff = 0, cos_beam = 0, cutoff = 0, inv_transition = 0, tan_cutoff = 0;
   std::optional<TextureIndex> texture;  // the projected image
 
+  Pivot pivot(const LightWorld&, const LightNumbers&) const { return {position, axis, cos_cutoff}; }
   bool dark(const LightWorld&) const { return is_black(intensity); }
   double power(const LightWorld&) const {
     return luminance(intensity) * 2 * kPiD * (1 - .5 * (cos_cutoff + cos_beam));
@@ -89,6 +91,9 @@ struct ProjectorLight : Punctual<ProjectorLight> {
   V3 axis_u, axis_v, axis;
   float tan_x = 0, tan_y = 0;  // tangents of half its two fields of view
 
+  // The cosine to the axis of the image's corners
+  float cos_corner() const { return 1 / std::sqrt(1 + tan_x * tan_x + tan_y * tan_y); }
+  Pivot pivot(const LightWorld&, const LightNumbers&) const { return {position, axis, cos_corner()}; }
   bool dark(const LightWorld& world) const { return is_black(value) || is_black(world.textures.mean(image)); }
   double power(const LightWorld& world) const {
     // The area of the image on the plane at distance 1, or its solid angle
@@ -100,7 +105,7 @@ struct ProjectorLight : Punctual<ProjectorLight> {
   LightBounds bounds(const LightWorld& world) const {
     LightBounds b = bounds_of(value * world.textures.mean(image));
     b.axis = axis;
-    b.cos_spread = 1 / std::sqrt(1 + tan_x * tan_x + tan_y * tan_y);
+    b.cos_spread = cos_corner();
     b.cos_reach = 1;
     return b;
   }

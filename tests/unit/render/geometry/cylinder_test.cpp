@@ -215,7 +215,7 @@ TEST(CylinderLights, AreSampledUniformlyByArea) {
   std::vector<double> counts(256, 0), expected(256, kSamples / 256.);
   for (int i = 0; i < kSamples; ++i) {
     const float u = r.uniform(), v = r.uniform();
-    const auto p = b.world->lights.pivot(b.world->lights.choose(numbers(0, u, v)));
+    const auto p = b.world->lights.pivot(b.world->lights.choose(numbers(0, u, v))).p;
     const Cylinder& c = b.world->geometry.cylinders[0];
     const V3d q = V3d(p) - c.p0;
     double angle = std::atan2(q.dot(c.v), q.dot(c.u)) / (2 * M_PI);

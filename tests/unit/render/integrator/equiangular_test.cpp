@@ -94,5 +94,53 @@ TEST(EquiAngular, DensityOfASampleIsTheDensityAtItsPlace) {
   }
 }
 
+// A light at the origin's height D that shines into a cone: all of the segment inside the cone is sampled, by
+// its angle, and nothing outside of it. At the cone's edge the two may differ by the rounding that keep_lit()
+// allows for.
+TEST(EquiAngular, SamplesTheLitPartOfTheSegment) {
+  RandomStream r(11);
+  int lit_segments = 0, dark_segments = 0;
+  for (const TestSegment& s : kSegments) {
+    const double size = std::max(std::abs(s.a), std::abs(s.b));
+    if (s.distance < 2e-5 * size || s.distance > 1e3 * size) continue;  // not limited, or sampled uniformly
+    const double edge = 4e-6 + 2e-6 * size / s.distance;
+    for (int k = 0; k < 200; ++k) {
+      const float z = 2 * r.uniform() - 1, w = std::sqrt(1 - z * z), turn = 6.2831853f * r.uniform();
+      const V3 axis(w * std::cos(turn), w * std::sin(turn), z);
+      const float reach = .05f + .94f * r.uniform();
+      const EquiAngular e(V3(s.a, 0, 0), V3(1, 0, 0), s.b - s.a, Pivot(V3(0, s.distance, 0), axis, reach));
+      const auto beyond = [&](double x) {  // the cosine of the direction to the point x, less cos_reach
+        return (axis.x * x - double{axis.y} * s.distance) / std::hypot(x, double{s.distance}) - reach;
+      };
+      // Steps of equal angle
+      const double lo = std::atan2(double{s.a}, double{s.distance});
+      const double hi = std::atan2(double{s.b}, double{s.distance});
+      constexpr int kSteps = 2000;
+      double integral = 0, lit = 0;
+      for (int i = 0; i < kSteps; ++i) {
+        const double angle = lo + (hi - lo) * (i + .5) / kSteps, x = s.distance * std::tan(angle);
+        const double pdf = e.pdf(static_cast<float>(x - s.a)), cosine = std::cos(angle);
+        integral += pdf * s.distance / (cosine * cosine) * (hi - lo) / kSteps;
+        lit += beyond(x) > 0;
+        if (beyond(x) > edge) ASSERT_GT(pdf, 0) << s.a << " " << s.b << " " << s.distance;
+        if (beyond(x) < -edge) ASSERT_EQ(pdf, 0) << s.a << " " << s.b << " " << s.distance;
+      }
+      const auto sample = e.sample(r.uniform());
+      if (lit == 0) {
+        ++dark_segments;
+        continue;
+      }
+      if (lit < 200) continue;
+      ++lit_segments;
+      // Two ends of the lit part, each within a step, and coarse t where the segment is far from the light
+      EXPECT_NEAR(integral, 1, 3 / lit + 1e-6 * size / s.distance);
+      ASSERT_GT(sample.pdf, 0);
+      EXPECT_GT(beyond(double{sample.p.x}), -edge);
+    }
+  }
+  EXPECT_GT(lit_segments, 100);
+  EXPECT_GT(dark_segments, 100);
+}
+
 }  // namespace
 }  // namespace ls::render

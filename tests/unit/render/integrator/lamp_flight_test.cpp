@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 
+#include "tests/support/render_check.h"
 #include "worker/render/math/random.h"
 
 namespace ls::render {
@@ -104,6 +106,25 @@ TEST(LampFlight, StaysFiniteInMediaWithoutAndBeyondAnyExtinction) {
       }
       ASSERT_TRUE(f.t >= 0);
     });
+}
+
+// Directions that are aimed near a lamp have a small weight, and what they meet there is bright. Roulette
+// that went by the weight alone would end most of these paths, and the few others would be fireflies.
+TEST(Roulette, SparesPathsThatAreAimedNearALamp) {
+  const auto error = [](int rr_depth) {
+    test::SceneBuilder b({16, 16});
+    b.scene.integrator.max_depth = 8;
+    b.scene.integrator.rr_depth = rr_depth;
+    b.look({0, 0, 5}, {0, 0, 0}, 40, {0, 1, 0});
+    b.shape(RectangleShape{}, test::translate({0, -1.2, 0}) * test::rotate_x(-90) * test::scale(3),
+            b.diffuse(.7));
+    b.container(CubeShape{}, {}, b.null(), b.homogeneous({.5, .5, .5}, {.95, .95, .95}, .5));
+    b.scene.emitters.push_back(PointEmitter{{.3, .2, -.1}, {1, 1, 1}});
+    return test::estimate(b, 256).standard_error[1];
+  };
+  const double with = error(1), without = error(100);
+  std::printf("with roulette %.4g, without %.4g\n", with, without);
+  EXPECT_LT(with, 1.5 * without);
 }
 
 }  // namespace

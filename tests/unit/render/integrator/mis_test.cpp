@@ -91,7 +91,7 @@ TEST(MisWeight, AlongSegmentsIsThatWhichIsAskedFor) {
     const double r = std::hypot(t - kAlong, kAside);
     return kSigma * std::exp(-kSigma * (t + r)) / (4 * kPi * r * r);
   };
-  const EquiAngular by_angle({0, 0, 0}, {1, 0, 0}, 1, {kAlong, kAside, 0});
+  const EquiAngular by_angle({0, 0, 0}, {1, 0, 0}, 1, V3(kAlong, kAside, 0));
   const double light = integrated(0, 1, f);
   for (const MisHeuristic heuristic : {MisHeuristic::power, MisHeuristic::balance}) {
     SceneBuilder builder({kSide, kSide});

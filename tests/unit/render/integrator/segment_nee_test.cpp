@@ -56,7 +56,7 @@ TEST(SegmentLightVertex, SharesAreNumbersAtTheEndsOfFloat32) {
       for (const float flight : {0.f, kTiny, 1e-38f, 1.f, kHuge})
         for (const float pivot : {0.f, 1e-30f, 1e-7f, 1.f, 1e30f}) {
           const Vertex v{by_depth, true, depth_ratio, flight, .5f, {0, 0, 0}, {1, 0, 0}, 1};
-          for (const float found : {v.found_as_light(), v.found_as_light({.5f, pivot, 0})}) {
+          for (const float found : {v.found_as_light(), v.found_as_light(V3(.5f, pivot, 0))}) {
             ASSERT_GE(found, 0);
             ASSERT_LE(found, kMaxRatio);
             for (const float p_s : {1e-30f, 1.f, 1e15f})

@@ -1,0 +1,18 @@
+// The point about which segments of paths are sampled equi-angularly, and where its light goes.
+#pragma once
+
+#include "worker/render/math/math.h"
+
+namespace ls::render {
+
+struct Pivot {
+  V3 p;
+  // All light leaves p at a cosine of at least cos_reach to the axis, a unit vector. -1: in all directions.
+  V3 axis{0, 0, 0};
+  float cos_reach = -1;
+
+  Pivot(const V3& point) : p(point) {}
+  Pivot(const V3& point, const V3& towards, float cosine) : p(point), axis(towards), cos_reach(cosine) {}
+};
+
+}  // namespace ls::render
