@@ -22,7 +22,7 @@ class CameraSegmentNee {
 
  public:
   struct Plan {
-    std::optional<typename Points::Plan> points;  // nullopt: not a segment of the camera
+    std::optional<typename Points::Plan> points;  // nullopt: the default strategy
     typename Single::Plan single;
 
     bool matters() const { return points || single.matters(); }
