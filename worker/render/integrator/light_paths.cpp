@@ -74,31 +74,6 @@ void learn(const World& w, bool in_any_case, Learned& learned) {
   }
 }
 
-// Computes the data by which the contribution of a light vertex to other points is estimated.
-LightVertices::Look look_of(const World& w, const LightVertex& y) {
-  const float light = mean_component(y.light) / mean_component(w.sun.irradiance);
-  LightVertices::Look look;
-  look.density = 1 / y.densities.sum(kInvFourPi);
-  if (y.medium == kNone) {
-    const SurfaceInfo& surface = w.geometry.surfaces[y.hit.surface];
-    look.n = dot(y.to_light, y.hit.ng) > 0 ? y.hit.ng : -y.hit.ng;
-    look.both_sides =
-        surface.crossed || std::abs(dot(y.hit.shading.n, y.hit.ng)) < kUntilted || surface.wants_slopes;
-    // Estimates the reflected light by the mean over four directions at 45 degrees to the normal, on the lit
-    // side
-    const V3 to_light = y.hit.shading.to_local(y.to_light);
-    const float z = std::copysign(.70710678f, to_light.z);
-    float reflected = 0;
-    for (const V3& to : {V3(.5f, .5f, z), V3(-.5f, .5f, z), V3(.5f, -.5f, z), V3(-.5f, -.5f, z)})
-      reflected += mean_component(w.bsdfs.eval(surface.bsdf, y.hit.uv_point(), to, to_light).f_cos) / 4;
-    look.strength = light * std::max(reflected, kLeastReflected * std::abs(to_light.z));
-  } else {
-    look.g = w.media[y.medium].phase.g;
-    look.strength = light * kInvFourPi;
-  }
-  return look;
-}
-
 template <Features F>
 LightVertices trace_with(const World& w, std::uint64_t seed, std::uint32_t set, std::uint64_t rays) {
   LightVertices all;
@@ -109,7 +84,7 @@ LightVertices trace_with(const World& w, std::uint64_t seed, std::uint32_t set, 
       y.light *= 1.f / static_cast<float>(rays);
       const LightVertices::Look look = look_of(w, y);
       const auto usable = [](float x) { return x > 0 && std::isfinite(x); };
-      if (usable(look.strength) && usable(look.density)) all.add(y, look);
+      if (usable(look.even + look.lobe) && usable(look.density)) all.add(y, look);
     });
   }
   all.finish();
@@ -131,6 +106,46 @@ LightVertices trace(const World& w, std::uint64_t seed, std::uint32_t set, std::
 }
 
 }  // namespace
+
+LightVertices::Look look_of(const World& w, const LightVertex& y) {
+  const float light = mean_component(y.light) / mean_component(w.sun.irradiance);
+  LightVertices::Look look;
+  look.density = 1 / y.densities.sum(kInvFourPi);
+  if (y.medium == kNone) {
+    const SurfaceInfo& surface = w.geometry.surfaces[y.hit.surface];
+    look.n = dot(y.to_light, y.hit.ng) > 0 ? y.hit.ng : -y.hit.ng;
+    look.both_sides =
+        surface.crossed || std::abs(dot(y.hit.shading.n, y.hit.ng)) < kUntilted || surface.wants_slopes;
+    const V3 to_light = y.hit.shading.to_local(y.to_light);
+    const auto reflected = [&](const V3& to, float* pdf = nullptr) {
+      const BsdfEval f = w.bsdfs.eval(surface.bsdf, y.hit.uv_point(), to_light, to);
+      if (pdf) *pdf = f.pdf;
+      return mean_component(f.f_cos) * std::abs(to_light.z / to.z);
+    };
+    // The mean over four directions at 45 degrees to the normal, on the lit side
+    const float z = std::copysign(.70710678f, to_light.z);
+    float even = 0;
+    for (const V3& to : {V3(.5f, .5f, z), V3(-.5f, .5f, z), V3(.5f, -.5f, z), V3(-.5f, -.5f, z)})
+      even += reflected(to) / 4;
+    look.even = light * std::max(even, kLeastReflected * std::abs(to_light.z));
+    // A lobe around the mirrored direction, as high there as the BSDF. Its width is that for light along the
+    // normal: at other angles lobes of microfacets are as long as that and narrower by the cosine.
+    const V3 mirrored(-to_light.x, -to_light.y, to_light.z);
+    float pdf = 0;
+    const float peak = reflected(mirrored, &pdf);
+    const float q = pdf * std::abs(to_light.z) / kInvFourPi;
+    if (peak > even && q > 1) {
+      look.axis = -y.hit.shading.to_world(mirrored);
+      look.g = (2 * q + 1 - std::sqrt(8 * q + 1)) / (2 * q);  // (1 + g) / (1 - g)^2 = q
+      look.lobe = light * (peak - even) * std::abs(to_light.z) / q;
+    }
+  } else {
+    look.axis = y.to_light;
+    look.g = w.media[y.medium].phase.g;
+    look.lobe = light * kInvFourPi;
+  }
+  return look;
+}
 
 void learn_connections(const IntegratorSettings& settings, World& w) {
   if (settings.light_vertices < 0 || !w.depth_allows(2)) return;

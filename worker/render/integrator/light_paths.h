@@ -18,4 +18,7 @@ void learn_connections(const IntegratorSettings& settings, World& w);
 // number of the set.
 LightVertices trace_light_vertices(const World& w, std::uint64_t set);
 
+// Returns the data by which LightVertices estimates how much a vertex contributes to other points.
+LightVertices::Look look_of(const World& w, const LightVertex& y);
+
 }  // namespace ls::render

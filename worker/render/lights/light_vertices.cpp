@@ -103,11 +103,12 @@ void LightVertices::add(const LightVertex& vertex, const Look& look) {
   Block& b = blocks_.back();
   b.x[lane] = vertex.p.x, b.y[lane] = vertex.p.y, b.z[lane] = vertex.p.z;
   b.nx[lane] = look.n.x, b.ny[lane] = look.n.y, b.nz[lane] = look.n.z;
-  b.lx[lane] = vertex.to_light.x, b.ly[lane] = vertex.to_light.y, b.lz[lane] = vertex.to_light.z;
+  b.ax[lane] = look.axis.x, b.ay[lane] = look.axis.y, b.az[lane] = look.axis.z;
   b.other_side[lane] = look.both_sides ? 1.f : 0.f;
   b.round[lane] = vertex.medium == kNone ? 0.f : 1.f;
   b.g[lane] = std::clamp(look.g, -kSharpest, kSharpest);
-  b.strength[lane] = look.strength;
+  b.even[lane] = look.even;
+  b.lobe[lane] = look.lobe;
   b.density[lane] = look.density;
 }
 
@@ -117,9 +118,9 @@ void LightVertices::finish() {
 }
 
 // Estimates the contributions of a block's light vertices y to the receiver x, without visibility and
-// transmittance. Up to a common factor they are strength * phase_y * cos_y * f_x * c / (c r^2 + p_x cos_y),
-// where c is Look::density, r the distance, f_x the BSDF times cosine or the phase function at x, and p_x its
-// density. Surfaces count as diffuse. Unused lanes have a strength of 0.
+// transmittance. Up to a common factor they are L_y * f_x * c / (c r^2 + p_x cos_y), where L_y is the
+// radiance times cosine by Look, c is Look::density, r the distance, f_x the BSDF times cosine or the phase
+// function at x, and p_x its density. Surfaces at x count as diffuse. Unused lanes have a radiance of 0.
 void LightVertices::towards(const Block& b, const Receiver& x, Lane& target) {
   const float other_side = x.both_sides ? 1.f : 0.f;
   const auto phase = [](float g, float cosine) {
@@ -134,8 +135,8 @@ void LightVertices::towards(const Block& b, const Receiver& x, Lane& target) {
     wx[k] = fx * inverse, wy[k] = fy * inverse, wz[k] = fz * inverse;
     const float cosine = -(b.nx[k] * wx[k] + b.ny[k] * wy[k] + b.nz[k] * wz[k]);
     cos_y[k] = std::max(std::max(cosine, -cosine * b.other_side[k]), b.round[k]);
-    scale[k] = b.strength[k] * b.density[k] * cos_y[k] *
-               phase(b.g[k], wx[k] * b.lx[k] + wy[k] * b.ly[k] + wz[k] * b.lz[k]);
+    const float lobe = b.lobe[k] * phase(b.g[k], wx[k] * b.ax[k] + wy[k] * b.ay[k] + wz[k] * b.az[k]);
+    scale[k] = (b.even[k] * cos_y[k] + (cos_y[k] > 0 ? lobe : 0.f)) * b.density[k];
   }
   if (x.in_medium) {
     for (std::size_t k = 0; k < kCandidates; ++k) {

@@ -134,13 +134,18 @@ class LightVertices {
  public:
   static constexpr std::size_t kCandidates = 32;
 
-  // The appearance of a light vertex from elsewhere, by which choose() estimates its contribution.
+  // The appearance of a light vertex from elsewhere, by which choose() estimates its contribution. Up to a
+  // common factor the radiance that leaves the vertex, times its cosine to the normal (1 in media), is
+  //   even * cosine + lobe * 4 pi * (the Henyey-Greenstein phase function with parameter g),
+  // the latter for the angle between the direction in which light leaves and -axis. The lobe of a glossy
+  // surface has no cosine, as that of a microfacet distribution.
   struct Look {
     V3 n{0, 0, 0};  // surfaces: the geometric normal, on the side that is lit
     // Surfaces: light may leave on the other side too, as through glass or where the shading normal is tilted
     bool both_sides = false;
-    float g = 0;         // media: the parameter of the phase function
-    float strength = 0;  // proportional to the radiance that leaves the vertex in a typical direction; > 0
+    float even = 0, lobe = 0;  // their sum is positive
+    V3 axis{0, 0, 1};
+    float g = 0;
     // 1 / densities.sum(1 / (4 pi)). The larger it is, the better connections are compared with the other
     // ways that find the light of the vertex.
     float density = 0;
@@ -162,7 +167,8 @@ class LightVertices {
  private:
   using Lane = std::array<float, kCandidates>;
   struct Block {
-    Lane x{}, y{}, z{}, nx{}, ny{}, nz{}, lx{}, ly{}, lz{}, other_side{}, round{}, g{}, strength{}, density{};
+    Lane x{}, y{}, z{}, nx{}, ny{}, nz{}, ax{}, ay{}, az{}, other_side{}, round{}, g{}, even{}, lobe{},
+        density{};
   };
   std::size_t index_of(std::uint32_t block) const { return (std::uint64_t{block} * blocks_.size()) >> 32; }
   static void towards(const Block& block, const Receiver& x, Lane& target);

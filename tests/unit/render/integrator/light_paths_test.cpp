@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <vector>
+
 #include "tests/support/render_check.h"
 #include "tests/support/sunny_room.h"
 #include "worker/render/integrator/light_paths.h"
@@ -88,6 +91,60 @@ TEST(LightPaths, TakeTheNoiseFromIndirectLight) {
     const double with = squared_error(1), without = squared_error(-1);
     std::printf("fog %g: %.3f\n", fog, with / without);
     EXPECT_LT(with, .5 * without) << fog;
+  }
+}
+
+// Where a glossy surface is bright, its look must not be much darker: its vertices would be chosen too
+// seldom, and count too much when they are. At an angle t from the mirrored direction a narrow Beckmann lobe
+// has the share exp(-x) of its peak, x = t^2 / (4 alpha^2), and the Henyey-Greenstein lobe of the same peak
+// and integral has (1 + 2 x)^-1.5. So the look is at most 3^1.5 / e = 1.91 times too dark, at x = 1. For wide
+// lobes, some of which are all even, the test finds up to 2.54.
+TEST(LightPaths, SeeHowBrightGlossySurfacesAre) {
+  for (const double alpha : {.03, .1, .15, .3, .6}) {
+    SceneBuilder b({4, 4});
+    b.look({0, 0, 3}, {0, 0, 0}, 40, {0, 1, 0});
+    RoughConductorBsdf metal;
+    metal.alpha_u = metal.alpha_v = b.texture({alpha, alpha, alpha});
+    metal.eta = {.4, .5, 1};
+    metal.k = {3.7, 2.8, 1.8};
+    metal.specular_reflectance = b.texture({1, 1, 1});
+    b.shape(RectangleShape{}, {}, b.bsdf(metal));
+    b.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, {1, 1, 1}});
+    b.scene.integrator.light_vertices = 1;
+    const auto world = test::world_of(b);
+    for (const float sine : {0.f, .3f, .7f, .95f}) {
+      LightVertex y;
+      const V3 o(.1f, .2f, 1), down(0, 0, -1);
+      const auto primitive = world->accel.nearest(o, down, kInfinity);
+      ASSERT_TRUE(primitive && world->geometry.complete(*primitive, o, down, y.hit));
+      y.light = C3(1);
+      y.to_light = {sine, 0, std::sqrt(1 - sine * sine)};
+      y.densities = {1, 0};
+      const auto look = look_of(*world, y);
+      const BsdfIndex bsdf = world->geometry.surfaces[y.hit.surface].bsdf;
+      const V3 to_light = y.hit.shading.to_local(y.to_light);
+      struct Seen {
+        float light, look;
+      };
+      std::vector<Seen> seen;
+      float peak = 0;
+      RandomStream random(3);
+      for (int i = 0; i < 4000; ++i) {
+        const auto s = world->bsdfs.sample(bsdf, y.hit.uv_point(), to_light, random.uniform(),
+                                           {random.uniform(), random.uniform()});
+        if (!s || s->wi.z < .05f) continue;
+        const float light = (s->weight.x + s->weight.y + s->weight.z) / 3 * s->pdf * to_light.z / s->wi.z;
+        const float cosine = -dot(y.hit.shading.to_world(s->wi), look.axis);
+        const float lobe = (1 - look.g * look.g) / std::pow(1 + look.g * look.g - 2 * look.g * cosine, 1.5f);
+        seen.push_back({light * s->wi.z, look.even * s->wi.z + look.lobe * lobe});
+        peak = std::max(peak, seen.back().light);
+      }
+      float worst = 0;
+      for (const Seen& s : seen)
+        if (s.light > .1f * peak) worst = std::max(worst, s.light / s.look);
+      EXPECT_GT(worst, 0);
+      EXPECT_LT(worst, alpha < .2 ? 1.95 : 2.6) << alpha << " " << sine;
+    }
   }
 }
 

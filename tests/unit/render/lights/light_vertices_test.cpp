@@ -5,6 +5,7 @@
 
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <thread>
@@ -134,8 +135,9 @@ LightVertices some(std::size_t count) {
     if (i % 3 == 0) y.medium = 0;
     LightVertices::Look look;
     look.n = y.medium == kNone ? V3(0, 0, 1) : V3(0);
-    look.g = y.medium == kNone ? 0 : .5f;
-    look.strength = .1f + random.uniform();
+    look.g = .5f;
+    (y.medium == kNone ? look.even : look.lobe) = .1f + random.uniform();
+    if (i % 5 == 0) look.lobe = random.uniform();
     look.density = 1 + random.uniform();
     all.add(y, look);
   }
@@ -188,7 +190,7 @@ TEST(LightVertices, AreSeenFromTheSidesThatTheyLight) {
     LightVertices::Look look;
     look.n = {0, 0, 1};
     look.both_sides = both_sides;
-    look.strength = look.density = 1;
+    look.even = look.density = 1;
     all.add(y, look);
     all.finish();
     for (const float z : {-1.f, 1.f}) {
@@ -205,7 +207,7 @@ TEST(LightVertices, AtTheReceiverItselfAreNoTrouble) {
   LightVertex y;
   y.medium = 0;
   LightVertices::Look look;
-  look.strength = look.density = 1;
+  look.even = look.density = 1;
   all.add(y, look);
   all.finish();
   Receiver surface, medium;
@@ -225,7 +227,7 @@ TEST(LightVertices, InMediaThatScatterSharplyAreChosen) {
     LightVertex y;
     y.medium = 0;
     LightVertices::Look look;
-    look.strength = look.density = 1;
+    look.lobe = look.density = 1;
     look.g = g;
     all.add(y, look);
     all.finish();
@@ -239,6 +241,31 @@ TEST(LightVertices, InMediaThatScatterSharplyAreChosen) {
       ASSERT_TRUE(c.vertex) << g;
       EXPECT_FLOAT_EQ(c.weight, 1) << g;
     }
+  }
+}
+
+// Two vertices at one place, one of which also shines upwards through a lobe.
+TEST(LightVertices, AreChosenByTheirLobes) {
+  LightVertices all;
+  LightVertex y;
+  LightVertices::Look look;
+  look.n = {0, 0, 1};
+  look.even = look.density = 1;
+  all.add(y, look);
+  look.lobe = 2;
+  look.axis = {0, 0, -1};
+  look.g = .5f;
+  all.add(y, look);
+  all.finish();
+  for (const float cosine : {1.f, .5f, .1f}) {
+    Receiver x;
+    x.p = {std::sqrt(1 - cosine * cosine), 0, cosine};
+    x.n = -x.p;
+    const auto last = all.choose(x, 0, .9999f);
+    const double lobe = .75 / std::pow(1.25 - double{cosine}, 1.5);
+    const double even = double{cosine}, both = even + 2 * lobe;  // radiances times cosine of the two vertices
+    const double any = .1 * (even + both) / LightVertices::kCandidates;  // a tenth is shared among all lanes
+    EXPECT_NEAR(double{last.weight} * (both + any) / (even + both + 2 * any), 1, 1e-5) << cosine;
   }
 }
 
