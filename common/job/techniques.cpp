@@ -20,7 +20,9 @@ constexpr std::array kRows{
     TechniqueRow{Technique::light_vertices, "light_vertices", "connects paths to points that the sun lights"},
     TechniqueRow{Technique::light_tree, "light_tree", "chooses among many lights by a tree"},
     TechniqueRow{Technique::path_reuse, "path_reuse",
-                 "lets paths serve several pixels from their second scattering on"}};
+                 "lets paths serve several pixels from their second scattering on"},
+    TechniqueRow{Technique::shadow_roulette, "shadow_roulette",
+                 "traces shadow rays through grids at random where they could bring little"}};
 
 constexpr bool in_order() {
   for (std::size_t i = 0; i < kRows.size(); ++i)
@@ -52,6 +54,8 @@ TechniqueSwitch off_switch(Technique technique, std::string_view integrator) {
       return {"light_tree", "-1"};
     case Technique::path_reuse:
       return {"path_reuse", "-1"};
+    case Technique::shadow_roulette:
+      return {"shadow_roulette", "-1"};
   }
   return {};
 }

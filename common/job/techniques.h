@@ -20,6 +20,7 @@ enum class Technique : std::uint8_t {
   light_vertices,   // connections to points that a directional emitter lights
   light_tree,       // one of many lights chosen by a tree
   path_reuse,       // paths that serve several pixels from their second vertices on
+  shadow_roulette,  // shadow rays through grids that are traced at random where they could bring little
 };
 
 struct TechniqueRow {

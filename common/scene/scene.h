@@ -369,6 +369,9 @@ struct IntegratorSettings {
   // For "volpath" only: the number of pixels that share what their paths find from the second vertices on. 0:
   // kUsualPathReuse or none, chosen for the scene; -1 or 1: none.
   int path_reuse = 0;
+  // For "volpath" only: whether shadow rays through grids that could bring little are traced at random. 0:
+  // chosen for the scene; -1: all are traced.
+  int shadow_roulette = 0;
   bool operator==(const IntegratorSettings&) const = default;
 };
 

@@ -205,7 +205,9 @@ void Reader::read_integrator(const Element& e, int depth) {
   i.name = row->ours;
   if (i.name != kDistantMis) refuse(p, {"distance", "heuristic"}, kDistantMis);
   if (i.name != "volpath")
-    refuse(p, {"camera_points", "phase_only", "light_vertices", "equiangular", "lamp_flights", "path_reuse"},
+    refuse(p,
+           {"camera_points", "phase_only", "light_vertices", "equiangular", "lamp_flights", "path_reuse",
+            "shadow_roulette"},
            "volpath");
   i.max_depth = row->default_depth;
   bind(p, i);

@@ -267,7 +267,8 @@ class Writer {
     void field(const Field& f, const T& x) {
       const bool distances = f.name == "distance" || f.name == "heuristic";
       const bool aims = f.name == "camera_points" || f.name == "phase_only" || f.name == "light_vertices" ||
-                        f.name == "equiangular" || f.name == "lamp_flights" || f.name == "path_reuse";
+                        f.name == "equiangular" || f.name == "lamp_flights" || f.name == "path_reuse" ||
+                        f.name == "shadow_roulette";
       if (distances ? integrator == kDistantMis : !aims || integrator == "volpath") writer.field(f, x);
     }
   };

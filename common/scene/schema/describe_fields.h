@@ -85,6 +85,12 @@ void describe(V& v, T& i) {
        .range = {-1, 64},
        .elided = true},
       i.path_reuse);
+  v.field({.name = "shadow_roulette",
+           .doc = "`volpath` alone: whether shadow rays through grids that could bring little are traced at "
+                  "random; 0: where it is possible; -1: never",
+           .range = {-1, 0},
+           .elided = true},
+          i.shadow_roulette);
 }
 
 template <class V, Of<Asset> T>

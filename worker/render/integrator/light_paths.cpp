@@ -8,6 +8,7 @@
 #include "worker/render/integrator/variant.h"
 #include "worker/render/math/processor.h"
 #include "worker/render/world/aim.h"
+#include "worker/render/world/shadow_roulette.h"
 #include "worker/render/world/world_build.h"
 
 namespace ls::render {
@@ -195,6 +196,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   if (settings.integrator == "volpath") {
     learn_connections(scene.integrator, **world);
     share_tails(scene.integrator, **world);
+    learn_shadow_roulette(scene.integrator, **world);
   }
   return std::shared_ptr<const World>(std::move(*world));
 }

@@ -19,6 +19,7 @@
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/optical_depth.h"
 #include "worker/render/media/segment.h"
+#include "worker/render/world/shadow_roulette.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {
@@ -116,10 +117,19 @@ class VertexNee {
         light->delta
             ? 1 / with_equiangular
             : light->pdf / (light->pdf * with_equiangular + path.direction_pdf(p, phase, light->direction));
+    float traced = 1;  // probability of tracing the shadow ray
+    if constexpr (F.grids && !F.connected) {
+      if (medium.grid && path.world_.faint_shadow > 0) {
+        C3 most = path.beta_ * light->radiance * (phase * weight / light->pdf);
+        if constexpr (F.chromatic) most /= path.mean(path.density_);
+        traced = shadow_ray_probability(path.mean(most), path.world_.faint_shadow);
+        if (!(g.u(3) < traced)) return;
+      }
+    }
     const C3 arriving = path.unoccluded(path.ray_.start, p, *light, path.medium_,
                                         path.stream_.stream(path.depth_, Purpose::track_shadow));
     if (!is_black(arriving))
-      path.add_found(choice, p, V3(0), path.beta_ * arriving * (phase * weight / light->pdf),
+      path.add_found(choice, p, V3(0), path.beta_ * arriving * (phase * weight / (light->pdf * traced)),
                      [phase] { return phase; });
   }
 

@@ -72,6 +72,9 @@ class World {
   float connections_per_ray = 1;
   float faint = 0;  // connections that would add less than this are made at random (Russian roulette)
   mutable LightVertexCache light_vertices;  // safe from several threads
+  // With Features::grids: shadow rays that could bring less than this are traced at random
+  // (shadow_roulette.h); 0: all are traced.
+  float faint_shadow = 0;
   // With Features::reuse: the number of pixels whose paths share their tails (path_reuse.h)
   int reuse = 0;
   bool hide_emitters = false;

@@ -70,6 +70,7 @@ TechniqueSet techniques_of(const World& w) {
   put(w.need.connected, Technique::light_vertices);
   put(w.lights.has_tree(), Technique::light_tree);
   put(w.need.reuse, Technique::path_reuse);
+  put(w.faint_shadow > 0, Technique::shadow_roulette);
   return set;
 }
 
@@ -99,6 +100,7 @@ WorldReport describe(const World& w) {
   feature(w.lights.count() > 1, "choice among lights");
   feature(techniques.has(Technique::light_tree), "tree of lights");
   feature(techniques.has(Technique::path_reuse), "paths that serve several pixels");
+  feature(techniques.has(Technique::shadow_roulette), "shadow rays at random where they could bring little");
   feature(w.camera.has_lens(), "thin lens");
   feature(!w.geometry.instances.empty(), "instances of groups");
   feature(w.geometry.primitive_count() > w.geometry.triangle_count(), "user geometries in the BVH");

@@ -59,6 +59,20 @@ SceneBuilder many_lamps() {
   return builder;
 }
 
+SceneBuilder cloud_under_sun_and_sky() {
+  SceneBuilder builder({24, 16});
+  builder.look({0, 0, 4}, {0, 0, 0}, 30, {0, 1, 0});
+  const MediumIndex cloud = builder.heterogeneous(
+      builder.grid({2, 2, 2}, {1, .2, .5, 1, .3, 1, 1, .4}, translate({-1, -1, -1}) * scale(2)), {.9, .95, 1},
+      5, .7);
+  builder.container(CubeShape{}, scale(.99), builder.null(), cloud);
+  builder.scene.emitters.push_back(DirectionalEmitter{{.3, -1, -.2}, {3, 3, 3}});
+  builder.scene.emitters.push_back(ConstantEmitter{{.3, .4, .5}});
+  builder.scene.integrator.max_depth = 6;
+  builder.scene.integrator.light_vertices = -1;
+  return builder;
+}
+
 struct Case {
   Technique technique;
   SceneBuilder builder;
@@ -72,7 +86,8 @@ std::vector<Case> cases() {
           {Technique::lamp_flights, lamp_in_fog()},
           {Technique::light_vertices, test::SunnyRoom{.fog = .3, .light_vertices = 1}.builder({24, 16})},
           {Technique::light_tree, many_lamps()},
-          {Technique::path_reuse, test::LampRoom{.fog = .3, .path_reuse = 8}.builder({24, 16})}};
+          {Technique::path_reuse, test::LampRoom{.fog = .3, .path_reuse = 8}.builder({24, 16})},
+          {Technique::shadow_roulette, cloud_under_sun_and_sky()}};
 }
 
 // What off_switch() says, done to the description that the reader would make of it.
@@ -88,6 +103,7 @@ SceneBuilder switched_off(const Case& c) {
       {"camera_points", [&] { i.camera_points = -1; }},
       {"light_vertices", [&] { i.light_vertices = -1; }},
       {"path_reuse", [&] { i.path_reuse = -1; }},
+      {"shadow_roulette", [&] { i.shadow_roulette = -1; }},
       {"distance", [&] {
          i.distance =
              off.value == "exponential" ? DistanceSampling::exponential : DistanceSampling::equiangular;

@@ -1,0 +1,73 @@
+// Which shadow rays are traced at random. That the image stays the same is tested in techniques_test.cpp.
+#include "worker/render/world/shadow_roulette.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/render_check.h"
+#include "tests/support/scene_builder.h"
+
+namespace ls::render {
+namespace {
+
+using test::SceneBuilder;
+
+SceneBuilder cloud() {
+  SceneBuilder b({32, 16});
+  b.look({0, 0, 4}, {0, 0, 0}, 30, {0, 1, 0});
+  const MediumIndex medium = b.heterogeneous(
+      b.grid({2, 2, 2}, {1, .2, .5, 1, .3, 1, 1, .4}, test::translate({-1, -1, -1}) * test::scale(2)),
+      {.9, .9, .9}, 5, .7);
+  b.container(CubeShape{}, test::scale(.99), b.null(), medium);
+  b.scene.emitters.push_back(ConstantEmitter{{.3, .4, .5}});
+  b.scene.emitters.push_back(DirectionalEmitter{{.3, -1, -.2}, {3, 3, 3}});
+  b.scene.integrator.light_vertices = -1;
+  return b;
+}
+
+TEST(ShadowRoulette, TracesFaintShadowRaysLessOften) {
+  EXPECT_EQ(shadow_ray_probability(2, 1), 1);
+  EXPECT_EQ(shadow_ray_probability(1, 1), 1);
+  EXPECT_EQ(shadow_ray_probability(.5f, 1), .5f);
+  EXPECT_EQ(shadow_ray_probability(0, 1), kLeastTraced);
+  EXPECT_EQ(shadow_ray_probability(0, 0), 1) << "no roulette";
+}
+
+// The mean of 32 paths whose radiances differ by less than twice their mean is off by less than a factor of 2
+// at 1.4 standard deviations; the paths are always the same.
+TEST(ShadowRoulette, MeasuresByTheMeanRadiance) {
+  const auto mean = test::estimate(cloud(), 32).mean;
+  const double all = (mean[0] + mean[1] + mean[2]) / 3;
+  const double faint = double{test::world_of(cloud())->faint_shadow};
+  EXPECT_GT(faint, all / 2);
+  EXPECT_LT(faint, all * 2);
+}
+
+TEST(ShadowRoulette, IsTheSameForEverySeedAndCrop) {
+  const SceneBuilder whole = cloud();
+  SceneBuilder crop = cloud();
+  crop.scene.film.crop_offset = {8, 4};
+  crop.scene.film.crop_size = {5, 6};
+  const float faint = test::world_of(whole)->faint_shadow;
+  EXPECT_GT(faint, 0);
+  EXPECT_EQ(test::world_of(whole, 7)->faint_shadow, faint);
+  EXPECT_EQ(test::world_of(crop)->faint_shadow, faint);
+}
+
+TEST(ShadowRoulette, IsLeftOutWhereItIsNotNeeded) {
+  const auto faint = [](auto&& change) {
+    SceneBuilder b = cloud();
+    change(b.scene);
+    return test::world_of(b)->faint_shadow;
+  };
+  EXPECT_EQ(faint([](Scene& s) { s.integrator.shadow_roulette = -1; }), 0);
+  EXPECT_EQ(faint([](Scene& s) { s.emitters.pop_back(); }), 0) << "a sky of one radiance is not sampled";
+  EXPECT_EQ(faint([](Scene& s) { s.integrator.max_depth = 1; }), 0) << "light that is not scattered";
+  EXPECT_EQ(faint([](Scene& s) { s.integrator.name = "volpath_distant_mis"; }), 0);
+  SceneBuilder fog({32, 16});
+  fog.container(CubeShape{}, {}, fog.null(), fog.homogeneous({1, 1, 1}, {.9, .9, .9}));
+  fog.scene.emitters.push_back(DirectionalEmitter{{.3, -1, -.2}, {3, 3, 3}});
+  EXPECT_EQ(test::world_of(fog)->faint_shadow, 0);
+}
+
+}  // namespace
+}  // namespace ls::render

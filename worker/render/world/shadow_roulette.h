@@ -1,0 +1,29 @@
+// Shadow rays through grids cost most of the time in clouds: each tracks the medium all the way to the light.
+// Most of them could bring little, because the phase function sends little light that way or because the path
+// has lost its weight. So a shadow ray whose light would be faint even if nothing dimmed it is traced at
+// random, with a probability in proportion to that light (Russian roulette: Arvo and Kirk 1990, "Particle
+// transport and image synthesis").
+#pragma once
+
+#include <algorithm>
+
+#include "common/scene/scene.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+// The smallest probability with which a shadow ray is traced. Roulette adds at most 1 / kLeastTraced - 1
+// times the second moment of the light that is found, in pixels of any brightness.
+inline constexpr float kLeastTraced = .25f;
+
+// The probability with which a shadow ray is traced that could bring `light`: the mean over the channels of
+// what it would add to the sample.
+inline float shadow_ray_probability(float light, float faint_shadow) {
+  return light < faint_shadow ? std::max(light / faint_shadow, kLeastTraced) : 1.f;
+}
+
+// Sets `faint_shadow` of a world that is otherwise complete, from the mean radiance of some camera paths. It
+// depends only on the scene and the size of the full frame: not on the seed, the number of samples or a crop.
+void learn_shadow_roulette(const IntegratorSettings& settings, World& w);
+
+}  // namespace ls::render
