@@ -1,8 +1,8 @@
-// Shadow rays through grids cost most of the time in clouds: each tracks the medium all the way to the light.
-// Most of them could bring little, because the phase function sends little light that way or because the path
-// has lost its weight. So a shadow ray whose light would be faint even if nothing dimmed it is traced at
-// random, with a probability in proportion to that light (Russian roulette: Arvo and Kirk 1990, "Particle
-// transport and image synthesis").
+// Shadow rays through grids cost a large part of the time in clouds: each tracks the medium all the way to
+// the light. Many of them could bring little, because the phase function sends little light that way or
+// because the path has lost its weight. So a shadow ray whose light would be faint even if nothing dimmed it
+// is traced at random, with a probability in proportion to that light (Russian roulette: Arvo and Kirk 1990,
+// "Particle transport and image synthesis").
 #pragma once
 
 #include <algorithm>
