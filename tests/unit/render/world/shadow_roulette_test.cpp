@@ -11,7 +11,7 @@ namespace {
 
 using test::SceneBuilder;
 
-SceneBuilder cloud() {
+SceneBuilder lit_cloud() {
   SceneBuilder b({32, 16});
   b.look({0, 0, 4}, {0, 0, 0}, 30, {0, 1, 0});
   const MediumIndex medium = b.heterogeneous(
@@ -35,16 +35,16 @@ TEST(ShadowRoulette, TracesFaintShadowRaysLessOften) {
 // The mean of 32 paths whose radiances differ by less than twice their mean is off by less than a factor of 2
 // at 1.4 standard deviations; the paths are always the same.
 TEST(ShadowRoulette, MeasuresByTheMeanRadiance) {
-  const auto mean = test::estimate(cloud(), 32).mean;
+  const auto mean = test::estimate(lit_cloud(), 32).mean;
   const double all = (mean[0] + mean[1] + mean[2]) / 3;
-  const double faint = double{test::world_of(cloud())->faint_shadow};
+  const double faint = double{test::world_of(lit_cloud())->faint_shadow};
   EXPECT_GT(faint, all / 2);
   EXPECT_LT(faint, all * 2);
 }
 
 TEST(ShadowRoulette, IsTheSameForEverySeedAndCrop) {
-  const SceneBuilder whole = cloud();
-  SceneBuilder crop = cloud();
+  const SceneBuilder whole = lit_cloud();
+  SceneBuilder crop = lit_cloud();
   crop.scene.film.crop_offset = {8, 4};
   crop.scene.film.crop_size = {5, 6};
   const float faint = test::world_of(whole)->faint_shadow;
@@ -55,7 +55,7 @@ TEST(ShadowRoulette, IsTheSameForEverySeedAndCrop) {
 
 TEST(ShadowRoulette, IsLeftOutWhereItIsNotNeeded) {
   const auto faint = [](auto&& change) {
-    SceneBuilder b = cloud();
+    SceneBuilder b = lit_cloud();
     change(b.scene);
     return test::world_of(b)->faint_shadow;
   };
