@@ -118,27 +118,25 @@ LightVertices::Look look_of(const World& w, const LightVertex& y) {
     look.both_sides =
         surface.crossed || std::abs(dot(y.hit.shading.n, y.hit.ng)) < kUntilted || surface.wants_slopes;
     const V3 to_light = y.hit.shading.to_local(y.to_light);
-    const auto reflected = [&](const V3& to, float* pdf = nullptr) {
-      const BsdfEval f = w.bsdfs.eval(surface.bsdf, y.hit.uv_point(), to_light, to);
-      if (pdf) *pdf = f.pdf;
-      return mean_component(f.f_cos) * std::abs(to_light.z / to.z);
+    const auto eval = [&](const V3& to) {
+      return w.bsdfs.eval(surface.bsdf, y.hit.uv_point(), to_light, to);
     };
+    const float cosine = std::abs(to_light.z);
     // The mean over four directions at 45 degrees to the normal, on the lit side
     const float z = std::copysign(.70710678f, to_light.z);
     float even = 0;
     for (const V3& to : {V3(.5f, .5f, z), V3(-.5f, .5f, z), V3(.5f, -.5f, z), V3(-.5f, -.5f, z)})
-      even += reflected(to) / 4;
-    look.even = light * std::max(even, kLeastReflected * std::abs(to_light.z));
+      even += mean_component(eval(to).f_cos) * cosine / (4 * std::abs(z));
+    look.even = light * std::max(even, kLeastReflected * cosine);
     // A lobe around the mirrored direction, as high there as the BSDF. Its width is that for light along the
     // normal: at other angles lobes of microfacets are as long as that and narrower by the cosine.
     const V3 mirrored(-to_light.x, -to_light.y, to_light.z);
-    float pdf = 0;
-    const float peak = reflected(mirrored, &pdf);
-    const float q = pdf * std::abs(to_light.z) / kInvFourPi;
+    const BsdfEval at_peak = eval(mirrored);
+    const float peak = mean_component(at_peak.f_cos), q = at_peak.pdf * cosine / kInvFourPi;
     if (peak > even && q > 1) {
       look.axis = -y.hit.shading.to_world(mirrored);
       look.g = (2 * q + 1 - std::sqrt(8 * q + 1)) / (2 * q);  // (1 + g) / (1 - g)^2 = q
-      look.lobe = light * (peak - even) * std::abs(to_light.z) / q;
+      look.lobe = light * (peak - even) * cosine / q;
     }
   } else {
     look.axis = y.to_light;

@@ -3,26 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/lit_cloud.h"
 #include "tests/support/render_check.h"
-#include "tests/support/scene_builder.h"
 
 namespace ls::render {
 namespace {
 
 using test::SceneBuilder;
 
-SceneBuilder lit_cloud() {
-  SceneBuilder b({32, 16});
-  b.look({0, 0, 4}, {0, 0, 0}, 30, {0, 1, 0});
-  const MediumIndex medium = b.heterogeneous(
-      b.grid({2, 2, 2}, {1, .2, .5, 1, .3, 1, 1, .4}, test::translate({-1, -1, -1}) * test::scale(2)),
-      {.9, .9, .9}, 5, .7);
-  b.container(CubeShape{}, test::scale(.99), b.null(), medium);
-  b.scene.emitters.push_back(ConstantEmitter{{.3, .4, .5}});
-  b.scene.emitters.push_back(DirectionalEmitter{{.3, -1, -.2}, {3, 3, 3}});
-  b.scene.integrator.light_vertices = -1;
-  return b;
-}
+constexpr FrameSize kSize{32, 16};
 
 TEST(ShadowRoulette, TracesFaintShadowRaysLessOften) {
   EXPECT_EQ(shadow_ray_probability(2, 1), 1);
@@ -32,19 +21,20 @@ TEST(ShadowRoulette, TracesFaintShadowRaysLessOften) {
   EXPECT_EQ(shadow_ray_probability(0, 0), 1) << "no roulette";
 }
 
-// The mean of 32 paths whose radiances differ by less than twice their mean is off by less than a factor of 2
-// at 1.4 standard deviations; the paths are always the same.
+// 512 paths tell the mean. If their standard deviation is at most twice the mean, that of their mean is at
+// most 0.09 of it, and a factor of 2 is more than 5 standard deviations away.
 TEST(ShadowRoulette, MeasuresByTheMeanRadiance) {
-  const auto mean = test::estimate(lit_cloud(), 32).mean;
+  const SceneBuilder b = test::lit_cloud({128, 64});
+  const auto mean = test::estimate(b, 4).mean;
   const double all = (mean[0] + mean[1] + mean[2]) / 3;
-  const double faint = double{test::world_of(lit_cloud())->faint_shadow};
+  const double faint = double{test::world_of(b)->faint_shadow};
   EXPECT_GT(faint, all / 2);
   EXPECT_LT(faint, all * 2);
 }
 
 TEST(ShadowRoulette, IsTheSameForEverySeedAndCrop) {
-  const SceneBuilder whole = lit_cloud();
-  SceneBuilder crop = lit_cloud();
+  const SceneBuilder whole = test::lit_cloud(kSize);
+  SceneBuilder crop = test::lit_cloud(kSize);
   crop.scene.film.crop_offset = {8, 4};
   crop.scene.film.crop_size = {5, 6};
   const float faint = test::world_of(whole)->faint_shadow;
@@ -55,7 +45,7 @@ TEST(ShadowRoulette, IsTheSameForEverySeedAndCrop) {
 
 TEST(ShadowRoulette, IsLeftOutWhereItIsNotNeeded) {
   const auto faint = [](auto&& change) {
-    SceneBuilder b = lit_cloud();
+    SceneBuilder b = test::lit_cloud(kSize);
     change(b.scene);
     return test::world_of(b)->faint_shadow;
   };

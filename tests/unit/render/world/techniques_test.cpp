@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "tests/support/lamp_room.h"
+#include "tests/support/lit_cloud.h"
 #include "tests/support/render_check.h"
 #include "tests/support/significance.h"
 #include "tests/support/sunny_room.h"
@@ -59,20 +60,6 @@ SceneBuilder many_lamps() {
   return builder;
 }
 
-SceneBuilder cloud_under_sun_and_sky() {
-  SceneBuilder builder({24, 16});
-  builder.look({0, 0, 4}, {0, 0, 0}, 30, {0, 1, 0});
-  const MediumIndex cloud = builder.heterogeneous(
-      builder.grid({2, 2, 2}, {1, .2, .5, 1, .3, 1, 1, .4}, translate({-1, -1, -1}) * scale(2)), {.9, .95, 1},
-      5, .7);
-  builder.container(CubeShape{}, scale(.99), builder.null(), cloud);
-  builder.scene.emitters.push_back(DirectionalEmitter{{.3, -1, -.2}, {3, 3, 3}});
-  builder.scene.emitters.push_back(ConstantEmitter{{.3, .4, .5}});
-  builder.scene.integrator.max_depth = 6;
-  builder.scene.integrator.light_vertices = -1;
-  return builder;
-}
-
 struct Case {
   Technique technique;
   SceneBuilder builder;
@@ -87,7 +74,7 @@ std::vector<Case> cases() {
           {Technique::light_vertices, test::SunnyRoom{.fog = .3, .light_vertices = 1}.builder({24, 16})},
           {Technique::light_tree, many_lamps()},
           {Technique::path_reuse, test::LampRoom{.fog = .3, .path_reuse = 8}.builder({24, 16})},
-          {Technique::shadow_roulette, cloud_under_sun_and_sky()}};
+          {Technique::shadow_roulette, test::lit_cloud({24, 16})}};
 }
 
 // What off_switch() says, done to the description that the reader would make of it.
