@@ -42,6 +42,18 @@ std::optional<ClearRegion> ClearRegion::inside(const Geometry& g, std::uint32_t 
     return std::nullopt;
   const double reach = std::max(largest(own->lo), largest(own->hi));
   ClearRegion region;
+  region.margin_ = static_cast<float>(kMargin * reach);
+  const SurfaceInfo& info = g.surfaces[surface];
+  region.lets_out_ = info.null && info.light == kNone && info.exterior == kNone;
+  for (const SurfaceBox& b : boxes) {
+    if (is_own(b)) continue;
+    const auto margin =
+        static_cast<float>(kMargin * std::max({double{largest(b.lo)}, double{largest(b.hi)}, reach}));
+    for (int k = 0; k < 3; ++k) {
+      region.others_lo_[k] = std::min(region.others_lo_[k], b.lo[k] - margin);
+      region.others_hi_[k] = std::max(region.others_hi_[k], b.hi[k] + margin);
+    }
+  }
   for (const Sphere& s : g.spheres) {
     if (s.surface != surface) continue;
     region.center_ = V3(s.center);

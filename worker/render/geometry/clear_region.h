@@ -1,8 +1,11 @@
 // Convex regions in which no surface lies. A flight through a medium that begins and ends in such a region
-// meets no surface, so no ray has to be traced for it.
+// meets no surface, so no ray has to be traced for it. Nor for a ray that leaves the region where nothing
+// else is in its way.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -31,15 +34,55 @@ class ClearRegion {
     return true;
   }
 
+  // The distance along o + t d, where the region contains o and d is a unit vector, at which the ray leaves
+  // the enclosing body and goes on to infinity through a vacuum, without another surface in its way. Returns
+  // nullopt if that is not known.
+  std::optional<float> way_out(const V3& o, const V3& d) const {
+    if (!lets_out_ || may_meet_others(o, d)) return std::nullopt;
+    const float t = distance_to_body(o, d);
+    return t < kInfinity ? std::optional(t) : std::nullopt;  // nullopt if d is not finite
+  }
+
  private:
   ClearRegion() { normal_.fill(V3(0)); }
   bool add_plane(const V3d& n, double distance);
+
+  // True if the ray meets the box of all other surfaces.
+  bool may_meet_others(const V3& o, const V3& d) const {
+    float from = 0, to = kInfinity;
+    for (int k = 0; k < 3; ++k) {
+      const bool down = std::signbit(d[k]);
+      const float enter = ((down ? others_hi_ : others_lo_)[k] - o[k]) / d[k],
+                  leave = ((down ? others_lo_ : others_hi_)[k] - o[k]) / d[k];
+      if (enter > from) from = enter;
+      if (leave < to) to = leave;
+    }
+    return !(from > to);
+  }
+  float distance_to_body(const V3& o, const V3& d) const {
+    if (planes_ == 0) {
+      const V3 c = o - center_;
+      const float along = dot(c, d), body = radius_ + margin_;
+      return std::sqrt(std::max(0.f, along * along - dot(c, c) + body * body)) - along;
+    }
+    float t = kInfinity;
+    for (std::size_t i = 0; i < planes_; ++i) {
+      const float speed = dot(normal_[i], d);
+      if (speed > 0) t = std::min(t, (distance_[i] + margin_ - dot(normal_[i], o)) / speed);
+    }
+    return t;
+  }
 
   std::size_t planes_ = 0;  // 0: a sphere
   V3 center_{0, 0, 0};
   float radius_ = 0;
   std::array<V3, kMostPlanes> normal_;  // outward unit normals
   std::array<float, kMostPlanes> distance_{};
+  float margin_ = 0;  // the distance from the region's faces to those of the body
+  // True if the body's surface is index-matched and emits no light, and a vacuum is outside of it
+  bool lets_out_ = false;
+  // A box around all other surfaces; lo > hi if there are none
+  V3 others_lo_{kInfinity, kInfinity, kInfinity}, others_hi_{-kInfinity, -kInfinity, -kInfinity};
 };
 
 }  // namespace ls::render

@@ -144,11 +144,11 @@ class PathTracer {
   Flight flight_through(const Medium& medium, float t_max);
   Step collide(const Medium& medium, Segment segment, const typename Light<F>::Plan& plan,
                const Flight& flight);
-  // The medium if the ray starts in its clear region, else null.
-  const Medium* clear_medium() const {
-    if (!medium_.any() || medium_.several()) return nullptr;
-    const Medium& m = world_.media[medium_.one()];
-    return m.clear && m.clear->contains(ray_.start) ? &m : nullptr;
+  // The medium if p is in its clear region, else null.
+  const Medium* clear_medium(const Within& in, const V3& p) const {
+    if (!in.any() || in.several()) return nullptr;
+    const Medium& m = world_.media[in.one()];
+    return m.clear && m.clear->contains(p) ? &m : nullptr;
   }
   void begin_vertex(Segment segment, const Flight& flight);
   Step scatter_by_phase(const Medium& medium);
@@ -317,13 +317,18 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
   for (segment_ = 0; segment_ < kMaxSegments; ++segment_, t_max = kInfinity) {
     std::optional<Flight> flown;
     if constexpr (kFliesFirst) {
-      const Medium* const medium = std::isfinite(t_max) ? nullptr : clear_medium();
+      const Medium* const medium = std::isfinite(t_max) ? nullptr : clear_medium(medium_, ray_.start);
       if (medium) {
         flown = flight_through(*medium, kInfinity);
         if (flown->scattered && medium->clear->contains(ray_.start + ray_.d * flown->t)) {
           const Step step = collide(*medium, {kInfinity, ray_.lead(), nullptr}, {}, *flown);
           if (step.collision == Collision::absorbed || !survives(step.roulette)) break;
           continue;
+        }
+        if (!flown->scattered && medium->clear->way_out(ray_.start, ray_.d)) {
+          apply(*flown);
+          if (world_.depth_allows(depth_)) add_environment();
+          break;
         }
       }
     }

@@ -23,6 +23,11 @@ C3 PathTracer<F, Light>::unoccluded(const V3& start, const V3& p, const LightSam
     if (!(left > 0)) return light.radiance;
     d = f / left;
   }
+  if constexpr (F.media) {
+    const Medium* const clear = std::isfinite(left) ? nullptr : clear_medium(medium, start);
+    if (const auto t = clear ? clear->clear->way_out(start, d) : std::nullopt)
+      return light.radiance * through_media(medium, start, d, *t, stream);
+  }
   LS_COUNT(shadow_rays);
   if (world_.accel.occluded(p, d, left)) return {0, 0, 0};
   bool walk = F.passing && world_.shadows_walk;
