@@ -22,7 +22,9 @@ constexpr std::array kRows{
     TechniqueRow{Technique::path_reuse, "path_reuse",
                  "lets paths serve several pixels from their second scattering on"},
     TechniqueRow{Technique::shadow_roulette, "shadow_roulette",
-                 "traces shadow rays through grids at random where they could bring little"}};
+                 "traces shadow rays through grids at random where they could bring little"},
+    TechniqueRow{Technique::sky_samples, "sky_samples",
+                 "looks for a sky of one radiance in a second direction from the first surface"}};
 
 constexpr bool in_order() {
   for (std::size_t i = 0; i < kRows.size(); ++i)
@@ -56,6 +58,8 @@ TechniqueSwitch off_switch(Technique technique, std::string_view integrator) {
       return {"path_reuse", "-1"};
     case Technique::shadow_roulette:
       return {"shadow_roulette", "-1"};
+    case Technique::sky_samples:
+      return {"sky_samples", "-1"};
   }
   return {};
 }

@@ -21,6 +21,7 @@ enum class Technique : std::uint8_t {
   light_tree,       // one of many lights chosen by a tree
   path_reuse,       // paths that serve several pixels from their second vertices on
   shadow_roulette,  // shadow rays through grids that are traced at random where they could bring little
+  sky_samples,      // a second direction from the first surface that looks for a constant environment
 };
 
 struct TechniqueRow {

@@ -372,6 +372,9 @@ struct IntegratorSettings {
   // For "volpath" only: whether shadow rays through grids that could bring little are traced at random. 0:
   // chosen for the scene; -1: all are traced.
   int shadow_roulette = 0;
+  // For "volpath" only: whether the first surface looks for a constant environment in a second direction. 0:
+  // chosen for the scene; -1: it does not.
+  int sky_samples = 0;
   bool operator==(const IntegratorSettings&) const = default;
 };
 

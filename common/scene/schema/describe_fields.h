@@ -91,6 +91,12 @@ void describe(V& v, T& i) {
            .range = {-1, 0},
            .elided = true},
           i.shadow_roulette);
+  v.field({.name = "sky_samples",
+           .doc = "`volpath` alone: whether the first surface looks for a `constant` environment in a second "
+                  "direction; 0: in scenes without media, if that pays; -1: never",
+           .range = {-1, 0},
+           .elided = true},
+          i.sky_samples);
 }
 
 template <class V, Of<Asset> T>

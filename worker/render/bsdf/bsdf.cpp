@@ -133,6 +133,12 @@ bool BsdfTable::has_smooth(BsdfIndex i) const {
   return with_kind(m.kind, [](const auto& k) { return k.kSmooth; }) ||
          any_part(m, [&](BsdfIndex part) { return has_smooth(part); });
 }
+bool BsdfTable::is_diffuse(BsdfIndex i) const {
+  const Material& m = materials_[i.value];
+  if (const auto* sides = std::get_if<TwoSided>(&m.kind))
+    return is_diffuse(sides->front) && is_diffuse(sides->back);
+  return with_kind(m.kind, [](const auto& k) { return k.kDiffuse; });
+}
 bool BsdfTable::reads_uv(BsdfIndex i) const {
   const Material& m = materials_[i.value];
   return with_kind(m.kind, [](const auto& k) { return k.reads_uv(); }) ||

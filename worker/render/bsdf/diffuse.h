@@ -20,7 +20,7 @@ inline std::optional<BsdfSample> sample_diffuse(const C3& reflectance, const V2&
 }
 
 struct Diffuse : MaterialKind {  // a diffuse material with one reflectance everywhere
-  static constexpr bool kSmooth = true;
+  static constexpr bool kSmooth = true, kDiffuse = true;
   C3 reflectance;
 
   BsdfEval eval(const Lookup&, const V3&, const V3& wi) const { return eval_diffuse(reflectance, wi); }
@@ -30,7 +30,7 @@ struct Diffuse : MaterialKind {  // a diffuse material with one reflectance ever
 };
 
 struct TexturedDiffuse : MaterialKind {
-  static constexpr bool kSmooth = true;
+  static constexpr bool kSmooth = true, kDiffuse = true;
   Slot reflectance;
 
   static bool reads_uv() { return true; }
@@ -45,7 +45,7 @@ struct TexturedDiffuse : MaterialKind {
 // A sheet that scatters light ideally on both sides: f = reflectance / pi on the side of wo, and
 // transmittance / pi on the other.
 struct DiffuseTransmission : MaterialKind {
-  static constexpr bool kFrontOnly = false, kSmooth = true;
+  static constexpr bool kFrontOnly = false, kSmooth = true, kDiffuse = true;
   Slot reflectance, transmittance;
 
   bool reads_uv() const { return any_texture(reflectance, transmittance); }

@@ -72,6 +72,7 @@ struct MaterialKind {
   // True if the back is black: eval() and sample() are then called only for directions above the surface.
   static constexpr bool kFrontOnly = true;
   static constexpr bool kSmooth = false;       // true if it has a lobe that is not a delta
+  static constexpr bool kDiffuse = false;      // see BsdfTable::is_diffuse
   static constexpr bool kReadsSlopes = false;  // see BsdfTable::reads_slopes
 
   static bool reads_uv() { return false; }

@@ -48,6 +48,7 @@ struct SurfaceInfo {  // properties of a surface; a surface is one shape of the 
   bool wants_attributes = false;  // true if hits have a FacePoint (mesh_attribute textures)
   // True if the material has a lobe that is not a delta, so that next-event estimation is used
   bool smooth = true;
+  bool diffuse = false;   // see BsdfTable::is_diffuse
   float orientation = 1;  // -1: normals are flipped against winding or outward direction
   // For a surface that coincides somewhere with others, one of them null: the largest reach (see
   // SurfaceHit::reach) of all of these surfaces, so that one step moves a ray past all of them. 0 if the

@@ -9,6 +9,7 @@
 #include "worker/render/math/processor.h"
 #include "worker/render/world/aim.h"
 #include "worker/render/world/shadow_roulette.h"
+#include "worker/render/world/sky_samples.h"
 #include "worker/render/world/world_build.h"
 
 namespace ls::render {
@@ -193,6 +194,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   if (!world) return tl::unexpected(world.error());
   if (settings.integrator == "volpath") {
     learn_connections(scene.integrator, **world);
+    learn_sky_samples(scene.integrator, **world);
     share_tails(scene.integrator, **world);
     learn_shadow_roulette(scene.integrator, **world);
   }

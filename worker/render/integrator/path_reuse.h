@@ -171,6 +171,32 @@ BsdfEval PathTracer<F, Light>::scattered_at(const PathVertex& y, const V3& d, co
                            y.hit.shading.to_local(-d), y.hit.shading.to_local(w));
 }
 
+// The BSDF or phase function at the second vertex of a path's tail, for light from one direction, towards
+// the first vertices of a group. On a diffuse surface it is evaluated once for each side of the surface.
+template <Features F, template <Features> class Light>
+class PathTracer<F, Light>::TowardsGroup {
+ public:
+  TowardsGroup(const PathTracer& giver, const V3& from) : giver_(giver), from_(from) {
+    const PathVertex& y = giver.sharing_.tail.at;
+    diffuse_ = !y.medium && giver.world_.geometry.surfaces[y.hit.surface].diffuse;
+  }
+  // For a first vertex from which the second one is seen along d.
+  BsdfEval operator()(const V3& d) {
+    const PathVertex& y = giver_.sharing_.tail.at;
+    const float z = diffuse_ ? dot(y.hit.shading.n, d) : 0;
+    if (z == 0) return giver_.scattered_at(y, d, from_);
+    std::optional<BsdfEval>& known = by_side_[z < 0];
+    if (!known) known = giver_.scattered_at(y, d, from_);
+    return *known;
+  }
+
+ private:
+  const PathTracer& giver_;
+  V3 from_;
+  bool diffuse_;
+  std::array<std::optional<BsdfEval>, 2> by_side_;
+};
+
 // Sorts the paths by what their first vertices can see of each other's second vertices: those in media by
 // their depth along the ray, then those on surfaces, then those that share nothing. The order of first
 // vertices on surfaces is kept: sorted, the same neighbours would always share, and their common errors would
@@ -198,17 +224,18 @@ void PathTracer<F, Light>::share(std::span<PathTracer* const> group) {
     const SharedTail& tail = giver->sharing_.tail;
     if (!tail.usable || !tail.brings_light()) continue;
     float lit = 0, scattered = 0, emitted = 0;  // sums of densities
+    TowardsGroup from_light(*giver, tail.to_light), from_onward(*giver, tail.onward);
     for (std::size_t k = 0; k < group.size(); ++k) {
       Seen& s = seen[k];
       s.look = group[k]->look_at(tail, group[k] == giver);
       if (!(s.look.density > 0)) continue;
       if (tail.light_pdf > 0) {
-        const BsdfEval eval = giver->scattered_at(tail.at, s.look.w, tail.to_light);
+        const BsdfEval eval = from_light(s.look.w);
         s.lit = eval.f_cos;
         lit += s.look.density * (tail.light_is_delta ? tail.light_pdf : tail.light_pdf + eval.pdf);
       }
       if (tail.goes_on) {
-        const BsdfEval eval = giver->scattered_at(tail.at, s.look.w, tail.onward);
+        const BsdfEval eval = from_onward(s.look.w);
         s.onward = eval.f_cos;
         scattered += s.look.density * eval.pdf;
         emitted += s.look.density * (eval.pdf + tail.hit_pdf);

@@ -166,6 +166,7 @@ class PathTracer {
   }
   void pass_boundary(const SurfaceHit& hit, const SurfaceInfo& surface);
   void light_surface(const SurfaceHit& hit, const V3& wo);
+  void look_for_sky(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo, Group numbers);
   // The density with which a vertex in a medium at p samples the direction w; `own` is the density of the
   // phase function.
   float direction_pdf([[maybe_unused]] const V3& p, float own, [[maybe_unused]] const V3& w) const {
@@ -219,6 +220,7 @@ class PathTracer {
   void begin_tail(const PathVertex& at, const V3& n, const V3& start, const Accepts& accepts);
   void go_on_as_tail(const V3& w, const C3& weight);
   Look look_at(const SharedTail& tail, bool own);
+  class TowardsGroup;
   BsdfEval scattered_at(const PathVertex& y, const V3& d, const V3& w) const;
   void add_shared(const C3& light) {
     outcome_.radiance += light;
@@ -290,6 +292,7 @@ class PathTracer {
   int passed_ = 0;   // null boundaries and null transmissions so far
   int segment_ = 0;  // number of rays so far, including those after null crossings
   Within medium_;
+  bool looked_for_sky_ = false;   // true if the first vertex also looked for the constant environment
   bool first_in_medium_ = false;  // with F.split: true if the first scattering was in a medium
   Vertex last_;
   SubpathDensities densities_;  // with F.connected: of the path up to the current vertex
@@ -485,6 +488,27 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
               [&] { return world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wi, wo).pdf; });
 }
 
+// At the path's first vertex: looks for the constant environment in a second direction (sky_samples.h).
+// `numbers` are the random numbers of the path's own direction.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::look_for_sky(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo,
+                                        Group numbers) {
+  looked_for_sky_ = true;
+  numbers.bits[0] = ~numbers.bits[0];
+  numbers.bits[1] = ~numbers.bits[1];
+  const auto s = sample_bsdf(hit, surface, wo, numbers);
+  if (!s) return;
+  LightSample sky;
+  sky.direction = normalize(hit.shading.to_world(s->wi));
+  if ((dot(sky.direction, hit.ng) > 0) != (s->wi.z > 0)) return;
+  sky.distance = kInfinity;
+  sky.radiance = world_.lights.constant_environment();
+  const Within medium = beyond(hit, surface, sky.direction, ray_.d, medium_);
+  const C3 arriving = unoccluded(hit.p, offset_point(hit, sky.direction), sky, medium,
+                                 stream_.stream(depth_, Purpose::track_sky));
+  if (!is_black(arriving)) add(beta_ * s->weight * arriving * .5f);
+}
+
 // Scatters the path at a surface. Returns Collision::absorbed if the surface absorbs the path, or if the path
 // has reached its maximum depth.
 template <Features F, template <Features> class Light>
@@ -516,6 +540,7 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
     if (surface.smooth) connect_on(hit, surface, wo);
   }
   const Group g = stream_.group(depth_, Purpose::direction);
+  if (depth_ == 1 && world_.sky_samples && surface.smooth) look_for_sky(hit, surface, wo, g);
   const auto s = sample_bsdf(hit, surface, wo, g);
   if (!s) return {Collision::absorbed};
   const V3 w = normalize(hit.shading.to_world(s->wi));
@@ -630,7 +655,9 @@ template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_environment() {
   if (!world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)) return;
   const float pdf = last_.pdf / last_.in_medium.found_as_light();
-  add(beta_ * world_.lights.environment(ray_.d, last_.delta ? kInfinity : pdf));
+  C3 light = world_.lights.environment(ray_.d, last_.delta ? kInfinity : pdf);
+  if (depth_ == 1 && looked_for_sky_) light -= world_.lights.constant_environment() * .5f;
+  add(beta_ * light);
 }
 
 // Russian roulette with the random number u. Returns false if the path ends.

@@ -8,6 +8,7 @@
 
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "common/base/error.h"
@@ -80,6 +81,9 @@ class Lights {
     const float as_light = light.pdf * map_probability_;
     return beside + (as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance);
   }
+  const C3& constant_environment() const { return environment_; }
+  // Sets the radiance of the constant environment, and returns what it was. A scene without one has black.
+  C3 exchange_constant_environment(const C3& radiance) { return std::exchange(environment_, radiance); }
   bool has_environment() const { return map_ || !suns_.empty() || !is_black(environment_); }
   const EnvironmentMap* map() const { return map_.get(); }
 

@@ -75,6 +75,8 @@ class World {
   // With Features::grids: shadow rays that could bring less than this are traced at random
   // (shadow_roulette.h); 0: all are traced.
   float faint_shadow = 0;
+  // The first vertex on a surface looks for the constant environment in a second direction (sky_samples.h)
+  bool sky_samples = false;
   // With Features::reuse: the number of pixels whose paths share their tails (path_reuse.h)
   int reuse = 0;
   bool hide_emitters = false;

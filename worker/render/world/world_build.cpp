@@ -67,6 +67,7 @@ void note_surface_needs(const Scene& scene, World& w) {
     s.wants_tangent = w.bsdfs.anisotropic(s.bsdf);
     s.wants_slopes = w.bsdfs.reads_slopes(s.bsdf);
     s.smooth = w.bsdfs.has_smooth(s.bsdf);
+    s.diffuse = w.bsdfs.is_diffuse(s.bsdf);
     w.null_transmission = w.null_transmission || s.null_transmission || (w.passing_counts && s.null);
   }
 }

@@ -71,6 +71,7 @@ TechniqueSet techniques_of(const World& w) {
   put(w.lights.has_tree(), Technique::light_tree);
   put(w.need.reuse, Technique::path_reuse);
   put(w.faint_shadow > 0, Technique::shadow_roulette);
+  put(w.sky_samples, Technique::sky_samples);
   return set;
 }
 
@@ -100,6 +101,7 @@ WorldReport describe(const World& w) {
   feature(w.lights.count() > 1, "choice among lights");
   feature(techniques.has(Technique::light_tree), "tree of lights");
   feature(techniques.has(Technique::path_reuse), "paths that serve several pixels");
+  feature(techniques.has(Technique::sky_samples), "second directions that look for the sky");
   feature(techniques.has(Technique::shadow_roulette), "shadow rays at random where they could bring little");
   feature(w.camera.has_lens(), "thin lens");
   feature(!w.geometry.instances.empty(), "instances of groups");

@@ -10,6 +10,7 @@
 #include "tests/support/lit_cloud.h"
 #include "tests/support/render_check.h"
 #include "tests/support/significance.h"
+#include "tests/support/sky_yard.h"
 #include "tests/support/sunny_room.h"
 
 namespace ls::render {
@@ -74,7 +75,8 @@ std::vector<Case> cases() {
           {Technique::light_vertices, test::SunnyRoom{.fog = .3, .light_vertices = 1}.builder({24, 16})},
           {Technique::light_tree, many_lamps()},
           {Technique::path_reuse, test::LampRoom{.fog = .3, .path_reuse = 8}.builder({24, 16})},
-          {Technique::shadow_roulette, test::lit_cloud({24, 16})}};
+          {Technique::shadow_roulette, test::lit_cloud({24, 16})},
+          {Technique::sky_samples, test::sky_yard({24, 16})}};
 }
 
 // What off_switch() says, done to the description that the reader would make of it.
@@ -91,6 +93,7 @@ SceneBuilder switched_off(const Case& c) {
       {"light_vertices", [&] { i.light_vertices = -1; }},
       {"path_reuse", [&] { i.path_reuse = -1; }},
       {"shadow_roulette", [&] { i.shadow_roulette = -1; }},
+      {"sky_samples", [&] { i.sky_samples = -1; }},
       {"distance", [&] {
          i.distance =
              off.value == "exponential" ? DistanceSampling::exponential : DistanceSampling::equiangular;
