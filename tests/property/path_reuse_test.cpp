@@ -23,6 +23,14 @@ SceneBuilder mirrors(int path_reuse) {
   return b;
 }
 
+// A sheet that reflects and transmits, with first vertices on both of its sides.
+SceneBuilder leaf(int path_reuse) {
+  SceneBuilder b = LampRoom{.path_reuse = path_reuse}.builder();
+  b.shape(RectangleShape{}, translate({0, -.3, -.2}) * rotate_y(60) * scale(.6),
+          b.bsdf(DiffuseTransmissionBsdf{b.texture({.7, .3, .2}), b.texture({.1, .5, .3})}));
+  return b;
+}
+
 // The means of the quarters of an image of 16 x 16, in each channel: sharing moves light between pixels, and
 // in a white room keeps the mean of all of them whatever the weights. Pixels that share tell too little of
 // the error of a mean; images of different seeds are independent.
@@ -72,7 +80,8 @@ TEST(PathReuse, GivesTheSameImageAsPathsAlone) {
                           {"fog", room({.fog = .8})},
                           {"glossy in fog", room({.glossy = true, .fog = .4})},
                           {"chromatic fog", room({.fog = 1, .chromatic = true})},
-                          {"mirrors", mirrors}};
+                          {"mirrors", mirrors},
+                          {"leaf", leaf}};
   const double level = tests.level(std::size(rivals) * kQuarters);
   for (const Rival& rival : rivals) {
     const SceneBuilder on = rival.scene(7), off = rival.scene(-1);

@@ -34,7 +34,7 @@ bool is_closed(const std::vector<V3d>& corners) {
 }  // namespace
 
 std::optional<ClearRegion> ClearRegion::inside(const Geometry& g, std::uint32_t surface,
-                                               const std::vector<SurfaceBox>& boxes) {
+                                               const std::vector<SurfaceBox>& boxes, bool media_overlap) {
   const auto is_own = [&](const SurfaceBox& b) { return b.surface == surface; };
   const auto own = std::ranges::find_if(boxes, is_own);
   if (own == boxes.end() || own->instance != kNone || g.surfaces[surface].sheet) return std::nullopt;
@@ -44,7 +44,7 @@ std::optional<ClearRegion> ClearRegion::inside(const Geometry& g, std::uint32_t 
   ClearRegion region;
   region.margin_ = static_cast<float>(kMargin * reach);
   const SurfaceInfo& info = g.surfaces[surface];
-  region.lets_out_ = info.null && info.light == kNone && info.exterior == kNone;
+  region.lets_out_ = info.null && info.light == kNone && info.exterior == kNone && !media_overlap;
   for (const SurfaceBox& b : boxes) {
     if (is_own(b)) continue;
     const auto margin =

@@ -1,6 +1,6 @@
 // Convex regions in which no surface lies. A flight through a medium that begins and ends in such a region
-// meets no surface, so no ray has to be traced for it. Nor for a ray that leaves the region where nothing
-// else is in its way.
+// meets no surface, so no ray has to be traced for it. A ray that leaves the region need not be
+// traced either, if nothing else is in its way.
 #pragma once
 
 #include <algorithm>
@@ -22,8 +22,9 @@ class ClearRegion {
 
   // The region inside of a surface that is not in a group. Returns nullopt if the surface is neither a sphere
   // nor such a body, or if the box of another surface touches its box. `boxes` are those of all surfaces.
+  // media_overlap: true if another medium may fill the space outside although the surface names none.
   static std::optional<ClearRegion> inside(const Geometry& g, std::uint32_t surface,
-                                           const std::vector<SurfaceBox>& boxes);
+                                           const std::vector<SurfaceBox>& boxes, bool media_overlap);
 
   // False for points that are not finite.
   bool contains(const V3& p) const {

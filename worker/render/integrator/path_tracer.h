@@ -489,7 +489,7 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
 }
 
 // At the path's first vertex: looks for the constant environment in a second direction (sky_samples.h).
-// `numbers` are the random numbers of the path's own direction.
+// `numbers` are the random numbers of the path's own direction. Only in scenes without media.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::look_for_sky(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo,
                                         Group numbers) {
@@ -501,11 +501,15 @@ void PathTracer<F, Light>::look_for_sky(const SurfaceHit& hit, const SurfaceInfo
   LightSample sky;
   sky.direction = normalize(hit.shading.to_world(s->wi));
   if ((dot(sky.direction, hit.ng) > 0) != (s->wi.z > 0)) return;
+  if (!is_finite(sky.direction)) {
+    outcome_.reject(HealthCause::no_direction);
+    return;
+  }
   sky.distance = kInfinity;
   sky.radiance = world_.lights.constant_environment();
-  const Within medium = beyond(hit, surface, sky.direction, ray_.d, medium_);
-  const C3 arriving = unoccluded(hit.p, offset_point(hit, sky.direction), sky, medium,
-                                 stream_.stream(depth_, Purpose::track_sky));
+  // There are no media, so no random numbers are drawn on the way
+  const C3 arriving = unoccluded(hit.p, offset_point(hit, sky.direction), sky, medium_,
+                                 stream_.stream(depth_, Purpose::track_shadow));
   if (!is_black(arriving)) add(beta_ * s->weight * arriving * .5f);
 }
 

@@ -34,7 +34,6 @@ enum class Purpose : std::uint32_t {
   track_guide,
   connect,
   track_connect,
-  track_sky,
   end  // not a purpose, but the number of purposes
 };
 

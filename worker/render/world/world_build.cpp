@@ -123,7 +123,7 @@ void find_clear_regions(World& w) {
   if (!boxes) return;
   for (std::uint32_t i = 0; i < surfaces.size(); ++i) {
     if (!wanted(surfaces[i])) continue;
-    if (const auto region = ClearRegion::inside(w.geometry, i, *boxes))
+    if (const auto region = ClearRegion::inside(w.geometry, i, *boxes, w.overlaps))
       w.media[surfaces[i].interior].clear = &w.clear_regions.emplace_back(*region);
   }
 }

@@ -1,5 +1,5 @@
-// Regions in which no surface lies: which bodies have one, which points are in it, and that flights that end
-// in it change no pixel.
+// Regions in which no surface lies: which bodies have one, which points are in it, where rays leave it for
+// good, and that pixels are the same, up to rounding, as with every ray traced.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -176,17 +176,24 @@ TEST(ClearRegion, KnowsWhereRaysLeaveTheBodyForGood) {
   SceneBuilder nested = cube;
   nested.scene.shapes[0].exterior = nested.homogeneous({.1, .1, .1}, {.5, .5, .5}, 0);
   EXPECT_FALSE(way_out(nested, up));
+  // Fog outside of the body, which names no medium there: the body's medium only takes its place inside.
+  SceneBuilder in_fog = cube;
+  std::get<HomogeneousMedium>(in_fog.scene.media[0]).priority = 1;
+  in_fog.scene.sensor.medium = in_fog.homogeneous({.1, .1, .1}, {.5, .5, .5});
+  EXPECT_TRUE(region_of(*made(in_fog)));
+  EXPECT_FALSE(way_out(in_fog, up));
 }
 
 // Expects pixels that differ by rounding alone. The distance to the surface of a body is rounded differently
-// if it is found without a ray: by less than 8 ulps of coordinates below 8, so 2^-17. With an extinction of
-// at most 8 that changes transmittances, and so pixels, by a factor of at most 1 +- 2^-14.
+// if it is found without a ray: by less than 8 ulps of coordinates below 8, so 2^-18. With an extinction of
+// at most 8 that changes transmittances, and so pixels, by a factor of at most 1 +- 2^-15. In grids it could
+// also change a tracker's decision near the surface; with these fixed seeds it changes none.
 void expect_rounded_alike(const std::vector<float>& a, const std::vector<float>& b, const char* what) {
   ASSERT_EQ(a.size(), b.size());
-  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], 0x1p-14f * b[i]) << what << i;
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], 0x1p-15f * b[i]) << what << i;
 }
 
-TEST(ClearRegion, ChangesNoPixel) {
+TEST(ClearRegion, ChangesPixelsByRoundingAlone) {
   for (const bool grid : {false, true})
     for (const bool cube : {false, true}) {
       const auto w = made(

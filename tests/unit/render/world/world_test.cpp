@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "tests/support/render_check.h"
+#include "tests/support/sky_yard.h"
 
 namespace ls::render {
 namespace {
@@ -160,6 +161,15 @@ TEST(World, EveryVariantThatCoversASceneGivesTheSameBits) {
       EXPECT_EQ(render(*world, name.c_str()).sums, first.sums) << n.name << " as " << name;
     }
   }
+}
+
+TEST(World, EveryVariantLooksForTheSkyAlike) {
+  const auto world = test::world_of(test::sky_yard({16, 16}));
+  ASSERT_TRUE(world->sky_samples);
+  const auto names = covering_variants(*world);
+  EXPECT_GE(names.size(), 3u);
+  const TileResult first = render(*world);
+  for (const std::string& name : names) EXPECT_EQ(render(*world, name.c_str()).sums, first.sums) << name;
 }
 
 TEST(World, EveryVariantThatAimsGivesTheSameBits) {
