@@ -10,6 +10,7 @@
 
 #include "tests/support/lamp_room.h"
 #include "tests/support/significance.h"
+#include "tests/support/sky_yard.h"
 
 namespace ls::test {
 namespace {
@@ -28,6 +29,14 @@ SceneBuilder leaf(int path_reuse) {
   SceneBuilder b = LampRoom{.path_reuse = path_reuse}.builder();
   b.shape(RectangleShape{}, translate({0, -.3, -.2}) * rotate_y(60) * scale(.6),
           b.bsdf(DiffuseTransmissionBsdf{b.texture({.7, .3, .2}), b.texture({.1, .5, .3})}));
+  return b;
+}
+
+// Under a sky that the first surface looks for twice; without the sheet with holes, which rules sharing out.
+SceneBuilder under_sky(int path_reuse) {
+  SceneBuilder b = sky_yard({16, 16});
+  b.scene.shapes.erase(b.scene.shapes.begin() + 3);
+  b.scene.integrator.path_reuse = path_reuse;
   return b;
 }
 
@@ -81,7 +90,8 @@ TEST(PathReuse, GivesTheSameImageAsPathsAlone) {
                           {"glossy in fog", room({.glossy = true, .fog = .4})},
                           {"chromatic fog", room({.fog = 1, .chromatic = true})},
                           {"mirrors", mirrors},
-                          {"leaf", leaf}};
+                          {"leaf", leaf},
+                          {"sky", under_sky}};
   const double level = tests.level(std::size(rivals) * kQuarters);
   for (const Rival& rival : rivals) {
     const SceneBuilder on = rival.scene(7), off = rival.scene(-1);

@@ -176,7 +176,7 @@ TEST(ClearRegion, KnowsWhereRaysLeaveTheBodyForGood) {
   SceneBuilder nested = cube;
   nested.scene.shapes[0].exterior = nested.homogeneous({.1, .1, .1}, {.5, .5, .5}, 0);
   EXPECT_FALSE(way_out(nested, up));
-  // Fog outside of the body, which names no medium there: the body's medium only takes its place inside.
+  // Fog fills the space outside, although the body names no medium there.
   SceneBuilder in_fog = cube;
   std::get<HomogeneousMedium>(in_fog.scene.media[0]).priority = 1;
   in_fog.scene.sensor.medium = in_fog.homogeneous({.1, .1, .1}, {.5, .5, .5});

@@ -30,7 +30,7 @@ TEST(SkySamples, AreTakenWhereTheSkyLightsTheScene) {
   })) << "the lamp is far brighter";
 }
 
-// What decides.
+// The mean light of the pilot's paths, by which the world decides.
 double light_scattered_once(const SceneBuilder& b, std::uint64_t seed = 0) {
   RenderSettings settings = test::settings_of(b.scene);
   settings.seed = seed;
