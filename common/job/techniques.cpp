@@ -24,7 +24,9 @@ constexpr std::array kRows{
     TechniqueRow{Technique::shadow_roulette, "shadow_roulette",
                  "traces shadow rays through grids at random where they could bring little"},
     TechniqueRow{Technique::sky_samples, "sky_samples",
-                 "looks for a sky of one radiance in a second direction from the first surface"}};
+                 "looks for a sky of one radiance in a second direction from the first surface"},
+    TechniqueRow{Technique::path_splitting, "path_splitting",
+                 "splits paths at their first scattering in a grid, and ends those that could bring little"}};
 
 constexpr bool in_order() {
   for (std::size_t i = 0; i < kRows.size(); ++i)
@@ -60,6 +62,8 @@ TechniqueSwitch off_switch(Technique technique, std::string_view integrator) {
       return {"shadow_roulette", "-1"};
     case Technique::sky_samples:
       return {"sky_samples", "-1"};
+    case Technique::path_splitting:
+      return {"path_splitting", "-1"};
   }
   return {};
 }

@@ -22,6 +22,7 @@ enum class Technique : std::uint8_t {
   path_reuse,       // paths that serve several pixels from their second vertices on
   shadow_roulette,  // shadow rays through grids that are traced at random where they could bring little
   sky_samples,      // a second direction from the first surface that looks for a constant environment
+  path_splitting,   // splitting and Russian roulette of paths, in scenes with grids, by what they may bring
 };
 
 struct TechniqueRow {

@@ -214,7 +214,7 @@ class Composer {
     i.camera_points = std::min(i.camera_points, 8);  // more only cost time
     if (i.name != kNames[0]) {
       i.camera_points = i.light_vertices = i.equiangular = i.lamp_flights = i.path_reuse = 0;
-      i.shadow_roulette = i.sky_samples = 0;
+      i.shadow_roulette = i.sky_samples = i.path_splitting = 0;
       i.phase_only = false;
     }
     if (i.name == kNames[1]) return;

@@ -207,7 +207,7 @@ void Reader::read_integrator(const Element& e, int depth) {
   if (i.name != "volpath")
     refuse(p,
            {"camera_points", "phase_only", "light_vertices", "equiangular", "lamp_flights", "path_reuse",
-            "shadow_roulette", "sky_samples"},
+            "shadow_roulette", "sky_samples", "path_splitting"},
            "volpath");
   i.max_depth = row->default_depth;
   bind(p, i);

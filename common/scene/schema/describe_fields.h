@@ -97,6 +97,12 @@ void describe(V& v, T& i) {
            .range = {-1, 0},
            .elided = true},
           i.sky_samples);
+  v.field({.name = "path_splitting",
+           .doc = "`volpath` alone: whether paths split at their first scattering in a grid, and Russian "
+                  "roulette compares a path with what it was there; 0: where it is possible; -1: never",
+           .range = {-1, 0},
+           .elided = true},
+          i.path_splitting);
 }
 
 template <class V, Of<Asset> T>

@@ -1,6 +1,8 @@
 // Which materials are diffuse: what they reflect is the same for every viewer on one side.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/unit/bsdf/materials.h"
 #include "worker/render/math/random.h"
 
@@ -55,6 +57,10 @@ TEST(DiffuseMaterials, LookTheSameFromEverywhereOnOneSide) {
         const BsdfEval one = b->eval(direction(side), wi), other = b->eval(direction(side), wi);
         EXPECT_EQ(one.f_cos, other.f_cos);
         EXPECT_EQ(one.pdf, other.pdf);
+        // In proportion to the cosine: two products, each rounded by half an ulp
+        const BsdfEval upright = b->eval(direction(side), {0, 0, std::copysign(1.f, wi.z)});
+        for (int c = 0; c < 3; ++c) EXPECT_FLOAT_EQ(one.f_cos[c], upright.f_cos[c] * std::abs(wi.z));
+        EXPECT_FLOAT_EQ(one.pdf, upright.pdf * std::abs(wi.z));
       }
   }
 }

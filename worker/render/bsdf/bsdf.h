@@ -80,7 +80,8 @@ class BsdfTable {
   bool has_null_transmission(BsdfIndex i) const;
   // True if there is a lobe that is not a delta, so that next-event estimation is useful
   bool has_smooth(BsdfIndex i) const;
-  // True if eval() depends on wo only by the side of the surface on which wo lies
+  // True if eval() depends on wo only by the side of the surface on which wo lies, and on wi only by its side
+  // and in proportion to its cosine
   bool is_diffuse(BsdfIndex i) const;
   bool reads_uv(BsdfIndex i) const;      // true if some parameter is a texture
   bool anisotropic(BsdfIndex i) const;   // true if the tangents of the local frame matter

@@ -8,8 +8,10 @@
 #include "worker/render/integrator/variant.h"
 #include "worker/render/math/processor.h"
 #include "worker/render/world/aim.h"
+#include "worker/render/world/pilot.h"
 #include "worker/render/world/shadow_roulette.h"
 #include "worker/render/world/sky_samples.h"
+#include "worker/render/world/splitting.h"
 #include "worker/render/world/world_build.h"
 
 namespace ls::render {
@@ -176,7 +178,7 @@ void learn_connections(const IntegratorSettings& settings, World& w) {
   w.sun_map = std::move(learned.learner.map);
   w.faint = kFaint * static_cast<float>(learned.radiance / static_cast<double>(learned.paths));
   w.need.connected = true;
-  aim(settings, w.frame, w);  // again, since with connections points on camera segments pay more often
+  aim(settings, w);  // again, since with connections points on camera segments pay more often
   w.rr_depth = std::min(w.rr_depth, kConnectedRoulette);
   const std::size_t count = trace(w, kLearningSeed, 0, kLearningRays).count();
   w.connections_per_ray =
@@ -188,6 +190,21 @@ LightVertices trace_light_vertices(const World& w, std::uint64_t set) {
   return trace(w, w.seed, static_cast<std::uint32_t>(set), kSunRays);
 }
 
+namespace {
+
+constexpr int kLongestPilot = 64;  // paths in a white and dense medium have thousands of segments
+
+// Sets up what needs the mean radiance of the image, in scenes with grids.
+void learn_roulette(const IntegratorSettings& settings, World& w) {
+  if ((settings.shadow_roulette < 0 && settings.path_splitting < 0) || !w.depth_allows(1)) return;
+  const auto mean = pilot_radiance(w, kLongestPilot);
+  if (!mean || !(*mean > 0) || !std::isfinite(*mean)) return;
+  learn_shadow_roulette(settings, static_cast<float>(*mean), w);
+  learn_splitting(settings, static_cast<float>(*mean), w);
+}
+
+}  // namespace
+
 Result<std::shared_ptr<const World>> build_world(const Scene& scene, const RenderSettings& settings,
                                                  const AssetFiles& files, int threads) {
   auto world = make_world(scene, settings, files, threads);
@@ -196,7 +213,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
     learn_connections(scene.integrator, **world);
     learn_sky_samples(scene.integrator, **world);
     share_tails(scene.integrator, **world);
-    learn_shadow_roulette(scene.integrator, **world);
+    if ((*world)->need.grids && !(*world)->need.connected) learn_roulette(scene.integrator, **world);
   }
   return std::shared_ptr<const World>(std::move(*world));
 }

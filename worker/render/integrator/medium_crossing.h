@@ -84,6 +84,31 @@ auto PathTracer<F, Light>::collide(const Medium& medium, Segment segment, const 
     Light<F>::at_vertex(*this, medium, last_.p, ray_.d);
   }
   if constexpr (F.connected) connect_in(medium, last_.p, ray_.d);
+  return scatter_in(medium);
+}
+
+// Scatters the path at its vertex in the medium. If paths split there, follows another one to its end first.
+template <Features F, template <Features> class Light>
+auto PathTracer<F, Light>::scatter_in(const Medium& medium) -> Step {
+  if constexpr (kSplits) {
+    if (depth_ == 1 && world_.paths_split && medium.grid) {
+      refer_to_first_vertex();
+      beta_ *= .5f;
+      reference_ *= .5f;
+      PathTracer other(*this);
+      other.stream_ = stream_.of_branch();
+      other.outcome_ = {};
+      other.counters_ = {};
+      const Step step = other.scatter_by_phase(medium);
+      if (other.survives(step.roulette)) {
+        ++other.segment_;
+        other.go_on(kInfinity);
+      }
+      outcome_.radiance += other.outcome_.radiance;
+      outcome_.majorant_violations += other.outcome_.majorant_violations;
+      if (other.outcome_.cut_off != HealthCause::none) outcome_.reject(other.outcome_.cut_off);
+    }
+  }
   return scatter_by_phase(medium);
 }
 
@@ -155,7 +180,7 @@ auto PathTracer<F, Light>::fly_through_several(const SurfaceHit* end, float reac
   begin_vertex(segment, flight);
   if constexpr (F.aimed) near_lamps_ = LampDirections(world_.lamps, last_.p);
   light_vertex(*met, last_.p, ray_.d);
-  return scatter_by_phase(*met);
+  return scatter_in(*met);
 }
 
 // Next-event estimation at a vertex p in a medium, where d is the direction of travel before the scattering.

@@ -99,6 +99,23 @@ void PathTracer<F, Light>::go_on_as_tail(const V3& w, const C3& weight) {
   beta_ = C3(1);
 }
 
+// Returns the BSDF at the path's first vertex, on a surface, for light from wi in its local frame. On a
+// diffuse surface it is evaluated once for each side.
+template <Features F, template <Features> class Light>
+BsdfEval PathTracer<F, Light>::scattered_at_first(const V3& wi) {
+  FirstVertex& x = sharing_.first;
+  const SurfaceHit& hit = x.at.hit;
+  const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
+  const auto eval = [&](const V3& w) {
+    return world_.bsdfs.eval(surface.bsdf, hit.uv_point(), hit.shading.to_local(-x.d), w);
+  };
+  if (!surface.diffuse || wi.z == 0) return eval(wi);
+  std::optional<BsdfEval>& known = x.by_side[wi.z < 0];
+  if (!known) known = eval({0, 0, std::copysign(1.f, wi.z)});
+  const float cosine = std::abs(wi.z);
+  return {known->f_cos * cosine, known->pdf * cosine};
+}
+
 // Computes what this path's first vertex x sees of the vertex y of a tail. `own` is true for the path's own
 // tail, to which the way is known to be free.
 template <Features F, template <Features> class Light>
@@ -122,7 +139,7 @@ auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     const V3 wi = hit.shading.to_local(w);
     if ((wi.z > 0) != (dot(w, hit.ng) > 0)) return look;
-    const BsdfEval eval = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), hit.shading.to_local(-x.d), wi);
+    const BsdfEval eval = scattered_at_first(wi);
     value = eval.f_cos;
     pdf = eval.pdf;
     origin = offset_point(hit, w);
@@ -145,7 +162,10 @@ auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
     end.distance = std::sqrt(r2);
     end.radiance = C3(1);
     depth_ = 1;
-    through = unoccluded(x.at.p, origin, end, around, stream_.stream(1, Purpose::track_connect));
+    // Without media no random numbers are drawn on the way
+    RandomStream stream(0);
+    if constexpr (F.media) stream = stream_.stream(1, Purpose::track_connect);
+    through = unoccluded(x.at.p, origin, end, around, stream);
   }
   const float geometry = cosine / r2;
   look.w = w;
@@ -208,7 +228,10 @@ void PathTracer<F, Light>::sort_to_share(std::span<PathTracer*> paths) {
     if (!first.usable) return std::pair(2, 0.f);
     return first.at.medium ? std::pair(0, dot(first.at.p, first.d)) : std::pair(1, 0.f);
   };
-  std::ranges::stable_sort(paths, {}, key);
+  if constexpr (F.media)
+    std::ranges::stable_sort(paths, {}, key);
+  else
+    std::ranges::stable_partition(paths, [](const PathTracer* path) { return path->sharing_.first.usable; });
 }
 
 // Adds to each path of the group the light of the tails of all paths of the group.

@@ -33,6 +33,7 @@
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/medium_stack.h"
 #include "worker/render/media/segment.h"
+#include "worker/render/world/splitting.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {
@@ -115,6 +116,8 @@ class PathTracer {
   friend class Light<F>;
   friend class VertexNee<F>;
   friend class SegmentNee<F>;
+  // True if paths may split (splitting.h): worlds with Features::connected or Features::reuse never do.
+  static constexpr bool kSplits = F.grids && !F.connected && !F.reuse;
   struct Vertex {  // where the current ray was scattered
     V3 p{0, 0, 0};
     V3 n{0, 0, 0};      // shading normal of its surface; 0 in a medium
@@ -135,6 +138,8 @@ class PathTracer {
   static constexpr bool kFliesFirst =
       F.media && !F.aimed && !F.reuse && std::is_same_v<Light<F>, VertexNee<F>>;
 
+  // Follows the path from its current vertex to its end. The first ray of the path ends at t_max.
+  void go_on(float t_max);
   // Samples a free flight up to the surface hit at `end`, or, if `end` is null, up to the distance `reach`.
   // `flown` is the flight if it was sampled before, without an end.
   Step fly(const SurfaceHit* end, float reach, const std::optional<Flight>& flown);
@@ -151,6 +156,7 @@ class PathTracer {
     return m.clear && m.clear->contains(p) ? &m : nullptr;
   }
   void begin_vertex(Segment segment, const Flight& flight);
+  Step scatter_in(const Medium& medium);
   Step scatter_by_phase(const Medium& medium);
   void light_vertex(const Medium& medium, const V3& p, const V3& d);
   void add_medium_emission_among(float t_max);
@@ -192,6 +198,9 @@ class PathTracer {
   [[gnu::noinline]] void prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max) const;
   [[gnu::noinline]] void add_emission_of_others(const SurfaceHit& hit);
   bool survives(float u);
+  // The throughput that decides whether Russian roulette ends the path.
+  float size() const;
+  void refer_to_first_vertex();
   void prefetch_light_vertices() const {
     if (connections_.vertices)
       connections_.vertices->prefetch(stream_.group(depth_, Purpose::connect).bits[0]);
@@ -220,6 +229,7 @@ class PathTracer {
   void begin_tail(const PathVertex& at, const V3& n, const V3& start, const Accepts& accepts);
   void go_on_as_tail(const V3& w, const C3& weight);
   Look look_at(const SharedTail& tail, bool own);
+  BsdfEval scattered_at_first(const V3& wi);
   class TowardsGroup;
   BsdfEval scattered_at(const PathVertex& y, const V3& d, const V3& w) const;
   void add_shared(const C3& light) {
@@ -282,10 +292,14 @@ class PathTracer {
   }
 
   const World& world_;
-  const SampleStream& stream_;
+  SampleStream stream_;
   LightSplit* split_;
   OffsetRay ray_;
   C3 beta_{1, 1, 1}, density_{1, 1, 1};
+  // Russian roulette compares the throughput with this (splitting.h). Where it compares with the first
+  // vertex, kNoReference until there is one.
+  static constexpr float kNoReference = 0;
+  float reference_ = 1;
   float eta_scale_ = 1;  // cancels the radiance scaling of refraction in Russian roulette
   int hero_ = 0;
   int depth_ = 0;    // scatterings so far
@@ -316,8 +330,14 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
   last_.p = ray.o;
   if constexpr (F.media) medium_ = start_medium();
   if constexpr (F.chromatic) hero_ = std::min(2, static_cast<int>(3 * stream_.group(0, Purpose::hero).u(0)));
-  float t_max = ray.t_max;
-  for (segment_ = 0; segment_ < kMaxSegments; ++segment_, t_max = kInfinity) {
+  if constexpr (kSplits) reference_ = world_.mean_radiance > 0 ? kNoReference : 1;
+  go_on(ray.t_max);
+  return outcome_;
+}
+
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::go_on(float t_max) {
+  for (; segment_ < kMaxSegments; ++segment_, t_max = kInfinity) {
     std::optional<Flight> flown;
     if constexpr (kFliesFirst) {
       const Medium* const medium = std::isfinite(t_max) ? nullptr : clear_medium(medium_, ray_.start);
@@ -384,8 +404,7 @@ SampleOutcome PathTracer<F, Light>::trace(const CameraRay& ray) {
   if (segment_ == kMaxSegments) outcome_.reject(HealthCause::too_many_surfaces);
   if constexpr (F.overlaps)
     if (medium_.overflowed()) outcome_.reject(HealthCause::nested_media);
-  outcome_.majorant_violations = counters_.majorant_violations;
-  return outcome_;
+  outcome_.majorant_violations += counters_.majorant_violations;
 }
 
 // Passes every index-matched surface, and each null-transmitting one with its probability. The random numbers
@@ -664,15 +683,30 @@ void PathTracer<F, Light>::add_environment() {
   add(beta_ * light);
 }
 
-// Russian roulette with the random number u. Returns false if the path ends.
 template <Features F, template <Features> class Light>
-bool PathTracer<F, Light>::survives(float u) {
-  if (is_black(beta_)) return false;
-  if (depth_ < world_.rr_depth) return true;
+float PathTracer<F, Light>::size() const {
   float size = max_component(beta_) * eta_scale_;
   if constexpr (F.reuse) size *= sharing_.survival;
   if constexpr (F.aimed) size /= std::min(aim_, 1.f);
   if constexpr (F.chromatic) size /= mean(density_);
+  return size;
+}
+
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::refer_to_first_vertex() {
+  reference_ = roulette_reference(size(), mean(outcome_.radiance), world_.mean_radiance);
+}
+
+// Russian roulette with the random number u. Returns false if the path ends.
+template <Features F, template <Features> class Light>
+bool PathTracer<F, Light>::survives(float u) {
+  if (is_black(beta_)) return false;
+  float size = this->size();
+  if constexpr (kSplits) {
+    if (reference_ == kNoReference) refer_to_first_vertex();
+    size /= reference_;
+  }
+  if (depth_ < world_.rr_depth) return true;
   const float q = std::min(size, forced_survival(depth_));
   if (q >= 1) return true;
   if (!(u < q)) return false;

@@ -2,6 +2,10 @@
 // pixels' paths find from their second vertices on (path_reuse.h). That part of a path is its tail.
 #pragma once
 
+#include <array>
+#include <optional>
+
+#include "worker/render/bsdf/bsdf.h"
 #include "worker/render/geometry/geometry.h"
 #include "worker/render/media/medium.h"
 #include "worker/render/media/medium_stack.h"
@@ -25,6 +29,9 @@ struct FirstVertex {
   C3 beta{0, 0, 0};     // the weight of the path up to the vertex
   C3 density{1, 1, 1};  // the path's density with each channel as the hero (medium.h), over their mean
   OneMedium around;     // the medium in front of the vertex
+  // On a diffuse surface: the BSDF for a direction along the normal, on its side or on the other, as far as
+  // it was asked for.
+  std::array<std::optional<BsdfEval>, 2> by_side;
 };
 
 // The second vertex of a path, and the light that arrives there.

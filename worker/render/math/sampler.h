@@ -52,6 +52,14 @@ class SampleStream {
   SampleStream(std::uint64_t seed, std::uint32_t x, std::uint32_t y, std::uint64_t sample)
       : SampleStream(combine(combine(seed, (std::uint64_t{y} << 32) | x), sample & 1), sample >> 1) {}
 
+  // The random numbers of a path into which a path with these numbers splits.
+  SampleStream of_branch() const {
+    SampleStream s(*this);
+    s.sequence_ = combine(sequence_, kBranch);
+    s.sample_ = combine(sample_, kBranch);
+    return s;
+  }
+
   Group group(int vertex, Purpose purpose) const {
     if (static_cast<std::uint32_t>(vertex) < by_sobol_)
       return {sobol4_reversed(
@@ -67,6 +75,7 @@ class SampleStream {
   }
 
  private:
+  static constexpr std::uint64_t kBranch = 0xb4a7c4;
   static constexpr int kPurposes = static_cast<int>(Purpose::end);
   static constexpr std::uint64_t slot(int vertex, Purpose purpose) {
     return (static_cast<std::uint64_t>(vertex) << 8) | static_cast<std::uint32_t>(purpose);

@@ -22,8 +22,7 @@ inline float shadow_ray_probability(float light, float faint_shadow) {
   return light < faint_shadow ? std::max(light / faint_shadow, kLeastTraced) : 1.f;
 }
 
-// Sets `faint_shadow` of a world that is otherwise complete, from the mean radiance of some camera paths. It
-// depends only on the scene and the size of the full frame: not on the seed, the number of samples or a crop.
-void learn_shadow_roulette(const IntegratorSettings& settings, World& w);
+// Sets `faint_shadow` of a world that is otherwise complete. `mean_radiance` is that of the image.
+void learn_shadow_roulette(const IntegratorSettings& settings, float mean_radiance, World& w);
 
 }  // namespace ls::render

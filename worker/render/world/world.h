@@ -75,6 +75,9 @@ class World {
   // With Features::grids: shadow rays that could bring less than this are traced at random
   // (shadow_roulette.h); 0: all are traced.
   float faint_shadow = 0;
+  // The mean radiance of the image, for Russian roulette (splitting.h); 0: roulette compares with 1
+  float mean_radiance = 0;
+  bool paths_split = false;  // paths split at their first vertex if it is in a grid (splitting.h)
   // The first vertex on a surface looks for the constant environment in a second direction (sky_samples.h)
   bool sky_samples = false;
   // With Features::reuse: the number of pixels whose paths share their tails (path_reuse.h)

@@ -269,7 +269,7 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
   // segments are sampled.
   if (!w.equiangular && !w.equiangular_points && settings.integrator != "volpath_distant_mis")
     w.lights.use_tree_in_media();
-  aim(scene.integrator, w.frame, w);
+  aim(scene.integrator, w);
   return world;
 }
 

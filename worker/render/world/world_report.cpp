@@ -72,6 +72,7 @@ TechniqueSet techniques_of(const World& w) {
   put(w.need.reuse, Technique::path_reuse);
   put(w.faint_shadow > 0, Technique::shadow_roulette);
   put(w.sky_samples, Technique::sky_samples);
+  put(w.mean_radiance > 0, Technique::path_splitting);
   return set;
 }
 
@@ -103,6 +104,7 @@ WorldReport describe(const World& w) {
   feature(techniques.has(Technique::path_reuse), "paths that serve several pixels");
   feature(techniques.has(Technique::sky_samples), "second directions that look for the sky");
   feature(techniques.has(Technique::shadow_roulette), "shadow rays at random where they could bring little");
+  feature(techniques.has(Technique::path_splitting), "paths that split, or end, by what their pixel shows");
   feature(w.camera.has_lens(), "thin lens");
   feature(!w.geometry.instances.empty(), "instances of groups");
   feature(w.geometry.primitive_count() > w.geometry.triangle_count(), "user geometries in the BVH");

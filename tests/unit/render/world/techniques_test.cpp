@@ -76,7 +76,8 @@ std::vector<Case> cases() {
           {Technique::light_tree, many_lamps()},
           {Technique::path_reuse, test::LampRoom{.fog = .3, .path_reuse = 8}.builder({24, 16})},
           {Technique::shadow_roulette, test::lit_cloud({24, 16})},
-          {Technique::sky_samples, test::sky_yard({24, 16})}};
+          {Technique::sky_samples, test::sky_yard({24, 16})},
+          {Technique::path_splitting, test::lit_cloud({24, 16})}};
 }
 
 // What off_switch() says, done to the description that the reader would make of it.
@@ -94,6 +95,7 @@ SceneBuilder switched_off(const Case& c) {
       {"path_reuse", [&] { i.path_reuse = -1; }},
       {"shadow_roulette", [&] { i.shadow_roulette = -1; }},
       {"sky_samples", [&] { i.sky_samples = -1; }},
+      {"path_splitting", [&] { i.path_splitting = -1; }},
       {"distance", [&] {
          i.distance =
              off.value == "exponential" ? DistanceSampling::exponential : DistanceSampling::equiangular;

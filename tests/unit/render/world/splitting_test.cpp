@@ -1,0 +1,163 @@
+// Which paths split and end, and by what. That the image stays the same is tested here for scenes in which
+// paths meet several media or surfaces, and in techniques_test.cpp.
+#include "worker/render/world/splitting.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/lit_cloud.h"
+#include "tests/support/render_check.h"
+#include "tests/support/significance.h"
+#include "worker/render/world/camera_collisions.h"
+
+namespace ls::render {
+namespace {
+
+using test::scale;
+using test::SceneBuilder;
+using test::translate;
+using test::operator*;
+
+constexpr FrameSize kFrame{32, 16};
+
+// A cloud in front of a sky, of which the camera sees both.
+SceneBuilder cloud_in_the_sky() {
+  SceneBuilder b = test::lit_cloud(kFrame);
+  b.look({0, 0, 4}, {0, 0, 0}, 60, {0, 1, 0});
+  return b;
+}
+SceneBuilder cloud_over_ground() {
+  SceneBuilder b = cloud_in_the_sky();
+  b.shape(RectangleShape{}, translate({0, -1.2, 0}) * test::rotate_x(-90) * scale(6), b.diffuse(.1));
+  b.scene.integrator.rr_depth = 2;
+  return b;
+}
+SceneBuilder without_splitting(SceneBuilder b) {
+  b.scene.integrator.path_splitting = -1;
+  return b;
+}
+void expect_same_image(const SceneBuilder& b, std::uint64_t spp) {
+  ASSERT_TRUE(test::world_of(b)->paths_split);
+  const auto with = test::estimate(b, spp), without = test::estimate(without_splitting(b), spp);
+  for (std::size_t k = 0; k < 3; ++k)
+    EXPECT_NEAR(with.mean[k], without.mean[k],
+                test::kStandardErrors * std::hypot(with.standard_error[k], without.standard_error[k]))
+        << k;
+}
+
+TEST(Splitting, RouletteComparesWithTheFirstVertex) {
+  EXPECT_EQ(roulette_reference(.25f, 0, 1), .25f);
+  EXPECT_EQ(roulette_reference(3, 0, 1), 1) << "paths that gain weight do not end sooner";
+  EXPECT_EQ(roulette_reference(.25f, 4, 2), 2) << "twice the mean radiance was found";
+  EXPECT_EQ(roulette_reference(.25f, .1f, 2), .25f);
+  EXPECT_EQ(roulette_reference(.25f, 1e30f, 1e-30f), kBrightestReference);
+}
+
+TEST(Splitting, IsTheSameForEverySeedAndCrop) {
+  const SceneBuilder whole = cloud_in_the_sky();
+  SceneBuilder crop = cloud_in_the_sky();
+  crop.scene.film.crop_offset = {8, 4};
+  crop.scene.film.crop_size = {5, 6};
+  const auto world = test::world_of(whole);
+  EXPECT_GT(world->mean_radiance, 0);
+  EXPECT_TRUE(world->paths_split);
+  for (const auto& other : {test::world_of(whole, 7), test::world_of(crop)}) {
+    EXPECT_EQ(other->mean_radiance, world->mean_radiance);
+    EXPECT_TRUE(other->paths_split);
+  }
+}
+
+TEST(Splitting, IsLeftOutWhereItIsNotNeeded) {
+  const auto world_with = [](auto&& change) {
+    SceneBuilder b = cloud_in_the_sky();
+    change(b.scene);
+    return test::world_of(b);
+  };
+  const auto expect_none = [](const std::shared_ptr<const World>& w, const char* why) {
+    EXPECT_EQ(w->mean_radiance, 0) << why;
+    EXPECT_FALSE(w->paths_split) << why;
+  };
+  expect_none(world_with([](Scene& s) { s.integrator.path_splitting = -1; }), "switched off");
+  expect_none(world_with([](Scene& s) { s.integrator.max_depth = 2; }), "light that is scattered once");
+  expect_none(world_with([](Scene& s) { s.integrator.name = "volpath_distant_mis"; }), "another integrator");
+  SceneBuilder fog(kFrame);
+  fog.container(CubeShape{}, {}, fog.null(), fog.homogeneous({1, 1, 1}, {.9, .9, .9}));
+  fog.scene.emitters.push_back(DirectionalEmitter{{.3, -1, -.2}, {3, 3, 3}});
+  expect_none(test::world_of(fog), "no grid");
+  // The camera is close to the cloud, so that it sees nothing else
+  SceneBuilder close = cloud_in_the_sky();
+  close.look({0, 0, 1.2}, {0, 0, 0}, 30, {0, 1, 0});
+  EXPECT_GT(test::world_of(close)->mean_radiance, 0);
+  EXPECT_FALSE(test::world_of(close)->paths_split);
+}
+
+// A box of fog 2 units deep, or two of them one behind the other, fills the left half of the frame.
+TEST(CameraCollisions, AreThoseOfTheOpticalDepth) {
+  SceneBuilder b({32, 32});
+  b.look({0, 0, 1000}, {0, 0, 0}, .1, {0, 1, 0});
+  const MediumIndex fog = b.homogeneous({.3, .3, .3}, {.5, .5, .5});
+  b.container(CubeShape{}, translate({-10, 0, 0}) * scale(10, 10, 1), b.null(), fog);
+  const auto expect = [&](double depth) {
+    const CameraCollisions c = camera_collisions(*test::world_of(b));
+    // The rays are parallel but for 0.05 degrees, so depths differ by 4e-7 of themselves: less than float32
+    // rounds exp() by, a few 6e-8
+    EXPECT_NEAR(c.met, -std::expm1(-depth), 1e-6);
+    EXPECT_NEAR(c.all, -std::expm1(-depth) / 2, 1e-6);
+  };
+  expect(.6);
+  b.container(CubeShape{}, translate({-10, 0, -5}) * scale(10, 10, 1), b.null(), fog);
+  expect(1.2);
+  // A wall between the two
+  b.shape(RectangleShape{}, translate({0, 0, -2}) * scale(20), b.diffuse(.5));
+  expect(.6);
+}
+
+TEST(Splitting, GivesTheSameImageOverDarkGround) { expect_same_image(cloud_over_ground(), 256); }
+
+TEST(Splitting, GivesTheSameImageOfCloudsWithinFogAndAcrossEachOther) {
+  SceneBuilder b = cloud_over_ground();
+  const MediumIndex fog = b.homogeneous({.2, .3, .4}, {.9, .8, .7}, .3);
+  b.container(CubeShape{}, translate({0, .2, 0}) * scale(.7), b.null(), fog);
+  ASSERT_TRUE(test::world_of(b)->overlaps);
+  expect_same_image(b, 256);
+}
+
+TEST(Splitting, GivesTheSameImageOfAGlowingCloudOfColouredExtinction) {
+  SceneBuilder b(kFrame);
+  b.look({0, 0, 4}, {0, 0, 0}, 60, {0, 1, 0});
+  std::vector<float> values;
+  for (const float v : {1.f, .2f, .5f, 1.f, .3f, 1.f, 1.f, .4f})
+    for (const float channel : {.5f, 1.f, .8f}) values.push_back(v * channel);
+  const VolumeIndex grid = b.grid({2, 2, 2}, values, translate({-1, -1, -1}) * scale(2), 3);
+  const MediumIndex cloud = b.heterogeneous(grid, {.9, .95, 1}, 3, .5);
+  b.set_emission(cloud, {.3, .2, .1});
+  b.container(CubeShape{}, scale(.99), b.null(), cloud);
+  b.shape(RectangleShape{}, translate({0, -1.2, 0}) * test::rotate_x(-90) * scale(6), b.diffuse(.1));
+  b.scene.emitters.push_back(DirectionalEmitter{{.3, -1, -.2}, {3, 3, 3}});
+  b.scene.integrator.max_depth = 6;
+  b.scene.integrator.rr_depth = 2;
+  b.scene.integrator.light_vertices = -1;
+  expect_same_image(b, 256);
+}
+
+TEST(Splitting, EveryVariantSplitsAlike) {
+  const auto world = test::world_of(cloud_over_ground());
+  ASSERT_TRUE(world->paths_split);
+  const auto names = covering_variants(*world);
+  EXPECT_GE(names.size(), 3u);
+  const PixelRect tile{0, 0, kFrame.width, kFrame.height};
+  const TileResult first = render_tile(*world, tile, {0, 8}, nullptr, nullptr);
+  for (const std::string& name : names)
+    EXPECT_EQ(render_tile_as(*world, name, tile, {0, 8}).sums, first.sums) << name;
+}
+
+TEST(Splitting, ReducesNoise) {
+  const auto noise = [](const SceneBuilder& b) { return test::estimate(b, 64).standard_error[1]; };
+  // Always the same two images. Their standard errors are those of sums over 512 pixels, so each is known to
+  // about 1 / sqrt(2 * 512) = 3 %; splitting takes a quarter away.
+  EXPECT_LT(noise(cloud_over_ground()), .9 * noise(without_splitting(cloud_over_ground())));
+}
+
+}  // namespace
+}  // namespace ls::render

@@ -1,0 +1,17 @@
+// How often camera rays collide with media.
+#pragma once
+
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+// Mean probabilities that media scatter or absorb a camera ray before it hits a surface.
+struct CameraCollisions {
+  float all = 0;  // over all camera rays
+  float met = 0;  // over those for which the probability is not nearly 0; 0 if there are none
+};
+
+// Over a lattice of camera rays of the full frame, of which the image may be a crop.
+CameraCollisions camera_collisions(const World& w);
+
+}  // namespace ls::render

@@ -1,0 +1,36 @@
+// Splitting and Russian roulette of paths in scenes with grids, by what a path may add to its pixel, as in
+// "Adjoint-driven Russian roulette and splitting in light transport simulation" (Vorba and Krivanek 2016),
+// but with one guess per path instead of a learned field.
+//
+// Splitting: a path whose first vertex is in a grid continues as two paths of half its weight. Nearly all of
+// the noise of such a path arises behind that vertex, and pixels without a cloud cost less.
+//
+// Roulette: what a pixel shows is about in proportion to the throughput of its paths at their first vertex.
+// So Russian roulette compares the throughput of a path with that, and not with 1: a path that comes from
+// dark ground into a cloud would otherwise end with a probability that makes the few that go on far brighter
+// than their pixel. If the light that the path has found at its first vertex is brighter than the image is in
+// the mean, the pixel is bright too, and so roulette compares with that light.
+#pragma once
+
+#include <algorithm>
+
+#include "common/scene/scene.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+// The largest value that light found at the first vertex gives roulette_reference(). It bounds the weight of
+// a path that survives: the light may be a bright spot in a dark pixel.
+inline constexpr float kBrightestReference = 10;
+
+// The throughput below which Russian roulette may end a path. `throughput` is that behind the first vertex,
+// `found` the light that was found up to there (mean of the channels), `mean_radiance` that of the image.
+inline float roulette_reference(float throughput, float found, float mean_radiance) {
+  return std::max(std::min(throughput, 1.f), std::min(found / mean_radiance, kBrightestReference));
+}
+
+// Sets `mean_radiance` and `paths_split` of a world that is otherwise complete. `mean_radiance` is that of
+// the image.
+void learn_splitting(const IntegratorSettings& settings, float mean_radiance, World& w);
+
+}  // namespace ls::render
