@@ -97,12 +97,14 @@ void describe(V& v, T& i) {
            .range = {-1, 0},
            .elided = true},
           i.sky_samples);
-  v.field({.name = "path_splitting",
-           .doc = "`volpath` alone: whether paths split at their first scattering in a grid, and Russian "
-                  "roulette compares a path with what it was there; 0: where it is possible; -1: never",
-           .range = {-1, 0},
-           .elided = true},
-          i.path_splitting);
+  v.field(
+      {.name = "path_splitting",
+       .doc = "`volpath` alone: in scenes with grids, whether paths split at their first scattering if it "
+              "is in a grid, and Russian roulette compares their weight with that behind the first "
+              "scattering; 0: where it is possible; -1: never",
+       .range = {-1, 0},
+       .elided = true},
+      i.path_splitting);
 }
 
 template <class V, Of<Asset> T>

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "worker/render/integrator/camera_segment_nee.h"
 #include "worker/render/integrator/variant.h"
@@ -197,10 +198,10 @@ constexpr int kLongestPilot = 64;  // paths in a white and dense medium have tho
 // Sets up what needs the mean radiance of the image, in scenes with grids.
 void learn_roulette(const IntegratorSettings& settings, World& w) {
   if ((settings.shadow_roulette < 0 && settings.path_splitting < 0) || !w.depth_allows(1)) return;
-  const auto mean = pilot_radiance(w, kLongestPilot);
-  if (!mean || !(*mean > 0) || !std::isfinite(*mean)) return;
-  learn_shadow_roulette(settings, static_cast<float>(*mean), w);
-  learn_splitting(settings, static_cast<float>(*mean), w);
+  const auto mean = static_cast<float>(pilot_radiance(w, kLongestPilot).value_or(0));
+  if (!(mean >= std::numeric_limits<float>::min()) || !std::isfinite(mean)) return;
+  learn_shadow_roulette(settings, mean, w);
+  learn_splitting(settings, mean, w);
 }
 
 }  // namespace

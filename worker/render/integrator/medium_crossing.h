@@ -87,7 +87,8 @@ auto PathTracer<F, Light>::collide(const Medium& medium, Segment segment, const 
   return scatter_in(medium);
 }
 
-// Scatters the path at its vertex in the medium. If paths split there, follows another one to its end first.
+// Scatters the path at its vertex in the medium. If paths split there, first follows a second path from the
+// vertex to its end.
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::scatter_in(const Medium& medium) -> Step {
   if constexpr (kSplits) {

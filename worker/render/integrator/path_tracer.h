@@ -296,10 +296,10 @@ class PathTracer {
   LightSplit* split_;
   OffsetRay ray_;
   C3 beta_{1, 1, 1}, density_{1, 1, 1};
-  // Russian roulette compares the throughput with this (splitting.h). Where it compares with the first
-  // vertex, kNoReference until there is one.
-  static constexpr float kNoReference = 0;
+  // Russian roulette may end the path if its throughput is below this (splitting.h). Where that depends on
+  // the first vertex, kNoReference up to there.
   float reference_ = 1;
+  static constexpr float kNoReference = -1;
   float eta_scale_ = 1;  // cancels the radiance scaling of refraction in Russian roulette
   int hero_ = 0;
   int depth_ = 0;    // scatterings so far
@@ -701,13 +701,11 @@ void PathTracer<F, Light>::refer_to_first_vertex() {
 template <Features F, template <Features> class Light>
 bool PathTracer<F, Light>::survives(float u) {
   if (is_black(beta_)) return false;
-  float size = this->size();
   if constexpr (kSplits) {
     if (reference_ == kNoReference) refer_to_first_vertex();
-    size /= reference_;
   }
   if (depth_ < world_.rr_depth) return true;
-  const float q = std::min(size, forced_survival(depth_));
+  const float q = std::min(kSplits ? size() / reference_ : size(), forced_survival(depth_));
   if (q >= 1) return true;
   if (!(u < q)) return false;
   beta_ /= q;

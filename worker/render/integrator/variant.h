@@ -57,14 +57,13 @@ template <Features F>
 void group_with(const World& w, std::span<const PixelAt> pixels, std::uint64_t sample,
                 std::span<LightSplit> splits, std::span<SampleOutcome> outcomes) {
   // Not arrays of optionals: the compiler would clear all of their bytes for each group
-  boost::container::static_vector<SampleStream, kMostTogether> streams;
   boost::container::static_vector<PathTracer<F>, kMostTogether> paths;
   boost::container::static_vector<PathTracer<F>*, kMostTogether> sorted;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const int x = pixels[i].x + w.origin_x, y = pixels[i].y + w.origin_y;
-    streams.emplace_back(w.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), sample);
-    paths.emplace_back(w, streams.back(), splits.empty() ? nullptr : &splits[i]);
-    (void)paths.back().trace(camera_ray(w, streams.back(), x, y));
+    const SampleStream stream(w.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), sample);
+    paths.emplace_back(w, stream, splits.empty() ? nullptr : &splits[i]);
+    (void)paths.back().trace(camera_ray(w, stream, x, y));
     sorted.push_back(&paths.back());
   }
   PathTracer<F>::sort_to_share(sorted);

@@ -1,6 +1,6 @@
 // The random numbers of one sample of a pixel. They are a pure function of (seed, pixel, sample index,
-// vertex, purpose). Even sample indices form half A, odd ones half B; each half of each pixel is its own
-// scrambled Sobol sequence.
+// branch, vertex, purpose), where a branch is one of the paths into which a path splits. Even sample indices
+// form half A, odd ones half B; each half of each pixel is its own scrambled Sobol sequence.
 #pragma once
 
 #include <array>
@@ -75,7 +75,7 @@ class SampleStream {
   }
 
  private:
-  static constexpr std::uint64_t kBranch = 0xb4a7c4;
+  static constexpr std::uint64_t kBranch = 0x9e6c'63d0'876a'3f6b;
   static constexpr int kPurposes = static_cast<int>(Purpose::end);
   static constexpr std::uint64_t slot(int vertex, Purpose purpose) {
     return (static_cast<std::uint64_t>(vertex) << 8) | static_cast<std::uint32_t>(purpose);

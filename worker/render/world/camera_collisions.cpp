@@ -39,7 +39,7 @@ float met_by(const World& w, const CameraRay& ray) {
 CameraCollisions camera_collisions(const World& w) {
   constexpr int kLattice = 16;
   constexpr float kNothing = 1e-3f;
-  float all = 0, met = 0;
+  double all = 0, met = 0;
   int rays = 0;
   for (int j = 0; j < kLattice; ++j)
     for (int i = 0; i < kLattice; ++i) {
@@ -50,7 +50,7 @@ CameraCollisions camera_collisions(const World& w) {
       met += p;
       ++rays;
     }
-  return {all / (kLattice * kLattice), rays > 0 ? met / static_cast<float>(rays) : 0};
+  return {static_cast<float>(all / (kLattice * kLattice)), rays > 0 ? static_cast<float>(met / rays) : 0};
 }
 
 }  // namespace ls::render

@@ -11,7 +11,8 @@ struct CameraCollisions {
   float met = 0;  // over those for which the probability is not nearly 0; 0 if there are none
 };
 
-// Over a lattice of camera rays of the full frame, of which the image may be a crop.
+// Over a lattice of camera rays of the full frame, of which the image may be a crop. Where media overlap,
+// only one of them counts at each place.
 CameraCollisions camera_collisions(const World& w);
 
 }  // namespace ls::render

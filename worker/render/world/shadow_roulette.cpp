@@ -9,7 +9,7 @@ constexpr float kFaint = 1;
 }  // namespace
 
 void learn_shadow_roulette(const IntegratorSettings& settings, float mean_radiance, World& w) {
-  if (settings.shadow_roulette < 0 || !w.need.grids || w.need.connected || !w.lights.can_sample()) return;
+  if (settings.shadow_roulette < 0 || !w.lights.can_sample()) return;
   w.faint_shadow = kFaint * mean_radiance;
 }
 

@@ -22,7 +22,8 @@ inline float shadow_ray_probability(float light, float faint_shadow) {
   return light < faint_shadow ? std::max(light / faint_shadow, kLeastTraced) : 1.f;
 }
 
-// Sets `faint_shadow` of a world that is otherwise complete. `mean_radiance` is that of the image.
+// Sets `faint_shadow` of a world with grids and without light vertices, which is otherwise complete.
+// `mean_radiance` is that of the image.
 void learn_shadow_roulette(const IntegratorSettings& settings, float mean_radiance, World& w);
 
 }  // namespace ls::render

@@ -5,15 +5,15 @@
 namespace ls::render {
 namespace {
 
-// Paths split if media scatter or absorb less than this share of the camera rays. If nearly all pixels show a
-// cloud, splitting is no better than as many samples.
+// Paths split if media of any kind scatter or absorb less than this share of the camera rays. If nearly all
+// pixels show a cloud, splitting is no better than as many samples.
 constexpr float kSplitsPay = .75f;
 
 }  // namespace
 
 void learn_splitting(const IntegratorSettings& settings, float mean_radiance, World& w) {
   // Light that is scattered once is found at the vertex that would be split
-  if (settings.path_splitting < 0 || !w.need.grids || w.need.connected || !w.depth_allows(2)) return;
+  if (settings.path_splitting < 0 || !w.depth_allows(2)) return;
   w.mean_radiance = mean_radiance;
   w.paths_split = camera_collisions(w).all < kSplitsPay;
 }

@@ -19,18 +19,20 @@
 
 namespace ls::render {
 
-// The largest value that light found at the first vertex gives roulette_reference(). It bounds the weight of
-// a path that survives: the light may be a bright spot in a dark pixel.
+// The smallest and the largest reference. Paths that come from nearly black surfaces are not worth following
+// to their ends; and light found at the first vertex may be a bright spot in a dark pixel.
+inline constexpr float kDarkestReference = .05f;
 inline constexpr float kBrightestReference = 10;
 
 // The throughput below which Russian roulette may end a path. `throughput` is that behind the first vertex,
 // `found` the light that was found up to there (mean of the channels), `mean_radiance` that of the image.
 inline float roulette_reference(float throughput, float found, float mean_radiance) {
-  return std::max(std::min(throughput, 1.f), std::min(found / mean_radiance, kBrightestReference));
+  const float bright = std::min(found / mean_radiance, kBrightestReference);
+  return std::max(kDarkestReference, std::max(std::min(throughput, 1.f), bright));
 }
 
-// Sets `mean_radiance` and `paths_split` of a world that is otherwise complete. `mean_radiance` is that of
-// the image.
+// Sets `mean_radiance` and `paths_split` of a world with grids and without light vertices, which is otherwise
+// complete. `mean_radiance` is that of the image.
 void learn_splitting(const IntegratorSettings& settings, float mean_radiance, World& w);
 
 }  // namespace ls::render
