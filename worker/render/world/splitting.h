@@ -3,7 +3,7 @@
 // but with one guess per path instead of a learned field.
 //
 // Splitting: a path whose first vertex is in a grid continues as two paths of half its weight. Nearly all of
-// the noise of such a path arises behind that vertex, and pixels without a cloud cost less.
+// the noise of such a path arises behind that vertex, and the work goes only to pixels that show a cloud.
 //
 // Roulette: what a pixel shows is about in proportion to the throughput of its paths at their first vertex.
 // So Russian roulette compares the throughput of a path with that, and not with 1: a path that comes from
