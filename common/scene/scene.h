@@ -34,8 +34,8 @@ struct BitmapTexture {
   Wrap wrap = Wrap::repeat;
   bool raw = false;  // true: 8- and 16-bit values are not decoded from sRGB
   UvTransform to_uv;
-  // For a texture that is used as an opacity. If true, the value is the image's alpha channel if that is
-  // below 1/2 in some pixel, otherwise the image's colour.
+  // For a texture that is used as an opacity. If true, the value is the image's alpha channel if any pixel of
+  // the image has an alpha below 1/2, otherwise the image's colour.
   bool alpha = false;
   // One channel: the value is that channel's number, without sRGB decoding; a missing alpha channel is 1.
   Channel channel = Channel::all;
@@ -358,22 +358,22 @@ struct IntegratorSettings {
   // sampled. 0: chosen for the scene, possibly none; -1: none.
   int camera_points = 0;
   bool phase_only = false;  // true: no direction is aimed at a point, spot or projector light
-  // Connections of paths to points that a directional emitter lights. 0: chosen for the scene; -1: never; 1:
-  // always.
+  // For "volpath" and "path" only: connections of paths to points that a directional emitter lights. 0:
+  // chosen for the scene; -1: never; 1: always.
   int light_vertices = 0;
   // For "volpath" only, with lamps being point, spot and projector lights. equiangular: points on segments
   // near lamps; without these points no direction is aimed at lamps either. lamp_flights: flights that end
   // near lamps. 0: chosen for the scene; -1: never.
   int equiangular = 0, lamp_flights = 0;
   int light_tree = 0;  // 0: a tree chooses among many lights; -1: lights are chosen by their power alone
-  // For "volpath" only: the number of pixels that share what their paths find from the second vertices on. 0:
-  // kUsualPathReuse or none, chosen for the scene; -1 or 1: none.
+  // For "volpath" and "path" only: the number of pixels that share what their paths find from the second
+  // vertices on. 0: kUsualPathReuse or none, chosen for the scene; -1 or 1: none.
   int path_reuse = 0;
   // For "volpath" only: whether shadow rays through grids that could bring little are traced at random. 0:
   // chosen for the scene; -1: all are traced.
   int shadow_roulette = 0;
-  // For "volpath" only: whether the first surface looks for a constant environment in a second direction. 0:
-  // chosen for the scene; -1: it does not.
+  // For "volpath" and "path" only: whether the first surface looks for a constant environment in a second
+  // direction. 0: chosen for the scene; -1: it does not.
   int sky_samples = 0;
   // For "volpath" only: whether paths in scenes with grids split at their first scattering and end by what
   // they may add to their pixel. 0: chosen for the scene; -1: they do not.

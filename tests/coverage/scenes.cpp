@@ -100,6 +100,8 @@ const std::vector<CoverageScene>& coverage_scenes() {
       {"surfaces, to a target", scene(room(lamp(400, .1))), 4096, false, 1.5e-3},
       {"media, to a target", scene(fog(1, .9, .9) + lamp(60, .1)), 4096, false, 1e-4},
       {"surfaces, shared, to a target", scene(room(lamp(400, .1)), "0, 0, 3.9", 8, 16), 4096, false, 1e-3},
+      {"media, shared, to a target", scene(room(lamp(60)) + fog(.6, .9, .995), "0, 0, 3.9", 8, 16), 4096,
+       false, 6e-4},
       {"fireflies", scene(caustic()), 64, true},
       {"fireflies, to a target", scene(caustic()), 1024, true, .2},
   };

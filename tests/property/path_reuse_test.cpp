@@ -32,11 +32,46 @@ SceneBuilder leaf(int path_reuse) {
   return b;
 }
 
-// Under a sky that the first surface looks for twice; without the sheet with holes, which rules sharing out.
+// A room with two sheets that let a part of the light pass straight on: one diffuse, of which both sides have
+// first and second vertices, and one of coloured glass.
+SceneBuilder sheets(LampRoom room, int path_reuse) {
+  room.path_reuse = path_reuse;
+  SceneBuilder b = room.builder();
+  const BsdfIndex red = b.bsdf(DiffuseBsdf{b.texture({.8, .4, .3})});
+  b.shape(RectangleShape{}, translate({0, -.3, -.2}) * rotate_y(60) * scale(.7),
+          b.bsdf(MaskBsdf{b.texture({.4, .4, .4}), b.bsdf(TwoSidedBsdf{red, red})}));
+  b.shape(RectangleShape{}, translate({.1, .1, .1}) * rotate_x(50) * scale(.6),
+          b.bsdf(ThinDielectricBsdf{1.5, 1, b.texture({1, 1, 1}), b.texture({.9, .5, .7})}));
+  return b;
+}
+// Sheets and boundaries passed count for the maximum depth, so that tails differ in how far they go on.
+SceneBuilder counted_sheets(int path_reuse) {
+  SceneBuilder b = sheets({.max_depth = 5}, path_reuse);
+  b.scene.integrator.name = "path";
+  b.shape(CubeShape{}, translate({.1, -.5, -.1}) * scale(.3), b.null());
+  return b;
+}
+
+// Under a sky that the first surface looks for twice, with a sheet with holes.
 SceneBuilder under_sky(int path_reuse) {
   SceneBuilder b = sky_yard({16, 16});
-  b.scene.shapes.erase(b.scene.shapes.begin() + 3);
   b.scene.integrator.path_reuse = path_reuse;
+  return b;
+}
+// Under a sky with an image, beside the constant one, and a sun of a single direction.
+SceneBuilder under_sky_image(int path_reuse) {
+  SceneBuilder b = under_sky(path_reuse);
+  SkyImage image(8, 5, .2f);
+  image.set(2, 2, {9, 4, 2});
+  image.set(5, 3, {1, 4, 6});
+  add_sky(b, image);
+  b.scene.emitters.push_back(DirectionalEmitter{{.4, .5, -1}, {1, 2, 1}});
+  return b;
+}
+// Under a wide sun, whose disk paths hit, too.
+SceneBuilder under_sun(int path_reuse) {
+  SceneBuilder b = under_sky(path_reuse);
+  b.scene.emitters.push_back(DirectionalEmitter{{.2, .3, -1}, {3, 2, 1}, 25});
   return b;
 }
 
@@ -84,14 +119,20 @@ TEST(PathReuse, GivesTheSameImageAsPathsAlone) {
       return r.builder();
     };
   };
-  const Rival rivals[] = {{"diffuse", room({})},
-                          {"glossy", room({.glossy = true})},
-                          {"fog", room({.fog = .8})},
-                          {"glossy in fog", room({.glossy = true, .fog = .4})},
-                          {"chromatic fog", room({.fog = 1, .chromatic = true})},
-                          {"mirrors", mirrors},
-                          {"leaf", leaf},
-                          {"sky", under_sky}};
+  const Rival rivals[] = {
+      {"diffuse", room({})},
+      {"glossy", room({.glossy = true})},
+      {"fog", room({.fog = .8})},
+      {"glossy in fog", room({.glossy = true, .fog = .4})},
+      {"chromatic fog", room({.fog = 1, .chromatic = true})},
+      {"mirrors", mirrors},
+      {"leaf", leaf},
+      {"sheets", [](int n) { return sheets({}, n); }},
+      {"sheets in chromatic fog", [](int n) { return sheets({.fog = .6, .chromatic = true}, n); }},
+      {"counted sheets", counted_sheets},
+      {"sky", under_sky},
+      {"sky with an image", under_sky_image},
+      {"wide sun", under_sun}};
   const double level = tests.level(std::size(rivals) * kQuarters);
   for (const Rival& rival : rivals) {
     const SceneBuilder on = rival.scene(7), off = rival.scene(-1);

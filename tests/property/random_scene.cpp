@@ -212,15 +212,20 @@ class Composer {
       i.path_reuse = -1;
     }
     i.camera_points = std::min(i.camera_points, 8);  // more only cost time
-    if (i.name != kNames[0]) {
-      i.camera_points = i.light_vertices = i.equiangular = i.lamp_flights = i.path_reuse = 0;
-      i.shadow_roulette = i.sky_samples = i.path_splitting = 0;
-      i.phase_only = false;
-    }
+    OthersParameters others{i.name};
+    scene::describe(others, i);
     if (i.name == kNames[1]) return;
     i.distance = DistanceSampling::mis;
     i.heuristic = MisHeuristic::power;
   }
+  // Resets the parameters that other integrators have.
+  struct OthersParameters {
+    std::string integrator;
+    template <class T>
+    void field(const scene::Field& f, T& x) const {
+      if (f.elided && !f.belongs_to(integrator)) x = T{};
+    }
+  };
 
   RandomScene& out_;
   Scene& scene_;

@@ -81,7 +81,7 @@ inline constexpr std::array kShares = {Share{Family::chi_square, "bsdf/sampling"
                                        Share{Family::scenes, "property/mirrors", 6},
                                        Share{Family::scenes, "property/connections", 18},
                                        Share{Family::scenes, "property/lit_disk", 1},
-                                       Share{Family::scenes, "property/path_reuse", 96},
+                                       Share{Family::scenes, "property/path_reuse", 156},
                                        Share{Family::scenes, "property/pruned", 720},
                                        Share{Family::scenes, "property/twins", 120},
                                        Share{Family::scenes, "property/shared_faces", 24},

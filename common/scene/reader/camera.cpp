@@ -176,6 +176,28 @@ void Reader::read_sampler(const Element& e) {
   p.finish();
 }
 
+namespace {
+
+// Rejects the parameters that only other integrators have.
+struct OthersParameters {
+  Params& params;
+  Report& report;
+  std::string_view integrator;
+  template <class T>
+  void field(const Field& f, const T&) {
+    if (f.belongs_to(integrator)) return;
+    if (const Element* e = params.take(f.name))
+      report.error(e->at,
+                   fmt::format("'{}' is a parameter of {} alone, not of {}", f.name,
+                               f.only_of[1].empty() ? fmt::format("the integrator \"{}\"", f.only_of[0])
+                                                    : fmt::format("the integrators \"{}\" and \"{}\"",
+                                                                  f.only_of[0], f.only_of[1]),
+                               params.title()));
+  }
+};
+
+}  // namespace
+
 void Reader::read_integrator(const Element& e, int depth) {
   if (depth == 0 && integrator_)
     return report_.error(e.at, fmt::format("a second integrator; the first is in {}",
@@ -203,24 +225,12 @@ void Reader::read_integrator(const Element& e, int depth) {
                                                         "by other means",
                                                         p.title(), row->ours));
   i.name = row->ours;
-  if (i.name != kDistantMis) refuse(p, {"distance", "heuristic"}, kDistantMis);
-  if (i.name != "volpath")
-    refuse(p,
-           {"camera_points", "phase_only", "light_vertices", "equiangular", "lamp_flights", "path_reuse",
-            "shadow_roulette", "sky_samples", "path_splitting"},
-           "volpath");
+  OthersParameters others{p, report_, i.name};
+  describe(others, i);
   i.max_depth = row->default_depth;
   bind(p, i);
   if (row->max_depth) i.max_depth = *row->max_depth;
   p.finish();
-}
-
-// Rejects parameters that exist only for the integrator `of`.
-void Reader::refuse(Params& p, std::initializer_list<std::string_view> names, std::string_view of) {
-  for (const std::string_view name : names)
-    if (const Element* e = p.take(name))
-      report_.error(e->at, fmt::format("'{}' is a parameter of the integrator \"{}\" alone, not of {}", name,
-                                       of, p.title()));
 }
 
 }  // namespace ls::scene

@@ -62,6 +62,18 @@ std::string range_of(const Field& f) {
   return low.empty() || high.empty() ? low + high : fmt::format("{}, {}", low, high);
 }
 
+std::string replaced(std::string text, std::string_view what, std::string_view by) {
+  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + by.size()))
+    text.replace(at, what.size(), by);
+  return text;
+}
+// Returns the beginning of a parameter's description if only some integrators have it.
+std::string integrators_of(const Field& f) {
+  if (f.only_of[0].empty()) return {};
+  if (f.only_of[1].empty()) return fmt::format("`{}` alone: ", f.only_of[0]);
+  return fmt::format("`{}` and `{}` alone: ", f.only_of[0], f.only_of[1]);
+}
+
 class Rows {
  public:
   template <class T>
@@ -75,7 +87,7 @@ class Rows {
                          f.required  ? "needed"
                          : f.derived ? ""
                                      : c.value,
-                         f.unit, range_of(f), f.doc);
+                         f.unit, range_of(f), integrators_of(f) + std::string(f.doc));
   }
   std::string take() const {
     return text_.empty() ? "No parameters.\n\n"
@@ -89,11 +101,6 @@ class Rows {
   std::string text_;
 };
 
-std::string replaced(std::string text, std::string_view what, std::string_view by) {
-  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + by.size()))
-    text.replace(at, what.size(), by);
-  return text;
-}
 std::string sentence(std::string_view text) {
   std::string out = fmt::format("{}.", text);
   out[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(out[0])));

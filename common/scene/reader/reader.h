@@ -125,7 +125,6 @@ class Reader {
   ReconstructionFilter read_filter(const Element& e);
   void read_sampler(const Element& e);
   void read_integrator(const Element& e, int depth);
-  void refuse(Params& p, std::initializer_list<std::string_view> names, std::string_view of);
   void read_channels(Params& p);
 
   std::string fresh_label(std::string name, std::string_view type, std::size_t index);

@@ -265,11 +265,7 @@ class Writer {
     std::string_view integrator;
     template <class T>
     void field(const Field& f, const T& x) {
-      const bool distances = f.name == "distance" || f.name == "heuristic";
-      const bool aims = f.name == "camera_points" || f.name == "phase_only" || f.name == "light_vertices" ||
-                        f.name == "equiangular" || f.name == "lamp_flights" || f.name == "path_reuse" ||
-                        f.name == "shadow_roulette" || f.name == "sky_samples" || f.name == "path_splitting";
-      if (distances ? integrator == kDistantMis : !aims || integrator == "volpath") writer.field(f, x);
+      if (f.belongs_to(integrator)) writer.field(f, x);
     }
   };
   void write_integrator() {

@@ -54,7 +54,12 @@ struct Field {
   // field has its type's initial value (false, 0, empty), or as a colour the value `unwritten`, it is written
   // neither in files nor in JSON, so it may be missing there.
   bool elided = false;
+  // The integrators that have this parameter; the first is empty if all have it, the second if one has it
+  std::array<std::string_view, 2> only_of{};
 
+  bool belongs_to(std::string_view integrator) const {
+    return only_of[0].empty() || integrator == only_of[0] || integrator == only_of[1];
+  }
   // Returns whether this field is written neither in files nor in JSON if it has this value.
   template <class T>
   bool leaves_out(const T& value) const {

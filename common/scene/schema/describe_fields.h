@@ -6,6 +6,7 @@
 #include "common/scene/schema/describe_shapes.h"
 #include "common/scene/schema/describe_surfaces.h"
 #include "common/scene/schema/describe_textures.h"
+#include "common/scene/schema/integrators.h"
 
 namespace ls::scene {
 
@@ -30,45 +31,46 @@ void describe(V& v, T& i) {
           i.rr_depth);
   v.field({.name = "hide_emitters", .doc = "lights are invisible to the camera"}, i.hide_emitters);
   v.field({.name = "distance",
-           .doc = "`volpath_distant_mis` alone: where on a ray's way through a medium it looks for light: as "
-                  "light fades (`exponential`), near the light (`equiangular`), or both (`mis`)"},
+           .doc = "where on a ray's way through a medium it looks for light: as "
+                  "light fades (`exponential`), near the light (`equiangular`), or both (`mis`)",
+           .only_of = {kDistantMis}},
           i.distance);
-  v.field({.name = "heuristic", .doc = "`volpath_distant_mis` alone: weighs the two against each other"},
+  v.field({.name = "heuristic", .doc = "weighs the two against each other", .only_of = {kDistantMis}},
           i.heuristic);
-  v.field(
-      {.name = "camera_points",
-       .doc =
-           "`volpath` alone: points of a camera ray's way through a medium at which it looks for light; 0: "
-           "as many as pay for the scene, perhaps none; -1: none, only where the ray is scattered",
-       .range = {-1, kMaxCameraPoints},
-       .elided = true},
-      i.camera_points);
-  v.field(
-      {.name = "phase_only",
-       .doc = "`volpath` alone: in media with point, spot or projector lights too, directions are those of "
-              "the phase function and the material, none is aimed at such a light",
-       .elided = true},
-      i.phase_only);
-  v.field(
-      {.name = "light_vertices",
-       .doc =
-           "`volpath` alone: whether paths are connected to points that a directional emitter lights; 0: if "
-           "that pays for the scene; -1: never; 1: always, as far as it is possible",
-       .range = {-1, 1},
-       .elided = true},
-      i.light_vertices);
+  v.field({.name = "camera_points",
+           .doc = "points of a camera ray's way through a medium at which it looks for light; 0: "
+                  "as many as pay for the scene, perhaps none; -1: none, only where the ray is scattered",
+           .range = {-1, kMaxCameraPoints},
+           .elided = true,
+           .only_of = {"volpath"}},
+          i.camera_points);
+  v.field({.name = "phase_only",
+           .doc = "in media with point, spot or projector lights too, directions are those of "
+                  "the phase function and the material, none is aimed at such a light",
+           .elided = true,
+           .only_of = {"volpath"}},
+          i.phase_only);
+  v.field({.name = "light_vertices",
+           .doc = "whether paths are connected to points that a directional emitter lights; 0: if "
+                  "that pays for the scene; -1: never; 1: always, as far as it is possible",
+           .range = {-1, 1},
+           .elided = true,
+           .only_of = {"volpath", "path"}},
+          i.light_vertices);
   v.field(
       {.name = "equiangular",
-       .doc = "`volpath` alone: whether light near lamps is looked for along whole ways through a medium; 0: "
+       .doc = "whether light near lamps is looked for along whole ways through a medium; 0: "
               "if that pays for the scene; -1: only where a ray is scattered, and nothing is aimed at lamps",
        .range = {-1, 0},
-       .elided = true},
+       .elided = true,
+       .only_of = {"volpath"}},
       i.equiangular);
   v.field({.name = "lamp_flights",
-           .doc = "`volpath` alone: whether a tenth of all flights through homogeneous media end near point, "
+           .doc = "whether a tenth of all flights through homogeneous media end near point, "
                   "spot and projector lights; 0: if directions are aimed at these; -1: never",
            .range = {-1, 0},
-           .elided = true},
+           .elided = true,
+           .only_of = {"volpath"}},
           i.lamp_flights);
   v.field(
       {.name = "light_tree",
@@ -77,34 +79,36 @@ void describe(V& v, T& i) {
        .range = {-1, 0},
        .elided = true},
       i.light_tree);
-  v.field(
-      {.name = "path_reuse",
-       .doc = "`volpath` alone: how many pixels share what their paths find from the second scattering on, "
-              "where lights have a place and media are homogeneous; 0: 16 if that pays for the scene, else "
-              "none; -1 or 1: none",
-       .range = {-1, 64},
-       .elided = true},
-      i.path_reuse);
+  v.field({.name = "path_reuse",
+           .doc = "how many pixels share what their paths find from the second scattering on, "
+                  "where media are homogeneous; 0: 16 if that pays for the scene, else "
+                  "none; -1 or 1: none",
+           .range = {-1, 64},
+           .elided = true,
+           .only_of = {"volpath", "path"}},
+          i.path_reuse);
   v.field({.name = "shadow_roulette",
-           .doc = "`volpath` alone: whether shadow rays through grids that could bring little are traced at "
+           .doc = "whether shadow rays through grids that could bring little are traced at "
                   "random; 0: where it is possible; -1: never",
            .range = {-1, 0},
-           .elided = true},
+           .elided = true,
+           .only_of = {"volpath"}},
           i.shadow_roulette);
   v.field({.name = "sky_samples",
-           .doc = "`volpath` alone: whether the first surface looks for a `constant` environment in a second "
+           .doc = "whether the first surface looks for a `constant` environment in a second "
                   "direction; 0: in scenes without media, if that pays; -1: never",
            .range = {-1, 0},
-           .elided = true},
+           .elided = true,
+           .only_of = {"volpath", "path"}},
           i.sky_samples);
-  v.field(
-      {.name = "path_splitting",
-       .doc = "`volpath` alone: in scenes with grids, whether paths split at their first scattering if it "
-              "is in a grid, and Russian roulette compares their weight with that behind the first "
-              "scattering; 0: where it is possible; -1: never",
-       .range = {-1, 0},
-       .elided = true},
-      i.path_splitting);
+  v.field({.name = "path_splitting",
+           .doc = "in scenes with grids, whether paths split at their first scattering if it "
+                  "is in a grid, and Russian roulette compares their weight with that behind the first "
+                  "scattering; 0: where it is possible; -1: never",
+           .range = {-1, 0},
+           .elided = true,
+           .only_of = {"volpath"}},
+          i.path_splitting);
 }
 
 template <class V, Of<Asset> T>

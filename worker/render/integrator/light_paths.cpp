@@ -152,6 +152,8 @@ LightVertices::Look look_of(const World& w, const LightVertex& y) {
 
 void learn_connections(const IntegratorSettings& settings, World& w) {
   if (settings.light_vertices < 0 || !w.depth_allows(2)) return;
+  // Light vertices do not know how many surfaces the light has passed
+  if (w.passing_counts && w.null_transmission) return;
   // An open boundary encloses no volume, so a ray from the sun may find another medium behind it than a
   // camera path does
   if (std::any_of(w.geometry.surfaces.begin(), w.geometry.surfaces.end(),
@@ -210,7 +212,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
                                                  const AssetFiles& files, int threads) {
   auto world = make_world(scene, settings, files, threads);
   if (!world) return tl::unexpected(world.error());
-  if (settings.integrator == "volpath") {
+  if (settings.integrator == "volpath" || settings.integrator == "path") {
     learn_connections(scene.integrator, **world);
     learn_sky_samples(scene.integrator, **world);
     share_tails(scene.integrator, **world);

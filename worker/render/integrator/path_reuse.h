@@ -3,9 +3,10 @@
 // path tracing by re-using paths").
 //
 // Let x_k be the first vertex of the path of pixel k, and q_k(y) the density per area or volume with which
-// that path finds a second vertex y: the density of the direction, times that of a flight that ends at y, or
-// 0 if something blocks the way. Each pixel i looks from x_i at the second vertex y_j of each path j of its
-// group, and weights what it sees by the balance heuristic over all paths that could have found it: light
+// that path finds a second vertex y: the density of the direction, times that of a flight that ends at y,
+// times the probabilities of passing every null-transmitting surface on the way and of not passing the one at
+// y; 0 if something blocks the way. Each pixel i looks from x_i at the second vertex y_j of each path j of
+// its group, and weights what it sees by the balance heuristic over all paths that could have found it: light
 // that arrives at y_j along w has the estimate
 //   beta_i f(x_i, y_j) V(x_i, y_j) f(y_j, w) L(w) / sum over k of q_k(y_j) p_k(w),
 // where f are BSDFs or phase functions with cosines, V is the transmittance with the geometric terms, and
@@ -37,6 +38,7 @@ void PathTracer<F, Light>::begin_sharing(const SurfaceHit* hit, const Medium* me
   if (hit) first.at.hit = *hit;
   first.d = ray_.d;
   first.around = medium_;
+  first.passed = passed_;
   first.beta = beta_;
   if constexpr (F.chromatic) {
     first.beta /= mean(density_);
@@ -67,6 +69,7 @@ void PathTracer<F, Light>::begin_tail(const PathVertex& at, const V3& n, const V
   SharedTail& tail = sharing_.tail;
   tail.usable = true;
   tail.at = at;
+  tail.passed = passed_;
   if (!world_.lights.can_sample()) return;
   const Group g = stream_.group(depth_, Purpose::light);
   const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, at.p, n);
@@ -97,6 +100,15 @@ void PathTracer<F, Light>::go_on_as_tail(const V3& w, const C3& weight) {
   }
   sharing_.survival = max_component(size);
   beta_ = C3(1);
+}
+
+// Keeps light that the path found straight from a light source when it left its second vertex. Next-event
+// estimation finds it with the density `pdf`.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::keep_emitted(const C3& emitted, float pdf) {
+  sharing_.tail.emitted = beta_ * emitted;
+  if constexpr (F.chromatic) sharing_.tail.emitted /= mean(density_);
+  sharing_.tail.hit_pdf = pdf;
 }
 
 // Returns the BSDF at the path's first vertex, on a surface, for light from wi in its local frame. On a
@@ -149,28 +161,40 @@ auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
   LightSample end;
   end.target = y.p;
   if (!y.medium) {
+    const V3 back = y.hit.shading.to_local(-w);
     // A path from x would use the geometric normal at y, because the shading normal faces away from it
-    if ((y.hit.shading.to_local(-w).z > 0) != (dot(w, y.hit.ng) < 0)) return look;
+    if ((back.z > 0) != (dot(w, y.hit.ng) < 0)) return look;
     cosine = std::abs(dot(w, y.hit.ng));
     end.target = offset_point(y.hit, -w);
+    const SurfaceInfo& surface = world_.geometry.surfaces[y.hit.surface];
+    if (surface.null_transmission)
+      pdf *= 1 - world_.bsdfs.null_transmission(surface.bsdf, y.hit.uv_point(), back).probability;
   }
   C3 through;
   if (own) {
     for (int c = 0; c < 3; ++c) through[c] = std::exp(-tail.depth[c]);
+    sharing_.flight = through * tail.passing;
+    through *= tail.transmission;
   } else {
     end.direction = w;
     end.distance = std::sqrt(r2);
     end.radiance = C3(1);
     depth_ = 1;
+    passed_ = x.passed;
+    sharing_.flight = C3(1);
+    sharing_.crossed = 0;
     // Without media no random numbers are drawn on the way
     RandomStream stream(0);
     if constexpr (F.media) stream = stream_.stream(1, Purpose::track_connect);
     through = unoccluded(x.at.p, origin, end, around, stream);
+    // The tail is that of a path that may pass so many surfaces more before it reaches its maximum depth
+    if (is_black(through) || (world_.passing_counts && x.passed + sharing_.crossed != tail.passed))
+      return look;
   }
   const float geometry = cosine / r2;
   look.w = w;
   look.value = x.beta * value * through * geometry;
-  C3 found = x.density * through;
+  C3 found = x.density * sharing_.flight;
   if (y.medium) {
     look.value *= y.medium->sigma_s;
     found *= y.medium->sigma_t;

@@ -141,7 +141,7 @@ class PathTracer {
   // Follows the path from its current vertex to its end. The first ray of the path ends at t_max.
   void go_on(float t_max);
   // Samples a free flight up to the surface hit at `end`, or, if `end` is null, up to the distance `reach`.
-  // `flown` is the flight if it was sampled before, without an end.
+  // If the flight was already sampled before the ray was traced (kFliesFirst), it is `flown`, without an end.
   Step fly(const SurfaceHit* end, float reach, const std::optional<Flight>& flown);
   Step fly_through(const Medium& medium, const SurfaceHit* end, float reach,
                    const std::optional<Flight>& flown);
@@ -240,6 +240,9 @@ class PathTracer {
     if constexpr (F.reuse) return sharing_.part == SharingPath::Part::second;
     return false;
   }
+  // True on the path's way from its second vertex to the next one.
+  bool is_leaving_second() const { return sharing_.part == SharingPath::Part::tail && depth_ == 2; }
+  void keep_emitted(const C3& emitted, float pdf);
 
   // The sum of densities_, with back() as `back`.
   template <class Back>
@@ -247,9 +250,9 @@ class PathTracer {
     return densities_.sum(densities_.needs_back() ? back() : 0);
   }
 
-  // Adds light that next-event estimation found at the current vertex p, on a surface of the geometric normal
-  // ng, or in a medium (0). back() is the density with which a path from the light would be scattered back
-  // along this path.
+  // Adds light that next-event estimation found at the current vertex p. ng is the geometric normal there, or
+  // 0 in a medium. back() returns the density with which a path from the light would be scattered back along
+  // this path.
   template <class Back>
   void add_found([[maybe_unused]] const LightChoice& choice, [[maybe_unused]] const V3& p,
                  [[maybe_unused]] const V3& ng, C3 light, [[maybe_unused]] const Back& back) {
@@ -267,8 +270,8 @@ class PathTracer {
     add(light);
   }
 
-  // Adds light to the sample. If `ahead`, the light was scattered once more than the path so far: in the
-  // medium on the segment ahead.
+  // Adds light to the sample, already multiplied by the throughput. If `ahead`, it was scattered once more
+  // than the path so far, in the medium on the path's next segment.
   void add(const C3& weighted, bool ahead = false) {
     C3 light = weighted;
     if constexpr (F.chromatic) light = weighted / mean(density_);
@@ -641,6 +644,12 @@ bool PathTracer<F, Light>::passes_null(const SurfaceHit& hit) {
   if (!(null_transmission.probability > 0)) return false;
   if (stream_.group(segment_, Purpose::null_transmission).u(0) < null_transmission.probability) {
     beta_ *= null_transmission.transmission / null_transmission.probability;
+    if constexpr (F.reuse) {
+      if (looks_for_second()) {
+        sharing_.tail.transmission *= null_transmission.transmission;
+        sharing_.tail.passing *= null_transmission.probability;
+      }
+    }
     return true;
   }
   beta_ /= 1 - null_transmission.probability;
@@ -662,10 +671,8 @@ void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
   if (!last_.delta) {
     const float p_l = world_.lights.pdf(hit, last_.p, ray_.d, last_.n);
     if constexpr (F.reuse) {
-      if (sharing_.part == SharingPath::Part::tail && depth_ == 2) {
-        sharing_.tail.emitted = beta_ * emitted;
-        if constexpr (F.chromatic) sharing_.tail.emitted /= mean(density_);
-        sharing_.tail.hit_pdf = p_l;
+      if (is_leaving_second()) {
+        keep_emitted(emitted, p_l);
         return;
       }
     }
@@ -677,6 +684,14 @@ void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::add_environment() {
   if (!world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)) return;
+  if constexpr (F.reuse) {
+    if (is_leaving_second()) {
+      const Lights::EnvironmentParts parts = world_.lights.environment_parts(ray_.d);
+      keep_emitted(parts.sampled, parts.pdf);
+      add(beta_ * parts.unsampled);
+      return;
+    }
+  }
   const float pdf = last_.pdf / last_.in_medium.found_as_light();
   C3 light = world_.lights.environment(ray_.d, last_.delta ? kInfinity : pdf);
   if (depth_ == 1 && looked_for_sky_) light -= world_.lights.constant_environment() * .5f;

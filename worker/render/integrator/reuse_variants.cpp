@@ -139,20 +139,20 @@ void share_tails(const IntegratorSettings& settings, World& w) {
   Features need = w.need;
   need.split = false;
   need.reuse = true;
-  // Paths are not shared in scenes with grids (the density of flights has no closed form), with lamps in
-  // media, light vertices or points on segments (these change how directions are sampled), or with lights
-  // without a position (these are weighted one by one where rays end).
+  // Paths are not shared in scenes with grids (the density of flights has no closed form), or with lamps in
+  // media, light vertices or points on segments (these change how directions are sampled).
   const auto variants = reuse_variants();
   const auto sharing =
       std::ranges::find_if(variants, [&](const Variant& v) { return v.covers.covers(need); });
   if (settings.path_reuse < 0 || settings.path_reuse == 1 || sharing == variants.end()) return;
-  if (w.lights.any_without_place() || w.null_transmission || !w.depth_allows(2)) return;
+  // Each tail keeps one light that both ways can find (SharedTail::hit_pdf).
+  if (!w.lights.single_environment_sample() || !w.depth_allows(2)) return;
   // Roulette at the first vertex would be a part of the densities
-  if (w.rr_depth < 2 || (w.passing_counts && w.need.passing)) return;
+  if (w.rr_depth < 2) return;
   for (const SurfaceInfo& s : w.geometry.surfaces)
-    // Rays from two sides may find different media behind an open boundary. A path may cross several null
-    // surfaces that emit light, but a tail records only one.
-    if ((s.transition && s.sheet) || (s.null && s.light != kNone)) return;
+    // Rays from two sides may find different media behind an open boundary. A path may pass several surfaces
+    // that emit light, but a tail keeps only one.
+    if ((s.transition && s.sheet) || ((s.null || s.null_transmission) && s.light != kNone)) return;
   const bool automatic = settings.path_reuse == 0;
   if (automatic && !sharing_pays(w, *sharing)) return;
   w.reuse = automatic ? kUsualPathReuse : settings.path_reuse;

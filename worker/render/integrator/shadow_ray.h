@@ -53,7 +53,9 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
     if constexpr (F.media) {
       if (medium.any()) {
         const float t = met && hit.t <= left ? ray.length_to(hit) : std::max(0.f, left + ray.lead());
-        value *= through_media(medium, ray.start, d, t, stream);
+        const C3 through = through_media(medium, ray.start, d, t, stream);
+        value *= through;
+        if constexpr (F.reuse) sharing_.flight *= through;
         if (is_black(value)) return value;
       }
     }
@@ -68,10 +70,13 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
     if (!may_go_on(depth_, passed_ + i + 1)) return {0, 0, 0};
     const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
     if (surface.null_transmission) {
-      value *=
-          world_.bsdfs.null_transmission(surface.bsdf, hit.uv_point(), hit.shading.to_local(-d)).transmission;
+      const NullTransmission null_transmission =
+          world_.bsdfs.null_transmission(surface.bsdf, hit.uv_point(), hit.shading.to_local(-d));
+      value *= null_transmission.transmission;
+      if constexpr (F.reuse) sharing_.flight *= null_transmission.probability;
       if (is_black(value)) return value;
     }
+    if constexpr (F.reuse) ++sharing_.crossed;
     if constexpr (F.media) medium = beyond(hit, surface, d, d, medium);
     if constexpr (F.overlaps) {
       if (medium.overflowed()) {

@@ -151,6 +151,20 @@ Pivot Lights::pivot(const SurfaceHit& hit) const {
   return with_area(hit, [&](const auto& l) { return l.pivot_of(world(), hit); });
 }
 
+Lights::EnvironmentParts Lights::environment_parts(const V3& direction) const {
+  EnvironmentParts parts{environment_, C3(0), 0};
+  if (map_) {
+    const EnvironmentMap::Light light = map_->at(direction);
+    parts.sampled = light.radiance;
+    parts.pdf = light.pdf * map_probability_;
+  } else if (!suns_.empty()) {
+    const Light& sun = lights_[suns_.front()];
+    parts.sampled = std::get_if<SunLight>(&sun.kind)->found(direction, kInfinity, sun.probability);
+    parts.pdf = std::get_if<SunLight>(&sun.kind)->density * sun.probability;
+  }
+  return parts;
+}
+
 C3 Lights::suns(const V3& direction, float pdf) const {
   C3 sum(0);
   for (const std::uint32_t i : suns_)

@@ -82,6 +82,16 @@ class Lights {
     return beside + (as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance);
   }
   const C3& constant_environment() const { return environment_; }
+  // The same light by the way in which it can be found. Requires single_environment_sample().
+  struct EnvironmentParts {
+    C3 unsampled;  // never sampled as a light
+    C3 sampled;    // sampled as a light with the density `pdf`, per steradian
+    float pdf;
+  };
+  EnvironmentParts environment_parts(const V3& direction) const;
+  // True if next-event estimation samples a direction by at most one light that paths can also hit when they
+  // leave the scene: a sun with an extent, or a map.
+  bool single_environment_sample() const { return suns_.size() + (map_ ? 1 : 0) <= 1; }
   // Sets the radiance of the constant environment, and returns what it was. A scene without one has black.
   C3 exchange_constant_environment(const C3& radiance) { return std::exchange(environment_, radiance); }
   bool has_environment() const { return map_ || !suns_.empty() || !is_black(environment_); }

@@ -47,9 +47,13 @@ TEST(LightPaths, LeaveOutWhatASceneDoesNotNeed) {
     std::get<DirectionalEmitter>(s.emitters[0]).angular_radius = 1;
   }))) << "a sun with an extent can be hit";
   EXPECT_FALSE(connects(changed([](Scene& s) { s.integrator.name = "volpath_distant_mis"; }, {.fog = .3})));
-  for (const int max_depth : {-1, 5})
-    EXPECT_FALSE(connects(changed([](Scene& s) { s.integrator.name = "path"; },
-                                  {.light_vertices = 1, .max_depth = max_depth})));
+  for (const bool sheet : {false, true})
+    for (const int max_depth : {-1, 5})
+      EXPECT_EQ(
+          connects(changed([](Scene& s) { s.integrator.name = "path"; },
+                           {.glossy = true, .sheet = sheet, .light_vertices = 1, .max_depth = max_depth})),
+          !sheet || max_depth < 0)
+          << "in `path`, sheets passed count for max_depth";
 }
 
 // Rays of the sun start in a vacuum, and find the media that the boundaries on their way declare. Where a

@@ -26,14 +26,26 @@ TEST(PathReuse, IsThereIfAskedForAndPossible) {
   EXPECT_TRUE(shares(LampRoom{.path_reuse = 8}.builder()));
   EXPECT_TRUE(shares(LampRoom{.glossy = true, .fog = .5, .chromatic = true, .path_reuse = 2}.builder()));
   EXPECT_FALSE(shares(LampRoom{}.builder()));
+  EXPECT_TRUE(shares(changed([](SceneBuilder& b) { b.scene.integrator.name = "path"; })));
+  EXPECT_FALSE(shares(changed([](SceneBuilder& b) { b.scene.integrator.name = "volpath_distant_mis"; })));
   EXPECT_FALSE(shares(LampRoom{.path_reuse = 8, .max_depth = 2}.builder())) << "direct light alone";
   EXPECT_FALSE(shares(changed([](SceneBuilder& b) { b.scene.integrator.rr_depth = 1; })));
   EXPECT_FALSE(shares(changed([](SceneBuilder& b) {
     b.scene.emitters.push_back(PointEmitter{{0, .5, 0}, {1, 1, 1}});
   }))) << "directions are aimed at a lamp in a medium";
+  const auto add_sun = [](SceneBuilder& b, double radius) {
+    b.scene.emitters.push_back(DirectionalEmitter{{0, -1, 0}, {1, 1, 1}, radius});
+  };
+  EXPECT_TRUE(shares(changed([&](SceneBuilder& b) { add_sun(b, 0); })));
+  EXPECT_TRUE(shares(changed([&](SceneBuilder& b) { add_sun(b, 3); })));
+  EXPECT_FALSE(shares(changed([&](SceneBuilder& b) {
+    add_sun(b, 3);
+    add_sun(b, 4);
+  }))) << "two lights that paths can hit in the same direction";
   EXPECT_FALSE(shares(changed([](SceneBuilder& b) {
-    b.scene.emitters.push_back(DirectionalEmitter{{0, -1, 0}, {1, 1, 1}});
-  })));
+    b.shape(RectangleShape{}, test::scale(.1), b.bsdf(MaskBsdf{b.texture({.5, .5, .5}), b.diffuse(.5)}))
+        .emitter = AreaEmitter{b.texture({1, 1, 1})};
+  }))) << "a path may pass several lights";
   EXPECT_FALSE(shares(changed([](SceneBuilder& b) {
     b.container(RectangleShape{}, test::scale(.1), b.null(), MediumIndex{0});
   }))) << "an open boundary";

@@ -74,6 +74,12 @@ TEST(Integrator, OfOtherNamesRefusesTheParametersOfVolpath) {
       EXPECT_EQ(r.diagnostics[0].place.line, 2);
       EXPECT_THAT(r.diagnostics[0].text, HasSubstr("a parameter of the integrator \"volpath\" alone"));
     }
+  const char* reuse = "<integer name=\"path_reuse\" value=\"8\"/>";
+  EXPECT_THAT(messages(read(integrator("whitted", reuse))),
+              HasSubstr("'path_reuse' is a parameter of the integrators \"volpath\" and \"path\" alone"));
+  const Scene path = must_read(integrator("path", reuse));
+  EXPECT_EQ(path.integrator.path_reuse, 8);
+  EXPECT_EQ(serialize(must_read(write_xml(path))), serialize(path));
 }
 
 TEST(Integrator, NamesTheSettingsThatThereAre) {
