@@ -132,8 +132,7 @@ Result<ValidateCase> chi2_case(const NoriTest& test, std::size_t bsdf, const ren
   if (!surface) return tl::unexpected(surface.error());
   if (!surface->bsdfs.has_smooth(surface->index))
     return fail(Errc::invalid_argument,
-                fmt::format("bsdf {} scatters into single directions alone: they have no density that a "
-                            "chi2test could test",
+                fmt::format("bsdf {} has delta lobes alone, so it has no density that a chi2test could test",
                             bsdf + 1));
   render::RandomStream stream(render::combine(seed, 0x6368693274657374));
   // Draws a direction with a density proportional to the cosine, as in Nori.

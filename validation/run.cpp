@@ -96,7 +96,8 @@ class Runner {
   }
 
   Result<Sight> difference(const Same& same, std::uint64_t paths, std::uint64_t seed) const {
-    // The mean of such a case is not known in advance, so a broken renderer is simulated with mean 1.
+    // A simulated broken renderer (RunOptions::gain) gets both scenes wrong alike, so a case that compares
+    // two scenes passes. Its mean is not known in advance; 1 stands for it.
     const auto a = options_.gain ? broken(grey(1)) : look(same.scene, paths, seed),
                b = options_.gain ? a : look(same.other, paths, ~seed);
     if (!a) return tl::unexpected(a.error());

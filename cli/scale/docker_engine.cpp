@@ -119,7 +119,9 @@ class Docker final : public Engine {
     if (output->code != 0)
       return fail(Errc::unavailable,
                   fmt::format("docker {}: {}", words[1],
-                              output->err.empty() ? "the container has ended" : first_line(output->err)));
+                              output->err.empty()
+                                  ? fmt::format("exit code {}; the container may have ended", output->code)
+                                  : first_line(output->err)));
     return std::move(output->out);
   }
 

@@ -52,7 +52,8 @@ class Notes {
   std::string last_;
 };
 
-// Adds the costs in the report of an earlier run to `ledger` and `spending`.
+// Loads the costs in the report of an earlier run, so that this run continues them. Does nothing if there is
+// no report.
 Result<void> go_on_from(const std::filesystem::path& file, const std::string& farm, Ledger& ledger,
                         Spending& spending) {
   std::ifstream in(file);

@@ -29,10 +29,11 @@ Result<ImageData> decode_image(std::string_view name, std::span<const std::byte>
   for (const std::string_view pfm : {"PF ", "PF\n", "PF\r", "Pf ", "Pf\n", "Pf\r"})
     if (head.starts_with(pfm)) return decode_pfm(name, file, max_pixels);
   if (ends_in_tga(name)) return decode_tga(name, file, max_pixels);
-  return fail(Errc::invalid_argument,
-              fmt::format("'{}': is no PNG, JPEG, BMP, QOI, OpenEXR, Radiance HDR or PFM image (by its first "
-                          "bytes), and its name does not end in .tga",
-                          name));
+  return fail(
+      Errc::invalid_argument,
+      fmt::format("'{}': by its first bytes this is not a PNG, JPEG, BMP, QOI, OpenEXR, Radiance HDR or "
+                  "PFM image, and its name does not end in .tga",
+                  name));
 }
 
 Result<ImageData> load_image(const std::filesystem::path& path, std::string_view name,

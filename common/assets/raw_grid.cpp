@@ -18,8 +18,8 @@ tl::unexpected<Error> bad_grid(std::string_view name, const std::string& text) {
 // Reads the header; the result has no values yet.
 Result<GridData> read_grid_header(std::string_view name, ByteReader& r, std::size_t size) {
   if (size < kHeader)
-    return bad_grid(name,
-                    fmt::format("{} bytes are too few for the header of a .bin grid: {}", size, kHeader));
+    return bad_grid(
+        name, fmt::format("the file has {} bytes, fewer than the {} of a .bin grid's header", size, kHeader));
   GridData g;
   g.channels = 1;
   std::uint64_t count = 1;
@@ -36,8 +36,8 @@ Result<GridData> read_grid_header(std::string_view name, ByteReader& r, std::siz
     for (float& x : *corner) x = *r.take<float>();
   for (std::size_t a = 0; a < 3; ++a)
     if (!std::isfinite(g.bbox_min[a]) || !std::isfinite(g.bbox_max[a]) || !(g.bbox_min[a] < g.bbox_max[a]))
-      return bad_grid(name,
-                      fmt::format("has a box from {} to {} along axis {}", g.bbox_min[a], g.bbox_max[a], a));
+      return bad_grid(name, fmt::format("the bounding box is empty or not finite along axis {}: {} to {}", a,
+                                        g.bbox_min[a], g.bbox_max[a]));
   if (count > kMaxGridValues)
     return fail(Errc::resource_exhausted,
                 fmt::format("'{}': {} values, more than the limit of {}", name, count, kMaxGridValues));

@@ -69,8 +69,8 @@ Result<Header> read_vol_header(std::string_view name, ByteReader& r, std::size_t
   for (int a = 0; a < 3; ++a)
     if (!std::isfinite(h.grid.bbox_min[a]) || !std::isfinite(h.grid.bbox_max[a]) ||
         !(h.grid.bbox_min[a] < h.grid.bbox_max[a]))
-      return bad_vol(name, fmt::format("has a bounding box from {} to {} along axis {}", h.grid.bbox_min[a],
-                                       h.grid.bbox_max[a], a));
+      return bad_vol(name, fmt::format("the bounding box is empty or not finite along axis {}: {} to {}", a,
+                                       h.grid.bbox_min[a], h.grid.bbox_max[a]));
   if (h.count > kMaxGridValues)
     return fail(Errc::resource_exhausted,
                 fmt::format("'{}': {} values, more than the limit of {}", name, h.count, kMaxGridValues));

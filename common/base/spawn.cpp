@@ -93,7 +93,7 @@ Result<pid_t> spawn(Program program) {
   posix_spawnattr_destroy(&attributes);
   if (error == 0) return pid;
   return fail(error == ENOENT ? Errc::not_found : Errc::internal,
-              fmt::format("{}: {}{}", program.path, std::strerror(error),
+              fmt::format("cannot start {}: {}{}", program.path, std::strerror(error),
                           error == EMFILE ? "; raise the limit of open files (ulimit -n)" : ""));
 }
 

@@ -18,8 +18,9 @@ using Pairs = std::vector<std::pair<std::string, std::string>>;
 constexpr const char* kTracesPath = "/v1/traces";
 constexpr std::string_view kServiceName = "service.name";
 
-// The value of the variable for traces, or else of the one for all signals (traces, metrics, logs), with the
-// variable's name for messages. An empty value counts as not set.
+// A setting of the exporter: the value of the variable for traces if it is set and not empty, otherwise that
+// of the variable for all signals (traces, metrics, logs). `name` is the variable that was used, for
+// messages.
 struct Setting {
   std::string name, value;
 };

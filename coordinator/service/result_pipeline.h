@@ -49,13 +49,13 @@ class ResultPipeline {
     TimePoint began{};   // when verification began
     double seconds = 0;  // time spent on it
   };
-  // The outcome of storing a result
+  // A result on its way into the log. prepare() decides whether it is stored; append() stores it.
   struct Stored {
-    std::shared_ptr<PartialLog> log;  // the log to store it in; null: it is not stored
-    double at_seconds = 0;            // time of storing, in seconds on the job's clock
-    std::uint64_t resumes = 0;        // the job's JobEntry::resumes when storing began
-    std::optional<PartialLog::Place> place;
-    std::optional<Error> error;
+    std::shared_ptr<PartialLog> log;         // the log to store it in; null: it is not stored
+    double at_seconds = 0;                   // time of storing, in seconds on the job's clock
+    std::uint64_t resumes = 0;               // the job's JobEntry::resumes when storing began
+    std::optional<PartialLog::Place> place;  // set by append()
+    std::optional<Error> error;              // why the job's record or the result cannot be written
   };
   void commit(std::vector<Checked> batch);
   std::vector<Stored> prepare(const std::vector<Checked>& batch);

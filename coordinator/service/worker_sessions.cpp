@@ -32,8 +32,8 @@ Result<void> check_hello(const WorkerHello& hello, const JoinCheck& may_join, bo
       hello.previous_id.value.size() > ls::limits::kIdBytes)
     return fail(Errc::invalid_argument, "the worker's name, build or id is too long");
   if (hello.tags.size() > limits::kMaxTags)
-    return fail(Errc::invalid_argument,
-                fmt::format("{} tags are more than {}", hello.tags.size(), limits::kMaxTags));
+    return fail(Errc::invalid_argument, fmt::format("the worker has {} tags; at most {} are allowed",
+                                                    hello.tags.size(), limits::kMaxTags));
   if (hello.threads < 1 || hello.threads > ls::limits::kThreads)
     return fail(Errc::invalid_argument,
                 fmt::format("{} threads: it must be 1 to {}", hello.threads, ls::limits::kThreads));

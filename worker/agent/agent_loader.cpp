@@ -15,8 +15,8 @@ namespace {
 constexpr std::size_t kWorldsKept = 2;
 constexpr std::size_t kBlobsTraced = 64;  // blobs of one scene that get a span each
 constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
-// A problem with loading a job is reported until this long after the next attempt to load the job was due. If
-// there was no such attempt by then, the worker has no units of the job any more.
+// A problem with loading a job is reported until this long after the next attempt was due. If that attempt
+// was not made, the worker has no more units of the job.
 constexpr Duration kTroubleShown = std::chrono::seconds(30);
 
 // True if the error is a problem of this machine, such as a full disk, that must not count as a failure of

@@ -34,8 +34,9 @@ class LockedFile final : public BlobFile {
   int fd_;
 };
 
-// Makes an error of a transfer one after which the agent tries again later, since the coordinator's problem
-// (a blob that is missing, damaged or denied there) may pass.
+// Maps a transfer error to one after which the agent tries again: codes other than unavailable and
+// resource_exhausted become internal. The blob may be missing, damaged or denied at the coordinator for a
+// time only.
 Error passing(Error error) {
   const bool temporary = error.code == Errc::unavailable || error.code == Errc::resource_exhausted;
   if (!temporary) error.code = Errc::internal;

@@ -152,7 +152,7 @@ Result<FakeFault> parse_fake_fault(std::string_view text) {
     const auto value = parse_number<std::int64_t>(eq == std::string_view::npos ? "" : item.substr(eq + 1));
     if (!field || !value)
       return fail(Errc::invalid_argument,
-                  fmt::format("'{}' is not seed=, tile= or round= with a number", item));
+                  fmt::format("'{}': expected seed=N, tile=N or round=N with an integer N", item));
     *field = *value;
   }
   return fault;

@@ -96,9 +96,9 @@ double product(const std::vector<double>& a, const std::vector<double>& b) {
   return sum;
 }
 
-// The line error = a - slope * time, fitted to the points with their covariance, whose Cholesky factor is
-// `l`; optionally with a prior for the slope. Times are relative to the last point, which makes a and slope
-// nearly independent.
+// The line log(relMSE) = a - slope * log(core seconds), fitted by generalised least squares; `l` is the
+// Cholesky factor of the points' covariance. A prior for the slope, of mean 1, is optional. Times are
+// relative to the last point, which makes a and slope nearly independent.
 class Line {
  public:
   Line(const std::vector<Log>& points, const Matrix& l, double prior_weight, double bend)

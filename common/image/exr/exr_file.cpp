@@ -104,8 +104,8 @@ std::map<std::string, std::string> strings_of(const Imf::Header& header) {
 Result<RgbWithError> read_colour(std::span<const std::byte> bytes, const std::string& name,
                                  const ExrLimits& limits, bool with_error) {
   if (bytes.size() > limits.max_bytes)
-    return fail(Errc::resource_exhausted,
-                fmt::format("{}: {} bytes, the limit is {}", name, bytes.size(), limits.max_bytes));
+    return fail(Errc::resource_exhausted, fmt::format("{}: the file has {} bytes, more than the limit of {}",
+                                                      name, bytes.size(), limits.max_bytes));
   return exr::guarded(
       Errc::invalid_argument, fmt::format("{}: cannot read this EXR", name), [&]() -> Result<RgbWithError> {
         if (const auto ok = exr::check_headers(bytes, name, limits); !ok) return tl::unexpected(ok.error());

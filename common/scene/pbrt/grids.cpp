@@ -123,8 +123,9 @@ class GridLight {
   const Param* scales_ = nullptr;
 };
 
-// The coefficients of an "rgbgrid": a colour a voxel. Those that are not given are 1, also outside of the
-// grid, where the others are 0 (RGBGridMedium::SamplePoint).
+// The coefficients sigma_a and sigma_s of an "rgbgrid", one RGB value per voxel. As in pbrt
+// (RGBGridMedium::SamplePoint), a coefficient that the file does not give is 1 everywhere, and one that it
+// gives is 0 outside the grid.
 class Colours {
  public:
   Colours(const Param* absorption, const Param* scattering, const std::array<int, 3>& sides)

@@ -7,6 +7,23 @@
 #include "coordinator/domain/farm/farm_state.h"
 
 namespace ls::coordinator {
+namespace {
+
+std::string_view cause_of_end(StopReason reason) {
+  switch (reason) {
+    case StopReason::spp:
+      return "has reached its number of samples";
+    case StopReason::error:
+      return "has reached its target error";
+    case StopReason::time:
+      return "has reached its time limit";
+    case StopReason::user:
+      break;
+  }
+  return "was stopped by a user";
+}
+
+}  // namespace
 
 Result<void> Farm::State::may_retarget(const Job& job, double target_error) {
   const std::string& id = job.plan.brief.job.value;
@@ -24,9 +41,10 @@ Result<void> Farm::State::may_retarget(const Job& job, double target_error) {
   if (job.stopping && job.stopping != StopReason::error)
     return ls::fail(
         Errc::failed_precondition,
-        fmt::format("job {} is ended by its {}: its target error can no longer be changed; extend "
-                    "its samples (spp), or submit it again",
-                    id, job.stopping == StopReason::spp ? "samples" : to_string(*job.stopping)));
+        fmt::format(
+            "job {} {}: its target error can no longer be changed; extend its samples (spp), or submit "
+            "it again",
+            id, cause_of_end(*job.stopping)));
   if (job.stopping && target_error >= *job.plan.target_error)
     return ls::fail(
         Errc::failed_precondition,

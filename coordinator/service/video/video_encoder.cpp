@@ -58,11 +58,11 @@ Result<std::unique_ptr<VideoEncoder>> VideoEncoder::start(const Asked& asked, co
                                                           std::stop_token stop) {
   std::array<int, 2> pixels{}, errors{};
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pixels.data()) != 0)
-    return fail(Errc::internal, fmt::format("a socket for ffmpeg: {}", std::strerror(errno)));
+    return fail(Errc::internal, fmt::format("cannot make a socket for ffmpeg: {}", std::strerror(errno)));
   if (::pipe2(errors.data(), O_CLOEXEC) != 0) {
     const int error = errno;
     for (const int fd : pixels) ::close(fd);
-    return fail(Errc::internal, fmt::format("a pipe for ffmpeg: {}", std::strerror(error)));
+    return fail(Errc::internal, fmt::format("cannot make a pipe for ffmpeg: {}", std::strerror(error)));
   }
   const auto program =
       spawn({asked.ffmpeg, command(asked), {pixels[1], kDevNull, errors[1]}, inherits, true});

@@ -30,8 +30,8 @@
 namespace ls::coordinator {
 
 // Decides which coordinators count as dead: those without a heartbeat in `looks` consecutive polls. It counts
-// polls, not seconds, and starts counting again after this process or Redis was stopped for a while, so that
-// such a pause does not count against the others.
+// polls, not seconds. After this process or Redis was stopped for a while, the caller must call
+// begin_again(), or the pause counts against the others.
 class FailureDetector {
  public:
   explicit FailureDetector(int looks) : looks_(looks) {}

@@ -80,7 +80,7 @@ TEST(RawGrid, RefusesHeadersThatTheFileDoesNotBear) {
   EXPECT_THAT(error(f), HasSubstr("more than the limit"));
   f = {};
   f.box[4] = -2;
-  EXPECT_THAT(error(f), HasSubstr("a box from -2 to -2 along axis 1"));
+  EXPECT_THAT(error(f), HasSubstr("empty or not finite along axis 1: -2 to -2"));
   f.box[4] = std::numeric_limits<float>::infinity();
   EXPECT_THAT(error(f), HasSubstr("along axis 1"));
 }

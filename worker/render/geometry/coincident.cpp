@@ -11,6 +11,7 @@ namespace ls::render {
 namespace {
 
 // The largest number of pairs of shapes or flat pieces that are compared; this takes about half a second.
+// With more, all surfaces are treated as coincident.
 constexpr std::uint64_t kMaxSurfacePairs = std::uint64_t{1} << 27;
 
 struct Piece {  // a triangle, or half of the square about a disk

@@ -208,10 +208,10 @@ inline V3 offset_point(const V3& p, const V3& ng, float reach, const V3& w) {
 inline V3 offset_point(const SurfaceHit& hit, const V3& w) {
   return offset_point(hit.p, hit.ng, hit.reach, w);
 }
-// Returns the reach of a hit p on a shape that is intersected in double precision; `size` is the largest
-// distance of p from the shape's reference point. p itself is rounded to float32, so the largest coordinate
-// of p counts in full. `size` is multiplied by 2^-28, because an ulp of double is 2^-29 times one of float32,
-// and for a safety factor of 2.
+// Returns SurfaceHit::reach, the magnitude that bounds the rounding error of p, for a shape that is
+// intersected in double precision. p is rounded to float32, so its largest coordinate counts in full. `size`,
+// the largest distance of p from the shape's reference point, counts times 2^-28: an ulp of double is 2^-29
+// of one of float32, and there is a safety factor of 2.
 inline float reach_in_double(const V3& p, double size) {
   return std::max(largest(p), static_cast<float>(size * 0x1p-28));
 }

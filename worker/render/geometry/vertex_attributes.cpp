@@ -23,11 +23,10 @@ Result<void> check(const MeshAttribute& a, std::string_view file, const scene::A
                    double scale) {
   using As = scene::AttributeUse::As;
   if (use.as == As::number && a.components != 1)
-    return fail(
-        Errc::invalid_argument,
-        fmt::format("'{}': a bsdf reads the attribute \"{}\" as one number, but it has {}: give the mesh "
-                    "another one for it",
-                    file, a.name, a.components));
+    return fail(Errc::invalid_argument,
+                fmt::format("'{}': a bsdf reads the attribute \"{}\" as one number, but it has {}: name an "
+                            "attribute of one number instead",
+                            file, a.name, a.components));
   if (use.as == As::colour && a.components != 3)
     return fail(
         Errc::invalid_argument,
@@ -43,10 +42,11 @@ Result<void> check(const MeshAttribute& a, std::string_view file, const scene::A
   if (a.bytes && !use.in_light && largest * scale > 1.0001)
     return fail(
         Errc::invalid_argument,
-        fmt::format("'{}': the attribute \"{}\" is stored in bytes, which count from 0 to 255 (as in "
-                    "Mitsuba), and a bsdf reads numbers up to 1: give the texture scale = 0.00392157, or "
-                    "store floats from 0 to 1",
-                    file, a.name));
+        fmt::format(
+            "'{}': the attribute \"{}\" is stored in bytes, which are numbers from 0 to 255 (as in "
+            "Mitsuba), but a bsdf needs numbers up to 1: set `scale` of the texture to 0.00392157, or "
+            "store floats from 0 to 1",
+            file, a.name));
   return {};
 }
 

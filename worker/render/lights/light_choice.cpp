@@ -19,8 +19,8 @@ float probability(std::uint64_t words) { return static_cast<float>(static_cast<d
 
 }  // namespace
 
-// Moves the lights with a position to the front of the list. Area lights have a position and are already
-// first, so their order does not change.
+// Moves the lights with a position to the front of the list, where build_tree() expects them, unless they are
+// too few for a tree. Area lights have a position and are already first, so their order does not change.
 void Lights::sort_places_first() {
   if (std::count_if(lights_.begin(), lights_.end(), has_place) < kTreeFrom) return;
   std::stable_partition(lights_.begin(), lights_.end(), has_place);

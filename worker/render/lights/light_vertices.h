@@ -157,7 +157,7 @@ class LightVertices {
     const LightVertex* vertex = nullptr;  // null: no vertex can be seen from x
     float weight = 0;                     // 1 / (expected number of times that this vertex is chosen)
   };
-  // Loads the block of vertices from which choose() will choose into the processor's caches.
+  // Prefetches into the processor's caches the vertices that choose() will need for the same `block`.
   void prefetch(std::uint32_t block) const;
   // Chooses a light vertex for x. `block` is 32 uniform random bits; u is uniform in [0, 1).
   Choice choose(const Receiver& x, std::uint32_t block, float u) const;

@@ -61,8 +61,9 @@ Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d
     unit_to_scene = unit_to_scene * box;
   }
   if (!unit_to_scene.invertible()) {
-    return fail(Errc::invalid_argument,
-                fmt::format("{}: the grid is placed by a map without inverse", files.name(v.file)));
+    return fail(Errc::invalid_argument, fmt::format("{}: the grid's transform (to_world, and the file's "
+                                                    "bounding box if it is used) cannot be inverted",
+                                                    files.name(v.file)));
   }
   const int n[3] = {static_cast<int>(data->nx), static_cast<int>(data->ny), static_cast<int>(data->nz)};
   if (node_centred && std::min({n[0], n[1], n[2]}) < 2) {
@@ -107,7 +108,9 @@ Result<LoadedVolume> vdb_file(const GridVolume& v, const AssetLoader& files, V3d
   std::copy(std::begin(raw.index_to_scene), std::end(raw.index_to_scene), t.m.begin());
   const Affine nodes_to_scene = Affine(v.to_world) * Affine(t);
   if (!nodes_to_scene.invertible()) {
-    return fail(Errc::invalid_argument, fmt::format("{}: the grid's transform has no inverse", name));
+    return fail(
+        Errc::invalid_argument,
+        fmt::format("{}: the grid's transform (to_world times the file's own) cannot be inverted", name));
   }
   const std::array<int, 3> size{raw.size[0], raw.size[1], raw.size[2]};
   const auto of = static_cast<std::size_t>(raw.channels);

@@ -42,10 +42,11 @@ Result<HenyeyGreenstein> phase_of(const Scene& scene, PhaseIndex i) {
 Result<void> check_extinction(const Rgb& sigma, double largest, double world_scale) {
   for (const double s : sigma) {
     if (s <= kMaxExtinction && s * largest <= kMaxExtinction) continue;
-    return fail(Errc::invalid_argument,
-                fmt::format("a medium's extinction reaches {} per scene unit: check its sigma_t, scale and "
-                            "densities",
-                            s * largest * world_scale));
+    return fail(
+        Errc::invalid_argument,
+        fmt::format("a medium's extinction reaches {} per scene unit, more than the limit of {}: reduce "
+                    "its sigma_t, scale or densities",
+                    s * std::max(largest, 1.) * world_scale, kMaxExtinction * world_scale));
   }
   return {};
 }

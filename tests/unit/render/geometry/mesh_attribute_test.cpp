@@ -194,7 +194,7 @@ TEST(MeshAttributes, OfBytesNeedAScale) {
       builder.bsdf(DiffuseBsdf{attribute(builder, "vertex_color", scale)});
     };
   };
-  EXPECT_THAT(refusal(bytes, diffuse(1)), HasSubstr("stored in bytes, which count from 0 to 255"));
+  EXPECT_THAT(refusal(bytes, diffuse(1)), HasSubstr("stored in bytes, which are numbers from 0 to 255"));
   EXPECT_EQ(refusal(bytes, diffuse(.00392157)), "");
 }
 

@@ -321,10 +321,10 @@ TEST(World, RefusesGridsThatAreNotNumbersOrHaveNoPlace) {
   };
   EXPECT_THAT(error_of(with_grid(std::nanf(""), kBox)), HasSubstr("grid.vol"));
   EXPECT_THAT(error_of(with_grid(std::numeric_limits<float>::infinity(), kBox)), HasSubstr("grid.vol"));
-  EXPECT_THAT(error_of(with_grid(1, test::scale(0))), HasSubstr("inverse"));
+  EXPECT_THAT(error_of(with_grid(1, test::scale(0))), HasSubstr("inverted"));
   // Finite maps whose determinants are not, or have no finite inverse.
-  EXPECT_THAT(error_of(with_grid(1, test::scale(1e200))), HasSubstr("inverse"));
-  EXPECT_THAT(error_of(with_grid(1, test::scale(1e-105))), HasSubstr("inverse"));
+  EXPECT_THAT(error_of(with_grid(1, test::scale(1e200))), HasSubstr("inverted"));
+  EXPECT_THAT(error_of(with_grid(1, test::scale(1e-105))), HasSubstr("inverted"));
   EXPECT_EQ(error_of(with_grid(1, kBox)), "");
 }
 
