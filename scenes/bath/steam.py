@@ -65,7 +65,8 @@ class Flow:
         return (.95 * smoothstep(.44, .66, banks) / (1 + away * away)).astype(np.float32)
 
     def project(self, velocity):
-        hat = [np.fft.rfftn(velocity[..., c]) for c in range(3)]
+        # In float64: numpy 2 would transform float32 in float32, with other bytes than numpy 1
+        hat = [np.fft.rfftn(velocity[..., c].astype(np.float64)) for c in range(3)]
         along = sum(k * f for k, f in zip(self.k, hat))
         return np.stack([np.fft.irfftn(f - k * along, self.n) for f, k in zip(hat, self.k_over_k2)], -1).astype(np.float32)
 
