@@ -3,6 +3,8 @@
 #include <pthread.h>
 #include <signal.h>
 
+#include <utility>
+
 #include "cli/output/console.h"
 
 namespace ls::cli {
@@ -33,11 +35,12 @@ Interrupt::Interrupt() {
 }
 
 void Interrupt::on_signal(std::function<void()> stop) {
-  thread_ = std::jthread([this, stop = std::move(stop)] {
+  thread_ = std::jthread([stop = std::move(stop)] {
     const sigset_t set = watched();
     int signal = 0;
+    bool stopping = false;
     while (sigwait(&set, &signal) == 0 && signal != SIGUSR1) {
-      if (happened_.exchange(true)) die_of(signal);
+      if (std::exchange(stopping, true)) die_of(signal);
       print_note("lightshaft: stopping; once more ends at once");
       stop();
     }

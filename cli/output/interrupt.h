@@ -2,7 +2,6 @@
 // process in the usual way.
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <thread>
 
@@ -18,10 +17,8 @@ class Interrupt {
 
   // Calls `stop` once, on a separate thread, at the first signal. Call once.
   void on_signal(std::function<void()> stop);
-  bool happened() const { return happened_; }
 
  private:
-  std::atomic<bool> happened_{false};
   std::jthread thread_;
 };
 

@@ -42,7 +42,7 @@ std::optional<Ahead> ahead_of(const Json& report, const Json& last, const Clock&
   if (!flag(forecast, "asked", false) || !(more > 0) || !(now > 0)) return std::nullopt;
   const double pace = clock.id == std::string_view(kCores.id) ? 1 : now / number(last, "core_seconds");
   if (!std::isfinite(pace)) return std::nullopt;
-  Ahead ahead{now + pace * more, 0, 0, 0};
+  Ahead ahead{now + pace * more};
   if (const auto ci = interval(forecast, "core_seconds_ci95"); ci && !doubtful(report)) {
     ahead.x_lo = now + pace * ci->first;
     ahead.x_hi = now + pace * ci->second;

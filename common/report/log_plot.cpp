@@ -8,6 +8,7 @@
 #include <iterator>
 
 #include "common/report/html.h"
+#include "common/report/log_axis.h"
 #include "common/report/phrases.h"
 #include "common/report/words.h"
 
@@ -134,7 +135,7 @@ class Drawing {
   void draw_grid() {
     const double bottom = y_.from, top = y_.to;
     text_ += R"(<g class="grid">)";
-    for (const Tick& t : ticks(x_, plot_.x_unit)) {
+    for (const Tick& t : ticks(x_, AxisUnit::seconds)) {
       const double x = x_.at(t.value);
       fmt::format_to(out(), R"(<path{} d="M{:.1f} {:.1f}V{:.1f}"/>)", t.major ? R"( class="major")" : "", x,
                      top, bottom);
@@ -193,15 +194,11 @@ class Drawing {
     }
     fmt::format_to(out(), R"(<path class="ahead c0" d="M{:.1f} {:.1f}L{:.1f} {:.1f}"/>)", x0, y0, x, y);
     fmt::format_to(out(), R"(<path class="dot c0" d="M{:.1f} {:.1f}l5 5l-5 5l-5 -5z"/>)", x, y - 5);
-    if (ahead.x_with_more > last.x)
-      fmt::format_to(out(), R"(<path class="more c0" d="M{:.1f} {:.1f}l5 5l-5 5l-5 -5z"/>)",
-                     x_.at(ahead.x_with_more), y - 5);
   }
 
   std::string said(const CurvePoint& p) const {
-    const std::string x = plot_.x_unit == AxisUnit::seconds ? duration(p.x) : figure(p.x);
     const std::string ci = has_band(p) ? fmt::format(" ({} to {})", figure(p.lo), figure(p.hi)) : "";
-    return fmt::format("{}{} at {}", figure(p.y), ci, x);
+    return fmt::format("{}{} at {}", figure(p.y), ci, duration(p.x));
   }
 
   void draw_curve(std::size_t index) {
@@ -274,7 +271,7 @@ std::string_view plot_css() {
 .plot .dots{fill:var(--k);stroke:var(--paper);stroke-width:.8}.plot .dot{fill:var(--k)}
 .plot .target{fill:none;stroke:var(--aim);stroke-width:1.5;stroke-dasharray:6 4}.plot .target-text{fill:var(--aim)}
 .plot .ahead{fill:none;stroke:var(--k);stroke-width:2;stroke-dasharray:.1 6;stroke-linecap:round}
-.plot .span,.plot .more{fill:none;stroke:var(--k);stroke-width:1.6}
+.plot .span{fill:none;stroke:var(--k);stroke-width:1.6}
 @media print{.plot{--ink:#000;--soft:#444;--line:#eee;--mid:#ccc}}
 )";
 }

@@ -7,8 +7,6 @@
 #include <string_view>
 #include <vector>
 
-#include "common/report/log_axis.h"
-
 namespace ls::report {
 
 struct CurvePoint {
@@ -27,15 +25,13 @@ inline constexpr std::size_t kMostCurvePoints = 512;
 // A predicted point: the x at which the first curve will reach the target.
 struct Ahead {
   double x = 0, x_lo = 0, x_hi = 0;  // x with its interval; x_lo = x_hi = 0: there is none
-  double x_with_more = 0;            // the x at which the target is reached with more workers; 0: unknown
 };
 
 struct LogPlot {
-  std::string id;       // letters, digits and -; must be unique in its page
-  std::string title;    // title for screen readers
-  std::string summary;  // description in one sentence
-  std::string x_title, y_title;
-  AxisUnit x_unit = AxisUnit::seconds;
+  std::string id;                // letters, digits and -; must be unique in its page
+  std::string title;             // title for screen readers
+  std::string summary;           // description in one sentence
+  std::string x_title, y_title;  // x is in seconds
   std::vector<Curve> curves;
   std::optional<double> target;  // horizontal line at this y
   std::optional<Ahead> ahead;    // drawn only with a target

@@ -32,7 +32,6 @@ class UnitFailures {
   // kUnitFailureAttempts attempts. `workers_known`: connected workers that could render the job.
   bool exhausted(UnitCode code, std::size_t workers_known) const;
   const std::vector<FailedAttempt>& attempts(UnitCode code) const;
-  bool any() const { return !units_.empty(); }
   void mark_workers(std::vector<bool>& used) const {
     for (const auto& [code, attempts] : units_)
       for (const FailedAttempt& attempt : attempts) used[attempt.worker] = true;

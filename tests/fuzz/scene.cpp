@@ -67,10 +67,8 @@ void scene_xml(Bytes input) {
   ReadOptions options;
   options.defines = {{"n", "2"}, {"name", "a#.png"}};
   if (input.size() % 2) options.frame = 7;
-  if (is_nori_test(text_of(input))) {
-    const auto read = read_nori_test("fuzz.xml", text_of(input), files, options);
-    return check_diagnostics(read.diagnostics, read.test.has_value());
-  }
+  const auto as_test = read_nori_test("fuzz.xml", text_of(input), files, options);
+  check_diagnostics(as_test.diagnostics, as_test.test.has_value());
   const auto read = read_scene("fuzz.xml", text_of(input), files, options);
   check_diagnostics(read.diagnostics, read.scene.has_value());
   if (read.scene) check_scene(*read.scene, files);

@@ -17,7 +17,6 @@ void GapMeter::add(double seconds) {
   const double step = seconds > kFirst ? kStepsPerOctave * std::log2(seconds / kFirst) : 0;
   ++counts_[static_cast<std::size_t>(std::min(step, kSteps - 1.))];
   ++count_;
-  total_ += seconds;
   longest_ = std::max(longest_, seconds);
 }
 

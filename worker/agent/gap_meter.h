@@ -13,8 +13,6 @@ class GapMeter {
  public:
   void add(double seconds);
   std::uint64_t count() const { return count_; }
-  double total() const { return total_; }      // seconds
-  double longest() const { return longest_; }  // seconds
   // Returns the quantile q (0 to 1) of the gaps in seconds; 0 if there were none.
   double quantile(double q) const;
   std::string text() const;  // a summary for the log
@@ -23,7 +21,7 @@ class GapMeter {
   static constexpr int kSteps = 8 * 32;
   std::array<std::uint64_t, kSteps> counts_{};
   std::uint64_t count_ = 0;
-  double total_ = 0, longest_ = 0;
+  double longest_ = 0;  // seconds
 };
 
 }  // namespace ls::worker

@@ -133,15 +133,6 @@ class TestReader {
 }  // namespace
 }  // namespace scene
 
-bool is_nori_test(std::string_view text) {
-  scene::Report report(false);
-  std::size_t elements_left = scene::kMaxElements;
-  if (text.size() > scene::kMaxTextBytes) return false;
-  const std::uint32_t file = report.add_file(scene::SourceText("", std::string(text)));
-  const auto root = scene::parse_xml(file, report, elements_left);
-  return root && root->tag == "test";
-}
-
 NoriTestResult read_nori_test(std::string_view file_name, std::string_view text, AssetSource& assets,
                               const ReadOptions& options) {
   scene::Report report(options.strict);

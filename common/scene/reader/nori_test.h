@@ -42,9 +42,6 @@ struct NoriTestResult {
   std::vector<Diagnostic> diagnostics;
 };
 
-// True if the root element of this text is a <test>; false if it is not, or if the text is not XML.
-bool is_nori_test(std::string_view text);
-
 // Reads a Nori test. Errors are reported as by read_scene().
 NoriTestResult read_nori_test(std::string_view file_name, std::string_view text, AssetSource& assets,
                               const ReadOptions& options = {});

@@ -66,7 +66,6 @@ class Reader {
   std::string hint_for(const Element& reference) const;
   void read_child(const Element& child);
   void read_idle_parts();
-  void warn_unused_sensor(const Element& e);
 
   std::optional<TextureIndex> read_texture(const Element& e);
   template <class T>

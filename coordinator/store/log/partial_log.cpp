@@ -218,7 +218,6 @@ Result<void> PartialLog::scan(std::uint32_t segment, bool last) {
   if (at == size) return {};
   // In a segment other than the last this is disk damage. The units behind it are rendered again, and the
   // bytes are kept for examination.
-  cut_bytes_ += size - at;
   log_warn(fmt::format("file={} offset={} bytes={}", path.string(), at, size - at),
            last ? "cut a torn record" : "left out damaged records; their units are rendered again");
   if (last && ::ftruncate(file->fd(), static_cast<off_t>(at)) != 0)

@@ -58,7 +58,6 @@ class PartialLog {
   static Result<std::unique_ptr<PartialLog>> open(std::filesystem::path folder);
 
   const std::vector<Entry>& found() const { return found_; }  // records found by open()
-  std::uint64_t cut_bytes() const { return cut_bytes_; }      // torn or damaged bytes skipped by open()
   void forget_found() { std::vector<Entry>().swap(found_); }
 
   // On an error the file is unchanged.
@@ -86,7 +85,6 @@ class PartialLog {
   std::optional<Error> lost_;       // set if a full segment could not be synced; reported by the next sync()
   std::vector<RawHeader> headers_;  // headers of the records in the current segment
   std::vector<Entry> found_;
-  std::uint64_t cut_bytes_ = 0;
 };
 
 }  // namespace ls::coordinator

@@ -1,6 +1,6 @@
 #include "worker/agent/gap_meter.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 namespace ls::worker {
 namespace {
@@ -15,8 +15,7 @@ TEST(GapMeter, SaysQuantilesToAStepOfItsHistogram) {
   GapMeter gaps;
   for (int i = 1; i <= 1000; ++i) gaps.add(i * 1e-5);  // 10 us to 10 ms
   EXPECT_EQ(gaps.count(), 1000u);
-  EXPECT_DOUBLE_EQ(gaps.longest(), 1e-2);
-  EXPECT_NEAR(gaps.total(), 5.005, 1e-9);
+  EXPECT_THAT(gaps.text(), testing::HasSubstr("longest 10.00 ms"));
   // The upper end of the bucket that holds the quantile: at most a factor 2^(1/8) above it, never below.
   for (const double q : {.01, .5, .99}) {
     EXPECT_GE(gaps.quantile(q), q * 1e-2 * (1 - 1e-12)) << q;
@@ -30,7 +29,7 @@ TEST(GapMeter, TakesWhatClocksMakeOfNoGapAtAllAndWhatNoBucketHolds) {
   gaps.add(-1e-7);
   gaps.add(1e9);
   EXPECT_EQ(gaps.count(), 2u);
-  EXPECT_DOUBLE_EQ(gaps.total(), 1e9);
+  EXPECT_NEAR(gaps.quantile(.5), 0, 1.1e-6) << "the end of the first bucket";
   EXPECT_DOUBLE_EQ(gaps.quantile(1), 1e9);
 }
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "common/scene/schema/bsdf_traits.h"
 #include "worker/render/bsdf/bsdf.h"
 
 namespace ls::render::test {
@@ -51,6 +52,9 @@ inline std::unique_ptr<Bench> bench(Scene scene, const ImageData& image = {}) {
   b->bsdf = {static_cast<std::uint32_t>(b->scene.bsdfs.size() - 1)};
   return b;
 }
+
+// True if shadow rays must ask the material what passes straight through it.
+inline bool passes_light(const Bench& b) { return scene::bsdf_traits(b.scene)->at(b.bsdf.value).passes; }
 
 inline const Rgb kGoldEta{.14, .37, 1.44}, kGoldK{3.98, 2.38, 1.60};
 

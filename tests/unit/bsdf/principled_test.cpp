@@ -137,8 +137,7 @@ TEST(Principled, StaysFiniteAtEveryExtreme) {
 
 TEST(Principled, SaysWhatItNeeds) {
   const auto plain = bench(principled({})), stretched = bench(principled({.anisotropic = .1}));
-  EXPECT_FALSE(plain->bsdfs.reads_uv({0}) || plain->bsdfs.anisotropic({0}) ||
-               plain->bsdfs.has_null_transmission({0}));
+  EXPECT_FALSE(plain->bsdfs.reads_uv({0}) || plain->bsdfs.anisotropic({0}) || passes_light(*plain));
   EXPECT_TRUE(stretched->bsdfs.anisotropic({0}) && plain->bsdfs.has_smooth({0}));
 }
 

@@ -34,7 +34,7 @@ TEST(DiffuseTransmission, ReflectsOnTheSideOfTheViewerAndTransmitsToTheOther) {
 TEST(DiffuseTransmission, LetsNothingPassStraightOn) {
   const auto b = bench(leaf({.1, .2, .3}, {.6, .4, .2}));
   EXPECT_TRUE(b->bsdfs.has_smooth(b->bsdf));
-  EXPECT_FALSE(b->bsdfs.has_null_transmission(b->bsdf));
+  EXPECT_FALSE(passes_light(*b));
 }
 
 // A reader refuses the first; of images none knows before they are rendered.
@@ -129,7 +129,7 @@ TEST(RoughSheet, BelowTheSpecularLimitIsTheSmoothOne) {
   for (const Bench* one : {rough.get(), textured.get()})
     for (const double mu : {.9, .3, -.6}) {
       const V3 wo = direction(mu, 2);
-      EXPECT_TRUE(one->bsdfs.has_null_transmission(one->bsdf));
+      EXPECT_TRUE(passes_light(*one));
       const auto passes = one->bsdfs.null_transmission(one->bsdf, one->at, wo),
                  wanted = smooth->bsdfs.null_transmission(smooth->bsdf, smooth->at, wo);
       EXPECT_EQ(passes.transmission, wanted.transmission);
@@ -145,7 +145,7 @@ TEST(RoughSheet, BelowTheSpecularLimitIsTheSmoothOne) {
 
 TEST(RoughSheet, LetsNothingPassStraightOn) {
   const auto constant = bench(rough_sheet(Microfacet::ggx, .3, .3, 1.5));
-  EXPECT_FALSE(constant->bsdfs.has_null_transmission(constant->bsdf));
+  EXPECT_FALSE(passes_light(*constant));
   EXPECT_EQ(constant->bsdfs.null_transmission(constant->bsdf, constant->at, {0, 0, 1}).probability, 0);
 }
 

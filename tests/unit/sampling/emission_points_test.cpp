@@ -16,6 +16,11 @@ constexpr int kEmissionCells = 48, kEmissionSamples = 100000;
 constexpr double kDepths[] = {0, 1e-16, 1e-6, .5, 4, 40};
 constexpr float kSigmas[] = {1e-3f, .7f, 9.f};
 
+// The density of truncated_exponential().
+double truncated_exponential_pdf(double t, double k, double h) {
+  return std::exp(-k * t) / (h * mean_transmittance(k * h));
+}
+
 // Counts of `sample` by cells of [0, length] against the density's integral by Simpson's rule in 64 parts.
 template <class Pdf, class Sample>
 void compare(test::ChiSquareTally& tally, const std::string& name, double length, double slack, Pdf pdf,

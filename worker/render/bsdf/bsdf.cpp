@@ -55,7 +55,6 @@ Result<BsdfTable> BsdfTable::build(const Scene& scene, const TextureTable& textu
     Material m = std::visit([&](const auto& one) { return material_of(make_material(one, builder)); }, b);
     if (builder.refused())
       return fail(builder.error()->code, fmt::format("material {}: {}", i, builder.error()->message));
-    m.null_transmission = (*traits)[i].passes && !std::holds_alternative<NullBoundary>(m.kind);
     table.materials_.push_back(std::move(m));
   }
   table.clamped_ = builder.clamped();
@@ -127,7 +126,6 @@ std::uint64_t BsdfTable::clamped_inputs() const { return clamped_; }
 bool BsdfTable::is_null(BsdfIndex i) const {
   return std::holds_alternative<NullBoundary>(materials_[i.value].kind);
 }
-bool BsdfTable::has_null_transmission(BsdfIndex i) const { return materials_[i.value].null_transmission; }
 bool BsdfTable::has_smooth(BsdfIndex i) const {
   const Material& m = materials_[i.value];
   return with_kind(m.kind, [](const auto& k) { return k.kSmooth; }) ||

@@ -76,8 +76,6 @@ class BsdfTable {
 
   // True for an index-matched boundary: light passes unchanged
   bool is_null(BsdfIndex i) const;
-  // True if part of the light passes straight through and part does not
-  bool has_null_transmission(BsdfIndex i) const;
   // True if there is a lobe that is not a delta, so that next-event estimation is useful
   bool has_smooth(BsdfIndex i) const;
   // True if eval() depends on wo only by the side of the surface on which wo lies, and on wi only by its side

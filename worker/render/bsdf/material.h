@@ -12,7 +12,6 @@ namespace ls::render {
 
 struct BsdfTable::Material {
   VariantOf<DiffuseKinds, ConductorKinds, DielectricKinds, PlasticKinds, NestedKinds, PrincipledKinds> kind;
-  bool null_transmission = false;  // true if part of the light passes straight through and part does not
 };
 
 }  // namespace ls::render

@@ -17,7 +17,6 @@ using C3 = Imath::V3f;  // colours and other values per channel, in linear RGB
 
 inline constexpr float kPi = 3.14159265358979323846f;
 inline constexpr float kTwoPi = 6.28318530717958647692f;
-inline constexpr float kFourPi = 12.5663706143591729539f;
 inline constexpr float kInvPi = .318309886183790671538f;
 inline constexpr float kInvTwoPi = .159154943091895335769f;
 inline constexpr float kInvFourPi = .0795774715459476678845f;

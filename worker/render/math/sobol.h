@@ -111,8 +111,5 @@ inline std::array<std::uint32_t, 4> sobol4_reversed(std::uint32_t reversed_index
   return std::bit_cast<std::array<std::uint32_t, 4>>(detail::reverse_bits(
       scramble_reversed(detail::sobol_reversed(i), reinterpret_cast<detail::U32x4>(seeds))));
 }
-inline std::array<std::uint32_t, 4> sobol4(std::uint32_t index, std::uint64_t key) {
-  return sobol4_reversed(reverse_bits(index), key);
-}
 
 }  // namespace ls::render

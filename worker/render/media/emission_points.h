@@ -15,9 +15,6 @@ inline double truncated_exponential(double u, double k, double h) {
   if (!(k * h > 1e-14)) return u * h;
   return std::min(h, -std::log1p(u * std::expm1(-k * h)) / k);
 }
-inline double truncated_exponential_pdf(double t, double k, double h) {
-  return std::exp(-k * t) / (h * mean_transmittance(k * h));
-}
 
 // Samples a point on an interval with a field of density rho. The interval absorbs the share `absorbed` of
 // the light; s is the extinction per density and u a random number. Returns the integral of rho up to the

@@ -169,7 +169,7 @@ TEST(EnvironmentMap, AConstantMapIsSampledUniformly) {
     const std::uint32_t x = r.bits(), y = r.bits();
     const EnvironmentMap::Light l = m.at(m.sample(x, y));
     // Shares of 2^-32 words, of cells of 1/128 and more; float32.
-    EXPECT_NEAR(l.pdf * kFourPi, 1, 1e-5f);
+    EXPECT_NEAR(l.pdf * 4 * kPi, 1, 1e-5f);
     EXPECT_FLOAT_EQ(l.radiance.x, 3);
   }
   EXPECT_NEAR(m.flux(), 3 * 4 * kPiD, 1e-4);

@@ -11,6 +11,10 @@
 namespace ls::render {
 namespace {
 
+std::array<std::uint32_t, 4> sobol4(std::uint32_t index, std::uint64_t key) {
+  return sobol4_reversed(reverse_bits(index), key);
+}
+
 // Points 2^k with one in each elementary interval of area 2^-k: a (0, k, 2)-net in base 2.
 bool is_net(const std::vector<std::array<std::uint32_t, 2>>& points, int k) {
   for (int a = 0; a <= k; ++a) {

@@ -24,7 +24,6 @@ TEST(NoriTest, OfScenesHoldsThemWithTheirReferences) {
   <scene><mesh type="sphere"/>{0}</scene><scene><mesh type="obj"><string name="filename" value="mesh.obj"/></mesh>{0}</scene></test>)",
                                        kNoriCamera);
 
-  EXPECT_TRUE(is_nori_test(text));
   const auto r = read_test(text);
 
   ASSERT_TRUE(r.test) << format_diagnostics(r.diagnostics);
@@ -76,8 +75,7 @@ TEST(NoriTest, InErrorSaysWhatIsWrong) {
   EXPECT_THAT(told(R"(<test type="ttest"><float name="significanceLevel" value="1"/></test>)"),
               HasSubstr("out of its range"));
   EXPECT_THAT(told(nori_scene("")), HasSubstr("this is no test"));
-  EXPECT_FALSE(is_nori_test(nori_scene("")));
-  EXPECT_FALSE(is_nori_test("no xml"));
+  EXPECT_FALSE(read_test("no xml").test);
 }
 
 }  // namespace
