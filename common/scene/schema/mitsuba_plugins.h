@@ -31,7 +31,4 @@ const PluginRow* plugin_row(std::string_view tag, std::string_view name);  // nu
 bool is_read_plugin(std::string_view tag, std::string_view name);
 std::vector<std::string> read_plugins(std::string_view tag);  // names
 
-// Generates docs/reference/mitsuba.md.
-std::string mitsuba_markdown();
-
 }  // namespace ls::scene

@@ -64,7 +64,4 @@ struct IntegratorRow {
 std::span<const IntegratorRow> integrators();
 const IntegratorRow* integrator_row(std::string_view name);
 
-// Generates the section about Nori of docs/reference/scene-format.md.
-std::string markdown();
-
 }  // namespace ls::scene::nori

@@ -1,11 +1,8 @@
-// The table of Mitsuba's plugins against what the reader does with each of them, and its page.
+// The table of Mitsuba's plugins against what the reader does with each of them.
 #include "common/scene/schema/mitsuba_plugins.h"
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <set>
 
 #include "common/scene/schema/describe_fields.h"
@@ -14,16 +11,6 @@
 
 namespace ls::scene {
 namespace {
-
-TEST(MitsubaPage, IsWhatTheTableSays) {
-  const std::string path = LS_SOURCE_DIR "/docs/reference/mitsuba.md";
-  if (std::getenv("LIGHTSHAFT_UPDATE_DOCS")) std::ofstream(path) << mitsuba_markdown();
-  std::ifstream in(path);
-  const std::string committed{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-
-  EXPECT_EQ(committed, mitsuba_markdown())
-      << "run LIGHTSHAFT_UPDATE_DOCS=1 scene_test --gtest_filter='MitsubaPage.*' and commit the page";
-}
 
 // A scene with the plugin in a place of its kind.
 std::string scene_with(const PluginRow& row) {

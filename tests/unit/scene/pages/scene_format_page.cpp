@@ -1,5 +1,3 @@
-#include "common/scene/reader/format_doc.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -12,10 +10,9 @@
 #include "common/scene/schema/describe_fields.h"
 #include "common/scene/schema/integrators.h"
 #include "common/scene/schema/materials.h"
-#include "common/scene/schema/nori_words.h"
+#include "tests/unit/scene/pages/pages.h"
 
-namespace ls {
-namespace scene {
+namespace ls::scene {
 namespace {
 
 std::string text_of(const std::array<double, 3>& v) {
@@ -333,10 +330,8 @@ std::string names_section() {
 }
 
 }  // namespace
-}  // namespace scene
 
 std::string scene_format_markdown() {
-  using namespace scene;
   std::string out(kPreamble);
   add_variant<Geometry>(out, "Shapes");
   out += "Every shape has besides:\n\n";
@@ -367,4 +362,4 @@ std::string scene_format_markdown() {
   return out += kCanonical;
 }
 
-}  // namespace ls
+}  // namespace ls::scene

@@ -1,12 +1,12 @@
-// Generates docs/reference/mitsuba.md from the table.
 #include <fmt/format.h>
 
 #include "common/scene/schema/mitsuba_plugins.h"
+#include "tests/unit/scene/pages/pages.h"
 
 namespace ls::scene {
 namespace {
 
-constexpr std::string_view kHead = R"(# Plugins of Mitsuba
+constexpr std::string_view kMitsubaHead = R"(# Plugins of Mitsuba
 
 <!-- Made by mitsuba_markdown() from the table in common/scene/schema/mitsuba_plugins.cpp; do not edit. -->
 
@@ -33,7 +33,7 @@ std::string_view text_of(Origin origin) {
 }  // namespace
 
 std::string mitsuba_markdown() {
-  std::string out(kHead);
+  std::string out(kMitsubaHead);
   for (const PluginRow& row : mitsuba_plugins())
     out += fmt::format("| {} | `{}` | {} | {} | {} |\n", row.tag, row.name, text_of(row.origin),
                        text_of(row.standing), row.note);

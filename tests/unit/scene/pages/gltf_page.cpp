@@ -1,10 +1,9 @@
-#include "common/scene/gltf/doc.h"
-
 #include <fmt/format.h>
 
 #include "common/scene/gltf/words.h"
+#include "tests/unit/scene/pages/pages.h"
 
-namespace ls {
+namespace ls::scene {
 namespace {
 
 constexpr std::string_view kGltfHead = R"(# Scenes of glTF
@@ -44,8 +43,8 @@ lightshaft render helmet.gltf -D environment=1 -o helmet.exr
 - **Samples**: 64 a pixel, paths of any depth; `--spp`, `--size` and the others choose otherwise.
 )";
 
-std::string_view effect(scene::gltf::Use use) {
-  using scene::gltf::Use;
+std::string_view effect(gltf::Use use) {
+  using gltf::Use;
   return use == Use::read ? "" : use == Use::ignored ? "no effect: " : "refused: ";
 }
 
@@ -54,7 +53,7 @@ std::string_view effect(scene::gltf::Use use) {
 std::string gltf_markdown() {
   std::string out(kGltfHead);
   out += "\n## Objects\n\n| object | members | what becomes of them |\n|---|---|---|\n";
-  for (const scene::gltf::Row& row : scene::gltf::objects())
+  for (const gltf::Row& row : gltf::objects())
     out += fmt::format("| `{}` | {} | {}{} |\n", row.where, row.name, effect(row.use), row.meaning);
   out +=
       "\n## Extensions\n\nWhat is refused is an error only if the file requires it; else its fallback is "
@@ -62,9 +61,9 @@ std::string gltf_markdown() {
       "this list, is a warning, and an error if the file requires it and it is not in this list.\n\n| "
       "extension | what "
       "becomes of it |\n|---|---|\n";
-  for (const scene::gltf::Row& row : scene::gltf::extensions())
+  for (const gltf::Row& row : gltf::extensions())
     out += fmt::format("| `{}` | {}{} |\n", row.name, effect(row.use), row.meaning);
   return out;
 }
 
-}  // namespace ls
+}  // namespace ls::scene

@@ -1,7 +1,7 @@
-// Generates the section on Nori of docs/reference/scene-format.md from the table.
 #include <fmt/format.h>
 
 #include "common/scene/schema/nori_words.h"
+#include "tests/unit/scene/pages/pages.h"
 
 namespace ls::scene::nori {
 namespace {

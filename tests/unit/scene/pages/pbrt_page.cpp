@@ -1,19 +1,18 @@
-#include "common/scene/pbrt/doc.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <tuple>
 
 #include "common/scene/pbrt/words.h"
+#include "tests/unit/scene/pages/pages.h"
 
-namespace ls {
+namespace ls::scene {
 namespace {
 
-using scene::pbrt::Row;
-using scene::pbrt::Word;
+using pbrt::Row;
+using pbrt::Word;
 
-constexpr std::string_view kHead = R"(# Scenes of pbrt
+constexpr std::string_view kPbrtHead = R"(# Scenes of pbrt
 
 <!-- Made by pbrt_markdown() from the table in common/scene/pbrt/words.cpp; do not edit. -->
 
@@ -92,12 +91,11 @@ bool same_words(const Row& a, const Row& b) {
 }  // namespace
 
 std::string pbrt_markdown() {
-  std::string out(kHead);
+  std::string out(kPbrtHead);
   out += "\n## Directives\n\n| directive | what it does |\n|---|---|\n";
-  for (const auto& d : scene::pbrt::plain_directives())
-    out += fmt::format("| `{}` | {} |\n", d.name, d.meaning);
+  for (const auto& d : pbrt::plain_directives()) out += fmt::format("| `{}` | {} |\n", d.name, d.meaning);
   out += "\n## Objects that are read\n";
-  const auto rows = scene::pbrt::rows();
+  const auto rows = pbrt::rows();
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Row& row = rows[i];
     if (!row.is_read) continue;
@@ -112,4 +110,4 @@ std::string pbrt_markdown() {
   return out;
 }
 
-}  // namespace ls
+}  // namespace ls::scene
