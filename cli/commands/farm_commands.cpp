@@ -103,10 +103,9 @@ int video(FarmApi& api, const FarmFlags& flags) {
   }
   if (!flags.exposure.empty()) {
     const auto stops = parse_number<double>(flags.exposure);
-    if (!stops || !(std::abs(*stops) <= coordinator::limits::kMaxVideoStops))
-      return usage_error(fmt::format("--exposure '{}': it must be a number of stops from -{} to {}",
-                                     flags.exposure, coordinator::limits::kMaxVideoStops,
-                                     coordinator::limits::kMaxVideoStops));
+    if (!stops || !(std::abs(*stops) <= coordinator::limits::kMaxExposure))
+      return usage_error(fmt::format("--exposure '{0}': it must be a number of stops from -{1} to {1}",
+                                     flags.exposure, coordinator::limits::kMaxExposure));
     asked["exposure"] = *stops;
   }
   if (flags.denoised) asked["layer"] = "denoised";

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "cli/output/console.h"
-#include "coordinator/http/message/limits.h"
+#include "common/scene/limits.h"
 #include "worker/machine.h"
 
 namespace ls::cli {
@@ -21,7 +21,7 @@ constexpr std::uint64_t kLittleMemory = std::uint64_t{2} << 30;
 // each scene twice, as XML and in canonical form, so a disk with less than twice the size of the largest XML
 // may not hold even a scene without other files. The OpenVDB file of a cloud has hundreds of MiB, so a few of
 // them fill 1 GiB.
-constexpr std::uint64_t kNoRoom = 2 * http::kMaxSceneXml, kLittleRoom = std::uint64_t{1} << 30;
+constexpr std::uint64_t kNoRoom = 2 * scene::kMaxTextBytes, kLittleRoom = std::uint64_t{1} << 30;
 // Differences between clocks, in seconds. Receivers of webhooks reject signatures that are several minutes
 // old (docs/guide/operations.md), so a difference of up to a minute does no harm. S3 rejects requests whose
 // time differs by more than 15 minutes.

@@ -70,7 +70,8 @@ Result<std::uint64_t> parse_bytes(const std::string& what, const std::string& te
 Result<double> parse_positive(const std::string& what, const std::string& text, double most) {
   const auto value = parse_number<double>(text);
   if (!value || !std::isfinite(*value) || !(*value > 0) || *value > most)
-    return bad_argument(fmt::format("{} '{}': it must be a number above 0, at most {:g}", what, text, most));
+    return bad_argument(
+        fmt::format("{} '{}': it must be a number above 0, at most {:.9g}", what, text, most));
   return *value;
 }
 

@@ -15,7 +15,7 @@ inline constexpr std::uint64_t kMaxUnits = std::uint64_t{1} << 26;
 // Largest size of a film's sums in bytes: all AOVs of a UHD frame take about 5 GB, colour alone of the
 // largest frame 3.2 GB.
 inline constexpr std::uint64_t kMaxFilmBytes = std::uint64_t{8} << 30;
-inline constexpr double kMaxSeconds = 1e9;  // longest time budget
+inline constexpr double kMaxSeconds = 365.0 * 86400;  // longest time budget
 inline constexpr double kMaxTargetError = 1e6;
 inline constexpr int kMaxPriority = 1'000'000;  // largest absolute value of a priority
 // Largest size in bytes of the text of a spec or of settings

@@ -49,6 +49,7 @@ inline constexpr std::size_t kMaxGltfMeshBytes = std::size_t{1} << 30;
 inline constexpr int kMaxReferenceDepth = 64;
 // Depth of nested bsdfs; a blend of this depth may contain 2^7 bsdfs
 inline constexpr int kMaxBsdfNesting = 8;
+inline constexpr double kMaxTemperature = 1e6;  // kelvin of a black body
 inline constexpr std::size_t kMaxDiagnostics = 20;
 inline constexpr std::size_t kMaxExcerptBytes = 160;  // bytes of a source line that a message shows
 inline constexpr std::size_t kMaxSceneJsonBytes = std::size_t{256} << 20;

@@ -14,6 +14,7 @@
 #include "common/scene/analysis/needs.h"
 #include "common/scene/analysis/prune.h"
 #include "common/scene/json/serialize.h"
+#include "common/scene/limits.h"
 #include "common/scene/schema/integrators.h"
 #include "common/scene/schema/nori_words.h"
 #include "coordinator/admission/cryptomatte_manifests.h"
@@ -109,9 +110,8 @@ Result<void> check_spec(const JobSpec& spec) {
   if (spec.target_layer == TargetLayer::denoised && !spec.target_error)
     return tl::unexpected(
         invalid("target_layer says which error target_error means, and there is no target_error: give one"));
-  if (spec.time && !(std::isfinite(*spec.time) && *spec.time > 0 && *spec.time <= limits::kMaxTimeSeconds))
-    return tl::unexpected(
-        invalid(fmt::format("time must be between 0 and {} seconds", limits::kMaxTimeSeconds)));
+  if (spec.time && !(std::isfinite(*spec.time) && *spec.time > 0 && *spec.time <= kMaxSeconds))
+    return tl::unexpected(invalid(fmt::format("time must be between 0 and {} seconds", kMaxSeconds)));
   if (spec.spp && (*spec.spp == 0 || *spec.spp > limits::kMaxSpp))
     return fail(Errc::invalid_argument,
                 fmt::format("{} samples per pixel: it must be 1 to {}", *spec.spp, limits::kMaxSpp));
@@ -174,9 +174,9 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
   const auto refuse = [](Error error, std::vector<Diagnostic> found = {}) {
     return tl::unexpected(rejected(std::move(error), std::move(found)));
   };
-  if (request.scene_text.size() > limits::kMaxSceneText)
+  if (request.scene_text.size() > scene::kMaxTextBytes)
     return refuse({Errc::invalid_argument, fmt::format("the scene text has {} bytes; {} are allowed",
-                                                       request.scene_text.size(), limits::kMaxSceneText)});
+                                                       request.scene_text.size(), scene::kMaxTextBytes)});
   if (request.assets.size() > limits::kMaxAssets)
     return refuse({Errc::invalid_argument, fmt::format("{} assets were named; {} are allowed",
                                                        request.assets.size(), limits::kMaxAssets)});

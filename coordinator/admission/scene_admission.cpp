@@ -4,7 +4,7 @@
 
 #include <map>
 
-#include "coordinator/base/limits.h"
+#include "common/scene/limits.h"
 
 namespace ls::coordinator {
 namespace {
@@ -27,9 +27,9 @@ class UploadedAssets final : public AssetSource {
   Result<std::string> text(std::string_view name) override {
     const auto asset = find(name, true);
     if (!asset) return tl::unexpected(asset.error());
-    if (asset->bytes > limits::kMaxIncludeBytes)
+    if (asset->bytes > scene::kMaxTextBytes)
       return fail(Errc::invalid_argument, fmt::format("\"{}\" has {} bytes; an included scene may have {}",
-                                                      name, asset->bytes, limits::kMaxIncludeBytes));
+                                                      name, asset->bytes, scene::kMaxTextBytes));
     const auto bytes = blobs_.read(asset->digest, 0, asset->bytes);
     if (!bytes) return tl::unexpected(bytes.error());
     text_bytes_ += bytes->size();

@@ -17,13 +17,10 @@ inline constexpr std::uint64_t kMaxBlobBytes = std::uint64_t{1} << 36;
 inline constexpr std::uint64_t kMaxBlobRead = std::uint64_t{256} << 20;  // bytes that one read() returns
 // Interrupted uploads that are kept so that they can be resumed
 inline constexpr std::size_t kMaxUnfinishedUploads = 1024;
-// Bytes of one file that a scene includes
-inline constexpr std::uint64_t kMaxIncludeBytes = std::uint64_t{32} << 20;
 // Time between two checks for blobs that paused jobs need
 inline constexpr Duration kMissingBlobLook = std::chrono::seconds(1);
 
 // Submission
-inline constexpr std::size_t kMaxSceneText = std::size_t{32} << 20;
 inline constexpr std::size_t kMaxAssets = 100'000;  // files that one submission may name
 inline constexpr std::size_t kMaxWarnings = 100;    // warnings kept per job
 // Longer names of jobs and workers are cut to this many bytes
@@ -33,7 +30,6 @@ inline constexpr std::size_t kMaxJobsOfUser = 25'000;  // how many of the kMaxJo
 using ls::kMaxFramePixels;
 using ls::kMaxFrameSide;
 using ls::kMaxSpp;
-inline constexpr double kMaxTimeSeconds = 365.0 * 86400;
 
 // Sequences (the limit on the number of frames is in common/base/frame_range.h)
 
@@ -47,10 +43,10 @@ inline constexpr std::uint64_t kMaxWokenPixels = std::uint64_t{1} << 26;
 // Sequences with more frames than this send progress events less often
 inline constexpr std::size_t kFramesPerEvent = 2500;
 
-// Videos of sequences
+// Pictures and videos
+inline constexpr double kMaxExposure = 32;  // stops, positive or negative
 inline constexpr double kMinVideoFps = 1, kMaxVideoFps = 120;
-inline constexpr double kMaxVideoStops = 32;  // exposure, positive or negative
-inline constexpr int kMaxVideoSide = 3840;    // pixels; larger images are shown at half the size, and so on
+inline constexpr int kMaxVideoSide = 3840;  // pixels; larger images are shown at half the size, and so on
 inline constexpr std::uint64_t kMaxVideoBytes = std::uint64_t{2} << 30;
 inline constexpr std::size_t kMaxVideosWaiting = 8;               // videos that wait while one is made
 inline constexpr Duration kMaxVideoTime = std::chrono::hours(1);  // time to make one video
@@ -75,7 +71,6 @@ inline constexpr int kVerifyThreads = 2;
 
 // Workers
 inline constexpr std::size_t kMaxWorkers = 16'384;
-inline constexpr std::size_t kMaxTags = 64;
 
 // Snapshots of a job's image. A snapshot is taken when kSnapshotUnits units have been added to the image
 // since the previous one, or when kSnapshotSeconds have passed. Adding that many units again after a crash

@@ -17,9 +17,9 @@ Result<void> check(const VideoAsked& asked) {
   if (!(asked.fps >= limits::kMinVideoFps && asked.fps <= limits::kMaxVideoFps))
     return fail(Errc::invalid_argument, fmt::format("'fps' must be from {} to {} pictures per second",
                                                     limits::kMinVideoFps, limits::kMaxVideoFps));
-  if (!(std::abs(asked.exposure) <= limits::kMaxVideoStops))
+  if (!(std::abs(asked.exposure) <= limits::kMaxExposure))
     return fail(Errc::invalid_argument,
-                fmt::format("'exposure' must be a number of stops from -{0} to {0}", limits::kMaxVideoStops));
+                fmt::format("'exposure' must be a number of stops from -{0} to {0}", limits::kMaxExposure));
   return {};
 }
 

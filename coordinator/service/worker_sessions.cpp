@@ -31,9 +31,9 @@ Result<void> check_hello(const WorkerHello& hello, const JoinCheck& may_join, bo
   if (hello.name.size() > ls::limits::kNameBytes || hello.build.size() > ls::limits::kNameBytes ||
       hello.previous_id.value.size() > ls::limits::kIdBytes)
     return fail(Errc::invalid_argument, "the worker's name, build or id is too long");
-  if (hello.tags.size() > limits::kMaxTags)
+  if (hello.tags.size() > ls::limits::kTags)
     return fail(Errc::invalid_argument, fmt::format("the worker has {} tags; at most {} are allowed",
-                                                    hello.tags.size(), limits::kMaxTags));
+                                                    hello.tags.size(), ls::limits::kTags));
   if (hello.threads < 1 || hello.threads > ls::limits::kThreads)
     return fail(Errc::invalid_argument,
                 fmt::format("{} threads: it must be 1 to {}", hello.threads, ls::limits::kThreads));

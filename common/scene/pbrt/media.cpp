@@ -5,14 +5,13 @@
 #include <cmath>
 
 #include "common/base/suggest.h"
+#include "common/scene/limits.h"
 #include "common/scene/pbrt/media_parts.h"
 #include "common/scene/pbrt/substances.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene::pbrt {
 namespace {
-
-constexpr double kHottest = 1e6;  // the largest temperature_offset of a medium
 
 Rgb one(MediumSource& m, std::string_view name) {
   const Param* p = m.p.take(name);
@@ -107,9 +106,9 @@ bool add_black_bodies(MediumSource& m, Element& out, double factor) {
   const double scale = m.p.number("temperaturescale", 1);
   const double offset = m.p.number("temperatureoffset", m.p.number("temperaturecutoff", 0));
   if (!(scale >= 0)) return m.wrong(m.p.at(), fmt::format("{}: temperaturescale is negative", m.p.title()));
-  if (!(std::abs(scale * offset) <= kHottest))
+  if (!(std::abs(scale * offset) <= kMaxTemperature))
     return m.wrong(m.p.at(), fmt::format("{}: temperatureoffset times temperaturescale is {} K, beyond {} K",
-                                         m.p.title(), scale * offset, kHottest));
+                                         m.p.title(), scale * offset, kMaxTemperature));
   if (!(factor >= 0)) return m.wrong(m.p.at(), fmt::format("{}: Lescale is negative", m.p.title()));
   add(out, "temperature_scale", scale, m.p.at());
   add(out, "temperature_offset", -scale * offset, m.p.at());

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/scene/limits.h"
 #include "common/scene/reader/reader.h"
 #include "common/scene/xml/transform_element.h"
 #include "common/scene/xml/values.h"
@@ -12,7 +13,6 @@ namespace ls::scene {
 namespace {
 
 constexpr std::size_t kMaxCurvePoints = 4096;  // of one curve
-constexpr double kHottest = 1e6;               // kelvin
 
 // Reads the numbers of a required <string>. Empty: it is missing or wrong, which has been reported.
 std::vector<double> curve_numbers(Params& p, std::string_view name, Report& report) {
@@ -68,7 +68,7 @@ std::optional<Reader::Spectrum> Reader::read_spectrum(const Element& e) {
     s = colour;
   } else if (type == "blackbody") {
     const double kelvin =
-        needed_number(p, "temperature", {.min = 0, .max = kHottest, .open_min = true}, report_);
+        needed_number(p, "temperature", {.min = 0, .max = kMaxTemperature, .open_min = true}, report_);
     if (report_.has_errors()) return std::nullopt;
     Rgb colour = linear_srgb(black_body_xyz(kelvin));
     for (double& x : colour) x = std::max(x, 0.0);  // a red outside of sRGB has negative components

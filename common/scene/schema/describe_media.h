@@ -158,9 +158,12 @@ void describe(V& v, T& m) {
            .range = kNonNegative,
            .unwritten = 1},
           m.temperature_scale);
-  v.field(
-      {.name = "temperature_offset", .doc = "added to it", .unit = "K", .range = {-1e6, 1e6}, .unwritten = 0},
-      m.temperature_offset);
+  v.field({.name = "temperature_offset",
+           .doc = "added to it",
+           .unit = "K",
+           .range = {-kMaxTemperature, kMaxTemperature},
+           .unwritten = 0},
+          m.temperature_offset);
   v.field({.name = "peak_one",
            .doc = "divides the spectrum of each black body by its largest value, as pbrt does: `temperature` "
                   "then gives the colour, and `emission_scale` the brightness. Not in Mitsuba",

@@ -58,7 +58,7 @@ Result<void> check_plan(const JobPlan& plan) {
   if (plan.target_error && !(*plan.target_error > 0 && std::isfinite(*plan.target_error))) {
     return fail(Errc::invalid_argument, "target_error must be positive");
   }
-  if (plan.time && !(*plan.time > 0 && *plan.time < 1e9)) {
+  if (plan.time && !(*plan.time > 0 && *plan.time <= kMaxSeconds)) {
     return fail(Errc::invalid_argument, "time must be positive, in seconds");
   }
   if (plan.focus && !lies_in(grid.frame, *plan.focus)) {

@@ -8,6 +8,8 @@
 
 #include "common/base/log.h"
 #include "common/base/parse_number.h"
+#include "common/protocol/limits.h"
+#include "common/scene/limits.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/message/problem.h"
 
@@ -178,7 +180,7 @@ std::uint64_t Api::body_limit(const Route& route, const Request& request) const 
   const BodyKind kind = body_kind(route, request);
   if (kind == BodyKind::blob) return limits_.blob_bytes;
   if (kind == BodyKind::archive) return limits_.bundle_bytes;
-  const bool is_job = route.body_limit == kMaxSceneXml;
+  const bool is_job = route.body_limit == scene::kMaxTextBytes;
   return is_job && media_type(request.header("content-type")) == "application/json" ? kMaxJobJson
                                                                                     : route.body_limit;
 }
@@ -222,7 +224,7 @@ Response guarded(std::string_view what, const std::function<Response()>& work) {
 }
 
 bool plausible_id(std::string_view id) {
-  if (id.empty() || id.size() > kMaxIdLength) return false;
+  if (id.empty() || id.size() > limits::kIdBytes) return false;
   for (const char c : id) {
     const bool ok =
         (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' || c == '_';

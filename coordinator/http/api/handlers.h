@@ -64,7 +64,8 @@ std::variant<Response, std::unique_ptr<BodySink>> open_bundle(Api&, const Reques
 
 // The steps that all submissions share, whether the body was a scene, JSON or an archive (job_handlers.cpp)
 
-// Returns the text of a scene file from the blob store; a file of more than kMaxSceneXml bytes is an error.
+// Returns the text of a scene file from the blob store; a file of more than scene::kMaxTextBytes bytes is an
+// error.
 Result<std::string> read_scene_blob(Api& api, const Digest& digest);
 
 // Submits the job and answers: 201 {id, url, warnings}, or the error with the scene's diagnostics.

@@ -6,6 +6,7 @@
 
 #include "common/base/parse_number.h"
 #include "common/job/limits.h"
+#include "common/scene/limits.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/api/handlers.h"
@@ -179,8 +180,9 @@ Response get_image_png(Api& api, const Request& request, const Params& params) {
   const auto id = job_of(request, params);
   if (!id) return problem(id.error());
   const auto exposure = parse_number<double>(request.parameter("exposure").value_or("0"));
-  if (!exposure || !(std::abs(*exposure) <= kMaxExposure))
-    return problem(400, fmt::format("'exposure' must be a number of stops from -{0} to {0}", kMaxExposure));
+  if (!exposure || !(std::abs(*exposure) <= coordinator::limits::kMaxExposure))
+    return problem(400, fmt::format("'exposure' must be a number of stops from -{0} to {0}",
+                                    coordinator::limits::kMaxExposure));
   const auto layer = request.parameter("layer");
   if (layer && *layer != "denoised")
     return problem(400, "'layer' must be \"denoised\", or be left out for the image itself");
@@ -244,9 +246,9 @@ Result<std::string> read_scene_blob(Api& api, const Digest& digest) {
                 fmt::format("the scene's blob {0} is not here: PUT /api/v1/blobs/{0} first", digest.hex()));
   const auto size = blobs.size(digest);
   if (!size) return tl::unexpected(size.error());
-  if (*size > kMaxSceneXml)
-    return fail(Errc::invalid_argument,
-                fmt::format("the scene file has {} bytes; at most {} are accepted", *size, kMaxSceneXml));
+  if (*size > scene::kMaxTextBytes)
+    return fail(Errc::invalid_argument, fmt::format("the scene file has {} bytes; at most {} are accepted",
+                                                    *size, scene::kMaxTextBytes));
   const auto bytes = blobs.read(digest, 0, *size);
   if (!bytes) return tl::unexpected(bytes.error());
   return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());

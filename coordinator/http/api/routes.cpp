@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "common/scene/limits.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/message/limits.h"
 
@@ -31,8 +32,8 @@ constexpr std::array kRoutes = {
     Route{Method::get, "/api/v1/session", kToken, Executor::here, kNone, 0, get_session},
     Route{Method::del, "/api/v1/session", kOpen, Executor::here, kNone, 0, delete_session},
     Route{Method::get, "/api/v1/jobs", kToken, Executor::quick, kNone, 0, get_jobs},
-    Route{Method::post, "/api/v1/jobs", kSubmit, Executor::slow, kWhole, kMaxSceneXml, post_job, kJobTypes,
-          kBundleTypes},
+    Route{Method::post, "/api/v1/jobs", kSubmit, Executor::slow, kWhole, scene::kMaxTextBytes, post_job,
+          kJobTypes, kBundleTypes},
     Route{Method::get, "/api/v1/jobs/{id}", kToken, Executor::quick, kNone, 0, get_job},
     Route{Method::patch, "/api/v1/jobs/{id}", kSubmit, Executor::quick, kWhole, kMaxControlJson, patch_job,
           kPatchJson},

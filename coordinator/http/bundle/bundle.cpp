@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/base/plain_text.h"
+#include "common/job/limits.h"
 #include "common/scene/xml/source_text.h"
 #include "coordinator/http/bundle/bundle_layout.h"
 #include "coordinator/http/message/limits.h"
@@ -108,7 +109,7 @@ class Survey {
       const auto part = std::span<const std::byte>(buffer_).first(*n);
       sha.update(part);
       // A job.json that is too long is an error only if it is used
-      if (keep && text.size() <= kMaxBundleJobJson)
+      if (keep && text.size() <= kMaxSpecBytes)
         text.append(reinterpret_cast<const char*>(part.data()), part.size());
     }
     if (folder) return {};

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "common/base/plain_text.h"
+#include "common/job/limits.h"
 #include "coordinator/http/message/limits.h"
 
 namespace ls::http {
@@ -77,8 +78,8 @@ struct JobFile {
 };
 
 Result<JobFile> read_job_file(const std::string& text) {
-  if (text.size() > kMaxBundleJobJson)
-    return bad_bundle(fmt::format("job.json has more than {} bytes", kMaxBundleJobJson));
+  if (text.size() > kMaxSpecBytes)
+    return bad_bundle(fmt::format("job.json has more than {} bytes", kMaxSpecBytes));
   JobFile out;
   json job;
   bool too_deep = false;

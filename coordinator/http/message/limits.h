@@ -10,7 +10,6 @@
 namespace ls::http {
 
 // Bodies, per route
-inline constexpr std::uint64_t kMaxSceneXml = 32u << 20;  // POST /jobs with application/xml
 inline constexpr std::uint64_t kMaxJobJson = 4u << 20;  // POST /jobs with application/json: names and digests
 inline constexpr std::uint64_t kMaxDigestList = 8u << 20;    // POST /blobs/missing
 inline constexpr std::uint64_t kMaxControlJson = 64u << 10;  // PATCH /jobs/ID
@@ -22,13 +21,10 @@ inline constexpr std::size_t kMaxDigests = 100'000;  // digests in one POST /blo
 inline constexpr std::size_t kMaxAssetName = 1024;   // characters
 inline constexpr std::size_t kMaxTarget = 8u << 10;  // request target
 inline constexpr std::size_t kMaxQueryParameters = 256;
-inline constexpr std::size_t kMaxIdLength = 64;  // characters of a job's id
-inline constexpr double kMaxExposure = 32;       // stops, positive or negative
 
 // Bundles
 inline constexpr std::size_t kMaxBundleEntries = coordinator::limits::kMaxAssets;  // files and folders
 inline constexpr std::size_t kMaxBundleNames = 16u << 20;    // bytes of all names together
-inline constexpr std::size_t kMaxBundleJobJson = 1u << 20;   // job.json
 inline constexpr std::uint64_t kMaxArchiveList = 32u << 20;  // a zip's directory, which is read as a whole
 // An archive may unpack to this many bytes per byte of its own size...
 inline constexpr std::uint64_t kMaxBundleRatio = 200;
@@ -56,7 +52,8 @@ inline constexpr std::size_t kMaxRevokedSessions = 10'000;
 
 // Limits that tests and the operator's config file may change
 struct Limits {
-  std::uint64_t blob_bytes = std::uint64_t{64} << 30;      // PUT /blobs/SHA256, and each file of a bundle
+  // PUT /blobs/SHA256, and each file of a bundle
+  std::uint64_t blob_bytes = coordinator::limits::kMaxBlobBytes;
   std::uint64_t bundle_bytes = std::uint64_t{16} << 30;    // POST /jobs with an archive
   std::uint64_t unpacked_bytes = std::uint64_t{64} << 30;  // all files of a bundle
   std::size_t header_bytes = 16u << 10;

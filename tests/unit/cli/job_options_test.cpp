@@ -75,7 +75,7 @@ TEST(JobOptions, NamesTheOptionAndWhatIsWrongWithIt) {
     options.memory = memory;
     EXPECT_THAT(error_of(options), testing::AllOf(HasSubstr("--memory"), HasSubstr(memory)));
   }
-  for (const char* time : {"0", "-2", "nan", "inf", "1e400", "2s"}) {
+  for (const char* time : {"0", "-2", "nan", "inf", "1e400", "2s", "31536001"}) {
     JobOptions options;
     options.time = time;
     EXPECT_THAT(error_of(options), testing::AllOf(HasSubstr("--time"), HasSubstr(time)));

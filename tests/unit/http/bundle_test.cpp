@@ -7,6 +7,7 @@
 
 #include <cstdio>
 
+#include "common/job/limits.h"
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {
@@ -168,7 +169,7 @@ TEST_F(Bundles, WithAWrongJobFileAreRefused) {
       {R"({"spec": 5})", "'spec'"},
       {R"({"spec": {}, "spp": 4})", "'spec'"},
       {std::string(100, '[') + std::string(100, ']'), "deeper"},
-      {"\"" + std::string(kMaxBundleJobJson, 'x') + "\"", "more than"},
+      {"\"" + std::string(kMaxSpecBytes, 'x') + "\"", "more than"},
   };
   for (const auto& [text, says] : kCases)
     EXPECT_THAT(refusal(kZip, {{"a.xml", "1"}, {"good", "inside"}, {"job.json", text}}), HasSubstr(says))

@@ -137,6 +137,8 @@ TEST(JobSpec, NamesTheKeyThatIsWrong) {
   EXPECT_THAT(spec_error(R"({"spp": null})"), HasSubstr("'spp'"));
   EXPECT_THAT(spec_error(R"({"target_error": 0})"), HasSubstr("'target_error'"));
   EXPECT_THAT(spec_error(R"({"time": -3})"), HasSubstr("'time'"));
+  EXPECT_EQ(spec_error(R"({"time": 31536000})"), "accepted");  // a year
+  EXPECT_THAT(spec_error(R"({"time": 31536001})"), HasSubstr("'time'"));
   EXPECT_THAT(spec_error(R"({"seed": 18446744073709551616})"), HasSubstr("'seed'"));
   EXPECT_THAT(spec_error(R"({"integrator": ""})"), HasSubstr("'integrator'"));
   EXPECT_THAT(spec_error(R"({"integrator": "../x"})"), HasSubstr("'integrator'"));

@@ -103,7 +103,7 @@ CameraRay Camera::orthographic_ray(double x, double y) const {
 // All rays start at the camera's position. u is the azimuth divided by a full turn, from -z towards +x; v is
 // the angle from +y divided by half a turn.
 CameraRay Camera::spherical_ray(double u, double v) const {
-  const double phi = u * 2 * 3.14159265358979323846, theta = v * 3.14159265358979323846;
+  const double phi = u * 2 * kPiD, theta = v * kPiD;
   const double x = std::sin(phi) * std::sin(theta), y = std::cos(theta), z = -std::cos(phi) * std::sin(theta);
   return {origin_, V3((axis_x_ * x + axis_y_ * y + axis_z_ * z).normalized()),
           std::numeric_limits<float>::infinity()};

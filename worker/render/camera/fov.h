@@ -4,13 +4,14 @@
 #include <cmath>
 
 #include "common/scene/scene.h"
+#include "worker/render/math/math.h"
 
 namespace ls::render {
 
 // Returns the tangent of half the horizontal field of view. `fov` is the field of view in degrees along
 // `axis`; `aspect` is the width of the frame over its height.
 inline double tan_half_fov_x(double fov, FovAxis axis, double aspect) {
-  const double t = std::tan(fov * (3.14159265358979323846 / 360));
+  const double t = std::tan(fov * (kPiD / 360));
   switch (axis) {
     case FovAxis::x:
       return t;

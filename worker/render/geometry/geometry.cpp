@@ -108,7 +108,7 @@ V3d local_direction(const Sphere& s, const V3d& n) {
 
 V2 uv_of(const V3d& local) {
   double angle = std::atan2(local.y, local.x);
-  if (angle < 0) angle += 2 * 3.14159265358979323846;
+  if (angle < 0) angle += 2 * kPiD;
   return {static_cast<float>(angle) * kInvTwoPi,
           static_cast<float>(std::acos(std::clamp(local.z, -1., 1.))) * kInvPi};
 }
@@ -144,7 +144,6 @@ bool complete_sphere(const Geometry& g, std::uint32_t i, const V3d& o, const V3d
     const V3d dpdv(along.x * r[0] + along.y * r[3] + along.z * r[6],
                    along.x * r[1] + along.y * r[4] + along.z * r[7],
                    along.x * r[2] + along.y * r[5] + along.z * r[8]);
-    constexpr double kPiD = 3.14159265358979323846;
     hit.set_slopes(V3(dpdu * (2 * kPiD * s.radius)), V3(dpdv * (kPiD * s.radius)), g.scale);
   }
   return true;
@@ -169,13 +168,13 @@ bool complete_disk(const Geometry& g, std::uint32_t i, const V3d& o, const V3d& 
   hit.surface = s.surface;
   hit.ng = V3(s.n) * g.surfaces[s.surface].orientation;
   double angle = std::atan2(b, a);
-  if (angle < 0) angle += 2 * 3.14159265358979323846;
+  if (angle < 0) angle += 2 * kPiD;
   hit.uv = {static_cast<float>(std::sqrt(a * a + b * b)), static_cast<float>(angle) * kInvTwoPi};
   hit.shading = Frame::from_tangent(hit.ng, V3(s.u * a + s.v * b));
   if (g.surfaces[s.surface].wants_slopes) {
     const double radius = std::sqrt(a * a + b * b);
     const V3d radial = radius > 0 ? (s.u * a + s.v * b) / radius : s.u;
-    hit.set_slopes(V3(radial), V3((s.v * a - s.u * b) * (2 * 3.14159265358979323846)), g.scale);
+    hit.set_slopes(V3(radial), V3((s.v * a - s.u * b) * (2 * kPiD)), g.scale);
   }
   return true;
 }
@@ -196,12 +195,11 @@ bool complete_cylinder(const Geometry& g, std::uint32_t i, const V3d& o, const V
   hit.reach = std::max(info.reach, reach_in_double(hit.p, s.length + s.radius));
   hit.ng = V3(n) * info.orientation;
   double angle = std::atan2(y, x);
-  if (angle < 0) angle += 2 * 3.14159265358979323846;
+  if (angle < 0) angle += 2 * kPiD;
   hit.uv = {static_cast<float>(angle) * kInvTwoPi, static_cast<float>(z / s.length)};
   const V3d along = s.v * (x / l) - s.u * (y / l);
   hit.shading = info.wants_tangent ? Frame::from_tangent(hit.ng, V3(along)) : Frame(hit.ng);
-  if (info.wants_slopes)
-    hit.set_slopes(V3(along * (2 * 3.14159265358979323846 * s.radius)), V3(s.axis * s.length), g.scale);
+  if (info.wants_slopes) hit.set_slopes(V3(along * (2 * kPiD * s.radius)), V3(s.axis * s.length), g.scale);
   return true;
 }
 

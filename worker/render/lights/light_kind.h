@@ -67,6 +67,4 @@ struct LightKind {
   static std::uint64_t extra_bytes() { return 0; }  // bytes of memory besides the struct itself
 };
 
-inline constexpr double kPiD = 3.14159265358979323846;
-
 }  // namespace ls::render

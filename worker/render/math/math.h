@@ -16,6 +16,7 @@ using V3d = Imath::V3d;
 using C3 = Imath::V3f;  // colours and other values per channel, in linear RGB
 
 inline constexpr float kPi = 3.14159265358979323846f;
+inline constexpr double kPiD = 3.14159265358979323846;
 inline constexpr float kTwoPi = 6.28318530717958647692f;
 inline constexpr float kInvPi = .318309886183790671538f;
 inline constexpr float kInvTwoPi = .159154943091895335769f;

@@ -18,8 +18,6 @@ namespace {
 
 using test::SkyImage;
 
-constexpr double kPiD = 3.14159265358979323846;
-
 SkyImage random_sky(int width, int height, unsigned seed) {
   SkyImage s(width, height);
   std::mt19937 rng(seed);
