@@ -1,12 +1,12 @@
 #include "compare/render_racer.h"
 
 #include <fmt/format.h>
-#include <time.h>
 
 #include <algorithm>
 #include <mutex>
 #include <thread>
 
+#include "common/base/clock.h"
 #include "common/image/film/film.h"
 #include "compare/picture.h"
 
@@ -17,12 +17,6 @@ namespace {
 // the last tile is a small part of it, and short enough that changes of the machine's speed affect all
 // racers.
 constexpr double kTurnSeconds = 1;
-
-double thread_cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 // Runs `work` on this many threads; returns their total CPU seconds.
 template <class Work>

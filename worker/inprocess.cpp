@@ -1,7 +1,6 @@
 #include "worker/inprocess.h"
 
 #include <fmt/format.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <fstream>
@@ -17,12 +16,6 @@
 
 namespace ls::worker {
 namespace {
-
-double thread_cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 // Makes a UnitFailure from an error. invalid_argument means that the scene is at fault; after any other error
 // (no memory, an unreadable file) the unit may succeed on another machine.

@@ -10,6 +10,7 @@
 
 #include "cli/farm/http_client.h"
 #include "cli/output/reply_fields.h"
+#include "common/base/percent_code.h"
 #include "common/base/secret.h"
 
 namespace ls::cli {
@@ -262,28 +263,14 @@ FarmApi::Answer<json> FarmApi::submit_bundle(const std::filesystem::path& file, 
   return as_json(client_.post_file("/api/v1/jobs" + query, file, type));
 }
 
-std::string job_path(const std::string& id) {
-  std::string path = "/api/v1/jobs/";
-  for (const unsigned char c : id)
-    path += std::isalnum(c) || c == '-' || c == '_' || c == '.' ? std::string(1, static_cast<char>(c))
-                                                                : fmt::format("%{:02X}", c);
-  return path;
-}
+std::string job_path(const std::string& id) { return "/api/v1/jobs/" + percent_encode(id); }
 
 namespace {
-
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const unsigned char c : text)
-    out += std::isalnum(c) || c == '-' || c == '_' || c == '.' ? std::string(1, static_cast<char>(c))
-                                                               : fmt::format("%{:02X}", c);
-  return out;
-}
 
 class Query {
  public:
   void add(std::string_view key, std::string_view value) {
-    text_ += fmt::format("{}{}={}", text_.empty() ? "?" : "&", key, escaped(value));
+    text_ += fmt::format("{}{}={}", text_.empty() ? "?" : "&", key, percent_encode(value));
   }
   template <class T>
   void add(std::string_view key, const std::optional<T>& value) {

@@ -70,8 +70,7 @@ std::string reference_error_text(const json& object, const char* key, const char
                                  int digits) {
   const auto value = number_field(object, key);
   if (!value) return "";
-  if (same_seed)
-    return fmt::format("{:.{}g} (not to be trusted: the reference has this job's seed)", *value, digits);
+  if (same_seed) return fmt::format("{:.{}g} ({})", *value, digits, report::phrase("oneSeed"));
   return flag_field(object, below) ? report::phrase("belowNoise") : fmt::format("{:.{}g}", *value, digits);
 }
 

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "cli/scale/child_command.h"
+#include "common/base/parse_number.h"
 
 namespace ls::cli {
 namespace {
@@ -30,11 +31,8 @@ exec "$@-${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID" --cache "$scratch/lightshaf
 std::optional<double> seconds_of(std::string_view text) {
   double days = 0, seconds = 0;
   const auto number = [](std::string_view digits) -> std::optional<double> {
-    int value = 0;
-    const auto end = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    if (digits.empty() || end.ec != std::errc{} || end.ptr != digits.data() + digits.size() || value < 0)
-      return std::nullopt;
-    return value;
+    const auto value = parse_number<int>(digits);
+    return value && *value >= 0 ? std::optional<double>(*value) : std::nullopt;
   };
   if (const auto dash = text.find('-'); dash != std::string_view::npos) {
     const auto value = number(text.substr(0, dash));

@@ -1,11 +1,11 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <charconv>
 #include <cmath>
 
 #include "common/assets/bytes.h"
 #include "common/assets/image.h"
+#include "common/base/parse_number.h"
 
 namespace ls {
 
@@ -22,9 +22,8 @@ struct HdrSize {
 // Parses "-Y height +X width", which means rows from the top. Other orientations are not in use.
 std::optional<HdrSize> resolution(std::string_view line) {
   const auto count = [](std::string_view w) -> std::uint32_t {
-    std::uint32_t n = 0;
-    const auto [end, ec] = std::from_chars(w.data(), w.data() + w.size(), n);
-    return ec == std::errc{} && end == w.data() + w.size() && n <= kMaxImageSide ? n : 0;
+    const auto n = parse_number<std::uint32_t>(w);
+    return n && *n <= kMaxImageSide ? *n : 0;
   };
   HdrSize s;
   if (next_word(line) != "-Y") return std::nullopt;

@@ -3,11 +3,11 @@
 // little endian), and its magnitude a factor on all values.
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cmath>
 
 #include "common/assets/bytes.h"
 #include "common/assets/image.h"
+#include "common/base/parse_number.h"
 
 namespace ls {
 namespace {
@@ -23,13 +23,6 @@ std::string_view next_field(std::string_view& text) {
   return word;
 }
 
-template <class T>
-std::optional<T> parsed(std::string_view word) {
-  T x{};
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), x);
-  return error == std::errc{} && end == word.data() + word.size() ? std::optional(x) : std::nullopt;
-}
-
 }  // namespace
 
 Result<ImageData> decode_pfm(std::string_view name, std::span<const std::byte> file,
@@ -40,9 +33,9 @@ Result<ImageData> decode_pfm(std::string_view name, std::span<const std::byte> f
   std::string_view text = as_text(file);
   const std::string_view kind = next_field(text);
   if (kind != "PF" && kind != "Pf") return bad("it does not begin with PF or Pf");
-  const auto width = parsed<std::uint32_t>(next_field(text)),
-             height = parsed<std::uint32_t>(next_field(text));
-  const auto scale = parsed<float>(next_field(text));
+  const auto width = parse_number<std::uint32_t>(next_field(text)),
+             height = parse_number<std::uint32_t>(next_field(text));
+  const auto scale = parse_number<float>(next_field(text));
   if (!width || !height || *width < 1 || *height < 1 || *width > kMaxImageSide || *height > kMaxImageSide)
     return bad("its header has no believable width and height");
   if (!scale || !std::isnormal(*scale)) return bad("its header has no scale");

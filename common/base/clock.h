@@ -1,6 +1,8 @@
 // Time is passed as an argument: only main() and SystemClock read the system's clock.
 #pragma once
 
+#include <time.h>
+
 #include <chrono>
 #include <cstdint>
 
@@ -26,6 +28,13 @@ class SystemClock final : public Clock {
 // The wall clock: nanoseconds since 1970 (UTC). It may be set while a program runs.
 inline std::int64_t system_unix_ns() {
   return std::chrono::duration_cast<Duration>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+// CPU time of the calling thread
+inline double thread_cpu_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
 inline double seconds(Duration d) { return std::chrono::duration<double>(d).count(); }

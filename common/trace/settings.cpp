@@ -8,6 +8,7 @@
 
 #include "common/base/log.h"
 #include "common/base/parse_number.h"
+#include "common/base/percent_code.h"
 #include "common/http/post.h"
 
 namespace ls::trace {
@@ -49,28 +50,12 @@ std::string_view trimmed(std::string_view text) {
   return begin == std::string_view::npos ? "" : text.substr(begin, end + 1 - begin);
 }
 
-int hex_digit(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  const char lower = static_cast<char>(c | 0x20);
-  return lower >= 'a' && lower <= 'f' ? lower - 'a' + 10 : -1;
-}
-
 // Decodes %XX, as in W3C Baggage. nullopt: wrong digits, or a control character, which could begin another
 // header.
 std::optional<std::string> decoded(std::string_view text) {
-  std::string out;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    char c = text[i];
-    if (c == '%') {
-      if (i + 2 >= text.size()) return std::nullopt;
-      const int high = hex_digit(text[i + 1]), low = hex_digit(text[i + 2]);
-      if (high < 0 || low < 0) return std::nullopt;
-      c = static_cast<char>(high * 16 + low);
-      i += 2;
-    }
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) return std::nullopt;
-    out += c;
-  }
+  auto out = percent_decode(text);
+  if (out && std::any_of(out->begin(), out->end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
+    return std::nullopt;
   return out;
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "coordinator/assemble/round_errors.h"
+
 namespace ls::coordinator {
 
 ReferenceTiles::ReferenceTiles(const Film& film) : tiles_(film.grid().count()) {
@@ -37,13 +39,7 @@ std::optional<std::vector<TilePicture>> ReferenceTiles::latest() const {
 }
 
 void ReferenceTiles::checkpoint_taken(std::span<const RoundIndex> rounds) {
-  for (std::size_t t = 0; t < tiles_.size(); ++t) {
-    auto& kept = tiles_[t].rounds;
-    const auto later =
-        std::find_if(kept.begin(), kept.end(), [&](const auto& r) { return r.first >= rounds[t]; });
-    // of the pictures before `later`, only the latest is still needed
-    if (later - kept.begin() > 1) kept.erase(kept.begin(), later - 1);
-  }
+  for (std::size_t t = 0; t < tiles_.size(); ++t) drop_rounds_before(rounds[t], tiles_[t].rounds);
 }
 
 std::vector<float> joined(const std::vector<TilePicture>& tiles, FrameSize frame) {

@@ -35,13 +35,7 @@ bool RoundErrors::knows(std::span<const RoundIndex> rounds) const {
 }
 
 void RoundErrors::checkpoint_taken(std::span<const RoundIndex> rounds) {
-  for (std::size_t i = 0; i < tiles_.size(); ++i) {
-    auto& kept = tiles_[i].rounds;
-    const auto later =
-        std::find_if(kept.begin(), kept.end(), [&](const auto& r) { return r.first >= rounds[i]; });
-    // of the errors before `later`, only the latest is still needed
-    if (later - kept.begin() > 1) kept.erase(kept.begin(), later - 1);
-  }
+  for (std::size_t i = 0; i < tiles_.size(); ++i) drop_rounds_before(rounds[i], tiles_[i].rounds);
 }
 
 std::vector<std::vector<double>> RoundErrors::relative() const {

@@ -4,6 +4,7 @@
 // the errors of a checkpoint do not depend on the order in which results arrive.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -14,6 +15,15 @@
 #include "common/image/error/error_estimate.h"
 
 namespace ls::coordinator {
+
+// Drops of a tile's rounds, which ascend, those that no checkpoint of `next` or more rounds needs: of the
+// rounds before `next`, only the latest is.
+template <class T>
+void drop_rounds_before(RoundIndex next, std::vector<std::pair<RoundIndex, T>>& rounds) {
+  const auto later =
+      std::find_if(rounds.begin(), rounds.end(), [&](const auto& r) { return r.first >= next; });
+  if (later - rounds.begin() > 1) rounds.erase(rounds.begin(), later - 1);
+}
 
 class RoundErrors {
  public:

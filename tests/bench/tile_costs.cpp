@@ -10,7 +10,6 @@
 // One table row a scene. CPU seconds of a busy machine stray; that makes the last column too large
 // rather than too small.
 #include <fmt/format.h>
-#include <time.h>
 
 #include <algorithm>
 #include <cmath>
@@ -23,18 +22,13 @@
 
 #include "cli/local/local_scene.h"
 #include "cli/local/local_world.h"
+#include "common/base/clock.h"
 #include "common/base/log.h"
 #include "common/image/film/film.h"
 #include "worker/render/render.h"
 
 namespace ls::test {
 namespace {
-
-double thread_cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 struct Tile {
   double pixels = 0, variance = 0, seconds = 0;  // per pixel and sample

@@ -1,7 +1,6 @@
 #include "worker/fake/fake.h"
 
 #include <fmt/format.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -11,6 +10,7 @@
 #include <mutex>
 #include <vector>
 
+#include "common/base/clock.h"
 #include "common/base/parse_number.h"
 #include "worker/fake/fake_pixels.h"
 
@@ -19,12 +19,6 @@ namespace {
 
 constexpr std::size_t kAllocationChunk = 64 << 20;  // bytes that the fault `memory` allocates at a time
 constexpr Duration kLongestNap = std::chrono::milliseconds(20);
-
-double thread_cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 class FakeBackend final : public LocalBackend {
  public:

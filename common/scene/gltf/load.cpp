@@ -4,9 +4,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstring>
 
+#include "common/base/parse_number.h"
 #include "common/base/plain_text.h"
 #include "common/base/suggest.h"
 #include "common/scene/file_names.h"
@@ -81,9 +81,7 @@ struct Choices {
 // Parses the value of an option -D, a number in [least, most].
 double number_of(const std::string& name, const std::string& value, double least, double most,
                  const Item& root) {
-  double x = 0;
-  const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), x);
-  if (error == std::errc() && end == value.data() + value.size() && x >= least && x <= most) return x;
+  if (const auto x = ls::parse_number<double>(value); x && *x >= least && *x <= most) return *x;
   root.error(fmt::format("-D {}={} wants a number from {} to {}", name, value, least, most));
   return least;
 }

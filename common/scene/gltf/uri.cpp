@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
+
+#include "common/base/percent_code.h"
 
 namespace ls::scene::gltf {
 namespace {
@@ -31,25 +32,6 @@ std::optional<std::string> decode_base64(std::string_view text) {
     if (held < 8) continue;
     held -= 8;
     out += static_cast<char>(bits >> held & 0xff);
-  }
-  return out;
-}
-
-std::optional<std::string> decode_percent(std::string_view text) {
-  std::string out;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (text[i] != '%') {
-      out += text[i];
-      continue;
-    }
-    int code = 0;
-    for (const std::size_t k : {i + 1, i + 2}) {
-      const auto c = k < text.size() ? static_cast<unsigned char>(text[k]) : '\0';
-      if (!std::isxdigit(c)) return std::nullopt;
-      code = code * 16 + (std::isdigit(c) ? c - '0' : std::tolower(c) - 'a' + 10);
-    }
-    out += static_cast<char>(code);
-    i += 2;
   }
   return out;
 }
@@ -82,7 +64,7 @@ std::optional<Uri> read_uri(const Item& uri) {
     uri.error("nothing is fetched from elsewhere: put the file beside this one, and name it");
     return std::nullopt;
   }
-  auto name = decode_percent(given);
+  auto name = percent_decode(given);
   if (name && is_name(*name)) return Uri{false, std::move(*name)};
   uri.error("this names no file");
   return std::nullopt;

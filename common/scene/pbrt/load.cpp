@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <utility>
 
 #include "common/base/frame_range.h"
+#include "common/base/parse_number.h"
 #include "common/base/suggest.h"
 #include "common/scene/file_names.h"
 #include "common/scene/limits.h"
@@ -157,11 +157,8 @@ class Loader {
 
   static std::optional<double> number(std::string_view text) {
     if (text.starts_with('+')) text.remove_prefix(1);
-    double x = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), x);
-    if (error != std::errc() || end != text.data() + text.size() || !(std::abs(x) <= 1e30))
-      return std::nullopt;
-    return x;
+    const auto x = ls::parse_number<double>(text);
+    return x && std::abs(*x) <= 1e30 ? x : std::nullopt;
   }
 
   std::nullopt_t no_numbers(const Token& d, const Token* next, std::size_t count) {

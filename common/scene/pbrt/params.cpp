@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/base/parse_number.h"
 #include "common/base/suggest.h"
 #include "common/scene/limits.h"
 
@@ -112,12 +112,11 @@ class ParamReader {
     }
     std::string_view text = token.text;
     if (text.starts_with('+')) text.remove_prefix(1);
-    double x = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), x);
-    if (error != std::errc() || end != text.data() + text.size() || !(std::abs(x) <= kLargest))
+    const auto x = ls::parse_number<double>(text);
+    if (!x || !(std::abs(*x) <= kLargest))
       return complain(token.at, fmt::format("'{}' is not a number; '{}' wants one", shown(text), p.name)),
              false;
-    p.numbers.push_back(x);
+    p.numbers.push_back(*x);
     return true;
   }
 

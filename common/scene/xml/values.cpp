@@ -6,6 +6,8 @@
 #include <cmath>
 #include <string>
 
+#include "common/base/parse_number.h"
+
 namespace ls::scene {
 namespace {
 
@@ -23,10 +25,7 @@ template <class T>
 std::optional<T> parse_whole(std::string_view text) {
   text = trimmed(text);
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
-  T value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || text.empty()) return std::nullopt;
-  return value;
+  return ls::parse_number<T>(text);
 }
 
 // Calls f(std::string_view) -> bool for each token of the text, until f returns false.

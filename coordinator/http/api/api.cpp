@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <exception>
 
 #include "common/base/log.h"
 #include "common/base/parse_number.h"
+#include "common/base/percent_code.h"
 #include "common/protocol/limits.h"
 #include "common/scene/limits.h"
 #include "coordinator/http/api/handlers.h"
@@ -43,21 +43,12 @@ Response not_found(const Request& request) {
 
 constexpr std::string_view kOneJob = "/api/v1/jobs/{id}";
 
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const unsigned char c : text)
-    out += std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.' || c == '~'
-               ? std::string(1, static_cast<char>(c))
-               : fmt::format("%{:02X}", c);
-  return out;
-}
-
 std::string target_of(const Request& request) {
   std::string target;
-  for (const auto& segment : request.segments) target += "/" + escaped(segment);
+  for (const auto& segment : request.segments) target += "/" + percent_encode(segment);
   for (const auto& [name, value] : request.query)
-    target += fmt::format("{}{}={}", target.find('?') == std::string::npos ? '?' : '&', escaped(name),
-                          escaped(value));
+    target += fmt::format("{}{}={}", target.find('?') == std::string::npos ? '?' : '&', percent_encode(name),
+                          percent_encode(value));
   return target;
 }
 

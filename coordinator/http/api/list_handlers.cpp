@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 
+#include "common/base/parse_number.h"
 #include "common/job/settings.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/api/handlers.h"
@@ -28,9 +28,9 @@ template <class T>
 Result<void> read_number(const Request& request, std::string_view name, T& out) {
   const auto text = request.parameter(name);
   if (!text) return {};
-  const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), out);
-  if (error != std::errc{} || end != text->data() + text->size() || !(out >= 0))
-    return bad_argument(fmt::format("'{}' must be a number from 0 on", name));
+  const auto value = parse_number<T>(*text);
+  if (!value || !(*value >= 0)) return bad_argument(fmt::format("'{}' must be a number from 0 on", name));
+  out = *value;
   return {};
 }
 

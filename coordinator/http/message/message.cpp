@@ -14,7 +14,7 @@
 #include <iterator>
 
 #include "common/base/overloaded.h"
-#include "coordinator/base/percent_decode.h"
+#include "common/base/percent_code.h"
 #include "coordinator/http/message/limits.h"
 
 namespace ls::http {
@@ -160,7 +160,7 @@ namespace {
 Result<std::string> decode(std::string_view text, bool plus_is_space) {
   std::string coded(text);
   if (plus_is_space) std::replace(coded.begin(), coded.end(), '+', ' ');
-  auto plain = coordinator::percent_decode(coded);
+  auto plain = percent_decode(coded);
   if (!plain) return fail(Errc::invalid_argument, "the request target has a broken percent code");
   return std::move(*plain);
 }

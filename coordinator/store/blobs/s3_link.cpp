@@ -11,6 +11,7 @@
 #include <mutex>
 
 #include "common/base/log.h"
+#include "common/base/percent_code.h"
 
 namespace ls::coordinator {
 namespace {
@@ -59,15 +60,6 @@ std::string xml_element(std::string_view xml, std::string_view name, std::size_t
   return end == std::string_view::npos
              ? ""
              : std::string(xml.substr(begin + open.size(), end - begin - open.size()));
-}
-
-std::string query_value(std::string_view text) {
-  std::string out;
-  for (const unsigned char c : text)
-    out += std::isalnum(c) || c == '-' || c == '_' || c == '.' || c == '~'
-               ? std::string(1, static_cast<char>(c))
-               : fmt::format("%{:02X}", c);
-  return out;
 }
 
 namespace {
@@ -263,8 +255,8 @@ Result<std::vector<std::string>> S3Link::list() const {
   std::vector<std::string> keys;
   for (std::string token; keys.size() < kMaxListed;) {
     Request request;
-    if (!token.empty()) request.query = "continuation-token=" + query_value(token) + "&";
-    request.query += "list-type=2&prefix=" + query_value(prefix);
+    if (!token.empty()) request.query = "continuation-token=" + percent_encode(token) + "&";
+    request.query += "list-type=2&prefix=" + percent_encode(prefix);
     const auto answer = ask(request);
     if (!answer) return tl::unexpected(answer.error());
     if (answer->status != 200) return tl::unexpected(error_of(request, *answer));

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "common/base/log.h"
+#include "common/base/percent_code.h"
 #include "coordinator/store/blobs/s3_request.h"
 #include "coordinator/store/files.h"
 
@@ -53,13 +54,13 @@ Result<void> S3Link::send_parts(const std::string& key, const std::string& uploa
       std::max(options_.address.part_bytes, (bytes + kMostParts - 1) / kMostParts);
   Request end{.method = "POST",
               .key = key,
-              .query = "uploadId=" + query_value(upload),
+              .query = "uploadId=" + percent_encode(upload),
               .body = "<CompleteMultipartUpload>"};
   int number = 1;
   for (std::uint64_t offset = 0; offset < bytes; offset += part_bytes, ++number) {
     Request part{.method = "PUT",
                  .key = key,
-                 .query = fmt::format("partNumber={}&uploadId={}", number, query_value(upload))};
+                 .query = fmt::format("partNumber={}&uploadId={}", number, percent_encode(upload))};
     part.file = file;
     part.offset = offset;
     part.bytes = std::min(part_bytes, bytes - offset);
@@ -86,7 +87,7 @@ Result<void> S3Link::send_parts(const std::string& key, const std::string& uploa
 
 // Tells the store to delete the parts sent so far. Otherwise it would keep them, invisible but charged for.
 void S3Link::give_up_parts(const std::string& key, const std::string& upload) const {
-  const Request request{.method = "DELETE", .key = key, .query = "uploadId=" + query_value(upload)};
+  const Request request{.method = "DELETE", .key = key, .query = "uploadId=" + percent_encode(upload)};
   const auto answer = ask(request);
   if (!answer || (answer->status / 100 != 2 && answer->status != 404))
     log_warn("store=s3", fmt::format("the parts of {} that were sent stay in {}: {}", key, shown(),

@@ -31,7 +31,5 @@ struct S3Link::Answer {
 // of that element. If there is none, returns an empty text and sets *at to npos. Understands just enough XML
 // for the answers of S3.
 std::string xml_element(std::string_view xml, std::string_view name, std::size_t* at = nullptr);
-// Escapes the text for use as a value in a query string.
-std::string query_value(std::string_view text);
 
 }  // namespace ls::coordinator

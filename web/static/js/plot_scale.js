@@ -74,8 +74,8 @@ export const drawable = (convergence, key) =>
     .sort((a, b) => a[key] - b[key]);
 
 /**
- * When the error will be down to the job's target, over the same clock: {x, lo, hi, more}, lo, hi and more (with eight
- * more workers) null if they are not known; null if nothing is forecast, or it is reached.
+ * When the error will be down to the job's target, over the same clock: {x, lo, hi, more}, lo, hi and more ({x, workers}: with so
+ * many more workers) null if they are not known; null if nothing is forecast, or it is reached.
  */
 export function aheadOf(job, report, key) {
   const last = drawable(report?.convergence, key).at(-1);
@@ -84,7 +84,7 @@ export function aheadOf(job, report, key) {
   if (!last || !(target > 0) || last.relmse <= target) return null;
   if (key === "seconds" && job.eta_seconds > 0 && Array.isArray(job.eta_ci95)) {
     const [lo, hi] = job.eta_ci95.map((eta) => job.elapsed_seconds + eta);
-    return { x: job.elapsed_seconds + job.eta_seconds, lo, hi, more: job.eta_with_more?.seconds > 0 ? job.elapsed_seconds + job.eta_with_more.seconds : null };
+    return { x: job.elapsed_seconds + job.eta_seconds, lo, hi, more: job.eta_with_more?.seconds > 0 ? { x: job.elapsed_seconds + job.eta_with_more.seconds, workers: job.eta_with_more.workers } : null };
   }
   if (!(forecast?.asked && forecast.core_seconds > 0)) return null;
   // The remaining time assumes the previous pace

@@ -85,7 +85,7 @@ function forecastText({ ahead, target, doubt }) {
   if (!ahead) return null;
   const at = doubt ? "not before" : "at";
   const ci = ahead.lo !== null ? ` (${duration(ahead.lo)} to ${duration(ahead.hi)})` : null;
-  return h("span", { key: "f", class: "forecast" }, `target ${given(target)} ${at} `, h("b", null, duration(ahead.x)), ci, ahead.more ? `, with 8 more workers ${at} ${duration(ahead.more)}` : null);
+  return h("span", { key: "f", class: "forecast" }, `target ${given(target)} ${at} `, h("b", null, duration(ahead.x)), ci, ahead.more ? `, with ${ahead.more.workers} more workers ${at} ${duration(ahead.more.x)}` : null);
 }
 
 /** The slope with its interval, and what it means, in words. */

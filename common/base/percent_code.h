@@ -1,12 +1,26 @@
 // The percent codes of URLs.
 #pragma once
 
+#include <fmt/format.h>
+
+#include <cctype>
 #include <charconv>
 #include <optional>
 #include <string>
 #include <string_view>
 
-namespace ls::coordinator {
+namespace ls {
+
+// "a b" -> "a%20b": codes all but the unreserved characters.
+inline std::string percent_encode(std::string_view text) {
+  std::string out;
+  for (const unsigned char c : text)
+    if (std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.' || c == '~')
+      out += static_cast<char>(c);
+    else
+      out += fmt::format("%{:02X}", c);
+  return out;
+}
 
 // "a%20b" -> "a b" (RFC 3986, section 2.1); nullopt if a '%' has no two hexadecimal digits behind it.
 inline std::optional<std::string> percent_decode(std::string_view text) {
@@ -22,4 +36,4 @@ inline std::optional<std::string> percent_decode(std::string_view text) {
   return out;
 }
 
-}  // namespace ls::coordinator
+}  // namespace ls
