@@ -15,6 +15,61 @@ void describe_multiple_scattering(V& v, T& b) {
           b.multiple_scattering);
 }
 
+// Describes the roughness that differs along u and v, of several rough surfaces.
+template <class V, class T>
+void describe_roughness(V& v, T& b) {
+  v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
+  v.field({.name = "alpha_u",
+           .doc = "roughness along u",
+           .range = kPositive,
+           .fallback = {.1, .1, .1},
+           .number = true},
+          b.alpha_u);
+  v.field({.name = "alpha_v",
+           .doc = "roughness along v",
+           .range = kPositive,
+           .fallback = {.1, .1, .1},
+           .number = true},
+          b.alpha_v);
+}
+
+template <class V, class T>
+void describe_metal(V& v, T& b) {
+  v.field(
+      {.name = "eta", .doc = "real part of the index of refraction; or `material`", .range = kNonNegative},
+      b.eta);
+  v.field({.name = "k", .doc = "imaginary part; or `material`", .range = kNonNegative}, b.k);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+}
+
+// Describes the boundary of a dielectric, or a sheet of it. `outside` and `through` are the meanings of
+// ext_ior and specular_transmittance.
+template <class V, class T>
+void describe_glass(V& v, T& b, std::string_view outside, std::string_view through) {
+  v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
+          b.int_ior);
+  v.field({.name = "ext_ior", .doc = outside, .range = kPositive, .named_ior = true}, b.ext_ior);
+  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
+          b.specular_reflectance);
+  v.field({.name = "specular_transmittance", .doc = through, .range = kUnit}, b.specular_transmittance);
+}
+
+// Describes a dielectric coat and the base under it.
+template <class V, class T>
+void describe_coat(V& v, T& b) {
+  v.field(
+      {.name = "int_ior", .doc = "index of refraction of the coat", .range = kPositive, .named_ior = true},
+      b.int_ior);
+  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
+          b.ext_ior);
+  v.field({.name = "nonlinear", .doc = "colour shifts by internal reflection"}, b.nonlinear);
+  v.field({.name = "diffuse_reflectance", .doc = "of the base", .range = kUnit, .fallback = {.5, .5, .5}},
+          b.diffuse_reflectance);
+  v.field({.name = "specular_reflectance", .doc = "factor on the coat's reflection", .range = kUnit},
+          b.specular_reflectance);
+}
+
 LS_TYPE(DiffuseBsdf, "bsdf", "diffuse", "", "ideally rough surface, one-sided unless wrapped in `twosided`")
 template <class V, Of<DiffuseBsdf> T>
 void describe(V& v, T& b) {
@@ -43,51 +98,22 @@ void describe(V& v, T& b) {
 LS_TYPE(ConductorBsdf, "bsdf", "conductor", "", "smooth metal")
 template <class V, Of<ConductorBsdf> T>
 void describe(V& v, T& b) {
-  v.field(
-      {.name = "eta", .doc = "real part of the index of refraction; or `material`", .range = kNonNegative},
-      b.eta);
-  v.field({.name = "k", .doc = "imaginary part; or `material`", .range = kNonNegative}, b.k);
-  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
-          b.specular_reflectance);
+  describe_metal(v, b);
 }
 
 LS_TYPE(RoughConductorBsdf, "bsdf", "roughconductor", "",
         "rough metal; `alpha` sets both alpha_u and alpha_v")
 template <class V, Of<RoughConductorBsdf> T>
 void describe(V& v, T& b) {
-  v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
-  v.field({.name = "alpha_u",
-           .doc = "roughness along u",
-           .range = kPositive,
-           .fallback = {.1, .1, .1},
-           .number = true},
-          b.alpha_u);
-  v.field({.name = "alpha_v",
-           .doc = "roughness along v",
-           .range = kPositive,
-           .fallback = {.1, .1, .1},
-           .number = true},
-          b.alpha_v);
-  v.field(
-      {.name = "eta", .doc = "real part of the index of refraction; or `material`", .range = kNonNegative},
-      b.eta);
-  v.field({.name = "k", .doc = "imaginary part; or `material`", .range = kNonNegative}, b.k);
-  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
-          b.specular_reflectance);
+  describe_roughness(v, b);
+  describe_metal(v, b);
   describe_multiple_scattering(v, b);
 }
 
 LS_TYPE(DielectricBsdf, "bsdf", "dielectric", "", "smooth boundary of glass, water or the like")
 template <class V, Of<DielectricBsdf> T>
 void describe(V& v, T& b) {
-  v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
-          b.int_ior);
-  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
-          b.ext_ior);
-  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
-          b.specular_reflectance);
-  v.field({.name = "specular_transmittance", .doc = "factor on the refraction", .range = kUnit},
-          b.specular_transmittance);
+  describe_glass(v, b, "index of refraction outside", "factor on the refraction");
 }
 
 LS_TYPE(RoughDielectricBsdf, "bsdf", "roughdielectric", "",
@@ -95,27 +121,8 @@ LS_TYPE(RoughDielectricBsdf, "bsdf", "roughdielectric", "",
         "thousandth of each other, or a roughness below one, make it a `dielectric`")
 template <class V, Of<RoughDielectricBsdf> T>
 void describe(V& v, T& b) {
-  v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
-  v.field({.name = "alpha_u",
-           .doc = "roughness along u",
-           .range = kPositive,
-           .fallback = {.1, .1, .1},
-           .number = true},
-          b.alpha_u);
-  v.field({.name = "alpha_v",
-           .doc = "roughness along v",
-           .range = kPositive,
-           .fallback = {.1, .1, .1},
-           .number = true},
-          b.alpha_v);
-  v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
-          b.int_ior);
-  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
-          b.ext_ior);
-  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
-          b.specular_reflectance);
-  v.field({.name = "specular_transmittance", .doc = "factor on the refraction", .range = kUnit},
-          b.specular_transmittance);
+  describe_roughness(v, b);
+  describe_glass(v, b, "index of refraction outside", "factor on the refraction");
   describe_multiple_scattering(v, b);
 }
 
@@ -124,14 +131,7 @@ LS_TYPE(ThinDielectricBsdf, "bsdf", "thindielectric", "",
         "which counts as no scattering")
 template <class V, Of<ThinDielectricBsdf> T>
 void describe(V& v, T& b) {
-  v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
-          b.int_ior);
-  v.field({.name = "ext_ior", .doc = "index of refraction around", .range = kPositive, .named_ior = true},
-          b.ext_ior);
-  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
-          b.specular_reflectance);
-  v.field({.name = "specular_transmittance", .doc = "factor on what passes", .range = kUnit},
-          b.specular_transmittance);
+  describe_glass(v, b, "index of refraction around", "factor on what passes");
 }
 
 LS_TYPE(RoughThinDielectricBsdf, "bsdf", "roughthindielectric", "",
@@ -140,43 +140,15 @@ LS_TYPE(RoughThinDielectricBsdf, "bsdf", "roughthindielectric", "",
         "alpha_u and alpha_v. Where both are below a thousandth it is a `thindielectric`")
 template <class V, Of<RoughThinDielectricBsdf> T>
 void describe(V& v, T& b) {
-  v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
-  v.field({.name = "alpha_u",
-           .doc = "roughness along u",
-           .range = kPositive,
-           .fallback = {.1, .1, .1},
-           .number = true},
-          b.alpha_u);
-  v.field({.name = "alpha_v",
-           .doc = "roughness along v",
-           .range = kPositive,
-           .fallback = {.1, .1, .1},
-           .number = true},
-          b.alpha_v);
-  v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},
-          b.int_ior);
-  v.field({.name = "ext_ior", .doc = "index of refraction around", .range = kPositive, .named_ior = true},
-          b.ext_ior);
-  v.field({.name = "specular_reflectance", .doc = "factor on the reflection", .range = kUnit},
-          b.specular_reflectance);
-  v.field({.name = "specular_transmittance", .doc = "factor on what passes", .range = kUnit},
-          b.specular_transmittance);
+  describe_roughness(v, b);
+  describe_glass(v, b, "index of refraction around", "factor on what passes");
   describe_multiple_scattering(v, b);
 }
 
 LS_TYPE(PlasticBsdf, "bsdf", "plastic", "", "diffuse base under a smooth dielectric coat")
 template <class V, Of<PlasticBsdf> T>
 void describe(V& v, T& b) {
-  v.field(
-      {.name = "int_ior", .doc = "index of refraction of the coat", .range = kPositive, .named_ior = true},
-      b.int_ior);
-  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
-          b.ext_ior);
-  v.field({.name = "nonlinear", .doc = "colour shifts by internal reflection"}, b.nonlinear);
-  v.field({.name = "diffuse_reflectance", .doc = "of the base", .range = kUnit, .fallback = {.5, .5, .5}},
-          b.diffuse_reflectance);
-  v.field({.name = "specular_reflectance", .doc = "factor on the coat's reflection", .range = kUnit},
-          b.specular_reflectance);
+  describe_coat(v, b);
 }
 
 LS_TYPE(RoughPlasticBsdf, "bsdf", "roughplastic", "", "diffuse base under a rough dielectric coat")
@@ -184,16 +156,7 @@ template <class V, Of<RoughPlasticBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
   v.field({.name = "alpha", .doc = "roughness", .range = kPositive}, b.alpha);
-  v.field(
-      {.name = "int_ior", .doc = "index of refraction of the coat", .range = kPositive, .named_ior = true},
-      b.int_ior);
-  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
-          b.ext_ior);
-  v.field({.name = "nonlinear", .doc = "colour shifts by internal reflection"}, b.nonlinear);
-  v.field({.name = "diffuse_reflectance", .doc = "of the base", .range = kUnit, .fallback = {.5, .5, .5}},
-          b.diffuse_reflectance);
-  v.field({.name = "specular_reflectance", .doc = "factor on the coat's reflection", .range = kUnit},
-          b.specular_reflectance);
+  describe_coat(v, b);
   describe_multiple_scattering(v, b);
 }
 
@@ -279,6 +242,11 @@ void describe(V& v, T& b) {
   describe_map(v, b);
 }
 
+// A parameter from 0 to 1 that is 0 if it is not given.
+inline Field share_field(std::string_view name, std::string_view doc) {
+  return {.name = name, .doc = doc, .range = kUnit, .fallback = {0, 0, 0}, .number = true};
+}
+
 LS_TYPE(PrincipledBsdf, "bsdf", "principled", "",
         "Burley's model of metals, coated dielectrics and glass. `specular` instead of `eta` means "
         "eta = 2 / (1 - sqrt(0.08 specular)) - 1")
@@ -292,54 +260,20 @@ void describe(V& v, T& b) {
            .fallback = {.5, .5, .5},
            .number = true},
           b.roughness);
-  v.field({.name = "anisotropic",
-           .doc = "stretches highlights along u",
-           .range = kUnit,
-           .fallback = {0, 0, 0},
-           .number = true},
-          b.anisotropic);
-  v.field(
-      {.name = "metallic", .doc = "share of metal", .range = kUnit, .fallback = {0, 0, 0}, .number = true},
-      b.metallic);
+  v.field(share_field("anisotropic", "stretches highlights along u"), b.anisotropic);
+  v.field(share_field("metallic", "share of metal"), b.metallic);
   v.field({.name = "spec_trans",
            .doc = "share of glass in what is not metal; not given, or 0, it has one side",
            .range = kUnit,
            .number = true},
           b.spec_trans);
   v.field({.name = "eta", .doc = "index of refraction inside over that outside", .range = kPositive}, b.eta);
-  v.field({.name = "spec_tint",
-           .doc = "how far the colour tints the reflection",
-           .range = kUnit,
-           .fallback = {0, 0, 0},
-           .number = true},
-          b.spec_tint);
-  v.field({.name = "sheen",
-           .doc = "of cloth, at grazing angles",
-           .range = kUnit,
-           .fallback = {0, 0, 0},
-           .number = true},
-          b.sheen);
-  v.field({.name = "sheen_tint",
-           .doc = "how far the colour tints it",
-           .range = kUnit,
-           .fallback = {0, 0, 0},
-           .number = true},
-          b.sheen_tint);
-  v.field({.name = "flatness",
-           .doc = "from diffuse to an imitation of light that scatters below",
-           .range = kUnit,
-           .fallback = {0, 0, 0},
-           .number = true},
-          b.flatness);
-  v.field(
-      {.name = "clearcoat", .doc = "of a thin coat", .range = kUnit, .fallback = {0, 0, 0}, .number = true},
-      b.clearcoat);
-  v.field({.name = "clearcoat_gloss",
-           .doc = "of the coat",
-           .range = kUnit,
-           .fallback = {0, 0, 0},
-           .number = true},
-          b.clearcoat_gloss);
+  v.field(share_field("spec_tint", "how far the colour tints the reflection"), b.spec_tint);
+  v.field(share_field("sheen", "of cloth, at grazing angles"), b.sheen);
+  v.field(share_field("sheen_tint", "how far the colour tints it"), b.sheen_tint);
+  v.field(share_field("flatness", "from diffuse to an imitation of light that scatters below"), b.flatness);
+  v.field(share_field("clearcoat", "of a thin coat"), b.clearcoat);
+  v.field(share_field("clearcoat_gloss", "of the coat"), b.clearcoat_gloss);
 }
 
 }  // namespace ls::scene
