@@ -138,47 +138,37 @@ Response post_job(Api& api, const Request& request, const Params&) {
   return submit_job(api, std::move(*submit), request.caller);
 }
 
-Response get_job(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
-  const auto job = api.coordinator().job(*id);
+Response get_job(Api& api, const Request&, const JobId& id) {
+  const auto job = api.coordinator().job(id);
   return job ? json_response(200, coordinator::job_json(*job)) : problem(job.error());
 }
 
-Response patch_job(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
-  if (const auto job = api.coordinator().job(*id); !job) return problem(job.error());
+Response patch_job(Api& api, const Request& request, const JobId& id) {
+  if (const auto job = api.coordinator().job(id); !job) return problem(job.error());
   const auto change = read_change(request.body);
   if (!change) return problem(change.error());
   if (change->priority)
     if (auto refused = refuse_priority(api, request.caller, *change->priority)) return std::move(*refused);
-  if (const auto done = api.coordinator().change(*id, *change); !done) return problem(done.error());
-  return get_job(api, request, params);
+  if (const auto done = api.coordinator().change(id, *change); !done) return problem(done.error());
+  return get_job(api, request, id);
 }
 
-Response delete_job(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
-  if (const auto done = api.coordinator().remove(*id); !done) return problem(done.error());
+Response delete_job(Api& api, const Request&, const JobId& id) {
+  if (const auto done = api.coordinator().remove(id); !done) return problem(done.error());
   Response response;
   response.status = 204;
   return response;
 }
 
-Response get_image_exr(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
-  if (const auto path = api.coordinator().final_file(*id, "image.exr"); !path.empty())
+Response get_image_exr(Api& api, const Request&, const JobId& id) {
+  if (const auto path = api.coordinator().final_file(id, "image.exr"); !path.empty())
     if (auto file = open_file_body(path))
-      return file_response("image/x-exr", std::move(*file), id->value + ".exr");
-  auto image = api.coordinator().image_exr(*id);
-  return image ? file_response("image/x-exr", std::move(*image), id->value + ".exr") : problem(image.error());
+      return file_response("image/x-exr", std::move(*file), id.value + ".exr");
+  auto image = api.coordinator().image_exr(id);
+  return image ? file_response("image/x-exr", std::move(*image), id.value + ".exr") : problem(image.error());
 }
 
-Response get_image_png(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
+Response get_image_png(Api& api, const Request& request, const JobId& id) {
   const auto exposure = parse_number<double>(request.parameter("exposure").value_or("0"));
   if (!exposure || !(std::abs(*exposure) <= coordinator::limits::kMaxExposure))
     return problem(400, fmt::format("'exposure' must be a number of stops from -{0} to {0}",
@@ -186,56 +176,44 @@ Response get_image_png(Api& api, const Request& request, const Params& params) {
   const auto layer = request.parameter("layer");
   if (layer && *layer != "denoised")
     return problem(400, "'layer' must be \"denoised\", or be left out for the image itself");
-  auto image = api.coordinator().image_png(*id, *exposure, layer.has_value());
-  return image ? file_response("image/png", std::move(*image), id->value + ".png") : problem(image.error());
+  auto image = api.coordinator().image_png(id, *exposure, layer.has_value());
+  return image ? file_response("image/png", std::move(*image), id.value + ".png") : problem(image.error());
 }
 
-Response get_error_png(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
-  auto map = api.coordinator().error_png(*id);
-  return map ? file_response("image/png", std::move(*map), id->value + "-error.png") : problem(map.error());
+Response get_error_png(Api& api, const Request&, const JobId& id) {
+  auto map = api.coordinator().error_png(id);
+  return map ? file_response("image/png", std::move(*map), id.value + "-error.png") : problem(map.error());
 }
 
-Response get_samples_png(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
-  auto map = api.coordinator().samples_png(*id);
-  return map ? file_response("image/png", std::move(*map), id->value + "-samples.png") : problem(map.error());
+Response get_samples_png(Api& api, const Request&, const JobId& id) {
+  auto map = api.coordinator().samples_png(id);
+  return map ? file_response("image/png", std::move(*map), id.value + "-samples.png") : problem(map.error());
 }
 
-Response get_report(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
-  if (const auto path = api.coordinator().final_file(*id, "report.json"); !path.empty())
+Response get_report(Api& api, const Request&, const JobId& id) {
+  if (const auto path = api.coordinator().final_file(id, "report.json"); !path.empty())
     if (auto file = open_file_body(path)) {
       Response response = json_response(200, {});
       response.body = std::move(*file);
       return response;
     }
-  auto report = api.coordinator().report_json(*id);
+  auto report = api.coordinator().report_json(id);
   return report ? json_response(200, std::move(*report)) : problem(report.error());
 }
 
-Response get_convergence(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
-  const auto points = api.coordinator().convergence(*id);
+Response get_convergence(Api& api, const Request&, const JobId& id) {
+  const auto points = api.coordinator().convergence(id);
   return points ? text_response(200, "text/csv; charset=utf-8", coordinator::convergence_csv(*points))
                 : problem(points.error());
 }
 
-Response get_tiles(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
-  const auto tiles = api.coordinator().tiles(*id);
+Response get_tiles(Api& api, const Request&, const JobId& id) {
+  const auto tiles = api.coordinator().tiles(id);
   return tiles ? json_response(200, coordinator::tiles_json(*tiles)) : problem(tiles.error());
 }
 
-Response get_log(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
-  auto log = api.coordinator().job_log(*id);
+Response get_log(Api& api, const Request&, const JobId& id) {
+  auto log = api.coordinator().job_log(id);
   return log ? text_response(200, "text/plain; charset=utf-8", std::move(*log)) : problem(log.error());
 }
 

@@ -87,24 +87,20 @@ Response get_jobs(Api& api, const Request& request, const Params&) {
   return json_response(200, coordinator::jobs_json(api.coordinator().list(*asked)));
 }
 
-Response post_again(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
-  if (const auto owner = api.coordinator().owner(*id); !owner) return problem(owner.error());
+Response post_again(Api& api, const Request& request, const JobId& id) {
+  if (const auto owner = api.coordinator().owner(id); !owner) return problem(owner.error());
   const auto body = read_object(request.body, {"spp", "target_error", "time", "seed", "priority"});
   if (!body) return problem(body.error());
   const auto changes = job_spec_of(*body);
   if (!changes) return problem(changes.error());
   if (auto refused = refuse_priority(api, request.caller, changes->priority)) return std::move(*refused);
-  const auto made = api.coordinator().submit_again(*id, *changes, request.caller.user,
+  const auto made = api.coordinator().submit_again(id, *changes, request.caller.user,
                                                    std::string(request.header("traceparent")));
   return made ? submitted(api, *made) : problem(made.error());
 }
 
-Response get_thumbnail(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
-  auto image = api.coordinator().thumbnail_png(*id);
+Response get_thumbnail(Api& api, const Request&, const JobId& id) {
+  auto image = api.coordinator().thumbnail_png(id);
   if (!image) return problem(image.error());
   Response response;
   response.content_type = "image/png";

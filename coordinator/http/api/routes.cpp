@@ -5,6 +5,7 @@
 #include "common/scene/limits.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/message/limits.h"
+#include "coordinator/http/message/problem.h"
 
 namespace ls::http {
 namespace {
@@ -22,6 +23,13 @@ constexpr std::string_view kBundleTypes =
     "application/zip application/x-zip-compressed application/x-tar application/x-tar+gzip "
     "application/gzip application/x-gzip";
 
+// Handles a request about one job.
+template <auto handler>
+Response of_job(Api& api, const Request& request, const Params& params) {
+  const auto id = job_of(request, params);
+  return id ? handler(api, request, *id) : problem(id.error());
+}
+
 constexpr std::array kRoutes = {
     Route{Method::get, "/healthz", kOpen, Executor::here, kNone, 0, get_healthz},
     Route{Method::get, "/readyz", kOpen, Executor::quick, kNone, 0, get_readyz},
@@ -34,30 +42,37 @@ constexpr std::array kRoutes = {
     Route{Method::get, "/api/v1/jobs", kToken, Executor::quick, kNone, 0, get_jobs},
     Route{Method::post, "/api/v1/jobs", kSubmit, Executor::slow, kWhole, scene::kMaxTextBytes, post_job,
           kJobTypes, kBundleTypes},
-    Route{Method::get, "/api/v1/jobs/{id}", kToken, Executor::quick, kNone, 0, get_job},
-    Route{Method::patch, "/api/v1/jobs/{id}", kSubmit, Executor::quick, kWhole, kMaxControlJson, patch_job,
-          kPatchJson},
-    Route{Method::del, "/api/v1/jobs/{id}", kSubmit, Executor::quick, kNone, 0, delete_job},
-    Route{Method::get, "/api/v1/jobs/{id}/image.exr", kToken, Executor::slow, kNone, 0, get_image_exr},
-    Route{Method::get, "/api/v1/jobs/{id}/image.png", kToken, Executor::slow, kNone, 0, get_image_png},
-    Route{Method::get, "/api/v1/jobs/{id}/thumbnail.png", kToken, Executor::slow, kNone, 0, get_thumbnail},
+    Route{Method::get, "/api/v1/jobs/{id}", kToken, Executor::quick, kNone, 0, of_job<get_job>},
+    Route{Method::patch, "/api/v1/jobs/{id}", kSubmit, Executor::quick, kWhole, kMaxControlJson,
+          of_job<patch_job>, kPatchJson},
+    Route{Method::del, "/api/v1/jobs/{id}", kSubmit, Executor::quick, kNone, 0, of_job<delete_job>},
+    Route{Method::get, "/api/v1/jobs/{id}/image.exr", kToken, Executor::slow, kNone, 0,
+          of_job<get_image_exr>},
+    Route{Method::get, "/api/v1/jobs/{id}/image.png", kToken, Executor::slow, kNone, 0,
+          of_job<get_image_png>},
+    Route{Method::get, "/api/v1/jobs/{id}/thumbnail.png", kToken, Executor::slow, kNone, 0,
+          of_job<get_thumbnail>},
     Route{Method::post, "/api/v1/jobs/{id}/again", kSubmit, Executor::slow, kWhole, kMaxControlJson,
-          post_again, kJson},
+          of_job<post_again>, kJson},
     Route{Method::post, "/api/v1/jobs/{id}/video", kSubmit, Executor::slow, kWhole, kMaxControlJson,
-          post_video, kJson},
-    Route{Method::get, "/api/v1/jobs/{id}/video", kToken, Executor::quick, kNone, 0, get_video},
-    Route{Method::get, "/api/v1/jobs/{id}/video.mp4", kToken, Executor::slow, kNone, 0, get_video_mp4},
-    Route{Method::get, "/api/v1/jobs/{id}/error.png", kToken, Executor::slow, kNone, 0, get_error_png},
-    Route{Method::get, "/api/v1/jobs/{id}/samples.png", kToken, Executor::slow, kNone, 0, get_samples_png},
-    Route{Method::get, "/api/v1/jobs/{id}/layers", kToken, Executor::slow, kNone, 0, get_layers},
-    Route{Method::get, "/api/v1/jobs/{id}/pixels", kToken, Executor::slow, kNone, 0, get_pixels},
-    Route{Method::get, "/api/v1/jobs/{id}/report", kToken, Executor::slow, kNone, 0, get_report},
-    Route{Method::get, "/api/v1/jobs/{id}/report.html", kToken, Executor::slow, kNone, 0, get_report_page},
+          of_job<post_video>, kJson},
+    Route{Method::get, "/api/v1/jobs/{id}/video", kToken, Executor::quick, kNone, 0, of_job<get_video>},
+    Route{Method::get, "/api/v1/jobs/{id}/video.mp4", kToken, Executor::slow, kNone, 0,
+          of_job<get_video_mp4>},
+    Route{Method::get, "/api/v1/jobs/{id}/error.png", kToken, Executor::slow, kNone, 0,
+          of_job<get_error_png>},
+    Route{Method::get, "/api/v1/jobs/{id}/samples.png", kToken, Executor::slow, kNone, 0,
+          of_job<get_samples_png>},
+    Route{Method::get, "/api/v1/jobs/{id}/layers", kToken, Executor::slow, kNone, 0, of_job<get_layers>},
+    Route{Method::get, "/api/v1/jobs/{id}/pixels", kToken, Executor::slow, kNone, 0, of_job<get_pixels>},
+    Route{Method::get, "/api/v1/jobs/{id}/report", kToken, Executor::slow, kNone, 0, of_job<get_report>},
+    Route{Method::get, "/api/v1/jobs/{id}/report.html", kToken, Executor::slow, kNone, 0,
+          of_job<get_report_page>},
     Route{Method::get, "/api/v1/jobs/{id}/convergence.csv", kToken, Executor::quick, kNone, 0,
-          get_convergence},
-    Route{Method::get, "/api/v1/jobs/{id}/tiles", kToken, Executor::slow, kNone, 0, get_tiles},
-    Route{Method::get, "/api/v1/jobs/{id}/log", kToken, Executor::quick, kNone, 0, get_log},
-    Route{Method::get, "/api/v1/jobs/{id}/events", kToken, Executor::quick, kNone, 0, get_job_events},
+          of_job<get_convergence>},
+    Route{Method::get, "/api/v1/jobs/{id}/tiles", kToken, Executor::slow, kNone, 0, of_job<get_tiles>},
+    Route{Method::get, "/api/v1/jobs/{id}/log", kToken, Executor::quick, kNone, 0, of_job<get_log>},
+    Route{Method::get, "/api/v1/jobs/{id}/events", kToken, Executor::quick, kNone, 0, of_job<get_job_events>},
     Route{Method::get, "/api/v1/events", kToken, Executor::quick, kNone, 0, get_events},
     Route{Method::get, "/api/v1/tokens", Access::admin, Executor::quick, kNone, 0, get_tokens},
     Route{Method::post, "/api/v1/tokens", Access::admin, Executor::slow, kWhole, kMaxControlJson, post_token,

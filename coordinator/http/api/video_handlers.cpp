@@ -32,33 +32,27 @@ Result<VideoAsked> read_asked_video(std::string_view text) {
 
 }  // namespace
 
-Response post_video(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
-  if (const auto job = api.coordinator().job(*id); !job) return problem(job.error());
+Response post_video(Api& api, const Request& request, const JobId& id) {
+  if (const auto job = api.coordinator().job(id); !job) return problem(job.error());
   const auto asked = read_asked_video(request.body);
   if (!asked) return problem(asked.error());
-  const auto video = api.coordinator().make_video(*id, *asked);
+  const auto video = api.coordinator().make_video(id, *asked);
   return video ? json_response(202, coordinator::video_json(*video)) : problem(video.error());
 }
 
-Response get_video(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
-  const auto video = api.coordinator().video(*id);
+Response get_video(Api& api, const Request&, const JobId& id) {
+  const auto video = api.coordinator().video(id);
   return video ? json_response(200, coordinator::video_json(*video)) : problem(video.error());
 }
 
-Response get_video_mp4(Api& api, const Request& request, const Params& params) {
-  const auto id = job_of(request, params);
-  if (!id) return problem(id.error());
-  const auto path = api.coordinator().video_file(*id);
+Response get_video_mp4(Api& api, const Request&, const JobId& id) {
+  const auto path = api.coordinator().video_file(id);
   if (!path) return problem(path.error());
   auto file = open_file_body(*path);
-  if (!file) return problem(404, fmt::format("the video of job {} is gone: ask for it again", id->value));
+  if (!file) return problem(404, fmt::format("the video of job {} is gone: ask for it again", id.value));
   Response response;
   response.content_type = "video/mp4";
-  response.headers.emplace_back("Content-Disposition", fmt::format("inline; filename=\"{}.mp4\"", id->value));
+  response.headers.emplace_back("Content-Disposition", fmt::format("inline; filename=\"{}.mp4\"", id.value));
   response.body = std::move(*file);
   return response;
 }
