@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "worker/render/base/in_order.h"
 #include "worker/render/integrator/camera_segment_nee.h"
 #include "worker/render/integrator/variant.h"
 #include "worker/render/math/processor.h"
@@ -19,13 +20,15 @@ namespace ls::render {
 namespace {
 
 // Number of camera paths from which the sun map (the distribution of rays from the sun: SunMap) is learned:
-// at most kLearningPaths, and at most kLearningPathsPerPixel for each pixel of the full frame. Learning may
-// stop after kFirstPaths if connections clearly do not pay.
+// at most kLearningPaths, and at most kLearningPathsPerPixel for each pixel of the full frame.
 constexpr std::uint64_t kLearningPaths = 1 << 16;
 constexpr std::uint64_t kLearningPathsPerPixel = 16;
-constexpr std::uint64_t kFirstPaths = 1 << 12;
-// Learning stops after this many vertices in total, since paths may be long.
-constexpr double kLearningVertices = 1 << 21;
+// Paths are traced in batches of this many, on several threads.
+constexpr std::uint64_t kLearningBatch = 1 << 10;
+// Learning may stop after this many batches if connections clearly do not pay.
+constexpr std::uint64_t kFirstBatches = 4;
+// A batch ends after this many vertices, since paths may be long.
+constexpr double kLearningVertices = 1 << 15;
 constexpr std::uint64_t kSunRays = 1 << 14;  // rays of the sun for one set of light vertices
 // Number of rays from which the mean number of light vertices per ray of the sun is estimated.
 constexpr std::uint64_t kLearningRays = 1 << 12;
@@ -53,30 +56,57 @@ struct Learned {
   double radiance = 0;  // sum of the radiances of all paths
   std::uint64_t paths = 0;
 
+  explicit Learned(const World& w) { learner.map = SunMap(w.sun.direction, w.geometry.radius); }
+  void add(const Learned& batch) {
+    learner.map.add(batch.learner.map);
+    learner.light += batch.learner.light;
+    learner.vertices += batch.learner.vertices;
+    learner.lit += batch.learner.lit;
+    learner.media_differ = learner.media_differ || batch.learner.media_differ;
+    radiance += batch.radiance;
+    paths += batch.paths;
+  }
   bool pays() const {
     return learner.lit < kLitThatPays * learner.vertices && learner.light > kLightThatPays * radiance;
   }
 };
 
 template <Features F, template <Features> class Light>
-void learn(const World& w, bool in_any_case, Learned& learned) {
-  const auto pixels = static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
-  const std::uint64_t most = std::min(kLearningPaths, kLearningPathsPerPixel * pixels);
-  while (learned.paths < most) {
-    const SampleStream stream(kLearningSeed, 0, 0, 2 * learned.paths++);
+Learned learn_batch(const World& w, std::uint64_t first, std::uint64_t end) {
+  const FlushDenormals mode;
+  Learned learned(w);
+  for (std::uint64_t i = first; i < end && learned.learner.vertices <= kLearningVertices; ++i) {
+    const SampleStream stream(kLearningSeed, 0, 0, 2 * i);
     const Group at = stream.group(0, Purpose::guide), lens = stream.group(0, Purpose::camera);
     const CameraRay ray =
         w.camera.ray(at.u(0) * w.frame.width, at.u(1) * w.frame.height, {lens.u(2), lens.u(3)});
     const SampleOutcome out =
         PathTracer<F, Light>(w, stream, nullptr, {.learner = &learned.learner}).trace(ray);
+    ++learned.paths;
     const double radiance = double{mean_component(out.radiance)};
     if (out.cut_off == HealthCause::none && std::isfinite(radiance)) learned.radiance += radiance;
-    if (learned.learner.vertices > kLearningVertices) return;
-    // If the sun is found often, few paths suffice to decide against connections
-    if (learned.paths == kFirstPaths && !in_any_case &&
-        learned.learner.lit > 2 * kLitThatPays * learned.learner.vertices)
-      return;
   }
+  return learned;
+}
+
+template <Features F, template <Features> class Light>
+Learned learn(const World& w, bool in_any_case, int threads) {
+  const auto pixels = static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
+  const std::uint64_t most = std::min(kLearningPaths, kLearningPathsPerPixel * pixels);
+  const std::uint64_t batches = (most + kLearningBatch - 1) / kLearningBatch;
+  Learned learned(w);
+  in_order(
+      threads, batches,
+      [&](std::size_t i) {
+        return learn_batch<F, Light>(w, i * kLearningBatch, std::min((i + 1) * kLearningBatch, most));
+      },
+      [&, taken = std::uint64_t{0}](const Learned& batch) mutable {
+        learned.add(batch);
+        // If the sun is found often, few paths suffice to decide against connections
+        return ++taken != kFirstBatches || in_any_case ||
+               learned.learner.lit <= 2 * kLitThatPays * learned.learner.vertices;
+      });
+  return learned;
 }
 
 template <Features F>
@@ -150,7 +180,7 @@ LightVertices::Look look_of(const World& w, const LightVertex& y) {
   return look;
 }
 
-void learn_connections(const IntegratorSettings& settings, World& w) {
+void learn_connections(const IntegratorSettings& settings, int threads, World& w) {
   if (settings.light_vertices < 0 || !w.depth_allows(2)) return;
   // Light vertices do not know how many surfaces the light has passed
   if (w.passing_counts && w.null_transmission) return;
@@ -165,16 +195,10 @@ void learn_connections(const IntegratorSettings& settings, World& w) {
   if (!kAimed.covers(need)) return;
   w.sun = w.lights.strongest_directional();
   if (w.sun.light == kNone) return;
-  const FlushDenormals mode;
-  Learned learned;
-  learned.learner.map = SunMap(w.sun.direction, w.geometry.radius);
   const bool in_any_case = settings.light_vertices > 0;
-  if (w.need.aimed)
-    learn<kAimed, CameraSegmentNee>(w, in_any_case, learned);
-  else if (w.need.media)
-    learn<kMedia, VertexNee>(w, in_any_case, learned);
-  else
-    learn<kSurfaces, VertexNee>(w, in_any_case, learned);
+  Learned learned = w.need.aimed   ? learn<kAimed, CameraSegmentNee>(w, in_any_case, threads)
+                    : w.need.media ? learn<kMedia, VertexNee>(w, in_any_case, threads)
+                                   : learn<kSurfaces, VertexNee>(w, in_any_case, threads);
   if (learned.learner.media_differ || (!in_any_case && !learned.pays())) return;
   learned.learner.map.finish();
   if (learned.learner.map.empty()) return;
@@ -183,6 +207,7 @@ void learn_connections(const IntegratorSettings& settings, World& w) {
   w.need.connected = true;
   aim(settings, w);  // again, since with connections points on camera segments pay more often
   w.rr_depth = std::min(w.rr_depth, kConnectedRoulette);
+  const FlushDenormals mode;
   const std::size_t count = trace(w, kLearningSeed, 0, kLearningRays).count();
   w.connections_per_ray =
       float{LightVertices::kCandidates * kLearningRays} / static_cast<float>(std::max<std::size_t>(count, 1));
@@ -213,9 +238,9 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   auto world = make_world(scene, settings, files, threads);
   if (!world) return tl::unexpected(world.error());
   if (settings.integrator == "volpath" || settings.integrator == "path") {
-    learn_connections(scene.integrator, **world);
+    learn_connections(scene.integrator, threads, **world);
     learn_sky_samples(scene.integrator, **world);
-    share_tails(scene.integrator, **world);
+    share_tails(scene.integrator, threads, **world);
     if ((*world)->need.grids && !(*world)->need.connected) learn_roulette(scene.integrator, **world);
   }
   return std::shared_ptr<const World>(std::move(*world));

@@ -11,8 +11,8 @@ namespace ls::render {
 
 // Sets `sun`, `sun_map`, `faint` and Features::connected of a world that is otherwise complete. The result
 // depends only on the scene, the depth limits and the size of the full frame: not on the seed, the number of
-// samples or a crop. The integrator must be `volpath` or `path`.
-void learn_connections(const IntegratorSettings& settings, World& w);
+// samples, a crop or the number of threads. The integrator must be `volpath` or `path`.
+void learn_connections(const IntegratorSettings& settings, int threads, World& w);
 
 // Traces the light vertices of one set (LightVertexCache). They depend only on the world, its seed and the
 // number of the set.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/image/error/relative_weights.h"
+#include "worker/render/base/in_order.h"
 #include "worker/render/integrator/sharing_block.h"
 #include "worker/render/integrator/variant.h"
 #include "worker/render/math/processor.h"
@@ -57,15 +58,22 @@ class Pilot {
     w_.reuse = 0;
   }
 
-  // Chooses a square at random and renders one group of its pixels, with shared paths and without. `dealing`
-  // is the sample number that determines how the square is divided into groups. Returns false if a sample is
-  // not usable.
-  bool add_group(const Variant& sharing, std::uint64_t dealing) {
-    const auto among = [&](int n) {
-      return static_cast<int>(places_.next() % static_cast<std::uint64_t>(n));
-    };
+  // Sums of squared relative errors; not `usable` if a sample was rejected.
+  struct Noise {
+    double shared = 0, alone = 0;
+    bool usable = true;
+    // True if there is more than `factor` times as much noise without sharing.
+    bool gains(double factor) const { return alone > factor * shared; }
+  };
+  // Renders one group of the pixels of a square that is chosen at random, with shared paths and without.
+  // `number` is that of the group, and the sample number that determines how the square is divided into
+  // groups.
+  Noise of_group(const Variant& sharing, std::uint64_t number) const {
+    const FlushDenormals mode;
+    RandomStream places(combine(kPilotSeed, number));
+    const auto among = [&](int n) { return static_cast<int>(places.next() % static_cast<std::uint64_t>(n)); };
     const PixelAt somewhere{among(w_.frame.width) - w_.origin_x, among(w_.frame.height) - w_.origin_y};
-    SharingBlock::Pixels group = SharingBlock(w_, somewhere).in_order_of(dealing);
+    SharingBlock::Pixels group = SharingBlock(w_, somewhere).in_order_of(number);
     if (group.size() > kSharing) group.resize(kSharing);
     std::array<Halves, kSharing> shared, alone;
     shared.fill({V3d(0), V3d(0)});
@@ -76,23 +84,22 @@ class Pilot {
       for (std::size_t k = 0; k < group.size(); ++k) {
         const SampleValue v = render_sample(w_, group[k].x, group[k].y, n);
         if (!v.finite || outcomes[k].cut_off != HealthCause::none || !is_finite(outcomes[k].radiance))
-          return false;
+          return {.usable = false};
         shared[k][n % 2] += V3d(outcomes[k].radiance);
         alone[k][n % 2] += V3d(v.rgb[0], v.rgb[1], v.rgb[2]);
       }
     }
+    Noise noise;
     for (std::size_t k = 0; k < group.size(); ++k)
       for (int c = 0; c < 3; ++c) {
         const double mean = (shared[k][0][c] + shared[k][1][c]) / kPilotSamples;
         const double weight = 1 / (mean * mean + kRelMseDenominator);
         const auto squared = [](double x) { return x * x; };
-        noise_shared_ += squared(shared[k][0][c] - shared[k][1][c]) * weight;
-        noise_alone_ += squared(alone[k][0][c] - alone[k][1][c]) * weight;
+        noise.shared += squared(shared[k][0][c] - shared[k][1][c]) * weight;
+        noise.alone += squared(alone[k][0][c] - alone[k][1][c]) * weight;
       }
-    return true;
+    return noise;
   }
-  // Returns true if the pixels have more than `factor` times as much noise without sharing.
-  bool gains(double factor) const { return noise_alone_ > factor * noise_shared_; }
 
  private:
   using Halves = std::array<V3d, 2>;  // sums of samples
@@ -100,23 +107,25 @@ class Pilot {
   World& w_;
   const std::uint64_t seed_;
   const int max_depth_;
-  RandomStream places_{kPilotSeed};
-  double noise_shared_ = 0, noise_alone_ = 0;  // sums of squared relative errors
 };
 
-bool sharing_pays(World& w, const Variant& sharing) {
+bool sharing_pays(World& w, const Variant& sharing, int threads) {
   const auto pixels = static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
   if (pixels < kPilotFrame) return false;
   const auto is_boundary = [](const SurfaceInfo& s) { return s.null; };
   if (std::ranges::count_if(w.geometry.surfaces, is_boundary) > kPilotBoundaries) return false;
-  const FlushDenormals mode;
   const std::uint64_t groups = std::clamp(pixels / kPixelsPerGroup, kFewestPilotGroups, kPilotGroups);
-  Pilot pilot(w);
-  for (std::uint64_t i = 0; i < groups; ++i) {
-    if (!pilot.add_group(sharing, i)) return false;
-    if (i + 1 >= kFewestPilotGroups && pilot.gains(kBeyondDoubt * kGainThatPays)) return true;
-  }
-  return pilot.gains(kGainThatPays);
+  const Pilot pilot(w);
+  Pilot::Noise all;
+  in_order(
+      threads, groups, [&](std::size_t i) { return pilot.of_group(sharing, i); },
+      [&, taken = std::uint64_t{0}](const Pilot::Noise& group) mutable {
+        all.usable = group.usable;
+        all.shared += group.shared;
+        all.alone += group.alone;
+        return all.usable && (++taken < kFewestPilotGroups || !all.gains(kBeyondDoubt * kGainThatPays));
+      });
+  return all.usable && all.gains(kGainThatPays);
 }
 
 }  // namespace
@@ -135,7 +144,7 @@ std::span<const Variant> reuse_variants() {
 const Variant kReuseSplitVariant =
     group_variant<kAllSplit>("homogeneous media, tails shared, and light in parts");
 
-void share_tails(const IntegratorSettings& settings, World& w) {
+void share_tails(const IntegratorSettings& settings, int threads, World& w) {
   Features need = w.need;
   need.split = false;
   need.reuse = true;
@@ -154,7 +163,7 @@ void share_tails(const IntegratorSettings& settings, World& w) {
     // that emit light, but a tail keeps only one.
     if ((s.transition && s.sheet) || ((s.null || s.null_transmission) && s.light != kNone)) return;
   const bool automatic = settings.path_reuse == 0;
-  if (automatic && !sharing_pays(w, *sharing)) return;
+  if (automatic && !sharing_pays(w, *sharing, threads)) return;
   w.reuse = automatic ? kUsualPathReuse : settings.path_reuse;
   w.need.reuse = true;
 }

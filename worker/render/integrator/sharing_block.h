@@ -20,7 +20,7 @@ namespace ls::render {
 // Sets `reuse` and Features::reuse of a world that is otherwise complete, if the densities of second vertices
 // are known in its scene, and if the settings ask for sharing or leave the choice to a pilot that finds that
 // sharing pays (reuse_variants.cpp).
-void share_tails(const IntegratorSettings& settings, World& w);
+void share_tails(const IntegratorSettings& settings, int threads, World& w);
 
 class SharingBlock {
  public:

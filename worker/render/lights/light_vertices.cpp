@@ -37,6 +37,10 @@ void SunMap::learn(const V3& p, float weight) {
   if (weight > 0 && std::isfinite(weight)) found_.push_back({{dot(p, u_), dot(p, v_)}, weight});
 }
 
+void SunMap::add(const SunMap& other) {
+  found_.insert(found_.end(), other.found_.begin(), other.found_.end());
+}
+
 std::size_t SunMap::cell_of(V2 at) const {
   const auto index = [](float x, float lo, float hi) {
     return static_cast<std::size_t>(std::clamp((x - lo) / (hi - lo) * kSide, 0.f, kSide - 1.f));

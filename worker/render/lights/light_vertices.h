@@ -50,7 +50,8 @@ class SunMap {
 
   // Adds a point at which a path found the sun; a weight that is not finite is ignored
   void learn(const V3& p, float weight);
-  void finish();  // call once, after the last learn(): makes the map a density
+  void add(const SunMap& other);  // adds the points that `other`, a map of the same sun, has learned
+  void finish();                  // call once, after all points: makes the map a density
 
   bool empty() const { return last_.empty(); }
   const V3& direction() const { return direction_; }

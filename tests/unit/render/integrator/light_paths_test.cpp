@@ -56,6 +56,17 @@ TEST(LightPaths, LeaveOutWhatASceneDoesNotNeed) {
           << "in `path`, sheets passed count for max_depth";
 }
 
+// The number of threads that learn has no part in the image.
+TEST(LightPaths, AreTheSameForAnyNumberOfThreads) {
+  const auto sums = [](int threads) {
+    const auto world = test::world_of(SunnyRoom{.glossy = true, .fog = .3}.builder({128, 128}), 3, threads);
+    EXPECT_TRUE(world->need.connected);
+    return render_tile(*world, {0, 0, 16, 16}, {0, 4}, nullptr, nullptr).sums;
+  };
+  const auto one = sums(1);
+  for (const int threads : {2, 5}) EXPECT_EQ(sums(threads), one) << threads;
+}
+
 // Rays of the sun start in a vacuum, and find the media that the boundaries on their way declare. Where a
 // path would find others, it is not connected.
 TEST(LightPaths, AreNotThereIfMediaDifferByTheWay) {

@@ -5,6 +5,7 @@
 
 #include "tests/support/lamp_room.h"
 #include "tests/support/render_check.h"
+#include "worker/render/world/world.h"
 
 namespace ls::render {
 namespace {
@@ -134,6 +135,13 @@ TEST(PathReuse, IsTheSameByDefaultAsIfAskedFor) {
   cropped.scene.film.crop_size = {2, 1};
   const auto whole = tile(*test::world_of(LampRoom{.fog = .5, .path_reuse = 16}.builder()), kAll, {0, 2});
   EXPECT_EQ(tile(*test::world_of(cropped), {0, 0, 2, 1}, {0, 2}), part(whole, kAll, {5, 3, 7, 4}));
+}
+
+// Neither has the number of threads of the pilot.
+TEST(PathReuse, IsDecidedAlikeByAnyNumberOfThreads) {
+  for (const SceneBuilder& b : {LampRoom{.path_reuse = 0}.builder({64, 64}), open_floor(), caustic()})
+    for (const int threads : {2, 3, 16})
+      EXPECT_EQ(test::world_of(b, 0, threads)->reuse, test::world_of(b)->reuse) << threads;
 }
 
 TEST(PathReuse, GivesTheSameBitsInEveryVariant) {
