@@ -79,3 +79,12 @@ def test_the_script_tells_what_learning_costs(scene):
     assert float(load) > 0 and learning.count("to") == 1
     ten, sixty, six_hundred = (float(share.removesuffix(" %")) for share in shares)
     assert ten >= sixty >= six_hundred >= 0
+
+
+def test_the_script_tells_how_rendering_scales(scene):
+    script = [sys.executable, ROOT / "tests/bench/threads.py", f"{scene}@16x12", "--spp", "4", "--threads", "1,2,3"]
+    head, _, row = subprocess.run(script, check=True, capture_output=True, text=True).stdout.splitlines()
+    name, *figures = row.strip("| ").split(" | ")
+
+    assert head == "| scene | load, 1 thread | load, 3 threads | 2 threads | 3 threads |"
+    assert name == "lamp, 16x12" and len(figures) == 4 and all(float(figure) >= 0 for figure in figures)

@@ -52,7 +52,7 @@ void expect_white(const Bench& b, const V3& wo, double tolerance, const std::str
   EXPECT_LT(e.error, .006) << what << " at " << wo.z;
 }
 
-// STABILITY N38: seen from above, single scattering off GGX of roughness 1 keeps 1 - ln 2 of the light.
+// Seen from above, single scattering off GGX of roughness 1 keeps 1 - ln 2 of the light.
 TEST(MultipleScattering, WithoutItWhiteGgxOfRoughnessOneKeepsOneLessLogTwo) {
   const auto b = bench(rough_metal(Microfacet::ggx, 1, 1, {0, 0, 0}, {1, 1, 1}));
   const Mean e = albedo_along(*b, {0, 0, 1});

@@ -9,16 +9,18 @@
 
 namespace ls::render {
 
-// Computes make(0), make(1), ..., make(count - 1) on up to `threads` threads, and passes the results to take()
-// one by one in this order until it returns false. So what is taken does not depend on the number of threads.
-// make() must be safe from several threads; what it returned beyond the last result that is taken is dropped.
+// Computes make(0), make(1), ..., make(count - 1) on up to `threads` threads, and passes the results to
+// take() one by one in this order until it returns false. So what is taken does not depend on the number of
+// threads. make() must be safe from several threads; what it returned beyond the last result that is taken is
+// dropped.
 template <class Make, class Take>
 void in_order(int threads, std::size_t count, const Make& make, Take take) {
   const auto wave = static_cast<std::size_t>(std::max(1, threads));
   for (std::size_t first = 0; first < count; first += wave) {
     std::vector<std::future<std::invoke_result_t<const Make&, std::size_t>>> others;
     for (std::size_t i = first + 1; i < std::min(first + wave, count); ++i)
-      others.push_back(std::async(std::launch::async | std::launch::deferred, [&make, i] { return make(i); }));
+      others.push_back(
+          std::async(std::launch::async | std::launch::deferred, [&make, i] { return make(i); }));
     if (!take(make(first))) return;
     for (auto& other : others)
       if (!take(other.get())) return;

@@ -1,4 +1,4 @@
-// Sums over more samples than float32 can count (STABILITY N49, N50, N55).
+// Sums over more samples than float32 can count.
 #include <gtest/gtest.h>
 
 #include <cstring>

@@ -1,4 +1,4 @@
-// Equi-angular distances where textbook arctangents cancel (STABILITY N22 to N24).
+// Equi-angular distances where textbook arctangents cancel.
 #include "worker/render/integrator/equiangular.h"
 
 #include <gtest/gtest.h>

@@ -16,6 +16,7 @@ namespace {
 
 using test::SceneBuilder;
 using test::SunnyRoom;
+using test::operator*;
 using testing::HasSubstr;
 
 std::string variant(const SceneBuilder& b) { return describe(*test::world_of(b)).variant; }

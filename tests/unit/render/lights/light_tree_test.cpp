@@ -153,7 +153,7 @@ TEST(LightTree, CopesWithLightsInOnePlaceAndWithExtremes) {
   }
 }
 
-// STABILITY N30: a million, of intensities 1e-20 to 1e20. All words are shared out to the last. A
+// A million lights, of intensities 1e-20 to 1e20. All words are shared out to the last. A
 // light is without one only where its node has fewer words than lights: no more than a word's share for each
 // light is lost (4e-7 of the sum here). The dim, of which those below 1e9 have 1e-10 of the sum, have as many
 // words as there are of them at most, 2.3e-4 of all: ten of a thousand that are looked up will not be theirs.

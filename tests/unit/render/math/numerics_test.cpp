@@ -1,4 +1,4 @@
-// Directions that stay directions (STABILITY N20).
+// Directions that stay directions.
 #include <gtest/gtest.h>
 
 #include <cmath>

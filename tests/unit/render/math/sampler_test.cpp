@@ -141,7 +141,7 @@ TEST(Exponential, IsTheLogarithmToTheLastPlacesAtBothEnds) {
   for (std::uint32_t i = 0; i < 300; ++i) check(~i);
 }
 
-// A thin medium scatters the share 1 - e^-depth of all flights (STABILITY N2): as many of the 2^32 inputs, to
+// A thin medium scatters the share 1 - e^-depth of all flights: as many of the 2^32 inputs, to
 // one.
 TEST(Exponential, TheShareBelowAThinDepthIsThatDepth) {
   for (const double depth : {1e-9, 1e-8, 3e-8, 1e-7, 1e-6, 1e-3, .5, .7, 2.}) {

@@ -39,7 +39,7 @@ TEST(MediumEmission, WithoutExtinctionIsEmissionTimesLength) {
   for (int c = 0; c < 3; ++c) EXPECT_EQ(light[c], kEmission[c] * 3.5f);
 }
 
-// STABILITY N2, N67: e L (1 - tau/2 + tau^2/6 - ...), where 1 - e^-tau of float32 is 0.
+// The thin limit: e L (1 - tau/2 + tau^2/6 - ...), where 1 - e^-tau of float32 is 0.
 TEST(MediumEmission, OfThinMediaHasFullPrecision) {
   for (const double tau : {1e-30, 1e-12, 1e-9, 1e-6, 1e-3}) {
     const C3 light = emission_of_length(homogeneous(C3(static_cast<float>(tau / 2))), 2);

@@ -321,7 +321,7 @@ TEST(CellWalk, MajorantDepthDoesNotDependOnHowARayIsCut) {
 }
 
 // A grid of a thousandth of the world, seen from across it: 128 voxels of 8e-6, where the ray's origin and
-// distances of float32 are 1.2e-7 and more apart (STABILITY N11).
+// distances of float32 are 1.2e-7 and more apart.
 TEST(CellWalk, TellsTheVoxelsOfASmallGridApartFromAfar) {
   const Size n{128, 128, 128};
   constexpr double kSide = 1e-3;

@@ -75,7 +75,7 @@ TEST(Trackers, TransmittancesAverageToTheExactOnes) {
   }
 }
 
-// One voxel of 1e6 among empty ones (STABILITY N10): past it the way is free, through it nothing gets.
+// One voxel of 1e6 among empty ones: past it the way is free, through it nothing gets.
 TEST(Trackers, AHotVoxelDoesNotDarkenItsCell) {
   const Size n{16, 16, 16};
   std::vector<float> values(16 * 16 * 16, 0);

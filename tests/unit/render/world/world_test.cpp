@@ -8,6 +8,7 @@
 
 #include "tests/support/render_check.h"
 #include "tests/support/sky_yard.h"
+#include "worker/render/world/world.h"
 
 namespace ls::render {
 namespace {
