@@ -84,10 +84,18 @@ SceneBuilder with_lamp(int light_vertices) {
   return b;
 }
 
+// The integrator `path`, which counts surfaces passed where there is a maximum depth.
+SceneBuilder by_path(bool sheet, int light_vertices) {
+  SceneBuilder b =
+      SunnyRoom{.glossy = sheet, .light_vertices = light_vertices, .max_depth = sheet ? -1 : 5}.builder();
+  b.scene.integrator.name = "path";
+  return b;
+}
+
 TEST(Connections, GiveTheSameImageAsPathsAlone) {
   constexpr int kSeeds = 64;
   Tests tests("property/connections");
-  const double level = tests.level(6 * 3);
+  const double level = tests.level(8 * 3);
   const auto room = [](SunnyRoom r) {
     return [r](int light_vertices) mutable {
       r.light_vertices = light_vertices;
@@ -99,10 +107,12 @@ TEST(Connections, GiveTheSameImageAsPathsAlone) {
     std::function<SceneBuilder(int light_vertices)> scene;
     std::uint64_t spp = 32;
   };
-  for (const Rival& rival : {Rival{"diffuse", room({})}, Rival{"glossy", room({.glossy = true})},
-                             Rival{"fog", room({.fog = .6}), 16}, Rival{"fog and a lamp", with_lamp, 16},
-                             Rival{"tilted normals", tilted, 64},
-                             Rival{"grid", room({.glossy = true, .fog = .4, .grid = true})}}) {
+  for (const Rival& rival :
+       {Rival{"diffuse", room({})}, Rival{"glossy", room({.glossy = true})},
+        Rival{"fog", room({.fog = .6}), 16}, Rival{"fog and a lamp", with_lamp, 16},
+        Rival{"tilted normals", tilted, 64}, Rival{"grid", room({.glossy = true, .fog = .4, .grid = true})},
+        Rival{"path", [](int n) { return by_path(false, n); }},
+        Rival{"path and a sheet", [](int n) { return by_path(true, n); }}}) {
     const SceneBuilder on = rival.scene(1), off = rival.scene(-1);
     ASSERT_THAT(estimate(on, 2).variant, testing::HasSubstr("connected"));
     ASSERT_THAT(estimate(off, 2).variant, testing::Not(testing::HasSubstr("connected")));

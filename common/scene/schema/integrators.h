@@ -7,7 +7,6 @@
 
 namespace ls::scene {
 
-// The only integrator that has settings other than depths.
 inline constexpr std::string_view kDistantMis = "volpath_distant_mis";
 // Nori's: direct light where mirrors and clear glass lead to, without media.
 inline constexpr std::string_view kWhitted = "whitted";

@@ -145,7 +145,7 @@ auto PathTracer<F, Light>::scatter_by_phase(const Medium& medium) -> Step {
   if constexpr (F.reuse) {
     if (looks_for_second())
       go_on_as_tail(s.w, C3(1));
-    else if (depth_ == 1)
+    else if (depth_ == 1 && !is_black(beta_))
       look_for_second();
   }
   return {Collision::scattered, direction.u(3)};

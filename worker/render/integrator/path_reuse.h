@@ -14,6 +14,9 @@
 // has that technique's density in place of p_k, or in the sum with it where both can find it. The group needs
 // one shadow ray for each pair, and no path has to be followed again.
 //
+// A path whose weight becomes 0 ends there. So q_k(y) is 0 where x_k scatters no light from y, and p_k(w)
+// where y scatters none from w towards x_k.
+//
 // The densities of flights must be known, so media are homogeneous. Light on the segment from the first to
 // the second vertex is not sampled equi-angularly: its density would have to be known for all k.
 #pragma once
@@ -157,7 +160,8 @@ auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
     origin = offset_point(hit, w);
     around = beyond(hit, surface, w, x.d, around);
   }
-  if (!(pdf > 0)) return look;
+  value *= x.beta;
+  if (!(pdf > 0) || is_black(value)) return look;
   LightSample end;
   end.target = y.p;
   if (!y.medium) {
@@ -187,13 +191,14 @@ auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
     RandomStream stream(0);
     if constexpr (F.media) stream = stream_.stream(1, Purpose::track_connect);
     through = unoccluded(x.at.p, origin, end, around, stream);
-    // The tail is that of a path that may pass so many surfaces more before it reaches its maximum depth
+    // Where surfaces passed count for the maximum depth, a tail is as long as the number passed before it
+    // allows, so only paths that passed as many can use it
     if (is_black(through) || (world_.passing_counts && x.passed + sharing_.crossed != tail.passed))
       return look;
   }
   const float geometry = cosine / r2;
   look.w = w;
-  look.value = x.beta * value * through * geometry;
+  look.value = value * through * geometry;
   C3 found = x.density * sharing_.flight;
   if (y.medium) {
     look.value *= y.medium->sigma_s;
@@ -267,6 +272,7 @@ void PathTracer<F, Light>::share(std::span<PathTracer* const> group) {
                      // tail
   };
   boost::container::static_vector<Seen, kMostSharing> seen(group.size());
+  const auto onward_pdf = [](const BsdfEval& eval) { return is_black(eval.f_cos) ? 0 : eval.pdf; };
   for (PathTracer* const giver : group) {
     const SharedTail& tail = giver->sharing_.tail;
     if (!tail.usable || !tail.brings_light()) continue;
@@ -279,13 +285,13 @@ void PathTracer<F, Light>::share(std::span<PathTracer* const> group) {
       if (tail.light_pdf > 0) {
         const BsdfEval eval = from_light(s.look.w);
         s.lit = eval.f_cos;
-        lit += s.look.density * (tail.light_is_delta ? tail.light_pdf : tail.light_pdf + eval.pdf);
+        lit += s.look.density * (tail.light_is_delta ? tail.light_pdf : tail.light_pdf + onward_pdf(eval));
       }
       if (tail.goes_on) {
         const BsdfEval eval = from_onward(s.look.w);
         s.onward = eval.f_cos;
-        scattered += s.look.density * eval.pdf;
-        emitted += s.look.density * (eval.pdf + tail.hit_pdf);
+        scattered += s.look.density * onward_pdf(eval);
+        emitted += s.look.density * (onward_pdf(eval) + tail.hit_pdf);
       }
     }
     for (std::size_t k = 0; k < group.size(); ++k) {

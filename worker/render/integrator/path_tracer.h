@@ -574,12 +574,12 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   // normal.
   if ((dot(w, hit.ng) > 0) != (s->wi.z > 0)) return {Collision::absorbed};
   if constexpr (F.reuse) {
-    if (looks_for_second() && sharing_.tail.usable && !s->delta) {
+    if (looks_for_second() && sharing_.tail.usable && !s->delta && !is_black(s->weight)) {
       go_on_as_tail(w, s->weight);
     } else {
       beta_ *= s->weight;
       if (looks_for_second()) sharing_.part = SharingPath::Part::alone;
-      if (depth_ == 1 && sharing_.first.usable && !s->delta) look_for_second();
+      if (depth_ == 1 && sharing_.first.usable && !s->delta && !is_black(beta_)) look_for_second();
     }
   } else {
     beta_ *= s->weight;

@@ -32,8 +32,8 @@ constexpr std::uint64_t kPilotSamples = 32;
 constexpr int kPilotDepth = 32;  // paths in a white and dense medium have thousands of segments
 // A smaller frame is not worth the pilot.
 constexpr std::uint64_t kPilotFrame = 256;  // pixels
-// A scene with more null boundaries gets no pilot, since a single path may take as long as the image of
-// another scene.
+// A scene with more shapes that light passes gets no pilot, since a single path may take as long as the image
+// of another scene.
 constexpr std::ptrdiff_t kPilotBoundaries = 64;
 // Sharing pays if the noise (squared relative error) without it is more than this many times the noise with
 // it. A shared sample takes 1.4 to 2.4 times as long (docs/decisions/0036-path-reuse.md). The limit is low
@@ -112,7 +112,7 @@ class Pilot {
 bool sharing_pays(World& w, const Variant& sharing, int threads) {
   const auto pixels = static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
   if (pixels < kPilotFrame) return false;
-  const auto is_boundary = [](const SurfaceInfo& s) { return s.null; };
+  const auto is_boundary = [](const SurfaceInfo& s) { return s.null || s.null_transmission; };
   if (std::ranges::count_if(w.geometry.surfaces, is_boundary) > kPilotBoundaries) return false;
   const std::uint64_t groups = std::clamp(pixels / kPixelsPerGroup, kFewestPilotGroups, kPilotGroups);
   const Pilot pilot(w);

@@ -29,7 +29,7 @@ struct FirstVertex {
   C3 beta{0, 0, 0};     // the weight of the path up to the vertex
   C3 density{1, 1, 1};  // the path's density with each channel as the hero (medium.h), over their mean
   OneMedium around;     // the medium in front of the vertex
-  int passed = 0;       // null crossings on the way to the vertex
+  int passed = 0;       // null crossings between the camera and the vertex
   // On a diffuse surface: the BSDF for a direction along the normal, on its side or on the other, as far as
   // it was asked for.
   std::array<std::optional<BsdfEval>, 2> by_side;
@@ -39,7 +39,7 @@ struct FirstVertex {
 struct SharedTail {
   bool usable = false;  // false: there is none, or it was not sampled by a smooth lobe
   PathVertex at;
-  int passed = 0;  // null crossings on the way to the vertex
+  int passed = 0;  // null crossings between the camera and the vertex
   // The way from the path's own first vertex: the media's optical depth in each channel; the null
   // transmissions of surfaces, and the probability of passing them.
   C3 depth{0, 0, 0}, transmission{1, 1, 1};
@@ -73,7 +73,7 @@ struct SharingPath {
   SharedTail tail;
   C3 scale{1, 1, 1};   // the factor of light that counts for this pixel only
   float survival = 1;  // factor of the path's weight in Russian roulette (survives)
-  // The way of the last shadow ray: the density with which a flight takes it, which is the transmittance of
+  // Of the shadow ray of look_at(): the density with which a flight takes it, which is the transmittance of
   // media times the probability of passing surfaces, and the number of surfaces that it passed.
   C3 flight{1, 1, 1};
   int crossed = 0;

@@ -51,7 +51,8 @@ class World {
   // equi-angularly.
   bool equiangular = false;
   bool equiangular_points = false;  // the same for grids: true if there are point lights in or near them
-  // True if some surface has null transmission, which shadow rays must account for
+  // True if some surface has null transmission, or is passed and counts (`passing_counts`): shadow rays must
+  // account for both
   bool null_transmission = false;
   // True if shadow rays are traced boundary by boundary, for null transmission or because they may cross
   // media.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <latch>
 #include <numeric>
 #include <stdexcept>
 #include <vector>
@@ -40,6 +41,22 @@ TEST(InOrder, EndsWhereTakeSaysSo) {
     EXPECT_EQ(taken, 10u);
     EXPECT_LT(made, 10u + static_cast<std::size_t>(threads)) << "at most the rest of a wave is dropped";
   }
+}
+
+TEST(InOrder, ComputesSeveralAtOnce) {
+  std::latch both(2);
+  std::size_t sum = 0;
+  in_order(
+      2, 2,
+      [&](std::size_t i) {
+        both.arrive_and_wait();  // forever, if one were computed after the other
+        return i;
+      },
+      [&](std::size_t i) {
+        sum += i + 1;
+        return true;
+      });
+  EXPECT_EQ(sum, 3u);
 }
 
 TEST(InOrder, PassesOnWhatIsThrown) {

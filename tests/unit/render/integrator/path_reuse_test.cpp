@@ -43,9 +43,22 @@ TEST(PathReuse, IsThereIfAskedForAndPossible) {
     add_sun(b, 3);
     add_sun(b, 4);
   }))) << "two lights that paths can hit in the same direction";
-  EXPECT_FALSE(shares(changed([](SceneBuilder& b) {
-    b.shape(RectangleShape{}, test::scale(.1), b.bsdf(MaskBsdf{b.texture({.5, .5, .5}), b.diffuse(.5)}))
-        .emitter = AreaEmitter{b.texture({1, 1, 1})};
+  const auto add_mask = [](SceneBuilder& b) -> Shape& {
+    return b.shape(RectangleShape{}, test::scale(.1),
+                   b.bsdf(MaskBsdf{b.texture({.5, .5, .5}), b.diffuse(.5)}));
+  };
+  EXPECT_TRUE(shares(changed([&](SceneBuilder& b) { add_mask(b); })));
+  EXPECT_TRUE(shares(changed([&](SceneBuilder& b) {
+    add_mask(b);
+    b.scene.integrator.name = "path";
+  })));
+  EXPECT_TRUE(shares(changed([](SceneBuilder& b) { add_sky(b, test::SkyImage(4, 3, 1)); })));
+  EXPECT_FALSE(shares(changed([&](SceneBuilder& b) {
+    add_sky(b, test::SkyImage(4, 3, 1));
+    add_sun(b, 3);
+  }))) << "two lights that paths can hit in the same direction";
+  EXPECT_FALSE(shares(changed([&](SceneBuilder& b) {
+    add_mask(b).emitter = AreaEmitter{b.texture({1, 1, 1})};
   }))) << "a path may pass several lights";
   EXPECT_FALSE(shares(changed([](SceneBuilder& b) {
     b.container(RectangleShape{}, test::scale(.1), b.null(), MediumIndex{0});
@@ -100,6 +113,30 @@ std::vector<float> part(const std::vector<float>& sums, PixelRect all, PixelRect
   return out;
 }
 
+// In `path` surfaces passed count for the maximum depth. A box that light passes stands before the left half
+// of the picture. A lamp that shines upwards lights the ceiling alone, and the ceiling the floor: of the
+// floor behind the box paths see nothing, since they may not go on to the ceiling.
+TEST(PathReuse, LooksOnlyAtSecondVerticesThatItsOwnPathCouldReach) {
+  SceneBuilder b({16, 16});
+  b.scene.integrator.name = "path";
+  b.scene.integrator.max_depth = 4;
+  b.scene.integrator.path_reuse = 16;
+  b.look({0, .5, 3}, {0, -1, .5}, 40, {0, 1, 0});
+  b.shape(RectangleShape{}, test::translate({0, -1, 0}) * test::rotate_x(-90) * test::scale(5),
+          b.diffuse(.7));
+  b.shape(RectangleShape{}, test::translate({0, 3, 0}) * test::rotate_x(90) * test::scale(5), b.diffuse(.7));
+  b.shape(RectangleShape{}, test::translate({0, 2, 0}) * test::rotate_x(-90), b.diffuse(0)).emitter =
+      AreaEmitter{b.texture({9, 9, 9})};
+  b.shape(CubeShape{}, test::translate({-1, .3, 2.5}) * test::scale(1, 1, .1), b.null());
+  ASSERT_TRUE(shares(b));
+  const auto sums = tile(*test::world_of(b), {0, 0, 16, 16}, {0, 32});
+  for (std::size_t p = 0; p < 256; ++p)
+    if (p % 16 < 7)
+      EXPECT_EQ(sums[p], 0) << p;
+    else if (p % 16 > 8)
+      EXPECT_GT(sums[p], 0) << p;
+}
+
 TEST(PathReuse, GivesTheSamePixelsInEveryTileCropAndSampleRange) {
   constexpr SampleRange kSamples{2, 6};
   constexpr PixelRect kAll{0, 0, 37, 20};
@@ -137,18 +174,25 @@ TEST(PathReuse, IsTheSameByDefaultAsIfAskedFor) {
   EXPECT_EQ(tile(*test::world_of(cropped), {0, 0, 2, 1}, {0, 2}), part(whole, kAll, {5, 3, 7, 4}));
 }
 
-// Neither has the number of threads of the pilot.
+// The number of threads of the pilot has no say in its decision. Frames of this size have 64 groups.
 TEST(PathReuse, IsDecidedAlikeByAnyNumberOfThreads) {
-  for (const SceneBuilder& b : {LampRoom{.path_reuse = 0}.builder({64, 64}), open_floor(), caustic()})
+  for (SceneBuilder b : {LampRoom{.path_reuse = 0}.builder(), open_floor(), caustic()}) {
+    b.scene.film.size = {256, 256};
     for (const int threads : {2, 3, 16})
       EXPECT_EQ(test::world_of(b, 0, threads)->reuse, test::world_of(b)->reuse) << threads;
+  }
 }
 
 TEST(PathReuse, GivesTheSameBitsInEveryVariant) {
-  for (const LampRoom& room :
-       {LampRoom{.glossy = true, .path_reuse = 5}, LampRoom{.fog = .5, .path_reuse = 5},
-        LampRoom{.fog = .5, .chromatic = true, .path_reuse = 5}}) {
-    const auto world = test::world_of(room.builder());
+  const auto veiled = [](SceneBuilder& b) {
+    b.shape(RectangleShape{}, test::scale(.5), b.bsdf(MaskBsdf{b.texture({.5, .5, .5}), b.diffuse(.5)}));
+    add_sky(b, test::SkyImage(4, 3, 1));
+  };
+  for (const SceneBuilder& b :
+       {LampRoom{.glossy = true, .path_reuse = 5}.builder(), LampRoom{.fog = .5, .path_reuse = 5}.builder(),
+        LampRoom{.fog = .5, .chromatic = true, .path_reuse = 5}.builder(), changed(veiled, {.path_reuse = 5}),
+        changed(veiled)}) {
+    const auto world = test::world_of(b);
     const auto names = covering_variants(*world);
     ASSERT_GE(names.size(), 2u);
     const auto first = render_tile_as(*world, names[0], {0, 0, 16, 16}, {0, 4}).sums;

@@ -190,6 +190,19 @@ TEST(EnvironmentMap, IsSampledAsOftenAsItsPowerSays) {
   EXPECT_FLOAT_EQ(world->lights.environment(l->direction, kInfinity).x, 1);
 }
 
+TEST(EnvironmentMap, IsSampledApartFromAConstantSky) {
+  SceneBuilder builder = under_sky(SkyImage(8, 5, 1));
+  builder.scene.emitters.push_back(ConstantEmitter{{.25, .25, .25}});
+  const auto world = test::world_of(builder);
+  const V3 d = normalize(V3(.3f, .2f, .9f));
+  const Lights::EnvironmentParts parts = world->lights.environment_parts(d);
+  EXPECT_EQ(parts.unsampled, C3(.25f));
+  EXPECT_FLOAT_EQ(parts.sampled.x, 1);
+  EXPECT_GT(parts.pdf, 0);
+  for (const float pdf : {.01f, .3f, 20.f})
+    EXPECT_FLOAT_EQ(world->lights.environment(d, pdf).x, .25f + 1 / (1 + parts.pdf / pdf)) << pdf;
+}
+
 TEST(EnvironmentMap, IsCountedInTheReport) {
   SkyImage s(8, 5, 1);
   s.set(3, 2, {-1, 0, 0});

@@ -60,6 +60,10 @@ TEST(Sun, EverySampleIsSeenAsWhatItIs) {
       ASSERT_FLOAT_EQ(full.x, s->radiance.x);
       const float q = 3 * s->pdf;
       ASSERT_FLOAT_EQ(b.world->lights.environment(s->direction, q).x, s->radiance.x * q / (q + s->pdf));
+      const Lights::EnvironmentParts parts = b.world->lights.environment_parts(s->direction);
+      ASSERT_EQ(parts.unsampled, C3(0));
+      ASSERT_EQ(parts.sampled, full);
+      ASSERT_FLOAT_EQ(parts.pdf, s->pdf);
     }
     // A direction is good to 6e-8 in each component: the rim is blurred by that, of a disk of radius 1.7e-5
     // at the least, and so up to 2 sqrt(3) 6e-8 / 1.7e-5 = 1.2 % of its area.
