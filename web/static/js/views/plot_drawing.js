@@ -82,5 +82,5 @@ function aheadMarks(last, key, target, { x: at, lo, hi, more }, { x, y, farthest
     ends ? h("path", { key: "span", class: "plot-span", d: `M${ends[0]} ${level - 5}v10M${ends[0]} ${level}H${ends[1]}M${ends[1]} ${level - 5}v10` }) : null,
     h("line", { key: "ahead", class: "plot-ahead", x1: x0, y1: y0, x2: x.at(at), y2: level }),
     diamond(at, "plot-meets"),
-    more > last[key] ? diamond(more, "plot-more") : null);
+    more?.x > last[key] ? diamond(more.x, "plot-more") : null);
 }
