@@ -165,6 +165,7 @@ def test_the_keyboard_scrubs_plays_and_steps(farm, dashboard):
     at = page.evaluate("location.hash").split("/")[-1]
     assert at in ("1", "2", "4") and shown(page) == at
 
+    page.wait("!!document.querySelector('[data-frame=\"2\"]')")
     page.evaluate("document.querySelector('[data-frame=\"2\"]').focus()")
     page.evaluate(f"void (location.hash = '#/jobs/{SEQUENCE}/2')")
     page.wait("document.querySelector('.frame[aria-current]').dataset.frame === '2'")
