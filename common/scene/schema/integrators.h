@@ -15,8 +15,8 @@ struct IntegratorRow {
   std::string_view name;         // Mitsuba's name, or ours
   std::string_view ours;         // IntegratorSettings::name
   std::optional<int> max_depth;  // maximum depth implied by the name
-  // True if the name belongs to another method with the same expected result that is not implemented here:
-  // scenes that request it get a warning.
+  // True if the name belongs to another method that computes the same picture. `ours` renders it instead, and
+  // the scene gets a warning.
   bool other_method = false;
   int default_depth = -1;  // max_depth if the scene gives none
 };

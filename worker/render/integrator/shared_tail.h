@@ -73,10 +73,9 @@ struct SharingPath {
   SharedTail tail;
   C3 scale{1, 1, 1};   // the factor of light that counts for this pixel only
   float survival = 1;  // factor of the path's weight in Russian roulette (survives)
-  // Of the shadow ray of look_at(): the density with which a flight takes it, which is the transmittance of
-  // media times the probability of passing surfaces, and the number of surfaces that it passed.
-  C3 flight{1, 1, 1};
-  int crossed = 0;
+  // look_at() traces a shadow ray, which sets these two:
+  C3 flight{1, 1, 1};  // the transmittance of its media times the probability of passing its surfaces
+  int crossed = 0;     // number of surfaces that it passed
 };
 
 }  // namespace ls::render
