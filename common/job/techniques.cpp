@@ -26,7 +26,9 @@ constexpr std::array kRows{
     TechniqueRow{Technique::sky_samples, "sky_samples",
                  "looks for a sky of one radiance in a second direction from the first surface"},
     TechniqueRow{Technique::path_splitting, "path_splitting",
-                 "splits paths at their first scattering in a grid, and ends those that could bring little"}};
+                 "splits paths at their first scattering in a grid, and ends those that could bring little"},
+    TechniqueRow{Technique::sky_portals, "sky_portals",
+                 "looks for the sky's image through the openings by which its light enters"}};
 
 constexpr bool in_order() {
   for (std::size_t i = 0; i < kRows.size(); ++i)
@@ -64,6 +66,8 @@ TechniqueSwitch off_switch(Technique technique, std::string_view integrator) {
       return {"sky_samples", "-1"};
     case Technique::path_splitting:
       return {"path_splitting", "-1"};
+    case Technique::sky_portals:
+      return {"sky_portals", "-1"};
   }
   return {};
 }

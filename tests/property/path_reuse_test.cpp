@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <functional>
 
+#include "tests/property/quarters.h"
 #include "tests/support/lamp_room.h"
 #include "tests/support/significance.h"
 #include "tests/support/sky_yard.h"
@@ -112,37 +113,6 @@ SceneBuilder in_chromatic_fog(SceneBuilder b) {
   b.scene.sensor.medium = b.homogeneous({.1, .3, .2}, {.9, .8, .7}, .3);
   b.container(CubeShape{}, scale(9), b.null(), *b.scene.sensor.medium);
   return b;
-}
-
-// The means of the quarters of an image of 16 x 16, in each channel: sharing moves light between pixels, and
-// in a white room keeps the mean of all of them whatever the weights. Pixels that share tell too little of
-// the error of a mean; images of different seeds are independent.
-constexpr int kSide = 16;
-constexpr std::size_t kQuarters = 4 * 3;
-struct Quarters {
-  std::array<double, kQuarters> mean{}, variance{};  // of the mean
-};
-Quarters quarters_of(const SceneBuilder& builder, std::uint64_t spp, int seeds, std::uint64_t first) {
-  Quarters all;
-  std::array<double, kQuarters> squares{};
-  for (int i = 0; i < seeds; ++i) {
-    const auto world = world_of(builder, first + static_cast<std::uint64_t>(i), 2);
-    const auto sums = render::render_tile(*world, {0, 0, kSide, kSide}, {0, spp}, nullptr, nullptr).sums;
-    std::array<double, kQuarters> image{};
-    for (std::size_t plane = 0; plane < 6; ++plane)
-      for (std::size_t p = 0; p < kSide * kSide; ++p) {
-        const std::size_t right = p % kSide >= kSide / 2, below = p / kSide >= kSide / 2;
-        image[(2 * below + right) * 3 + plane % 3] +=
-            double{sums[plane * kSide * kSide + p]} / (static_cast<double>(spp) * kSide * kSide / 4);
-      }
-    for (std::size_t q = 0; q < kQuarters; ++q) {
-      all.mean[q] += image[q] / seeds;
-      squares[q] += image[q] * image[q] / seeds;
-    }
-  }
-  for (std::size_t q = 0; q < kQuarters; ++q)
-    all.variance[q] = (squares[q] - all.mean[q] * all.mean[q]) / (seeds - 1);
-  return all;
 }
 
 TEST(PathReuse, GivesTheSameImageAsPathsAlone) {

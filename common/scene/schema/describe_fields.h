@@ -101,6 +101,13 @@ void describe(V& v, T& i) {
            .elided = true,
            .only_of = {"volpath", "path"}},
           i.sky_samples);
+  v.field({.name = "sky_portals",
+           .doc = "whether directions towards an `envmap` are also sampled through the openings by "
+                  "which its light enters the scene; 0: if that pays; -1: never; 1: where it is possible",
+           .range = {-1, 1},
+           .elided = true,
+           .only_of = {"volpath", "path"}},
+          i.sky_portals);
   v.field({.name = "path_splitting",
            .doc = "in scenes with grids, whether paths split at their first scattering if it "
                   "is in a grid, and Russian roulette compares their weight with that behind the first "

@@ -15,6 +15,7 @@ namespace ls::render {
 // scattered the path by a delta lobe: then no connection of a shorter subpath finds the same path.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::arrive(const Vertex& from, const V3& p, const V3& ng) {
+  if (connections_.learner) ++connections_.learner->scatterings;
   densities_ = {};
   const V3 f = p - from.p;
   if (!from.delta && dot(f, f) > 0)

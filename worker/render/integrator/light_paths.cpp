@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <utility>
 
 #include "worker/render/base/in_order.h"
 #include "worker/render/integrator/camera_segment_nee.h"
@@ -19,14 +21,23 @@
 namespace ls::render {
 namespace {
 
-// Number of camera paths from which the sun map (the distribution of rays from the sun: SunMap) is learned:
-// at most kLearningPaths, and at most kLearningPathsPerPixel for each pixel of the full frame.
+// Number of camera paths from which the sun map (the distribution of rays from the sun: SunMap) and the
+// portals are learned: at most these, and at most kLearningPathsPerPixel for each pixel of the full frame.
 constexpr std::uint64_t kLearningPaths = 1 << 16;
+constexpr std::uint64_t kPortalPaths = 1 << 14;
 constexpr std::uint64_t kLearningPathsPerPixel = 16;
 // Paths are traced in batches of this many, on several threads.
 constexpr std::uint64_t kLearningBatch = 1 << 10;
 // Learning may stop after this many batches if connections clearly do not pay.
 constexpr std::uint64_t kFirstBatches = 4;
+// Portals pay if the sky brings at least the share kSkyThatPays of the light that is scattered towards the
+// camera, is seen in at most the share kSeenThatPays of the attempts to find it, and at least kTimesThatPay
+// times as often by next-event estimation with portals as by any way without them.
+constexpr double kSkyThatPays = .25;
+constexpr double kSeenThatPays = .125;
+constexpr double kTimesThatPay = 4;
+// Portals are learned from paths of at most this many segments.
+constexpr int kLongestPortalPath = 4;
 // A batch ends after this many vertices, since paths may be long.
 constexpr double kLearningVertices = 1 << 15;
 constexpr std::uint64_t kSunRays = 1 << 14;  // rays of the sun for one set of light vertices
@@ -63,6 +74,11 @@ struct Learned {
     learner.vertices += batch.learner.vertices;
     learner.lit += batch.learner.lit;
     learner.media_differ = learner.media_differ || batch.learner.media_differ;
+    learner.sky.insert(learner.sky.end(), batch.learner.sky.begin(), batch.learner.sky.end());
+    learner.looked += batch.learner.looked;
+    learner.seen += batch.learner.seen;
+    learner.scatterings += batch.learner.scatterings;
+    learner.left += batch.learner.left;
     radiance += batch.radiance;
     paths += batch.paths;
   }
@@ -89,10 +105,12 @@ Learned learn_batch(const World& w, std::uint64_t first, std::uint64_t end) {
   return learned;
 }
 
-template <Features F, template <Features> class Light>
-Learned learn(const World& w, bool in_any_case, int threads) {
+// Traces up to `paths` camera paths. After the first kFirstBatches, `go_on` is asked whether to trace the
+// rest.
+template <Features F, template <Features> class Light, class GoOn>
+Learned learn_with(const World& w, std::uint64_t paths, int threads, const GoOn& go_on) {
   const auto pixels = static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
-  const std::uint64_t most = std::min(kLearningPaths, kLearningPathsPerPixel * pixels);
+  const std::uint64_t most = std::min(paths, kLearningPathsPerPixel * pixels);
   const std::uint64_t batches = (most + kLearningBatch - 1) / kLearningBatch;
   Learned learned(w);
   in_order(
@@ -102,9 +120,7 @@ Learned learn(const World& w, bool in_any_case, int threads) {
       },
       [&, taken = std::uint64_t{0}](const Learned& batch) mutable {
         learned.add(batch);
-        // If the sun is found often, few paths suffice to decide against connections
-        return ++taken != kFirstBatches || in_any_case ||
-               learned.learner.lit <= 2 * kLitThatPays * learned.learner.vertices;
+        return ++taken != kFirstBatches || go_on(learned.learner);
       });
   return learned;
 }
@@ -133,6 +149,20 @@ constexpr Features kAimed = [] {
   f.aimed = true;
   return f;
 }();
+
+template <class GoOn>
+Learned learn(const World& w, std::uint64_t paths, int threads, const GoOn& go_on) {
+  if (w.need.aimed) return learn_with<kAimed, CameraSegmentNee>(w, paths, threads, go_on);
+  return w.need.media ? learn_with<kMedia, VertexNee>(w, paths, threads, go_on)
+                      : learn_with<kSurfaces, VertexNee>(w, paths, threads, go_on);
+}
+
+bool can_learn(const World& w) {
+  Features need = w.need;
+  need.split = false;
+  need.connected = true;
+  return kAimed.covers(need);
+}
 
 // Uses the same features as camera paths do, because weights depend on how directions are sampled.
 LightVertices trace(const World& w, std::uint64_t seed, std::uint32_t set, std::uint64_t rays) {
@@ -189,16 +219,14 @@ void learn_connections(const IntegratorSettings& settings, int threads, World& w
   if (std::any_of(w.geometry.surfaces.begin(), w.geometry.surfaces.end(),
                   [](const SurfaceInfo& s) { return s.transition && s.sheet; }))
     return;
-  Features need = w.need;
-  need.split = false;
-  need.connected = true;
-  if (!kAimed.covers(need)) return;
+  if (!can_learn(w)) return;
   w.sun = w.lights.strongest_directional();
   if (w.sun.light == kNone) return;
   const bool in_any_case = settings.light_vertices > 0;
-  Learned learned = w.need.aimed   ? learn<kAimed, CameraSegmentNee>(w, in_any_case, threads)
-                    : w.need.media ? learn<kMedia, VertexNee>(w, in_any_case, threads)
-                                   : learn<kSurfaces, VertexNee>(w, in_any_case, threads);
+  // If the sun is found often, few paths suffice to decide against connections
+  Learned learned = learn(w, kLearningPaths, threads, [&](const Connections::Learner& first) {
+    return in_any_case || first.lit <= 2 * kLitThatPays * first.vertices;
+  });
   if (learned.learner.media_differ || (!in_any_case && !learned.pays())) return;
   learned.learner.map.finish();
   if (learned.learner.map.empty()) return;
@@ -211,6 +239,50 @@ void learn_connections(const IntegratorSettings& settings, int threads, World& w
   const std::size_t count = trace(w, kLearningSeed, 0, kLearningRays).count();
   w.connections_per_ray =
       float{LightVertices::kCandidates * kLearningRays} / static_cast<float>(std::max<std::size_t>(count, 1));
+}
+
+namespace {
+
+// The share of the attempts to find the sky that found it, by next-event estimation
+double seen(const Connections::Learner& l) { return l.looked > 0 ? l.seen / l.looked : 0; }
+
+bool sees_sky_seldom(const Connections::Learner& l) {
+  return seen(l) <= kSeenThatPays && l.left <= kSeenThatPays * l.scatterings;
+}
+
+bool sky_matters(const Learned& learned) {
+  double light = 0;
+  for (const Portals::Found& f : learned.learner.sky) light += double{f.light};
+  return light >= kSkyThatPays * learned.radiance;
+}
+
+// Sets the portals if they pay, or in any case if so asked.
+void find_portals(bool in_any_case, int threads, World& w) {
+  const auto go_on = [&](const Connections::Learner& first) { return in_any_case || sees_sky_seldom(first); };
+  const Learned without = learn(w, kPortalPaths, threads, go_on);
+  if (!go_on(without.learner) || !(in_any_case || sky_matters(without))) return;
+  auto portals = std::make_unique<const Portals>(without.learner.sky);
+  if (!portals->any()) return;
+  w.lights.set_portals(std::move(portals));
+  if (in_any_case) return;
+  const Learned with = learn(w, kPortalPaths / 4, threads, [](const Connections::Learner&) { return false; });
+  const double otherwise =
+      std::max(seen(without.learner), without.learner.left / without.learner.scatterings);
+  if (seen(with.learner) < kTimesThatPay * otherwise) w.lights.set_portals(nullptr);
+}
+
+}  // namespace
+
+void learn_portals(const IntegratorSettings& settings, int threads, World& w) {
+  const bool sky = w.lights.map() || !is_black(w.lights.constant_environment());
+  if (settings.sky_portals < 0 || !sky || !w.depth_allows(1) || !can_learn(w)) return;
+  const int own_depth =
+      std::exchange(w.max_depth, w.depth_allows(kLongestPortalPath) ? kLongestPortalPath : w.max_depth);
+  // Portals are of no use where the camera itself sees the sky
+  const bool hide_emitters = std::exchange(w.hide_emitters, true);
+  find_portals(settings.sky_portals > 0, threads, w);
+  w.hide_emitters = hide_emitters;
+  w.max_depth = own_depth;
 }
 
 LightVertices trace_light_vertices(const World& w, std::uint64_t set) {
@@ -238,6 +310,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   auto world = make_world(scene, settings, files, threads);
   if (!world) return tl::unexpected(world.error());
   if (settings.integrator == "volpath" || settings.integrator == "path") {
+    learn_portals(scene.integrator, threads, **world);
     learn_connections(scene.integrator, threads, **world);
     learn_sky_samples(scene.integrator, **world);
     share_tails(scene.integrator, threads, **world);

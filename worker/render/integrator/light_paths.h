@@ -1,5 +1,6 @@
-// Decides whether the paths of a world are connected to light vertices (lights/light_vertices.h), learns
-// which part of the sun's light they need, and traces the light vertices.
+// What is learned from camera paths before the first sample: through which portals the light of the sky
+// enters (lights/portals.h), whether paths are connected to light vertices (lights/light_vertices.h), and
+// which part of the sun's light these need. It also traces the light vertices.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +14,9 @@ namespace ls::render {
 // depends only on the scene, the depth limits and the size of the full frame: not on the seed, the number of
 // samples, a crop or the number of threads. The integrator must be `volpath` or `path`.
 void learn_connections(const IntegratorSettings& settings, int threads, World& w);
+
+// Sets the portals of a world's lights if they pay; the rest is as for learn_connections().
+void learn_portals(const IntegratorSettings& settings, int threads, World& w);
 
 // Traces the light vertices of one set (LightVertexCache). They depend only on the world, its seed and the
 // number of the set.

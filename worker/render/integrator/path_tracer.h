@@ -83,6 +83,15 @@ struct Connections {
     // True if a ray towards the sun met other media than a ray from the sun would. The scene then declares
     // different media on the two sides of a boundary, or the medium outside is not a vacuum.
     bool media_differ = false;
+    // The light of the sky that vertices found
+    std::vector<Portals::Found> sky;
+    // How often the sky was looked for by next-event estimation and how often it was seen so, how many
+    // directions were sampled by BSDFs and phase functions and how many of them led to the sky
+    double looked = 0, seen = 0, scatterings = 0, left = 0;
+
+    void found_sky(const V3& p, const V3& d, float found) {
+      if (found > 0 && std::isfinite(found)) sky.push_back({p, d, found});
+    }
   };
   Learner* learner = nullptr;
 };
@@ -255,8 +264,13 @@ class PathTracer {
   // this path.
   template <class Back>
   void add_found([[maybe_unused]] const LightChoice& choice, [[maybe_unused]] const V3& p,
-                 [[maybe_unused]] const V3& ng, C3 light, [[maybe_unused]] const Back& back) {
+                 [[maybe_unused]] const V3& ng, [[maybe_unused]] const V3& to_light, C3 light,
+                 [[maybe_unused]] const Back& back) {
     if constexpr (F.connected) {
+      if (connections_.learner && world_.lights.is_sky(choice)) {
+        ++connections_.learner->seen;
+        connections_.learner->found_sky(p, to_light, mean(light));
+      }
       if (choice.light == world_.sun.light && densities_.last > 0) {
         if (connections_.vertices)
           light /= 1 + first_density(world_.sun_map.density(p), ng) * densities_sum(back);
@@ -270,6 +284,12 @@ class PathTracer {
     add(light);
   }
 
+  // While learning: counts next-event estimation that looks for the sky.
+  void look_at_sky([[maybe_unused]] const LightChoice& choice) {
+    if constexpr (F.connected) {
+      if (connections_.learner && world_.lights.is_sky(choice)) ++connections_.learner->looked;
+    }
+  }
   // Adds light to the sample, already multiplied by the throughput. If `ahead`, it was scattered once more
   // than the path so far, in the medium on the path's next segment.
   void add(const C3& weighted, bool ahead = false) {
@@ -491,6 +511,7 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   if (!world_.lights.can_sample() || !surface.smooth) return;
   const Group g = stream_.group(depth_, Purpose::light);
   const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, hit.p, hit.shading.n);
+  look_at_sky(choice);
   const auto light = world_.lights.sample(choice, hit.p);
   if (!light) return;
   const V3 wi = hit.shading.to_local(light->direction);
@@ -506,7 +527,7 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   const Within medium = beyond(hit, surface, light->direction, ray_.d, medium_);
   const C3 arriving = unoccluded(hit.p, p, *light, medium, stream_.stream(depth_, Purpose::track_shadow));
   if (!is_black(arriving))
-    add_found(choice, hit.p, hit.ng, beta_ * f.f_cos * arriving * (weight / light->pdf),
+    add_found(choice, hit.p, hit.ng, light->direction, beta_ * f.f_cos * arriving * (weight / light->pdf),
               [&] { return world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wi, wo).pdf; });
 }
 
@@ -686,14 +707,20 @@ void PathTracer<F, Light>::add_environment() {
   if (!world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)) return;
   if constexpr (F.reuse) {
     if (is_leaving_second()) {
-      const Lights::EnvironmentParts parts = world_.lights.environment_parts(ray_.d);
+      const Lights::EnvironmentParts parts = world_.lights.environment_parts(last_.p, ray_.d);
       keep_emitted(parts.sampled, parts.pdf);
       add(beta_ * parts.unsampled);
       return;
     }
   }
   const float pdf = last_.pdf / last_.in_medium.found_as_light();
-  C3 light = world_.lights.environment(ray_.d, last_.delta ? kInfinity : pdf);
+  C3 light = world_.lights.environment(last_.p, ray_.d, last_.delta ? kInfinity : pdf);
+  if constexpr (F.connected) {
+    if (connections_.learner && !last_.delta) {
+      ++connections_.learner->left;
+      connections_.learner->found_sky(last_.p, ray_.d, mean(beta_ * light));
+    }
+  }
   if (depth_ == 1 && looked_for_sky_) light -= world_.lights.constant_environment() * .5f;
   add(beta_ * light);
 }

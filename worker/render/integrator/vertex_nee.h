@@ -106,6 +106,7 @@ class VertexNee {
     if (!lights.can_sample()) return;
     const Group g = path.stream_.group(path.depth_, Purpose::light);
     const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]}, p, V3(0));
+    path.look_at_sky(choice);
     const auto light = lights.sample(choice, p);
     if (!light) return;
     const float phase = medium.phase.value(d, light->direction);
@@ -129,7 +130,8 @@ class VertexNee {
     const C3 arriving = path.unoccluded(path.ray_.start, p, *light, path.medium_,
                                         path.stream_.stream(path.depth_, Purpose::track_shadow));
     if (!is_black(arriving))
-      path.add_found(choice, p, V3(0), path.beta_ * arriving * (phase * weight / (light->pdf * traced)),
+      path.add_found(choice, p, V3(0), light->direction,
+                     path.beta_ * arriving * (phase * weight / (light->pdf * traced)),
                      [phase] { return phase; });
   }
 

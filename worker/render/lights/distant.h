@@ -5,6 +5,7 @@
 
 #include "worker/render/lights/envmap.h"
 #include "worker/render/lights/light_kind.h"
+#include "worker/render/lights/portals.h"
 
 namespace ls::render {
 
@@ -56,27 +57,61 @@ struct SunLight : LightKind {
   }
 };
 
-struct MapLight : LightKind {
-  const EnvironmentMap* map = nullptr;
+// The sky as next-event estimation samples it: an environment map, by its brightness, and with portals also
+// the directions that lead through them. With portals the constant environment is part of it.
+struct SkyLight : LightKind {
+  // With portals, the share of directions that is sampled by the map's brightness alone, so that every
+  // direction in which it shines has a density; and the number of words that choose this.
+  static constexpr float kByBrightness = .25f;
+  static constexpr std::uint64_t kBrightnessWords = std::uint64_t{1} << 30;
 
-  bool dark(const LightWorld&) const { return map->black(); }
+  const EnvironmentMap* map = nullptr;
+  const Portals* portals = nullptr;
+  C3 constant{0, 0, 0};
+
+  bool sampled() const { return map || portals; }
+  bool dark(const LightWorld&) const { return !portals && map->black(); }
   double power(const LightWorld& world) const {
     const float radius = world.geometry.radius;
-    return map->flux() * kPiD * radius * radius;
+    return ((map ? map->flux() : 0) + 4 * kPiD * luminance(constant)) * kPiD * radius * radius;
   }
   // Radiance and density are evaluated in the sampled direction itself. Paths that leave the scene do the
   // same, so that both use the same density.
-  std::optional<LightSample> sample(const LightWorld&, const LightNumbers& numbers, const V3&,
+  std::optional<LightSample> sample(const LightWorld&, const LightNumbers& numbers, const V3& x,
                                     float p) const {
-    const V3 direction = map->sample(numbers.x, numbers.y);
-    const EnvironmentMap::Light light = map->at(direction);
+    const auto direction = direction_at(x, numbers);
+    if (!direction) return std::nullopt;
+    const EnvironmentMap::Light light = from(x, *direction);
     const float pdf = light.pdf * p;
     if (!(pdf > 0) || !std::isfinite(pdf)) return std::nullopt;
-    return LightSample{direction, kInfinity, V3(0), light.radiance, pdf, false};
+    return LightSample{*direction, kInfinity, V3(0), light.radiance, pdf, false};
+  }
+  // The light that arrives at x from the direction d, and the density of sample() for it
+  EnvironmentMap::Light from(const V3& x, const V3& d) const {
+    EnvironmentMap::Light light = map ? map->at(d) : EnvironmentMap::Light{C3(0), 0};
+    if (portals) {
+      const float share = map ? kByBrightness : 0.f;
+      light.radiance += constant;
+      light.pdf = share * light.pdf + (1 - share) * portals->pdf(x, d);
+    }
+    return light;
+  }
+
+ private:
+  std::optional<V3> direction_at(const V3& x, const LightNumbers& numbers) const {
+    if (!portals) return map->sample(numbers.x, numbers.y);
+    if (!map) return portals->sample(x, numbers.x, numbers.y);
+    // The position of the word among those that make the same choice is used again
+    if (numbers.x < kBrightnessWords)
+      return map->sample(static_cast<std::uint32_t>((std::uint64_t{numbers.x} << 32) / kBrightnessWords),
+                         numbers.y);
+    const std::uint64_t others = (std::uint64_t{1} << 32) - kBrightnessWords;
+    const std::uint64_t rest = ((numbers.x - kBrightnessWords) << 32) / others;
+    return portals->sample(x, static_cast<std::uint32_t>(rest), numbers.y);
   }
 };
 
-using DistantKinds = Kinds<DirectionalLight, SunLight, MapLight>;
+using DistantKinds = Kinds<DirectionalLight, SunLight, SkyLight>;
 
 // A disk of uniform radiance L and angular radius a gives a plane facing its centre the irradiance integral
 // of L cos = L 2 pi integral_0^a cos sin = L pi sin^2 a.

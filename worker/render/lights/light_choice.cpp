@@ -48,6 +48,9 @@ void Lights::build_tree() {
 // The probability of each of the n lights is half its share of the power plus half of 1/n, so none is below
 // 1/(2n). Probabilities are exact shares of the 2^32 random words.
 void Lights::set_probabilities() {
+  last_.clear();
+  suns_.clear();
+  any_with_place_ = false;
   std::vector<double> p;
   double sum = 0;
   for (const Light& l : lights_) sum += p.emplace_back(std::max(0., power(l)));
@@ -67,7 +70,7 @@ void Lights::set_probabilities() {
     before = edge;
     any_with_place_ = any_with_place_ || has_place(lights_[i]);
     if (std::holds_alternative<SunLight>(lights_[i].kind)) suns_.push_back(static_cast<std::uint32_t>(i));
-    if (std::holds_alternative<MapLight>(lights_[i].kind)) map_probability_ = lights_[i].probability;
+    if (std::holds_alternative<SkyLight>(lights_[i].kind)) sky_probability_ = lights_[i].probability;
   }
 }
 

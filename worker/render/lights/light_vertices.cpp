@@ -9,9 +9,8 @@
 namespace ls::render {
 namespace {
 
-// The shares of the sun map's rays that are uniform over its rectangle and over the whole scene, so that
-// light that paths found seldom or never while learning is connected too.
-constexpr double kRectangleShare = .2;
+// The share of the sun map's rays that is uniform over the whole scene, so that light that no path found
+// while learning is connected too.
 constexpr double kSceneShare = .05;
 constexpr float kSmallestMargin = 1e-4f;  // margin of the rectangle, as a share of the scene's radius
 // The largest |g| of a phase function in towards(): with sharper ones, rounding errors would dominate the
@@ -33,70 +32,14 @@ SunMap::SunMap(const V3& direction, float radius) : direction_(direction), radiu
   v_ = frame.to_world({0, 1, 0});
 }
 
-void SunMap::learn(const V3& p, float weight) {
-  if (weight > 0 && std::isfinite(weight)) found_.push_back({{dot(p, u_), dot(p, v_)}, weight});
-}
-
-void SunMap::add(const SunMap& other) {
-  found_.insert(found_.end(), other.found_.begin(), other.found_.end());
-}
-
-std::size_t SunMap::cell_of(V2 at) const {
-  const auto index = [](float x, float lo, float hi) {
-    return static_cast<std::size_t>(std::clamp((x - lo) / (hi - lo) * kSide, 0.f, kSide - 1.f));
-  };
-  return index(at.x, lo_.x, hi_.x) * kSide + index(at.y, lo_.y, hi_.y);
-}
-
-float SunMap::density_at(V2 at) const {
-  const bool inside = at.x >= lo_.x && at.x < hi_.x && at.y >= lo_.y && at.y < hi_.y;
-  return everywhere_ + (inside ? density_[cell_of(at)] : 0);
-}
-
 void SunMap::finish() {
-  if (found_.empty()) return;
-  lo_ = hi_ = found_.front().at;
-  for (const Found& f : found_) {
-    lo_ = {std::min(lo_.x, f.at.x), std::min(lo_.y, f.at.y)};
-    hi_ = {std::max(hi_.x, f.at.x), std::max(hi_.y, f.at.y)};
-  }
-  const V2 margin = (hi_ - lo_) * (1.f / kSide) + V2(radius_ * kSmallestMargin);
-  lo_ -= margin;
-  hi_ += margin;
-  constexpr std::size_t n = kSide * kSide;
-  std::vector<double> weight(n, 0.);
-  double sum = 0;
-  for (const Found& f : found_) {
-    weight[cell_of(f.at)] += double{f.weight};
-    sum += double{f.weight};
-  }
-  const double cell = double{hi_.x - lo_.x} * double{hi_.y - lo_.y} / n;
-  last_.resize(n + 1);
-  density_.resize(n);
-  double up_to = 0;
-  std::uint64_t words = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    up_to += (1 - kRectangleShare - kSceneShare) * weight[i] / sum + kRectangleShare / n;
-    const auto end = static_cast<std::uint64_t>(std::ldexp(up_to, 32));
-    last_[i] = static_cast<std::uint32_t>(end - 1);
-    density_[i] = static_cast<float>(std::ldexp(static_cast<double>(end - words), -32) / cell);
-    words = end;
-  }
-  last_[n] = ~std::uint32_t{0};
-  const double left = std::ldexp(static_cast<double>((std::uint64_t{1} << 32) - words), -32);
-  everywhere_ = static_cast<float>(left / (4 * double{radius_} * double{radius_}));
-  found_ = {};
+  found_.finish(radius_ * kSmallestMargin, kSceneShare);
+  everywhere_ = static_cast<float>(found_.outside_share() / (4 * double{radius_} * double{radius_}));
 }
 
 SunMap::Ray SunMap::sample(const std::array<std::uint32_t, 4>& bits) const {
-  const auto i =
-      static_cast<std::size_t>(std::lower_bound(last_.begin(), last_.end(), bits[0]) - last_.begin());
   const V2 u(unit_float(bits[1]), unit_float(bits[2]));
-  V2 at = (u * 2 - V2(1)) * radius_;
-  if (i < density_.size()) {
-    const V2 cell(static_cast<float>(i / kSide), static_cast<float>(i % kSide));
-    at = lo_ + (cell + u) * (hi_ - lo_) * (1.f / kSide);
-  }
+  const V2 at = found_.sample(bits[0], u).value_or((u * 2 - V2(1)) * radius_);
   return {u_ * at.x + v_ * at.y - direction_ * (2 * radius_), density_at(at)};
 }
 

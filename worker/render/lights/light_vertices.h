@@ -34,13 +34,13 @@
 #include <vector>
 
 #include "worker/render/geometry/geometry.h"
+#include "worker/render/lights/learned_rectangle.h"
 #include "worker/render/math/math.h"
 
 namespace ls::render {
 
-// The distribution of the rays from the sun, over a plane normal to the sun's direction. It is learned: it
-// has one density for each cell of a rectangle around the points at which camera paths found the sun. A small
-// share is uniform over the whole scene.
+// The distribution of the rays from the sun, over a plane normal to the sun's direction. It is learned from
+// the points at which camera paths found the sun. A small share is uniform over the whole scene.
 class SunMap {
  public:
   SunMap() = default;
@@ -49,15 +49,15 @@ class SunMap {
   SunMap(const V3& direction, float radius);
 
   // Adds a point at which a path found the sun; a weight that is not finite is ignored
-  void learn(const V3& p, float weight);
-  void add(const SunMap& other);  // adds the points that `other`, a map of the same sun, has learned
-  void finish();                  // call once, after all points: makes the map a density
+  void learn(const V3& p, float weight) { found_.learn(on_plane(p), weight); }
+  void add(const SunMap& other) { found_.add(other.found_); }  // adds what `other`, of the same sun, learned
+  void finish();  // call once, after all points: makes the map a density
 
-  bool empty() const { return last_.empty(); }
+  bool empty() const { return found_.empty(); }
   const V3& direction() const { return direction_; }
   // The density of the rays through p, per area of the plane; its integral is 1. Positive for every p in the
   // scene.
-  float density(const V3& p) const { return density_at({dot(p, u_), dot(p, v_)}); }
+  float density(const V3& p) const { return density_at(on_plane(p)); }
 
   struct Ray {
     V3 o;           // origin, outside of the scene
@@ -68,21 +68,13 @@ class SunMap {
 
  private:
   static constexpr std::size_t kSide = 64;
-  struct Found {
-    V2 at;
-    float weight;
-  };
-  std::size_t cell_of(V2 at) const;
-  float density_at(V2 at) const;
+  V2 on_plane(const V3& p) const { return {dot(p, u_), dot(p, v_)}; }
+  float density_at(V2 at) const { return everywhere_ + found_.density(at); }
 
   V3 direction_{0, 0, 1}, u_{1, 0, 0}, v_{0, 1, 0};
   float radius_ = 1;
-  std::vector<Found> found_;  // used while learning
-  V2 lo_{0, 0}, hi_{0, 0};    // corners of the rectangle
-  std::vector<float> density_;
+  LearnedRectangle found_{kSide};
   float everywhere_ = 0;  // density of the uniform share over the whole scene
-  // The last word that chooses each cell; the last entry is for the whole scene
-  std::vector<std::uint32_t> last_;
 };
 
 // A subpath's share in the denominator of the balance heuristic, for subpaths from the camera and from the
@@ -135,8 +127,8 @@ class LightVertices {
  public:
   static constexpr std::size_t kCandidates = 32;
 
-  // The appearance of a light vertex from elsewhere, by which choose() estimates its contribution. Up to a
-  // common factor the radiance that leaves the vertex, times its cosine to the normal (1 in media), is
+  // The appearance of a light vertex from outside_share, by which choose() estimates its contribution. Up to
+  // a common factor the radiance that leaves the vertex, times its cosine to the normal (1 in media), is
   //   even * cosine + lobe * 4 pi * (the Henyey-Greenstein phase function with parameter g),
   // the latter for the angle between the direction in which light leaves and -axis. The lobe of a glossy
   // surface has no cosine, as that of a microfacet distribution.

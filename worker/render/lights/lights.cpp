@@ -49,7 +49,8 @@ Result<void> Lights::add_map(const Scene& scene, const EnvmapEmitter& emitter, c
     return {};
   }
   map_ = std::make_unique<const EnvironmentMap>(std::move(*map));
-  add(MapLight{{}, map_.get()});
+  sky_.map = map_.get();
+  add(sky_);
   return {};
 }
 
@@ -151,12 +152,40 @@ Pivot Lights::pivot(const SurfaceHit& hit) const {
   return with_area(hit, [&](const auto& l) { return l.pivot_of(world(), hit); });
 }
 
-Lights::EnvironmentParts Lights::environment_parts(const V3& direction) const {
+bool Lights::is_sky(const LightChoice& choice) const {
+  return std::holds_alternative<SkyLight>(lights_[choice.light].kind);
+}
+
+void Lights::set_portals(std::unique_ptr<const Portals> portals) {
+  portals_ = std::move(portals);
+  sky_.portals = portals_.get();
+  if (portals_)
+    sky_.constant += std::exchange(environment_, C3(0));
+  else
+    environment_ += std::exchange(sky_.constant, C3(0));
+  const auto is_sky = [](const Light& l) { return std::holds_alternative<SkyLight>(l.kind); };
+  const auto at = std::find_if(lights_.begin(), lights_.end(), is_sky);
+  if (!sky_.sampled()) {
+    if (at != lights_.end()) lights_.erase(at);
+  } else if (at != lights_.end()) {
+    at->kind = sky_;
+  } else {
+    lights_.push_back({sky_});
+  }
+  set_probabilities();
+  if (has_tree()) build_tree();
+}
+
+std::uint64_t Lights::map_bytes() const {
+  return (map_ ? map_->bytes() : 0) + (portals_ ? portals_->bytes() : 0);
+}
+
+Lights::EnvironmentParts Lights::environment_parts(const V3& x, const V3& direction) const {
   EnvironmentParts parts{environment_, C3(0), 0};
-  if (map_) {
-    const EnvironmentMap::Light light = map_->at(direction);
+  if (sky_.sampled()) {
+    const EnvironmentMap::Light light = sky_.from(x, direction);
     parts.sampled = light.radiance;
-    parts.pdf = light.pdf * map_probability_;
+    parts.pdf = light.pdf * sky_probability_;
   } else if (!suns_.empty()) {
     const Light& sun = lights_[suns_.front()];
     parts.sampled = std::get_if<SunLight>(&sun.kind)->found(direction, kInfinity, sun.probability);

@@ -70,17 +70,19 @@ class Lights {
   // sample() find the point `hit` of a surface light. `direction` points from x to the hit.
   float pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const V3& n = V3(0)) const;
   Pivot pivot(const SurfaceHit& hit) const;
-  // Environment radiance for a path that leaves the scene in this direction (a unit vector), weighted against
-  // sampling the environment as a light. `pdf` is the density, per steradian, with which the path sampled the
-  // direction. Infinity gives the full radiance, for directions that were not sampled. A constant environment
-  // is never sampled as a light, since it is smooth and paths find it when they leave.
-  C3 environment(const V3& direction, float pdf) const {
+  // Environment radiance for a path that leaves the scene from x in this direction (a unit vector), weighted
+  // against sampling the environment as a light at x. `pdf` is the density, per steradian, with which the
+  // path sampled the direction. Infinity gives the full radiance, for directions that were not sampled.
+  // Without portals a constant environment is never sampled as a light, since it is smooth and paths find it
+  // when they leave.
+  C3 environment(const V3& x, const V3& direction, float pdf) const {
     const C3 beside = suns_.empty() ? environment_ : environment_ + suns(direction, pdf);
-    if (!map_) return beside;
-    const EnvironmentMap::Light light = map_->at(direction);
-    const float as_light = light.pdf * map_probability_;
+    if (!sky_.sampled()) return beside;
+    const EnvironmentMap::Light light = sky_.from(x, direction);
+    const float as_light = light.pdf * sky_probability_;
     return beside + (as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance);
   }
+  // The environment of constant radiance, as far as it is not sampled as a light
   const C3& constant_environment() const { return environment_; }
   // The same light by the way in which it can be found. Requires single_environment_sample().
   struct EnvironmentParts {
@@ -88,14 +90,19 @@ class Lights {
     C3 sampled;    // sampled as a light with the density `pdf`, per steradian
     float pdf;
   };
-  EnvironmentParts environment_parts(const V3& direction) const;
+  EnvironmentParts environment_parts(const V3& x, const V3& direction) const;
   // True if next-event estimation samples a direction by at most one light that paths can also hit when they
   // leave the scene: a sun with an extent, or a map.
-  bool single_environment_sample() const { return suns_.size() + (map_ ? 1 : 0) <= 1; }
+  bool single_environment_sample() const { return suns_.size() + (sky_.sampled() ? 1 : 0) <= 1; }
   // Sets the radiance of the constant environment, and returns what it was. A scene without one has black.
   C3 exchange_constant_environment(const C3& radiance) { return std::exchange(environment_, radiance); }
-  bool has_environment() const { return map_ || !suns_.empty() || !is_black(environment_); }
+  bool has_environment() const { return sky_.sampled() || !suns_.empty() || !is_black(environment_); }
   const EnvironmentMap* map() const { return map_.get(); }
+  bool is_sky(const LightChoice& choice) const;
+  // From this call on, directions towards the environment map and the constant environment are also sampled
+  // through these portals; null: no longer.
+  void set_portals(std::unique_ptr<const Portals> portals);
+  const Portals* portals() const { return portals_.get(); }
 
   // From this call on, lights are also chosen by the tree for points in media, if there is a tree. Only for
   // integrators that do not sample points on segments: for such points the light is chosen before the point.
@@ -103,6 +110,7 @@ class Lights {
   bool has_tree() const { return !tree_.empty(); }
   std::uint64_t tree_bytes() const { return tree_.bytes(); }
   std::uint64_t table_bytes() const;
+  std::uint64_t map_bytes() const;  // of the environment map and its portals
 
   std::size_t count() const { return lights_.size(); }
   std::uint64_t left_out() const { return left_out_; }
@@ -171,7 +179,9 @@ class Lights {
   const TextureTable* textures_ = nullptr;
   C3 environment_{0, 0, 0};
   std::unique_ptr<const EnvironmentMap> map_;
-  float map_probability_ = 0;
+  std::unique_ptr<const Portals> portals_;
+  SkyLight sky_;  // a copy of that among lights_, if it is there
+  float sky_probability_ = 0;
   // If there are many lights, those with a position come first in the list and are in the tree. The first
   // words of the table choose these lights; at each point the tree redistributes these words among them,
   // except every kTableShare-th word, which the table keeps.

@@ -36,20 +36,19 @@ std::vector<WorldReport::Structure> structures_of(const World& w) {
   const std::string grids =
       w.grids.empty() ? "no grid"
                       : fmt::format("{} of {} values", counted(w.grids.size(), "grid"), value_count);
-  return {
-      {"geometry", w.geometry.bytes(), primitives(w.geometry)},
-      {"bvh", w.accel.bytes(),
-       w.accel.has_boundaries() ? "one for all, one for what blocks light, one for what lets it pass"
-                                : "one; nothing lets light pass"},
-      {"materials", w.bsdfs.bytes(), counted(w.bsdfs.size(), "material")},
-      {"textures", w.textures.bytes(), w.textures.bytes() > 0 ? "texels" : "no image"},
-      {"environment map", map ? map->bytes() : 0, map ? "texels and the table that samples them" : "none"},
-      {"grid values", values, grids},
-      {"majorant cells", cells, grids},
-      {"light table", w.lights.table_bytes(), counted(w.lights.count(), "light")},
-      {"light tree", w.lights.tree_bytes(),
-       w.lights.has_tree() ? counted(w.lights.count(), "light")
-                           : "too few lights with a place to choose among"}};
+  return {{"geometry", w.geometry.bytes(), primitives(w.geometry)},
+          {"bvh", w.accel.bytes(),
+           w.accel.has_boundaries() ? "one for all, one for what blocks light, one for what lets it pass"
+                                    : "one; nothing lets light pass"},
+          {"materials", w.bsdfs.bytes(), counted(w.bsdfs.size(), "material")},
+          {"textures", w.textures.bytes(), w.textures.bytes() > 0 ? "texels" : "no image"},
+          {"environment map", w.lights.map_bytes(), map ? "texels and the table that samples them" : "none"},
+          {"grid values", values, grids},
+          {"majorant cells", cells, grids},
+          {"light table", w.lights.table_bytes(), counted(w.lights.count(), "light")},
+          {"light tree", w.lights.tree_bytes(),
+           w.lights.has_tree() ? counted(w.lights.count(), "light")
+                               : "too few lights with a place to choose among"}};
 }
 
 }  // namespace
@@ -73,6 +72,7 @@ TechniqueSet techniques_of(const World& w) {
   put(w.faint_shadow > 0, Technique::shadow_roulette);
   put(w.sky_samples, Technique::sky_samples);
   put(w.mean_radiance > 0, Technique::path_splitting);
+  put(w.lights.portals(), Technique::sky_portals);
   return set;
 }
 
@@ -104,6 +104,7 @@ WorldReport describe(const World& w) {
   feature(techniques.has(Technique::path_reuse), "paths that serve several pixels");
   feature(techniques.has(Technique::sky_samples), "second directions that look for the sky");
   feature(techniques.has(Technique::shadow_roulette), "shadow rays at random where they could bring little");
+  feature(techniques.has(Technique::sky_portals), "directions towards the sky through openings");
   feature(techniques.has(Technique::path_splitting), "paths that split, or end, by what their pixel shows");
   feature(w.camera.has_lens(), "thin lens");
   feature(!w.geometry.instances.empty(), "instances of groups");

@@ -10,6 +10,7 @@
 #include "tests/support/lit_cloud.h"
 #include "tests/support/render_check.h"
 #include "tests/support/significance.h"
+#include "tests/support/sky_room.h"
 #include "tests/support/sky_yard.h"
 #include "tests/support/sunny_room.h"
 
@@ -77,7 +78,8 @@ std::vector<Case> cases() {
           {Technique::path_reuse, test::LampRoom{.fog = .3, .path_reuse = 8}.builder({24, 16})},
           {Technique::shadow_roulette, test::lit_cloud({24, 16})},
           {Technique::sky_samples, test::sky_yard({24, 16})},
-          {Technique::path_splitting, test::lit_cloud({24, 16})}};
+          {Technique::path_splitting, test::lit_cloud({24, 16})},
+          {Technique::sky_portals, test::SkyRoom{}.builder({24, 16})}};
 }
 
 // What off_switch() says, done to the description that the reader would make of it.
@@ -96,6 +98,7 @@ SceneBuilder switched_off(const Case& c) {
       {"shadow_roulette", [&] { i.shadow_roulette = -1; }},
       {"sky_samples", [&] { i.sky_samples = -1; }},
       {"path_splitting", [&] { i.path_splitting = -1; }},
+      {"sky_portals", [&] { i.sky_portals = -1; }},
       {"distance", [&] {
          i.distance =
              off.value == "exponential" ? DistanceSampling::exponential : DistanceSampling::equiangular;

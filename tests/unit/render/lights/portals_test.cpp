@@ -1,0 +1,160 @@
+// Portals: the plane on which they are found, the density of their directions, and odd input.
+#include "worker/render/lights/portals.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "worker/render/math/random.h"
+
+namespace ls::render {
+namespace {
+
+using Found = Portals::Found;
+
+// A room of 2 x 2 x 2 about the origin whose sky is seen through a window at the given axis and offset, from
+// -0.1 to 0.3 and from 0.4 to 0.7 on the two axes after that: rays from points in the room to points of the
+// window.
+struct Window {
+  int axis = 0;
+  float offset = .8f;
+
+  V3 point(float u, float v) const {
+    V3 q;
+    q[axis] = offset;
+    q[(axis + 1) % 3] = -.1f + .4f * u;
+    q[(axis + 2) % 3] = .4f + .3f * v;
+    return q;
+  }
+  bool holds(const V3& q) const {
+    const float u = q[(axis + 1) % 3], v = q[(axis + 2) % 3];
+    return u >= -.1f && u < .3f && v >= .4f && v < .7f;
+  }
+  std::vector<Found> rays(int count, RandomStream& random) const {
+    std::vector<Found> all;
+    while (static_cast<int>(all.size()) < count) {
+      V3 p;
+      for (int k = 0; k < 3; ++k) p[k] = 2 * random.uniform() - 1;
+      const V3 to = point(random.uniform(), random.uniform()) - p;
+      if (to[axis] * offset > 0) all.push_back({p, normalize(to), 1});
+    }
+    return all;
+  }
+};
+V3 at_plane(const Window& w, const V3& p, const V3& d) {
+  return p + d * ((w.offset - p[w.axis]) / d[w.axis]);
+}
+
+TEST(Portals, AreFoundInThePlaneOfTheWindow) {
+  constexpr int kSamples = 2000;
+  for (const Window& window : {Window{}, Window{0, -.8f}, Window{1, .7f}, Window{2, -.9f}}) {
+    RandomStream random(3);
+    const Portals portals(window.rays(4000, random));
+    ASSERT_TRUE(portals.any());
+    const V3 p(.1f, -.3f, .2f);
+    int through = 0;
+    for (int i = 0; i < kSamples; ++i) {
+      const auto d = portals.sample(p, random.bits(), random.bits());
+      if (d && window.holds(at_plane(window, p, *d))) ++through;
+    }
+    // The share of the samples that is uniform over the rectangle, 0.2, has a margin of a cell on each side
+    // of the window and may hence miss it; cells at the edges may, too. The window fills 1 / 64 of the wall.
+    EXPECT_GT(through, .6 * kSamples) << window.axis << ' ' << window.offset;
+  }
+}
+
+std::vector<Found> through(std::initializer_list<Window> windows) {
+  RandomStream random(5);
+  std::vector<Found> all;
+  for (const Window& w : windows) {
+    const auto rays = w.rays(1000, random);
+    all.insert(all.end(), rays.begin(), rays.end());
+  }
+  return all;
+}
+
+// The mean of a direction's function over its density is the function's integral if, and only if, the density
+// is that of the samples. A function that is 0 but for directions of positive density makes the integral
+// finite: the density itself, within directions of which the others' share is known. Five standard errors.
+TEST(Portals, HaveTheDensityThatTheySay) {
+  const std::vector<Found> found = through({Window{0, .8f}, Window{1, -.7f}, Window{2, .9f}});
+  const Portals portals(found);
+  for (const V3& p : {V3(0, 0, 0), V3(.5f, -.2f, .6f), V3(-.9f, .9f, -.9f), V3(.95f, 0, 0), V3(2, 3, 4)}) {
+    constexpr int kSamples = 1 << 18;
+    RandomStream random(7);
+    double sampled = 0;  // samples that have a direction
+    std::array<double, 2> by_samples{}, by_sphere{}, squares{}, sphere_squares{};
+    const auto values = [](const V3& d) { return std::array<double, 2>{std::max(0.f, d.x), d.y * d.z}; };
+    for (int i = 0; i < kSamples; ++i) {
+      const auto d = portals.sample(p, random.bits(), random.bits());
+      for (std::size_t k = 0; d && k < 2; ++k) {
+        ASSERT_GT(portals.pdf(p, *d), 0);
+        const double v = values(*d)[k];
+        by_samples[k] += v / kSamples;
+        squares[k] += v * v / kSamples;
+      }
+      sampled += d ? 1. / kSamples : 0;
+    }
+    double integral = 0, integral_squares = 0;
+    for (int i = 0; i < kSamples; ++i) {
+      const float z = 1 - 2 * random.uniform(), r = safe_sqrt(1 - z * z);
+      const V2 phi = unit_circle(random.uniform());
+      const V3 d(r * phi.x, r * phi.y, z);
+      const double q = 4 * M_PI * double{portals.pdf(p, d)};
+      integral += q / kSamples;
+      integral_squares += q * q / kSamples;
+      for (std::size_t k = 0; k < 2; ++k) {
+        const double v = values(d)[k] * q;
+        by_sphere[k] += v / kSamples;
+        sphere_squares[k] += v * v / kSamples;
+      }
+    }
+    const auto error = [](double square, double mean) {
+      return std::sqrt((square - mean * mean) / kSamples);
+    };
+    EXPECT_NEAR(integral, sampled, 5 * (error(integral_squares, integral) + error(sampled, sampled)));
+    for (std::size_t k = 0; k < 2; ++k)
+      EXPECT_NEAR(by_sphere[k], by_samples[k],
+                  5 * (error(sphere_squares[k], by_sphere[k]) + error(squares[k], by_samples[k])));
+  }
+}
+
+TEST(Portals, AreNotInFrontOfPointsBehindThem) {
+  const Portals portals(through({Window{0, .8f}}));
+  RandomStream random(1);
+  for (int i = 0; i < 1000; ++i) {
+    EXPECT_FALSE(portals.sample({5, .1f, .5f}, random.bits(), random.bits()));
+    EXPECT_TRUE(portals.sample({-5, .1f, .5f}, random.bits(), random.bits()));
+  }
+  EXPECT_EQ(portals.pdf({5, .1f, .5f}, {-1, 0, 0}), 0);
+  EXPECT_EQ(portals.pdf({5, .1f, .5f}, {1, 0, 0}), 0);
+  EXPECT_GT(portals.pdf({-5, .1f, .5f}, {1, 0, 0}), 0);
+  EXPECT_EQ(portals.pdf({0, 0, 0}, {0, 1, 0}), 0) << "along the plane";
+}
+
+TEST(Portals, BearOddInput) {
+  EXPECT_FALSE(Portals({}).any());
+  const V3 p(.1f, .2f, .3f), d(1, 0, 0);
+  EXPECT_FALSE(Portals(std::vector<Found>{{p, d, 1}}).any()) << "one point encloses no room";
+  // All points on a line, whose box has no volume; directions along its faces and edges; light of all sizes
+  std::vector<Found> flat;
+  for (int i = 0; i < 100; ++i)
+    flat.push_back({{static_cast<float>(i) * .01f, 0, 0},
+                    i % 2 == 0 ? V3(0, 1, 0) : V3(1, 0, 0),
+                    i % 3 == 0 ? 1e-38f : 1e30f});
+  const Portals portals(flat);
+  RandomStream random(2);
+  for (int i = 0; i < 1000; ++i) {
+    const auto w =
+        portals.any() ? portals.sample({.5f, .1f, .2f}, random.bits(), random.bits()) : std::nullopt;
+    if (w) {
+      EXPECT_TRUE(is_finite(*w));
+      EXPECT_GE(portals.pdf({.5f, .1f, .2f}, *w), 0);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ls::render

@@ -1,0 +1,54 @@
+// A density over a rectangle that is learned from points: it has one value for each of side x side cells.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "worker/render/math/math.h"
+
+namespace ls::render {
+
+class LearnedRectangle {
+ public:
+  LearnedRectangle() = default;  // without cells: only to be assigned to
+  explicit LearnedRectangle(std::size_t side) : side_(side) {}
+
+  // Adds a point; a weight that is not positive and finite is ignored.
+  void learn(V2 at, float weight);
+  void add(const LearnedRectangle& other);  // adds the points that `other` has learned
+  // Makes the points a density; call once, after all points. The rectangle is that of the points, with a
+  // margin of a cell's side and `margin` on each side. The density's integral is 1 - `outside_share`, of
+  // which a share is uniform over the rectangle, for places where few points or none were learned.
+  void finish(float margin, double outside_share);
+
+  bool empty() const { return last_.empty(); }
+  float density(V2 at) const;                              // 0 outside of the rectangle
+  double outside_share() const { return outside_share_; }  // as given, rounded to whole words
+
+  // The place that `word`, 32 uniform random bits, chooses with the uniform numbers u; nullopt: none, which
+  // happens with the probability outside_share().
+  std::optional<V2> sample(std::uint32_t word, V2 u) const;
+  // The same, with u.x taken from the position of `word` among those that choose its cell
+  std::optional<V2> sample(std::uint32_t word, float v) const;
+
+  std::uint64_t bytes() const { return density_.size() * sizeof(float) + last_.size() * sizeof(last_[0]); }
+
+ private:
+  struct Found {
+    V2 at;
+    float weight;
+  };
+  std::size_t cell_of(V2 at) const;
+  std::size_t chosen(std::uint32_t word) const;
+  V2 in_cell(std::size_t cell, V2 u) const;
+
+  std::size_t side_ = 0;
+  std::vector<Found> found_;  // used while learning
+  V2 lo_{0, 0}, hi_{0, 0};    // corners of the rectangle
+  std::vector<float> density_;
+  std::vector<std::uint32_t> last_;  // the last word that chooses each cell
+  double outside_share_ = 0;
+};
+
+}  // namespace ls::render
