@@ -28,7 +28,7 @@ constexpr std::array kRows{
     TechniqueRow{Technique::path_splitting, "path_splitting",
                  "splits paths at their first scattering in a grid, and ends those that could bring little"},
     TechniqueRow{Technique::sky_portals, "sky_portals",
-                 "looks for the sky's image through the openings by which its light enters"}};
+                 "looks for the sky through the openings by which its light enters"}};
 
 constexpr bool in_order() {
   for (std::size_t i = 0; i < kRows.size(); ++i)

@@ -23,7 +23,7 @@ enum class Technique : std::uint8_t {
   shadow_roulette,  // shadow rays through grids that are traced at random where they could bring little
   sky_samples,      // a second direction from the first surface that looks for a constant environment
   path_splitting,   // splitting and Russian roulette of paths, in scenes with grids, by what they may bring
-  sky_portals,      // sampling of directions towards an environment map through openings
+  sky_portals,      // sampling of directions towards the sky through openings
 };
 
 struct TechniqueRow {

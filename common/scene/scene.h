@@ -375,8 +375,9 @@ struct IntegratorSettings {
   // For "volpath" and "path" only: whether the first surface looks for a constant environment in a second
   // direction. 0: chosen for the scene; -1: it does not.
   int sky_samples = 0;
-  // For "volpath" and "path" only: whether directions towards an environment map are sampled through the
-  // openings by which its light enters the scene. 0: chosen for the scene; -1: never; 1: where possible.
+  // For "volpath" and "path" only: whether directions towards the sky, an environment map or a constant
+  // environment, are also sampled through the openings by which its light enters the scene. 0: chosen for the
+  // scene; -1: never; 1: where possible.
   int sky_portals = 0;
   // For "volpath" only: whether paths in scenes with grids split at their first scattering and end by what
   // they may add to their pixel. 0: chosen for the scene; -1: they do not.

@@ -102,8 +102,9 @@ void describe(V& v, T& i) {
            .only_of = {"volpath", "path"}},
           i.sky_samples);
   v.field({.name = "sky_portals",
-           .doc = "whether directions towards an `envmap` are also sampled through the openings by "
-                  "which its light enters the scene; 0: if that pays; -1: never; 1: where it is possible",
+           .doc = "whether directions towards the sky, an `envmap` or a `constant` environment, are also "
+                  "sampled through the openings by which its light enters the scene; 0: if that pays; -1: "
+                  "never; 1: where it is possible",
            .range = {-1, 1},
            .elided = true,
            .only_of = {"volpath", "path"}},

@@ -30,12 +30,13 @@ constexpr std::uint64_t kLearningPathsPerPixel = 16;
 constexpr std::uint64_t kLearningBatch = 1 << 10;
 // Learning may stop after this many batches if connections clearly do not pay.
 constexpr std::uint64_t kFirstBatches = 4;
-// Portals pay if the sky brings at least the share kSkyThatPays of the light that is scattered towards the
-// camera, is seen in at most the share kSeenThatPays of the attempts to find it, and at least kTimesThatPay
-// times as often by next-event estimation with portals as by any way without them.
-constexpr double kSkyThatPays = .25;
-constexpr double kSeenThatPays = .125;
-constexpr double kTimesThatPay = 4;
+// Portals are tried if at most this share of the directions that BSDFs and phase functions sample leads to
+// the sky. They pay if the noise of some pixels without them is more than kPortalGainThatPays times the noise
+// with them, and kShadowGainThatPays times where they add a light to a scene that had none to look for, since
+// then shadow rays are traced that were not before.
+constexpr double kLeftThatPays = .125;
+constexpr double kPortalGainThatPays = 1.1;
+constexpr double kShadowGainThatPays = 2;
 // Portals are learned from paths of at most this many segments.
 constexpr int kLongestPortalPath = 4;
 // A batch ends after this many vertices, since paths may be long.
@@ -67,7 +68,10 @@ struct Learned {
   double radiance = 0;  // sum of the radiances of all paths
   std::uint64_t paths = 0;
 
-  explicit Learned(const World& w) { learner.map = SunMap(w.sun.direction, w.geometry.radius); }
+  explicit Learned(const World& w, bool keeps_sky = false) {
+    learner.map = SunMap(w.sun.direction, w.geometry.radius);
+    learner.keeps_sky = keeps_sky;
+  }
   void add(const Learned& batch) {
     learner.map.add(batch.learner.map);
     learner.light += batch.learner.light;
@@ -75,8 +79,6 @@ struct Learned {
     learner.lit += batch.learner.lit;
     learner.media_differ = learner.media_differ || batch.learner.media_differ;
     learner.sky.insert(learner.sky.end(), batch.learner.sky.begin(), batch.learner.sky.end());
-    learner.looked += batch.learner.looked;
-    learner.seen += batch.learner.seen;
     learner.scatterings += batch.learner.scatterings;
     learner.left += batch.learner.left;
     radiance += batch.radiance;
@@ -88,9 +90,9 @@ struct Learned {
 };
 
 template <Features F, template <Features> class Light>
-Learned learn_batch(const World& w, std::uint64_t first, std::uint64_t end) {
+Learned learn_batch(const World& w, bool keeps_sky, std::uint64_t first, std::uint64_t end) {
   const FlushDenormals mode;
-  Learned learned(w);
+  Learned learned(w, keeps_sky);
   for (std::uint64_t i = first; i < end && learned.learner.vertices <= kLearningVertices; ++i) {
     const SampleStream stream(kLearningSeed, 0, 0, 2 * i);
     const Group at = stream.group(0, Purpose::guide), lens = stream.group(0, Purpose::camera);
@@ -108,7 +110,7 @@ Learned learn_batch(const World& w, std::uint64_t first, std::uint64_t end) {
 // Traces up to `paths` camera paths. After the first kFirstBatches, `go_on` is asked whether to trace the
 // rest.
 template <Features F, template <Features> class Light, class GoOn>
-Learned learn_with(const World& w, std::uint64_t paths, int threads, const GoOn& go_on) {
+Learned learn_with(const World& w, std::uint64_t paths, int threads, const GoOn& go_on, bool keeps_sky) {
   const auto pixels = static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
   const std::uint64_t most = std::min(paths, kLearningPathsPerPixel * pixels);
   const std::uint64_t batches = (most + kLearningBatch - 1) / kLearningBatch;
@@ -116,7 +118,8 @@ Learned learn_with(const World& w, std::uint64_t paths, int threads, const GoOn&
   in_order(
       threads, batches,
       [&](std::size_t i) {
-        return learn_batch<F, Light>(w, i * kLearningBatch, std::min((i + 1) * kLearningBatch, most));
+        return learn_batch<F, Light>(w, keeps_sky, i * kLearningBatch,
+                                     std::min((i + 1) * kLearningBatch, most));
       },
       [&, taken = std::uint64_t{0}](const Learned& batch) mutable {
         learned.add(batch);
@@ -151,10 +154,10 @@ constexpr Features kAimed = [] {
 }();
 
 template <class GoOn>
-Learned learn(const World& w, std::uint64_t paths, int threads, const GoOn& go_on) {
-  if (w.need.aimed) return learn_with<kAimed, CameraSegmentNee>(w, paths, threads, go_on);
-  return w.need.media ? learn_with<kMedia, VertexNee>(w, paths, threads, go_on)
-                      : learn_with<kSurfaces, VertexNee>(w, paths, threads, go_on);
+Learned learn(const World& w, std::uint64_t paths, int threads, const GoOn& go_on, bool keeps_sky = false) {
+  if (w.need.aimed) return learn_with<kAimed, CameraSegmentNee>(w, paths, threads, go_on, keeps_sky);
+  return w.need.media ? learn_with<kMedia, VertexNee>(w, paths, threads, go_on, keeps_sky)
+                      : learn_with<kSurfaces, VertexNee>(w, paths, threads, go_on, keeps_sky);
 }
 
 bool can_learn(const World& w) {
@@ -243,46 +246,38 @@ void learn_connections(const IntegratorSettings& settings, int threads, World& w
 
 namespace {
 
-// The share of the attempts to find the sky that found it, by next-event estimation
-double seen(const Connections::Learner& l) { return l.looked > 0 ? l.seen / l.looked : 0; }
+constexpr int kLongestPilot = 64;  // paths in a white and dense medium have thousands of segments
 
-bool sees_sky_seldom(const Connections::Learner& l) {
-  return seen(l) <= kSeenThatPays && l.left <= kSeenThatPays * l.scatterings;
-}
-
-bool sky_matters(const Learned& learned) {
-  double light = 0;
-  for (const Portals::Found& f : learned.learner.sky) light += double{f.light};
-  return light >= kSkyThatPays * learned.radiance;
-}
-
-// Sets the portals if they pay, or in any case if so asked.
-void find_portals(bool in_any_case, int threads, World& w) {
-  const auto go_on = [&](const Connections::Learner& first) { return in_any_case || sees_sky_seldom(first); };
-  const Learned without = learn(w, kPortalPaths, threads, go_on);
-  if (!go_on(without.learner) || !(in_any_case || sky_matters(without))) return;
-  auto portals = std::make_unique<const Portals>(without.learner.sky);
-  if (!portals->any()) return;
-  w.lights.set_portals(std::move(portals));
-  if (in_any_case) return;
-  const Learned with = learn(w, kPortalPaths / 4, threads, [](const Connections::Learner&) { return false; });
-  const double otherwise =
-      std::max(seen(without.learner), without.learner.left / without.learner.scatterings);
-  if (seen(with.learner) < kTimesThatPay * otherwise) w.lights.set_portals(nullptr);
+std::unique_ptr<const Portals> find_portals(bool in_any_case, int threads, World& w) {
+  const PilotSettings settings(w, kLearningSeed, kLongestPortalPath);
+  const auto go_on = [&](const Connections::Learner& first) {
+    return in_any_case || first.left <= kLeftThatPays * first.scatterings;
+  };
+  const Learned learned = learn(w, kPortalPaths, threads, go_on, /*keeps_sky=*/true);
+  if (!go_on(learned.learner)) return nullptr;
+  auto portals = std::make_unique<const Portals>(learned.learner.sky);
+  return portals->any() ? std::move(portals) : nullptr;
 }
 
 }  // namespace
 
 void learn_portals(const IntegratorSettings& settings, int threads, World& w) {
   const bool sky = w.lights.map() || !is_black(w.lights.constant_environment());
+  const bool in_any_case = settings.sky_portals > 0;
   if (settings.sky_portals < 0 || !sky || !w.depth_allows(1) || !can_learn(w)) return;
-  const int own_depth =
-      std::exchange(w.max_depth, w.depth_allows(kLongestPortalPath) ? kLongestPortalPath : w.max_depth);
-  // Portals are of no use where the camera itself sees the sky
-  const bool hide_emitters = std::exchange(w.hide_emitters, true);
-  find_portals(settings.sky_portals > 0, threads, w);
-  w.hide_emitters = hide_emitters;
-  w.max_depth = own_depth;
+  if (!in_any_case && !pilot_pays(w)) return;
+  auto portals = find_portals(in_any_case, threads, w);
+  if (!portals) return;
+  const bool adds_rays = !w.lights.can_sample(), may_share = w.lights.single_environment_sample();
+  const auto without = in_any_case ? std::vector<PilotPixel>{} : pilot_pixels(w, kLongestPilot, threads);
+  w.lights.set_portals(std::move(portals));
+  aim(settings, w);  // again, since a constant environment may now be a light that is sampled
+  if (in_any_case) return;
+  const auto with = pilot_pixels(w, kLongestPilot, threads);
+  const double gain = adds_rays ? kShadowGainThatPays : kPortalGainThatPays;
+  if (may_share == w.lights.single_environment_sample() && is_noisier(without, with, gain)) return;
+  w.lights.set_portals(nullptr);
+  aim(settings, w);
 }
 
 LightVertices trace_light_vertices(const World& w, std::uint64_t set) {
@@ -291,8 +286,6 @@ LightVertices trace_light_vertices(const World& w, std::uint64_t set) {
 }
 
 namespace {
-
-constexpr int kLongestPilot = 64;  // paths in a white and dense medium have thousands of segments
 
 // Sets up what needs the mean radiance of the image, in scenes with grids.
 void learn_roulette(const IntegratorSettings& settings, World& w) {

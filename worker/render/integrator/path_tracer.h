@@ -83,14 +83,13 @@ struct Connections {
     // True if a ray towards the sun met other media than a ray from the sun would. The scene then declares
     // different media on the two sides of a boundary, or the medium outside is not a vacuum.
     bool media_differ = false;
-    // The light of the sky that vertices found
+    bool keeps_sky = false;  // true if the light of the sky that vertices found is kept in `sky`
     std::vector<Portals::Found> sky;
-    // How often the sky was looked for by next-event estimation and how often it was seen so, how many
-    // directions were sampled by BSDFs and phase functions and how many of them led to the sky
-    double looked = 0, seen = 0, scatterings = 0, left = 0;
+    double scatterings = 0;  // number of vertices
+    double left = 0;         // number of those that the path left towards the sky
 
     void found_sky(const V3& p, const V3& d, float found) {
-      if (found > 0 && std::isfinite(found)) sky.push_back({p, d, found});
+      if (keeps_sky && found > 0 && std::isfinite(found)) sky.push_back({p, d, found});
     }
   };
   Learner* learner = nullptr;
@@ -259,18 +258,16 @@ class PathTracer {
     return densities_.sum(densities_.needs_back() ? back() : 0);
   }
 
-  // Adds light that next-event estimation found at the current vertex p. ng is the geometric normal there, or
-  // 0 in a medium. back() returns the density with which a path from the light would be scattered back along
-  // this path.
+  // Adds light that next-event estimation found at the current vertex p, in the direction `to_light`. ng is
+  // the geometric normal at p, or 0 in a medium. back() returns the density with which a path from the light
+  // would be scattered back along this path.
   template <class Back>
   void add_found([[maybe_unused]] const LightChoice& choice, [[maybe_unused]] const V3& p,
                  [[maybe_unused]] const V3& ng, [[maybe_unused]] const V3& to_light, C3 light,
                  [[maybe_unused]] const Back& back) {
     if constexpr (F.connected) {
-      if (connections_.learner && world_.lights.is_sky(choice)) {
-        ++connections_.learner->seen;
+      if (connections_.learner && world_.lights.is_sky(choice))
         connections_.learner->found_sky(p, to_light, mean(light));
-      }
       if (choice.light == world_.sun.light && densities_.last > 0) {
         if (connections_.vertices)
           light /= 1 + first_density(world_.sun_map.density(p), ng) * densities_sum(back);
@@ -284,12 +281,6 @@ class PathTracer {
     add(light);
   }
 
-  // While learning: counts next-event estimation that looks for the sky.
-  void look_at_sky([[maybe_unused]] const LightChoice& choice) {
-    if constexpr (F.connected) {
-      if (connections_.learner && world_.lights.is_sky(choice)) ++connections_.learner->looked;
-    }
-  }
   // Adds light to the sample, already multiplied by the throughput. If `ahead`, it was scattered once more
   // than the path so far, in the medium on the path's next segment.
   void add(const C3& weighted, bool ahead = false) {
@@ -511,7 +502,6 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   if (!world_.lights.can_sample() || !surface.smooth) return;
   const Group g = stream_.group(depth_, Purpose::light);
   const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, hit.p, hit.shading.n);
-  look_at_sky(choice);
   const auto light = world_.lights.sample(choice, hit.p);
   if (!light) return;
   const V3 wi = hit.shading.to_local(light->direction);
@@ -716,7 +706,7 @@ void PathTracer<F, Light>::add_environment() {
   const float pdf = last_.pdf / last_.in_medium.found_as_light();
   C3 light = world_.lights.environment(last_.p, ray_.d, last_.delta ? kInfinity : pdf);
   if constexpr (F.connected) {
-    if (connections_.learner && !last_.delta) {
+    if (connections_.learner && !last_.delta && !is_black(light)) {
       ++connections_.learner->left;
       connections_.learner->found_sky(last_.p, ray_.d, mean(beta_ * light));
     }

@@ -11,6 +11,7 @@
 #include "worker/render/integrator/variant.h"
 #include "worker/render/math/processor.h"
 #include "worker/render/render.h"
+#include "worker/render/world/pilot.h"
 
 namespace ls::render {
 namespace {
@@ -30,11 +31,6 @@ constexpr std::uint64_t kFewestPilotGroups = 4;
 constexpr std::uint64_t kPixelsPerGroup = 1024;
 constexpr std::uint64_t kPilotSamples = 32;
 constexpr int kPilotDepth = 32;  // paths in a white and dense medium have thousands of segments
-// A smaller frame is not worth the pilot.
-constexpr std::uint64_t kPilotFrame = 256;  // pixels
-// A scene with more shapes that light passes gets no pilot, since a single path may take as long as the image
-// of another scene.
-constexpr std::ptrdiff_t kPilotBoundaries = 64;
 // Sharing pays if the noise (squared relative error) without it is more than this many times the noise with
 // it. A shared sample takes 1.4 to 2.4 times as long (docs/decisions/0036-path-reuse.md). The limit is low
 // because the few pixels of the pilot rarely show the rare bright paths that sharing helps most.
@@ -42,21 +38,12 @@ constexpr double kGainThatPays = 1.5;
 // If the gain after some of the groups is this many times kGainThatPays, the other groups are not rendered.
 constexpr double kBeyondDoubt = 4;
 
-// Sets the pilot's settings in the world; the destructor restores the world's own.
 class Pilot {
  public:
-  explicit Pilot(World& w) : w_(w), seed_(w.seed), max_depth_(w.max_depth) {
-    w.seed = kPilotSeed;
-    w.max_depth = w.depth_allows(kPilotDepth) ? kPilotDepth : w.max_depth;
-    w.reuse = kSharing;
-  }
+  explicit Pilot(World& w) : w_(w), settings_(w, kPilotSeed, kPilotDepth) { w.reuse = kSharing; }
   Pilot(const Pilot&) = delete;
   Pilot& operator=(const Pilot&) = delete;
-  ~Pilot() {
-    w_.seed = seed_;
-    w_.max_depth = max_depth_;
-    w_.reuse = 0;
-  }
+  ~Pilot() { w_.reuse = 0; }
 
   // Sums of squared relative errors; not `usable` if a sample was rejected.
   struct Noise {
@@ -105,15 +92,12 @@ class Pilot {
   using Halves = std::array<V3d, 2>;  // sums of samples
 
   World& w_;
-  const std::uint64_t seed_;
-  const int max_depth_;
+  const PilotSettings settings_;
 };
 
 bool sharing_pays(World& w, const Variant& sharing, int threads) {
+  if (!pilot_pays(w)) return false;
   const auto pixels = static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
-  if (pixels < kPilotFrame) return false;
-  const auto is_boundary = [](const SurfaceInfo& s) { return s.null || s.null_transmission; };
-  if (std::ranges::count_if(w.geometry.surfaces, is_boundary) > kPilotBoundaries) return false;
   const std::uint64_t groups = std::clamp(pixels / kPixelsPerGroup, kFewestPilotGroups, kPilotGroups);
   const Pilot pilot(w);
   Pilot::Noise all;

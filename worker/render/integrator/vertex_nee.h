@@ -106,7 +106,6 @@ class VertexNee {
     if (!lights.can_sample()) return;
     const Group g = path.stream_.group(path.depth_, Purpose::light);
     const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]}, p, V3(0));
-    path.look_at_sky(choice);
     const auto light = lights.sample(choice, p);
     if (!light) return;
     const float phase = medium.phase.value(d, light->direction);

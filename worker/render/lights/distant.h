@@ -58,7 +58,8 @@ struct SunLight : LightKind {
 };
 
 // The sky as next-event estimation samples it: an environment map, by its brightness, and with portals also
-// the directions that lead through them. With portals the constant environment is part of it.
+// the directions that lead through those in front of a point. With portals the constant environment is part
+// of it.
 struct SkyLight : LightKind {
   // With portals, the share of directions that is sampled by the map's brightness alone, so that every
   // direction in which it shines has a density; and the number of words that choose this.
@@ -84,14 +85,17 @@ struct SkyLight : LightKind {
     const EnvironmentMap::Light light = from(x, *direction);
     const float pdf = light.pdf * p;
     if (!(pdf > 0) || !std::isfinite(pdf)) return std::nullopt;
+    if (portals && is_black(light.radiance)) return std::nullopt;
     return LightSample{*direction, kInfinity, V3(0), light.radiance, pdf, false};
   }
+  C3 radiance(const V3& d) const { return map ? map->at(d).radiance + constant : constant; }
   // The light that arrives at x from the direction d, and the density of sample() for it
   EnvironmentMap::Light from(const V3& x, const V3& d) const {
     EnvironmentMap::Light light = map ? map->at(d) : EnvironmentMap::Light{C3(0), 0};
-    if (portals) {
+    if (!portals) return light;
+    light.radiance += constant;
+    if (portals->any_in_front_of(x)) {
       const float share = map ? kByBrightness : 0.f;
-      light.radiance += constant;
       light.pdf = share * light.pdf + (1 - share) * portals->pdf(x, d);
     }
     return light;
@@ -99,7 +103,7 @@ struct SkyLight : LightKind {
 
  private:
   std::optional<V3> direction_at(const V3& x, const LightNumbers& numbers) const {
-    if (!portals) return map->sample(numbers.x, numbers.y);
+    if (map && !(portals && portals->any_in_front_of(x))) return map->sample(numbers.x, numbers.y);
     if (!map) return portals->sample(x, numbers.x, numbers.y);
     // The position of the word among those that make the same choice is used again
     if (numbers.x < kBrightnessWords)

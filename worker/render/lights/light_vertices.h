@@ -127,7 +127,7 @@ class LightVertices {
  public:
   static constexpr std::size_t kCandidates = 32;
 
-  // The appearance of a light vertex from outside_share, by which choose() estimates its contribution. Up to
+  // The appearance of a light vertex from other points, by which choose() estimates its contribution. Up to
   // a common factor the radiance that leaves the vertex, times its cosine to the normal (1 in media), is
   //   even * cosine + lobe * 4 pi * (the Henyey-Greenstein phase function with parameter g),
   // the latter for the angle between the direction in which light leaves and -axis. The lobe of a glossy

@@ -6,6 +6,7 @@
 // projectors light only a part of a segment, to which the samples are limited.
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -39,7 +40,7 @@ class Lights {
   bool can_sample() const { return !lights_.empty(); }
   bool any_with_place() const { return any_with_place_; }
   std::vector<V3> points() const;  // positions of all lights without extent, the most powerful first
-  // True if next-event estimation samples lights without a position: distant lights, suns, environment maps.
+  // True if next-event estimation samples lights without a position: distant lights, suns, the sky.
   bool any_without_place() const;
   // The strongest light with a single direction: its irradiance on a plane that faces it, and its direction
   // of travel. `light` is kNone if there is no such light.
@@ -78,6 +79,7 @@ class Lights {
   C3 environment(const V3& x, const V3& direction, float pdf) const {
     const C3 beside = suns_.empty() ? environment_ : environment_ + suns(direction, pdf);
     if (!sky_.sampled()) return beside;
+    if (!std::isfinite(pdf)) return beside + sky_.radiance(direction);
     const EnvironmentMap::Light light = sky_.from(x, direction);
     const float as_light = light.pdf * sky_probability_;
     return beside + (as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance);
@@ -92,7 +94,7 @@ class Lights {
   };
   EnvironmentParts environment_parts(const V3& x, const V3& direction) const;
   // True if next-event estimation samples a direction by at most one light that paths can also hit when they
-  // leave the scene: a sun with an extent, or a map.
+  // leave the scene: a sun with an extent, or the sky.
   bool single_environment_sample() const { return suns_.size() + (sky_.sampled() ? 1 : 0) <= 1; }
   // Sets the radiance of the constant environment, and returns what it was. A scene without one has black.
   C3 exchange_constant_environment(const C3& radiance) { return std::exchange(environment_, radiance); }

@@ -15,26 +15,52 @@ constexpr double kLeastLight = .02;
 // A plane must have more than this share of its face's light pass through it. Light that was found between
 // the plane and the face does not.
 constexpr double kLeastThrough = .9;
-// The planes that are tried for a face, from the face to the middle of the box
-constexpr int kPlanes = 32;
+// The share of the rays' origins that lie beyond each face of the box
+constexpr double kOutliers = .01;
+// The planes that are tried for a face: from kBeyond of the box's side outside of it to the middle of the box
+constexpr int kPlanes = 40;
+constexpr float kBeyond = .1f;
 // A plane is divided into kCells x kCells cells to tell how close together the rays are on it. They cover
 // twice the face's width and height; rays farther out count for the outermost cells.
 constexpr int kCells = 128;
-constexpr std::size_t kSide = 16;      // cells across and down a portal's rectangle
-constexpr float kLeastMargin = 1e-4f;  // margin of a portal's rectangle, as a share of the box's size
+constexpr std::size_t kSide = 16;  // cells across and down a portal's rectangle
+// The margin of a portal's rectangle, as shares of the box's size and of its largest coordinate: the latter
+// is above the rounding of places
+constexpr float kLeastMargin = 1e-4f;
+constexpr float kRounding = 1e-5f;
+constexpr float kBelowOne = 0x1.fffffep-1f;
 
 }  // namespace
 
+// The box in which most of the rays begin: the few origins outside of it, such as those on the ground outside
+// of a room, would make it so large that planes are far apart.
 struct Portals::Box {
-  V3 low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
+  V3 low{0, 0, 0}, high{0, 0, 0};
 
   explicit Box(std::span<const Found> found) {
-    for (const Found& f : found) {
-      for (int k = 0; k < 3; ++k) {
-        low[k] = std::min(low[k], f.p[k]);
-        high[k] = std::max(high[k], f.p[k]);
-      }
+    const auto last = static_cast<std::ptrdiff_t>(found.size()) - 1;
+    const auto outliers = static_cast<std::ptrdiff_t>(kOutliers * static_cast<double>(found.size()));
+    std::vector<float> values(found.size());
+    for (int k = 0; k < 3 && last >= 0; ++k) {
+      for (std::size_t i = 0; i < found.size(); ++i) values[i] = found[i].p[k];
+      const auto value_at = [&](std::ptrdiff_t n) {
+        std::nth_element(values.begin(), values.begin() + n, values.end());
+        return values[static_cast<std::size_t>(n)];
+      };
+      low[k] = value_at(outliers);
+      high[k] = value_at(last - outliers);
     }
+  }
+  bool contains(const V3& p) const {
+    for (int k = 0; k < 3; ++k)
+      if (!(p[k] >= low[k] && p[k] <= high[k])) return false;
+    return true;
+  }
+  // The largest coordinate: it bounds rounding
+  float reach() const {
+    float r = 0;
+    for (int k = 0; k < 3; ++k) r = std::max({r, std::abs(low[k]), std::abs(high[k])});
+    return r;
   }
   float side(int axis) const { return high[axis] - low[axis]; }
   // The face through which a ray from inside leaves: 2 axis + (1 if it is the one where p[axis] is larger)
@@ -53,9 +79,9 @@ struct Portals::Box {
 };
 
 std::optional<float> Portals::Plane::distance(const V3& p, const V3& d) const {
+  if (!in_front_of(p) || !(d[axis] * side > 0)) return std::nullopt;
   const float t = (offset - p[axis]) / d[axis];
-  if (!(d[axis] * side > 0) || !(t > 0) || !std::isfinite(t)) return std::nullopt;
-  return t;
+  return std::isfinite(t) && t > 0 ? std::optional(t) : std::nullopt;
 }
 
 // Rays are close together on a plane if the entropy of their light over its cells is small: e to the entropy
@@ -75,7 +101,8 @@ std::optional<Portals::Plane> Portals::best_plane(const Box& box, int face, std:
   double smallest = std::numeric_limits<double>::infinity();
   std::vector<double> cells;
   for (int i = 0; i < kPlanes; ++i) {
-    const float inwards = box.side(plane.axis) * (.5f * static_cast<float>(i) / kPlanes);
+    const float inwards =
+        box.side(plane.axis) * ((.5f + kBeyond) * static_cast<float>(i) / kPlanes - kBeyond);
     plane.offset = plane.side > 0 ? box.high[plane.axis] - inwards : box.low[plane.axis] + inwards;
     cells.assign(std::size_t{kCells} * kCells, 0.);
     double through = 0;
@@ -104,15 +131,16 @@ Portals::Portals(std::span<const Found> found) {
   std::array<double, 6> light{};
   double all = 0;
   for (const Found& f : found) {
+    if (!box.contains(f.p)) continue;
     const auto face = static_cast<std::size_t>(box.face_of(f));
     by_face[face].push_back(f);
     light[face] += double{f.light};
     all += double{f.light};
   }
-  const float margin = kLeastMargin * std::max({box.side(0), box.side(1), box.side(2)});
-  double sum = 0;
+  const float size = std::max({box.side(0), box.side(1), box.side(2)});
+  const float margin = kLeastMargin * size + kRounding * box.reach();
   for (std::size_t face = 0; face < by_face.size(); ++face) {
-    if (!(light[face] > kLeastLight * all) || !(margin > 0)) continue;
+    if (!(light[face] > kLeastLight * all) || !(size > 0)) continue;
     const auto plane = best_plane(box, static_cast<int>(face), by_face[face]);
     if (!plane) continue;
     Portal portal;
@@ -122,36 +150,42 @@ Portals::Portals(std::span<const Found> found) {
       if (const auto t = plane->distance(f.p, f.d))
         portal.places.learn(plane->on_plane(f.p + f.d * *t), std::sqrt(f.light));
     portal.places.finish(margin, 0);
-    portal.probability = static_cast<float>(light[face]);
-    sum += light[face];
+    portal.weight = static_cast<float>(light[face] / all);
     portals_.push_back(std::move(portal));
-  }
-  double up_to = 0;
-  std::uint64_t words = 0;
-  for (Portal& p : portals_) {
-    p.first = static_cast<std::uint32_t>(words);
-    up_to += double{p.probability};
-    const auto end = &p == &portals_.back() ? std::uint64_t{1} << 32
-                                            : static_cast<std::uint64_t>(std::ldexp(up_to / sum, 32));
-    p.probability = static_cast<float>(std::ldexp(static_cast<double>(end - words), -32));
-    words = end;
   }
 }
 
+float Portals::in_front_of(const V3& p) const {
+  float sum = 0;
+  for (const Portal& portal : portals_)
+    if (portal.plane.in_front_of(p)) sum += portal.weight;
+  return sum;
+}
+
 std::optional<V3> Portals::sample(const V3& p, std::uint32_t x, std::uint32_t y) const {
-  std::size_t i = portals_.size() - 1;
-  while (portals_[i].first > x) --i;
-  const Portal& portal = portals_[i];
-  const std::uint64_t end = i + 1 < portals_.size() ? portals_[i + 1].first : std::uint64_t{1} << 32;
-  const std::uint64_t word = (std::uint64_t{x - portal.first} << 32) / (end - portal.first);
-  const auto at = portal.places.sample(static_cast<std::uint32_t>(word), unit_float(y));
-  if (!at) return std::nullopt;
+  // The position of x among the words that choose a portal is used again to choose a place on it
+  const double sum = double{in_front_of(p)}, at = std::ldexp((double{x} + .5) * sum, -32);
+  const Portal* chosen = nullptr;
+  double before = 0;
+  for (const Portal& portal : portals_) {
+    if (!portal.plane.in_front_of(p)) continue;
+    if (chosen) {
+      if (at < before + double{chosen->weight}) break;
+      before += double{chosen->weight};
+    }
+    chosen = &portal;
+  }
+  if (!chosen) return std::nullopt;
+  const double left = (at - before) / double{chosen->weight};
+  const auto word = static_cast<std::uint32_t>(std::ldexp(std::clamp(left, 0., double{kBelowOne}), 32));
+  const auto place = chosen->places.sample(word, unit_float(y));
+  if (!place) return std::nullopt;
   V3 to = -p;
-  to[portal.plane.axis] += portal.plane.offset;
-  to[(portal.plane.axis + 1) % 3] += at->x;
-  to[(portal.plane.axis + 2) % 3] += at->y;
+  to[chosen->plane.axis] += chosen->plane.offset;
+  to[(chosen->plane.axis + 1) % 3] += place->x;
+  to[(chosen->plane.axis + 2) % 3] += place->y;
   const V3 d = normalize(to);
-  if (!portal.plane.distance(p, d)) return std::nullopt;
+  if (!chosen->plane.distance(p, d)) return std::nullopt;
   return d;
 }
 
@@ -161,9 +195,9 @@ float Portals::pdf(const V3& p, const V3& d) const {
     const auto t = portal.plane.distance(p, d);
     if (!t) continue;
     const float density = portal.places.density(portal.plane.on_plane(p + d * *t));
-    sum += portal.probability * density * *t * *t / std::abs(d[portal.plane.axis]);
+    sum += portal.weight * density * *t * *t / std::abs(d[portal.plane.axis]);
   }
-  return sum;
+  return sum > 0 ? sum / in_front_of(p) : 0;
 }
 
 std::uint64_t Portals::bytes() const {

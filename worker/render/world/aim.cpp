@@ -28,11 +28,13 @@ int points_for(const IntegratorSettings& settings, const World& w) {
 }  // namespace
 
 void aim(const IntegratorSettings& settings, World& w) {
+  w.lamps = {};
+  w.lamp_flights = w.need.aimed = false;
+  w.camera_points = 0;
   if (w.distant_mis || !w.need.media || !w.lights.can_sample() || !w.depth_allows(1)) return;
   const bool in_medium = std::any_of(w.media.begin(), w.media.end(), [](const Medium& m) {
     return m.equiangular_mode != EquiangularMode::none;
   });
-  w.lamps = {};
   if (in_medium && !settings.phase_only)
     for (const V3& p : w.lights.points())
       if (w.lamps.count < kMaxLamps) w.lamps.position[w.lamps.count++] = p;

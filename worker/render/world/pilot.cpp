@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <utility>
 
+#include "common/image/error/relative_weights.h"
+#include "worker/render/base/in_order.h"
 #include "worker/render/math/processor.h"
 #include "worker/render/math/random.h"
 #include "worker/render/render.h"
@@ -17,27 +19,96 @@ constexpr std::uint64_t kPilotSeed = 0x5eed0f5ad0;
 constexpr std::uint64_t kPilotPaths = 1 << 10;
 constexpr std::uint64_t kPixelsPerPath = 16;
 constexpr std::uint64_t kFewestPaths = 16;
+// Pixels that tell the noise, and samples of each
+constexpr std::uint64_t kNoisePixels = 128;
+constexpr std::uint64_t kNoiseSamples = 16;
+// pilot_pays(): the smallest frame, in pixels, and the largest number of shapes that light passes
+constexpr std::uint64_t kPilotFrame = 256;
+constexpr std::ptrdiff_t kPilotBoundaries = 64;
+
+std::uint64_t pixels_of(const World& w) {
+  return static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
+}
+
+// A pixel of the full frame, in the coordinates of the image
+std::pair<int, int> somewhere(const World& w, RandomStream& places) {
+  const auto among = [&](int n) { return static_cast<int>(places.next() % static_cast<std::uint64_t>(n)); };
+  const int x = among(w.frame.width) - w.origin_x;
+  return {x, among(w.frame.height) - w.origin_y};
+}
 
 }  // namespace
 
+PilotSettings::PilotSettings(World& w, std::uint64_t seed, int max_depth)
+    : w_(w), seed_(w.seed), max_depth_(w.max_depth) {
+  w.seed = seed;
+  if (w.depth_allows(max_depth)) w.max_depth = max_depth;
+}
+PilotSettings::~PilotSettings() {
+  w_.seed = seed_;
+  w_.max_depth = max_depth_;
+}
+
+bool pilot_pays(const World& w) {
+  const auto is_boundary = [](const SurfaceInfo& s) { return s.null || s.null_transmission; };
+  return pixels_of(w) >= kPilotFrame &&
+         std::ranges::count_if(w.geometry.surfaces, is_boundary) <= kPilotBoundaries;
+}
+
 std::optional<double> pilot_radiance(World& w, int max_depth) {
-  const auto pixels = static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
-  const std::uint64_t paths = std::min(kPilotPaths, pixels / kPixelsPerPath);
+  const std::uint64_t paths = std::min(kPilotPaths, pixels_of(w) / kPixelsPerPath);
   if (paths < kFewestPaths) return std::nullopt;
   const FlushDenormals mode;
-  const std::uint64_t seed = std::exchange(w.seed, kPilotSeed);
-  const int own_depth = std::exchange(w.max_depth, w.depth_allows(max_depth) ? max_depth : w.max_depth);
+  const PilotSettings settings(w, kPilotSeed, max_depth);
   RandomStream places(kPilotSeed);
-  const auto among = [&](int n) { return static_cast<int>(places.next() % static_cast<std::uint64_t>(n)); };
   double sum = 0;
   for (std::uint64_t i = 0; i < paths; ++i) {
-    const int x = among(w.frame.width) - w.origin_x, y = among(w.frame.height) - w.origin_y;
+    const auto [x, y] = somewhere(w, places);
     const SampleValue v = render_sample(w, x, y, i);
     if (v.finite) sum += (double{v.rgb[0]} + double{v.rgb[1]} + double{v.rgb[2]}) / 3;
   }
-  w.seed = seed;
-  w.max_depth = own_depth;
   return sum / static_cast<double>(paths);
+}
+
+std::vector<PilotPixel> pilot_pixels(World& w, int max_depth, int threads) {
+  const PilotSettings settings(w, kPilotSeed, max_depth);
+  const auto pixel = [&w](std::size_t i) -> std::optional<PilotPixel> {
+    const FlushDenormals mode;
+    RandomStream places(combine(kPilotSeed, i));
+    const auto [x, y] = somewhere(w, places);
+    V3d sum(0), squares(0);
+    for (std::uint64_t n = 0; n < kNoiseSamples; ++n) {
+      const SampleValue v = render_sample(w, x, y, n);
+      if (!v.finite) return std::nullopt;
+      const V3d value(v.rgb[0], v.rgb[1], v.rgb[2]);
+      sum += value;
+      squares += value * value;
+    }
+    constexpr double k = kNoiseSamples;
+    const V3d mean = sum / k;
+    return PilotPixel{mean, (squares / k - mean * mean) * (k / (k - 1))};
+  };
+  std::vector<PilotPixel> all;
+  in_order(threads, kNoisePixels, pixel, [&](const std::optional<PilotPixel>& one) {
+    if (one)
+      all.push_back(*one);
+    else
+      all.clear();
+    return one.has_value();
+  });
+  return all;
+}
+
+bool is_noisier(const std::vector<PilotPixel>& a, const std::vector<PilotPixel>& b, double factor) {
+  if (a.empty() || b.empty()) return false;
+  double sum_a = 0, sum_b = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    for (int c = 0; c < 3; ++c) {
+      const double mean = (a[i].mean[c] + b[i].mean[c]) / 2, weight = 1 / (mean * mean + kRelMseDenominator);
+      sum_a += a[i].variance[c] * weight;
+      sum_b += b[i].variance[c] * weight;
+    }
+  return sum_a > factor * sum_b;
 }
 
 }  // namespace ls::render

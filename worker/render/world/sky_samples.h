@@ -1,4 +1,5 @@
-// A sky of one radiance is not sampled as a light: directions that BSDFs sample find it. Where much of the
+// Without portals (lights/portals.h) a sky of one radiance is not sampled as a light: directions that BSDFs
+// sample find it. Where much of the
 // direct light comes from such a sky, its visibility from the first vertex is most of the noise. There a
 // second direction is sampled at the first vertex, which only looks for the sky. The two random numbers that
 // place it in its lobe are 1 less those of the path's own direction, since a horizon that hides one direction

@@ -43,6 +43,11 @@ struct Window {
     return all;
   }
 };
+// The share of the samples that must lead through the window: 16 times its share of the wall. It cannot be 1:
+// a fifth of the samples is uniform over the portal's rectangle, which has a margin, and on a plane that is
+// not quite that of the window, rays at grazing angles are spread.
+constexpr double kUseful = .5;
+
 V3 at_plane(const Window& w, const V3& p, const V3& d) {
   return p + d * ((w.offset - p[w.axis]) / d[w.axis]);
 }
@@ -59,9 +64,7 @@ TEST(Portals, AreFoundInThePlaneOfTheWindow) {
       const auto d = portals.sample(p, random.bits(), random.bits());
       if (d && window.holds(at_plane(window, p, *d))) ++through;
     }
-    // The share of the samples that is uniform over the rectangle, 0.2, has a margin of a cell on each side
-    // of the window and may hence miss it; cells at the edges may, too. The window fills 1 / 64 of the wall.
-    EXPECT_GT(through, .6 * kSamples) << window.axis << ' ' << window.offset;
+    EXPECT_GT(through, kUseful * kSamples) << window.axis << ' ' << window.offset;
   }
 }
 
@@ -75,9 +78,9 @@ std::vector<Found> through(std::initializer_list<Window> windows) {
   return all;
 }
 
-// The mean of a direction's function over its density is the function's integral if, and only if, the density
-// is that of the samples. A function that is 0 but for directions of positive density makes the integral
-// finite: the density itself, within directions of which the others' share is known. Five standard errors.
+// The means of functions of sampled directions are the integrals of these functions times the density, which
+// are estimated by uniform directions; the integral of the density is the share of samples that have a
+// direction. Five standard errors each.
 TEST(Portals, HaveTheDensityThatTheySay) {
   const std::vector<Found> found = through({Window{0, .8f}, Window{1, -.7f}, Window{2, .9f}});
   const Portals portals(found);
@@ -85,18 +88,22 @@ TEST(Portals, HaveTheDensityThatTheySay) {
     constexpr int kSamples = 1 << 18;
     RandomStream random(7);
     double sampled = 0;  // samples that have a direction
+    int rounded = 0;     // samples of density 0
     std::array<double, 2> by_samples{}, by_sphere{}, squares{}, sphere_squares{};
     const auto values = [](const V3& d) { return std::array<double, 2>{std::max(0.f, d.x), d.y * d.z}; };
     for (int i = 0; i < kSamples; ++i) {
       const auto d = portals.sample(p, random.bits(), random.bits());
+      if (d && !(portals.pdf(p, *d) > 0)) ++rounded;
       for (std::size_t k = 0; d && k < 2; ++k) {
-        ASSERT_GT(portals.pdf(p, *d), 0);
         const double v = values(*d)[k];
         by_samples[k] += v / kSamples;
         squares[k] += v * v / kSamples;
       }
       sampled += d ? 1. / kSamples : 0;
     }
+    // A sample at the edge of a rectangle may be rounded to a place beside it, where no light was learned:
+    // the places of points in a room have errors of 1e-6 of its rectangles.
+    EXPECT_LE(rounded, 1e-4 * kSamples);
     double integral = 0, integral_squares = 0;
     for (int i = 0; i < kSamples; ++i) {
       const float z = 1 - 2 * random.uniform(), r = safe_sqrt(1 - z * z);
@@ -128,10 +135,30 @@ TEST(Portals, AreNotInFrontOfPointsBehindThem) {
     EXPECT_FALSE(portals.sample({5, .1f, .5f}, random.bits(), random.bits()));
     EXPECT_TRUE(portals.sample({-5, .1f, .5f}, random.bits(), random.bits()));
   }
+  EXPECT_FALSE(portals.any_in_front_of({5, .1f, .5f}));
+  EXPECT_TRUE(portals.any_in_front_of({-5, .1f, .5f}));
   EXPECT_EQ(portals.pdf({5, .1f, .5f}, {-1, 0, 0}), 0);
   EXPECT_EQ(portals.pdf({5, .1f, .5f}, {1, 0, 0}), 0);
   EXPECT_GT(portals.pdf({-5, .1f, .5f}, {1, 0, 0}), 0);
   EXPECT_EQ(portals.pdf({0, 0, 0}, {0, 1, 0}), 0) << "along the plane";
+}
+
+// Rays from the ground far outside of the room do not hide the window.
+TEST(Portals, AreFoundDespiteRaysFromFarOutside) {
+  constexpr int kSamples = 2000;
+  RandomStream random(4);
+  const Window window;
+  std::vector<Found> found = window.rays(4000, random);
+  for (int i = 0; i < 30; ++i) found.push_back({{1e3f * static_cast<float>(i), -1, 7e3f}, {0, 1, 0}, 1});
+  const Portals portals(found);
+  ASSERT_TRUE(portals.any());
+  const V3 p(.1f, -.3f, .2f);
+  int through = 0;
+  for (int i = 0; i < kSamples; ++i) {
+    const auto d = portals.sample(p, random.bits(), random.bits());
+    if (d && window.holds(at_plane(window, p, *d))) ++through;
+  }
+  EXPECT_GT(through, kUseful * kSamples);
 }
 
 TEST(Portals, BearOddInput) {

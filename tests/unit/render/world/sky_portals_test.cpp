@@ -13,6 +13,7 @@ namespace ls::render {
 namespace {
 
 using test::SceneBuilder;
+using test::SkyImage;
 using test::SkyRoom;
 
 bool has_portals(const SceneBuilder& b) { return test::world_of(b)->lights.portals() != nullptr; }
@@ -26,10 +27,46 @@ bool has_portals_with(Change change, SkyRoom room = {}) {
 TEST(SkyPortals, AreUsedWhereTheSkyIsRarelySeen) {
   for (const bool image : {false, true})
     for (const double fog : {0., .3}) EXPECT_TRUE(has_portals(SkyRoom{.image = image, .fog = fog}.builder()));
+  EXPECT_TRUE(has_portals_with([](Scene& s) { s.integrator.camera_points = 0; }, {.fog = .1}))
+      << "light is found at points of camera segments, too";
   EXPECT_FALSE(has_portals(test::sky_yard({32, 16}))) << "half of the sky is seen from everywhere";
-  EXPECT_FALSE(has_portals_with([](Scene& s) {
-    s.emitters.push_back(PointEmitter{{0, .5, 0}, {30, 30, 30}});
-  })) << "a lamp brings nearly all light";
+}
+
+// Scenes whose paths find portals, but where these do not pay: each is rendered as if it had none.
+TEST(SkyPortals, LeaveNoTraceWhereTheyDoNotPay) {
+  const auto with = [](auto&& change, SkyRoom room) {
+    SceneBuilder b = room.builder();
+    change(b);
+    return b;
+  };
+  const auto lamps = [](SceneBuilder& b) {  // enough for a tree of lights
+    for (int i = 0; i < 40; ++i)
+      b.scene.emitters.push_back(PointEmitter{{-.9 + .04 * i, .8, -.5}, {2, 2, 2}});
+  };
+  const auto wide_sun = [](SceneBuilder& b) {
+    b.scene.emitters.push_back(DirectionalEmitter{{-1, -1, -.1}, {2, 2, 2}, 5});
+  };
+  // A sky that is nearly all sun, which shines through the slit
+  const auto sunny = [](SceneBuilder& b) {
+    b.scene.emitters.clear();
+    SkyImage sky(512, 257, .01f);
+    sky.set(127, 64, {9e4, 9e4, 9e4});
+    test::add_sky(b, sky);
+  };
+  const SceneBuilder rooms[] = {with(lamps, {.image = false}), with(lamps, {}),
+                                with(wide_sun, {.image = false}), with(sunny, {})};
+  for (const SceneBuilder& room : rooms) {
+    const auto number = &room - rooms;
+    SceneBuilder asked = room, off = room;
+    asked.scene.integrator.sky_portals = 1;
+    off.scene.integrator.sky_portals = -1;
+    EXPECT_TRUE(has_portals(asked)) << number;
+    EXPECT_FALSE(has_portals(room)) << number;
+    const auto sums = [](const SceneBuilder& b) {
+      return render_tile(*test::world_of(b, 3), {0, 0, 16, 16}, {0, 4}, nullptr, nullptr).sums;
+    };
+    EXPECT_EQ(sums(room), sums(off)) << number;
+  }
 }
 
 TEST(SkyPortals, AreLeftOutWhereTheyAreNotNeeded) {
@@ -39,17 +76,6 @@ TEST(SkyPortals, AreLeftOutWhereTheyAreNotNeeded) {
       << "light that is not scattered";
   EXPECT_FALSE(has_portals_with([](Scene& s) { s.integrator.name = "volpath_distant_mis"; }, {.fog = .3}));
   EXPECT_TRUE(has_portals_with([](Scene& s) { s.integrator.name = "path"; }));
-}
-
-// A constant sky that is sampled as a light is not looked for a second time by other techniques, and is the
-// same light as before where portals do not pay.
-TEST(SkyPortals, LeaveNoTraceWhereTheyDoNotPay) {
-  SceneBuilder yard = test::sky_yard({32, 16}), off = yard;
-  off.scene.integrator.sky_portals = -1;
-  const auto sums = [](const SceneBuilder& b) {
-    return render_tile(*test::world_of(b, 3), {0, 0, 32, 16}, {0, 4}, nullptr, nullptr).sums;
-  };
-  EXPECT_EQ(sums(yard), sums(off));
 }
 
 TEST(SkyPortals, AreTheSameForAnyNumberOfThreadsAndForEveryCrop) {
