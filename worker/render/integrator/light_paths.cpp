@@ -160,6 +160,7 @@ Learned learn(const World& w, std::uint64_t paths, int threads, const GoOn& go_o
                       : learn_with<kSurfaces, VertexNee>(w, paths, threads, go_on, keeps_sky);
 }
 
+// True if the path tracers that learn have the features of the world.
 bool can_learn(const World& w) {
   Features need = w.need;
   need.split = false;

@@ -79,7 +79,7 @@ class Lights {
   C3 environment(const V3& x, const V3& direction, float pdf) const {
     const C3 beside = suns_.empty() ? environment_ : environment_ + suns(direction, pdf);
     if (!sky_.sampled()) return beside;
-    if (!std::isfinite(pdf)) return beside + sky_.radiance(direction);
+    if (std::isinf(pdf)) return beside + sky_.radiance(direction);
     const EnvironmentMap::Light light = sky_.from(x, direction);
     const float as_light = light.pdf * sky_probability_;
     return beside + (as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance);

@@ -21,7 +21,7 @@ constexpr double kOutliers = .01;
 constexpr int kPlanes = 40;
 constexpr float kBeyond = .1f;
 // A plane is divided into kCells x kCells cells to tell how close together the rays are on it. They cover
-// twice the face's width and height; rays farther out count for the outermost cells.
+// twice the face's width and height; the places of rays farther out are not learned.
 constexpr int kCells = 128;
 constexpr std::size_t kSide = 16;  // cells across and down a portal's rectangle
 // The margin of a portal's rectangle, as shares of the box's size and of its largest coordinate: the latter
@@ -63,6 +63,20 @@ struct Portals::Box {
     return r;
   }
   float side(int axis) const { return high[axis] - low[axis]; }
+  // The place at which a ray crosses a plane: in the plane, and as shares of the sides of the rectangle of
+  // the cells, from 0 to less than 1. nullopt: it does not cross the plane in this rectangle.
+  struct Place {
+    V2 on_plane, of_box;
+  };
+  std::optional<Place> place_on(const Plane& plane, const Found& f) const {
+    const auto t = plane.distance(f.p, f.d);
+    if (!t) return std::nullopt;
+    const V2 at = plane.on_plane(f.p + f.d * *t), from = plane.on_plane(low),
+             size = plane.on_plane(high) - from;
+    const V2 share((at.x - from.x) / size.x / 2 + .25f, (at.y - from.y) / size.y / 2 + .25f);
+    if (!(share.x >= 0 && share.x < 1 && share.y >= 0 && share.y < 1)) return std::nullopt;
+    return Place{at, share};
+  }
   // The face through which a ray from inside leaves: 2 axis + (1 if it is the one where p[axis] is larger)
   int face_of(const Found& f) const {
     int face = 0;
@@ -79,7 +93,7 @@ struct Portals::Box {
 };
 
 std::optional<float> Portals::Plane::distance(const V3& p, const V3& d) const {
-  if (!in_front_of(p) || !(d[axis] * side > 0)) return std::nullopt;
+  if (!is_in_front_of(p) || !(d[axis] * side > 0)) return std::nullopt;
   const float t = (offset - p[axis]) / d[axis];
   return std::isfinite(t) && t > 0 ? std::optional(t) : std::nullopt;
 }
@@ -90,11 +104,6 @@ std::optional<Portals::Plane> Portals::best_plane(const Box& box, int face, std:
   Plane plane;
   plane.axis = face / 2;
   plane.side = face % 2 == 1 ? 1.f : -1.f;
-  const V2 low = plane.on_plane(box.low), size = plane.on_plane(box.high) - low;
-  const auto index = [](float x, float from, float length) {
-    const float at = length > 0 ? ((x - from) / length + .5f) / 2 : 0;
-    return static_cast<std::size_t>(std::clamp(at * kCells, 0.f, kCells - 1.f));
-  };
   double light = 0;
   for (const Found& f : rays) light += double{f.light};
   std::optional<Plane> best;
@@ -107,10 +116,10 @@ std::optional<Portals::Plane> Portals::best_plane(const Box& box, int face, std:
     cells.assign(std::size_t{kCells} * kCells, 0.);
     double through = 0;
     for (const Found& f : rays) {
-      const auto t = plane.distance(f.p, f.d);
-      if (!t) continue;
-      const V2 at = plane.on_plane(f.p + f.d * *t);
-      cells[index(at.x, low.x, size.x) * kCells + index(at.y, low.y, size.y)] += double{f.light};
+      const auto at = box.place_on(plane, f);
+      if (!at) continue;
+      const V2 cell = at->of_box * kCells;
+      cells[static_cast<std::size_t>(cell.x) * kCells + static_cast<std::size_t>(cell.y)] += double{f.light};
       through += double{f.light};
     }
     if (!(through > kLeastThrough * light)) continue;
@@ -147,28 +156,27 @@ Portals::Portals(std::span<const Found> found) {
     portal.plane = *plane;
     portal.places = LearnedRectangle(kSide);
     for (const Found& f : by_face[face])
-      if (const auto t = plane->distance(f.p, f.d))
-        portal.places.learn(plane->on_plane(f.p + f.d * *t), std::sqrt(f.light));
+      if (const auto at = box.place_on(*plane, f)) portal.places.learn(at->on_plane, std::sqrt(f.light));
     portal.places.finish(margin, 0);
     portal.weight = static_cast<float>(light[face] / all);
     portals_.push_back(std::move(portal));
   }
 }
 
-float Portals::in_front_of(const V3& p) const {
+float Portals::weight_in_front_of(const V3& p) const {
   float sum = 0;
   for (const Portal& portal : portals_)
-    if (portal.plane.in_front_of(p)) sum += portal.weight;
+    if (portal.plane.is_in_front_of(p)) sum += portal.weight;
   return sum;
 }
 
 std::optional<V3> Portals::sample(const V3& p, std::uint32_t x, std::uint32_t y) const {
   // The position of x among the words that choose a portal is used again to choose a place on it
-  const double sum = double{in_front_of(p)}, at = std::ldexp((double{x} + .5) * sum, -32);
+  const double sum = double{weight_in_front_of(p)}, at = std::ldexp((double{x} + .5) * sum, -32);
   const Portal* chosen = nullptr;
   double before = 0;
   for (const Portal& portal : portals_) {
-    if (!portal.plane.in_front_of(p)) continue;
+    if (!portal.plane.is_in_front_of(p)) continue;
     if (chosen) {
       if (at < before + double{chosen->weight}) break;
       before += double{chosen->weight};
@@ -197,7 +205,7 @@ float Portals::pdf(const V3& p, const V3& d) const {
     const float density = portal.places.density(portal.plane.on_plane(p + d * *t));
     sum += portal.weight * density * *t * *t / std::abs(d[portal.plane.axis]);
   }
-  return sum > 0 ? sum / in_front_of(p) : 0;
+  return sum > 0 ? sum / weight_in_front_of(p) : 0;
 }
 
 std::uint64_t Portals::bytes() const {

@@ -33,7 +33,7 @@ class Portals {
 
   bool any() const { return !portals_.empty(); }
   // True if there is a portal in front of p: only then are directions sampled there.
-  bool any_in_front_of(const V3& p) const { return in_front_of(p) > 0; }
+  bool any_in_front_of(const V3& p) const { return weight_in_front_of(p) > 0; }
   // Samples a direction at p by 64 uniform random bits. nullopt only if none is representable.
   std::optional<V3> sample(const V3& p, std::uint32_t x, std::uint32_t y) const;
   // The density of sample() at p for the direction d, per steradian
@@ -47,7 +47,7 @@ class Portals {
     float side = 1;  // 1: the sky is where p[axis] is larger; -1: where it is smaller
     float offset = 0;
 
-    bool in_front_of(const V3& p) const { return (offset - p[axis]) * side > 0; }
+    bool is_in_front_of(const V3& p) const { return (offset - p[axis]) * side > 0; }
     // The distance from p, which is in front of the plane, to it along d; nullopt: d leads away from it.
     std::optional<float> distance(const V3& p, const V3& d) const;
     V2 on_plane(const V3& p) const { return {p[(axis + 1) % 3], p[(axis + 2) % 3]}; }
@@ -58,7 +58,7 @@ class Portals {
     float weight = 0;  // a portal is chosen with this over the sum of the weights of those in front of p
   };
   struct Box;
-  float in_front_of(const V3& p) const;  // the sum of the weights of the portals in front of p
+  float weight_in_front_of(const V3& p) const;  // the sum over the portals in front of p
   static std::optional<Plane> best_plane(const Box& box, int face, std::span<const Found> rays);
 
   std::vector<Portal> portals_;
