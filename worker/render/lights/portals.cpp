@@ -93,7 +93,7 @@ struct Portals::Box {
 };
 
 std::optional<float> Portals::Plane::distance(const V3& p, const V3& d) const {
-  if (!is_in_front_of(p) || !(d[axis] * side > 0)) return std::nullopt;
+  if (!(d[axis] * side > 0)) return std::nullopt;
   const float t = (offset - p[axis]) / d[axis];
   return std::isfinite(t) && t > 0 ? std::optional(t) : std::nullopt;
 }

@@ -48,7 +48,7 @@ class Portals {
     float offset = 0;
 
     bool is_in_front_of(const V3& p) const { return (offset - p[axis]) * side > 0; }
-    // The distance from p, which is in front of the plane, to it along d; nullopt: d leads away from it.
+    // The distance from p along d to the plane; nullopt: p is behind it, or d leads away from it.
     std::optional<float> distance(const V3& p, const V3& d) const;
     V2 on_plane(const V3& p) const { return {p[(axis + 1) % 3], p[(axis + 2) % 3]}; }
   };
