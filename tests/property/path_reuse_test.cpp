@@ -153,18 +153,8 @@ TEST(PathReuse, GivesTheSameImageAsPathsAlone) {
     const SceneBuilder on = rival.scene(7), off = rival.scene(-1);
     ASSERT_THAT(estimate(on, 2).variant, testing::HasSubstr("shared")) << rival.name;
     ASSERT_THAT(estimate(off, 2).variant, testing::Not(testing::HasSubstr("shared")));
-    const Quarters a = quarters_of(on, rival.spp, kSeeds, 100),
-                   b = quarters_of(off, 2 * rival.spp, kSeeds, 900);
-    double least = 1;
-    for (std::size_t q = 0; q < kQuarters; ++q) {
-      const double error = std::sqrt(a.variance[q] + b.variance[q]);
-      // Student's test with the freedom of one of the two alone: that of both together is larger
-      EXPECT_LT(std::abs(a.mean[q] - b.mean[q]), cli::student_quantile(level, kSeeds - 1) * error)
-          << rival.name << ", quarter and channel " << q << ": " << a.mean[q] << " and " << b.mean[q];
-      least = std::min(least, error / b.mean[q]);
-    }
-    std::printf("%s: +- %.2g %%\n", rival.name, 100 * least);
-    EXPECT_LT(least, .015) << rival.name << ": the test has no power";
+    expect_same_quarters(rival.name, level, quarters_of(on, rival.spp, kSeeds, 100),
+                         quarters_of(off, 2 * rival.spp, kSeeds, 900), kSeeds);
   }
   tests.close();
 }

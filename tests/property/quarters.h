@@ -3,10 +3,16 @@
 // Pixels that share tell too little of the error of a mean; images of different seeds are independent.
 #pragma once
 
+#include <gtest/gtest.h>
+
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <cstdio>
 
 #include "tests/support/render_check.h"
+#include "tests/support/significance.h"
 
 namespace ls::test {
 
@@ -36,6 +42,21 @@ inline Quarters quarters_of(const SceneBuilder& builder, std::uint64_t spp, int 
   for (std::size_t q = 0; q < kQuarters; ++q)
     all.variance[q] = (squares[q] - all.mean[q] * all.mean[q]) / (seeds - 1);
   return all;
+}
+
+// Fails if the means of two ways to render the same image, each over `seeds` images, differ at this level.
+inline void expect_same_quarters(const char* name, double level, const Quarters& a, const Quarters& b,
+                                 int seeds) {
+  double least = 1;
+  for (std::size_t q = 0; q < kQuarters; ++q) {
+    const double error = std::sqrt(a.variance[q] + b.variance[q]);
+    // Student's test with the freedom of one of the two alone: that of both together is larger
+    EXPECT_LT(std::abs(a.mean[q] - b.mean[q]), cli::student_quantile(level, seeds - 1) * error)
+        << name << ", quarter and channel " << q << ": " << a.mean[q] << " and " << b.mean[q];
+    least = std::min(least, error / b.mean[q]);
+  }
+  std::printf("%s: +- %.2g %%\n", name, 100 * least);
+  EXPECT_LT(least, .015) << name << ": the test has no power";
 }
 
 }  // namespace ls::test

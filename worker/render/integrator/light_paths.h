@@ -1,6 +1,6 @@
-// What is learned from camera paths before the first sample: through which portals the light of the sky
-// enters (lights/portals.h), whether paths are connected to light vertices (lights/light_vertices.h), and
-// which part of the sun's light these need. It also traces the light vertices.
+// Camera paths that are traced before the first sample teach a world which portals the sky's light comes
+// through (lights/portals.h), whether to connect paths to light vertices (lights/light_vertices.h), and which
+// part of the sun's light the light vertices need. The light vertices are traced here, too.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,8 @@ namespace ls::render {
 // samples, a crop or the number of threads. The integrator must be `volpath` or `path`.
 void learn_connections(const IntegratorSettings& settings, int threads, World& w);
 
-// Sets the portals of a world's lights if they pay; the rest is as for learn_connections().
+// Sets the portals of a world's lights if they pay. The result depends on the same things as that of
+// learn_connections(), and the integrator must be one of the same.
 void learn_portals(const IntegratorSettings& settings, int threads, World& w);
 
 // Traces the light vertices of one set (LightVertexCache). They depend only on the world, its seed and the

@@ -52,19 +52,24 @@ V3 at_plane(const Window& w, const V3& p, const V3& d) {
   return p + d * ((w.offset - p[w.axis]) / d[w.axis]);
 }
 
-TEST(Portals, AreFoundInThePlaneOfTheWindow) {
+// The share of the samples of a point in the room that lead through the window
+double share_through(const Window& window, const Portals& portals, RandomStream& random) {
   constexpr int kSamples = 2000;
+  const V3 p(.1f, -.3f, .2f);
+  int through = 0;
+  for (int i = 0; i < kSamples; ++i) {
+    const auto d = portals.sample(p, random.bits(), random.bits());
+    if (d && window.holds(at_plane(window, p, *d))) ++through;
+  }
+  return static_cast<double>(through) / kSamples;
+}
+
+TEST(Portals, AreFoundInThePlaneOfTheWindow) {
   for (const Window& window : {Window{}, Window{0, -.8f}, Window{1, .7f}, Window{2, -.9f}}) {
     RandomStream random(3);
     const Portals portals(window.rays(4000, random));
     ASSERT_TRUE(portals.any());
-    const V3 p(.1f, -.3f, .2f);
-    int through = 0;
-    for (int i = 0; i < kSamples; ++i) {
-      const auto d = portals.sample(p, random.bits(), random.bits());
-      if (d && window.holds(at_plane(window, p, *d))) ++through;
-    }
-    EXPECT_GT(through, kUseful * kSamples) << window.axis << ' ' << window.offset;
+    EXPECT_GT(share_through(window, portals, random), kUseful) << window.axis << ' ' << window.offset;
   }
 }
 
@@ -145,20 +150,13 @@ TEST(Portals, AreNotInFrontOfPointsBehindThem) {
 
 // Rays from the ground far outside of the room do not hide the window.
 TEST(Portals, AreFoundDespiteRaysFromFarOutside) {
-  constexpr int kSamples = 2000;
   RandomStream random(4);
   const Window window;
   std::vector<Found> found = window.rays(4000, random);
   for (int i = 0; i < 30; ++i) found.push_back({{1e3f * static_cast<float>(i), -1, 7e3f}, {0, 1, 0}, 1});
   const Portals portals(found);
   ASSERT_TRUE(portals.any());
-  const V3 p(.1f, -.3f, .2f);
-  int through = 0;
-  for (int i = 0; i < kSamples; ++i) {
-    const auto d = portals.sample(p, random.bits(), random.bits());
-    if (d && window.holds(at_plane(window, p, *d))) ++through;
-  }
-  EXPECT_GT(through, kUseful * kSamples);
+  EXPECT_GT(share_through(window, portals, random), kUseful);
 }
 
 TEST(Portals, BearOddInput) {
