@@ -164,6 +164,28 @@ class Page:
         }})"""
         return self.evaluate(script, timeout + 15)
 
+    def hold_reply(self, request):
+        """Holds the reply to the first request for which the JavaScript expression of `url` and `method` is truthy; once it has come, `window.held` is true."""
+        self.evaluate(f"""void (() => {{
+          const real = fetch;
+          let found = false;
+          window.held = false;
+          window.released = new Promise((resolve) => {{ window.release = resolve; }});
+          window.fetch = async (url, options) => {{
+            const method = options?.method ?? "GET";
+            const hold = !found && ({request});
+            found ||= hold;
+            const response = await real(url, options);
+            if (hold) {{ window.held = true; await window.released; }}
+            return response;
+          }};
+        }})()""")
+
+    def release_reply(self):
+        """Returns when the page has seen the held reply and was drawn again."""
+        self.evaluate("window.released.then(() => new Promise(requestAnimationFrame)), window.release()")
+        self.evaluate("new Promise(requestAnimationFrame).then(() => new Promise(requestAnimationFrame))")
+
     def text(self, selector):
         """What a reader sees of the first match, in one line."""
         return self.wait(f"[document.querySelector({json.dumps(selector)}).innerText]")[0].replace("\n", " ").strip()

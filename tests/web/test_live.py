@@ -102,22 +102,13 @@ def test_a_slow_list_does_not_undo_what_an_event_said_meanwhile(farm, dashboard)
     farm.jobs["j-1"] = job()
     page = dashboard()
     page.wait("document.querySelector('[data-job]')")
-    page.evaluate("""void (() => {
-      const real = fetch;
-      window.released = new Promise((resolve) => { window.release = resolve; });
-      window.fetch = async (...request) => {
-        const response = await real(...request);
-        if (request[0].includes("/jobs?")) { window.held = true; await window.released; }
-        return response;
-      };
-    })()""")
+    page.hold_reply("url.includes('/jobs?')")
 
     farm.emit("reset", {"missed_from": 1, "missed_to": 2})
     page.wait("window.held")
     farm.change("j-1", state="done", progress=1)
     page.wait("document.querySelector('[data-job] .pill').innerText === 'done'")
-    page.evaluate("window.released.then(() => new Promise(requestAnimationFrame)), window.release()")
-    page.evaluate("new Promise(requestAnimationFrame).then(() => new Promise(requestAnimationFrame))")
+    page.release_reply()
 
     assert page.text("[data-job] .pill") == "done"
 
@@ -126,25 +117,14 @@ def test_of_two_lists_the_one_asked_for_later_holds(farm, dashboard):
     farm.jobs["j-1"] = job()
     page = dashboard()
     page.wait("document.querySelector('[data-job]')")
-    page.evaluate("""void (() => {
-      const real = fetch;
-      let lists = 0;
-      window.released = new Promise((resolve) => { window.release = resolve; });
-      window.fetch = async (...request) => {
-        const list = request[0].includes("/jobs?") && ++lists;
-        const response = await real(...request);
-        if (list === 1) { window.held = true; await window.released; }
-        return response;
-      };
-    })()""")
+    page.hold_reply("url.includes('/jobs?')")
 
     farm.emit("reset", {"missed_from": 1, "missed_to": 2})
     page.wait("window.held")
     farm.jobs["j-1"] = job(progress=0.75)
     farm.emit("reset", {"missed_from": 3, "missed_to": 4})
     page.wait("document.querySelector('[data-job]').innerText.includes('75 %')")
-    page.evaluate("window.released.then(() => new Promise(requestAnimationFrame)), window.release()")
-    page.evaluate("new Promise(requestAnimationFrame).then(() => new Promise(requestAnimationFrame))")
+    page.release_reply()
 
     assert "75 %" in page.text("[data-job]")
 
@@ -182,6 +162,21 @@ def test_pause_and_resume(farm, dashboard):
     page.click("[aria-label='Resume: steam.xml']")
 
     page.wait("document.querySelector('[data-job] .pill').innerText === 'rendering'")
+
+
+def test_a_slow_reply_to_a_change_does_not_undo_what_an_event_said_meanwhile(farm, dashboard):
+    farm.jobs["j-1"] = job()
+    page = dashboard()
+    page.wait("document.querySelector('[data-job]')")
+    page.hold_reply("url.endsWith('/jobs/j-1') && method === 'GET'")
+
+    page.click("[aria-label='Pause: steam.xml']")
+    page.wait("window.held")
+    farm.change("j-1", state="done", progress=1)
+    page.wait("document.querySelector('[data-job] .pill').innerText === 'done'")
+    page.release_reply()
+
+    assert page.text("[data-job] .pill") == "done"
 
 
 def test_a_refused_action_says_why(farm, dashboard):

@@ -448,6 +448,29 @@ def test_a_region_is_rendered_first_by_the_mouse_and_its_box_is_drawn(farm, view
     assert farm.jobs["j-1"]["focus"] is None
 
 
+@pytest.mark.parametrize("method", ("GET", "PATCH"))
+def test_a_slow_reply_does_not_undo_what_an_event_said_of_the_region(farm, viewer, method):
+    page = viewer()
+    region = frame_region(page)
+    page.hold_reply(f"url.endsWith('/jobs/j-1') && method === '{method}'")
+
+    if method == "GET":  # the job is fetched when its viewer is opened
+        here = page.evaluate("location.hash")
+        page.evaluate("void (location.hash = '#/jobs')")
+        page.wait("document.querySelector('[data-job]')")
+        page.evaluate(f"void (location.hash = {json.dumps(here)})")
+        page.wait("window.held && document.querySelector('float-view')")
+    else:
+        page.click(".viewer-focus button")
+        page.wait("window.held")
+    assert region != [8, 8, 40, 32]
+    farm.change("j-1", focus=[8, 8, 40, 32])
+    page.wait("document.querySelector('.viewer-focus').innerText.includes('8, 8 to 40, 32')")
+    page.release_reply()
+
+    assert "8, 8 to 40, 32" in page.text(".viewer-focus")
+
+
 def test_a_job_that_is_over_and_a_reader_have_nothing_to_render_first(farm, viewer):
     farm.role = "read"
     page = viewer()

@@ -4,13 +4,12 @@ import { doneFrames, withJob, withOpen, withUi } from "./state.js";
 
 const kVideoPauseMs = 1000;
 
-export function makeJobActions({ get, set, attempt, api }) {
+export function makeJobActions({ get, set, attempt, api, snapshot }) {
   async function change(id, wanted) {
     set(withUi(get(), { busy: id, confirming: null }));
-    const done = await attempt(() => api.setState(id, wanted));
-    const job = done && (await attempt(() => api.job(id)));
-    const next = withUi(get(), { busy: null });
-    set(job ? withJob(next, job) : next);
+    const changed = await attempt(() => api.setState(id, wanted));
+    if (changed) await snapshot(`job ${id}`, () => attempt(() => api.job(id)), withJob);
+    set(withUi(get(), { busy: null }));
   }
 
   const film = (more) => set(withOpen(get(), { film: more }));

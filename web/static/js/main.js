@@ -109,8 +109,8 @@ const newest = new Map(); // for each kind of request, the number of the latest 
 let asked = 0;
 
 /**
- * Puts a fetched list under the events that came meanwhile: its answer may be older than they are. Of two requests for
- * the same, the later one holds: answers overtake each other on their way.
+ * Puts a fetched list or job under the events that came meanwhile: its answer may be older than they are. Of two
+ * requests for the same, the later one holds: answers overtake each other on their way.
  */
 async function snapshot(what, fetch, apply) {
   const number = ++asked;
@@ -167,7 +167,7 @@ async function refreshOpen() {
   const id = state.open?.id;
   if (!id) return;
   try {
-    await snapshot("job", () => api.job(id), (now, job) => (now.open?.id === id ? withJob(now, job) : now));
+    await snapshot(`job ${id}`, () => api.job(id), (now, job) => (now.open?.id === id ? withJob(now, job) : now));
     if (state.open?.id !== id || !state.jobs.has(id)) return; // the job was removed or closed meanwhile
     set(withOpen(state, { problem: null }));
     if (!showFrame()) await refreshShown();

@@ -13,7 +13,7 @@ const kExposureStep = 0.5;
 
 const next = (list, value, by) => list[(list.indexOf(value) + by + list.length) % list.length];
 
-export function makeViewerActions({ get, set, attempt, api }) {
+export function makeViewerActions({ get, set, attempt, api, snapshot }) {
   const sources = { a: null, b: null };
   let pointing = 0;
 
@@ -101,8 +101,8 @@ export function makeViewerActions({ get, set, attempt, api }) {
 
   /** Has the tiles of a rectangle rendered before the others; null: all alike again. */
   async function focus(rect) {
-    const job = await attempt(() => api.change(get().viewer.id, { focus: rect }));
-    if (job) set(withJob(get(), job));
+    const { id } = get().viewer;
+    await snapshot(`job ${id}`, () => attempt(() => api.change(id, { focus: rect })), withJob);
   }
 
   /** The region is rendered first; if it is already, or there is none, all tiles are alike again. */
@@ -145,7 +145,7 @@ export function makeViewerActions({ get, set, attempt, api }) {
       set({ ...get(), viewer: { id, view, a: null, b: null, file: null, others: null, tool: "pan", probe: null, figures: null, flip: null, problem: null, changed: 0 } });
       openJob("a", id);
       // if this fails, the viewer says so for the layers
-      api.job(id).then((job) => (get().viewer?.id === id ? set(withJob(get(), job)) : null), () => {});
+      snapshot(`job ${id}`, () => api.job(id), (now, job) => (now.viewer?.id === id ? withJob(now, job) : now)).catch(() => {});
       // if this fails, only jobs that are known already are offered
       api.list("sort=-submitted&limit=200").then(({ jobs }) => set(withViewer(get(), { others: jobs })), () => {});
       if (view.other) openJob("b", view.other);
