@@ -393,6 +393,27 @@ def the_type_says_who_holds_the_lock(tree):
             yield f"{path}: {name}: take a reference to the state of a Guarded<> instead of asking callers to hold a lock"
 
 
+FILE_SCOPE_NAME = re.compile(r"^(?:constexpr\s[^=({]*?\b(k[A-Z]\w*)\s*(?:\[[^\]]*\]\s*)?[={]|(?:struct|class|enum class)\s+(\w+)[^;:{]*(?::[^;{]*)?\{)", re.M)
+
+
+NAMED_NAMESPACE = re.compile(r"^namespace\s+([\w:]+)\s*\{", re.M)
+
+
+def names_of_a_library_do_not_clash(tree):
+    """Presets with CMAKE_UNITY_BUILD compile all files of a library as one (cmake/flags.cmake)."""
+    libraries = {folder(path) for path in tree if path.endswith("CMakeLists.txt")}
+    seen = {}
+    for path, text in product(tree).items():
+        library = next((up for up in map(str, pathlib.PurePosixPath(path).parents) if up in libraries), None)
+        if library and path.endswith(".cpp"):
+            namespace = NAMED_NAMESPACE.findall(text)[:1]
+            for names in FILE_SCOPE_NAME.findall(without_texts(text)):
+                seen.setdefault((library, *namespace, "".join(names)), set()).add(path)
+    for (library, *_, name), paths in seen.items():
+        if len(paths) > 1:
+            yield f"{name} is defined in {' and '.join(sorted(paths))}: define it once, or give it two names, as all files of {library} may be compiled as one"
+
+
 def nothing_unfinished(tree):
     for path, text in tree.items():
         for match in UNFINISHED.finditer(text):
@@ -486,5 +507,5 @@ def constants_are_listed(tree):
 
 
 RULES = [layering, quoted_includes_exist, include_cycles, folder_cycles, small_rooms, doors, library_types_stay_behind_their_doors, headers_are_guarded,
-         short_files, classes_are_whole, narrow_classes, interfaces_have_two_implementations, the_type_says_who_holds_the_lock, nothing_unfinished, clock_is_injected, tests_do_not_sleep, tests_assert_no_times, nobody_exits,
+         short_files, classes_are_whole, narrow_classes, interfaces_have_two_implementations, the_type_says_who_holds_the_lock, names_of_a_library_do_not_clash, nothing_unfinished, clock_is_injected, tests_do_not_sleep, tests_assert_no_times, nobody_exits,
          exceptions_are_files, constants_are_listed]

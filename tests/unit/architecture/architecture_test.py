@@ -62,6 +62,16 @@ class Rules(unittest.TestCase):
             "tests/unit/a_test.cpp": '#include "coordinator/http/net/http_server.h"\n#include "worker/agent/link.h"\n',
         })
 
+    def test_clashing_names(self):
+        self.assert_finds(architecture.names_of_a_library_do_not_clash, {
+            "common/a/CMakeLists.txt": "", "common/b/CMakeLists.txt": "",
+            "common/a/x.cpp": "constexpr float kTwice = 1;\nconstexpr Row kRows[] = {1};\nstruct Pair : Base {\n};\nvoid f() {\n  constexpr int kLocal = 1;\n}\n",
+            "common/a/in/y.cpp": "constexpr int kTwice = 2;  // not kRows\nclass Pair final {\n};\nenum class Kind : char { kRows };\nvoid g() {\n  constexpr int kLocal = 1;\n}\n",
+            "common/a/z.cpp": "constexpr std::array kRows{1};\nclass Kind;\nstruct Pair::Inner {\n};\n",
+            "common/a/other.cpp": "namespace ls::other {\nconstexpr float kTwice = 1;\n",
+            "common/b/x.cpp": "constexpr float kTwice = 1;\nstruct Pair {\n};\n",
+        }, "kTwice is defined in common/a/in/y.cpp and common/a/x.cpp", "Pair is defined", "kRows is defined in common/a/x.cpp and common/a/z.cpp")
+
     def test_quoted_includes(self):
         self.assert_finds(architecture.quoted_includes_exist, {
             "common/a.cpp": '#include "common/b.h"\n#include "a.h"\n#include "proto/farm.pb.h"\n', "common/b.h": HEADER}, '"a.h"')

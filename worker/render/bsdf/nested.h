@@ -66,7 +66,7 @@ struct Blend : MaterialKind {
     const Mixture x = mixture(look, wo);
     const int k = u_lobe < x.chance[1];
     const float rest = k ? u_lobe / x.chance[1] : (u_lobe - x.chance[1]) / x.chance[0];
-    auto s = sample_part(look, part[k], look.at, wo, std::min(rest, 0x1.fffffep-1f), u);
+    auto s = sample_part(look, part[k], look.at, wo, std::min(rest, kBelowOne), u);
     if (!s) return s;
     // If the other material contributes nothing, the result is that of this material alone, bit for bit.
     if (x.share[1 - k] == 0 && x.chance[1 - k] == 0) return s;

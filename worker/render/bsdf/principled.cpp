@@ -5,7 +5,6 @@
 namespace ls::render {
 namespace {
 
-constexpr float kBelowOne = 0x1.fffffep-1f;
 constexpr float kCoatShadowing = .25f;  // roughness for the coat's masking, regardless of its gloss
 
 float mix(float a, float b, float t) { return a * (1 - t) + b * t; }

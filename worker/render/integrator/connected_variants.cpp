@@ -6,7 +6,7 @@ namespace ls::render {
 namespace {
 
 constexpr Features kAll{.media = true, .grids = true, .passing = true, .aimed = true, .connected = true};
-constexpr Features kAllSplit = [] {
+constexpr Features kConnectedAndSplit = [] {
   Features all = kAll;
   all.split = true;
   return all;
@@ -25,6 +25,6 @@ std::span<const Variant> connected_variants() {
 }
 
 const Variant kConnectedSplitVariant =
-    variant<kAllSplit, CameraSegmentNee>("grey media, aimed and connected, and light in parts");
+    variant<kConnectedAndSplit, CameraSegmentNee>("grey media, aimed and connected, and light in parts");
 
 }  // namespace ls::render

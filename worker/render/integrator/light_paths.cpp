@@ -58,7 +58,7 @@ constexpr float kLeastReflected = .01f;
 constexpr float kUntilted = .999999f;
 // Connections that would add less than this share of the image's mean radiance are subject to Russian
 // roulette.
-constexpr float kFaint = .5f;
+constexpr float kFaintConnection = .5f;
 
 constexpr std::uint64_t kLearningSeed = 0x5eed0f1ea2;
 constexpr std::uint64_t kSunRaySeed = 0x5eed0f5a1;
@@ -235,7 +235,7 @@ void learn_connections(const IntegratorSettings& settings, int threads, World& w
   learned.learner.map.finish();
   if (learned.learner.map.empty()) return;
   w.sun_map = std::move(learned.learner.map);
-  w.faint = kFaint * static_cast<float>(learned.radiance / static_cast<double>(learned.paths));
+  w.faint = kFaintConnection * static_cast<float>(learned.radiance / static_cast<double>(learned.paths));
   w.need.connected = true;
   aim(settings, w);  // again, since with connections points on camera segments pay more often
   w.rr_depth = std::min(w.rr_depth, kConnectedRoulette);

@@ -16,14 +16,15 @@
 namespace ls::render {
 namespace {
 
-constexpr Features kAllSplit{.media = true, .chromatic = true, .passing = true, .split = true, .reuse = true};
+constexpr Features kSharedAndSplit{
+    .media = true, .chromatic = true, .passing = true, .split = true, .reuse = true};
 
 constexpr std::size_t kSharing = kUsualPathReuse;
 
 // The pilot renders some groups of pixels to find out whether sharing pays. It takes as many samples as a
 // quick image has: with fewer, more of the noise would be that of edges and soft shadows, which sharing does
 // not reduce.
-constexpr std::uint64_t kPilotSeed = 0x5eed0f9a7e;
+constexpr std::uint64_t kSharingPilotSeed = 0x5eed0f9a7e;
 constexpr std::uint64_t kPilotGroups = 64;  // at most
 constexpr std::uint64_t kFewestPilotGroups = 4;
 // One group is rendered for this many pixels of the frame, so that the pilot takes about as long as one
@@ -40,7 +41,7 @@ constexpr double kBeyondDoubt = 4;
 
 class Pilot {
  public:
-  explicit Pilot(World& w) : w_(w), settings_(w, kPilotSeed, kPilotDepth) { w.reuse = kSharing; }
+  explicit Pilot(World& w) : w_(w), settings_(w, kSharingPilotSeed, kPilotDepth) { w.reuse = kSharing; }
   Pilot(const Pilot&) = delete;
   Pilot& operator=(const Pilot&) = delete;
   ~Pilot() { w_.reuse = 0; }
@@ -57,7 +58,7 @@ class Pilot {
   // groups.
   Noise of_group(const Variant& sharing, std::uint64_t number) const {
     const FlushDenormals mode;
-    RandomStream places(combine(kPilotSeed, number));
+    RandomStream places(combine(kSharingPilotSeed, number));
     const auto among = [&](int n) { return static_cast<int>(places.next() % static_cast<std::uint64_t>(n)); };
     const PixelAt somewhere{among(w_.frame.width) - w_.origin_x, among(w_.frame.height) - w_.origin_y};
     SharingBlock::Pixels group = SharingBlock(w_, somewhere).in_order_of(number);
@@ -126,7 +127,7 @@ std::span<const Variant> reuse_variants() {
 }
 
 const Variant kReuseSplitVariant =
-    group_variant<kAllSplit>("homogeneous media, tails shared, and light in parts");
+    group_variant<kSharedAndSplit>("homogeneous media, tails shared, and light in parts");
 
 void share_tails(const IntegratorSettings& settings, int threads, World& w) {
   Features need = w.need;

@@ -19,7 +19,6 @@ constexpr double kWords = 0x1p32;
 // The largest radiance of a texel. It equals the largest radiance of a sample (render_tile.cpp), since larger
 // samples cannot be summed.
 constexpr float kLargestTexel = 0x1p96f;
-constexpr float kBelowOne = 0x1.fffffep-1f;
 // The tolerance for a to_world that is a rotation only up to rounding, because it was written with six
 // digits.
 constexpr double kSlack = 1e-4;

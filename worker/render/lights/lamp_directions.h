@@ -54,7 +54,7 @@ class LampDirections {
       const auto which = static_cast<std::size_t>(choice / kLampShare * static_cast<float>(count_));
       return near(to_lamp_[std::min(which, count_ - 1)], u);
     }
-    choice = std::min((choice - kLampShare) / (1 - kLampShare), 0x1.fffffep-1f);
+    choice = std::min((choice - kLampShare) / (1 - kLampShare), kBelowOne);
     return std::nullopt;
   }
 

@@ -8,7 +8,6 @@ namespace {
 
 // The share of the density that is uniform over the rectangle
 constexpr double kRectangleShare = .2;
-constexpr float kBelowOne = 0x1.fffffep-1f;
 
 }  // namespace
 

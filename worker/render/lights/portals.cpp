@@ -28,7 +28,6 @@ constexpr std::size_t kSide = 16;  // cells across and down a portal's rectangle
 // is above the rounding of places
 constexpr float kLeastMargin = 1e-4f;
 constexpr float kRounding = 1e-5f;
-constexpr float kBelowOne = 0x1.fffffep-1f;
 
 }  // namespace
 

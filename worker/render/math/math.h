@@ -22,6 +22,7 @@ inline constexpr float kInvPi = .318309886183790671538f;
 inline constexpr float kInvTwoPi = .159154943091895335769f;
 inline constexpr float kInvFourPi = .0795774715459476678845f;
 inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
+inline constexpr float kBelowOne = 0x1.fffffep-1f;  // the largest float below 1
 
 template <class T>
 constexpr T sqr(T x) {

@@ -4,13 +4,13 @@ namespace ls::render {
 namespace {
 
 // Shadow rays that could bring less than this share of the mean radiance are traced at random.
-constexpr float kFaint = 1;
+constexpr float kFaintShadowRay = 1;
 
 }  // namespace
 
 void learn_shadow_roulette(const IntegratorSettings& settings, float mean_radiance, World& w) {
   if (settings.shadow_roulette < 0 || !w.lights.can_sample()) return;
-  w.faint_shadow = kFaint * mean_radiance;
+  w.faint_shadow = kFaintShadowRay * mean_radiance;
 }
 
 }  // namespace ls::render
