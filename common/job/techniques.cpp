@@ -28,7 +28,9 @@ constexpr std::array kRows{
     TechniqueRow{Technique::path_splitting, "path_splitting",
                  "splits paths at their first scattering in a grid, and ends those that could bring little"},
     TechniqueRow{Technique::sky_portals, "sky_portals",
-                 "looks for the sky through the openings by which its light enters"}};
+                 "looks for the sky through the openings by which its light enters"},
+    TechniqueRow{Technique::local_lights, "local_lights",
+                 "chooses lights by which of them reach places like the one that is lit"}};
 
 constexpr bool in_order() {
   for (std::size_t i = 0; i < kRows.size(); ++i)
@@ -68,6 +70,8 @@ TechniqueSwitch off_switch(Technique technique, std::string_view integrator) {
       return {"path_splitting", "-1"};
     case Technique::sky_portals:
       return {"sky_portals", "-1"};
+    case Technique::local_lights:
+      return {"local_lights", "-1"};
   }
   return {};
 }

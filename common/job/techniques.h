@@ -24,6 +24,7 @@ enum class Technique : std::uint8_t {
   sky_samples,      // a second direction from the first surface that looks for a constant environment
   path_splitting,   // splitting and Russian roulette of paths, in scenes with grids, by what they may bring
   sky_portals,      // sampling of directions towards the sky through openings
+  local_lights,     // one of few lights chosen by what was learned about the place
 };
 
 struct TechniqueRow {

@@ -379,6 +379,9 @@ struct IntegratorSettings {
   // environment, are also sampled through the openings by which its light enters the scene. 0: chosen for the
   // scene; -1: never; 1: where possible.
   int sky_portals = 0;
+  // For "volpath" and "path" only: whether one of few lights is chosen by what was learned about the light at
+  // each place. 0: chosen for the scene; -1: never; 1: where possible.
+  int local_lights = 0;
   // For "volpath" only: whether paths in scenes with grids split at their first scattering and end by what
   // they may add to their pixel. 0: chosen for the scene; -1: they do not.
   int path_splitting = 0;

@@ -52,7 +52,6 @@ struct SunnyRoom {
     return b;
   }
 
- private:
   static BsdfIndex plastic(SceneBuilder& b) {
     RoughPlasticBsdf p;
     p.diffuse_reflectance = b.texture({.5, .4, .3});
@@ -61,6 +60,8 @@ struct SunnyRoom {
     const BsdfIndex one = b.bsdf(p);
     return b.bsdf(TwoSidedBsdf{one, one});
   }
+
+ private:
   static BsdfIndex metal(SceneBuilder& b) {
     RoughConductorBsdf m;
     m.alpha_u = m.alpha_v = b.texture({.25, .25, .25});

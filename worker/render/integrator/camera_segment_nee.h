@@ -36,6 +36,7 @@ class CameraSegmentNee {
     float found_as_light(const Pivot& pivot) const {
       return by_points ? points.found_as_light(pivot) : single.found_as_light(pivot);
     }
+    bool light_chosen_first() const { return by_points; }
     bool uses_equiangular(bool is_point) const { return single.uses_equiangular(is_point); }
     float equiangular_ratio(const Pivot& pivot) const { return single.equiangular_ratio(pivot); }
   };

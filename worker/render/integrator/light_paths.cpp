@@ -39,6 +39,18 @@ constexpr double kPortalGainThatPays = 1.1;
 constexpr double kShadowGainThatPays = 2;
 // Portals are learned from paths of at most this many segments.
 constexpr int kLongestPortalPath = 4;
+// The choice of lights by place is learned from camera paths of at most kLongestLocalLightPath segments,
+// which look for every light at each surface: from kLocalLightPaths with few lights, from fewer with many. It
+// is tried if next-event estimation at these surfaces has a mean square of more than kSpreadThatPays times
+// the square of its mean. It pays if the noise of direct light in some pixels is more than kLocalGainThatPays
+// times as high without it: a light that reaches the surface costs more than one that does not, so samples
+// take up to 1.5 times as long, and few pixels hardly show the edges of small patches of light.
+constexpr std::uint64_t kLocalLightPaths = 1 << 14;
+constexpr std::uint64_t kLocalLightLooks = 1 << 17;  // lights times paths
+constexpr std::uint64_t kLocalLightTrial = 4;        // first, this part of the paths tells whether it pays
+constexpr int kLongestLocalLightPath = 6;
+constexpr double kSpreadThatPays = 1.2;
+constexpr double kLocalGainThatPays = 3;
 // A batch ends after this many vertices, since paths may be long.
 constexpr double kLearningVertices = 1 << 15;
 constexpr std::uint64_t kSunRays = 1 << 14;  // rays of the sun for one set of light vertices
@@ -63,14 +75,20 @@ constexpr float kFaintConnection = .5f;
 constexpr std::uint64_t kLearningSeed = 0x5eed0f1ea2;
 constexpr std::uint64_t kSunRaySeed = 0x5eed0f5a1;
 
+// What is kept besides the sun map, because it takes memory or time
+struct Keep {
+  bool sky = false, lights = false;
+};
+
 struct Learned {
   Connections::Learner learner;
   double radiance = 0;  // sum of the radiances of all paths
   std::uint64_t paths = 0;
 
-  explicit Learned(const World& w, bool keeps_sky = false) {
+  explicit Learned(const World& w, Keep keep = {}) {
     learner.map = SunMap(w.sun.direction, w.geometry.radius);
-    learner.keeps_sky = keeps_sky;
+    learner.keeps_sky = keep.sky;
+    learner.keeps_lights = keep.lights;
   }
   void add(const Learned& batch) {
     learner.map.add(batch.learner.map);
@@ -81,6 +99,7 @@ struct Learned {
     learner.sky.insert(learner.sky.end(), batch.learner.sky.begin(), batch.learner.sky.end());
     learner.scatterings += batch.learner.scatterings;
     learner.left += batch.learner.left;
+    learner.lights.add(batch.learner.lights);
     radiance += batch.radiance;
     paths += batch.paths;
   }
@@ -90,9 +109,9 @@ struct Learned {
 };
 
 template <Features F, template <Features> class Light>
-Learned learn_batch(const World& w, bool keeps_sky, std::uint64_t first, std::uint64_t end) {
+Learned learn_batch(const World& w, Keep keep, std::uint64_t first, std::uint64_t end) {
   const FlushDenormals mode;
-  Learned learned(w, keeps_sky);
+  Learned learned(w, keep);
   for (std::uint64_t i = first; i < end && learned.learner.vertices <= kLearningVertices; ++i) {
     const SampleStream stream(kLearningSeed, 0, 0, 2 * i);
     const Group at = stream.group(0, Purpose::guide), lens = stream.group(0, Purpose::camera);
@@ -110,7 +129,7 @@ Learned learn_batch(const World& w, bool keeps_sky, std::uint64_t first, std::ui
 // Traces up to `paths` camera paths. After the first kFirstBatches, `go_on` is asked whether to trace the
 // rest.
 template <Features F, template <Features> class Light, class GoOn>
-Learned learn_with(const World& w, std::uint64_t paths, int threads, const GoOn& go_on, bool keeps_sky) {
+Learned learn_with(const World& w, std::uint64_t paths, int threads, const GoOn& go_on, Keep keep) {
   const auto pixels = static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
   const std::uint64_t most = std::min(paths, kLearningPathsPerPixel * pixels);
   const std::uint64_t batches = (most + kLearningBatch - 1) / kLearningBatch;
@@ -118,8 +137,7 @@ Learned learn_with(const World& w, std::uint64_t paths, int threads, const GoOn&
   in_order(
       threads, batches,
       [&](std::size_t i) {
-        return learn_batch<F, Light>(w, keeps_sky, i * kLearningBatch,
-                                     std::min((i + 1) * kLearningBatch, most));
+        return learn_batch<F, Light>(w, keep, i * kLearningBatch, std::min((i + 1) * kLearningBatch, most));
       },
       [&, taken = std::uint64_t{0}](const Learned& batch) mutable {
         learned.add(batch);
@@ -154,10 +172,10 @@ constexpr Features kAimed = [] {
 }();
 
 template <class GoOn>
-Learned learn(const World& w, std::uint64_t paths, int threads, const GoOn& go_on, bool keeps_sky = false) {
-  if (w.need.aimed) return learn_with<kAimed, CameraSegmentNee>(w, paths, threads, go_on, keeps_sky);
-  return w.need.media ? learn_with<kMedia, VertexNee>(w, paths, threads, go_on, keeps_sky)
-                      : learn_with<kSurfaces, VertexNee>(w, paths, threads, go_on, keeps_sky);
+Learned learn(const World& w, std::uint64_t paths, int threads, const GoOn& go_on, Keep keep = {}) {
+  if (w.need.aimed) return learn_with<kAimed, CameraSegmentNee>(w, paths, threads, go_on, keep);
+  return w.need.media ? learn_with<kMedia, VertexNee>(w, paths, threads, go_on, keep)
+                      : learn_with<kSurfaces, VertexNee>(w, paths, threads, go_on, keep);
 }
 
 // True if the path tracers that learn have the features of the world.
@@ -254,7 +272,7 @@ std::unique_ptr<const Portals> find_portals(bool in_any_case, int threads, World
   const auto go_on = [&](const Connections::Learner& first) {
     return in_any_case || first.left <= kLeftThatPays * first.scatterings;
   };
-  const Learned learned = learn(w, kPortalPaths, threads, go_on, /*keeps_sky=*/true);
+  const Learned learned = learn(w, kPortalPaths, threads, go_on, {.sky = true});
   if (!go_on(learned.learner)) return nullptr;
   auto portals = std::make_unique<const Portals>(learned.learner.sky);
   return portals->any() ? std::move(portals) : nullptr;
@@ -281,6 +299,30 @@ void learn_portals(const IntegratorSettings& settings, int threads, World& w) {
   aim(settings, w);
 }
 
+void learn_local_lights(const IntegratorSettings& settings, int threads, World& w) {
+  const bool in_any_case = settings.local_lights > 0;
+  if (settings.local_lights < 0 || !w.lights.can_be_local() || !w.depth_allows(1) || !can_learn(w)) return;
+  const std::uint64_t paths = std::min(kLocalLightPaths, kLocalLightLooks / w.lights.count());
+  const auto visits_of = [&](std::uint64_t most) {
+    const PilotSettings limits(w, kLearningSeed, kLongestLocalLightPath);
+    return learn(w, most, threads, [](const Connections::Learner&) { return true; }, {.lights = true})
+        .learner.lights;
+  };
+  if (!in_any_case) {
+    if (!pilot_pays(w)) return;
+    const LightVisits few = visits_of(paths / kLocalLightTrial);
+    if (!(w.lights.spread_over(few) > kSpreadThatPays)) return;
+    constexpr int kDirect = 2;  // segments of paths that show direct light
+    const auto without = pilot_pixels(w, kDirect, threads);
+    w.lights.set_local(&few);
+    const auto with = pilot_pixels(w, kDirect, threads);
+    w.lights.set_local(nullptr);
+    if (!is_noisier(without, with, kLocalGainThatPays)) return;
+  }
+  const LightVisits all = visits_of(paths);
+  if (!all.places.empty()) w.lights.set_local(&all);
+}
+
 LightVertices trace_light_vertices(const World& w, std::uint64_t set) {
   const FlushDenormals mode;
   return trace(w, w.seed, static_cast<std::uint32_t>(set), kSunRays);
@@ -305,6 +347,7 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   if (!world) return tl::unexpected(world.error());
   if (settings.integrator == "volpath" || settings.integrator == "path") {
     learn_portals(scene.integrator, threads, **world);
+    learn_local_lights(scene.integrator, threads, **world);
     learn_connections(scene.integrator, threads, **world);
     learn_sky_samples(scene.integrator, **world);
     share_tails(scene.integrator, threads, **world);

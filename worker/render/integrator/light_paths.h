@@ -18,6 +18,9 @@ void learn_connections(const IntegratorSettings& settings, int threads, World& w
 // Sets the portals of a world's lights if they pay. The result depends on the same things as that of
 // learn_connections(), and the integrator must be one of the same.
 void learn_portals(const IntegratorSettings& settings, int threads, World& w);
+// Learns from camera paths which lights reach which places (local_lights.h), and lets surfaces choose lights
+// by that if it pays or the settings ask for it.
+void learn_local_lights(const IntegratorSettings& settings, int threads, World& w);
 
 // Traces the light vertices of one set (LightVertexCache). They depend only on the world, its seed and the
 // number of the set.

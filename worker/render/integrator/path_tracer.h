@@ -85,8 +85,10 @@ struct Connections {
     bool media_differ = false;
     bool keeps_sky = false;  // true if the light of the sky that vertices found is kept in `sky`
     std::vector<Portals::Found> sky;
-    double scatterings = 0;  // number of vertices
-    double left = 0;         // number of those that the path left towards the sky
+    double scatterings = 0;     // number of vertices
+    double left = 0;            // number of those that the path left towards the sky
+    bool keeps_lights = false;  // true if all lights are looked for at each surface, and kept in `lights`
+    LightVisits lights;
 
     void found_sky(const V3& p, const V3& d, float found) {
       if (keeps_sky && found > 0 && std::isfinite(found)) sky.push_back({p, d, found});
@@ -180,6 +182,9 @@ class PathTracer {
   }
   void pass_boundary(const SurfaceHit& hit, const SurfaceInfo& surface);
   void light_surface(const SurfaceHit& hit, const V3& wo);
+  [[gnu::always_inline]] inline void light_surface_by(const LightChoice& choice, const SurfaceHit& hit,
+                                                      const SurfaceInfo& surface, const V3& wo);
+  void learn_lights(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo);
   void look_for_sky(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo, Group numbers);
   // The density with which a vertex in a medium at p samples the direction w; `own` is the density of the
   // phase function.
@@ -501,7 +506,16 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   const SurfaceInfo& surface = world_.geometry.surfaces[hit.surface];
   if (!world_.lights.can_sample() || !surface.smooth) return;
   const Group g = stream_.group(depth_, Purpose::light);
-  const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, hit.p, hit.shading.n);
+  if constexpr (F.connected) {
+    if (connections_.learner && connections_.learner->keeps_lights) learn_lights(hit, surface, wo);
+  }
+  light_surface_by(world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, hit.p, hit.shading.n), hit,
+                   surface, wo);
+}
+
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::light_surface_by(const LightChoice& choice, const SurfaceHit& hit,
+                                            const SurfaceInfo& surface, const V3& wo) {
   const auto light = world_.lights.sample(choice, hit.p);
   if (!light) return;
   const V3 wi = hit.shading.to_local(light->direction);
@@ -519,6 +533,25 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   if (!is_black(arriving))
     add_found(choice, hit.p, hit.ng, light->direction, beta_ * f.f_cos * arriving * (weight / light->pdf),
               [&] { return world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wi, wo).pdf; });
+}
+
+// Looks for each light, as light_surface() does for the one that is chosen, and keeps what it finds.
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::learn_lights(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo) {
+  const C3 beta = std::exchange(beta_, C3(1)), radiance = outcome_.radiance;
+  Connections::Learner* const learner = std::exchange(connections_.learner, nullptr);
+  RandomStream numbers = stream_.stream(depth_, Purpose::guide);
+  std::vector<float> found;
+  for (std::uint32_t i = 0; i < world_.lights.count(); ++i) {
+    outcome_.radiance = C3(0);
+    const std::uint32_t x = numbers.bits(), y = numbers.bits();
+    light_surface_by(world_.lights.choice_of(i, 1, {0, x, y}), hit, surface, wo);
+    found.push_back(mean(outcome_.radiance));
+  }
+  learner->lights.add(hit.p, hit.shading.n, found);
+  connections_.learner = learner;
+  beta_ = beta;
+  outcome_.radiance = radiance;
 }
 
 // At the path's first vertex: looks for the constant environment in a second direction (sky_samples.h).
@@ -680,7 +713,7 @@ void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
   if (is_black(emitted)) return;
   float weight = 1;
   if (!last_.delta) {
-    const float p_l = world_.lights.pdf(hit, last_.p, ray_.d, last_.n);
+    const float p_l = world_.lights.pdf(hit, last_.p, ray_.d, last_.n, last_.in_medium.light_chosen_first());
     if constexpr (F.reuse) {
       if (is_leaving_second()) {
         keep_emitted(emitted, p_l);
@@ -697,14 +730,14 @@ void PathTracer<F, Light>::add_environment() {
   if (!world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)) return;
   if constexpr (F.reuse) {
     if (is_leaving_second()) {
-      const Lights::EnvironmentParts parts = world_.lights.environment_parts(last_.p, ray_.d);
+      const Lights::EnvironmentParts parts = world_.lights.environment_parts(last_.p, last_.n, ray_.d);
       keep_emitted(parts.sampled, parts.pdf);
       add(beta_ * parts.unsampled);
       return;
     }
   }
   const float pdf = last_.pdf / last_.in_medium.found_as_light();
-  C3 light = world_.lights.environment(last_.p, ray_.d, last_.delta ? kInfinity : pdf);
+  C3 light = world_.lights.environment(last_.p, last_.n, ray_.d, last_.delta ? kInfinity : pdf);
   if constexpr (F.connected) {
     if (connections_.learner && !last_.delta && !is_black(light)) {
       ++connections_.learner->left;

@@ -46,6 +46,8 @@ class SegmentNee {
     float length = 0;
     float points = 1;  // number of points sampled by depth; one more is sampled by angle
 
+    // Vertices on surfaces have the same type; in media, worlds of this strategy choose by the table anyway.
+    static bool light_chosen_first() { return false; }
     float found_as_light() const { return std::min(points * depth_ratio, kMaxRatio); }
     float found_as_light(const Pivot& pivot) const {
       if (!by_angle) return found_as_light();

@@ -70,6 +70,9 @@ class VertexNee {
       return uses_equiangular(false) ? 1 + equiangular_ratio(pivot) : 1.f;
     }
     static float found_as_light() { return 1; }
+    // True if the light that was sampled for this vertex was chosen before the vertex was known, although
+    // others are chosen after it.
+    static bool light_chosen_first() { return false; }
   };
 
   template <class Path>

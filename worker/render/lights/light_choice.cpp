@@ -1,8 +1,9 @@
-// The choice of a light: by the table of all lights or, if the shaded point is known, also by the tree.
-// Either maps a word, a random integer of 32 bits, to a light.
+// The choice of a light: by the table of all lights or, if the shaded point is known, also by the tree or by
+// what was learned about its place. Each maps a word, a random integer of 32 bits, to a light.
 #include <algorithm>
 #include <cmath>
 
+#include "worker/render/lights/light_table.h"
 #include "worker/render/lights/lights.h"
 
 namespace ls::render {
@@ -14,8 +15,6 @@ constexpr std::ptrdiff_t kTreeFrom = 32;
 // Of the words that choose lights in the tree, every kTableShare-th one chooses by the table instead. So no
 // light gets less than 1/16 of its probability in the table.
 constexpr std::uint64_t kTableShare = 16;
-
-float probability(std::uint64_t words) { return static_cast<float>(static_cast<double>(words) * 0x1p-32); }
 
 }  // namespace
 
@@ -56,34 +55,43 @@ void Lights::set_probabilities() {
   for (const Light& l : lights_) sum += p.emplace_back(std::max(0., power(l)));
   alone_ = p.size() == 1;
   const double uniform = .5 / static_cast<double>(p.size());
-  double acc = 0;
-  std::uint64_t before = 0;
+  for (double& x : p) x = (sum > 0 && std::isfinite(sum) ? .5 * x / sum : uniform) + uniform;
+  append_light_table(p, last_);
   for (std::size_t i = 0; i < p.size(); ++i) {
-    acc += (sum > 0 && std::isfinite(sum) ? .5 * p[i] / sum : uniform) + uniform;
-    const bool is_last = i + 1 == p.size();
-    // Each light gets at least one word, so last_ is strictly increasing.
-    const std::uint64_t edge =
-        is_last ? std::uint64_t{1} << 32
-                : std::max(before + 1, static_cast<std::uint64_t>(std::llround(acc * 0x1p32)));
-    lights_[i].probability = static_cast<float>(static_cast<double>(edge - before) * 0x1p-32);
-    last_.push_back(static_cast<std::uint32_t>(edge - 1));
-    before = edge;
+    lights_[i].probability = probability_in_table(last_, static_cast<std::uint32_t>(i));
     any_with_place_ = any_with_place_ || has_place(lights_[i]);
     if (std::holds_alternative<SunLight>(lights_[i].kind)) suns_.push_back(static_cast<std::uint32_t>(i));
-    if (std::holds_alternative<SkyLight>(lights_[i].kind)) sky_probability_ = lights_[i].probability;
+    if (std::holds_alternative<SkyLight>(lights_[i].kind)) sky_index_ = static_cast<std::uint32_t>(i);
   }
+}
+
+double Lights::spread_over(const LightVisits& visits) const {
+  double sum = 0;
+  for (std::size_t i = 0; i < visits.values.size(); ++i) {
+    const double v = double{visits.values[i]};
+    sum += v * v / double{lights_[i % lights_.size()].probability};
+  }
+  return visits.places.empty() ? 0 : sum / static_cast<double>(visits.places.size());
+}
+
+void Lights::set_local(const LightVisits* visits) {
+  local_ = nullptr;
+  if (!visits) return;
+  std::vector<double> table;
+  for (const Light& light : lights_) table.push_back(double{light.probability});
+  local_ = std::make_unique<const LocalLights>(*visits, table);
 }
 
 std::uint64_t Lights::table_bytes() const {
   std::uint64_t n = lights_.size() * sizeof(Light) + last_.size() * sizeof(last_[0]);
+  if (local_) n += local_->bytes();
   for (const Light& light : lights_)
     n += with_kind(light.kind, [](const auto& l) { return l.extra_bytes(); });
   return n;
 }
 
-Lights::Drawn Lights::by_table(std::uint32_t word) const {
-  const auto i =
-      static_cast<std::uint32_t>(std::lower_bound(last_.begin(), last_.end() - 1, word) - last_.begin());
+DrawnLight Lights::by_table(std::uint32_t word) const {
+  const std::uint32_t i = light_of_word(last_, word);
   return {i, lights_[i].probability};
 }
 
@@ -94,23 +102,26 @@ std::uint64_t Lights::table_words(std::uint32_t i) const {
   return (end + kTableShare - 1) / kTableShare - (first + kTableShare - 1) / kTableShare;
 }
 
-Lights::Drawn Lights::draw(std::uint32_t word, const V3& x, const V3& n) const {
+DrawnLight Lights::draw(std::uint32_t word, const V3& x, const V3& n) const {
+  if (by_place(n)) return local_->draw(word, x, n);
   return by_tree(n) ? from_tree(word, x, n) : by_table(word);
 }
 
-Lights::Drawn Lights::from_tree(std::uint32_t word, const V3& x, const V3& n) const {
+DrawnLight Lights::from_tree(std::uint32_t word, const V3& x, const V3& n) const {
   if (word >= tree_words_) return draw(word);
   const std::uint64_t words = tree_words_ - table_words_;
   if (word >= table_words_) {
     const LightTree::Found found = tree_.find(word - table_words_, words, x, n);
-    return {found.light, probability(found.words + table_words(found.light))};
+    return {found.light, probability_of_words(found.words + table_words(found.light))};
   }
   const std::uint32_t i = draw(static_cast<std::uint32_t>(word * kTableShare)).light;
-  return {i, probability(tree_.words_of(i, words, x, n) + table_words(i))};
+  return {i, probability_of_words(tree_.words_of(i, words, x, n) + table_words(i))};
 }
 
 float Lights::probability_at(std::uint32_t i, const V3& x, const V3& n) const {
-  return probability(tree_.words_of(i, tree_words_ - table_words_, x, n) + table_words(i));
+  if (by_place(n)) return local_->probability(i, x, n);
+  if (!by_tree(n) || !has_place(lights_[i])) return lights_[i].probability;
+  return probability_of_words(tree_.words_of(i, tree_words_ - table_words_, x, n) + table_words(i));
 }
 
 }  // namespace ls::render

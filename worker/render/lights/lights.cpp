@@ -142,9 +142,10 @@ C3 Lights::emitted(const SurfaceHit& hit, const V3& w) const {
                    [&](const AreaLight& l) { return l.emitted(world(), hit.uv, &hit.face, dot(hit.ng, w)); });
 }
 
-float Lights::pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const V3& n) const {
+float Lights::pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const V3& n,
+                  bool before_point) const {
   const std::uint32_t light = geometry_->surfaces[hit.surface].light;
-  const float p = by_tree(n) ? probability_at(light, x, n) : lights_[light].probability;
+  const float p = before_point ? lights_[light].probability : probability_at(light, x, n);
   return with_area(hit, [&](const auto& l) { return l.pdf(world(), hit, x, direction, p); });
 }
 
@@ -172,6 +173,7 @@ void Lights::set_portals(std::unique_ptr<const Portals> portals) {
   } else {
     lights_.push_back({sky_});
   }
+  local_ = nullptr;
   set_probabilities();
   if (has_tree()) build_tree();
 }
@@ -180,24 +182,24 @@ std::uint64_t Lights::map_bytes() const {
   return (map_ ? map_->bytes() : 0) + (portals_ ? portals_->bytes() : 0);
 }
 
-Lights::EnvironmentParts Lights::environment_parts(const V3& x, const V3& direction) const {
+Lights::EnvironmentParts Lights::environment_parts(const V3& x, const V3& n, const V3& direction) const {
   EnvironmentParts parts{environment_, C3(0), 0};
   if (sky_.sampled()) {
     const EnvironmentMap::Light light = sky_.from(x, direction);
     parts.sampled = light.radiance;
-    parts.pdf = light.pdf * sky_probability_;
+    parts.pdf = light.pdf * probability_at(sky_index_, x, n);
   } else if (!suns_.empty()) {
-    const Light& sun = lights_[suns_.front()];
-    parts.sampled = std::get_if<SunLight>(&sun.kind)->found(direction, kInfinity, sun.probability);
-    parts.pdf = std::get_if<SunLight>(&sun.kind)->density * sun.probability;
+    const SunLight& sun = *std::get_if<SunLight>(&lights_[suns_.front()].kind);
+    parts.sampled = sun.found(direction, kInfinity, 1);
+    parts.pdf = sun.density * probability_at(suns_.front(), x, n);
   }
   return parts;
 }
 
-C3 Lights::suns(const V3& direction, float pdf) const {
+C3 Lights::suns(const V3& x, const V3& n, const V3& direction, float pdf) const {
   C3 sum(0);
   for (const std::uint32_t i : suns_)
-    sum += std::get_if<SunLight>(&lights_[i].kind)->found(direction, pdf, lights_[i].probability);
+    sum += std::get_if<SunLight>(&lights_[i].kind)->found(direction, pdf, probability_at(i, x, n));
   return sum;
 }
 

@@ -15,6 +15,7 @@
 #include "common/base/error.h"
 #include "worker/render/lights/area.h"
 #include "worker/render/lights/distant.h"
+#include "worker/render/lights/local_lights.h"
 #include "worker/render/lights/punctual.h"
 
 namespace ls::render {
@@ -54,7 +55,8 @@ class Lights {
   // uniformly.
   LightChoice choose(const LightNumbers& numbers) const { return chosen(numbers, draw(numbers.light)); }
   // Chooses a light for the point x on a surface of normal n, or in a medium (n = 0). If there are many
-  // lights, they are chosen by a tree (light_tree.h).
+  // lights, they are chosen by a tree (light_tree.h); of few, by what was learned about places like x
+  // (local_lights.h).
   LightChoice choose(const LightNumbers& numbers, const V3& x, const V3& n) const {
     return chosen(numbers, alone_ ? only_one() : draw(numbers.light, x, n));
   }
@@ -67,21 +69,23 @@ class Lights {
   // The radiance that a surface light emits at `hit` in the direction w, which points from the surface to the
   // viewer.
   C3 emitted(const SurfaceHit& hit, const V3& w) const;
-  // Density, per steradian at x and including the choice of the light, with which choose(numbers, x, n) and
-  // sample() find the point `hit` of a surface light. `direction` points from x to the hit.
-  float pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const V3& n = V3(0)) const;
+  // Density, per steradian at x and including the choice of the light, with which sample() finds the point
+  // `hit` of a surface light after choose(numbers, x, n) or, if `before_point`, after choose(numbers).
+  // `direction` points from x to the hit.
+  float pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const V3& n = V3(0),
+            bool before_point = false) const;
   Pivot pivot(const SurfaceHit& hit) const;
   // Environment radiance for a path that leaves the scene from x in this direction (a unit vector), weighted
-  // against sampling the environment as a light at x. `pdf` is the density, per steradian, with which the
-  // path sampled the direction. Infinity gives the full radiance, for directions that were not sampled.
-  // Without portals a constant environment is never sampled as a light, since it is smooth and paths find it
-  // when they leave.
-  C3 environment(const V3& x, const V3& direction, float pdf) const {
-    const C3 beside = suns_.empty() ? environment_ : environment_ + suns(direction, pdf);
+  // against sampling the environment as a light at x, a point on a surface of normal n or in a medium (n =
+  // 0). `pdf` is the density, per steradian, with which the path sampled the direction. Infinity gives the
+  // full radiance, for directions that were not sampled. Without portals a constant environment is never
+  // sampled as a light, since it is smooth and paths find it when they leave.
+  C3 environment(const V3& x, const V3& n, const V3& direction, float pdf) const {
+    const C3 beside = suns_.empty() ? environment_ : environment_ + suns(x, n, direction, pdf);
     if (!sky_.sampled()) return beside;
     if (std::isinf(pdf)) return beside + sky_.radiance(direction);
     const EnvironmentMap::Light light = sky_.from(x, direction);
-    const float as_light = light.pdf * sky_probability_;
+    const float as_light = light.pdf * probability_at(sky_index_, x, n);
     return beside + (as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance);
   }
   // The environment of constant radiance, as far as it is not sampled as a light
@@ -92,7 +96,7 @@ class Lights {
     C3 sampled;    // sampled as a light with the density `pdf`, per steradian
     float pdf;
   };
-  EnvironmentParts environment_parts(const V3& x, const V3& direction) const;
+  EnvironmentParts environment_parts(const V3& x, const V3& n, const V3& direction) const;
   // True if next-event estimation samples a direction by at most one light that paths can also hit when they
   // leave the scene: a sun with an extent, or the sky.
   bool single_environment_sample() const { return suns_.size() + (sky_.sampled() ? 1 : 0) <= 1; }
@@ -110,6 +114,18 @@ class Lights {
   // integrators that do not sample points on segments: for such points the light is chosen before the point.
   void use_tree_in_media() { tree_in_media_ = true; }
   bool has_tree() const { return !tree_.empty(); }
+  // True if set_local() may be called.
+  bool can_be_local() const { return lights_.size() > 1 && lights_.size() <= LocalLights::kMostLights; }
+  // The mean square of next-event estimation at these places, over the square of its mean, if the table
+  // chooses the light. 1 is the least: no light but the chosen one reaches the place.
+  double spread_over(const LightVisits& visits) const;
+  // From this call on, lights are chosen for points on surfaces by what these visits tell; null: no longer.
+  void set_local(const LightVisits* visits);
+  const LocalLights* local() const { return local_.get(); }
+  // This light, as if it had been chosen with this probability.
+  LightChoice choice_of(std::uint32_t light, float probability, const LightNumbers& numbers) const {
+    return chosen(numbers, {light, probability});
+  }
   std::uint64_t tree_bytes() const { return tree_.bytes(); }
   std::uint64_t table_bytes() const;
   std::uint64_t map_bytes() const;  // of the environment map and its portals
@@ -122,10 +138,6 @@ class Lights {
   struct Light {
     VariantOf<AreaKinds, PunctualKinds, DistantKinds> kind;
     float probability = 0;
-  };
-  struct Drawn {
-    std::uint32_t light;
-    float probability;
   };
 
   static bool has_place(const Light& light) {
@@ -158,19 +170,20 @@ class Lights {
   void sort_places_first();
   void build_tree();
   double power(const Light& light) const;
+  bool by_place(const V3& n) const { return local_ && dot(n, n) > 0; }
   bool by_tree(const V3& n) const { return !tree_.empty() && (tree_in_media_ || dot(n, n) > 0); }
-  Drawn only_one() const { return {0, lights_.front().probability}; }
-  Drawn draw(std::uint32_t word) const { return alone_ ? only_one() : by_table(word); }
-  Drawn draw(std::uint32_t word, const V3& x, const V3& n) const;
-  Drawn by_table(std::uint32_t word) const;
-  Drawn from_tree(std::uint32_t word, const V3& x, const V3& n) const;
+  DrawnLight only_one() const { return {0, lights_.front().probability}; }
+  DrawnLight draw(std::uint32_t word) const { return alone_ ? only_one() : by_table(word); }
+  DrawnLight draw(std::uint32_t word, const V3& x, const V3& n) const;
+  DrawnLight by_table(std::uint32_t word) const;
+  DrawnLight from_tree(std::uint32_t word, const V3& x, const V3& n) const;
   float probability_at(std::uint32_t light, const V3& x, const V3& n) const;
   std::uint64_t table_words(std::uint32_t light) const;
-  LightChoice chosen(const LightNumbers& numbers, const Drawn& drawn) const {
+  LightChoice chosen(const LightNumbers& numbers, const DrawnLight& drawn) const {
     const Light& light = lights_[drawn.light];
     return {drawn.light, drawn.probability, has_place(light), is_point(light), numbers};
   }
-  C3 suns(const V3& direction, float pdf) const;
+  C3 suns(const V3& x, const V3& n, const V3& direction, float pdf) const;
 
   std::vector<Light> lights_;
   std::vector<std::uint32_t> suns_;  // indices of the suns in lights_
@@ -182,12 +195,13 @@ class Lights {
   C3 environment_{0, 0, 0};
   std::unique_ptr<const EnvironmentMap> map_;
   std::unique_ptr<const Portals> portals_;
-  SkyLight sky_;  // a copy of that among lights_, if it is there
-  float sky_probability_ = 0;
+  SkyLight sky_;                 // a copy of that among lights_, if it is there
+  std::uint32_t sky_index_ = 0;  // its place among lights_
   // If there are many lights, those with a position come first in the list and are in the tree. The first
   // words of the table choose these lights; at each point the tree redistributes these words among them,
   // except every kTableShare-th word, which the table keeps.
   LightTree tree_;
+  std::unique_ptr<const LocalLights> local_;
   std::uint64_t tree_words_ = 0, table_words_ = 0;
   bool tree_in_media_ = false;
   bool any_with_place_ = false;

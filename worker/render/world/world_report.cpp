@@ -73,6 +73,7 @@ TechniqueSet techniques_of(const World& w) {
   put(w.sky_samples, Technique::sky_samples);
   put(w.mean_radiance > 0, Technique::path_splitting);
   put(w.lights.portals(), Technique::sky_portals);
+  put(w.lights.local(), Technique::local_lights);
   return set;
 }
 
@@ -105,6 +106,7 @@ WorldReport describe(const World& w) {
   feature(techniques.has(Technique::sky_samples), "second directions that look for the sky");
   feature(techniques.has(Technique::shadow_roulette), "shadow rays at random where they could bring little");
   feature(techniques.has(Technique::sky_portals), "directions towards the sky through openings");
+  feature(techniques.has(Technique::local_lights), "lights chosen by what reaches a place");
   feature(techniques.has(Technique::path_splitting), "paths that split, or end, by what their pixel shows");
   feature(w.camera.has_lens(), "thin lens");
   feature(!w.geometry.instances.empty(), "instances of groups");

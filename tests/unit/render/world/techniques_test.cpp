@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "tests/support/lamp_room.h"
+#include "tests/support/lamp_rooms.h"
 #include "tests/support/lit_cloud.h"
 #include "tests/support/render_check.h"
 #include "tests/support/significance.h"
@@ -79,7 +80,8 @@ std::vector<Case> cases() {
           {Technique::shadow_roulette, test::lit_cloud({24, 16})},
           {Technique::sky_samples, test::sky_yard({24, 16})},
           {Technique::path_splitting, test::lit_cloud({24, 16})},
-          {Technique::sky_portals, test::SkyRoom{}.builder({24, 16})}};
+          {Technique::sky_portals, test::SkyRoom{}.builder({24, 16})},
+          {Technique::local_lights, test::LampRooms{}.builder({24, 16})}};
 }
 
 // What off_switch() says, done to the description that the reader would make of it.
@@ -99,6 +101,7 @@ SceneBuilder switched_off(const Case& c) {
       {"sky_samples", [&] { i.sky_samples = -1; }},
       {"path_splitting", [&] { i.path_splitting = -1; }},
       {"sky_portals", [&] { i.sky_portals = -1; }},
+      {"local_lights", [&] { i.local_lights = -1; }},
       {"distance", [&] {
          i.distance =
              off.value == "exponential" ? DistanceSampling::exponential : DistanceSampling::equiangular;

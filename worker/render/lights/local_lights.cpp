@@ -1,0 +1,136 @@
+#include "worker/render/lights/local_lights.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+namespace ls::render {
+namespace {
+
+// Share of the choices that is made by the usual table.
+constexpr double kTablePart = .25;
+// A cell is divided if it has more visits than this.
+constexpr std::ptrdiff_t kVisitsOfCell = 32;
+// What a cell's visits tell counts as much as this many visits with the mean of the cell around it.
+constexpr double kVisitsOfParent = 16;
+constexpr std::size_t kSides = 6;
+
+// The side to which a normal faces: its longest component, and the sign of that.
+std::size_t side_of(const V3& n) {
+  const V3 size(std::abs(n.x), std::abs(n.y), std::abs(n.z));
+  const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  return static_cast<std::size_t>(2 * axis + (n[axis] < 0 ? 1 : 0));
+}
+
+}  // namespace
+
+void LightVisits::add(const V3& p, const V3& n, std::span<const float> found) {
+  double all = 0;
+  for (const float v : found) all += double{v};
+  if (!(all > 0) || !std::isfinite(all)) return;
+  places.push_back({p, n});
+  for (const float v : found) values.push_back(static_cast<float>(double{v} / all));
+}
+
+void LightVisits::add(const LightVisits& more) {
+  places.insert(places.end(), more.places.begin(), more.places.end());
+  values.insert(values.end(), more.values.begin(), more.values.end());
+}
+
+struct LocalLights::Builder {
+  using Index = std::uint32_t;
+  using Means = std::vector<double>;  // of the squared value of each light
+
+  LocalLights& of;
+  const LightVisits& visits;
+  std::span<const double> table;
+
+  Means means(std::span<const Index> some, const Means& around) const {
+    Means sums(of.lights_, 0.);
+    for (const Index i : some)
+      for (std::size_t l = 0; l < of.lights_; ++l) {
+        const double v = double{visits.values[i * of.lights_ + l]};
+        sums[l] += v * v;
+      }
+    const double of_parent = around.empty() ? 0 : kVisitsOfParent;
+    const double count = static_cast<double>(some.size()) + of_parent;
+    for (std::size_t l = 0; l < of.lights_; ++l)
+      sums[l] = count > 0 ? (sums[l] + (around.empty() ? 0 : of_parent * around[l])) / count : 0;
+    return sums;
+  }
+
+  void add_leaf(std::size_t node, const Means& squares) {
+    double sum = 0;
+    for (const double s : squares) sum += std::sqrt(s);
+    std::vector<double> p(of.lights_);
+    for (std::size_t l = 0; l < of.lights_; ++l)
+      p[l] = kTablePart * table[l] + (1 - kTablePart) * (sum > 0 ? std::sqrt(squares[l]) / sum : table[l]);
+    of.nodes_[node].next = static_cast<std::uint32_t>(of.tables_.size());
+    append_light_table(p, of.tables_);
+  }
+
+  void build(std::size_t node, std::span<Index> some, const Means& around) {
+    const Means squares = means(some, around);
+    V3 low(kInfinity), high(-kInfinity);
+    for (const Index i : some)
+      for (int c = 0; c < 3; ++c) {
+        low[c] = std::min(low[c], visits.places[i].p[c]);
+        high[c] = std::max(high[c], visits.places[i].p[c]);
+      }
+    const V3 extent = high - low;
+    const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
+    if (std::ssize(some) <= kVisitsOfCell || !(extent[axis] > 0) || !std::isfinite(extent[axis]))
+      return add_leaf(node, squares);
+    const auto at = [&](Index i) { return visits.places[i].p[axis]; };
+    const auto middle = some.begin() + std::ssize(some) / 2;
+    std::ranges::nth_element(some, middle, {}, at);
+    // Points on the plane are above it. If half of the points are at the low end, the rest is above.
+    float plane = at(*middle);
+    if (!(plane > low[axis])) {
+      plane = high[axis];
+      for (const Index i : some)
+        if (at(i) > low[axis]) plane = std::min(plane, at(i));
+    }
+    const auto above = std::ranges::partition(some, [&](Index i) { return at(i) < plane; }).begin();
+    const std::size_t first = of.nodes_.size();
+    of.nodes_.resize(first + 2);
+    of.nodes_[node] = {plane, static_cast<std::uint32_t>(first), static_cast<std::uint8_t>(axis)};
+    build(first, {some.begin(), above}, squares);
+    build(first + 1, {above, some.end()}, squares);
+  }
+};
+
+LocalLights::LocalLights(const LightVisits& visits, std::span<const double> table) : lights_(table.size()) {
+  Builder builder{*this, visits, table};
+  std::array<std::vector<Builder::Index>, kSides> sides;
+  for (std::size_t i = 0; i < visits.places.size(); ++i)
+    sides[side_of(visits.places[i].n)].push_back(static_cast<Builder::Index>(i));
+  std::vector<Builder::Index> all(visits.places.size());
+  std::iota(all.begin(), all.end(), Builder::Index{0});
+  const Builder::Means means = builder.means(all, {});
+  nodes_.resize(kSides);
+  for (std::size_t side = 0; side < kSides; ++side) builder.build(side, sides[side], means);
+}
+
+std::span<const std::uint32_t> LocalLights::table_at(const V3& p, const V3& n) const {
+  const Node* node = &nodes_[side_of(n)];
+  while (node->axis != kLeaf) node = &nodes_[node->next + (p[node->axis] < node->plane ? 0 : 1)];
+  return {tables_.data() + node->next, lights_};
+}
+
+DrawnLight LocalLights::draw(std::uint32_t word, const V3& p, const V3& n) const {
+  const auto last = table_at(p, n);
+  const std::uint32_t light = light_of_word(last, word);
+  return {light, probability_in_table(last, light)};
+}
+
+float LocalLights::probability(std::uint32_t light, const V3& p, const V3& n) const {
+  return probability_in_table(table_at(p, n), light);
+}
+
+std::uint64_t LocalLights::bytes() const {
+  return nodes_.size() * sizeof(Node) + tables_.size() * sizeof(tables_[0]);
+}
+
+}  // namespace ls::render
