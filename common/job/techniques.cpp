@@ -30,7 +30,7 @@ constexpr std::array kRows{
     TechniqueRow{Technique::sky_portals, "sky_portals",
                  "looks for the sky through the openings by which its light enters"},
     TechniqueRow{Technique::local_lights, "local_lights",
-                 "chooses lights by which of them reach places like the one that is lit"}};
+                 "chooses lights by which of them reach the place that is lit"}};
 
 constexpr bool in_order() {
   for (std::size_t i = 0; i < kRows.size(); ++i)

@@ -56,19 +56,29 @@ TEST(LocalLights, GiveTheSameImageAsTheTableOfAllLights) {
     sky(b);
     shared(b);
   };
+  const auto shared_sun = [=](SceneBuilder& b) {
+    wide_sun(b);
+    shared(b);
+  };
+  const auto by_path = [](SceneBuilder& b) { b.scene.integrator.name = "path"; };
+  // Most lamps are hit by paths that were scattered on a camera segment
   const auto camera_points = [=](SceneBuilder& b) {
     sun(b);
+    b.scene.phases[0] = HgPhase{.9};
+    b.scene.integrator.max_depth = 2;
+    b.scene.integrator.light_vertices = -1;
     b.scene.integrator.camera_points = 2;
   };
   const Rival rivals[] = {
       {"lamps", {}},
-      {"lamps, glossy", {.glossy = true}},
+      {"lamps, glossy, by `path`", {.glossy = true}, by_path},
       {"lamps without extent in fog", {.points = true, .fog = .4}},
-      {"lamps in fog, and a sun at points on camera segments", {.fog = .2}, camera_points, "aimed"},
+      {"lamps in fog, and a sun at points on camera segments", {.fog = .2}, camera_points, "aimed", 48},
       {"lamps in a grid", {.fog = .4, .grid = true}},
       {"many lamps", {.lamps = 40}},
       {"shared paths", {.fog = .4}, shared, "shared"},
       {"shared paths under a sky", {.glossy = true}, shared_sky, "shared"},
+      {"shared paths, wide sun", {}, shared_sun, "shared"},
       {"sun, connected", {.fog = .3, .grid = true}, connected, "connected"},
       {"wide sun", {}, wide_sun},
       {"sky with an image", {.glossy = true}, sky},

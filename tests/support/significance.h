@@ -83,7 +83,7 @@ inline constexpr std::array kShares = {Share{Family::chi_square, "bsdf/sampling"
                                        Share{Family::scenes, "property/lit_disk", 1},
                                        Share{Family::scenes, "property/path_reuse", 216},
                                        Share{Family::scenes, "property/sky_portals", 13 * 12},
-                                       Share{Family::scenes, "property/local_lights", 12 * 12},
+                                       Share{Family::scenes, "property/local_lights", 13 * 12},
                                        Share{Family::scenes, "property/light_tree", 12},
                                        Share{Family::scenes, "property/pruned", 720},
                                        Share{Family::scenes, "property/twins", 120},

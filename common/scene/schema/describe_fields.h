@@ -109,14 +109,13 @@ void describe(V& v, T& i) {
            .elided = true,
            .only_of = {"volpath", "path"}},
           i.sky_portals);
-  v.field(
-      {.name = "local_lights",
-       .doc = "whether surfaces choose among 2 to 64 lights by which of them reach places like theirs, as "
-              "camera paths learned it; 0: if that pays; -1: never; 1: where it is possible",
-       .range = {-1, 1},
-       .elided = true,
-       .only_of = {"volpath", "path"}},
-      i.local_lights);
+  v.field({.name = "local_lights",
+           .doc = "whether 2 to 64 lights are chosen by which of them reach the place that is lit, as camera "
+                  "paths learned it; 0: if that pays; -1: never; 1: where it is possible",
+           .range = {-1, 1},
+           .elided = true,
+           .only_of = {"volpath", "path"}},
+          i.local_lights);
   v.field({.name = "path_splitting",
            .doc = "in scenes with grids, whether paths split at their first scattering if it "
                   "is in a grid, and Russian roulette compares their weight with that behind the first "

@@ -44,7 +44,7 @@ std::vector<double> claimed(const LightBench& b, const V3& x, const V3& n) {
     EXPECT_TRUE(g.complete({PrimitiveId::Kind::disk, static_cast<std::uint32_t>(i)}, x, way, hit));
     const double area = M_PI * d.u.cross(d.v).length(), cosine = std::abs(dot(hit.ng, way));
     p[g.surfaces[d.surface].light] =
-        b.world->lights.pdf(hit, x, way, n) * area * cosine / dot(hit.p - x, hit.p - x);
+        b.world->lights.pdf(hit, x, way, {x, n}) * area * cosine / dot(hit.p - x, hit.p - x);
   }
   return p;
 }
@@ -65,7 +65,7 @@ TEST(LightChoice, IsMadeAsOftenAsAHitClaims) {
         RandomStream r(3);
         for (int i = 0; i < kSamples; ++i) {
           const std::uint32_t word = r.bits(), u = r.bits(), v = r.bits();
-          const LightChoice c = b.world->lights.choose({word, u, v}, x, n);
+          const LightChoice c = b.world->lights.choose({word, u, v}, {x, n});
           // Lights without a surface are all but the disks.
           ++got[p[c.light] > 0 ? c.light : p.size() - 1];
         }

@@ -87,8 +87,7 @@ double density(const LightBench& b, const V3& x, const V3& d) {
   if (id && w.geometry.complete(*id, x, d, hit) && w.geometry.surfaces[hit.surface].light != kNone)
     return is_black(w.lights.emitted(hit, -d)) ? 0 : double{w.lights.pdf(hit, x, d)};
   // With a density of 1 of its own a ray that leaves is weighted by 1 / (1 + p), which tells p.
-  const C3 alone = w.lights.environment(x, V3(0), d, kInfinity),
-           shared = w.lights.environment(x, V3(0), d, 1);
+  const C3 alone = w.lights.environment(x, d, kInfinity, {}), shared = w.lights.environment(x, d, 1, {});
   return alone.x > 0 ? double{alone.x} / double{shared.x} - 1 : 0;
 }
 

@@ -43,7 +43,7 @@ constexpr int kLongestPortalPath = 4;
 // which look for every light at each surface: from kLocalLightPaths with few lights, from fewer with many. It
 // is tried if next-event estimation at these surfaces has a mean square of more than kSpreadThatPays times
 // the square of its mean. It pays if the noise of direct light in some pixels is more than kLocalGainThatPays
-// times as high without it: a light that reaches the surface costs more than one that does not, so samples
+// times as high without it: a light that reaches the vertex costs more than one that does not, so samples
 // take up to 1.5 times as long, and few pixels hardly show the edges of small patches of light.
 constexpr std::uint64_t kLocalLightPaths = 1 << 14;
 constexpr std::uint64_t kLocalLightLooks = 1 << 17;  // lights times paths
@@ -75,9 +75,11 @@ constexpr float kFaintConnection = .5f;
 constexpr std::uint64_t kLearningSeed = 0x5eed0f1ea2;
 constexpr std::uint64_t kSunRaySeed = 0x5eed0f5a1;
 
-// What is kept besides the sun map, because it takes memory or time
-struct Keep {
+// What is kept besides the sun map, because it takes memory or time; the number of the first path, and how
+// many paths make a batch.
+struct Lesson {
   bool sky = false, lights = false;
+  std::uint64_t first_path = 0, batch = kLearningBatch;
 };
 
 struct Learned {
@@ -85,10 +87,10 @@ struct Learned {
   double radiance = 0;  // sum of the radiances of all paths
   std::uint64_t paths = 0;
 
-  explicit Learned(const World& w, Keep keep = {}) {
+  explicit Learned(const World& w, const Lesson& lesson = {}) {
     learner.map = SunMap(w.sun.direction, w.geometry.radius);
-    learner.keeps_sky = keep.sky;
-    learner.keeps_lights = keep.lights;
+    learner.keeps_sky = lesson.sky;
+    learner.keeps_lights = lesson.lights;
   }
   void add(const Learned& batch) {
     learner.map.add(batch.learner.map);
@@ -109,9 +111,9 @@ struct Learned {
 };
 
 template <Features F, template <Features> class Light>
-Learned learn_batch(const World& w, Keep keep, std::uint64_t first, std::uint64_t end) {
+Learned learn_batch(const World& w, const Lesson& lesson, std::uint64_t first, std::uint64_t end) {
   const FlushDenormals mode;
-  Learned learned(w, keep);
+  Learned learned(w, lesson);
   for (std::uint64_t i = first; i < end && learned.learner.vertices <= kLearningVertices; ++i) {
     const SampleStream stream(kLearningSeed, 0, 0, 2 * i);
     const Group at = stream.group(0, Purpose::guide), lens = stream.group(0, Purpose::camera);
@@ -126,18 +128,21 @@ Learned learn_batch(const World& w, Keep keep, std::uint64_t first, std::uint64_
   return learned;
 }
 
-// Traces up to `paths` camera paths. After the first kFirstBatches, `go_on` is asked whether to trace the
-// rest.
+// Traces camera paths up to the number `paths`. After the first kFirstBatches, `go_on` is asked whether to
+// trace the rest.
 template <Features F, template <Features> class Light, class GoOn>
-Learned learn_with(const World& w, std::uint64_t paths, int threads, const GoOn& go_on, Keep keep) {
+Learned learn_with(const World& w, std::uint64_t paths, int threads, const GoOn& go_on,
+                   const Lesson& lesson) {
   const auto pixels = static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
   const std::uint64_t most = std::min(paths, kLearningPathsPerPixel * pixels);
-  const std::uint64_t batches = (most + kLearningBatch - 1) / kLearningBatch;
+  const std::uint64_t first = std::min(lesson.first_path, most);
+  const std::uint64_t batches = (most - first + lesson.batch - 1) / lesson.batch;
   Learned learned(w);
   in_order(
       threads, batches,
       [&](std::size_t i) {
-        return learn_batch<F, Light>(w, keep, i * kLearningBatch, std::min((i + 1) * kLearningBatch, most));
+        const std::uint64_t begin = first + i * lesson.batch;
+        return learn_batch<F, Light>(w, lesson, begin, std::min(begin + lesson.batch, most));
       },
       [&, taken = std::uint64_t{0}](const Learned& batch) mutable {
         learned.add(batch);
@@ -172,10 +177,11 @@ constexpr Features kAimed = [] {
 }();
 
 template <class GoOn>
-Learned learn(const World& w, std::uint64_t paths, int threads, const GoOn& go_on, Keep keep = {}) {
-  if (w.need.aimed) return learn_with<kAimed, CameraSegmentNee>(w, paths, threads, go_on, keep);
-  return w.need.media ? learn_with<kMedia, VertexNee>(w, paths, threads, go_on, keep)
-                      : learn_with<kSurfaces, VertexNee>(w, paths, threads, go_on, keep);
+Learned learn(const World& w, std::uint64_t paths, int threads, const GoOn& go_on,
+              const Lesson& lesson = {}) {
+  if (w.need.aimed) return learn_with<kAimed, CameraSegmentNee>(w, paths, threads, go_on, lesson);
+  return w.need.media ? learn_with<kMedia, VertexNee>(w, paths, threads, go_on, lesson)
+                      : learn_with<kSurfaces, VertexNee>(w, paths, threads, go_on, lesson);
 }
 
 // True if the path tracers that learn have the features of the world.
@@ -302,25 +308,32 @@ void learn_portals(const IntegratorSettings& settings, int threads, World& w) {
 void learn_local_lights(const IntegratorSettings& settings, int threads, World& w) {
   const bool in_any_case = settings.local_lights > 0;
   if (settings.local_lights < 0 || !w.lights.can_be_local() || !w.depth_allows(1) || !can_learn(w)) return;
-  const std::uint64_t paths = std::min(kLocalLightPaths, kLocalLightLooks / w.lights.count());
-  const auto visits_of = [&](std::uint64_t most) {
+  if (!in_any_case && !pilot_pays(w)) return;
+  const std::uint64_t lights = w.lights.count();
+  const std::uint64_t paths = std::min(kLocalLightPaths, kLocalLightLooks / lights);
+  const auto visits_of = [&](std::uint64_t first, std::uint64_t end) {
     const PilotSettings limits(w, kLearningSeed, kLongestLocalLightPath);
-    return learn(w, most, threads, [](const Connections::Learner&) { return true; }, {.lights = true})
+    const Lesson lesson{.lights = true, .first_path = first, .batch = kLearningBatch / lights};
+    return learn(
+               w, end, threads, [](const Connections::Learner&) { return true; }, lesson)
         .learner.lights;
   };
+  const std::uint64_t trial = paths / kLocalLightTrial;
+  LightVisits visits = visits_of(0, trial);
   if (!in_any_case) {
-    if (!pilot_pays(w)) return;
-    const LightVisits few = visits_of(paths / kLocalLightTrial);
-    if (!(w.lights.spread_over(few) > kSpreadThatPays)) return;
+    if (!(w.lights.spread_over(visits) > kSpreadThatPays)) return;
+    // Direct light is not connected, so no light vertices need be traced
+    const bool connected = std::exchange(w.need.connected, false);
     constexpr int kDirect = 2;  // segments of paths that show direct light
     const auto without = pilot_pixels(w, kDirect, threads);
-    w.lights.set_local(&few);
+    w.lights.set_local(&visits);
     const auto with = pilot_pixels(w, kDirect, threads);
     w.lights.set_local(nullptr);
+    w.need.connected = connected;
     if (!is_noisier(without, with, kLocalGainThatPays)) return;
   }
-  const LightVisits all = visits_of(paths);
-  if (!all.places.empty()) w.lights.set_local(&all);
+  visits.add(visits_of(trial, paths));
+  if (!visits.places.empty()) w.lights.set_local(&visits);
 }
 
 LightVertices trace_light_vertices(const World& w, std::uint64_t set) {
@@ -347,8 +360,8 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
   if (!world) return tl::unexpected(world.error());
   if (settings.integrator == "volpath" || settings.integrator == "path") {
     learn_portals(scene.integrator, threads, **world);
-    learn_local_lights(scene.integrator, threads, **world);
     learn_connections(scene.integrator, threads, **world);
+    learn_local_lights(scene.integrator, threads, **world);
     learn_sky_samples(scene.integrator, **world);
     share_tails(scene.integrator, threads, **world);
     if ((*world)->need.grids && !(*world)->need.connected) learn_roulette(scene.integrator, **world);

@@ -1,6 +1,7 @@
 // Camera paths that are traced before the first sample teach a world which portals the sky's light comes
-// through (lights/portals.h), whether to connect paths to light vertices (lights/light_vertices.h), and which
-// part of the sun's light the light vertices need. The light vertices are traced here, too.
+// through (lights/portals.h), which lights reach which places (lights/local_lights.h), whether to connect
+// paths to light vertices (lights/light_vertices.h), and which part of the sun's light the light vertices
+// need. The light vertices are traced here, too.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +19,8 @@ void learn_connections(const IntegratorSettings& settings, int threads, World& w
 // Sets the portals of a world's lights if they pay. The result depends on the same things as that of
 // learn_connections(), and the integrator must be one of the same.
 void learn_portals(const IntegratorSettings& settings, int threads, World& w);
-// Learns from camera paths which lights reach which places (local_lights.h), and lets surfaces choose lights
-// by that if it pays or the settings ask for it.
+// Lets lights be chosen by place if that pays or the settings ask for it. The result depends on the same
+// things as that of learn_connections(), and the integrator must be one of the same.
 void learn_local_lights(const IntegratorSettings& settings, int threads, World& w);
 
 // Traces the light vertices of one set (LightVertexCache). They depend only on the world, its seed and the

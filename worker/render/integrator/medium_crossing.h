@@ -68,16 +68,18 @@ auto PathTracer<F, Light>::collide(const Medium& medium, Segment segment, const 
   last_ = Vertex{};
   last_.delta = false;
   if (plan.matters()) last_.in_medium = Light<F>::vertex(*this, medium, plan, flight.t);
+  [[maybe_unused]] const LightPlace place = place_on(segment);
   begin_vertex(segment, flight);
   if constexpr (F.aimed) near_lamps_ = LampDirections(world_.lamps, last_.p);
   if constexpr (F.connected) {
+    learn_lights(place, [&](const LightChoice& light) { light_vertex_by(light, medium, last_.p, ray_.d); });
     arrive(previous, last_.p, V3(0));
     prefetch_light_vertices();
   }
   if constexpr (F.reuse) {
     begin_sharing(nullptr, &medium);
     if (looks_for_second())
-      begin_tail({last_.p, &medium, {}}, V3(0), ray_.start, [](const V3&) { return true; });
+      begin_tail({last_.p, &medium, {}}, last_.place, ray_.start, [](const V3&) { return true; });
     else
       Light<F>::at_vertex(*this, medium, last_.p, ray_.d);
   } else {
@@ -115,8 +117,11 @@ auto PathTracer<F, Light>::scatter_in(const Medium& medium) -> Step {
 
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::begin_vertex(Segment segment, const Flight& flight) {
+  const bool by_segment = world_.lights.local_in_media();
+  if (by_segment) last_.place = place_on(segment);
   ray_.advance_to(segment, flight.t);
   last_.p = ray_.origin;
+  if (!by_segment) last_.place.p = last_.p;
   apply(flight);
   if constexpr (F.split) first_in_medium_ = first_in_medium_ || depth_ == 0;
   ++depth_;
@@ -191,8 +196,13 @@ void PathTracer<F, Light>::light_vertex(const Medium& medium, const V3& p, const
   const Lights& lights = world_.lights;
   if (!lights.can_sample()) return;
   const Group g = stream_.group(depth_, Purpose::light);
-  const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]}, p, V3(0));
-  const auto light = lights.sample(choice, p);
+  light_vertex_by(lights.choose({g.bits[0], g.bits[1], g.bits[2]}, last_.place), medium, p, d);
+}
+
+template <Features F, template <Features> class Light>
+void PathTracer<F, Light>::light_vertex_by(const LightChoice& choice, const Medium& medium, const V3& p,
+                                           const V3& d) {
+  const auto light = world_.lights.sample(choice, p);
   if (!light) return;
   const float phase = medium.phase.value(d, light->direction);
   const float sampled = direction_pdf(p, phase, light->direction);

@@ -67,7 +67,7 @@ void PathTracer<F, Light>::look_for_second() {
 // from which light must not be added.
 template <Features F, template <Features> class Light>
 template <class Accepts>
-void PathTracer<F, Light>::begin_tail(const PathVertex& at, const V3& n, const V3& start,
+void PathTracer<F, Light>::begin_tail(const PathVertex& at, const LightPlace& place, const V3& start,
                                       const Accepts& accepts) {
   SharedTail& tail = sharing_.tail;
   tail.usable = true;
@@ -75,7 +75,7 @@ void PathTracer<F, Light>::begin_tail(const PathVertex& at, const V3& n, const V
   tail.passed = passed_;
   if (!world_.lights.can_sample()) return;
   const Group g = stream_.group(depth_, Purpose::light);
-  const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, at.p, n);
+  const LightChoice choice = world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, place);
   const auto light = world_.lights.sample(choice, at.p);
   if (!light || !accepts(light->direction)) return;
   const V3 p = at.medium ? at.p : offset_point(at.hit, light->direction);

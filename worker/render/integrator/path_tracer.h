@@ -13,7 +13,9 @@
 //   void at_vertex(path, medium, p, d)              adds light scattered at that vertex;
 //   Vertex::found_as_light(), (pivot)               total density of next-event estimation over that of the
 //                                                   flight, for lights without a position and for lights with
-//                                                   this pivot. 1 if default-constructed, as on surfaces.
+//                                                   this pivot. 1 if default-constructed, as on surfaces;
+//   Vertex::light_chosen_first()                    true if the vertex's light was chosen by
+//                                                   Lights::choose_before_point().
 #pragma once
 
 #include <algorithm>
@@ -130,7 +132,7 @@ class PathTracer {
   static constexpr bool kSplits = F.grids && !F.connected && !F.reuse;
   struct Vertex {  // where the current ray was scattered
     V3 p{0, 0, 0};
-    V3 n{0, 0, 0};      // shading normal of its surface; 0 in a medium
+    LightPlace place;   // by which lights are chosen for it
     V3 ng{0, 0, 0};     // with F.connected: the geometric normal
     float pdf = 0;      // of the sampled direction
     bool delta = true;  // sampled by a delta lobe or the camera: lights that are hit have full weight
@@ -169,6 +171,7 @@ class PathTracer {
   Step scatter_in(const Medium& medium);
   Step scatter_by_phase(const Medium& medium);
   void light_vertex(const Medium& medium, const V3& p, const V3& d);
+  void light_vertex_by(const LightChoice& choice, const Medium& medium, const V3& p, const V3& d);
   void add_medium_emission_among(float t_max);
   float others_end(std::size_t but, int hero, float t_max, RandomStream streams);
   void add_medium_emission(const Medium& medium, float t_max);
@@ -184,7 +187,12 @@ class PathTracer {
   void light_surface(const SurfaceHit& hit, const V3& wo);
   [[gnu::always_inline]] inline void light_surface_by(const LightChoice& choice, const SurfaceHit& hit,
                                                       const SurfaceInfo& surface, const V3& wo);
-  void learn_lights(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo);
+  template <class LookFor>
+  void learn_lights(const LightPlace& place, const LookFor& look_for);
+  // By which place lights are chosen for the segment ahead.
+  LightPlace place_on(const Segment& segment) const {
+    return {Lights::place_on(ray_.start, ray_.d, segment.length), V3(0)};
+  }
   void look_for_sky(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo, Group numbers);
   // The density with which a vertex in a medium at p samples the direction w; `own` is the density of the
   // phase function.
@@ -239,7 +247,7 @@ class PathTracer {
   void begin_sharing(const SurfaceHit* hit, const Medium* medium);
   void look_for_second();
   template <class Accepts>
-  void begin_tail(const PathVertex& at, const V3& n, const V3& start, const Accepts& accepts);
+  void begin_tail(const PathVertex& at, const LightPlace& place, const V3& start, const Accepts& accepts);
   void go_on_as_tail(const V3& w, const C3& weight);
   Look look_at(const SharedTail& tail, bool own);
   BsdfEval scattered_at_first(const V3& wi);
@@ -507,9 +515,10 @@ void PathTracer<F, Light>::light_surface(const SurfaceHit& hit, const V3& wo) {
   if (!world_.lights.can_sample() || !surface.smooth) return;
   const Group g = stream_.group(depth_, Purpose::light);
   if constexpr (F.connected) {
-    if (connections_.learner && connections_.learner->keeps_lights) learn_lights(hit, surface, wo);
+    learn_lights({hit.p, hit.shading.n},
+                 [&](const LightChoice& light) { light_surface_by(light, hit, surface, wo); });
   }
-  light_surface_by(world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, hit.p, hit.shading.n), hit,
+  light_surface_by(world_.lights.choose({g.bits[0], g.bits[1], g.bits[2]}, {hit.p, hit.shading.n}), hit,
                    surface, wo);
 }
 
@@ -535,9 +544,11 @@ void PathTracer<F, Light>::light_surface_by(const LightChoice& choice, const Sur
               [&] { return world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wi, wo).pdf; });
 }
 
-// Looks for each light, as light_surface() does for the one that is chosen, and keeps what it finds.
+// While the choice of lights is learned: looks for each light by look_for(choice), and keeps what it finds.
 template <Features F, template <Features> class Light>
-void PathTracer<F, Light>::learn_lights(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo) {
+template <class LookFor>
+void PathTracer<F, Light>::learn_lights(const LightPlace& place, const LookFor& look_for) {
+  if (!connections_.learner || !connections_.learner->keeps_lights) return;
   const C3 beta = std::exchange(beta_, C3(1)), radiance = outcome_.radiance;
   Connections::Learner* const learner = std::exchange(connections_.learner, nullptr);
   RandomStream numbers = stream_.stream(depth_, Purpose::guide);
@@ -545,10 +556,10 @@ void PathTracer<F, Light>::learn_lights(const SurfaceHit& hit, const SurfaceInfo
   for (std::uint32_t i = 0; i < world_.lights.count(); ++i) {
     outcome_.radiance = C3(0);
     const std::uint32_t x = numbers.bits(), y = numbers.bits();
-    light_surface_by(world_.lights.choice_of(i, 1, {0, x, y}), hit, surface, wo);
+    look_for(world_.lights.choice_of(i, 1, {0, x, y}));
     found.push_back(mean(outcome_.radiance));
   }
-  learner->lights.add(hit.p, hit.shading.n, found);
+  learner->lights.add(place.p, place.n, found);
   connections_.learner = learner;
   beta_ = beta;
   outcome_.radiance = radiance;
@@ -598,7 +609,7 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
     const bool shared = surface.smooth && !hit.normal_replaced;
     if (shared) begin_sharing(&hit, nullptr);
     if (shared && looks_for_second()) {
-      begin_tail({hit.p, nullptr, hit}, hit.shading.n, hit.p,
+      begin_tail({hit.p, nullptr, hit}, {hit.p, hit.shading.n}, hit.p,
                  [&](const V3& w) { return (dot(w, hit.shading.n) > 0) == (dot(w, hit.ng) > 0); });
     } else {
       light_surface(hit, wo);
@@ -631,7 +642,7 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
   if (s->transmitted) eta_scale_ *= s->eta * s->eta;
   last_ = Vertex{};
   last_.p = hit.p;
-  last_.n = hit.shading.n;
+  last_.place = {hit.p, hit.shading.n};
   last_.pdf = s->pdf;
   last_.delta = s->delta;
   if constexpr (F.connected) {
@@ -713,7 +724,8 @@ void PathTracer<F, Light>::add_emission(const SurfaceHit& hit) {
   if (is_black(emitted)) return;
   float weight = 1;
   if (!last_.delta) {
-    const float p_l = world_.lights.pdf(hit, last_.p, ray_.d, last_.n, last_.in_medium.light_chosen_first());
+    const float p_l =
+        world_.lights.pdf(hit, last_.p, ray_.d, last_.place, last_.in_medium.light_chosen_first());
     if constexpr (F.reuse) {
       if (is_leaving_second()) {
         keep_emitted(emitted, p_l);
@@ -730,14 +742,14 @@ void PathTracer<F, Light>::add_environment() {
   if (!world_.lights.has_environment() || (depth_ == 0 && world_.hide_emitters)) return;
   if constexpr (F.reuse) {
     if (is_leaving_second()) {
-      const Lights::EnvironmentParts parts = world_.lights.environment_parts(last_.p, last_.n, ray_.d);
+      const Lights::EnvironmentParts parts = world_.lights.environment_parts(last_.p, ray_.d, last_.place);
       keep_emitted(parts.sampled, parts.pdf);
       add(beta_ * parts.unsampled);
       return;
     }
   }
   const float pdf = last_.pdf / last_.in_medium.found_as_light();
-  C3 light = world_.lights.environment(last_.p, last_.n, ray_.d, last_.delta ? kInfinity : pdf);
+  C3 light = world_.lights.environment(last_.p, ray_.d, last_.delta ? kInfinity : pdf, last_.place);
   if constexpr (F.connected) {
     if (connections_.learner && !last_.delta && !is_black(light)) {
       ++connections_.learner->left;

@@ -70,14 +70,16 @@ class SegmentNee {
       const Group g = path.stream_.group(path.segment_, Purpose::distance);
       for (int i = 0; i < points; ++i) {
         const Group at = point_of(g, i, points);
-        const LightChoice choice = lights.choose({at.bits[0], at.bits[1], at.bits[2]});
+        const LightChoice choice =
+            lights.choose_before_point({at.bits[0], at.bits[1], at.bits[2]}, path.place_on(segment));
         propose(path, medium, segment, plan, choice, false, at.bits[3], stream);
       }
     }
     if (plan.angles) {
       RandomStream stream = path.stream_.stream(path.segment_, Purpose::track_segment);
       const Group g = path.stream_.group(path.segment_, Purpose::segment);
-      const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]});
+      const LightChoice choice =
+          lights.choose_before_point({g.bits[0], g.bits[1], g.bits[2]}, path.place_on(segment));
       if (choice.has_place || path.world_.distance == DistanceSampling::equiangular)
         propose(path, medium, segment, plan, choice, choice.has_place, g.bits[3], stream);
     }

@@ -70,8 +70,7 @@ class VertexNee {
       return uses_equiangular(false) ? 1 + equiangular_ratio(pivot) : 1.f;
     }
     static float found_as_light() { return 1; }
-    // True if the light that was sampled for this vertex was chosen before the vertex was known, although
-    // others are chosen after it.
+    // True if the light that was sampled for this vertex was chosen by Lights::choose_before_point().
     static bool light_chosen_first() { return false; }
   };
 
@@ -108,7 +107,7 @@ class VertexNee {
     const Lights& lights = path.world_.lights;
     if (!lights.can_sample()) return;
     const Group g = path.stream_.group(path.depth_, Purpose::light);
-    const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]}, p, V3(0));
+    const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]}, path.last_.place);
     const auto light = lights.sample(choice, p);
     if (!light) return;
     const float phase = medium.phase.value(d, light->direction);
@@ -148,7 +147,8 @@ class VertexNee {
   [[gnu::noinline]] static void sample_equiangular(Path& path, const Medium& medium, Segment segment) {
     const Lights& lights = path.world_.lights;
     const Group g = path.stream_.group(path.segment_, Purpose::segment);
-    const LightChoice choice = lights.choose({g.bits[0], g.bits[1], g.bits[2]});
+    const LightChoice choice =
+        lights.choose_before_point({g.bits[0], g.bits[1], g.bits[2]}, path.place_on(segment));
     if (!choice.has_place || (points_only(medium) && !choice.is_point)) return;
     const OpticalDepthIn<F> depths(medium, path.ray_.start, path.ray_.d, segment.length);
     const float length = depths.to() - depths.from();

@@ -102,26 +102,27 @@ std::uint64_t Lights::table_words(std::uint32_t i) const {
   return (end + kTableShare - 1) / kTableShare - (first + kTableShare - 1) / kTableShare;
 }
 
-DrawnLight Lights::draw(std::uint32_t word, const V3& x, const V3& n) const {
-  if (by_place(n)) return local_->draw(word, x, n);
-  return by_tree(n) ? from_tree(word, x, n) : by_table(word);
+DrawnLight Lights::draw(std::uint32_t word, const LightPlace& place) const {
+  if (by_place(place)) return local_->draw(word, place.p, place.n);
+  return by_tree(place) ? from_tree(word, place) : by_table(word);
 }
 
-DrawnLight Lights::from_tree(std::uint32_t word, const V3& x, const V3& n) const {
+DrawnLight Lights::from_tree(std::uint32_t word, const LightPlace& place) const {
   if (word >= tree_words_) return draw(word);
   const std::uint64_t words = tree_words_ - table_words_;
   if (word >= table_words_) {
-    const LightTree::Found found = tree_.find(word - table_words_, words, x, n);
+    const LightTree::Found found = tree_.find(word - table_words_, words, place.p, place.n);
     return {found.light, probability_of_words(found.words + table_words(found.light))};
   }
   const std::uint32_t i = draw(static_cast<std::uint32_t>(word * kTableShare)).light;
-  return {i, probability_of_words(tree_.words_of(i, words, x, n) + table_words(i))};
+  return {i, probability_of_words(tree_.words_of(i, words, place.p, place.n) + table_words(i))};
 }
 
-float Lights::probability_at(std::uint32_t i, const V3& x, const V3& n) const {
-  if (by_place(n)) return local_->probability(i, x, n);
-  if (!by_tree(n) || !has_place(lights_[i])) return lights_[i].probability;
-  return probability_of_words(tree_.words_of(i, tree_words_ - table_words_, x, n) + table_words(i));
+float Lights::probability_at(std::uint32_t i, const LightPlace& place) const {
+  if (by_place(place)) return local_->probability(i, place.p, place.n);
+  if (!by_tree(place) || !has_place(lights_[i])) return lights_[i].probability;
+  return probability_of_words(tree_.words_of(i, tree_words_ - table_words_, place.p, place.n) +
+                              table_words(i));
 }
 
 }  // namespace ls::render

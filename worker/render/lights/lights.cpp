@@ -142,10 +142,11 @@ C3 Lights::emitted(const SurfaceHit& hit, const V3& w) const {
                    [&](const AreaLight& l) { return l.emitted(world(), hit.uv, &hit.face, dot(hit.ng, w)); });
 }
 
-float Lights::pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const V3& n,
+float Lights::pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const LightPlace& place,
                   bool before_point) const {
   const std::uint32_t light = geometry_->surfaces[hit.surface].light;
-  const float p = before_point ? lights_[light].probability : probability_at(light, x, n);
+  const float p =
+      before_point && !by_place(place) ? lights_[light].probability : probability_at(light, place);
   return with_area(hit, [&](const auto& l) { return l.pdf(world(), hit, x, direction, p); });
 }
 
@@ -182,24 +183,25 @@ std::uint64_t Lights::map_bytes() const {
   return (map_ ? map_->bytes() : 0) + (portals_ ? portals_->bytes() : 0);
 }
 
-Lights::EnvironmentParts Lights::environment_parts(const V3& x, const V3& n, const V3& direction) const {
+Lights::EnvironmentParts Lights::environment_parts(const V3& x, const V3& direction,
+                                                   const LightPlace& place) const {
   EnvironmentParts parts{environment_, C3(0), 0};
   if (sky_.sampled()) {
     const EnvironmentMap::Light light = sky_.from(x, direction);
     parts.sampled = light.radiance;
-    parts.pdf = light.pdf * probability_at(sky_index_, x, n);
+    parts.pdf = light.pdf * probability_at(sky_index_, place);
   } else if (!suns_.empty()) {
     const SunLight& sun = *std::get_if<SunLight>(&lights_[suns_.front()].kind);
     parts.sampled = sun.found(direction, kInfinity, 1);
-    parts.pdf = sun.density * probability_at(suns_.front(), x, n);
+    parts.pdf = sun.density * probability_at(suns_.front(), place);
   }
   return parts;
 }
 
-C3 Lights::suns(const V3& x, const V3& n, const V3& direction, float pdf) const {
+C3 Lights::suns(const V3& direction, float pdf, const LightPlace& place) const {
   C3 sum(0);
   for (const std::uint32_t i : suns_)
-    sum += std::get_if<SunLight>(&lights_[i].kind)->found(direction, pdf, probability_at(i, x, n));
+    sum += std::get_if<SunLight>(&lights_[i].kind)->found(direction, pdf, probability_at(i, place));
   return sum;
 }
 

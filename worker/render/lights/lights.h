@@ -29,6 +29,13 @@ struct LightChoice {
   LightNumbers numbers;
 };
 
+// What the choice of a light depends on: a point on a surface and its normal or, in a medium, n = 0 and the
+// point itself. Where lights are chosen by place in media, too, that point belongs to the segment instead
+// (Lights::place_on), so that the choice is the same for all points of a segment.
+struct LightPlace {
+  V3 p{0, 0, 0}, n{0, 0, 0};
+};
+
 class Lights {
  public:
   // Builds the list of the scene's lights and sets the light index of the surfaces of `geometry`. Lights
@@ -54,12 +61,20 @@ class Lights {
   // Chooses a light before the shaded point is known: with probability 1/2 in proportion to power, else
   // uniformly.
   LightChoice choose(const LightNumbers& numbers) const { return chosen(numbers, draw(numbers.light)); }
-  // Chooses a light for the point x on a surface of normal n, or in a medium (n = 0). If there are many
-  // lights, they are chosen by a tree (light_tree.h); of few, by what was learned about places like x
-  // (local_lights.h).
-  LightChoice choose(const LightNumbers& numbers, const V3& x, const V3& n) const {
-    return chosen(numbers, alone_ ? only_one() : draw(numbers.light, x, n));
+  // Chooses a light for a place: by what was learned about places like this (local_lights.h) or, if nothing
+  // was learned and there are many lights, by a tree (light_tree.h).
+  LightChoice choose(const LightNumbers& numbers, const LightPlace& place) const {
+    return chosen(numbers, alone_ ? only_one() : draw(numbers.light, place));
   }
+  // Chooses a light for a segment in a medium, before the point on the segment is known.
+  LightChoice choose_before_point(const LightNumbers& numbers, const LightPlace& place) const {
+    return by_place(place) ? choose(numbers, place) : choose(numbers);
+  }
+  // The place by which lights are chosen in media, if they are chosen by place there.
+  static V3 place_on(const V3& start, const V3& direction, float length) {
+    return std::isfinite(length) ? start + direction * (length / 2) : start;
+  }
+  bool local_in_media() const { return local_ && local_->in_media(); }
   // The pivot of the chosen light, which must have a position.
   Pivot pivot(const LightChoice& choice) const;
   // Samples the light that arrives at x from the chosen light. Returns nullopt if no light can arrive: if x
@@ -70,22 +85,22 @@ class Lights {
   // viewer.
   C3 emitted(const SurfaceHit& hit, const V3& w) const;
   // Density, per steradian at x and including the choice of the light, with which sample() finds the point
-  // `hit` of a surface light after choose(numbers, x, n) or, if `before_point`, after choose(numbers).
+  // `hit` of a surface light after choose(numbers, place) or, if `before_point`, after choose_before_point().
   // `direction` points from x to the hit.
-  float pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const V3& n = V3(0),
+  float pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const LightPlace& place = {},
             bool before_point = false) const;
   Pivot pivot(const SurfaceHit& hit) const;
   // Environment radiance for a path that leaves the scene from x in this direction (a unit vector), weighted
-  // against sampling the environment as a light at x, a point on a surface of normal n or in a medium (n =
-  // 0). `pdf` is the density, per steradian, with which the path sampled the direction. Infinity gives the
-  // full radiance, for directions that were not sampled. Without portals a constant environment is never
-  // sampled as a light, since it is smooth and paths find it when they leave.
-  C3 environment(const V3& x, const V3& n, const V3& direction, float pdf) const {
-    const C3 beside = suns_.empty() ? environment_ : environment_ + suns(x, n, direction, pdf);
+  // against sampling the environment as a light at x, chosen by `place`. `pdf` is the density, per steradian,
+  // with which the path sampled the direction. Infinity gives the full radiance, for directions that were not
+  // sampled. Without portals a constant environment is never sampled as a light, since it is smooth and paths
+  // find it when they leave.
+  C3 environment(const V3& x, const V3& direction, float pdf, const LightPlace& place) const {
+    const C3 beside = suns_.empty() ? environment_ : environment_ + suns(direction, pdf, place);
     if (!sky_.sampled()) return beside;
     if (std::isinf(pdf)) return beside + sky_.radiance(direction);
     const EnvironmentMap::Light light = sky_.from(x, direction);
-    const float as_light = light.pdf * probability_at(sky_index_, x, n);
+    const float as_light = light.pdf * probability_at(sky_index_, place);
     return beside + (as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance);
   }
   // The environment of constant radiance, as far as it is not sampled as a light
@@ -96,7 +111,7 @@ class Lights {
     C3 sampled;    // sampled as a light with the density `pdf`, per steradian
     float pdf;
   };
-  EnvironmentParts environment_parts(const V3& x, const V3& n, const V3& direction) const;
+  EnvironmentParts environment_parts(const V3& x, const V3& direction, const LightPlace& place) const;
   // True if next-event estimation samples a direction by at most one light that paths can also hit when they
   // leave the scene: a sun with an extent, or the sky.
   bool single_environment_sample() const { return suns_.size() + (sky_.sampled() ? 1 : 0) <= 1; }
@@ -114,12 +129,16 @@ class Lights {
   // integrators that do not sample points on segments: for such points the light is chosen before the point.
   void use_tree_in_media() { tree_in_media_ = true; }
   bool has_tree() const { return !tree_.empty(); }
+  // True if lights are chosen by the tree at some places. `media`: the scene has media.
+  bool uses_tree(bool media) const {
+    return has_tree() && (!local_ || (media && tree_in_media_ && !local_in_media()));
+  }
   // True if set_local() may be called.
   bool can_be_local() const { return lights_.size() > 1 && lights_.size() <= LocalLights::kMostLights; }
   // The mean square of next-event estimation at these places, over the square of its mean, if the table
-  // chooses the light. 1 is the least: no light but the chosen one reaches the place.
+  // chooses the light. It is at least 1, as where each light brings the share that it has in the table.
   double spread_over(const LightVisits& visits) const;
-  // From this call on, lights are chosen for points on surfaces by what these visits tell; null: no longer.
+  // From this call on, lights are chosen by what these visits tell; null: no longer.
   void set_local(const LightVisits* visits);
   const LocalLights* local() const { return local_.get(); }
   // This light, as if it had been chosen with this probability.
@@ -170,20 +189,23 @@ class Lights {
   void sort_places_first();
   void build_tree();
   double power(const Light& light) const;
-  bool by_place(const V3& n) const { return local_ && dot(n, n) > 0; }
-  bool by_tree(const V3& n) const { return !tree_.empty() && (tree_in_media_ || dot(n, n) > 0); }
+  static bool on_surface(const LightPlace& place) { return dot(place.n, place.n) > 0; }
+  bool by_place(const LightPlace& place) const { return local_ && (local_->in_media() || on_surface(place)); }
+  bool by_tree(const LightPlace& place) const {
+    return !tree_.empty() && (tree_in_media_ || on_surface(place));
+  }
   DrawnLight only_one() const { return {0, lights_.front().probability}; }
   DrawnLight draw(std::uint32_t word) const { return alone_ ? only_one() : by_table(word); }
-  DrawnLight draw(std::uint32_t word, const V3& x, const V3& n) const;
+  DrawnLight draw(std::uint32_t word, const LightPlace& place) const;
   DrawnLight by_table(std::uint32_t word) const;
-  DrawnLight from_tree(std::uint32_t word, const V3& x, const V3& n) const;
-  float probability_at(std::uint32_t light, const V3& x, const V3& n) const;
+  DrawnLight from_tree(std::uint32_t word, const LightPlace& place) const;
+  float probability_at(std::uint32_t light, const LightPlace& place) const;
   std::uint64_t table_words(std::uint32_t light) const;
   LightChoice chosen(const LightNumbers& numbers, const DrawnLight& drawn) const {
     const Light& light = lights_[drawn.light];
     return {drawn.light, drawn.probability, has_place(light), is_point(light), numbers};
   }
-  C3 suns(const V3& x, const V3& n, const V3& direction, float pdf) const;
+  C3 suns(const V3& direction, float pdf, const LightPlace& place) const;
 
   std::vector<Light> lights_;
   std::vector<std::uint32_t> suns_;  // indices of the suns in lights_

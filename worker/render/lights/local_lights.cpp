@@ -8,16 +8,17 @@
 namespace ls::render {
 namespace {
 
-// Share of the choices that is made by the usual table.
+// Share of the choices that is made by the table of all lights.
 constexpr double kTablePart = .25;
 // A cell is divided if it has more visits than this.
 constexpr std::ptrdiff_t kVisitsOfCell = 32;
 // What a cell's visits tell counts as much as this many visits with the mean of the cell around it.
 constexpr double kVisitsOfParent = 16;
-constexpr std::size_t kSides = 6;
+constexpr std::size_t kSides = 7, kInMedia = 6;
 
-// The side to which a normal faces: its longest component, and the sign of that.
+// The side to which a normal faces: its longest component, and the sign of that. Points in media have none.
 std::size_t side_of(const V3& n) {
+  if (n == V3(0)) return kInMedia;
   const V3 size(std::abs(n.x), std::abs(n.y), std::abs(n.z));
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   return static_cast<std::size_t>(2 * axis + (n[axis] < 0 ? 1 : 0));
@@ -28,7 +29,7 @@ std::size_t side_of(const V3& n) {
 void LightVisits::add(const V3& p, const V3& n, std::span<const float> found) {
   double all = 0;
   for (const float v : found) all += double{v};
-  if (!(all > 0) || !std::isfinite(all)) return;
+  if (!(all > 0) || !std::isfinite(all) || !is_finite(p)) return;
   places.push_back({p, n});
   for (const float v : found) values.push_back(static_cast<float>(double{v} / all));
 }
@@ -82,17 +83,21 @@ struct LocalLights::Builder {
     const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
     if (std::ssize(some) <= kVisitsOfCell || !(extent[axis] > 0) || !std::isfinite(extent[axis]))
       return add_leaf(node, squares);
-    const auto at = [&](Index i) { return visits.places[i].p[axis]; };
-    const auto middle = some.begin() + std::ssize(some) / 2;
-    std::ranges::nth_element(some, middle, {}, at);
+    std::vector<float> coordinates;
+    for (const Index i : some) coordinates.push_back(visits.places[i].p[axis]);
+    const auto middle = coordinates.begin() + std::ssize(coordinates) / 2;
+    std::ranges::nth_element(coordinates, middle);
     // Points on the plane are above it. If half of the points are at the low end, the rest is above.
-    float plane = at(*middle);
+    float plane = *middle;
     if (!(plane > low[axis])) {
       plane = high[axis];
-      for (const Index i : some)
-        if (at(i) > low[axis]) plane = std::min(plane, at(i));
+      for (const float x : coordinates)
+        if (x > low[axis]) plane = std::min(plane, x);
     }
-    const auto above = std::ranges::partition(some, [&](Index i) { return at(i) < plane; }).begin();
+    // Stable, since means() depends on the order in the last bits
+    const auto above = std::ranges::stable_partition(some, [&](Index i) {
+                         return visits.places[i].p[axis] < plane;
+                       }).begin();
     const std::size_t first = of.nodes_.size();
     of.nodes_.resize(first + 2);
     of.nodes_[node] = {plane, static_cast<std::uint32_t>(first), static_cast<std::uint8_t>(axis)};
@@ -109,6 +114,7 @@ LocalLights::LocalLights(const LightVisits& visits, std::span<const double> tabl
   std::vector<Builder::Index> all(visits.places.size());
   std::iota(all.begin(), all.end(), Builder::Index{0});
   const Builder::Means means = builder.means(all, {});
+  in_media_ = !sides[kInMedia].empty();
   nodes_.resize(kSides);
   for (std::size_t side = 0; side < kSides; ++side) builder.build(side, sides[side], means);
 }

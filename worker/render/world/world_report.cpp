@@ -67,7 +67,7 @@ TechniqueSet techniques_of(const World& w) {
   put(w.lamps.count > 0, Technique::lamp_directions);
   put(w.lamp_flights, Technique::lamp_flights);
   put(w.need.connected, Technique::light_vertices);
-  put(w.lights.has_tree(), Technique::light_tree);
+  put(w.lights.uses_tree(w.need.media), Technique::light_tree);
   put(w.need.reuse, Technique::path_reuse);
   put(w.faint_shadow > 0, Technique::shadow_roulette);
   put(w.sky_samples, Technique::sky_samples);

@@ -186,8 +186,8 @@ TEST(EnvironmentMap, IsSampledAsOftenAsItsPowerSays) {
   ASSERT_TRUE(l);
   EXPECT_NEAR(l->pdf * 4 * kPiExact, expected, 1e-4);
   // As a path that leaves finds it: one whose direction had the same density shares it in halves.
-  EXPECT_FLOAT_EQ(world->lights.environment(V3(0), V3(0), l->direction, l->pdf).x, .5f);
-  EXPECT_FLOAT_EQ(world->lights.environment(V3(0), V3(0), l->direction, kInfinity).x, 1);
+  EXPECT_FLOAT_EQ(world->lights.environment(V3(0), l->direction, l->pdf, {}).x, .5f);
+  EXPECT_FLOAT_EQ(world->lights.environment(V3(0), l->direction, kInfinity, {}).x, 1);
 }
 
 TEST(EnvironmentMap, IsSampledApartFromAConstantSky) {
@@ -195,13 +195,12 @@ TEST(EnvironmentMap, IsSampledApartFromAConstantSky) {
   builder.scene.emitters.push_back(ConstantEmitter{{.25, .25, .25}});
   const auto world = test::world_of(builder);
   const V3 d = normalize(V3(.3f, .2f, .9f));
-  const Lights::EnvironmentParts parts = world->lights.environment_parts(V3(0), V3(0), d);
+  const Lights::EnvironmentParts parts = world->lights.environment_parts(V3(0), d, {});
   EXPECT_EQ(parts.unsampled, C3(.25f));
   EXPECT_FLOAT_EQ(parts.sampled.x, 1);
   EXPECT_GT(parts.pdf, 0);
   for (const float pdf : {.01f, .3f, 20.f})
-    EXPECT_FLOAT_EQ(world->lights.environment(V3(0), V3(0), d, pdf).x, .25f + 1 / (1 + parts.pdf / pdf))
-        << pdf;
+    EXPECT_FLOAT_EQ(world->lights.environment(V3(0), d, pdf, {}).x, .25f + 1 / (1 + parts.pdf / pdf)) << pdf;
 }
 
 TEST(EnvironmentMap, IsCountedInTheReport) {

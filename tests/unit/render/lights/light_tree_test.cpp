@@ -201,7 +201,7 @@ TEST(ManyLights, ProbabilitiesSumToOneAndAreThoseOfTheWords) {
     std::vector<double> seen(lights.count(), 0), said(lights.count(), 0);
     constexpr int kProbes = 1 << 16;
     for (int i = 0; i < kProbes; ++i) {
-      const LightChoice c = lights.choose({static_cast<std::uint32_t>(i) << 16, 0, 0}, x, n);
+      const LightChoice c = lights.choose({static_cast<std::uint32_t>(i) << 16, 0, 0}, {x, n});
       seen[c.light] += 1. / kProbes;
       if (said[c.light] > 0) {
         ASSERT_EQ(said[c.light], c.probability) << "whichever way it is found";
@@ -224,7 +224,7 @@ TEST(ManyLights, AHitHasTheDensityOfItsSample) {
   int hits = 0;
   for (int i = 0; i < 20000; ++i) {
     const V3 x = b.at({20 * r.uniform() - 10., 20 * r.uniform() - 10., .5}), n = random_direction(r);
-    const auto s = lights.sample(lights.choose(numbers(r.uniform(), r.uniform(), r.uniform()), x, n), x);
+    const auto s = lights.sample(lights.choose(numbers(r.uniform(), r.uniform(), r.uniform()), {x, n}), x);
     if (!s || s->delta || !std::isfinite(s->distance)) continue;
     const auto primitive = b.world->accel.nearest(x, s->direction, kInfinity);
     SurfaceHit hit;
@@ -234,7 +234,7 @@ TEST(ManyLights, AHitHasTheDensityOfItsSample) {
     if (c < .1f) continue;
     ++hits;
     // The light's point is 2^-20 of the world off its surface, at distances from 1/60 of it.
-    ASSERT_NEAR(lights.pdf(hit, x, s->direction, n) / s->pdf, 1, 2e-4 / c);
+    ASSERT_NEAR(lights.pdf(hit, x, s->direction, {x, n}) / s->pdf, 1, 2e-4 / c);
   }
   EXPECT_GT(hits, 1000);
 }
@@ -265,8 +265,8 @@ double variance_gain(const LightBench& b, const std::vector<Vec3>& places) {
         return s ? luminance(s->radiance) * std::max(0.f, s->direction.z) / s->pdf : 0.;
       };
       table.add(value(lights.choose(u)));
-      tree.add(value(lights.choose(u, x, n)));
-      medium.add(value(lights.choose(u, x, V3(0))));
+      tree.add(value(lights.choose(u, {x, n})));
+      medium.add(value(lights.choose(u, {x, V3(0)})));
     }
     EXPECT_NEAR(tree.mean(), table.mean(), 5 * std::hypot(table.error(), tree.error())) << p[0];
     EXPECT_NEAR(medium.mean(), table.mean(), 5 * std::hypot(table.error(), medium.error())) << p[0];
@@ -310,7 +310,7 @@ TEST(ManyLights, FewAreLeftToTheTable) {
   RandomStream r(9);
   for (int i = 0; i < 100; ++i) {
     const LightNumbers u = numbers(r.uniform(), .5f, .5f);
-    const LightChoice a = few.world->lights.choose(u), b = few.world->lights.choose(u, V3(.1f), {0, 0, 1});
+    const LightChoice a = few.world->lights.choose(u), b = few.world->lights.choose(u, {V3(.1f), {0, 0, 1}});
     EXPECT_EQ(a.light, b.light);
     EXPECT_EQ(a.probability, b.probability);
   }

@@ -72,6 +72,17 @@ TEST(LocalLights, FollowTheSquareRootOfTheMeanSquare) {
   EXPECT_NEAR(lights.probability(0, {2, 0, 0}, {0, 0, 1}), .25 * .6 + .75 * first / (first + second), .02);
 }
 
+TEST(LocalLights, KnowMediaOnlyIfTheyWereVisited) {
+  LightVisits visits = two_rooms(200);
+  EXPECT_FALSE(LocalLights(visits, kTable).in_media());
+  for (int i = 0; i < 200; ++i)
+    visits.add({-.5f, .5f, .01f * static_cast<float>(i)}, V3(0), std::array{0.f, 0.f, 1.f});
+  const LocalLights lights(visits, kTable);
+  EXPECT_TRUE(lights.in_media());
+  EXPECT_GT(lights.probability(2, {-.5f, .5f, 1}, V3(0)), .6f);
+  EXPECT_LT(lights.probability(2, {-.5f, .5f, 1}, {1, 0, 0}), .2f);
+}
+
 TEST(LocalLights, KnowSidesThatNobodyVisited) {
   LightVisits visits;
   for (int i = 0; i < 1000; ++i)
@@ -86,6 +97,8 @@ TEST(LocalLights, TakeOddVisits) {
   visits.add({0, 0, 0}, {0, 0, 1}, std::array{0.f, 0.f, 0.f});
   visits.add({0, 0, 0}, {0, 0, 1}, std::array{kInfinity, 0.f, 0.f});
   visits.add({0, 0, 0}, {0, 0, 1}, std::array{kNan, 1.f, 0.f});
+  visits.add({kNan, 0, 0}, {0, 0, 1}, std::array{1.f, 0.f, 0.f});
+  visits.add({0, kInfinity, 0}, {0, 0, 1}, std::array{1.f, 0.f, 0.f});
   EXPECT_TRUE(visits.places.empty()) << "dark, or without a meaning";
 
   for (int i = 0; i < 1000; ++i) visits.add({1, 2, 3}, {0, 0, 1}, std::array{1.f, 0.f, 0.f});
@@ -93,7 +106,6 @@ TEST(LocalLights, TakeOddVisits) {
   for (int i = 0; i < 900; ++i)
     visits.add({2, 2, static_cast<float>(i)}, {0, 1, 0}, std::array{i < 500 ? 0.f : 1.f, 1.f, 0.f});
   for (int i = 0; i < 1000; ++i) visits.add({2, 2, 0}, {0, 1, 0}, std::array{0.f, 1.f, 0.f});
-  visits.add({kNan, kInfinity, 0}, {1, 0, 0}, std::array{1.f, 0.f, 0.f});
   const LocalLights lights(visits, kTable);
   for (const V3& p : {V3(1, 2, 3), V3(2, 2, 700), V3(kNan, 0, 0), V3(-kInfinity)})
     for (const V3& n : {V3(0, 0, 1), V3(0, 1, 0), V3(kNan)}) {

@@ -54,14 +54,14 @@ TEST(Sun, EverySampleIsSeenAsWhatItIs) {
       ASSERT_FLOAT_EQ(s->radiance.x, static_cast<float>(radiance(radius)));
       ASSERT_FLOAT_EQ(s->pdf, static_cast<float>(1 / solid_angle));
       // A path that leaves that way, chosen with density q, counts q / (q + p) of it.
-      const C3 full = b.world->lights.environment(V3(0), V3(0), s->direction, kInfinity);
+      const C3 full = b.world->lights.environment(V3(0), s->direction, kInfinity, {});
       if (is_black(full)) continue;
       ++seen;
       ASSERT_FLOAT_EQ(full.x, s->radiance.x);
       const float q = 3 * s->pdf;
-      ASSERT_FLOAT_EQ(b.world->lights.environment(V3(0), V3(0), s->direction, q).x,
+      ASSERT_FLOAT_EQ(b.world->lights.environment(V3(0), s->direction, q, {}).x,
                       s->radiance.x * q / (q + s->pdf));
-      const Lights::EnvironmentParts parts = b.world->lights.environment_parts(V3(0), V3(0), s->direction);
+      const Lights::EnvironmentParts parts = b.world->lights.environment_parts(V3(0), s->direction, {});
       ASSERT_EQ(parts.unsampled, C3(0));
       ASSERT_EQ(parts.sampled, full);
       ASSERT_FLOAT_EQ(parts.pdf, s->pdf);
@@ -77,7 +77,7 @@ TEST(Sun, EndsAtItsRim) {
     const LightBench b(sunny(radius));
     const auto at = [&](double degrees) {
       const double a = degrees * M_PI / 180;
-      return b.world->lights.environment(V3(0), V3(0), V3(std::sin(a), 0, std::cos(a)), kInfinity).x;
+      return b.world->lights.environment(V3(0), V3(std::sin(a), 0, std::cos(a)), kInfinity, {}).x;
     };
     EXPECT_FLOAT_EQ(at(.999 * radius), static_cast<float>(radiance(radius)));
     EXPECT_EQ(at(1.001 * radius), 0);

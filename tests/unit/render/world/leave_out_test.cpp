@@ -156,7 +156,7 @@ TEST(LeaveOut, OneLightNeedsNoChoiceAndNoTree) {
   const auto world = test::world_of(builder);
   EXPECT_EQ(world->lights.count(), 1u);
   EXPECT_FALSE(world->lights.has_tree());
-  EXPECT_EQ(world->lights.choose({~0u, 1, 2}, V3(0), V3(0, 0, 1)).probability, 1.f);
+  EXPECT_EQ(world->lights.choose({~0u, 1, 2}, {V3(0), V3(0, 0, 1)}).probability, 1.f);
 }
 
 #ifdef LIGHTSHAFT_COUNT

@@ -5,6 +5,7 @@
 #include "tests/support/lamp_room.h"
 #include "tests/support/lamp_rooms.h"
 #include "tests/support/render_check.h"
+#include "worker/render/math/random.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {
@@ -23,15 +24,16 @@ bool is_local_with(Change change, LampRooms rooms = {}) {
 
 TEST(LocalLights, AreUsedWhereMostLampsAreInOtherRooms) {
   EXPECT_TRUE(is_local(LampRooms{}.builder()));
-  EXPECT_TRUE(is_local(LampRooms{.points = true, .fog = .3}.builder()));
+  for (const bool points : {false, true})
+    EXPECT_TRUE(is_local(LampRooms{.points = points, .fog = .3}.builder())) << points;
   EXPECT_TRUE(is_local(LampRooms{.lamps = 40}.builder())) << "instead of a tree";
 }
 
 TEST(LocalLights, AreLeftOutWhereTheyAreNotNeeded) {
   EXPECT_FALSE(is_local_with([](Scene& s) { s.integrator.local_lights = -1; }));
   EXPECT_FALSE(is_local(test::LampRoom{}.builder())) << "one lamp";
-  EXPECT_FALSE(is_local_with([](Scene& s) { s.integrator.local_lights = 1; }, {.lamps = 100})) << "too many";
-  EXPECT_FALSE(is_local_with([](Scene& s) { s.integrator.max_depth = 1; })) << "light that is not scattered";
+  for (const int lamps : {63, 64})  // in the right room, besides one in the left room
+    EXPECT_EQ(is_local(LampRooms{.lamps = lamps, .local_lights = 1}.builder()), lamps == 63);
   EXPECT_FALSE(is_local_with([](Scene& s) { s.integrator.name = "volpath_distant_mis"; }, {.fog = .3}));
   EXPECT_TRUE(is_local_with([](Scene& s) { s.integrator.name = "path"; }));
 }
@@ -54,13 +56,24 @@ TEST(LocalLights, LeaveNoTraceWhereTheyDoNotPay) {
   EXPECT_NE(sums(asked), sums(off));
 }
 
+TEST(LocalLights, AreTheSameForEverySeed) {
+  const SceneBuilder rooms = LampRooms{.fog = .3}.builder();
+  const auto one = test::world_of(rooms, 3), two = test::world_of(rooms, 4);
+  RandomStream random(1);
+  for (int i = 0; i < 100; ++i) {
+    const V3 p(4 * random.uniform() - 2, 2 * random.uniform() - 1, 2 * random.uniform() - 1);
+    const auto probability = [&](const World& w) { return w.lights.local()->probability(0, p, {0, 1, 0}); };
+    EXPECT_EQ(probability(*one), probability(*two));
+  }
+}
+
 TEST(LocalLights, AreTheSameForAnyNumberOfThreadsAndForEveryCrop) {
   const auto sums = [](SceneBuilder b, int threads, PixelRect tile) {
     const auto world = test::world_of(b, 3, threads);
     EXPECT_TRUE(world->lights.local());
     return render_tile(*world, tile, {0, 4}, nullptr, nullptr).sums;
   };
-  const SceneBuilder rooms = LampRooms{.glossy = true}.builder({64, 64});
+  const SceneBuilder rooms = LampRooms{.glossy = true, .fog = .2}.builder({64, 64});
   const auto one = sums(rooms, 1, {16, 16, 24, 24});
   for (const int threads : {2, 5}) EXPECT_EQ(sums(rooms, threads, {16, 16, 24, 24}), one) << threads;
   SceneBuilder crop = rooms;
