@@ -40,8 +40,8 @@ constexpr double kShadowGainThatPays = 2;
 // Portals are learned from paths of at most this many segments.
 constexpr int kLongestPortalPath = 4;
 // The choice of lights by place is learned from camera paths of at most kLongestLocalLightPath segments,
-// which look for every light at each surface: from kLocalLightPaths with few lights, from fewer with many. It
-// is tried if next-event estimation at these surfaces has a mean square of more than kSpreadThatPays times
+// which look for every light at each vertex: from kLocalLightPaths with few lights, from fewer with many. It
+// is tried if next-event estimation at these vertices has a mean square of more than kSpreadThatPays times
 // the square of its mean. It pays if the noise of direct light in some pixels is more than kLocalGainThatPays
 // times as high without it: a light that reaches the vertex costs more than one that does not, so samples
 // take up to 1.5 times as long, and few pixels hardly show the edges of small patches of light.

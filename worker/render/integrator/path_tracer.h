@@ -89,7 +89,7 @@ struct Connections {
     std::vector<Portals::Found> sky;
     double scatterings = 0;     // number of vertices
     double left = 0;            // number of those that the path left towards the sky
-    bool keeps_lights = false;  // true if all lights are looked for at each surface, and kept in `lights`
+    bool keeps_lights = false;  // true if all lights are looked for at each vertex, and kept in `lights`
     LightVisits lights;
 
     void found_sky(const V3& p, const V3& d, float found) {
