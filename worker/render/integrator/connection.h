@@ -1,9 +1,11 @@
 // Part of path_tracer.h, which includes it: connections of a path's vertices to light vertices
-// (lights/light_vertices.h).
+// (lights/light_vertices.h), and what paths that learn keep (Connections::Learner).
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "worker/render/base/features.h"
 #include "worker/render/world/world.h"
@@ -20,6 +22,27 @@ void PathTracer<F, Light>::arrive(const Vertex& from, const V3& p, const V3& ng)
   const V3 f = p - from.p;
   if (!from.delta && dot(f, f) > 0)
     densities_ = SubpathDensities::extended(f, from.pdf, from.sum, ng, from.ng);
+}
+
+// While the choice of lights is learned: looks for each light by look_for(choice), and keeps what it finds.
+template <Features F, template <Features> class Light>
+template <class LookFor>
+void PathTracer<F, Light>::learn_lights(const LightPlace& place, const LookFor& look_for) {
+  if (!connections_.learner || !connections_.learner->keeps_lights) return;
+  const C3 beta = std::exchange(beta_, C3(1)), radiance = outcome_.radiance;
+  Connections::Learner* const learner = std::exchange(connections_.learner, nullptr);
+  RandomStream numbers = stream_.stream(depth_, Purpose::guide);
+  std::vector<float> found;
+  for (std::uint32_t i = 0; i < world_.lights.count(); ++i) {
+    outcome_.radiance = C3(0);
+    const std::uint32_t x = numbers.bits(), y = numbers.bits();
+    look_for(world_.lights.choice_of(i, 1, {0, x, y}));
+    found.push_back(mean(outcome_.radiance));
+  }
+  learner->lights.add(place.p, place.n, found);
+  connections_.learner = learner;
+  beta_ = beta;
+  outcome_.radiance = radiance;
 }
 
 template <Features F, template <Features> class Light>

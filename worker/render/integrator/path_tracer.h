@@ -544,27 +544,6 @@ void PathTracer<F, Light>::light_surface_by(const LightChoice& choice, const Sur
               [&] { return world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wi, wo).pdf; });
 }
 
-// While the choice of lights is learned: looks for each light by look_for(choice), and keeps what it finds.
-template <Features F, template <Features> class Light>
-template <class LookFor>
-void PathTracer<F, Light>::learn_lights(const LightPlace& place, const LookFor& look_for) {
-  if (!connections_.learner || !connections_.learner->keeps_lights) return;
-  const C3 beta = std::exchange(beta_, C3(1)), radiance = outcome_.radiance;
-  Connections::Learner* const learner = std::exchange(connections_.learner, nullptr);
-  RandomStream numbers = stream_.stream(depth_, Purpose::guide);
-  std::vector<float> found;
-  for (std::uint32_t i = 0; i < world_.lights.count(); ++i) {
-    outcome_.radiance = C3(0);
-    const std::uint32_t x = numbers.bits(), y = numbers.bits();
-    look_for(world_.lights.choice_of(i, 1, {0, x, y}));
-    found.push_back(mean(outcome_.radiance));
-  }
-  learner->lights.add(place.p, place.n, found);
-  connections_.learner = learner;
-  beta_ = beta;
-  outcome_.radiance = radiance;
-}
-
 // At the path's first vertex: looks for the constant environment in a second direction (sky_samples.h).
 // `numbers` are the random numbers of the path's own direction. Only in scenes without media.
 template <Features F, template <Features> class Light>
