@@ -75,10 +75,9 @@ constexpr float kFaintConnection = .5f;
 constexpr std::uint64_t kLearningSeed = 0x5eed0f1ea2;
 constexpr std::uint64_t kSunRaySeed = 0x5eed0f5a1;
 
-// What is kept besides the sun map, because it takes memory or time; the number of the first path, and how
-// many paths make a batch.
+// Which paths are traced, and what they record. All of them record the sun map.
 struct Lesson {
-  bool sky = false, lights = false;
+  bool sky = false, lights = false;  // record the light of the sky, and that of each light
   std::uint64_t first_path = 0, batch = kLearningBatch;
 };
 

@@ -29,9 +29,8 @@ struct LightChoice {
   LightNumbers numbers;
 };
 
-// What the choice of a light depends on: a point on a surface and its normal or, in a medium, n = 0 and the
-// point itself. Where lights are chosen by place in media, too, that point belongs to the segment instead
-// (Lights::place_on), so that the choice is the same for all points of a segment.
+// The place for which a light is chosen: a point on a surface and its normal or, with n = 0, a point in a
+// medium. If LocalLights chooses in media, all points of a segment have the same place (Lights::place_on).
 struct LightPlace {
   V3 p{0, 0, 0}, n{0, 0, 0};
 };

@@ -12,7 +12,7 @@ namespace {
 constexpr double kTablePart = .25;
 // A cell is divided if it has more visits than this.
 constexpr std::ptrdiff_t kVisitsOfCell = 32;
-// What a cell's visits tell counts as much as this many visits with the mean of the cell around it.
+// The mean of the surrounding cell counts as this many visits in the mean of a cell.
 constexpr double kVisitsOfParent = 16;
 constexpr std::size_t kSides = 7, kInMedia = 6;
 
