@@ -1,5 +1,5 @@
-// The program `lightshaft`: renders, inspects and merges on this machine, and talks to a farm. Exit codes: 0
-// success, 1 failure, 2 bad usage or bad scene.
+// The program `lightshaft`: renders, inspects and merges on this machine, and is a client of a farm's
+// coordinator. Exit codes: 0 success, 1 failure, 2 bad usage or bad scene.
 #include <signal.h>
 
 #include <CLI/CLI.hpp>

@@ -1,4 +1,4 @@
-// Predicted against actual times: what our renders predicted, while running, about their remaining time.
+// Compares the remaining times that our renders predicted while they ran with the actual ones.
 #pragma once
 
 #include <string>
@@ -17,10 +17,10 @@ struct Prediction {
   std::optional<double> actual;          // nullopt: not reached by the end of the race, hence later than hi
   bool within() const { return actual && *actual >= lo && *actual <= hi; }
 };
-// Returns predictions that were made at each doubling of the samples, from 8 per pixel on. Each is what
-// forecast_of() predicts from the checkpoints (measured images of a render) up to then, for reaching a half,
-// a quarter or an eighth of the error estimated at that time. Only predictions whose interval ends within the
-// race are returned, so that the choice does not depend on the outcome.
+// Returns the forecasts of all renders, made at 8 samples per pixel and at each doubling after that. Each
+// uses forecast_of() on the checkpoints (measured images of a render) so far. Its targets are 1/2, 1/4 and
+// 1/8 of the relMSE estimated at that time. A forecast is included only if its interval ends before the
+// render does. This condition depends on no error measured later, so it does not favour correct forecasts.
 std::vector<Prediction> predictions_of(const Race& race);
 
 }  // namespace ls::race

@@ -1,4 +1,4 @@
-// Images of a race until they are judged, and their errors.
+// Stores the images of a race until they are judged, and computes their errors.
 #pragma once
 
 #include <filesystem>
@@ -31,7 +31,7 @@ class Scratch {
 Result<void> keep(const std::filesystem::path& file, std::span<const float> pixels);
 Result<Pixels> kept(const std::filesystem::path& file, FrameSize size);
 
-// Reads an image of a given size. invalid_argument: it is not a readable EXR, has another size, or values
+// Reads an image of a given size. invalid_argument: it is not a readable EXR, has another size, or has values
 // that are NaN or infinite; the message names the file.
 Result<Pixels> read_picture(const std::filesystem::path& exr, FrameSize size);
 
@@ -48,7 +48,7 @@ struct Wrong {
 // channels of (x - a)(x - b); `relmse` is the mean of the same divided by r^2 + 0.01, where r = (a + b) / 2.
 // If a and b are unbiased and independent of x and of each other, E[(x - a)(x - b)] = E[(x - truth)^2]: the
 // references' own noise cancels. The result may be negative where that noise is larger than the error of x.
-// With a single reference b = a, and its noise counts as the image's.
+// With a single reference b = a, and its noise counts as error of the image.
 Wrong wrong(std::span<const float> pixels, const Reference& reference);
 
 // Returns the relMSE of the mean of the two references a and b, from their difference: the mean of (a - b)^2

@@ -9,8 +9,8 @@
 namespace ls::race {
 namespace {
 
-// The part of a race with one seed: runs the lanes (a lane is one entrant with this seed) to the end.
-// Entrants that fail are added to `failures`.
+// The part of a race with one seed: runs its lanes (a lane is one entrant with one seed) to the end. Adds
+// entrants that fail to `failures`.
 class Heat {
  public:
   Heat(std::size_t seed, Lanes& out) : seed_(seed), out_(out) {}

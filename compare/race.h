@@ -1,5 +1,5 @@
-// A race on one scene. An entrant is an integrator that takes part; it runs once per seed, and each of these
-// runs is a lane. Lanes run in turns, then their images are judged.
+// A race on one scene. An entrant is an integrator that takes part. It runs once per seed; each such run is a
+// lane. Lanes run in turns, then their images are judged.
 #pragma once
 
 #include <functional>
@@ -73,7 +73,7 @@ struct Race {
 Result<void> judges_itself(const Race& race, std::size_t seeds);
 
 // Measures the errors of all images against `reference`. Without a reference, it makes one for each seed s
-// from the final images of the best entrant for all other seeds: one image from the means of
+// from the final images that the best entrant rendered with all other seeds: one image from the means of
 // their halves A (even samples), another from those of their halves B (odd samples). These two are
 // independent of the images of seed s and of each other. invalid_argument: there is no such entrant, or only
 // one seed.

@@ -6,8 +6,8 @@
 
 namespace ls::race {
 
-// Restricts this process and its threads to `count` of its cores. Call before any
-// thread is created. resource_exhausted: the process has fewer cores.
+// Restricts this process and its threads to `count` of its cores. Call before any thread is created.
+// resource_exhausted: the process has fewer cores.
 Result<void> use_cores(int count);
 
 // Returns the machine's processor and the number of cores used, such as "AMD EPYC 7B13, 2 of 8 cores".

@@ -13,9 +13,8 @@
 namespace ls::race {
 namespace {
 
-// The wall time after which a turn ends, unless the round ends earlier. It is long enough that waiting for
-// the last tile is a small part of it, and short enough that changes of the machine's speed affect all
-// racers.
+// Wall seconds after which a turn ends, unless the round ends earlier: long enough that waiting for the last
+// tile is a small part of the turn, and short enough that changes of the machine's speed affect all racers.
 constexpr double kTurnSeconds = 1;
 
 // Runs `work` on this many threads; returns their total CPU seconds.
@@ -111,7 +110,7 @@ class RenderRacer final : public Racer {
     auto rendered = render::render_tile(*entry_.world, partial.header.tile, *range_, &stop, nullptr);
     if (rendered.stopped) return true;
     partial.sums = std::move(rendered.sums);
-    const Digest digest;  // the chain of digests is not needed, as nothing is sent
+    const Digest digest;  // zero: no result is sent, so the chain of digests is not needed
     const std::lock_guard lock(mutex_);
     const auto folded = film_.fold(tile, round_, partial, digest);
     if (!folded) {
@@ -181,7 +180,7 @@ class RenderRacer final : public Racer {
   std::optional<Error> trouble_;
 
   RoundIndex round_ = 0;
-  std::optional<SampleRange> range_;  // of the current round; nullopt: it is over
+  std::optional<SampleRange> range_;  // of the current round; nullopt: the race is over
   double seconds_per_sample_ = 0;
   Cost cost_;
   std::vector<Checkpoint> points_;

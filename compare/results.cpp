@@ -14,7 +14,7 @@ namespace {
 
 using report::figure;
 
-// A share of all cores' time. The background activity of an otherwise idle system stays below it.
+// A share of all cores' time that the background activity of an otherwise idle system does not exceed.
 constexpr double kIdleShare = .05;
 constexpr double kHeavySpread = 4;
 

@@ -30,16 +30,16 @@ struct Turn {
   double used = 0;      // seconds of the race used so far
   double expected = 0;  // seconds expected for the next turn; 0: unknown
 };
-// Returns the index of the racer that runs next: the one for which used + expected / 2, the middle of its
-// next turn, is smallest. So turns alternate. Among equals, the first one counting cyclically from index
-// `lap` runs, so that no racer always goes first. nullopt: all are done.
+// Returns the index of the racer that runs next: the one whose next turn has the earliest middle, used +
+// expected / 2. So turns alternate. Among equals, the first one from index `lap` on, cyclically, runs, so
+// that no racer always goes first. nullopt: all are done.
 std::optional<std::size_t> next_turn(std::span<const Turn> turns, std::size_t lap);
 
 // Returns the samples that a render adds next: those of round `k` (a fixed range of samples), cut to what
 // fits into `seconds_left` at a cost of `seconds_per_sample`, and to `most_spp` samples per pixel in total.
 // `seconds_per_sample` is the time for one more sample in every pixel; 0: unknown, which is allowed only for
-// round 0. nullopt: the render ends here, because no samples fit, or a cut round would add no more than a
-// sixteenth to the existing samples.
+// round 0. nullopt: the render ends here, because no samples fit, or a cut round would add less than a
+// sixteenth of the existing samples.
 std::optional<SampleRange> next_range(RoundIndex k, double seconds_per_sample, double seconds_left,
                                       std::uint64_t most_spp);
 

@@ -1,5 +1,5 @@
-// The results of a race: for each entrant its final error, its
-// efficiency and its curve of error over time, as means over the seeds.
+// The results of a race: for each entrant its final error, its efficiency and its curve of error over time,
+// as means over the seeds.
 #pragma once
 
 #include <optional>

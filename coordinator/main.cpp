@@ -62,8 +62,8 @@ Result<int> lock_folder(const fs::path& folder) {
   return fd;
 }
 
-// Raises the limit on file descriptors, of which every connection needs one, to the highest that the system
-// allows.
+// Raises the limit on file descriptors to the highest that the system allows. Every connection needs a
+// descriptor.
 void raise_file_limit() {
   rlimit limit{};
   if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == limit.rlim_max) return;
@@ -85,8 +85,8 @@ Result<void> write_ports(const fs::path& folder, int http, int grpc) {
 }
 
 // Keeps freed memory in the process. Results of units and images, of 100 KB to some MB each, are allocated
-// many times a second; without this, malloc would return their memory to the system each time, and the next
-// use would cost page faults.
+// many times a second. By default malloc would return their memory to the system each time, and the next use
+// would cost page faults.
 void keep_freed_memory() {
   ::mallopt(M_MMAP_THRESHOLD, 32 << 20);
   ::mallopt(M_TRIM_THRESHOLD, 256 << 20);
@@ -126,14 +126,11 @@ Result<std::unique_ptr<ls::coordinator::Webhooks>> start_webhooks(
   if (flags.webhooks.empty()) return nullptr;
   auto secret = ls::http::read_or_make_token(data / "webhook-secret");
   if (!secret) return tl::unexpected(secret.error());
-  const auto unix_time = [] {
-    return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-  };
   return ls::coordinator::Webhooks::start(coordinator, {flags.webhooks,
                                                         *secret,
                                                         data / "webhooks",
                                                         std::make_shared<ls::SystemClock>(),
-                                                        unix_time,
+                                                        ls::system_unix_seconds,
                                                         {},
                                                         tracer});
 }
@@ -169,7 +166,7 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   const fs::path data = flags.data;
   const auto tracer = ls::trace::tracer_from_environment("lightshaft-coordinator", LIGHTSHAFT_VERSION, "");
   if (!tracer) return tl::unexpected(tracer.error());
-  // The port is opened first, so that a port in use is reported before anything is changed. Connections wait
+  // The port is opened first, so that a port in use is reported before any file is changed. Connections wait
   // until the coordinator is ready.
   auto http = ls::http::Server::listen(flags.http);
   if (!http) return tl::unexpected(http.error());
@@ -234,11 +231,7 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   limits.spool = data / "spool";
   ls::http::Api api(**coordinator, **tokens, limits, ls::http::StaticFiles(ls::http::embedded_files()),
                     identity != nullptr);
-  if (*webhooks)
-    api.webhooks([&hooks = **webhooks] {
-      const auto f = hooks.figures();
-      return ls::http::WebhookFigures{f.delivered, f.failed_attempts, f.given_up, f.waiting};
-    });
+  if (*webhooks) api.webhooks([&hooks = **webhooks] { return hooks.figures(); });
   if (*tracer) api.traces([tracer = *tracer] { return tracer->figures(); });
   (*coordinator)
       ->announce(flags.public_http.empty()

@@ -11,8 +11,8 @@ namespace {
 
 constexpr int kUsage = 2;
 
-// Adds hidden options for the limits that the HTTP server imposes on slow and greedy clients. They are meant
-// for the config file and for tests.
+// Adds hidden options for the limits of the HTTP server on slow clients and on resources. They are meant for
+// the config file and for tests.
 void add_limits(CLI::App& app, http::Limits& limits) {
   const auto hidden = [&app](const char* name, auto& value, double least) {
     app.add_option(name, value)->check(CLI::Range(least, 1e15))->group("");
@@ -33,7 +33,8 @@ void add_limits(CLI::App& app, http::Limits& limits) {
   hidden("--http-bundle-bytes", limits.bundle_bytes, 1);
 }
 
-// Adds the options that limit how many units are leased at the same time (docs/design/scheduling.md).
+// Adds the options for scheduling (docs/design/scheduling.md): limits on workers and leased units per job and
+// per user, the highest priority that a user may set, the share of results that is audited, and --allow-fake.
 void add_shares(CLI::App& app, Flags& flags) {
   const auto limit = [&app](const char* name, std::uint32_t& value, const char* text) {
     app.add_option(name, value, text)->check(CLI::Range(0, 1'000'000))->capture_default_str();
@@ -96,8 +97,8 @@ void add_files(CLI::App& app, Flags& flags) {
                  "with --shared: HOST:PORT where workers reach this one, if not as --grpc says");
 }
 
-// Checks the flags that --shared requires: other coordinators must be able to read this one's data, or they
-// could not take over its jobs.
+// Checks the flags that --shared requires: other coordinators must be able to read this one's data in order
+// to take over its jobs.
 Result<void> check_shared(const Flags& flags) {
   if (!flags.shared) return {};
   if (flags.store == "sqlite" || flags.blobs.empty())

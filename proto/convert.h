@@ -1,7 +1,7 @@
 // Converts the messages of farm.proto (the protocol between coordinator and workers) to and from the plain
-// values of common/protocol. A value within the limits always becomes a message that reads back equal, except
-// for texts that are too long, see below. A received message becomes a value, or an invalid_argument that
-// names the wrong field. Code that gets the values need not check a length, a rectangle or a list again.
+// values of common/protocol. A value within the limits, with texts in UTF-8, survives the round trip
+// unchanged. A received message is converted to a value, or rejected with invalid_argument and the name of
+// the invalid field, so the code that uses the values need not check lengths, rectangles or lists again.
 //
 // Names, tags and reasons longer than their limit are cut when sent; ids, tokens and lists are never cut.
 #pragma once
@@ -20,7 +20,7 @@ namespace pb = ::lightshaft::farm::v1;
 pb::FromWorker to_wire(const FromWorker& message);
 pb::ToWorker to_wire(const ToWorker& message);
 
-// True if this version knows this kind of message. A newer peer may send others; the caller should ignore
+// True if this version supports this kind of message. A newer peer may send others; the caller should ignore
 // them.
 bool known(const pb::FromWorker& message);
 bool known(const pb::ToWorker& message);

@@ -28,8 +28,8 @@ Result<PixelRect> rect_from(const pb::Rect& rect, const char* field);
 Result<SampleRange> range_from(std::uint64_t s0, std::uint64_t s1, const char* field);
 
 // Returns the text in a form that may be sent: bytes that are not UTF-8 are replaced by '?', because a peer
-// throws away the whole message if one of its strings is not valid UTF-8. The text is cut to at most `limit`
-// bytes, between two characters.
+// drops the whole message if one of its strings is not valid UTF-8. The text is cut to at most `limit` bytes,
+// between two characters.
 std::string sendable(const std::string& text, std::size_t limit);
 
 }  // namespace ls::wire

@@ -1,4 +1,4 @@
-// Converts received messages to plain values. Everything is checked, because anyone may have sent it.
+// Converts received messages to plain values. Every field is checked, because senders are not trusted.
 #include <fmt/format.h>
 
 #include <utility>
@@ -125,7 +125,7 @@ Result<Health> health_from(const pb::UnitResult& in) {
     return Health{};
   auto health = parse_health(in.health().empty() ? "{}" : in.health());
   if (!health) return wrong("result.health", health.error().message);
-  // A sender that knows no causes sends only the three counts. If a count exceeds the sum of its causes in
+  // A sender without causes sends only the three counts. If a count exceeds the sum of its causes in
   // `health`, the excess is added under a cause of its own.
   const auto rest = [](std::uint64_t stated, std::uint64_t named) {
     return stated > named ? stated - named : 0;

@@ -1,4 +1,4 @@
-// Converts plain values to the messages that are sent.
+// Converts plain values to messages.
 #include <utility>
 
 #include "common/base/overloaded.h"

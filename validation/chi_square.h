@@ -1,4 +1,4 @@
-// Pearson's chi-square test that a bsdf samples directions with the density that it claims.
+// Pearson's chi-square test of whether a BSDF samples directions with the density that its pdf returns.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +10,9 @@
 
 namespace ls::cli {
 
-// Tests test.bsdfs[bsdf], seen from a direction that `seed` chooses. In the result, `expected` is the number
-// of degrees of freedom, `got` the statistic, `standard_error` the statistic's standard deviation for a
-// correct sampler, and `z` the deviation in these units. `p` is the probability of such a deviation; the
+// Tests test.bsdfs[bsdf] for an outgoing direction that depends on `seed`. In the result, `expected` is the
+// number of degrees of freedom, `got` the statistic, `standard_error` the statistic's standard deviation for
+// a correct sampler, and `z` the deviation in these units. `p` is the probability of such a deviation; the
 // caller judges it. The case has failed already (`why` is set) if the density itself is wrong: its integral
 // is more than 1, or samples lie where it is 0. invalid_argument: the renderer rejects the bsdf, or it has
 // delta lobes only.

@@ -8,14 +8,10 @@
 #include "validation/chi_square.h"
 #include "validation/measure/hypothesis_tests.h"
 #include "validation/measure/measure.h"
+#include "validation/significance_level.h"
 
 namespace ls::cli {
 namespace {
-
-// The relative error allowed for rounding. Radiance is float32: a path of n vertices multiplies about 10 n
-// numbers, each rounded by 2^-24, and errors of many samples partly share their sign. The allowance is
-// sufficient for paths of 25 vertices in the worst case.
-constexpr double kRounding = 0x1p-16;
 
 class Runner {
  public:
@@ -72,7 +68,7 @@ class Runner {
       c.level = level_;
       c.nonfinite = m->unhealthy();
       c.seconds = m->seconds / static_cast<double>(names.size());
-      judge(c, m->freedom[q], kRounding * std::abs(c.expected));
+      judge(c, m->freedom[q], cases::kRounding * std::abs(c.expected));
       add(std::move(c));
     }
     return {};

@@ -21,18 +21,19 @@ using cli::ValidateCase;
 
 // Number of paths of a case's first run, which determines how many paths the case needs.
 constexpr std::uint64_t kPilotPaths = 1 << 13;
-// The number of paths is planned so that this many standard errors (1.5) remain between the interval and the
-// band's end. In about one run of seven, chance alone uses up more than that; or the first run's estimate of
-// the variance was far off. Then the case is repeated, with between kAgain and kMostAgain times as many
-// paths, as many as the better estimate requires.
+// The number of paths is planned so that kSpare standard errors remain between the interval and the band's
+// end. In about one run of seven, chance uses up more than that; or the first run's estimate of the variance
+// was far off. Then the case is repeated, with kAgain to kMostAgain times as many paths, according to the
+// better estimate.
 constexpr double kSpare = 1.5, kAgain = 2, kMostAgain = 16;
 // The degrees of freedom of the standard error that are assumed when the number of paths is planned.
 constexpr double kPlannedFreedom = 1e3;
-// Two one-sided tests decide that the figure lies in the band; this is their level, as that of a two-sided
-// interval.
+// Two one-sided tests, each at the level kWrongPass / kAttempts, decide whether the figure lies in the band.
+// They pass if a two-sided confidence interval of this level lies inside the band.
 constexpr double kBandLevel = 2 * kWrongPass / kAttempts;
 
-// FNV-1a, a hash of the case's id: so a case's random numbers do not depend on its neighbours in the table.
+// FNV-1a hash of the case's id, the seed and the attempt: a case's random numbers do not depend on its
+// neighbours in the table.
 std::uint64_t seed_of(const std::string& id, std::uint64_t seed, std::uint64_t attempt) {
   std::uint64_t h = 0xcbf29ce484222325ull;
   const auto eat = [&h](std::uint64_t byte) { h = (h ^ byte) * 0x100000001b3ull; };
@@ -96,8 +97,8 @@ class Runner {
   }
 
   Result<Sight> difference(const Same& same, std::uint64_t paths, std::uint64_t seed) const {
-    // A simulated broken renderer (RunOptions::gain) gets both scenes wrong alike, so a case that compares
-    // two scenes passes. Its mean is not known in advance; 1 stands for it.
+    // A simulated broken renderer (RunOptions::gain) has the same error in both scenes, so a case that
+    // compares two scenes passes. Their mean is not known in advance; 1 stands for it.
     const auto a = options_.gain ? broken(grey(1)) : look(same.scene, paths, seed),
                b = options_.gain ? a : look(same.other, paths, ~seed);
     if (!a) return tl::unexpected(a.error());
@@ -105,7 +106,7 @@ class Runner {
     if (a->mean[1] == 0 && b->mean[1] == 0)
       return fail(Errc::internal, "both scenes are black: nothing was compared");
     Sight s{{}, {}, {}, {}, a->health, a->paths + b->paths, a->seconds + b->seconds};
-    cli::add(s.health, b->health);
+    s.health.merge(b->health);
     for (std::size_t k = 0; k < 3; ++k) {
       const double va = a->standard_error[k] * a->standard_error[k],
                    vb = b->standard_error[k] * b->standard_error[k];

@@ -20,8 +20,8 @@ struct RunOptions {
   std::string only;                                         // prefix or glob of ids; empty: all
   std::function<void(const cli::ValidateCase&)> done = {};  // called after each line of the table
   // Simulates a broken renderer, to test that each case fails for it: every value is multiplied by `gain`.
-  // Statistical cases are then not rendered but judged by the figures that such a renderer gives on average,
-  // with the standard error that the case's number of paths is planned for.
+  // Statistical cases are then not rendered. They are judged by the expected mean of such a renderer, and the
+  // standard error for which the case's number of paths is planned.
   std::optional<double> gain = {};
 };
 

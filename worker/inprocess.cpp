@@ -24,9 +24,9 @@ tl::unexpected<UnitFailure> failed(const Error& error) {
       UnitFailure{.scene_at_fault = error.code == Errc::invalid_argument, .reason = error.message});
 }
 
-// Compares the scene's needs (the features and files that rendering it takes), as this worker finds them,
-// with the needs in the job's brief. The coordinator decides by those in the brief which files to send, so
-// coordinator and worker must derive the needs by the same rules.
+// Checks that the scene's needs (the features and files that rendering it takes), as this worker derives
+// them, equal those in the job's brief. The coordinator serves the files that the brief lists, so coordinator
+// and worker must derive the needs by the same rules.
 tl::expected<void, UnitFailure> check_needs(const Scene& scene, const JobBrief& brief) {
   if (brief.needs.empty()) return {};
   const std::string own =

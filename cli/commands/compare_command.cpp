@@ -190,9 +190,7 @@ void add_options(CLI::App& compare, const std::shared_ptr<CompareFlags>& flags) 
       .add_option("--references", flags->references,
                   "of a set: a folder with NAME.exr, or NAME.0.exr and NAME.1.exr")
       ->type_name("DIR");
-  compare.add_option("-D,--define", flags->defines, "sets the scene's $name")
-      ->allow_extra_args(false)
-      ->type_name("name=value");
+  add_defines(compare, flags->defines);
   compare.add_option("--report", flags->report, "the folder for page, plots and tables")
       ->required()
       ->type_name("DIR");

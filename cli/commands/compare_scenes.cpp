@@ -14,9 +14,8 @@
 namespace ls::cli {
 namespace {
 
+using coordinator::rejected;
 using coordinator::Rejected;
-
-tl::unexpected<Rejected> rejected(const Error& error) { return tl::unexpected(Rejected{error, {}}); }
 
 class SceneRace {
  public:
@@ -49,7 +48,7 @@ class SceneRace {
   struct Ours {
     std::string name;
     JobSpec spec;
-    std::optional<LocalWorld> world;  // the scene, built for the first seed; nullopt: not kept, or used
+    std::optional<LocalWorld> world;  // the scene for the first seed; nullopt: not kept, or already used
   };
 
   // Prepares every integrator of the race. Each is tried before the race begins, so that errors in the scene
@@ -133,7 +132,7 @@ class SceneRace {
   const SystemClock clock_;
   race::Race race_;
   std::vector<Ours> ours_;
-  std::vector<Digest> scenes_;  // the scene's digests, as our images contain them
+  std::vector<Digest> scenes_;  // digests of the scene, one per integrator, as stored in our images
   std::filesystem::path folder_;
 };
 

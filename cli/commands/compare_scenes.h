@@ -25,7 +25,7 @@ struct CompareOptions {
   bool strict = false, quiet = false;
 };
 
-// Returns names of the scenes for tables and files: the name of the scene file without extension, or its
+// Returns the names of the scenes in tables and files: the name of the scene file without extension, or its
 // folder's name if the file is called "scene". A number is appended to a name that occurs twice.
 std::vector<std::string> scene_names(const std::vector<std::string>& files);
 

@@ -40,7 +40,7 @@ struct Converted {
   std::vector<FileCopy> copies;  // files that must be copied
 };
 
-// Finds only the assets of a scene that has already been read.
+// An asset source that has only the assets of a scene that has already been read.
 class KnownAssets final : public AssetSource {
  public:
   explicit KnownAssets(const Scene& scene) {
@@ -69,8 +69,7 @@ bool leads_out(const std::string& name) {
   return name.starts_with('/') || name == ".." || name.starts_with("../");
 }
 
-// Renames assets whose names lead out of the new folder. The new names are within the folder and differ from
-// all others.
+// Renames assets whose names lead out of the new folder. The new names lie in the folder and are unique.
 void rename_those_outside(Scene& scene) {
   std::set<std::string> taken;
   for (const Asset& a : scene.assets)
@@ -115,11 +114,11 @@ Result<std::vector<FileCopy>> copies_for(const LocalScene& scene, const Scene& w
   return copies;
 }
 
-// Converts a scene for the file `out`. If `out` is in the folder of the original scene, file names are
-// unchanged and nothing is copied. Otherwise files are copied to the folder of `out`, under the names that
-// the scene has for them; a file whose name is absolute or leads out by ".." is put directly into that
-// folder. The text is then read again and compared. internal: the text does not give the same scene;
-// already_exists: the folder contains another file with a name that is needed.
+// Converts a scene to the text of the file `out`, and lists the files to copy beside it. If `out` is in the
+// folder of the original scene, these are only files made from numbers in the scene's text. Otherwise they
+// are all files that the scene needs, with the same relative names; a file whose name is absolute or leaves
+// the folder by ".." goes directly into the folder of `out`. The new text is read and compared with the
+// scene. internal: they differ; already_exists: the folder contains another file with a name that is needed.
 Result<Converted> convert_scene(const LocalScene& scene, const fs::path& out) {
   Scene written = scene.scene;
   Converted converted;
@@ -192,9 +191,7 @@ void add_convert(CLI::App& app, Action& action) {
                                          "digest then, if no file had to be renamed; it is printed");
   convert->add_option("in", flags->in, "the scene")->required()->type_name("IN");
   convert->add_option("out", flags->out, "the XML file to write")->required()->type_name("OUT");
-  convert->add_option("-D,--define", flags->defines, "sets the scene's $name")
-      ->allow_extra_args(false)
-      ->type_name("name=value");
+  add_defines(*convert, flags->defines);
   convert->add_flag("--strict", flags->strict, "warnings are errors");
   convert->add_flag("--quiet", flags->quiet, "only the digest, warnings and errors");
   convert->callback([flags, &action] { action = [flags] { return run(*flags); }; });

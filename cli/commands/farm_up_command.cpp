@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 
 #include "cli/commands/commands.h"
@@ -15,6 +14,7 @@
 #include "cli/scale/kubernetes_engine.h"
 #include "cli/scale/slurm_engine.h"
 #include "cli/scale/ssh_engine.h"
+#include "common/base/clock.h"
 #include "common/base/helper_program.h"
 #include "common/base/secret.h"
 
@@ -125,11 +125,6 @@ Result<int> parse_minutes(const FarmUpFlags& f) {
   return static_cast<int>(*minutes);
 }
 
-// Returns the seconds since 1970. Engines use this time to say when they started a worker.
-double unix_time() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
 Result<std::unique_ptr<Engine>> open_engine_of_pods(const FarmUpFlags& f, const FarmUpOptions& o) {
   const auto minutes = parse_minutes(f);
   if (!minutes) return tl::unexpected(minutes.error());
@@ -141,7 +136,7 @@ Result<std::unique_ptr<Engine>> open_engine_of_pods(const FarmUpFlags& f, const 
                           .logs = f.logs,
                           .kubectl = f.kubectl,
                           .worker_options = f.worker_options},
-                         unix_time);
+                         system_unix_seconds);
 }
 
 Result<std::unique_ptr<Engine>> open_engine(const FarmUpFlags& f, const FarmUpOptions& o,
@@ -179,7 +174,7 @@ Result<std::unique_ptr<Engine>> open_engine(const FarmUpFlags& f, const FarmUpOp
                         .drain_seconds = drain_seconds,
                         .logs = log_folder,
                         .run = f.docker},
-                       unix_time);
+                       system_unix_seconds);
   if (f.machines.empty()) return bad_argument("--machines FILE is needed with --on ssh: one machine a line");
   auto machines = read_machines(f.machines);
   if (!machines) return tl::unexpected(machines.error());

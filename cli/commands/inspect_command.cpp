@@ -34,7 +34,7 @@ FrameSize small(FrameSize size) {
 }
 
 // Prepares the scene for tracing a small image. Whether pixels share paths normally depends on the size of
-// the image; this one is made to share them exactly if the whole image does.
+// the image; the pixels of the small image share them exactly if those of the whole image do.
 tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> small_world(
     LocalScene scene, const LocalWorld& whole) {
   int& path_reuse = scene.scene.integrator.path_reuse;
@@ -126,9 +126,7 @@ void add_inspect(CLI::App& app, Action& action) {
   inspect->add_option("scene", flags->scene, "Mitsuba XML, .pbrt, .gltf or .glb")
       ->required()
       ->type_name("SCENE");
-  inspect->add_option("-D,--define", flags->defines, "sets the scene's $name")
-      ->allow_extra_args(false)
-      ->type_name("name=value");
+  add_defines(*inspect, flags->defines);
   inspect->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
   inspect->add_flag("--strict", flags->strict, "warnings are errors");
   inspect->add_flag("--variants", flags->variants,

@@ -85,8 +85,8 @@ std::string parts(const ordered_json& j, bool used) {
   return table.text();
 }
 
-// Describes what becomes known only when the scene's files are loaded: the structures of the BVH and of the
-// lights, and the sampling strategies.
+// Lists the renderer's optional features that the scene uses and those that it does not use, such as grids, a
+// light tree or equi-angular sampling. They are known only after the scene's files have been loaded.
 std::string made_ready(const ordered_json& j) {
   const auto listed = [&](const char* key) {
     std::vector<std::string> all;

@@ -45,8 +45,8 @@ int report(const std::vector<ValidateCase>& lines, nlohmann::ordered_json json, 
   return failed > 0 ? kFailed : kOk;
 }
 
-// Returns the table as JSON, with its significance level and with the cases that --quick has left out. The
-// docs page is made from this; and a check uses it to see that no case is missing.
+// Returns the table as JSON, with its significance level and the cases that --quick has left out. The docs
+// page is generated from it, and a check uses it to find missing cases.
 nlohmann::ordered_json table_with_rows(const cases::Table& table, const std::vector<ValidateCase>& lines,
                                        bool quick) {
   nlohmann::ordered_json json = table_json(lines);

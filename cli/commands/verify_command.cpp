@@ -224,9 +224,7 @@ void add_verify(CLI::App& app, Action& action) {
   verify->add_option("--tiles", flags->tiles, fmt::format("how many (default {})", kDefaultTiles))
       ->type_name("K");
   verify->add_option("--seed", flags->seed, "chooses the tiles; default: anew each time")->type_name("N");
-  verify->add_option("-D,--define", flags->defines, "sets the scene's $name")
-      ->allow_extra_args(false)
-      ->type_name("name=value");
+  add_defines(*verify, flags->defines);
   verify->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
   verify->add_option("--threads", flags->threads, "default: all")->type_name("N")->check(CLI::Range(1, 1024));
   verify->add_flag("--json", flags->json, "as JSON");

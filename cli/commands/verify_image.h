@@ -35,8 +35,8 @@ VerifiedTile verify_tile(const render::World& world, const SealedImage& image, T
                          const std::atomic<bool>& stop);
 
 // Returns, as "header NAME", the headers in the image that contradict its settings or the names in the scene.
-// If `tiles` has all tiles of the image, also returns headers that contradict the tiles' samples. The other
-// headers (seconds, health, ...) are protected by the seal only (the digests of all layers and headers).
+// If `tiles` has all tiles of the image, also returns headers that contradict the tiles' samples. Only the
+// seal (the digests of all layers and headers) protects the other headers (seconds, health, ...).
 std::vector<std::string> wrong_headers(const SealedImage& image, const CryptomatteManifests& names,
                                        const std::vector<VerifiedTile>& tiles);
 

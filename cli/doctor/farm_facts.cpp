@@ -1,19 +1,15 @@
 #include "cli/doctor/farm_facts.h"
 
 #include <algorithm>
-#include <chrono>
 
 #include "cli/farm/farm_api.h"
 #include "cli/output/reply_fields.h"
+#include "common/base/clock.h"
 
 namespace ls::cli {
 namespace {
 
 using nlohmann::json;
-
-double wall_clock() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 
 // Removes user and password: "https://user:password@host" becomes "https://host".
 std::string without_password(const std::string& url) {
@@ -78,9 +74,9 @@ Result<FarmFacts> observe_one(const HttpClient::Options& connection) {
   if (!client) return tl::unexpected(client.error());
   FarmFacts facts;
   facts.has_token = !connection.token.empty();
-  facts.asked_at = wall_clock();
+  facts.asked_at = system_unix_seconds();
   const auto health = client->request("GET", "/healthz");
-  facts.answered_at = wall_clock();
+  facts.answered_at = system_unix_seconds();
   if (!health) {
     facts.trouble = health.error().message;
     return facts;

@@ -26,7 +26,7 @@ struct FarmFacts {
   // answer.
   double asked_at = 0, answered_at = 0;
   std::optional<std::int64_t> date;
-  int session_status = 0;  // HTTP status of the answer to the question whose token this is
+  int session_status = 0;  // HTTP status of GET /api/v1/session, which returns the token's role
   std::string session_trouble, role, user, version;
   std::optional<std::vector<WorkerFacts>> workers;
 };

@@ -32,6 +32,14 @@ Finding ok(std::string name, std::string what) {
   return {std::move(name), {}, Status::ok, std::move(what), {}};
 }
 
+Finding warning(std::string name, std::string what, std::string advice) {
+  return {std::move(name), {}, Status::warning, std::move(what), std::move(advice)};
+}
+
+Finding problem(std::string name, std::string what, std::string advice) {
+  return {std::move(name), {}, Status::problem, std::move(what), std::move(advice)};
+}
+
 Finding of_memory(const MachineFacts& facts) {
   Finding found = ok("memory", fmt::format("{} for this process", show_bytes(facts.memory_bytes)));
   if (facts.memory_bytes < kLittleMemory) {
@@ -66,23 +74,18 @@ Finding of_file_limit(const MachineFacts& facts) {
 
 Finding of_sandbox(const MachineFacts& facts) {
   if (!facts.sandbox)
-    return {"sandbox",
-            {},
-            Status::warning,
-            "it could not be tried: this program cannot start itself",
-            "check that /proc is mounted"};
+    return warning("sandbox", "it could not be tried: this program cannot start itself",
+                   "check that /proc is mounted");
   std::vector<std::string> missing;
   if (!facts.sandbox->calls) missing.emplace_back("opening sockets (seccomp)");
   if (!facts.sandbox->files) missing.emplace_back("files that are not a scene's (Landlock)");
   if (facts.sandbox->files && !facts.sandbox->sizes)
     missing.emplace_back("cutting cached files short (Landlock of Linux 6.2)");
   if (missing.empty()) return ok("sandbox", "the kernel confines the rendering process of a worker");
-  return {"sandbox",
-          {},
-          Status::warning,
-          fmt::format("the kernel cannot keep a worker's rendering process from {}",
-                      fmt::join(missing, ", nor from ")),
-          "use Linux 6.2 or later with Landlock, or render trusted scenes only"};
+  return warning("sandbox",
+                 fmt::format("the kernel cannot keep a worker's rendering process from {}",
+                             fmt::join(missing, ", nor from ")),
+                 "use Linux 6.2 or later with Landlock, or render trusted scenes only");
 }
 
 Finding of_folder(const FolderFacts& folder) {
@@ -121,29 +124,22 @@ std::vector<Finding> judge_machine(const MachineFacts& facts) {
       facts.processor_fits
           ? ok("processor", fmt::format("has what this build needs ({}); numeric class {:.12}",
                                         facts.processor_target, facts.numeric_class))
-          : Finding{"processor",
-                    {},
-                    Status::problem,
+          : problem("processor",
                     fmt::format("lacks instructions that this build needs ({})", facts.processor_target),
-                    "use a newer machine, or build with another LIGHTSHAFT_ARCH on all machines"});
+                    "use a newer machine, or build with another LIGHTSHAFT_ARCH on all machines"));
   all.push_back(of_memory(facts));
   all.push_back(of_cores(facts));
   all.push_back(of_file_limit(facts));
   all.push_back(of_sandbox(facts));
   all.push_back(facts.vdb_found
                     ? ok("openvdb", facts.vdb_program.string())
-                    : Finding{"openvdb",
-                              {},
-                              Status::problem,
+                    : problem("openvdb",
                               fmt::format("{} is missing: .vdb and .nvdb files cannot be read",
                                           facts.vdb_program.string()),
-                              "install the package lightshaft-vdb, or build the target lightshaft-vdb"});
+                              "install the package lightshaft-vdb, or build the target lightshaft-vdb"));
   all.push_back(!facts.denoiser.empty() ? ok("denoiser", facts.denoiser)
-                                        : Finding{"denoiser",
-                                                  {},
-                                                  Status::warning,
-                                                  facts.denoiser_trouble,
-                                                  "only --denoise needs it: run deploy/install-denoiser.sh"});
+                                        : warning("denoiser", facts.denoiser_trouble,
+                                                  "only --denoise needs it: run deploy/install-denoiser.sh"));
   all.push_back(ok("redis", facts.redis_server.empty()
                                 ? "no redis-server in PATH; only a coordinator with --store redis:// needs "
                                   "one, on any machine"
@@ -177,43 +173,32 @@ Finding of_reachability(const FarmFacts& facts) {
   if (!facts.trouble.empty()) {
     const bool tls = facts.trouble.find("SSL") != std::string::npos ||
                      facts.trouble.find("certificate") != std::string::npos;
-    return {"farm",
-            {},
-            Status::problem,
-            facts.trouble,
-            tls ? "name the file of the farm's authority with --ca or LIGHTSHAFT_CA (ca.pem, in the "
-                  "coordinator's DATA/tls), and check that the address is one that its certificate names"
-                : "check the address, that the coordinator runs, and that no firewall is between"};
+    return problem(
+        "farm", facts.trouble,
+        tls ? "name the file of the farm's authority with --ca or LIGHTSHAFT_CA (ca.pem, in the "
+              "coordinator's DATA/tls), and check that the address is one that its certificate names"
+            : "check the address, that the coordinator runs, and that no firewall is between");
   }
   if (!facts.is_coordinator)
-    return {"farm",
-            {},
-            Status::problem,
-            "something else than a coordinator answers there",
-            "check the address and port: it is the coordinator's --http"};
+    return problem("farm", "something else than a coordinator answers there",
+                   "check the address and port: it is the coordinator's --http");
   if (!facts.not_ready.empty())
-    return {"farm", {}, Status::problem, facts.not_ready, "see the coordinator's log; its disk may be full"};
-  if (!facts.remark.empty()) return {"farm", {}, Status::warning, facts.remark, "see the coordinator's log"};
+    return problem("farm", facts.not_ready, "see the coordinator's log; its disk may be full");
+  if (!facts.remark.empty()) return warning("farm", facts.remark, "see the coordinator's log");
   return ok("farm", "reachable and ready");
 }
 
 Finding of_tls(const FarmFacts& facts) {
   if (facts.url.starts_with("https:")) return ok("tls", "encrypted, and its certificate is trusted");
   if (on_this_machine(facts.url)) return ok("tls", "not encrypted, but on this machine");
-  return {"tls",
-          {},
-          Status::warning,
-          "not encrypted: others on the way can read the token",
-          "start the coordinator with --tls, and use its https address"};
+  return warning("tls", "not encrypted: others on the way can read the token",
+                 "start the coordinator with --tls, and use its https address");
 }
 
 Finding of_clock(const FarmFacts& facts) {
   if (!facts.date)
-    return {"clock",
-            {},
-            Status::warning,
-            "the answer has no header Date, so the clocks were not compared",
-            "check whether a proxy removes it"};
+    return warning("clock", "the answer has no header Date, so the clocks were not compared",
+                   "check whether a proxy removes it");
   const double lead = clock_lead(facts.asked_at, facts.answered_at, *facts.date);
   if (std::abs(lead) <= kClockWarning)
     return ok("clock", lead == 0 ? std::string("agrees with this machine's")
@@ -230,37 +215,27 @@ Finding of_clock(const FarmFacts& facts) {
 
 Finding of_token(const FarmFacts& facts) {
   if (!facts.has_token)
-    return {"token",
-            {},
-            Status::problem,
-            "none is given, so that the farm answers no questions",
-            "give --token-file FILE or LIGHTSHAFT_TOKEN; `lightshaft token add` makes one"};
+    return problem("token", "none is given, so that the farm answers no questions",
+                   "give --token-file FILE or LIGHTSHAFT_TOKEN; `lightshaft token add` makes one");
   if (!facts.role.empty())
     return ok("token", facts.user.empty() ? fmt::format("valid, role {}", facts.role)
                                           : fmt::format("valid, role {}, user {}", facts.role, facts.user));
   if (facts.session_status == 401)
-    return {"token",
-            {},
-            Status::problem,
-            "the farm does not know it",
-            "check the file or LIGHTSHAFT_TOKEN; the farm's admin can make another: lightshaft token add"};
-  return {"token",
-          {},
-          Status::problem,
-          facts.session_trouble.empty() ? "no answer" : facts.session_trouble,
-          facts.session_status == 403 ? "use a token of the role submit, read or admin"
-                                      : "try again, and see the coordinator's log"};
+    return problem(
+        "token", "the farm does not know it",
+        "check the file or LIGHTSHAFT_TOKEN; the farm's admin can make another: lightshaft token add");
+  return problem("token", facts.session_trouble.empty() ? "no answer" : facts.session_trouble,
+                 facts.session_status == 403 ? "use a token of the role submit, read or admin"
+                                             : "try again, and see the coordinator's log");
 }
 
 Finding of_version(const FarmFacts& facts, const std::string& program_version) {
   if (facts.version == program_version)
     return ok("version", fmt::format("coordinator and this command are {}", program_version));
   const std::string coordinator = facts.version.empty() ? "does not tell its version" : "is " + facts.version;
-  return {"version",
-          {},
-          Status::warning,
-          fmt::format("the coordinator {}, this command is {}", coordinator, program_version),
-          "install the same version everywhere"};
+  return warning("version",
+                 fmt::format("the coordinator {}, this command is {}", coordinator, program_version),
+                 "install the same version everywhere");
 }
 
 std::string list(const std::set<std::string>& names) {
@@ -278,7 +253,7 @@ void add_if_any(std::vector<Finding>& all, const std::vector<WorkerFacts>& worke
   std::set<std::string> names;
   for (const WorkerFacts& worker : workers)
     if (wrong(worker)) names.insert(worker.name);
-  if (!names.empty()) all.push_back({name, {}, Status::warning, what + ": " + list(names), advice});
+  if (!names.empty()) all.push_back(warning(name, what + ": " + list(names), advice));
 }
 
 void add_workers(std::vector<Finding>& all, const FarmFacts& facts, const std::string& numeric_class) {
@@ -286,11 +261,8 @@ void add_workers(std::vector<Finding>& all, const FarmFacts& facts, const std::s
   for (const WorkerFacts& worker : *facts.workers)
     if (worker.state != "lost" && worker.state != "gone") present.push_back(worker);
   if (present.empty()) {
-    all.push_back({"workers",
-                   {},
-                   Status::warning,
-                   "none is connected, so that no job goes on",
-                   "start lightshaft-worker with this coordinator's address for workers (--grpc)"});
+    all.push_back(warning("workers", "none is connected, so that no job goes on",
+                          "start lightshaft-worker with this coordinator's address for workers (--grpc)"));
     return;
   }
   const std::size_t before = all.size();
@@ -310,19 +282,16 @@ void add_workers(std::vector<Finding>& all, const FarmFacts& facts, const std::s
   for (const WorkerFacts& worker : present)
     if (!worker.fake) classes.insert(worker.numeric_class);
   if (classes.size() > 1)
-    all.push_back(
-        {"numeric-class",
-         {},
-         Status::warning,
-         fmt::format("the workers are of {} numeric classes, and each job uses one of them", classes.size()),
-         "give all workers the same build"});
+    all.push_back(warning(
+        "numeric-class",
+        fmt::format("the workers are of {} numeric classes, and each job uses one of them", classes.size()),
+        "give all workers the same build"));
   else if (!classes.empty() && !classes.contains(numeric_class))
-    all.push_back({"numeric-class",
-                   {},
-                   Status::warning,
-                   "the workers are of another numeric class than this machine: `lightshaft render` gives "
-                   "other bits than the farm",
-                   "install the workers' build here, if equal bits matter"});
+    all.push_back(
+        warning("numeric-class",
+                "the workers are of another numeric class than this machine: `lightshaft render` gives "
+                "other bits than the farm",
+                "install the workers' build here, if equal bits matter"));
   else if (!classes.empty())
     all.push_back(ok("numeric-class", "the workers render the same bits as this machine"));
 }

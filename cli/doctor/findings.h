@@ -15,7 +15,7 @@ std::string to_string(Status status);
 
 struct Finding {
   std::string name;     // name of the check: "memory"
-  std::string subject;  // the object of a check that may occur several times: an address, a folder
+  std::string subject;  // which object a repeated check concerns: an address, a folder
   Status status = Status::ok;
   std::string what;
   std::string advice;  // what the user should do; empty: nothing
@@ -29,10 +29,10 @@ std::vector<Finding> judge_farm(const FarmFacts& facts, const std::string& progr
 
 Status worst(const std::vector<Finding>& findings);
 
-// Returns the smallest difference, in seconds, between the coordinator's clock and this machine's that
-// explains the answer: positive if the coordinator's is ahead, negative if it is behind, 0 if the clocks may
-// agree. The difference is not known exactly: the header Date (`date`) has whole seconds, rounded down, and
-// was written at some time between request and answer.
+// Returns the smallest difference, in seconds, between the coordinator's clock and this machine's that is
+// consistent with the answer: positive if the coordinator's is ahead, negative if it is behind, 0 if the
+// clocks may agree. The difference has an uncertainty: the header Date (`date`) has whole seconds, rounded
+// down, and was written at some time between request and answer.
 double clock_lead(double asked_at, double answered_at, std::int64_t date);
 
 }  // namespace ls::cli

@@ -22,7 +22,8 @@ using nlohmann::json;
 constexpr std::size_t kMaxShownBody = 300;
 constexpr std::size_t kDigestsPerQuestion = 10'000;
 // Files of at least this size are sent in parts, so that an upload can continue after a broken connection. A
-// smaller file is sent as a whole, if need be again; this saves the request that asks how much has arrived.
+// smaller file is sent as a whole, and again if necessary; this saves the request that asks how many bytes
+// have arrived.
 constexpr std::uintmax_t kSentInParts = 1u << 20;
 constexpr int kBarrenAttempts = 8;  // give up after this many consecutive attempts without progress
 
@@ -69,10 +70,8 @@ Diagnostic diagnostic_of(const json& d) {
   return out;
 }
 
-tl::unexpected<Rejected> refused(Error error) { return tl::unexpected(Rejected{std::move(error), {}}); }
-
 FarmApi::Answer<HttpResponse> checked(Result<HttpResponse> response) {
-  if (!response) return refused(response.error());
+  if (!response) return coordinator::rejected(response.error());
   if (response->status / 100 != 2) return tl::unexpected(problem_of(*response));
   return std::move(*response);
 }
@@ -82,7 +81,7 @@ FarmApi::Answer<json> as_json(Result<HttpResponse> response) {
   if (!good) return tl::unexpected(good.error());
   json j = json::parse(good->body, nullptr, false);
   if (!j.is_object())
-    return refused(
+    return coordinator::rejected(
         {Errc::internal, "the answer is no JSON object: is this address a Lightshaft coordinator?"});
   return j;
 }
@@ -159,12 +158,6 @@ FarmApi::Answer<void> FarmApi::remove(const std::string& path) {
   return {};
 }
 
-FarmApi::Answer<std::string> FarmApi::get_text(const std::string& path) {
-  auto response = checked(client_.request("GET", path));
-  if (!response) return tl::unexpected(response.error());
-  return std::move(response->body);
-}
-
 FarmApi::Answer<void> FarmApi::download(const std::string& path, const std::filesystem::path& file) {
   const auto response = checked(client_.download(path, file));
   if (!response) return tl::unexpected(response.error());
@@ -186,7 +179,8 @@ FarmApi::Answer<void> FarmApi::upload_missing(const LocalScene& scene, const Job
     if (!answer) return tl::unexpected(answer.error());
     const auto missing_ones = answer->find("missing");
     if (missing_ones == answer->end() || !missing_ones->is_array())
-      return refused({Errc::internal, "the coordinator's answer does not say which files it lacks"});
+      return coordinator::rejected(
+          {Errc::internal, "the coordinator's answer does not say which files it lacks"});
     for (const json& missing : *missing_ones) {
       const auto found = missing.is_string() ? by_digest.find(missing.get<std::string>()) : by_digest.end();
       if (found == by_digest.end()) continue;
@@ -217,7 +211,7 @@ FarmApi::Answer<HttpResponse> FarmApi::send_file(const std::string& path, const 
 FarmApi::Answer<HttpResponse> FarmApi::send_rest(const std::string& path, const std::filesystem::path& file,
                                                  Sending& sending) {
   auto there = client_.request("HEAD", path);
-  if (!there) return refused(there.error());
+  if (!there) return coordinator::rejected(there.error());
   if (there->status / 100 == 2) return std::move(*there);
   if (there->status != 404) return checked(std::move(there));
   const std::uint64_t offset = there->upload_offset.value_or(0);
@@ -226,14 +220,15 @@ FarmApi::Answer<HttpResponse> FarmApi::send_rest(const std::string& path, const 
   auto put = client_.upload(path, file, offset);
   sending.retry.answered();
   // 409: between the two requests, an earlier connection has delivered more bytes.
-  if (put && put->status == 409) return refused({Errc::unavailable, problem_of(*put).error.message});
+  if (put && put->status == 409)
+    return coordinator::rejected({Errc::unavailable, problem_of(*put).error.message});
   return checked(std::move(put));
 }
 
 FarmApi::Answer<Digest> FarmApi::upload(const std::filesystem::path& file,
                                         const std::function<void(const std::string&)>& on_progress) {
   const auto digest = sha256_file(file);
-  if (!digest) return refused({Errc::invalid_argument, digest.error().message});
+  if (!digest) return coordinator::rejected({Errc::invalid_argument, digest.error().message});
   const json question{{"digests", {digest->hex()}}};
   const auto answer = as_json(client_.request("POST", "/api/v1/blobs/missing", question.dump()));
   if (!answer) return tl::unexpected(answer.error());

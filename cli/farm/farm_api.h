@@ -37,7 +37,6 @@ class FarmApi {
   Answer<Json> post(const std::string& path, const Json& body);
   Answer<void> remove(const std::string& path);
   Answer<Json> patch(const std::string& path, const Json& body);
-  Answer<std::string> get_text(const std::string& path);
   Answer<void> download(const std::string& path, const std::filesystem::path& file);
 
   // Uploads the scene and those of its files that the coordinator does not have, then creates the job.

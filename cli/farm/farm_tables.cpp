@@ -89,11 +89,6 @@ std::string frames_table(const json& frames) {
   return rows.size() == 1 ? "" : "\n" + table(rows);
 }
 
-bool is_over(const json& job) {
-  const std::string state = text_field(job, "state");
-  return state == "done" || state == "failed" || state == "cancelled";
-}
-
 // Describes the samples done and requested. For a job that ends by target error or time only, `spp` is a
 // limit that the user did not set.
 std::string samples(const json& job) {
@@ -167,6 +162,11 @@ std::string share_text(const json& share) {
 }
 
 }  // namespace
+
+bool is_over(const json& job) {
+  const std::string state = text_field(job, "state");
+  return state == "done" || state == "failed" || state == "cancelled";
+}
 
 std::string jobs_table(const json& answer) {
   std::vector<Row> rows{{"ID", "STATE", "DONE", "SPP", "RELMSE", "LEFT", "NAME"}};

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 
+#include "cli/farm/farm_tables.h"
 #include "cli/farm/http_client.h"
 #include "cli/output/console.h"
 #include "cli/output/convergence_text.h"
@@ -14,11 +15,6 @@ namespace {
 using nlohmann::json;
 
 constexpr int kPollMilliseconds = 250;
-
-bool ended(const json& job) {
-  const std::string state = text_field(job, "state");
-  return state == "done" || state == "failed" || state == "cancelled";
-}
 
 }  // namespace
 
@@ -70,7 +66,7 @@ FarmApi::Answer<json> watch_job(FarmApi& api, const std::string& id, const Watch
       if (const std::string line = job->dump(-1, ' ', false, json::error_handler_t::replace);
           line != reported)
         print(reported = line);
-    if (ended(*job)) return job;
+    if (is_over(*job)) return job;
   }
 }
 

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 constexpr long kConnectSeconds = 15;
 constexpr long kStallSeconds = 60;  // longest time without a byte of an answer
 constexpr long kRedirects = 3;
-constexpr long kWorkSeconds = 3600;  // the same for requests on which the server works for long
+constexpr long kWorkSeconds = 3600;  // the same for requests that the server takes long to process
 
 struct CloseFile {
   void operator()(std::FILE* file) const { std::fclose(file); }

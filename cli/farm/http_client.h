@@ -25,7 +25,7 @@ class HttpClient {
  public:
   struct Options {
     // The coordinator's address, such as "https://farm.example:8080": http or https, with or without a path
-    // before /api. If several coordinators share a farm, their addresses separated by commas: if one does not
+    // before /api. It may be a list, separated by commas, of coordinators that share a farm: if one does not
     // answer, the client tries the next.
     std::string url;
     std::string token;  // sent as a bearer token; may be empty
@@ -37,7 +37,7 @@ class HttpClient {
   HttpClient(HttpClient&&) noexcept;
 
   // Sends a request and returns the response, whatever its status. `path` begins with "/". Errors:
-  // unavailable (no connection, a connection that broke, or no trusted certificate: the message says which),
+  // unavailable (no connection, a connection that broke, or no trusted certificate, as the message states),
   // resource_exhausted (the response is larger than kMaxAnswerBytes).
   Result<HttpResponse> request(std::string_view method, const std::string& path, std::string_view body = {},
                                std::string_view content_type = "application/json");
@@ -62,8 +62,8 @@ class HttpClient {
   std::unique_ptr<State> state_;
 };
 
-// Decides whether to repeat a failed request: a coordinator may be unreachable for a while because of a
-// restart, a proxy in between, or too many requests.
+// Decides whether to repeat a failed request: a restart, a proxy in between, or too many requests may make a
+// coordinator unreachable for a while.
 class RetryPolicy {
  public:
   // Waits, each time longer, and returns true if the failed request should be repeated. Returns false without

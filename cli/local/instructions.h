@@ -1,6 +1,6 @@
-// Counts the instructions executed by a thread and the threads that it starts, with the processor's counter.
-// Also measures, by these counts, what the variants of the integrator cost (a variant is compiled for a
-// subset of the features that a scene can have).
+// Counts the instructions that a thread and the threads that it starts execute, with the processor's counter.
+// From these counts it measures the cost of the integrator's variants. A variant is compiled for a subset of
+// the features that a scene can have.
 #pragma once
 
 #include <cstdint>

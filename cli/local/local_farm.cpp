@@ -159,7 +159,7 @@ Result<Digest> LocalFarm::adopt(const std::filesystem::path& file) {
 tl::expected<JobId, coordinator::Rejected> LocalFarm::submit(const LocalScene& scene, const JobSpec& spec) {
   for (const auto& [name, file] : scene.files)
     if (const auto adopted = blobs_->adopt(file.digest, file.path); !adopted)
-      return tl::unexpected(coordinator::Rejected{adopted.error(), {}});
+      return coordinator::rejected(adopted.error());
   return coordinator_->submit(submit_request(scene, spec));
 }
 

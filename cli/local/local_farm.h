@@ -41,13 +41,13 @@ class LocalLink final : public worker::CoordinatorLink {
   std::unique_ptr<coordinator::WorkerSession> session_;
 };
 
-// Gives the worker agent in this process the blobs (scene and assets, named by digest) of the in-memory
-// coordinator as files. Adopted files stay where they are. Blobs in memory (the canonical scene) become
-// memory files, which leave nothing on disk.
+// Gives the worker agent in this process the blobs (scene and assets, identified by digest) of the
+// coordinator in this process as files. Adopted files stay where they are. Blobs in memory (the canonical
+// scene) become memory files, which leave nothing on disk.
 class LocalBlobFiles final : public worker::BlobFiles {
  public:
   explicit LocalBlobFiles(std::shared_ptr<coordinator::MemoryBlobs> blobs) : blobs_(std::move(blobs)) {}
-  // Errors of acquire() are final: there is no point in waiting for this machine to recover.
+  // All errors of acquire() are final: waiting and trying again would not help.
   Result<std::shared_ptr<const worker::BlobFile>> acquire(const BlobRef& blob) override;
   std::vector<Digest> held(std::size_t) const override { return {}; }
 

@@ -13,7 +13,7 @@ tl::expected<LocalWorld, coordinator::Rejected> build_local_world(const LocalSce
   render::AssetFiles files;
   for (const auto& [name, file] : scene.files) {
     if (const auto adopted = blobs.adopt(file.digest, file.path); !adopted)
-      return tl::unexpected(coordinator::Rejected{adopted.error(), {}});
+      return coordinator::rejected(adopted.error());
     files.emplace(file.digest, file.path);
   }
   auto admission = coordinator::admit(submit_request(scene, spec), blobs, scene.frame);
@@ -21,11 +21,11 @@ tl::expected<LocalWorld, coordinator::Rejected> build_local_world(const LocalSce
   const auto limit = render::limit_threads(threads);
   // The scene in the form that a worker receives.
   const auto stored = deserialize_scene(admission->scene_json);
-  if (!stored) return tl::unexpected(coordinator::Rejected{stored.error(), {}});
+  if (!stored) return coordinator::rejected(stored.error());
   auto world = render::build_world(*stored, admission->job.settings, files, threads);
   if (!world && world.error().code == Errc::invalid_argument)
     return tl::unexpected(scene_fault(scene, world.error().message));
-  if (!world) return tl::unexpected(coordinator::Rejected{world.error(), {}});
+  if (!world) return coordinator::rejected(world.error());
   const bool sees_media = scene::sees_media(admission->job.settings.integrator);
   return LocalWorld{std::move(admission->job), std::move(*world), scene::needs_of(*stored, sees_media),
                     admission->scene_json.size()};
@@ -39,7 +39,7 @@ tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> build_
   if (world) return std::move(*world);
   if (world.error().code == Errc::invalid_argument)
     return tl::unexpected(scene_fault(scene, world.error().message));
-  return tl::unexpected(coordinator::Rejected{world.error(), {}});
+  return coordinator::rejected(world.error());
 }
 
 coordinator::Rejected scene_fault(const LocalScene& scene, const std::string& text) {

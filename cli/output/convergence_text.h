@@ -10,8 +10,8 @@
 namespace ls::cli {
 
 struct Verdict {
-  // True if few pixels carry the error, if the error has reached a bias floor (it no longer falls), or if no
-  // light has been found yet.
+  // True if few pixels contribute most of the error, if the error has reached a bias floor (it no longer
+  // falls), or if no light has been found yet.
   bool doubtful = false;
   std::string words;  // plain text; begins with kDoubt if doubtful
 };

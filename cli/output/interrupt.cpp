@@ -10,7 +10,8 @@
 namespace ls::cli {
 namespace {
 
-// Returns the signals to wait for. SIGUSR1 wakes the waiting thread when the Interrupt is destroyed.
+// Returns the signals to wait for, including SIGUSR1, which wakes the waiting thread when the Interrupt is
+// destroyed.
 sigset_t watched() {
   sigset_t set;
   sigemptyset(&set);

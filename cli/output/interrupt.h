@@ -1,5 +1,5 @@
-// Handles Ctrl-C and SIGTERM while something runs: the first signal requests a stop, the second ends the
-// process in the usual way.
+// Handles Ctrl-C and SIGTERM during a long operation: the first signal requests a stop, the second ends the
+// process.
 #pragma once
 
 #include <functional>

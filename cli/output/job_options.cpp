@@ -107,6 +107,12 @@ Result<std::map<std::string, std::string>> parse_defines(const std::vector<std::
   return values;
 }
 
+void add_defines(CLI::App& app, std::vector<std::string>& defines) {
+  app.add_option("-D,--define", defines, "sets the scene's $name")
+      ->allow_extra_args(false)
+      ->type_name("name=value");
+}
+
 void JobOptions::add_to(CLI::App& app) {
   app.add_option("--spp", spp, "samples per pixel; default: the scene's")->type_name("N");
   app.add_option("--target-error", target_error, "stop when the image's relMSE is below this")
@@ -131,9 +137,7 @@ void JobOptions::add_to(CLI::App& app) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("NAME,...");
-  app.add_option("-D,--define", defines, "sets the scene's $name")
-      ->allow_extra_args(false)
-      ->type_name("name=value");
+  add_defines(app, defines);
   app.add_flag("--float", float_output, "32-bit pixels in the image instead of half");
   app.add_flag("--denoise", denoise,
                "also the layers denoised.R, G, B, with their own error (needs Open Image Denoise: "

@@ -26,6 +26,8 @@ struct JobOptions {
   Result<JobSpec> parse() const;
 };
 
+void add_defines(CLI::App& app, std::vector<std::string>& defines);  // adds -D name=value
+
 // Parses a whole number, as in "--spp 64". `what` is the option's name, for the message.
 Result<std::uint64_t> parse_whole(const std::string& what, const std::string& text, std::uint64_t least,
                                   std::uint64_t most);

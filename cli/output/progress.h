@@ -56,7 +56,7 @@ class ProgressBar {
   ProgressForm form_;
   bool shown_;
   bool dirty_ = false;
-  std::optional<double> percent_ = {};  // that of the last line of the form `lines`
+  std::optional<double> percent_ = {};  // percent of the last line printed, for ProgressForm::lines
 };
 
 }  // namespace ls::cli

@@ -40,8 +40,8 @@ struct Pipe {
 
 Result<pid_t> start_program(const Words& words, std::vector<int> standard_files) {
   const auto inherits = [](std::string_view variable) { return !variable.starts_with("LIGHTSHAFT_"); };
-  // The program gets its own process group. Otherwise Ctrl-C at the terminal would stop it too; it is for us
-  // alone, and we decide what to do with the program.
+  // The program gets its own process group. Otherwise Ctrl-C at the terminal would stop it, too; only this
+  // process should receive Ctrl-C and decide how to end the program.
   return spawn({words.front(), words, std::move(standard_files), inherits, true});
 }
 
@@ -78,8 +78,8 @@ Result<CommandOutput> run_command(const Words& words, const std::string& input, 
   std::size_t written = 0;
   if (input.empty()) Pipe::close(in.write);
   std::optional<int> code;
-  // Reading stops soon after the program has ended, even if processes that it left behind keep its output
-  // open.
+  // Reading stops soon after the program has ended, even if child processes that it left running keep its
+  // output open.
   while (out.read >= 0 || err.read >= 0 || !code) {
     if (!code)
       if (const auto status = poll_end(*pid)) code = exit_code(*status);
@@ -109,7 +109,7 @@ Result<LongCommand> LongCommand::start(const Words& words, const std::string& in
   if (in.read < 0) return fail(Errc::resource_exhausted, "no pipe to run a program with");
   int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
   if (file < 0) return bad_argument(fmt::format("{}: {}", log, std::strerror(errno)));
-  // Writing does not block: a pipe holds 64 KiB before anybody reads, far more than a command with its token.
+  // Writing does not block: a pipe holds 64 KiB without a reader, far more than a command with its token.
   ::fcntl(in.write, F_SETFL, O_NONBLOCK);
   const bool sent = ::write(in.write, input.data(), input.size()) == static_cast<ssize_t>(input.size());
   const Result<pid_t> pid = sent ? start_program(words, {in.read, file, file})

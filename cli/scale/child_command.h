@@ -1,5 +1,5 @@
 // Runs other programs, such as sbatch and ssh. Arguments are passed directly, without a shell. The programs
-// inherit the environment without our own variables (LIGHTSHAFT_...), which may contain tokens.
+// inherit the environment except our own variables (LIGHTSHAFT_...), which may contain tokens.
 #pragma once
 
 #include <sys/types.h>

@@ -8,13 +8,13 @@
 
 namespace ls::cli {
 
-// How to tell our workers from others: ours have names FARM-..., and run on `engine`.
+// Identifies the workers of this farm-up: their names begin with "FARM-", and they run on `engine`.
 struct OurWorkers {
   std::string farm, engine;
 };
 
-// Asks the coordinator, adds the costs to `spending`, and returns the demand. It leaves out the work of jobs
-// whose budget is used up.
+// Asks the coordinator, adds the costs to `spending`, and returns the demand, without the work of jobs whose
+// budget is used up.
 FarmApi::Answer<Demand> ask_demand(FarmApi& api, const OurWorkers& ours, Spending& spending);
 
 // The same, from the coordinator's answers to GET /api/v1/jobs and GET /api/v1/workers.

@@ -6,7 +6,6 @@
 #include <sstream>
 
 #include "cli/scale/child_command.h"
-#include "cli/scale/container_worker.h"
 #include "common/base/parse_number.h"
 
 namespace ls::cli {
@@ -125,9 +124,9 @@ class Docker final : public Engine {
     return std::move(output->out);
   }
 
-  // Runs a command of Docker on several containers. Some may have ended since they were listed. That is no
-  // error, and the call must not be repeated: the others have got their signal, and a second SIGTERM ends a
-  // worker at once.
+  // Runs a command of Docker on several containers. Containers that have ended since they were listed are no
+  // error. The call must not be repeated: the other containers have received their signal, and a second
+  // SIGTERM ends a worker at once.
   Result<void> for_all(Words words, const std::vector<std::string>& ids) const {
     if (ids.empty()) return {};
     for (const std::string& id : ids) words.push_back(container(id));

@@ -12,7 +12,7 @@ struct DockerOptions {
   WorkerCommand worker;  // `program` is the path in the image
   std::string join_token;
   std::string image;             // name of the image, which deploy/images.sh builds
-  int drain_seconds = 120;       // how long Docker lets a worker drain if somebody else stops its container
+  int drain_seconds = 120;       // how long Docker lets a worker drain if another command stops its container
   std::string logs = ".";        // folder for the logs of workers that have ended
   std::vector<std::string> run;  // more options of `docker run`, one word each
 };

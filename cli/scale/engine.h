@@ -3,7 +3,11 @@
 // run of `lightshaft farm up`, with all earlier runs under the same name.
 #pragma once
 
+#include <fmt/format.h>
+
+#include <fstream>
 #include <memory>
+#include <random>
 #include <span>
 #include <string>
 #include <vector>
@@ -50,6 +54,15 @@ struct WorkerCommand {
 
 // Returns the name under which the coordinator shows the worker.
 inline std::string worker_name(const std::string& farm, const std::string& id) { return farm + "-" + id; }
+
+// Returns a new id of a worker in a container: eight random hexadecimal digits.
+inline std::string new_worker_id() { return fmt::format("{:08x}", std::random_device{}()); }
+
+// Writes FOLDER/NAME.log, the log of an ended worker. If that fails, the log is lost: a worker is removed all
+// the same.
+inline void keep_log(const std::string& folder, const std::string& name, const std::string& text) {
+  std::ofstream(fmt::format("{}/{}.log", folder, name)) << text;
+}
 
 // Returns the first line of a command's output, which names its version or the reason why it failed.
 inline std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }

@@ -109,7 +109,7 @@ class FarmUp {
   }
 
  private:
-  // Reads the demand. While the coordinator does not answer, the number of workers stays as it is. Error: it
+  // Reads the demand. While the coordinator does not answer, the number of workers does not change. Error: it
   // has never answered.
   FarmApi::Answer<void> look_at_jobs() {
     auto asked = ask_demand(api_, {options_.limits.farm, version_}, spending_);

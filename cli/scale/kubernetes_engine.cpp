@@ -10,7 +10,6 @@
 
 #include "cli/output/reply_fields.h"
 #include "cli/scale/child_command.h"
-#include "cli/scale/container_worker.h"
 #include "common/base/parse_number.h"
 
 namespace ls::cli {

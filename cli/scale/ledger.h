@@ -15,7 +15,7 @@ namespace ls::cli {
 class Ledger {
  public:
   // Adds the cost since the previous call, `elapsed` seconds ago. `workers` is the engine's present list. A
-  // worker that is no longer in it is charged for all of `elapsed`, since nobody saw when it ended.
+  // worker that is no longer in it is charged for all of `elapsed`, since the time of its end is unknown.
   void observe(std::span<const EngineWorker> workers, double elapsed);
   double core_seconds() const;
   // Returns how many workers have started to run. A worker that the engine requeued and ran again counts

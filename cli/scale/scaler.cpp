@@ -72,8 +72,8 @@ void Scaler::drain_failed(std::span<const EngineWorker> workers) {
   for (const auto& w : workers) seen_[w.id].draining_since.reset();
 }
 
-// Updates the known workers. A worker that ended or got stuck before the farm knew it, without being drained,
-// is a failed start.
+// Updates the list of workers. A worker that ended or got stuck before it joined the farm, without being
+// drained, is a failed start.
 void Scaler::observe(const Demand& demand, std::span<const EngineWorker> workers, TimePoint now) {
   std::map<std::string, Seen> present;
   for (const auto& w : workers) {
@@ -104,14 +104,14 @@ int Scaler::wanted(const Demand& demand) const {
   if (demand.open_jobs == 0) return 0;
   const double threads = std::ceil(demand.queued_core_seconds / limits_.finish_in) - demand.other_threads;
   const double workers = std::ceil(threads / limits_.threads);
-  // Without workers of others at least one is wanted: it finds out what a job of unknown cost takes, and
-  // finishes work that workers hold already (which queued_core_seconds leaves out).
+  // If nobody else runs workers, an open job needs at least one: to measure the job's cost if that is
+  // unknown, and to finish the work that workers already hold (queued_core_seconds leaves it out).
   const double least = demand.other_threads > 0 ? 0 : 1;
   return static_cast<int>(std::clamp(workers, least, static_cast<double>(limits_.most_workers)));
 }
 
-// Returns how many more workers the budget allows. It must pay for kWorthStarting seconds, and the time to
-// end, of each new and each existing worker.
+// Returns how many more workers the budget allows. For each new and each existing worker it must pay for
+// kWorthStarting seconds and the time to end.
 int Scaler::affordable(std::span<const EngineWorker> workers, double spent) const {
   if (!limits_.budget_core_seconds) return limits_.most_workers;
   const double each = kWorthStarting + seconds_to_end();
@@ -121,8 +121,8 @@ int Scaler::affordable(std::span<const EngineWorker> workers, double spent) cons
                   static_cast<int>(std::min<double>(limits_.most_workers, left / (limits_.threads * each))));
 }
 
-// Returns for how many seconds, at most, a worker still costs if the next check ends it: the interval until
-// that check, the time to drain, and another interval until its end is seen.
+// Returns the most seconds that a worker still costs if the next check ends it: the interval until that
+// check, the time to drain, and another interval until its end is noticed.
 double Scaler::seconds_to_end() const { return limits_.drain_seconds + 2 * limits_.poll_seconds; }
 
 void Scaler::drain(const EngineWorker& worker, ScaleActions& out, TimePoint now) {

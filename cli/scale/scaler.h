@@ -19,7 +19,7 @@ namespace ls::cli {
 struct Demand {
   int open_jobs = 0;    // queued or running, with something left of their budgets
   int unpaid_jobs = 0;  // queued or running, but nothing is left of their budgets
-  // Predicted cost of the work that no worker holds, as far as budgets pay for it. 0 also if no cost was
+  // Predicted cost of the work that no worker holds, up to what the budgets pay for. 0 also if no cost was
   // measured yet.
   double queued_core_seconds = 0;
   bool more_helps = true;        // false: by the coordinator's forecast, more workers would save no time

@@ -131,8 +131,8 @@ class Slurm final : public Engine {
     return {};
   }
 
-  // True if scancel complains only about jobs that have ended since they were listed. That is no error, and
-  // the call must not be repeated: the other jobs have got their signal, and a second SIGTERM stops a worker
+  // True if scancel complains only about jobs that have ended since they were listed, which is no error. The
+  // call must not be repeated: the other jobs have received their signal, and a second SIGTERM stops a worker
   // immediately.
   static bool only_ended(const std::string& complaints) {
     std::istringstream in(complaints);
@@ -171,9 +171,9 @@ Result<std::vector<EngineWorker>> parse_squeue(const std::string& lines) {
     if (!seconds || cores < 1) return bad_argument(fmt::format("squeue answered '{}'", line));
     const std::string& state = fields[1];
     const std::string reason = fields.size() > 4 ? fields[4] : "";
-    // Two kinds of jobs count as stuck, so that other workers are started instead. Slurm holds a job that it
-    // could not start several times. And a job that is requeued after the loss of its node has to wait for
-    // two minutes (BeginTime).
+    // Two kinds of jobs count as stuck, so that other workers are started instead: jobs that Slurm holds
+    // because it could not start them several times, and jobs that wait for two minutes (BeginTime) because
+    // they were requeued after the loss of their node.
     const bool held = state == "REQUEUE_HOLD" || state == "SPECIAL_EXIT" ||
                       (state == "PENDING" && reason.find("requeued held") != std::string::npos) ||
                       (state == "PENDING" && (reason.starts_with("JobHeld") || reason == "BeginTime"));

@@ -9,7 +9,7 @@ namespace ls::cli {
 struct SlurmOptions {
   WorkerCommand worker;
   int minutes = 60;                 // time limit of a worker's job, in minutes
-  int drain_seconds = 120;          // how long before the time limit Slurm tells the worker to drain
+  int drain_seconds = 120;          // how long before the time limit Slurm signals the worker to drain
   std::string logs = ".";           // folder for the workers' logs
   std::vector<std::string> sbatch;  // more options of sbatch, one word each
 };

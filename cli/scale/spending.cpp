@@ -23,7 +23,7 @@ void Spending::observe(std::span<const JobCost> jobs, std::span<const WorkerCost
     job.name = cost.name, job.owner = cost.owner;
     if (is_new && !begun_) job.before = cost.core_seconds;
     // A coordinator that was killed may have lost the latest results, and then reports less. The core seconds
-    // were spent all the same, so a sum never falls.
+    // were still spent, so a sum never falls.
     job.now = std::max(job.now, cost.core_seconds);
   }
   for (const WorkerCost& cost : workers) {

@@ -14,7 +14,7 @@ namespace {
 // The script that runs on the machine, the same for every worker. From standard input it reads the worker's
 // command line, one word on each line up to an empty line, and then the token. So no shell parses the words,
 // and no list of processes shows the token. When standard input ends, because `farm up` closed it or the
-// connection broke, the script tells the worker to deliver its results and end.
+// connection broke, the script signals the worker to deliver its results and end.
 constexpr const char* kRemote =
     R"(sh -c 'set --
 while IFS= read -r word && [ -n "$word" ]; do set -- "$@" "$word"; done
@@ -49,7 +49,7 @@ class Ssh final : public Engine {
     return workers;
   }
 
-  // Takes the machines in turn, so that a machine that is down is not tried again and again.
+  // Tries the machines in turn, so that one that is down does not get every attempt.
   Result<void> start(int count) override {
     for (std::size_t tried = 0; count > 0 && tried < options_.machines.size(); ++tried) {
       const std::string& machine = options_.machines[next_++ % options_.machines.size()];

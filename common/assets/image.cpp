@@ -1,6 +1,7 @@
 #include "common/assets/image.h"
 
 #include <fmt/format.h>
+#include <strings.h>
 
 #include "common/assets/bytes.h"
 #include "common/image/exr/exr_file.h"
@@ -9,10 +10,7 @@ namespace ls {
 namespace {
 
 bool ends_in_tga(std::string_view name) {
-  constexpr std::string_view kEnd = ".tga";
-  return name.size() >= kEnd.size() &&
-         std::equal(kEnd.begin(), kEnd.end(), name.end() - kEnd.size(),
-                    [](char a, char b) { return a == (b >= 'A' && b <= 'Z' ? b - 'A' + 'a' : b); });
+  return name.size() >= 4 && ::strncasecmp(name.data() + name.size() - 4, ".tga", 4) == 0;
 }
 
 }  // namespace

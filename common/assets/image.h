@@ -1,5 +1,5 @@
 // Decodes PNG, JPEG, BMP, QOI, OpenEXR, Radiance HDR and PFM, recognised by their first bytes, and TGA, which
-// has none that are its own, by the ending of its name. An image of more than max_pixels is rejected
+// has no signature, recognised by the ending of its name. An image of more than max_pixels is rejected
 // (resource_exhausted) before memory is allocated for it.
 #pragma once
 
@@ -17,7 +17,7 @@ Result<ImageData> decode_image(std::string_view name, std::span<const std::byte>
 Result<ImageData> load_image(const std::filesystem::path& path, std::string_view name,
                              std::uint64_t max_pixels = kMaxImagePixels);
 
-// Decoders of single formats, for tests and for callers that know the format.
+// Decoders of single formats, for tests and for data of known format.
 //
 // PNG: 1..16 bits, palette, alpha.
 Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> file,
@@ -28,7 +28,7 @@ Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> 
 // BMP: 24 and 32 bits; alpha is ignored.
 Result<ImageData> decode_bmp(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
-// TGA: 15 to 32 bits of colour, 8 of grey, colour maps; alpha if the file says that it has any.
+// TGA: 15 to 32 bits of colour, 8 of grey, colour maps; alpha if the header declares it.
 Result<ImageData> decode_tga(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
 // QOI: colour and alpha, 8 bits, sRGB or linear.

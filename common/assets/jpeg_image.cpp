@@ -22,8 +22,8 @@ void on_error(j_common_ptr info) {
   f->base.format_message(info, f->message);
   std::longjmp(f->escape, 1);
 }
-// Treats the library's warnings as errors. The library would replace missing data by grey, but a broken file
-// should be an error.
+// Treats the library's warnings as errors. The library replaces missing data by grey, but a broken file must
+// be an error.
 void on_message(j_common_ptr info, int level) {
   if (level < 0) on_error(info);
 }

@@ -19,9 +19,9 @@ Result<MeshData> decode_obj(std::string_view name, std::span<const std::byte> fi
 
 // Reads a PLY file: ascii, binary_little_endian or binary_big_endian, version 1.0. It must have an element
 // `vertex` with x y z, optionally nx ny nz and (u v | s t | texture_u texture_v), and an element `face` with
-// the list vertex_indices or vertex_index. Of the other properties, decode_ply_with() also reads those of the
-// requested `attributes` that exist (ply_attributes.h). Everything else is skipped. Attributes of a face
-// become those of each of its triangles.
+// the list vertex_indices or vertex_index. decode_ply_with() also reads the properties of the requested
+// `attributes` that exist (ply_attributes.h). Everything else is skipped. Attributes of a face become those
+// of each of its triangles.
 Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file);
 Result<MeshData> decode_ply_with(std::span<const std::string> attributes, std::string_view name,
                                  std::span<const std::byte> file);

@@ -69,7 +69,8 @@ class ObjReader {
       if (w.empty() && i >= needed) break;
       if (!w.empty() && w[0] == '+') w.remove_prefix(1);
       const auto [end, ec] = std::from_chars(w.data(), w.data() + w.size(), a[i]);
-      // A number that is too small becomes 0; one that is too large leads to a triangle that is left out
+      // On underflow the number becomes 0 or denormal, on overflow infinite. Triangles with an infinite
+      // vertex position are left out (add_polygon).
       if (ec == std::errc::result_out_of_range)
         a[i] = static_cast<float>(std::strtod(std::string(w.substr(0, 64)).c_str(), nullptr));
       else if (ec != std::errc{} || end != w.data() + w.size())

@@ -177,8 +177,7 @@ class PlyReader {
       const char* const last = rest_.data() + rest_.size();
       const auto [end, ec] = std::from_chars(rest_.data() + a, last, v);
       if (ec == std::errc::invalid_argument) return std::nullopt;
-      if (ec == std::errc::result_out_of_range)
-        v = 0;  // outside of the range of double, so not a meaningful coordinate
+      if (ec == std::errc::result_out_of_range) v = 0;  // outside the range of double
       if (end != last && std::string_view(" \t\r\n\v\f").find(*end) == std::string_view::npos)
         return std::nullopt;
       rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));

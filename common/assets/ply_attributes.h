@@ -1,11 +1,11 @@
 // Groups the properties of a PLY element into attributes, by the rules of Mitsuba 3.9.
 //
 // Properties r g b, or red green blue, at any position are the attribute "color"; a fourth property, a or
-// alpha, is ignored. Of the other properties only those count whose name ends in an underscore and one
-// character. Consecutive ones of these with the same prefix form a group: foo_x foo_y foo_z, foo_0 foo_1
-// foo_2 or foo_1 foo_2 foo_3 are the attribute "foo", foo_r foo_g foo_b are "foo_color", each of three
-// numbers. A group that consists only of its first property is an attribute of one number. Groups of two or
-// four are no attribute. If several groups with the same prefix would be attributes, only the first one is.
+// alpha, is ignored. Other properties count only if their name ends in an underscore and one character.
+// Consecutive ones with the same prefix form a group: foo_x foo_y foo_z, foo_0 foo_1 foo_2 or foo_1 foo_2
+// foo_3 are the attribute "foo", foo_r foo_g foo_b are "foo_color", each of three numbers. A group that
+// consists only of its first property is an attribute of one number. Groups of two or four are no attribute.
+// If several groups with the same prefix would be attributes, only the first one is.
 #pragma once
 
 #include <span>

@@ -26,8 +26,8 @@ enum Flags : std::uint32_t {
   kDouble = 0x2000  // if absent: single precision
 };
 
-// A zlib stream, unpacked on demand. So memory never exceeds the data actually unpacked, whatever size the
-// file claims.
+// A zlib stream, unpacked on demand. So memory depends on the data that are unpacked, not on the size that
+// the file claims.
 class Inflater {
  public:
   explicit Inflater(std::span<const std::byte> data) : data_(data) { ok_ = inflateInit(&z_) == Z_OK; }
@@ -165,8 +165,8 @@ class SerializedReader {
     return false;
   }
 
-  // True if the counts in the header may be right: zlib packs at most 1032 to 1. False counts are rejected
-  // before memory is allocated.
+  // True if the counts in the header are possible: zlib packs at most 1032 to 1. Impossible counts are
+  // rejected before memory is allocated.
   bool plausible(std::uint32_t flags, std::uint64_t vertices, std::uint64_t triangles) {
     const std::uint64_t per_vertex =
         3 + (flags & kHasNormals ? 3 : 0) + (flags & kHasUvs ? 2 : 0) + (flags & kHasColours ? 3 : 0);

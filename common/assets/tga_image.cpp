@@ -24,7 +24,7 @@ std::optional<TgaHeader> read_tga_header(ByteReader& r) {
   const auto id = r.take<std::uint8_t>(), map = r.take<std::uint8_t>(), type = r.take<std::uint8_t>();
   const auto map_first = r.take<std::uint16_t>(), map_count = r.take<std::uint16_t>();
   const auto map_bits = r.take<std::uint8_t>();
-  if (!map_bits || !r.skip(4)) return std::nullopt;  // the origin's place on a screen
+  if (!map_bits || !r.skip(4)) return std::nullopt;  // position of the image on a screen
   const auto width = r.take<std::uint16_t>(), height = r.take<std::uint16_t>();
   const auto bits = r.take<std::uint8_t>(), order = r.take<std::uint8_t>();
   if (!order || *map > 1 || (*order & 0xc0) != 0) return std::nullopt;  // no interleaved rows
@@ -53,7 +53,7 @@ std::uint32_t little_endian(std::span<const std::byte> b) {
   return x;
 }
 
-// The colour of 2 bytes (5 bits each, one of alpha), 3 or 4 bytes.
+// Returns the colour in 2 bytes (5 bits per channel, 1 bit of alpha), 3 or 4 bytes.
 Codes colour_of(std::span<const std::byte> b) {
   const std::uint32_t x = little_endian(b);
   const auto code = [](std::uint32_t v) { return static_cast<std::uint8_t>(v); };
@@ -62,14 +62,14 @@ Codes colour_of(std::span<const std::byte> b) {
   return {of_five(10), of_five(5), of_five(0), code(x & 0x8000 ? 255 : 0)};
 }
 
-// Gives the bytes of one pixel after the other.
+// Returns the bytes of one pixel after another.
 class PixelBytes {
  public:
   PixelBytes(std::span<const std::byte> data, std::size_t size, bool packed)
       : data_(data), size_(size), packed_(packed) {}
 
-  // Returns false if the data end before `pixels`, as far as that can be said without decoding them: a packet
-  // is at least 1 + size bytes, and stands for 128 pixels at most.
+  // Returns false if the data are certainly too short for `pixels`. Nothing is decoded: a packet has at least
+  // 1 + size bytes and at most 128 pixels.
   bool may_suffice(std::uint64_t pixels) const {
     return data_.size() >= (packed_ ? (pixels + 127) / 128 * (1 + size_) : pixels * size_);
   }

@@ -1,4 +1,5 @@
-// Time is passed as an argument: only main() and SystemClock read the system's clock.
+// Clocks and conversions of time. Functions get the time as an argument: only main() and SystemClock read the
+// system's clock.
 #pragma once
 
 #include <time.h>
@@ -29,6 +30,8 @@ class SystemClock final : public Clock {
 inline std::int64_t system_unix_ns() {
   return std::chrono::duration_cast<Duration>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
+
+inline double system_unix_seconds() { return static_cast<double>(system_unix_ns()) / 1e9; }
 
 // CPU time of the calling thread
 inline double thread_cpu_seconds() {

@@ -1,6 +1,6 @@
 // Failpoints: named steps in the life of a unit (a range of samples of one tile) at which the chaos tests
-// kill a process. With LIGHTSHAFT_KILL_AT=STEP or STEP:N in the environment, the process dies as by kill -9
-// when it reaches the step (for the N-th time). Otherwise a failpoint costs one comparison.
+// kill a process. With LIGHTSHAFT_KILL_AT=STEP or STEP:N in the environment, the process kills itself by
+// SIGKILL when it reaches the step (for the N-th time). Otherwise a failpoint costs one comparison.
 #pragma once
 
 #include <string_view>

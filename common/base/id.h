@@ -8,7 +8,7 @@
 
 namespace ls {
 
-// A short printable name, e.g. "j-7f3a91c2"; made by the coordinator, unique within its data folder.
+// A short printable name such as "j-7f3a91c2". The coordinator makes it, unique within its data folder.
 template <class Tag>
 struct Id {
   std::string value;

@@ -28,7 +28,7 @@ spdlog::logger& logger() {
 
 bool control(char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }
 
-// Keeps a message on one line, so that names and file contents in it cannot forge log lines.
+// Replaces control characters by spaces, so that names and file contents in a message cannot forge log lines.
 std::string one_line(std::string_view text) {
   std::string line(text);
   std::replace_if(line.begin(), line.end(), control, ' ');

@@ -22,7 +22,7 @@ inline std::string percent_encode(std::string_view text) {
   return out;
 }
 
-// "a%20b" -> "a b" (RFC 3986, section 2.1); nullopt if a '%' has no two hexadecimal digits behind it.
+// "a%20b" -> "a b" (RFC 3986, section 2.1); nullopt if a '%' is not followed by two hexadecimal digits.
 inline std::optional<std::string> percent_decode(std::string_view text) {
   std::string out;
   while (!text.empty()) {

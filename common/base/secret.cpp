@@ -1,12 +1,19 @@
 #include "common/base/secret.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <openssl/crypto.h>
 #include <openssl/evp.h>
 #include <openssl/hmac.h>
+#include <unistd.h>
 
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <iomanip>
+
+#include "common/base/helper_program.h"
 
 namespace ls {
 
@@ -48,6 +55,17 @@ Result<std::string> read_pem(const std::filesystem::path& file) {
   if (text.size() > kPemBytes || text.find("-----BEGIN ") == std::string::npos)
     return fail(Errc::invalid_argument, fmt::format("{} is no PEM file", file.string()));
   return text;
+}
+
+Result<void> write_private(const std::filesystem::path& file, std::string_view text, mode_t mode) {
+  const std::string aside = file.string() + ".new";
+  ::unlink(aside.c_str());
+  const Descriptor out{::open(aside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode)};
+  if (out.fd < 0 || ::write(out.fd, text.data(), text.size()) != static_cast<ssize_t>(text.size()) ||
+      ::fsync(out.fd) != 0 || ::rename(aside.c_str(), file.c_str()) != 0)
+    return fail(Errc::resource_exhausted,
+                fmt::format("cannot write '{}': {}", file.string(), std::strerror(errno)));
+  return {};
 }
 
 }  // namespace ls

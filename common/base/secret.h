@@ -1,6 +1,8 @@
 // Reading and comparing secrets.
 #pragma once
 
+#include <sys/types.h>
+
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -27,5 +29,8 @@ Result<std::string> read_secret(const std::filesystem::path& file);
 // invalid_argument: it is larger, or not PEM.
 inline constexpr std::size_t kPemBytes = 1u << 20;
 Result<std::string> read_pem(const std::filesystem::path& file);
+
+// Replaces the file in one step: after a crash there is either the old or the new file, with this mode.
+Result<void> write_private(const std::filesystem::path& file, std::string_view text, mode_t mode = 0600);
 
 }  // namespace ls

@@ -22,7 +22,7 @@ struct Program {
   std::vector<int> files = {0, 1, 2};
   // Returns true if the program inherits the environment variable, given as NAME=VALUE.
   std::function<bool(std::string_view)> inherits;
-  // A process group of its own does not get the signals of the terminal, such as Ctrl-C.
+  // True: the program gets a process group of its own, and so none of the terminal's signals, such as Ctrl-C.
   bool own_group = false;
 };
 

@@ -1,6 +1,6 @@
 // Denoises images with Intel Open Image Denoise (https://www.openimagedenoise.org), version 2. The library is
 // optional and is searched for at run time. It runs in a separate program, lightshaft-denoise, installed
-// beside the executable: a crash or a lack of memory in it is merely an error here.
+// beside the executable: a crash or a lack of memory in it is only an error for the caller.
 //
 // If the environment variable LIGHTSHAFT_OIDN is set, it names the library: its file, its folder, or the
 // folder above that. Otherwise the library is searched for in this order: `oidn/lib` beside the executable;

@@ -19,9 +19,10 @@ struct HttpPost {
   std::vector<std::pair<std::string, std::string>> headers;
   std::string body;
   double seconds = 15;                // time limit until the answer has arrived
-  std::size_t most_answer_bytes = 0;  // so much of the answer's body is kept; the rest is dropped
+  std::size_t most_answer_bytes = 0;  // the answer's body is cut to this length
   std::string ca_file;                // certificates of the authorities to trust; empty: the system's
-  // Called about once a second while the request runs; true ends it with an error. May be empty.
+  // Called about once a second while the request runs; if it returns true, the request ends with an error.
+  // May be empty.
   std::function<bool()> give_up = {};
 };
 

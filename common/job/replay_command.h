@@ -1,4 +1,4 @@
-// The command that renders one sample of a job again, which a person can copy to debug it.
+// The command line that renders one sample of a job again, for debugging.
 #pragma once
 
 #include <cstdint>

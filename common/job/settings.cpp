@@ -55,8 +55,8 @@ void read_frames(Fields& fields, JobSpec& spec) {
     fields.wrong("defines", "gives $frame, which in a job with 'frames' is the number of the frame");
 }
 
-// Reads `target_layer` and `denoise`. If the target error is that of the denoised layers, the job needs these
-// layers, so `denoise` may be left out.
+// Reads `target_layer` and `denoise`. A target error of the denoised layers implies `denoise`, which may then
+// be left out.
 void read_denoise(Fields& fields, JobSpec& spec) {
   const auto layer = fields.name("target_layer");
   if (layer) {

@@ -1,7 +1,7 @@
-// The techniques by which the integrators find light that is found too rarely by sampling the directions of
-// materials and media, and by next-event estimation at vertices. Which of them a job uses depends on its
-// scene and its files: the workers find out when they build the world, and say so with each result. A
-// parameter of the scene's integrator switches each off (docs/reference/scene-format.md, Integrators).
+// The integrators' sampling techniques for light that BSDF and phase function sampling and next-event
+// estimation at vertices find too rarely. A job's scene and files determine which of them it uses: the
+// workers choose them when they build the world, and report them with each result. A parameter of the scene's
+// integrator switches each technique off (docs/reference/scene-format.md, Integrators).
 #pragma once
 
 #include <cstdint>
@@ -12,19 +12,19 @@
 namespace ls {
 
 enum class Technique : std::uint8_t {
-  equiangular,      // points on segments of paths in media, chosen near lights that have a position
-  exponential,      // points on segments of paths in media, chosen as light fades along them
+  equiangular,      // points on segments of paths in media, sampled near lights that have a position
+  exponential,      // points on segments of paths in media, sampled by transmittance
   camera_points,    // several points on the segments of camera rays in media
-  lamp_directions,  // a share of the directions is aimed close to lights without extent
-  lamp_flights,     // a share of the flights through media ends close to lights without extent
+  lamp_directions,  // a share of the directions is sampled close to lights without extent
+  lamp_flights,     // a share of the flights through media is sampled to end close to lights without extent
   light_vertices,   // connections to points that a directional emitter lights
-  light_tree,       // one of many lights chosen by a tree
-  path_reuse,       // paths that serve several pixels from their second vertices on
-  shadow_roulette,  // shadow rays through grids that are traced at random where they could bring little
-  sky_samples,      // a second direction from the first surface that looks for a constant environment
-  path_splitting,   // splitting and Russian roulette of paths, in scenes with grids, by what they may bring
+  light_tree,       // one of many lights, chosen by a tree
+  path_reuse,       // subpaths from the second vertex on that several pixels share
+  shadow_roulette,  // Russian roulette for shadow rays through grids that could contribute little
+  sky_samples,      // a second direction from the first surface, sampled towards a constant environment
+  path_splitting,   // in scenes with grids: splitting and Russian roulette by possible contribution
   sky_portals,      // sampling of directions towards the sky through openings
-  local_lights,     // one of few lights chosen by what was learned about the place
+  local_lights,     // one of few lights, chosen by probabilities learned for each place
 };
 
 struct TechniqueRow {
@@ -34,7 +34,7 @@ struct TechniqueRow {
 };
 std::span<const TechniqueRow> techniques();  // all, in the order of the enumeration
 
-// The parameter of the integrator that switches the technique off, and the value that does.
+// The integrator's parameter and its value that switch a technique off.
 struct TechniqueSwitch {
   std::string_view parameter, value;
 };

@@ -1,5 +1,5 @@
-// All size limits of the worker protocol. Both sides check received data against them before allocating or
-// storing anything, and obey them when sending.
+// All size limits of the worker protocol. Coordinator and worker check received data against them before
+// allocating or storing anything, and keep to them when sending.
 #pragma once
 
 #include <cstddef>

@@ -71,9 +71,9 @@ struct Lease {
   bool operator==(const Lease&) const = default;
 };
 
-// Seconds that a worker spent on a unit besides rendering it. Two of them are about the job's world (the
+// Seconds that a worker spent on a unit besides rendering it. `load` and `build` concern the job's world (the
 // scene prepared for rendering) and are sent only with the first result rendered from it: `load` is the time
-// to fetch the job's files, `build` the wall-clock time in which the loading thread read them and built the
+// to fetch the job's files, `build` the wall-clock time in which the loading thread reads them and builds the
 // world.
 struct UnitTimes {
   double load = 0, build = 0;
@@ -92,7 +92,7 @@ struct UnitResult {
   double cpu_seconds = 0;      // CPU time of the thread that rendered the unit
   Health health;
   UnitTimes times;
-  TechniqueSet techniques;  // those that the integrator used for this job's world; none: not known
+  TechniqueSet techniques;  // techniques that the integrator uses in this job's world; empty: unknown
   // If its lease is traced: when the worker received the unit, by its clock in nanoseconds since 1970; 0: not
   // sent
   std::uint64_t held_unix_ns = 0;
@@ -149,8 +149,8 @@ struct WorkerProgress {
 struct WorkerDraining {
   bool operator==(const WorkerDraining&) const = default;
 };
-// Units of this lease that this worker has not rendered and will not render, because it drains
-// (WorkerDraining), or because they were cancelled.
+// Units of this lease that the worker has not rendered and will not render, because it drains
+// (WorkerDraining) or the units were cancelled.
 struct LeaseReturned {
   LeaseId lease;
   std::vector<UnitKey> unrendered;

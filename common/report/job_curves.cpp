@@ -12,7 +12,7 @@
 namespace ls::report {
 namespace {
 
-constexpr std::size_t kMostRows = 256;  // the table has at most this many rows, the last ones
+constexpr std::size_t kMostRows = 256;  // at most this many rows in the table: the last checkpoints
 
 struct Clock {
   const char* key;
@@ -27,9 +27,8 @@ std::string range(const std::optional<std::pair<double, double>>& ci, std::strin
   return ci ? fmt::format("{} to {}", words(ci->first), words(ci->second)) : std::string();
 }
 
-// Returns the interval of the error at a checkpoint. Whether figures can be trusted is known only for the
-// last checkpoint, not for earlier ones. If the last one's cannot be trusted (`doubt`), no checkpoint gets an
-// interval.
+// Returns the interval of the error at a checkpoint. The report judges only the last checkpoint. If its
+// figures are not trusted (`doubt`), no checkpoint gets an interval.
 std::optional<std::pair<double, double>> shown_interval(const Json& point, bool doubt) {
   return doubt ? std::nullopt : interval(point, "relmse_ci95");
 }

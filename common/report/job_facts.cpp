@@ -72,7 +72,7 @@ std::string target_of(const Json& report) {
   return given(target) + (denoised_target(report) ? " of the denoised layers" : "");
 }
 
-// Lists the path limits and end conditions that were requested; those that were not are left out.
+// Lists the requested path limits and end conditions.
 std::string asked(const Json& report) {
   const double depth = number(report, "max_depth"), spp = number(report, "spp_asked");
   const std::string roulette = whole(number(report, "rr_depth"));

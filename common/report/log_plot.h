@@ -37,8 +37,8 @@ struct LogPlot {
   std::optional<Ahead> ahead;    // drawn only with a target
 };
 
-// Returns an SVG element for a page whose style includes plot_css(). If there are no points, the drawing says
-// so.
+// Returns an SVG element for a page whose style includes plot_css(). Without points, the drawing has a note
+// instead.
 std::string svg_of(const LogPlot& plot);
 // Returns the content of a separate SVG file, which follows the reader's dark or light mode.
 std::string standalone_svg(const LogPlot& plot);

@@ -1,4 +1,4 @@
-// Tells from the ending of a file's name what kind of file it is.
+// Classifies files by the endings of their names.
 #pragma once
 
 #include <initializer_list>

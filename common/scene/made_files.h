@@ -10,13 +10,13 @@
 
 namespace ls::scene {
 
-// Triangles for a PLY file. Each list but positions and indices may be empty.
+// Triangles for a PLY file. All lists except positions and indices may be empty.
 struct MadeMesh {
   std::vector<float> positions, normals, uvs;  // three, three, two numbers per corner (vertex)
   std::vector<float> colours, opacities;       // the attributes "vertex_color", "vertex_opacity": three, one
   std::vector<std::uint32_t> indices;          // three per triangle, all in range
   std::size_t corners() const { return positions.size() / 3; }
-  std::size_t bytes() const;  // of the file
+  std::size_t bytes() const;  // size of the file
 };
 
 struct MadeGrid {

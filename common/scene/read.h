@@ -27,7 +27,8 @@ class AssetSource {
   // Keeps a file that the reader has made from numbers in the scene's text; from then on find() returns it.
   // If a source keeps no files, the sender of the scene must send this file, too, under the same name.
   virtual Result<Asset> keep(std::string_view name, const std::string& bytes);
-  // Returns whether keep() stores files. If not, readers need not make a file that was not sent.
+  // Returns whether keep() stores files. If not, the sender must send made files, and readers need not
+  // compute them.
   virtual bool keeps() const { return false; }
 };
 

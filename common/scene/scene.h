@@ -76,16 +76,16 @@ using Texture = std::variant<ConstantTexture, BitmapTexture, CheckerboardTexture
 
 // Surfaces.
 enum class Microfacet { beckmann, ggx };
-// Those of the following rough surfaces that have multiple_scattering set include light that is scattered
-// several times between microfacets, which the plain model leaves out (docs/design/multiple-scattering.md).
-// The roughness of such a surface must be one constant.
+// Rough surfaces with multiple_scattering set include light that is scattered several times between
+// microfacets, which the plain microfacet model leaves out (docs/design/multiple-scattering.md). Their
+// roughness must be one constant.
 
 struct DiffuseBsdf {
   TextureIndex reflectance;
   bool operator==(const DiffuseBsdf&) const = default;
 };
-// A thin sheet that scatters light ideally on both sides, such as a leaf or paper. At every point the sum of
-// the two is at most 1: where textures exceed it, both are divided by it.
+// A thin sheet that scatters light ideally on both sides, such as a leaf or paper. At every point reflectance
+// + transmittance is at most 1: where textures exceed 1, both are divided by their sum.
 struct DiffuseTransmissionBsdf {
   TextureIndex reflectance, transmittance;
   bool operator==(const DiffuseTransmissionBsdf&) const = default;
@@ -122,8 +122,8 @@ struct ThinDielectricBsdf {
   TextureIndex specular_reflectance, specular_transmittance;
   bool operator==(const ThinDielectricBsdf&) const = default;
 };
-// A thin sheet with rough sides, both sides in one surface. The lobe of transmitted light is that of the
-// reflected light, mirrored at the sheet.
+// A thin sheet whose two rough sides are one surface. The lobe of transmitted light is that of the reflected
+// light, mirrored at the sheet.
 struct RoughThinDielectricBsdf {
   Microfacet distribution = Microfacet::beckmann;
   TextureIndex alpha_u, alpha_v;
@@ -318,9 +318,9 @@ struct EnvmapEmitter {
 };
 
 // An inverse camera at the origin of to_world, which looks along its +z axis with +y up. It projects an image
-// in the way in which a camera with that field of view and the image's aspect ratio would see it. On the
-// plane one scene unit ahead, the irradiance is pi * scale times the image's value; if `as_intensity` is set,
-// scale times the image's value is instead the radiant intensity in the texel's direction [W/sr] (pbrt).
+// as a camera with this field of view and the image's aspect ratio sees it. On the plane one scene unit
+// ahead, the irradiance is pi * scale times the image's value. With `as_intensity`, the radiant intensity in
+// a texel's direction is instead scale times the texel's value [W/sr] (pbrt).
 struct ProjectorEmitter {
   TextureIndex irradiance;
   double scale = 1;
@@ -344,7 +344,7 @@ using Emitter = std::variant<ConstantEmitter, DirectionalEmitter, PointEmitter, 
                              ProjectorEmitter, GoniometricEmitter>;
 
 // Integrator.
-inline constexpr int kUsualPathReuse = 16;  // pixels that share paths, if path_reuse 0 chooses to share
+inline constexpr int kUsualPathReuse = 16;  // pixels that share subpaths, if path_reuse 0 selects sharing
 struct IntegratorSettings {
   // Our name: "volpath", "volpath_distant_mis", "path" or "whitted".
   std::string name = "volpath";
@@ -354,36 +354,36 @@ struct IntegratorSettings {
   // Distance and heuristic are used by "volpath_distant_mis" only
   DistanceSampling distance = DistanceSampling::mis;
   MisHeuristic heuristic = MisHeuristic::power;
-  // For "volpath" only: number of points on the segment of a camera ray through a medium at which light is
-  // sampled. 0: chosen for the scene, possibly none; -1: none.
+  // For "volpath" only: number of points on a camera ray's segment through a medium at which next-event
+  // estimation samples light. 0: chosen for the scene, possibly none; -1: none.
   int camera_points = 0;
-  bool phase_only = false;  // true: no direction is aimed at a point, spot or projector light
-  // For "volpath" and "path" only: connections of paths to points that a directional emitter lights. 0:
-  // chosen for the scene; -1: never; 1: always.
+  bool phase_only = false;  // true: directions are not sampled towards point, spot or projector lights
+  // For "volpath" and "path" only: whether paths are connected to points that a directional emitter lights.
+  // 0: chosen for the scene; -1: never; 1: always.
   int light_vertices = 0;
-  // For "volpath" only, with lamps being point, spot and projector lights. equiangular: points on segments
-  // near lamps; without these points no direction is aimed at lamps either. lamp_flights: flights that end
-  // near lamps. 0: chosen for the scene; -1: never.
+  // For "volpath" only. Lamps are point, spot and projector lights. equiangular: whether points on path
+  // segments are sampled near lamps; if not, directions are not sampled towards lamps either. lamp_flights:
+  // whether a share of the free flights is sampled to end near lamps. 0: chosen for the scene; -1: never.
   int equiangular = 0, lamp_flights = 0;
   int light_tree = 0;  // 0: a tree chooses among many lights; -1: lights are chosen by their power alone
-  // For "volpath" and "path" only: the number of pixels that share what their paths find from the second
-  // vertices on. 0: kUsualPathReuse or none, chosen for the scene; -1 or 1: none.
+  // For "volpath" and "path" only: the number of pixels that share the subpaths from the second vertex on. 0:
+  // kUsualPathReuse or none, chosen for the scene; -1 or 1: none.
   int path_reuse = 0;
-  // For "volpath" only: whether shadow rays through grids that could bring little are traced at random. 0:
-  // chosen for the scene; -1: all are traced.
+  // For "volpath" only: whether Russian roulette applies to shadow rays through grids whose largest possible
+  // contribution is small. 0: chosen for the scene; -1: all are traced.
   int shadow_roulette = 0;
-  // For "volpath" and "path" only: whether the first surface looks for a constant environment in a second
-  // direction. 0: chosen for the scene; -1: it does not.
+  // For "volpath" and "path" only: whether the first surface of a path samples a second direction towards a
+  // constant environment. 0: chosen for the scene; -1: it does not.
   int sky_samples = 0;
   // For "volpath" and "path" only: whether directions towards the sky, an environment map or a constant
   // environment, are also sampled through the openings by which its light enters the scene. 0: chosen for the
   // scene; -1: never; 1: where possible.
   int sky_portals = 0;
-  // For "volpath" and "path" only: whether one of few lights is chosen by what was learned about the light at
-  // each place. 0: chosen for the scene; -1: never; 1: where possible.
+  // For "volpath" and "path" only: whether one of few lights is chosen by probabilities that camera paths
+  // learned for each place. 0: chosen for the scene; -1: never; 1: where possible.
   int local_lights = 0;
-  // For "volpath" only: whether paths in scenes with grids split at their first scattering and end by what
-  // they may add to their pixel. 0: chosen for the scene; -1: they do not.
+  // For "volpath" only: whether, in scenes with grids, paths split at their first scattering and Russian
+  // roulette ends them by their possible contribution to the pixel. 0: chosen for the scene; -1: they do not.
   int path_splitting = 0;
   bool operator==(const IntegratorSettings&) const = default;
 };

@@ -14,7 +14,7 @@ struct RectangleShape {  // [-1,1]^2 in z = 0, normal +z, uv = (x+1)/2, (y+1)/2
 struct CubeShape {  // [-1,1]^3, normals outwards, uv per face
   bool operator==(const CubeShape&) const = default;
 };
-struct SphereShape {  // center and radius apply before to_world does
+struct SphereShape {  // center and radius apply before to_world
   Vec3 center{0, 0, 0};
   double radius = 1;
   bool operator==(const SphereShape&) const = default;

@@ -1,5 +1,5 @@
 // The bodies of OTLP over HTTP in JSON (https://opentelemetry.io/docs/specs/otlp/): the request
-// ExportTraceServiceRequest and the part of its answer that says how many spans were rejected.
+// ExportTraceServiceRequest and the part of its answer with the number of rejected spans.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,8 @@ struct PartialSuccess {
   std::uint64_t rejected = 0;  // number of spans
   std::string message;         // for the operator, of at most 200 characters; empty: none
 };
-// Reads the body of an answer of status 2xx. Whatever is not understood counts as a full success: an answer
-// may be empty or of another encoding.
+// Reads the body of an answer of status 2xx. A body that cannot be parsed counts as a full success: it may be
+// empty or in another encoding.
 PartialSuccess otlp_partial_success(std::string_view answer);
 
 }  // namespace ls::trace

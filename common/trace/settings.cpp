@@ -1,6 +1,7 @@
 #include "common/trace/settings.h"
 
 #include <fmt/format.h>
+#include <strings.h>
 
 #include <algorithm>
 #include <cmath>
@@ -35,14 +36,6 @@ Setting setting(const Environment& environment, const std::string& ending) {
 std::string plain(const Environment& environment, const char* name) {
   const char* value = environment(name);
   return value ? value : "";
-}
-
-// The specification compares without regard to case.
-bool is_true(std::string_view value) {
-  constexpr std::string_view kTrue = "true";
-  return std::equal(value.begin(), value.end(), kTrue.begin(), kTrue.end(), [](char given, char wanted) {
-    return (given >= 'A' && given <= 'Z' ? given - 'A' + 'a' : given) == wanted;
-  });
 }
 
 std::string_view trimmed(std::string_view text) {
@@ -108,8 +101,8 @@ Result<Sampler> read_sampler(std::string name, const std::string& argument) {
 
 Result<void> check_protocol(const Setting& protocol) {
   if (protocol.value.empty() || protocol.value == "http/json") return {};
-  // Only a warning: this value is often set for all programs of a machine, and collectors take both encodings
-  // on one port.
+  // This is only a warning, since http/protobuf is often set for all programs of a machine, and collectors
+  // accept both encodings on one port.
   if (protocol.value == "http/protobuf") {
     log_warn("", fmt::format("{} is http/protobuf, but spans are sent as http/json: the collector must take "
                              "that, too",
@@ -146,7 +139,9 @@ bool Sampler::takes(const TraceId& trace, std::optional<bool> parent_sampled) co
 
 Result<std::optional<Settings>> settings_from(const Environment& environment, const std::string& program) {
   const std::string exporter = plain(environment, "OTEL_TRACES_EXPORTER");
-  if (is_true(plain(environment, "OTEL_SDK_DISABLED")) || exporter == "none") return std::nullopt;
+  // The specification compares without regard to case.
+  const bool off = ::strcasecmp(plain(environment, "OTEL_SDK_DISABLED").c_str(), "true") == 0;
+  if (off || exporter == "none") return std::nullopt;
   auto url = read_url(environment);
   if (!url) return tl::unexpected(url.error());
   if (url->empty()) return std::nullopt;

@@ -1,4 +1,4 @@
-// Where traces are sent and which are recorded, as the operator sets it by OpenTelemetry's standard
+// The destination of traces and which are recorded, set by the operator in OpenTelemetry's standard
 // environment variables (https://opentelemetry.io/docs/specs/otel/configuration/sdk-environment-variables/).
 #pragma once
 
@@ -22,7 +22,7 @@ struct Sampler {
 };
 
 struct Settings {
-  std::string url;  // for POST requests with spans
+  std::string url;  // receives POST requests with spans
   std::vector<std::pair<std::string, std::string>> headers;
   std::string ca_file;  // certificates of authorities; empty: the system's
   double seconds = 10;  // time limit until the answer

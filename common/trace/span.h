@@ -1,4 +1,4 @@
-// A span: a named stretch of time of one job, with facts about it. Times are nanoseconds since 1970 (UTC).
+// A span: a named time interval of one job, with attributes. Times are nanoseconds since 1970 (UTC).
 #pragma once
 
 #include <cstdint>
@@ -35,7 +35,7 @@ struct Span {
   bool failed = false;
 };
 
-// Tells whoever looks at the trace which program recorded its spans.
+// Identifies the program that recorded the spans of a trace.
 struct Resource {
   std::vector<std::pair<std::string, std::string>> attributes;
 };

@@ -1,5 +1,5 @@
-// The spans that wait to be sent. A SpanQueue depends only on what is put in and the times passed in. It is
-// bounded: a span that finds no room is dropped and counted. Not thread-safe.
+// The spans that wait to be sent. Its state depends only on its calls and the times passed in. It is bounded:
+// a span that finds no room is dropped and counted. Not thread-safe.
 #pragma once
 
 #include <cstddef>

@@ -13,10 +13,10 @@
 namespace ls::trace {
 namespace {
 
-constexpr double kLastSeconds = 2;        // for sending what waits when the program ends
-constexpr double kComplaintSeconds = 60;  // between two lines in the log about the collector
+constexpr double kLastSeconds = 2;        // time limit for sending the waiting spans when the program ends
+constexpr double kComplaintSeconds = 60;  // least time between two log lines about the collector
 constexpr std::size_t kMostAnswer = 64 << 10;
-// The wall clock was set if it differs by more than this from what the monotonic clock says.
+// If the difference between wall clock and monotonic clock changes by more than this, the wall clock was set.
 constexpr std::int64_t kClockStepNs = 100'000'000;
 constexpr int kClockReadings = 5;
 
@@ -76,8 +76,8 @@ std::int64_t Tracer::unix_ns(TimePoint at) const { return count(at) + offset_ns_
 
 Figures Tracer::figures() const { return queue_.lock()->figures(); }
 
-// The two clocks are compared again and again, since the wall clock may be set and the monotonic clock stops
-// while a machine sleeps.
+// Compares the two clocks. This is repeated, since the wall clock may be set and the monotonic clock stops
+// while the machine sleeps.
 void Tracer::set_clock() {
   std::int64_t offset = 0, narrowest = std::numeric_limits<std::int64_t>::max();
   // The clocks are read several times; the reading with the shortest gap between the two is used, since the

@@ -1,6 +1,6 @@
 // Records spans and sends them to a collector, on a thread of its own. Recording takes a short lock and never
-// waits for the collector: if the collector refuses, hangs or is gone, spans are dropped and counted. A
-// program that is not traced has no Tracer; its callers hold a null pointer and only check it.
+// waits for the collector: if the collector refuses them, hangs or is unreachable, spans are dropped and
+// counted. A program that is not traced has a null pointer instead of a Tracer.
 #pragma once
 
 #include <atomic>
@@ -36,11 +36,11 @@ class Tracer {
   // Sends the waiting spans, if the collector takes them within kLastSeconds.
   ~Tracer();
 
-  // Adds the span to those that wait to be sent. Thread-safe. The span must be of a sampled trace.
+  // Adds the span to the queue of spans to send. Thread-safe. The span must be of a sampled trace.
   void record(Span span);
   SpanId new_span_id();
-  // A time of the injected clock as nanoseconds since 1970. Times of one process keep their order, except
-  // over a moment at which the wall clock was set or the machine slept.
+  // A time of the injected clock as nanoseconds since 1970. In one process a later time gives a later result,
+  // unless the wall clock was set or the machine slept in between.
   std::int64_t unix_ns(TimePoint at) const;
   const Sampler& sampler() const { return options_.settings.sampler; }
   Figures figures() const;

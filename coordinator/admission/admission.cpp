@@ -25,8 +25,8 @@
 namespace ls::coordinator {
 namespace {
 
-// At most this many of the scene's items that are left out of the rendering are listed, so that a job's
-// record stays small
+// At most this many items of the scene that are left out of the rendering are listed, so that a job's record
+// stays small
 constexpr std::size_t kMostListed = 64;
 
 // Returns the total bytes of the files that only this part of the renderer reads.
@@ -45,9 +45,9 @@ std::uint64_t bytes_of_files(const scene::Needs& needs, const std::string& part)
   return sum;
 }
 
-// Sets needs, features and analysis of `job`: what the scene needs, and which of its parts are left out of
-// the rendering, for workers and as text for users. `pruned` is the part of the scene that the job's
-// integrator uses.
+// Sets needs, features and analysis of `job`: the renderer's features that the scene needs, and the parts of
+// the scene that are left out of the rendering, for workers and as text for users. `pruned` is the part of
+// the scene that the job's integrator uses.
 void note_analysis(const scene::Pruned& pruned, const RenderSettings& settings, StoredJob& job) {
   using nlohmann::json;
   const scene::Needs needs = scene::needs_of(pruned.scene, scene::sees_media(settings.integrator));
@@ -148,10 +148,6 @@ Result<RenderSettings> settings_of(const Scene& scene, const JobSpec& spec, std:
   return settings;
 }
 
-Rejected rejected(Error error, std::vector<Diagnostic> diagnostics = {}) {
-  return {std::move(error), std::move(diagnostics)};
-}
-
 // Returns the part of the scene that the job's integrator uses, or an error if a file of this part is not in
 // the store.
 tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, const BlobStore& blobs,
@@ -172,7 +168,7 @@ tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, 
 tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const BlobStore& blobs,
                                         std::optional<std::uint32_t> frame) {
   const auto refuse = [](Error error, std::vector<Diagnostic> found = {}) {
-    return tl::unexpected(rejected(std::move(error), std::move(found)));
+    return tl::unexpected(Rejected{std::move(error), std::move(found)});
   };
   if (request.scene_text.size() > scene::kMaxTextBytes)
     return refuse({Errc::invalid_argument, fmt::format("the scene text has {} bytes; {} are allowed",

@@ -19,7 +19,7 @@ struct Admission {
   std::size_t text_bytes = 0;  // bytes of all scene files that were read
 };
 
-// Reads the scene with the request's assets as its only files, so a scene can never read a path on this
+// Reads the scene. The scene can use only the request's assets as files, so it can never read a path on this
 // machine. Only assets that the scene uses become part of the job; each must be in `blobs`. Stores nothing.
 // `frame` is the number of a frame of a sequence (a job with frames). The scene is then read for this frame,
 // and its seed is the job's plus this number: frames have independent noise, and a frame rendered alone has
@@ -33,7 +33,8 @@ tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitReques
 
 // Returns a new job with the scene, settings and files of the job `before`, but without id, owner and time.
 // If `changes` has any of spp, target_error and time, it replaces all three. The seed and priority of
-// `changes` also apply; its other members are ignored. failed_precondition: a file of the scene is gone.
+// `changes` also apply; its other members are ignored. failed_precondition: a file of the scene is no longer
+// in `blobs`.
 Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, const BlobStore& blobs);
 
 // Reads the job's reference image, for an image of this size. Errors: failed_precondition if its blob is

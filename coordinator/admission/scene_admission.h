@@ -21,8 +21,8 @@ struct UploadedScene {
 };
 
 // Reads the request's scene. If `strict`, a file that is not in the store is an error, with its place in the
-// scene. Otherwise it is listed in not_uploaded, unless the scene includes it as a further scene file, and
-// the caller decides whether it is needed.
+// scene. Otherwise it is listed in not_uploaded, and the caller decides whether it is needed; only a missing
+// scene file that the scene includes is still an error.
 tl::expected<UploadedScene, Rejected> read_uploaded(const SubmitRequest& request, const BlobStore& blobs,
                                                     std::optional<std::uint32_t> frame, bool strict);
 

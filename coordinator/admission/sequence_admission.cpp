@@ -18,7 +18,7 @@ class Budget {
  public:
   explicit Budget(std::uint32_t frames) : frames_(frames) {}
 
-  // Call scene() before the scene's text is read, and frame() for every frame.
+  // Call scene() once, before the frames are read, and frame() for every frame.
   Result<void> scene(std::size_t bytes) const {
     if (bytes <= limits::kMaxSequenceText / frames_) return {};
     return too_much("bytes of scene text", limits::kMaxSequenceText);

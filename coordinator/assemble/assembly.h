@@ -25,14 +25,13 @@
 namespace ls::coordinator {
 
 // Numeric health (counts of invalid values) of the units in a job's film (its image); a unit is one round
-// (range of samples) of one tile. A unit that was rendered twice counts once, and one that is not in the film
-// does not count.
+// (range of samples) of one tile. Each unit in the film counts once, even if it was rendered twice.
 class HealthTable {
  public:
   // Adds the health of a unit that was added to the film. The health of a truncated round is kept separately:
-  // if the round comes again with more samples, its new health replaces the old one, as its pixels do.
+  // if the round is folded again with more samples, its new health replaces the old one, as its pixels do.
   void folded(TileIndex tile, RoundIndex round, const SampleRange& samples, const Health& health);
-  void discard(TileIndex tile);  // removes the tile's health, since the tile begins again without samples
+  void discard(TileIndex tile);  // removes the health of a tile that begins again without samples
   Health total() const;
 
   std::string save() const;
@@ -45,9 +44,9 @@ class HealthTable {
   std::map<TileIndex, Health> full_, tails_;
 };
 
-// The CPU cost of an image's units; a unit is one round (range of samples) of one tile. A checkpoint (the
-// image with a given number of rounds for each tile) costs what its units cost, even if some tiles already
-// have later rounds.
+// The CPU cost of an image's units; a unit is one round (range of samples) of one tile. The cost of a
+// checkpoint (the image with a given number of rounds for each tile) is the sum over its units, even if some
+// tiles already have later rounds.
 class UnitCosts {
  public:
   explicit UnitCosts(TileIndex tiles = 0) : tiles_(tiles) {}
@@ -116,9 +115,8 @@ class Assembly {
   // drops waiting partials of a truncated round that is to be rendered again in full
   void forget_round(RoundIndex round);
   void forget_waiting();
-  void discard(TileIndex tile);  // drops everything about the tile, since it begins again without samples
+  void discard(TileIndex tile);  // drops all data of the tile, which begins again without samples
   std::size_t waiting() const { return waiting_.size(); }
-  bool holds(TileIndex tile, RoundIndex round) const { return waiting_.contains({tile, round}); }
 
   Result<TileError> fold(TileIndex tile, RoundIndex round, const WaitingPartial& waiting);
 

@@ -49,12 +49,12 @@ json reference_of(const ReportFacts& facts, const std::optional<ReferenceError>&
           {"noise_relmse", noise ? number(noise->relmse) : json()}};
 }
 
-// Adds to the curve the forecast of the time to the target made at each checkpoint, so that the reliability
-// of forecasts can be judged afterwards.
+// Adds to the curve, at some checkpoints, the forecast of the cost of reaching the target from the points up
+// to there, so that users can judge the reliability of forecasts afterwards.
 void put_forecasts(json& curve, const std::vector<ConvergencePoint>& points, double target) {
   const std::vector<ErrorPoint> all = error_points(points);
-  // A forecast is added each time the samples have doubled. Points in between would add little, and each
-  // forecast evaluates all points
+  // A forecast is added each time the samples have doubled. Forecasts in between would add little, and each
+  // evaluates all points so far
   double next = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (all[i].spp < next) continue;

@@ -57,8 +57,8 @@ std::map<std::string, double> header_figures(const ReportFacts& facts);
 // (if it is the denoised one), denoised_by, denoised_relmse_ci95 and denoised_rmse_ci95, if they apply
 std::map<std::string, std::string> header_notes(const ReportFacts& facts);
 
-// Returns a note for an image that ended for another reason than having all its samples; otherwise an empty
-// text. `layer` is the layer whose error the job's target error refers to.
+// Returns a note for the image of a job that stopped at a target error or by time; else an empty text.
+// `layer` is the layer to which the job's target error applies.
 std::string note_on(StopReason stopped, TargetLayer layer);
 TimeSplit split_of(const JobTotals& totals);
 ErrorFigures figures_of(const ImageError& error);

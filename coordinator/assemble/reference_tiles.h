@@ -1,7 +1,7 @@
 // Keeps the pictures of tiles that a comparison with a reference image still needs. A round is a range of
 // samples; folding adds a tile's next round to the image. A checkpoint gives a number of rounds for each
 // tile, and shows every tile as it was after these rounds, even if some tiles already have later ones.
-// RoundErrors (round_errors.h) does the same with sums of errors; here whole pictures are kept, since the
+// RoundErrors (round_errors.h) does the same with sums of errors; this class keeps whole pictures, since the
 // perceived error (FLIP) is not a sum over tiles.
 //
 // Not thread-safe. Pictures are shared and immutable: the result of at() may be used without a lock.
@@ -28,7 +28,7 @@ class ReferenceTiles {
   // tiles' earlier pictures are unknown.
   explicit ReferenceTiles(const Film& film);
 
-  // Keeps the tile's picture after this round. Call it each time a round was added to `film`.
+  // Keeps the tile's picture after this round. Call it after each round that is added to `film`.
   void folded(TileIndex tile, RoundIndex round, const Film& film);
   // Returns the picture of each tile after `rounds[tile]` rounds. A tile with fewer rounds gives its latest
   // picture. nullopt: the picture of some tile is lost, because the coordinator was restarted meanwhile.
@@ -36,8 +36,8 @@ class ReferenceTiles {
   // Called when the tile begins again without samples
   void discard(TileIndex tile) { tiles_[tile].rounds.clear(); }
   std::optional<std::vector<TilePicture>> latest() const;
-  // Drops pictures that no later checkpoint needs. From now on, at() must not be asked for fewer rounds of
-  // any tile than `rounds`.
+  // Drops pictures that no later checkpoint needs. Later calls of at() must request at least `rounds[tile]`
+  // rounds of every tile.
   void checkpoint_taken(std::span<const RoundIndex> rounds);
 
  private:

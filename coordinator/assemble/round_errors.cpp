@@ -57,7 +57,8 @@ void put(std::vector<std::byte>& out, const T& value) {
   std::memcpy(&out[at], &value, sizeof value);
 }
 
-// Reads values from `bytes`. It never allocates more memory than `bytes` has, whatever counts are in them.
+// Reads values from `bytes`. It never allocates more memory than the size of `bytes`, whatever counts they
+// contain.
 class Reader {
  public:
   explicit Reader(std::span<const std::byte> bytes) : bytes_(bytes) {}

@@ -1,5 +1,5 @@
-// Keeps the error sums of every tile after every fold, as long as they are needed. A round is a range of
-// samples; folding adds a tile's next round to the image. A checkpoint gives a number of rounds for each
+// Keeps the error sums of every tile after every fold, as long as checkpoints need them. A round is a range
+// of samples; folding adds a tile's next round to the image. A checkpoint gives a number of rounds for each
 // tile, and sums the errors of the tiles after these rounds, even if some tiles already have later ones. So
 // the errors of a checkpoint do not depend on the order in which results arrive.
 #pragma once
@@ -16,8 +16,8 @@
 
 namespace ls::coordinator {
 
-// Drops of a tile's rounds, which ascend, those that no checkpoint of `next` or more rounds needs: of the
-// rounds before `next`, only the latest is.
+// Drops those of a tile's rounds (ascending) that no checkpoint with `next` or more rounds needs: all rounds
+// before `next` except the latest of them.
 template <class T>
 void drop_rounds_before(RoundIndex next, std::vector<std::pair<RoundIndex, T>>& rounds) {
   const auto later =
@@ -42,8 +42,8 @@ class RoundErrors {
   bool knows(std::span<const RoundIndex> rounds) const;
   // Called when the tile begins again without samples
   void discard(TileIndex tile) { tiles_[tile] = {}; }
-  // Drops errors that no later checkpoint needs. From now on, at() must not be asked for fewer rounds of any
-  // tile than `rounds`.
+  // Drops errors that no later checkpoint needs. Later calls of at() must request at least `rounds[tile]`
+  // rounds of every tile.
   void checkpoint_taken(std::span<const RoundIndex> rounds);
 
   // Returns the relative error sums as [round][tile]; empty unless `keep_relative`. The sum is 0 for tiles

@@ -1,6 +1,6 @@
-// Mip levels of images that are on disk only. A tile on disk contains all its layers, and reading one layer
-// costs as much as reading all. So for each tile that is read, a small version of all its layers is kept in
-// memory, from which later requests are answered. Thread-safe.
+// Mip levels of images that are on disk only. Reading one layer of a tile costs as much as reading all its
+// layers. So for each tile that is read, a small version of all its layers stays in memory and answers later
+// requests. Thread-safe.
 #pragma once
 
 #include <functional>

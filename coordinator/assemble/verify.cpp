@@ -14,8 +14,8 @@ BadResult bad(const UnitResult& result, Errc code, std::string_view why) {
                              result.unit.round, why)}};
 }
 
-// True if `got` differs from `expected` only in where its round was truncated: the headers are equal except
-// for the end of the sample range, and this end is within the round.
+// True if the headers differ at most in the end of the sample range, that is, in where the round was
+// truncated, and this end is within the round.
 bool same_round(const UnitHeader& got, const UnitHeader& expected, RoundIndex round) {
   UnitHeader other = got;
   other.samples = expected.samples;

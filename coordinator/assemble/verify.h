@@ -15,7 +15,7 @@ struct OtherRange {
   SampleRange samples;
 };
 // The result is wrong: its size, windows, scene, settings, numeric class, tile or digest differ from the
-// expected ones, or it has values that are not finite. The error says which.
+// expected ones, or it has values that are not finite. The error names the difference.
 struct BadResult {
   Error error;
 };

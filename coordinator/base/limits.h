@@ -26,7 +26,7 @@ inline constexpr std::size_t kMaxWarnings = 100;    // warnings kept per job
 // Longer names of jobs and workers are cut to this many bytes
 inline constexpr std::size_t kMaxShownName = 256;
 inline constexpr std::size_t kMaxJobs = 100'000;       // jobs kept; every frame of a sequence counts as one
-inline constexpr std::size_t kMaxJobsOfUser = 25'000;  // how many of the kMaxJobs one user may have
+inline constexpr std::size_t kMaxJobsOfUser = 25'000;  // jobs of one user, of the kMaxJobs
 using ls::kMaxFramePixels;
 using ls::kMaxFrameSide;
 using ls::kMaxSpp;
@@ -38,7 +38,7 @@ inline constexpr std::size_t kMaxSequenceText = std::size_t{512} << 20;
 // Tiles of all frames together; each takes 24 bytes of memory from the start
 inline constexpr std::uint64_t kMaxSequenceTiles = std::uint64_t{1} << 24;
 inline constexpr std::size_t kMaxSequenceFiles = std::size_t{1} << 20;  // asset files of all frames together
-// Pixels, in total, of the finished frames of a sequence that one change may resume together
+// Total pixels of the finished frames of a sequence that one change may resume
 inline constexpr std::uint64_t kMaxWokenPixels = std::uint64_t{1} << 26;
 // Sequences with more frames than this send progress events less often
 inline constexpr std::size_t kFramesPerEvent = 2500;
@@ -73,7 +73,7 @@ inline constexpr int kVerifyThreads = 2;
 inline constexpr std::size_t kMaxWorkers = 16'384;
 
 // Snapshots of a job's image. A snapshot is taken when kSnapshotUnits units have been added to the image
-// since the previous one, or when kSnapshotSeconds have passed. Adding that many units again after a crash
+// since the previous one, or when kSnapshotSeconds have passed. Folding that many units again after a crash
 // takes about 2 s
 inline constexpr std::uint64_t kSnapshotUnits = 8192;
 inline constexpr double kSnapshotSeconds = 60;

@@ -24,7 +24,7 @@ class WorkQueue {
       const std::lock_guard lock(mutex_);
       items_.push_back(std::move(item));
     }
-    filled_.notify_one();  // one item serves one waiting thread: others would wake up in vain
+    filled_.notify_one();  // one item can serve only one waiting thread
   }
   std::size_t size() const {
     const std::lock_guard lock(mutex_);
@@ -63,10 +63,10 @@ class WorkQueue {
 class ByteBudget {
  public:
   explicit ByteBudget(std::size_t bytes) : room_(bytes) {}
-  // Calls `granted` once the bytes fit, in the order of requests. If they fit now, the call is made on this
-  // thread before ask() returns; else later on a thread that calls release(). It is never made after close().
-  // A single item larger than the whole budget is granted when nothing else is in use. Every waiting request
-  // is kept, so callers must limit their number.
+  // Calls `granted` once the bytes fit, in the order of requests: if they fit now, on this thread before
+  // ask() returns; else later on a thread that calls release(). `granted` is never called after close(). A
+  // single item larger than the whole budget is granted when nothing else is in use. Every waiting request is
+  // kept, so callers must limit their number.
   void ask(std::size_t bytes, std::function<void()> granted) {
     {
       const std::lock_guard lock(mutex_);
@@ -116,8 +116,8 @@ class ByteBudget {
   bool closed_ = false;
 };
 
-// Calls act() once per `pause` until a stop is requested through `token`. The first call comes after one
-// pause. Blocks the calling thread.
+// Calls act() again and again, each time after a pause of this length, until a stop is requested through
+// `token`. Blocks the calling thread.
 template <class Act>
 void every(Duration pause, const std::stop_token& token, Act&& act) {
   std::mutex mutex;

@@ -1,30 +1,29 @@
-// Adaptive sampling decides when the tiles of a job with a target error stop getting samples. It reads
-// nothing but the tiles' own error estimates. A round is a fixed range of sample indices
-// (common/image/frame/rounds.h); folding adds the pixel sums of a tile's round to the image. Tiles stop in
-// groups (stop_groups()).
+// Adaptive sampling decides when the tiles of a job with a target error stop getting samples. It reads only
+// the tiles' own error estimates. A round is a fixed range of sample indices (common/image/frame/rounds.h);
+// folding adds the pixel sums of a tile's round to the image. Tiles stop in groups (stop_groups()).
 //
 // The image's relMSE is the mean over its pixels. Take a group of p pixels whose relative variance per
 // sample, averaged over pixels and channels, is a. After n samples per pixel it adds p a / n to the sum over
-// the image's pixels, and it has cost p n samples. For a given total cost the sum is least where one more
-// sample lowers it equally everywhere: where a / n^2 is equal, so n ~ sqrt(a). (Equal errors everywhere, n ~
-// a, would cost as much as uniform sampling.) In rounds: let n_k be the samples per pixel up to the end of
-// round k. Group g continues after round k as long as its gain a / (n_k n_k+1), the error that the next round
+// the image's pixels, and it has cost p n samples. For a given total cost the sum is least if one more sample
+// lowers it equally in every group: where a / n^2 is equal, so n ~ sqrt(a). (Equal errors everywhere, n ~ a,
+// would cost as much as uniform sampling.) In rounds: let n_k be the samples per pixel up to the end of round
+// k. Group g continues after round k as long as its gain a / (n_k n_k+1), the error that the next round
 // removes per sample, exceeds a level common to all groups (marginal allocation, Fox 1966).
 //
 // The right level for a target is not known in advance, and must not depend on which results arrive first. So
-// levels fall step by step on a fixed grid, 2^(-j/4). At each level every group stops independently; when all
-// have stopped, the error of the image is predicted: either it meets the target, or the level falls. Each
-// state depends on the groups' errors alone, and the sequence of states does not even depend on the target: a
-// smaller target continues where a larger one ended, so an extended job has the same bits as one that had the
-// smaller target from the start.
+// the level falls step by step on a fixed grid, 2^(-j/4). At each level every group stops independently; when
+// all groups have stopped, the error of the image is predicted: either it meets the target, or the level
+// falls. Each state depends on the groups' errors alone, and the sequence of states does not even depend on
+// the target: a smaller target continues where a larger one ended, so an extended job has the same bits as
+// one that had the smaller target from the start.
 //
 // The decision to stop after round k does not use the error after round k: a group's own last error would
 // bias the decision towards stopping. Instead the error after round k is predicted from the rounds before k,
 // with a variance that falls as 1/n. (Samplers that converge faster make the image better than requested.)
-// The image's error is predicted in the same way. Only when this prediction meets the target are the errors
-// of the last rounds checked, too, and they may make the image continue. No tile stops before
-// kMinSppBeforeStop samples per pixel. The cost per sample is taken to be equal everywhere: measured times
-// would make pixels depend on the machine. An unknown error (NaN) stops nothing.
+// The image's error is predicted in the same way. If this prediction meets the target, the errors of the last
+// rounds are checked, too, and may make the image continue. No tile stops before kMinSppBeforeStop samples
+// per pixel. The cost per sample is taken to be equal everywhere: measured times would make pixels depend on
+// the machine. An unknown error (NaN) stops nothing.
 //
 // Both this rule and the error estimates that it reads use only +, -, *, / and square roots, which give the
 // same bits on every machine: another coordinator that takes over the job makes the same decisions.
@@ -63,7 +62,7 @@ class AdaptiveStop {
   void folded(TileIndex tile, RoundIndex round, double rel_error_sum);
 
   // Returns the last round of the tile that is certain to be needed: rounds up to this one may be added to
-  // the image. Once the image is accepted, this is the tile's last round.
+  // the image. If the image meets the target, this is the tile's last round.
   RoundIndex wanted(TileIndex tile) const { return groups_[group_of_[tile]].stop; }
 
   // Returns the group of tiles that stop together with this tile, including the tile itself.
@@ -71,18 +70,18 @@ class AdaptiveStop {
 
   // True if all groups of tiles have stopped at the current level.
   bool settled() const { return settled_ == groups_.size(); }
-  // Tells if the image's relMSE at the current level is at most `target`. `unknown`: not all groups of tiles
-  // have stopped, or the error of some group's last round is not known yet.
+  // Decides whether the image's relMSE at the current level is at most `target`. `unknown`: not all groups of
+  // tiles have stopped, or the error of some group's last round is not known yet.
   enum class Verdict { unknown, no, yes };
   Verdict judge(double target) const;
   // Returns the relMSE of the image at the current level, predicted from the rounds before each tile's last.
   // Requires settled().
   double predicted() const;
-  // True if every group of tiles has reached the sample limit, so that none can continue.
+  // True if every group of tiles has reached the sample limit, so that no group can continue.
   bool exhausted() const;
   // Goes to the next lower level (threshold for stopping), at which some groups of tiles may continue.
-  // Requires settled() and not exhausted(). If no group's gain (the error that one more round removes per
-  // sample) is known to be positive, all groups continue to the sample limit.
+  // Requires settled() and not exhausted(). If no group has a known and positive gain (the error that one
+  // more round removes per sample), all groups continue to the sample limit.
   void lower();
   double level() const { return level_; }
 
@@ -129,7 +128,7 @@ class AdaptiveStop {
   // Pixel samples that the group still needs up to the end of round `last`
   double samples_missing(const Group& g, RoundIndex last) const;
   double gain(const Group& g) const;  // error that one more round after `stop` removes per sample
-  // relMSE of the image, from the errors of each group's last round, all of which must be known
+  // relMSE of the image, from the errors of each group's last round. Requires that all of these are known
   double measured() const;
   // True if the error of the group's round `stop` is known.
   static bool whole(const Group& g) { return g.sums.size() > g.stop; }

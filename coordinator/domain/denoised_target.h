@@ -1,16 +1,16 @@
-// Decides when a job ends whose target error is that of its denoised layers
-// (common/denoise/denoised_image.h). Where samples go is still the decision of the stop rule
-// (adaptive_stop.h), which reads the errors of the image itself: its levels do not depend on the denoiser.
-// This class only says at which level the job ends.
+// Decides when a job ends if its target error applies to its denoised layers
+// (common/denoise/denoised_image.h). The stop rule (adaptive_stop.h) still decides which tiles get samples,
+// from the errors of the image itself: its levels do not depend on the denoiser. This class only decides at
+// which level the job ends.
 //
 // The denoised error is checked at some levels: at the first one, and then whenever the samples have grown by
 // kDenoisedCheckGrowth. Which levels these are depends neither on the target nor on earlier checks, so a job
-// that is given a smaller target continues as if it had had it from the start.
+// that gets a smaller target later continues as if it had that target from the start.
 //
 // The job ends when at two successive checks the upper end of the error's 95 % interval is at most the
-// target. One check is not enough, since its estimate may be low by chance; the next check includes further
+// target. One check is not enough, since its estimate may be low by chance; the second one includes further
 // samples. A check without an interval meets no target. An image without noise ends at the first check that
-// meets the target: its pixels will not change any more.
+// meets the target: more samples do not change its pixels.
 //
 // A denoiser may give different results on different machines. So each check is made once, by the
 // coordinator, and stored with the job: after a restart, or at another coordinator, the stored values decide.
@@ -35,17 +35,17 @@ class DenoisedTarget {
   // `made` are the checks that are stored with the job.
   explicit DenoisedTarget(std::vector<DenoisedCheck> made = {}) : made_(std::move(made)) {}
 
-  // Says whether the job ends at the level with `spp` samples per pixel. Levels come in order; the latest one
-  // may come again, with another target. `check`: the error of the denoised layers must be known first.
+  // Decides whether the job ends at the level with `spp` samples per pixel. Levels come in order; the latest
+  // one may come again, with another target. `check`: the error of the denoised layers must be checked first.
   enum class Answer { go_on, check, end };
   Answer judge(double spp, double target);
   void add(const DenoisedCheck& check);
-  // True if the error was checked at the latest level at which judge() wanted a check, and meets the target.
+  // True if the latest level at which judge() requires a check was checked and meets the target.
   bool met(double target) const;
-  // True if the level with `spp` samples per pixel is the latest one at which judge() wanted a check.
+  // True if the level with `spp` samples per pixel is the latest one at which judge() requires a check.
   bool due(double spp) const { return spp == due_; }
 
-  // Predicts by which factor the image's own error is still to fall before the job ends. Affects no pixel.
+  // Predicts the factor by which the image's own error still falls until the job ends. Affects no pixel.
   double error_left(double target) const;
 
  private:

@@ -24,9 +24,9 @@ struct Send {
   ToWorker message;
 };
 
-// These units are no longer part of this lease (the list of units that the worker was told to render). If
-// they are still needed and no other lease holds them, they wait for another worker. `audit`: the lease was
-// an audit, in which a unit that has an accepted result is rendered again for comparison.
+// These units are no longer part of this lease (a list of units that is assigned to the worker). If they are
+// still needed and no other lease holds them, they wait for another worker. `audit`: the lease was an audit,
+// in which a unit that has an accepted result is rendered again for comparison.
 struct UnitsFreed {
   JobId job;
   LeaseId lease;
@@ -64,16 +64,16 @@ struct DropUnwanted {
   WorkerId worker;
   std::string why;
 };
-// Two results of one unit differ although both workers have the same numeric class (machines that compute the
-// same bits): one of them has bad memory or lies. A third worker is asked to render the unit; if there is
-// none, a running job fails.
+// Two results of one unit differ although they are of one numeric class (machines that compute the same
+// bits): a worker has bad memory or lies. A third worker decides (farm_trust.cpp); if there is none and the
+// second result is a vote, the job fails unless it has ended.
 struct DigestMismatch {
   UnitKey unit;
   Digest first, second;
   WorkerId first_worker, second_worker;
 };
 
-// From now on only workers of this numeric class may render the job.
+// Only workers of this numeric class may render the job from now on.
 struct JobPinned {
   JobId job;
   Digest numeric_class;
@@ -92,10 +92,10 @@ struct Checkpoint {
   std::vector<RoundIndex> rounds;  // for each tile, how many of its rounds the checkpoint includes
   double spp = 0;                  // samples per pixel, mean over all pixels
 };
-// The target error of this job is that of its denoised layers, and must now be compared with theirs. The film
-// is exactly that of the level with `spp` samples per pixel, mean over all pixels, and stays so until the
-// event DenoisedChecked is raised. If the layers cannot be made, the service pauses the job; the effect comes
-// again when the job is resumed.
+// Compute the error of this job's denoised layers, to which its target error applies. The film is exactly
+// that of the level with `spp` samples per pixel, mean over all pixels, and stays so until the event
+// DenoisedChecked is raised. If the layers cannot be made, the service pauses the job; the farm repeats the
+// effect when the job is resumed.
 struct CheckDenoised {
   JobId job;
   double spp = 0;
@@ -118,7 +118,6 @@ struct JobFinished {
 struct JobFailed {
   JobId job;
   std::string error;
-  std::optional<UnitFailure> failure;  // the failure that ended the job
 };
 
 struct WorkerStateChanged {
@@ -132,16 +131,18 @@ struct WorkerBlocked {
   JobId job;
   std::string why;
 };
-// Two other workers agree that this worker rendered wrong pixels. It gets no more work of any job, and its
-// messages are ignored. The service must store this before it carries out the effects that follow; after a
-// restart none of the worker's results may be accepted.
+// This worker rendered wrong pixels: two other workers agree on other pixels, or it delivered two different
+// results of one unit. It gets no more work of any job, and its messages are ignored. The service must store
+// this before it carries out the effects that follow; after a restart none of the worker's results may be
+// accepted.
 struct WorkerFoundFaulty {
   WorkerId worker;
   UnitKey unit;  // the unit whose differing results revealed it
   std::string evidence;
 };
-// The pixels of this tile are void, since a quarantined worker rendered part of them. The tile is summed up
-// again from round 0, and none of its earlier results count.
+// The pixels of this tile are void, since a quarantined worker rendered part of them or, in a job with a
+// target error, part of any tile. The tile is summed up again from round 0, and none of its earlier results
+// count.
 struct TileDiscarded {
   JobId job;
   TileIndex tile = 0;

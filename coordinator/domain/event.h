@@ -1,7 +1,6 @@
 // Events: the farm's inputs. Every fact on which a decision depends arrives as an event; the farm reads no
-// clock and no file.
-// A unit is one round (range of samples) of one tile; a lease is a set of units that one worker was told to
-// render. A numeric class is a set of machines that compute the same bits.
+// clock and no file. A unit is one round (range of samples) of one tile; a lease is a list of units that is
+// assigned to one worker. A numeric class is a set of machines that compute the same bits.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +27,7 @@ struct JobPlan {
   TileGrid grid;
   std::optional<std::uint64_t> spp;    // samples per pixel; nullopt: limits.h kMaxSppWithoutLimit
   std::optional<double> target_error;  // the job ends when the image has this relMSE
-  bool target_denoised = false;        // target_error is that of the denoised layers instead
+  bool target_denoised = false;        // target_error applies to the denoised layers instead
   std::optional<double> time;          // the job ends this many seconds after the first ray
   int priority = 0;                    // higher first
   std::vector<std::string> tags;       // a worker must have all of them
@@ -37,18 +36,18 @@ struct JobPlan {
   std::string replay = "lightshaft render SCENE";
   // Limits and fair shares (fair_share.h, docs/design/scheduling.md)
   std::string owner;  // the user (JobView::owner); empty: the administrator, to whom no user limits apply
-  // The sequence (a job with frames) that this job is a frame of; empty: the job is no frame. Jobs of one
-  // owner and group count as one job for fair shares, and run in order.
+  // The sequence (a job with frames) that this job is a frame of; empty: none. Jobs of one owner and group
+  // count as one job for fair shares, and run in order.
   std::string group;
   // Limits of the job, or of all jobs of its group together
   std::uint32_t max_workers = 0;   // at most this many workers hold units at the same time; 0: no limit
   std::uint32_t max_units = 0;     // at most this many units are leased at the same time; 0: no limit
   std::uint64_t memory_bytes = 0;  // memory that a worker needs for this job; 0: unknown
-  // The numeric class that is to render the job: the first of its hexadecimal digits, or the beginning of its
-  // platform's name. Empty: any class may begin the job
+  // The numeric class that the user requests: a prefix of its hexadecimal digits or of its platform's name.
+  // Empty: any class
   std::string class_asked;
-  // Pixels of the frame whose tiles are leased before all other tiles; nullopt: all tiles are treated alike.
-  // It changes the order in which units are leased, and nothing about the image.
+  // Pixels of the frame whose tiles are leased before all other tiles; nullopt: no tile goes first. It
+  // changes only the order in which units are leased, not the image.
   std::optional<PixelRect> focus;
 };
 
@@ -89,7 +88,7 @@ struct JobRestored {
     bool operator==(const Audit&) const = default;
   };
   std::vector<Audit> audits;
-  // The checks of the denoised layers' error so far, if the target error is theirs
+  // The checks of the denoised layers' error so far, if the target error applies to these layers
   std::vector<DenoisedCheck> denoised_checks;
 };
 
@@ -102,8 +101,8 @@ struct JobPaused {
 struct JobResumed {
   JobId job;
 };
-// The user has stopped the job. Units that are leased already are still rendered; then the job ends as
-// `done`.
+// The user has stopped the job. Units that were leased before, and the first round of every tile, are still
+// rendered; then the job ends as `done`.
 struct JobStopped {
   JobId job;
 };
@@ -116,16 +115,17 @@ struct JobFocused {
   JobId job;
   std::optional<PixelRect> focus;
 };
-// Changes the target error of a job. The job must have one, and it must not have stopped for another reason
-// (Farm::may_retarget). A smaller target also resumes a job that reached the larger one. The image then has
-// the same bits as if the job had had the smaller target from the start: an image that missed the larger
-// target misses the smaller one, too. A larger target applies from the job's current state on.
+// Changes the target error of a job. The job must have a target error, and must not have stopped for another
+// reason (Farm::may_retarget). A smaller target also resumes a job that reached the larger one. The image
+// then has the same bits as with the smaller target from the start: an image that missed the larger target
+// misses the smaller one, too. A larger target applies from the job's current state on.
 struct JobRetargeted {
   JobId job;
   double target_error = 0;  // relMSE
 };
-// Raises the job's total of samples per pixel; the job may be running, paused or done. If a target error or
-// time limit has already decided the job's end, it no longer applies: all tiles get the new total.
+// Raises the job's total of samples per pixel; the job may be running, paused or done. Once the job's end is
+// decided, its target error no longer applies, nor does a time limit that has passed: all tiles get the new
+// total.
 struct JobExtended {
   JobId job;
   std::uint64_t spp = 0;
@@ -153,8 +153,8 @@ struct WorkerJoined {
   bool may_begin = true;
   std::string platform = {};  // machine and build of its numeric class in words
 };
-// The worker rendered wrong pixels; this was found before a restart or by another coordinator. It gets no
-// work, and its results for jobs of this farm are void.
+// The worker rendered wrong pixels, as found before a restart or by another coordinator. It gets no work, and
+// its results for jobs of this farm are void.
 struct WorkerQuarantined {
   WorkerId worker;
   std::string why;
@@ -172,7 +172,7 @@ struct LeaseProgress {
   std::vector<WorkerProgress::Entry> leases;
 };
 // A result of this worker has arrived, but the coordinator has no room for it yet. The result waits, and so
-// do all later messages of the worker. This is not the worker's fault, so its leases are renewed.
+// do all later messages of the worker. The wait is not the worker's fault, so its leases are renewed.
 struct ResultsWait {
   WorkerId worker;
 };
@@ -190,8 +190,8 @@ struct ClassChosen {
   JobId job;
   Digest numeric_class;
 };
-// A verified and durable result has arrived. The event is raised once per arrival; the farm finds out which
-// results are duplicates.
+// A verified and durable result has arrived. The event is raised once per arrival; the farm detects
+// duplicates.
 struct UnitAccepted {
   UnitKey unit;
   SampleRange samples;

@@ -29,7 +29,7 @@ class UnitFailures {
   // True if this worker has failed on this unit.
   bool failed_on(UnitCode code, WorkerIndex worker) const;
   // True if the unit has failed on min(kUnitFailureWorkers, workers_known) distinct workers and in at least
-  // kUnitFailureAttempts attempts. `workers_known`: connected workers that could render the job.
+  // kUnitFailureAttempts attempts. `workers_known`: number of connected workers that could render the job.
   bool exhausted(UnitCode code, std::size_t workers_known) const;
   const std::vector<FailedAttempt>& attempts(UnitCode code) const;
   void mark_workers(std::vector<bool>& used) const {

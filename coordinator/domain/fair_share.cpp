@@ -25,8 +25,8 @@ void FairShare::change(Job& job, Change&& change) {
   const auto user_before = turn_of(at.user);
   const auto group_before = turn_of(at.group);
   change(at);
-  // A job is at work while it has units to lease or leased units. When the first job of a user or group
-  // begins to be at work, the share of that user or group is raised to the clock, which is the share of the
+  // A job counts in at_work while it has units to lease or leased units. When the first job of a user or
+  // group begins to count, the share of that user or group is raised to the clock, which is the share of the
   // one served most recently.
   const bool works = job.offered || job.charge_out > 0;
   if (works && at_work_.insert(job.seq).second) {
@@ -169,8 +169,7 @@ std::vector<FairShare::Figure> FairShare::figures() const {
   std::vector<Figure> all;
   for (const auto& [priority, level] : levels_)
     for (const auto& [owner, user] : level.users)
-      if (user.share.at_work > 0)
-        all.push_back({owner, -priority, user.share.had(), user.share.out, !user.ready.empty()});
+      if (user.share.at_work > 0) all.push_back({owner, -priority, user.share.had()});
   return all;
 }
 

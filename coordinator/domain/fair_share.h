@@ -5,7 +5,7 @@
 // 1996, with measured instead of declared lengths).
 //
 // A user or job that arrives, or returns after a pause, starts at the share of the one that got the last
-// lease. So a user gains no turns by waiting, and loses none for having used the farm alone. If two users
+// lease. So a user gains no turns by waiting, and loses none after having used the farm alone. If two users
 // both have work for all workers all the time, their shares differ by at most one lease each, plus errors of
 // prediction.
 //
@@ -37,8 +37,9 @@ class FairShare {
   // spend() adds core seconds that a result reported.
   void charge(Job& job, double seconds);
   void spend(Job& job, double seconds);
-  // Forgets users and groups that have no work and whose share is not greater than the clock (the share of
-  // the user or group served most recently). If they come back, they start at the clock anyway.
+  // Forgets users and groups without work whose share is not greater than the clock (the share of the user or
+  // group served most recently): if they come back, they start at the clock in any case. Also forgets all
+  // groups of a user without work.
   void tidy();
   // leave() must be called before the job's priority changes, and enter() afterwards, which adds the core
   // seconds of its leases at the new priority. The caller then offers the job again.
@@ -46,20 +47,19 @@ class FairShare {
   void enter(Job& job);
 
   // Calls visit(job, lag) for the jobs that have units to lease, the next in turn first, until a call returns
-  // true; returns true if one did. `lag` is a number of core seconds: how many more the job's user has had
-  // than the user who is first in turn, plus how many more the job's group has had than the first group of
-  // that user. It is infinite below the highest priority that has jobs.
+  // true; returns true if one did. `lag` is a number of core seconds: the excess of the job's user over the
+  // user who is first in turn, plus the excess of the job's group over the first group of that user. It is
+  // infinite below the highest priority that has units to lease.
   using Visit = std::function<bool(Job&, double lag)>;
   bool in_turn(const Visit& visit) const;
-  // Notes that the job gets a lease: users and groups that arrive later start at the share that its user and
-  // its group have now.
+  // Notes that the job gets a lease: users and groups that arrive later start at the present shares of its
+  // user and its group.
   void served(const Job& job);
 
   struct Figure {
     std::string owner;
     std::int64_t priority;
-    double seconds, leased;
-    bool waits;  // true if one of its jobs has units to lease
+    double seconds;
   };
   std::vector<Figure> figures() const;
   std::size_t kept() const;  // number of priorities, users and groups remembered

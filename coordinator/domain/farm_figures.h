@@ -8,6 +8,12 @@
 
 namespace ls::coordinator {
 
+// Counts of notifications to webhooks since the start: notifications accepted by a receiver, failed attempts,
+// and notifications given up. `waiting`: notifications that now wait to be sent.
+struct WebhookFigures {
+  std::uint64_t delivered = 0, failed_attempts = 0, given_up = 0, waiting = 0;
+};
+
 // Why a unit (one round of one tile) left a worker's lease without a result.
 enum class FreedCause {
   worker_lost,
@@ -41,8 +47,9 @@ constexpr std::string_view to_string(FreedCause cause) {
   return "";
 }
 
-// Counters that the service keeps, since the farm itself cannot. All start at 0 when the coordinator starts;
-// members whose names end in _now are current values. A unit is one round (range of samples) of one tile.
+// Counters that the service keeps, of effects and of work outside the farm. All start at 0 when the
+// coordinator starts; members whose names end in _now are current values. A unit is one round (range of
+// samples) of one tile.
 struct FarmFigures {
   // Leases
   std::uint64_t leases_granted = 0, units_leased = 0;
@@ -77,8 +84,8 @@ struct ShareLimits {
   bool operator==(const ShareLimits&) const = default;
 };
 
-// How much of the farm can take the units of a job that is pinned to a numeric class: the workers of this
-// class and their threads, of all that are connected and not quarantined.
+// The part of the farm that can render a job pinned to a numeric class: workers and threads of this class,
+// and of all classes (of_...). Only connected workers that are not quarantined count.
 struct ClassShare {
   int workers = 0, of_workers = 0;
   int threads = 0, of_threads = 0;
@@ -90,7 +97,7 @@ struct ClassShare {
 struct AuditFigures {
   std::uint64_t asked = 0;  // audits begun
   std::uint64_t equal = 0;  // audits whose second result had the same bits
-  // Audits whose second result had other bits: a third worker was asked, or the job failed
+  // Units whose second result had other bits: a third worker had to decide, or the job failed
   std::uint64_t differ = 0;
   std::uint64_t dropped = 0;  // audits given up: no other worker could render the unit, or the job ended
   // Results chosen for an audit that did not begin: no other worker of the class was connected

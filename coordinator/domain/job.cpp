@@ -48,8 +48,8 @@ void Job::move_windows(int farm_threads) {
 
 void Job::move_window(TileIndex tile, int farm_threads) {
   if (!adaptive_running()) return queue.set_window(tile, units.rounds_complete() + kRoundsAhead);
-  // `busy`: number of rounds that each tile needs ahead so that all threads of the farm have work. A small
-  // image has few tiles, so each needs more rounds.
+  // `busy`: number of rounds that must be leasable ahead in each tile so that all threads of the farm have
+  // work. A small image has few tiles, so it needs more rounds.
   const RoundIndex busy = kUnitsAThread * static_cast<RoundIndex>(std::max(farm_threads, 0)) / units.tiles();
   queue.set_window(tile, std::min(units.folded(tile) + kRoundsAhead, adaptive->predicted_last(tile) + busy));
   queue.set_wanted(tile, adaptive->wanted(tile) + 1, adaptive->variance(tile));

@@ -1,5 +1,5 @@
-// A job in the farm. A unit is one round (range of samples) of one tile; a lease is a list of units that one
-// worker was told to render. At every moment each planned unit of the job is done (its result is accepted),
+// A job in the farm. A unit is one round (range of samples) of one tile; a lease is a list of units that is
+// assigned to one worker. At every moment each planned unit of the job is done (its result is accepted),
 // leased to a worker, or queued.
 #pragma once
 
@@ -26,9 +26,9 @@
 
 namespace ls::coordinator {
 
-// The CPU seconds that one pixel sample costs, as results report them: for each tile, and as a
-// running mean over the job for tiles that have no result yet. The cost affects the size of leases and their
-// deadlines, never a pixel.
+// The CPU seconds that one pixel sample costs, as results report them: for each tile, and as a running mean
+// over the job for tiles that have no result yet. The cost affects the size of leases and their deadlines,
+// never a pixel.
 class CostModel {
  public:
   explicit CostModel(TileIndex tiles) : tile_cost_(tiles, 0.0f) {}
@@ -61,10 +61,10 @@ class CostModel {
   std::vector<float> tile_cost_;
 };
 
-// Remembers workers that once held a lease on a unit (one round of one tile) but did not deliver its accepted
-// result. If results of a unit differ, only these workers may vote on it (farm_trust.cpp). The table is
-// bounded: beyond kMaxVoters the entries of the earliest rounds are dropped, and later results of those units
-// are mere claims, not votes.
+// The workers that held a lease on a unit (one round of one tile) but did not deliver its accepted result. If
+// results of a unit differ, only these workers may vote on it (farm_trust.cpp). The table is bounded: beyond
+// kMaxVoters the entries of the earliest rounds are dropped, and later results of those units are mere
+// claims, not votes.
 class VoterTable {
  public:
   void note(UnitCode unit, WorkerIndex worker) {
@@ -97,7 +97,7 @@ struct Holders {
   }
 };
 
-// Counts the units that are leased at the moment, of one job or of all jobs of a user or group
+// The number of leased units of one job, or of all jobs of a user or group
 struct Load {
   // copies of units are counted, audits are not
   std::uint32_t units = 0;
@@ -110,8 +110,7 @@ struct Audit {
   WorkerIndex first = kNoWorker;  // worker of the accepted result
   // The second result, if it differs from the accepted one
   std::optional<std::pair<WorkerIndex, Digest>> second;
-  // A differing result from a worker that was not asked for it. It does not count as a vote, but it causes an
-  // audit
+  // A differing result of a worker that held no lease on the unit. It is not a vote, but it causes an audit
   std::optional<std::pair<WorkerIndex, Digest>> claim;
   std::vector<WorkerIndex> tried;  // workers that tried to render it for the audit and failed
   TimePoint since{};               // time of the second result, or of the restart
@@ -140,12 +139,12 @@ struct Job {
   JobPlan plan;
   std::uint64_t spp;  // samples per pixel: the plan's, or kMaxSppWithoutLimit; always even
   JobState state = JobState::queued;
-  // Why the job ends. It is set once the last rounds of all tiles are decided, although some of their units
-  // may still be leased or not be in the image. It is final once the job is done
+  // Why the job ends. It is set once the last rounds of all tiles are decided, even while some of their units
+  // are leased or not in the image yet. It is final once the job is done
   std::optional<StopReason> stopping;
-  bool frozen = false;  // stopped by time or user: only results of units leased before are still accepted
+  bool frozen = false;  // stopped by time or user: only units leased before and first rounds still count
   std::optional<Digest> numeric_class;
-  // Time of the first ray, shifted by the periods during which the job's clock was stopped
+  // Time of the first ray, moved later by the periods in which the job's clock was stopped
   std::optional<TimePoint> first_ray;
   std::optional<TimePoint> still_since;  // set while the job is paused or done: its time budget does not run
 
@@ -161,16 +160,16 @@ struct Job {
   Load load;
   std::uint32_t leased = 0;   // units under all leases, including audits
   bool has_units = false;     // true if it had units to lease when this was last checked
-  bool offered = false;       // true if FairShare counts it among the jobs that have units to lease
+  bool offered = false;       // true if FairShare lists it as a job that has units to lease
   double charge_out = 0;      // core seconds charged for units that are leased now (fair_share.h)
   double checkpoint_spp = 0;  // samples per pixel at the last checkpoint of whole rounds
 
   std::optional<AdaptiveStop> adaptive;  // only for a job with a target error
   double level_seen = 0;                 // the level at which the image was judged most recently; 0: none
   std::deque<LevelMark> marks;  // levels whose checkpoints are still to be taken, by rising number of samples
-  // Only for a job whose target error is that of its denoised layers
+  // Only for a job whose target error applies to its denoised layers
   std::optional<DenoisedTarget> denoised;
-  double checking_spp = 0;  // the level whose denoised error the service was asked for; 0: none
+  double checking_spp = 0;  // the level whose denoised error is being computed; 0: none
   // relMSE of the image itself (before denoising) at which the job will probably end; 0: unknown
   double predicted_error = 0;
   double marked_spp = 0;           // LevelMark::spp of the latest mark
@@ -191,10 +190,10 @@ struct Job {
   double predict(UnitCode code) const { return cost.predict(tile_of(code), pixel_samples(code)); }
   std::uint64_t queued() const { return queue.planned() - units.accepted_count() - out.size(); }
 
-  // True if the tiles' errors decide how many rounds the tiles get, and have not decided it yet.
+  // True while the stop rule of a target error has not decided the ends of the tiles yet.
   bool adaptive_running() const { return adaptive && !stopping; }
-  // Starts the adaptive stop rule if the plan has a target error, drops the rule if the plan has none any
-  // more, and has the image judged again.
+  // Starts the adaptive stop rule if the plan has a target error, drops the rule if the plan no longer has
+  // one, and resets level_seen, so that the image is judged again.
   void steer();
   // The relMSE of the image (before denoising) at which the job will probably end; nullopt: unknown
   std::optional<double> predicted_target() const {
@@ -205,8 +204,8 @@ struct Job {
   RoundIndex last_foldable(TileIndex tile) const {
     return adaptive_running() ? adaptive->wanted(tile) : std::numeric_limits<RoundIndex>::max();
   }
-  // Sets how far ahead of the rounds in the image further rounds may be leased, in a farm whose workers have
-  // this many threads in total.
+  // Sets how far ahead of the rounds in the image further rounds may be leased. `farm_threads`: threads of
+  // all connected workers.
   void move_windows(int farm_threads);
   void move_window(TileIndex tile, int farm_threads);
   // Sets the end of each tile to ends[tile] rounds, unless it ends earlier already, and forgets accepted

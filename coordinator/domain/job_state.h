@@ -6,7 +6,8 @@
 
 namespace ls::coordinator {
 
-// `queued`: no unit has been leased yet. The last three are final, except that a `done` job can be extended.
+// `queued`: no unit has been leased yet. The last three are final, except that more samples or a smaller
+// target error resume a `done` job.
 enum class JobState { queued, running, paused, done, failed, cancelled };
 constexpr std::string_view to_string(JobState state) {
   constexpr std::string_view kWords[] = {"queued", "running", "paused", "done", "failed", "cancelled"};
@@ -14,7 +15,7 @@ constexpr std::string_view to_string(JobState state) {
 }
 // True for states that a job never leaves.
 constexpr bool is_closed(JobState state) { return state == JobState::failed || state == JobState::cancelled; }
-// True for final states. Of these, a job can leave only `done`, by an extension.
+// True for final states; a job can leave only `done`.
 constexpr bool is_terminal(JobState state) { return state == JobState::done || is_closed(state); }
 
 // Why a job is done: it has its samples per pixel, has reached its target error, has used up its time, or its

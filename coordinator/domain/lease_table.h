@@ -1,5 +1,5 @@
-// All leases, oldest first, with their deadlines. A lease is a list of units (rounds of tiles) that one
-// worker was told to render.
+// All leases, oldest first, with their deadlines. A lease is a list of units (rounds of tiles) that is
+// assigned to one worker.
 #pragma once
 
 #include <map>
@@ -19,7 +19,7 @@ struct LeaseRecord {
   // lease
   std::vector<UnitCode> units;
   std::uint32_t remaining = 0;  // number of units still leased
-  std::uint32_t reported = 0;   // number of units done, as the worker's progress reports say
+  std::uint32_t reported = 0;   // number of units done, from the worker's progress reports
   double seconds_per_unit = 0;  // predicted CPU seconds of a unit, mean over all units of the lease
   // Core seconds per unit charged to the owner's share: seconds_per_unit, or kAssumedUnitSeconds if nothing
   // is measured
@@ -43,7 +43,7 @@ class LeaseTable {
   LeaseRecord* find(const LeaseId& id);
   void erase(LeaseSeq seq);
   void renew(LeaseRecord& lease, TimePoint deadline);
-  // Returns the lease with the earliest deadline if that has passed at `now`, else null.
+  // Returns the lease with the earliest deadline if this deadline has passed at `now`, else null.
   LeaseRecord* expired(TimePoint now);
 
   std::map<LeaseSeq, LeaseRecord>& all() { return leases_; }

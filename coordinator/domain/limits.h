@@ -1,5 +1,5 @@
 // All limits and constants of the farm's decisions. A unit is one round (range of samples) of one tile; a
-// lease is a list of units that one worker was told to render.
+// lease is a list of units that is assigned to one worker.
 #pragma once
 
 #include <cstdint>
@@ -31,8 +31,8 @@ inline constexpr std::uint32_t kMaxLeaseUnits = 1024;
 inline constexpr std::uint32_t kQueuedLeases = 3;
 // Units per thread that a worker holds, even if units take long: one that it renders, and one that waits
 inline constexpr std::uint32_t kUnitsAThread = 2;
-// Speculative units (units that may turn out not to be needed) go only to workers whose queued work takes
-// less than this many seconds. With 0 a worker would idle between two small units until the next message.
+// Speculative units (the job may end without them) go only to workers whose queued work takes less than this
+// many seconds. With 0 a worker would idle between two small units until the next message.
 inline constexpr double kSpeculativeSeconds = .05;
 inline constexpr std::uint32_t kMaxLeasesPerWorker = 64;  // applies near the end of a job, when a lease is a
                                                           // single unit
@@ -44,14 +44,14 @@ inline constexpr Duration kDeadlineSlack = 10s;  // added to every lease's deadl
 inline constexpr Duration kLoadSlack = 120s;
 // If a worker finishes no unit for this long, its progress reports no longer renew its leases
 inline constexpr Duration kNoGrowthLimit = 600s;
-// A lease that will wait at least this long behind other work of its worker is moved to an idle worker. This
-// is far longer than it takes to send a lease.
+// A lease is moved to an idle worker if it would wait longer than this behind other work of its worker.
+// Sending a lease takes far less time.
 inline constexpr Duration kTakeBackAfter = 20ms;
 // Idle workers may copy the units of a lease after kSpeculateAfter times its predicted duration plus
 // kSpeculateSlack
 inline constexpr double kSpeculateAfter = 1.5;
 inline constexpr Duration kSpeculateSlack = 1s;
-// At most this many leases are checked when an idle worker looks for units to copy or take over
+// At most this many leases are searched for units that an idle worker can copy or take over
 inline constexpr std::uint32_t kSpeculationScan = 64;
 
 // Fair shares
@@ -61,9 +61,9 @@ inline double plausible_seconds(double reported) {
 }
 // Core seconds charged for a unit until a cost is measured for its job
 inline constexpr double kAssumedUnitSeconds = 1.0;
-// A worker that has loaded the world (scene) of another job than the one in turn may get units of that other
-// job, as long as its lag (fair_share.h) exceeds that of the job in turn by at most this many seconds times
-// the farm's threads. This saves loading worlds.
+// A worker may get units of a job whose world (scene) it has loaded although another job is next in turn, as
+// long as the lag (fair_share.h) of the loaded job exceeds that of the next one by at most this many seconds
+// times the farm's threads. This saves loading worlds.
 inline constexpr double kLocalitySeconds = 5.0;
 // at most this many jobs are checked to find one whose world the worker has loaded
 inline constexpr std::uint32_t kJobsLookedAt = 64;
@@ -72,7 +72,7 @@ inline constexpr std::size_t kBlobsRemembered = 1024;
 
 // Audits. In an audit another worker renders the unit of an accepted result again, for comparison.
 
-// At most this many audits are open at the same time per job; no further one begins then
+// At most this many audits of one job are open at the same time
 inline constexpr std::size_t kMaxAuditsOpen = 64;
 // Time for workers to reconnect before a restored audit is dropped
 inline constexpr Duration kAuditAfterRestart = 60s;

@@ -1,13 +1,13 @@
 // The units of a job that wait for a worker; a unit is one round (range of samples) of one tile. Each tile
 // has its own end, since the tiles of an adaptive job (one with a target error) stop after different numbers
-// of rounds. A tile's waiting units are all rounds from `next` to its end, and those earlier ones that were
+// of rounds. The waiting units of a tile are all rounds from `next` to its end, and earlier rounds that were
 // leased and came back without a result. Lower rounds go first, so that a complete picture is available
-// early. In an adaptive job some rounds are speculative: they may turn out not to be needed. They go behind
-// all that are certain, in the order in which the stop rule would come to need them (adaptive_stop.h).
+// early. In an adaptive job some rounds are speculative: the job may end without them. They go after all
+// certain rounds, in the order in which the stop rule (adaptive_stop.h) would request them.
 //
-// A focus is a set of tiles whose certain units go before those of all other tiles. It changes the order of
-// units and nothing else: which units belong to the job, and which of them are certain, do not depend on it.
-// Speculative units keep their order, since those that go early are the ones most likely to be needed.
+// A focus is a set of tiles whose certain units go before those of all other tiles. It changes only the order
+// of units, not which units belong to the job and which of them are certain. The order of speculative units
+// ignores the focus, since the first of them are the most likely to be needed.
 //
 // Every operation but set_focus() costs O(log tiles) at most, amortised; memory is 20 bytes per tile, 60 if
 // there are speculative units.
@@ -117,8 +117,8 @@ class UnitQueue {
 
   // Returns the first waiting unit that may be leased; nullopt if there is none. Certain units of the focus
   // go first, then the other certain ones, then speculative ones. Within each of these three, units that were
-  // leased and came back go first. `excluded` is asked only about units that came back; those for which it is
-  // true are skipped.
+  // leased and came back go first. Units that came back are skipped if `excluded` is true for them; it is
+  // called only for such units.
   template <class Excluded>
   std::optional<UnitCode> front(const UnitTable& units, Excluded&& excluded) {
     const auto first_of = [&](const std::set<UnitCode>& returned) {
@@ -149,12 +149,12 @@ class UnitQueue {
     else
       forget(code);
   }
-  // Puts a leased unit that came back without a result into the queue again.
+  // Queues a leased unit that came back without a result again.
   void put_back(UnitCode code) {
     if (plans(code) && round_of(code) < next_[tile_of(code)])
       (wanted(code) ? line_of(tile_of(code)).returned : returned_perhaps_).insert(code);
   }
-  // Removes a unit from the queue, if it is there, because a late result of it arrived.
+  // Removes a unit whose late result arrived from the queue, if it is there.
   void forget(UnitCode code) {
     line_of(tile_of(code)).returned.erase(code);
     returned_perhaps_.erase(code);
@@ -169,7 +169,7 @@ class UnitQueue {
  private:
   static constexpr RoundIndex kNoWindow = std::numeric_limits<RoundIndex>::max();
 
-  // Per tile, the arguments of the latest set_wanted(). Not used while no tile has speculative units.
+  // The arguments of a tile's latest set_wanted(); unused while no tile has speculative units
   struct Wanted {
     RoundIndex before = kNoWindow;
     float weight = 0;
@@ -179,7 +179,7 @@ class UnitQueue {
     std::priority_queue<UnitCode, std::vector<UnitCode>, std::greater<>> heads;
     std::set<UnitCode> returned;
   };
-  // A unit that may turn out not to be needed, with the error that it removes per sample.
+  // A speculative unit, with the error that it removes per sample
   struct Perhaps {
     float gain;
     UnitCode code;
@@ -218,7 +218,7 @@ class UnitQueue {
     if (perhaps_.size() > 2 * next_.size()) return offer_all_perhaps();
     perhaps_.push({gain(code), code});
   }
-  // Rebuilds perhaps_ without outdated entries, so that outdated entries never outnumber the others by much.
+  // Rebuilds perhaps_ without its outdated entries, which bounds their number.
   void offer_all_perhaps() {
     std::vector<Perhaps> all;
     for (TileIndex t = 0; t < tiles(); ++t) {

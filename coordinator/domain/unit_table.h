@@ -26,7 +26,7 @@ inline constexpr WorkerIndex kNoWorker = ~WorkerIndex{0};
 class UnitTable {
  public:
   struct Result {
-    Digest digest;  // all zero: unknown (added to the image before a restart that lost the record)
+    Digest digest;  // all zero: unknown (in the image since before a restart that lost the record)
     WorkerIndex worker = kNoWorker;
   };
 
@@ -56,8 +56,8 @@ class UnitTable {
 
   // Folding
 
-  // If the tile's next round to be added to the image has an accepted result and is below `end` and at most
-  // `limit`, returns this round and counts it in issued(). Otherwise returns nullopt.
+  // Returns the tile's next round to add to the image and counts it in issued(); nullopt if this round has no
+  // accepted result, is above `limit` or not below `end`.
   std::optional<RoundIndex> issue_fold(TileIndex tile, RoundIndex limit, RoundIndex end);
   // Number of rounds whose addition to the image was requested
   RoundIndex issued(TileIndex tile) const { return issued_[tile]; }

@@ -1,6 +1,6 @@
 // All known workers: their connection, leases and failures. A unit is one round (range of samples) of one
-// tile; a lease is a list of units that one worker was told to render. A numeric class is a set of machines
-// that compute the same bits.
+// tile; a lease is a list of units that is assigned to one worker. A numeric class is a set of machines that
+// compute the same bits.
 #pragma once
 
 #include <algorithm>
@@ -32,8 +32,7 @@ class CoreShare {
     cpu_ = cpu_ * kMemory + cpu_seconds;
     wall_ = wall_ * kMemory + cpu_seconds + wait_seconds;
   }
-  // Returns the share, which is 1 until something has been measured. It is never less than kLeastCoreShare,
-  // whatever the worker reports.
+  // Returns the share, which is 1 until something has been measured. It is never less than kLeastCoreShare.
   double get() const { return wall_ > 0 ? std::max(kLeastCoreShare, cpu_ / wall_) : 1; }
 
  private:
@@ -91,9 +90,9 @@ struct Worker {
     const auto it = failures.find(job);
     return it != failures.end() && it->second.blocked_at(now);
   }
-  // True if the worker should get another lease. This is so while it holds fewer than kUnitsAThread units per
-  // thread. It is also so while it holds fewer than kQueuedLeases leases and they take it less time than that
-  // many full leases (kLeaseSeconds each). It never holds more than kMaxLeasesPerWorker leases.
+  // True if the worker should get another lease: it holds fewer than kUnitsAThread units per thread, or fewer
+  // than kQueuedLeases leases with less work than that many full leases (kLeaseSeconds each). It never holds
+  // more than kMaxLeasesPerWorker leases.
   bool wants_more() const {
     if (leases.size() >= kMaxLeasesPerWorker) return false;
     if (units_out < kUnitsAThread * static_cast<std::uint32_t>(threads)) return true;
@@ -117,7 +116,7 @@ class WorkerTable {
   Worker* find(const WorkerId& id);
   const Worker* find(const WorkerId& id) const;
   const WorkerId& name_of(WorkerIndex index) const { return ids_[index]; }
-  // Accepts also ids from stored records of workers that never connected to this farm
+  // Also accepts ids, from stored records, of workers that never connected to this farm
   WorkerIndex index_of(const WorkerId& id);
   void forget(Worker& worker);
   // True if it is time for keep_names(). Names accumulate: results refer to workers that are gone, and
@@ -129,7 +128,7 @@ class WorkerTable {
   void keep_names(std::vector<bool> used);
   std::vector<bool> no_index() const { return std::vector<bool>(ids_.size()); }
 
-  // Adds the worker to wanting_work() or removes it, as its state demands; call it after any change to a
+  // Adds the worker to wanting_work() or removes it, depending on its state; call it after any change to a
   // worker.
   void settle(Worker& worker);
   const std::set<WorkerIndex>& wanting_work() const { return wanting_work_; }
@@ -169,10 +168,10 @@ std::uint64_t head_of(const Digest& digest);
 // True if the worker has loaded the job's world, or at least reports to hold its scene file.
 bool holds(const Job& job, const Worker& worker);
 
-// True if the job asks for no numeric class, or for that of this worker (JobPlan::class_asked).
+// True if the user requests no numeric class for the job, or that of this worker (JobPlan::class_asked).
 bool of_class_asked(const Job& job, const Worker& worker);
-// True if the worker has the job's numeric class (or may begin the job, if it has none yet) and tags, has
-// enough memory, and is not quarantined. Whether the worker is busy does not matter.
+// True if the worker has the job's numeric class (or may begin a job that has none yet), the requested class
+// and the job's tags, has enough memory, and is not quarantined. Whether the worker is busy does not matter.
 bool fits(const Job& job, const Worker& worker);
 // True if the worker fits the job and may also take units of it now.
 bool may_serve(const Job& job, const Worker& worker, TimePoint now);

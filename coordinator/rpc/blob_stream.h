@@ -1,6 +1,6 @@
 // One FetchBlob call: sends a blob to a worker in chunks, as fast as the worker takes them. The blob is read
-// on separate threads: the coordinator may first have to fetch it from another machine, which
-// can take minutes, and gRPC's few threads must stay free for the messages of workers.
+// on separate threads: the coordinator may first have to fetch it from another machine, which can take
+// minutes, and gRPC's few threads must stay free for the messages of workers.
 #pragma once
 
 #include <functional>

@@ -16,7 +16,7 @@ struct JoinGuard {
   std::function<int(const std::string& address, std::string_view token)> wait = [](const auto&, auto) {
     return 0;
   };
-  // Called after a token from this address was checked; `right` is the outcome.
+  // Called after a token from this address was checked; `right`: the token is valid.
   std::function<void(const std::string& address, std::string_view token, bool right)> tried =
       [](const auto&, auto, bool) {};
 };

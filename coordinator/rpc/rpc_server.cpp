@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <grpcpp/grpcpp.h>
 
-#include <condition_variable>
 #include <mutex>
 #include <set>
 #include <thread>
@@ -24,10 +23,10 @@ namespace {
 
 // At most this many workers are connected at the same time; the same as kMaxWorkers
 constexpr int kWorkStreams = 16'384;
-// At most this many blob transfers are in progress; further ones are refused, and workers retry them
+// At most this many blob transfers are in progress; further ones are rejected, and workers retry them
 constexpr int kFetches = 512;
-// Number of threads that read blobs for these transfers. There are many, because most of the threads may be
-// waiting for blobs that the coordinator must first fetch from another machine
+// Number of threads that read blobs for these transfers. There are many, because most of them may wait for
+// blobs that the coordinator must first fetch from another machine
 constexpr int kReadThreads = 64;
 // A worker may send at most this many bytes before the coordinator reads them.
 constexpr int kUnreadBytes = 64 << 10;
@@ -88,13 +87,12 @@ struct GrpcServer::Impl final : pb::Farm::CallbackService {
   }
 
   // Disconnects workers that opened a stream but sent no hello in time.
-  void sweep(std::stop_token token) {
-    std::unique_lock lock(mutex);
-    while (!token.stop_requested()) {
-      changed.wait_for(lock, token, std::chrono::seconds(1), [] { return false; });
+  void sweep(const std::stop_token& token) {
+    every(std::chrono::seconds(1), token, [this] {
+      const std::lock_guard lock(mutex);
       for (WorkStream* stream : streams)
         if (stream->hello_overdue(clock.now())) stream->cut();
-    }
+    });
   }
 
   Coordinator& coordinator;
@@ -103,7 +101,6 @@ struct GrpcServer::Impl final : pb::Farm::CallbackService {
   const SystemClock clock;
   std::unique_ptr<grpc::Server> server;
   std::mutex mutex;
-  std::condition_variable_any changed;
   std::set<WorkStream*> streams;  // guarded by mutex
   bool stopping = false;          // guarded by mutex
   std::atomic<int> fetches{0};
@@ -134,8 +131,8 @@ Result<int> GrpcServer::start(const std::string& address, const std::optional<Tl
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, 16 << 10);
-  // Limits the bytes that gRPC receives on a stream before the coordinator reads them. By default gRPC raises
-  // this limit to megabytes per worker.
+  // Limits the bytes that gRPC receives on a stream before the coordinator reads them. The default lets this
+  // limit grow to megabytes per worker.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kUnreadBytes);
   impl_->server = builder.BuildAndStart();
@@ -166,7 +163,6 @@ void GrpcServer::stop() {
       stream->end(grpc::Status(grpc::StatusCode::UNAVAILABLE, "the coordinator is going down"));
   }
   impl_->sweeper.request_stop();
-  impl_->changed.notify_all();
   // Streams that do not end within this time are cut off.
   impl_->server->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(2));
   impl_->server->Wait();

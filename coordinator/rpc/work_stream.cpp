@@ -74,7 +74,7 @@ void WorkStream::OnReadDone(bool ok) {
     end(grpc::Status::OK);
     return;
   }
-  // A message of a kind that only newer versions know is ignored: newer workers must not rely on it
+  // A message of a kind that only newer versions have is ignored: newer workers must not rely on it
   if (greeted_ && !wire::known(incoming_)) {
     StartRead(&incoming_);
     return;
@@ -90,12 +90,13 @@ void WorkStream::OnReadDone(bool ok) {
     if (session_) StartRead(&incoming_);
     return;
   }
-  // The outlet outlives this stream, which may be gone by the time there is room for the next message.
+  // The callback uses the outlet, because this stream may be deleted before there is room for the next
+  // message.
   session_->receive(std::move(*message), [outlet = outlet_] { outlet->read_on(); });
 }
 
-// Starts to read the worker's next message; no thread waits for it. The stream cannot be deleted before
-// Finish was called, so it may be used here until then.
+// Starts to read the worker's next message; no thread waits for it. gRPC does not delete the stream before
+// Finish is called, so it may be used here until then.
 void Outlet::read_on() {
   const auto state = state_.lock();
   if (state->stream && !state->finished) state->stream->StartRead(&state->stream->incoming_);

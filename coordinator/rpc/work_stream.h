@@ -2,9 +2,9 @@
 // the worker through a queue of at most kQueuedMessages.
 //
 // A stream consists of two objects. The Outlet is the WorkerSink through which the coordinator sends; the
-// coordinator may keep it as long as it likes. The WorkStream is gRPC's reactor and deletes itself in OnDone.
-// The outlet's lock is never held during calls to the coordinator, so the coordinator may call the sink with
-// its own locks held.
+// coordinator may keep it after the stream has ended. The WorkStream is gRPC's reactor and deletes itself in
+// OnDone. The outlet's lock is never held during calls to the coordinator, so the coordinator may call the
+// sink with its own locks held.
 #pragma once
 
 #include <atomic>
@@ -50,13 +50,13 @@ class Outlet final : public WorkerSink {
 
 class WorkStream final : public grpc::ServerBidiReactor<pb::FromWorker, pb::ToWorker> {
  public:
-  // The last call of the stream, before it deletes itself, is `on_gone`. `guard` must outlive the stream. The
-  // server disconnects a worker that has not sent its hello by `hello_deadline`.
+  // The stream calls `on_gone` last, before it deletes itself. `guard` must outlive the stream. The server
+  // disconnects a worker that has not sent its hello by `hello_deadline`.
   WorkStream(Coordinator& coordinator, grpc::CallbackServerContext* context, const JoinGuard& guard,
              TimePoint hello_deadline, std::function<void(WorkStream*)> on_gone);
 
   void begin() { StartRead(&incoming_); }
-  // Sends the error to the worker, then ends the stream. `retry` tells the worker whether to try again later.
+  // Sends the error to the worker, then ends the stream. `retry`: the worker should try again later.
   void refuse(const Error& error, bool retry);
   void end(const grpc::Status& status);  // ends the stream after the queued messages are sent
   void cut();                            // ends the stream immediately, without sending the queued messages

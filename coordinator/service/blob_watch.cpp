@@ -13,7 +13,7 @@ namespace ls::coordinator {
 namespace {
 
 constexpr Duration kLongestPause = std::chrono::hours(1);
-// Number of searches for unused blobs during the time keep_unused; so an unused blob stays for at most 1.25
+// Number of searches for unused blobs within the time keep_unused; so an unused blob stays for at most 1.25
 // times keep_unused
 constexpr int kSweepsPerTime = 4;
 // Number of jobs whose needed blobs are collected before the lock is released and taken again
@@ -26,8 +26,8 @@ std::optional<BlobRef> file_of(const StoredJob& job, const Digest& digest) {
   return asset == job.assets.end() ? std::nullopt : std::optional(*asset);
 }
 
-// Returns a text that tells the user what to send again. A file can be uploaded, but the scene is stored in
-// our own format, which only a submission makes.
+// Returns a text for the user about the file or scene to send again. A file can be uploaded, but the scene is
+// stored in our own format, which only a submission makes.
 std::string what_to_do(const StoredJob& job, const BlobRef& file, bool damaged) {
   const bool scene = file.digest == job.scene;
   return fmt::format(
@@ -69,7 +69,7 @@ void BlobWatch::missing(const Digest& digest, const Error& why) {
       waiting.push_back(entry);
   }
   if (waiting.empty()) return;
-  (void)core->records.put_together([&] {  // changes that cannot be stored are found again at the next start
+  (void)core->records.put_together([&] {  // if storing fails, the next start finds the loss again
     for (const EntryPtr& entry : waiting) {
       core->records.log(entry->stored.id, why.message);
       await_blob(*core, *entry, *file_of(entry->stored, digest), why.code == Errc::failed_precondition);

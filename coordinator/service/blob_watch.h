@@ -1,6 +1,6 @@
-// Watches over blobs (files of scenes). Jobs whose blobs are missing or damaged are paused; this does not
-// count against units or workers. They resume automatically when the blob is available again, from whatever
-// source. Blobs that no job needs are removed.
+// Watches over blobs (files of scenes). Jobs whose blobs are missing or damaged are paused; this counts as no
+// failure of a unit or worker. They resume automatically when the blobs are available again. Blobs that no
+// job needs are removed.
 #pragma once
 
 #include <optional>
@@ -35,7 +35,7 @@ class BlobWatch {
   void look_if_due(Core& core);
   void look_loop(const std::stop_token& token);
 
-  // Checks whether the blob store is available. Requests of workers do not suffice to notice an outage, since
+  // Checks whether the blob store is available. Requests of workers do not suffice to detect an outage, since
   // hours may pass between two requests.
   void check_store();
   // Returns why the store is unavailable; empty: it is available.

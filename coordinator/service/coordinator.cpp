@@ -131,8 +131,8 @@ void Coordinator::Parts::start_threads() {
   run([this](Stop stop) { every(*options.tick, stop, [&] { tick(); }); });
 }
 
-// Nothing is flushed here: accepted results are durable already, and workers send results again that were not
-// acknowledged. After a clean shutdown the state is the same as after a crash.
+// Nothing is flushed here: accepted results are durable already, and workers send unacknowledged results
+// again. After a clean shutdown the state is the same as after a crash.
 void Coordinator::Parts::stop() {
   sessions.abandon();
   results.close();
@@ -189,7 +189,7 @@ Result<std::unique_ptr<Coordinator>> Coordinator::open(Options options) {
 }
 
 Coordinator::Coordinator(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
-// The parts exist until all threads have ended, because listeners may ask this object for jobs until then.
+// The parts exist until all threads have ended, because listeners may call this object until then.
 Coordinator::~Coordinator() { parts_->stop(); }
 
 // Jobs

@@ -1,6 +1,6 @@
-// The coordinator without sockets: domain (the farm, which decides what is rendered where), store and
-// assembler behind one thread-safe object. rpc/ and http/ put it on the network; `lightshaft render` uses it
-// in process.
+// The coordinator without its network interfaces: one thread-safe object that contains the farm (the state
+// machine that decides which worker renders what), the job store and the assembler of images. rpc/ and http/
+// serve it over the network; `lightshaft render` calls it in its own process.
 #pragma once
 
 #include <cstdint>
@@ -30,20 +30,20 @@ class Coordinator {
     std::filesystem::path data;
     // Where jobs are stored: sqlite, or a redis:// address (store/redis/redis_link.h)
     std::string store = "sqlite";
-    std::shared_ptr<JobStore> jobs;    // set by tests; null: opened as `store` says
-    std::shared_ptr<BlobStore> blobs;  // set for in-memory use; null: opened as `blobs_at` says
+    std::shared_ptr<JobStore> jobs;    // set by tests; null: opened from `store`
+    std::shared_ptr<BlobStore> blobs;  // set for in-memory use; null: opened from `blobs_at`
     // Where blobs are stored: a folder or an s3:// address; empty: a folder under `data`
     std::string blobs_at;
-    // How long a blob (file of a scene) is kept that no job needs and nobody requests, or an interrupted
-    // upload that does not continue. nullopt: blobs are kept forever, interrupted uploads for a day.
+    // How long to keep a blob (file of a scene) that no job needs and nobody requests, and an interrupted
+    // upload that is not continued. nullopt: blobs are kept forever, interrupted uploads for a day.
     std::optional<Duration> keep_unused = std::chrono::hours(24);
     bool shared = false;      // other coordinators use the same store and blobs
     std::string join_token;   // empty: any worker may join
     JoinCheck may_join;       // if set, decides which workers may join, instead of join_token
     bool allow_fake = false;  // true: fake workers, which invent their pixels, may join (for tests)
     // Version of this program. Workers of another version finish the jobs of their numeric class (machines
-    // that compute the same bits) but begin none, so that jobs submitted during an upgrade are not left to
-    // workers that are about to go. Empty: any worker begins jobs.
+    // that compute the same bits) but begin none, so that jobs submitted during an upgrade do not depend on
+    // workers that will stop soon. Empty: any worker begins jobs.
     std::string version;
     ShareLimits limits;
     double audit_rate = 0.01;  // fraction of the results that are audited: another worker renders them again
@@ -80,7 +80,8 @@ class Coordinator {
   // (JobView::error).
   Result<void> wait(const JobId& id) const;
 
-  // The job's span, for spans that others record below it; nullopt: the job is not traced or not known
+  // The job's span, as parent of spans that other code records; nullopt: the job is not traced or does not
+  // exist
   std::optional<trace::SpanContext> trace_of(const JobId& id) const;
 
   // Images and reports
@@ -88,7 +89,7 @@ class Coordinator {
   // The final image if there is one, else the current image
   Result<std::vector<std::byte>> image_exr(const JobId& id) const;
   // The image as an 8-bit PNG. With `denoised`, returns the denoised image of a job with JobSpec::denoise,
-  // even if it still renders. One image is denoised at a time, which takes seconds.
+  // even while the job renders. One image is denoised at a time, which takes seconds.
   Result<std::vector<std::byte>> image_png(const JobId& id, double exposure, bool denoised = false) const;
   // A small picture of the final or the current image, for lists
   Result<std::vector<std::byte>> thumbnail_png(const JobId& id) const;
@@ -99,8 +100,8 @@ class Coordinator {
   // False-colour maps of the error and of the samples (common/image/exr/maps.h).
   Result<std::vector<std::byte>> error_png(const JobId& id) const;
   Result<std::vector<std::byte>> samples_png(const JobId& id) const;
-  // layers_json() lists the layers of the image (final or current). The other function returns a rectangle of
-  // one layer at one mip level as numbers (common/image/exr/pixel_layers.h).
+  // layers_json() lists the layers of the image (final or current). pixels() returns a rectangle of one layer
+  // at one mip level as numbers (common/image/exr/pixel_layers.h).
   Result<std::string> layers_json(const JobId& id) const;
   Result<std::vector<std::byte>> pixels(const JobId& id, const PixelsAsked& asked) const;
   Result<std::string> report_json(const JobId& id) const;

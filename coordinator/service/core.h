@@ -1,5 +1,5 @@
 // The state of the coordinator's jobs and workers. One mutex guards all of it: it can be reached only through
-// Guarded<Core>::lock(). So a function that takes a Core& runs under the lock, and a function without a Core&
+// Guarded<Core>::lock(). So a function with a Core& parameter runs under the lock, and a function without one
 // does not need the lock. The constant members of a JobEntry (id, scene, settings, grid) may also be read
 // without the lock. Slow work has its own threads, which take the lock briefly:
 //

@@ -17,7 +17,7 @@
 namespace ls::coordinator {
 
 struct Denoised {
-  DenoisedImage image;  // without pixels if denoising failed; figures.trouble then says why
+  DenoisedImage image;  // without pixels if denoising failed; the reason is in figures.trouble
   DenoisedFigures figures;
 };
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/base/clock.h"
 #include "common/base/failpoint.h"
 #include "common/base/log.h"
 #include "coordinator/service/core.h"
@@ -115,12 +116,11 @@ void FarmDriver::on(const RecordUnit& e) {
   const auto figures = farm_.job(e.unit.job);
   entry->clock_zero = figures && figures->first_ray ? *figures->first_ray : clock_.now();
   if (entry->stored.totals.began_unix == 0)
-    entry->stored.totals.began_unix = unix_now() - entry->elapsed(clock_.now());
+    entry->stored.totals.began_unix = system_unix_seconds() - entry->elapsed(clock_.now());
 }
 
 // Returns the accepted partial (the encoded pixel sums of one unit) that is to be added to the image. Reads
-// it from the log if it is not in memory, because it arrived before a restart or because too many partials
-// wait.
+// it from the log if it is not in memory, since it arrived before a restart or too many partials wait.
 Result<WaitingPartial> FarmDriver::partial_for(JobEntry& entry, const Fold& e) const {
   auto waiting = entry.assembly->take(e.unit.tile, e.unit.round, e.samples);
   if (!waiting) return fail(Errc::internal, "an accepted partial is not at hand");
@@ -145,8 +145,8 @@ void FarmDriver::on(const Fold& e) {
   const auto error =
       waiting ? entry->assembly->fold(e.unit.tile, e.unit.round, *waiting) : tl::unexpected(waiting.error());
   if (!error) {
-    // If the partial cannot be read, the tile stops and the job waits: a wrong pixel must never get into the
-    // image.
+    // If the partial cannot be read, the tile gets no more rounds and the job is paused: the image must never
+    // contain a wrong pixel.
     entry->trouble =
         fmt::format("tile {} round {} cannot be folded: {}; restart the coordinator to render it again",
                     e.unit.tile, e.unit.round, error.error().message);
@@ -165,7 +165,7 @@ void FarmDriver::on(const Fold& e) {
   todo_.push_back(UnitFolded{e.unit, e.samples, error->relative.squares});
   const TimePoint end = clock_.now();
   entry->stored.totals.time.merge += seconds(end - begin);
-  // a result that was in the image before a restart publishes nothing when it is added again
+  // a result that was in the image before a restart publishes no event when it is added again
   if (core_.publisher.quiet()) return;
   failpoint("result-folded");
   if (entry->trace)
@@ -239,7 +239,7 @@ void FarmDriver::on(const JobPinned& e) {
 // The state `done` is published and stored only after the final image is written: see ImageWriter.
 void FarmDriver::on(const JobStateChanged& e) {
   const auto entry = core_.jobs.find(e.job);
-  // If the job was removed here, another coordinator continues it, or nobody does.
+  // A job that was removed here is continued by another coordinator or not at all.
   if (!entry || entry->removed || e.to == JobState::done) return;
   entry->stored.state = e.to;
   entry->stored.stopped.reset();
@@ -285,7 +285,7 @@ void FarmDriver::on(const JobFinished& e) {
 void FarmDriver::end_image(const EntryPtr& entry) {
   JobTotals& totals = entry->stored.totals;
   totals.render_seconds = entry->fold_seconds;
-  entry->ended_unix = unix_now();
+  entry->ended_unix = system_unix_seconds();
   entry->clock_zero.reset();
   entry->leased.clear();
   if (!entry->assembly) return;
@@ -315,7 +315,7 @@ void FarmDriver::on(const Checkpoint& e) {
   entry->assembly->checkpoint_taken(e.rounds);
   entry->stored.totals.doubt = error.verdict;
   entry->stored.totals.few_hits = error.few_hits;
-  // The curve has this checkpoint already, from before a restart
+  // The curve already contains this checkpoint, from before a restart
   if (!entry->points.empty() && entry->points.back().spp >= error.spp) {
     const bool compared = std::none_of(entry->points.begin(), entry->points.end(), [&](const auto& p) {
       return p.spp == error.spp && !p.reference_error;
@@ -323,8 +323,8 @@ void FarmDriver::on(const Checkpoint& e) {
     if (!compared) comparer_.compare(core_, entry, e.rounds, error.spp);
     return;
   }
-  // If the errors are not exact, the convergence curve gets no point for this checkpoint: some tile is being
-  // rendered again, and earlier errors of the other tiles are lost.
+  // Without exact errors the convergence curve gets no point for this checkpoint: some tile is being rendered
+  // again, and earlier errors of the other tiles are lost.
   if (!exact) return;
   core_.records.add_point(
       entry, {entry->fold_seconds, entry->assembly->costs().until(e.rounds), error.spp, figures_of(error)});
@@ -365,9 +365,9 @@ void FarmDriver::on(const WorkerBlocked& e) {
   core_.records.log(e.job, fmt::format("worker {} gets no more of it: {}", e.worker.value, e.why));
 }
 
-// A faulty worker is stored separately from the jobs, and for longer, so that none of its results is accepted
-// after a restart or in jobs that are extended later. Until it is stored every job waits, since a restart
-// would accept the worker's results from the log.
+// A faulty worker is stored separately from the jobs, and outlives them, so that none of its results is
+// accepted after a restart or in jobs that are extended later. Until it is stored every job waits, since a
+// restart would accept the worker's results from the log.
 void FarmDriver::on(const WorkerFoundFaulty& e) {
   log_error(fmt::format("worker={} job={} tile={} round={}", e.worker.value, e.unit.job.value, e.unit.tile,
                         e.unit.round),

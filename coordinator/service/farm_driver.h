@@ -26,8 +26,8 @@ class FarmDriver {
   // Gives a stored job to the farm. Results that are added to the image again publish no events.
   void replay(JobEntry& entry, JobRestored event);
   void quarantine(const std::vector<QuarantinedWorker>& workers);  // `workers` are stored already
-  // Unloads an ended job whose files are complete on disk: frees its image in memory and the farm's state of
-  // it; only its files and its record remain. Results that still arrive for it are dropped.
+  // Unloads an ended job whose files are complete on disk: frees its image in memory and its state in the
+  // farm; only its files and its record remain. Results that still arrive for it are dropped.
   void unload(JobEntry& entry);
 
  private:

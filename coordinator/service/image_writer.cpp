@@ -82,7 +82,7 @@ void ImageWriter::snapshot_if_due(Core&, const EntryPtr& entry) {
   writes_.push([this, entry] { take_snapshot(entry); });
 }
 
-// Takes a snapshot while results are added to the image. Those that are added to a tile after it was copied
+// Takes a snapshot while results are added to the image. Results that are added to a tile after it was copied
 // are added again after a restart. The convergence points that the snapshot includes must be stored before
 // it; they are in the writer's queue already, so the snapshot is queued behind them.
 void ImageWriter::take_snapshot(const EntryPtr& entry) {

@@ -29,10 +29,11 @@ class ImageWriter {
   void keep_audits(Core&, const EntryPtr& entry, const std::vector<JobRestored::Audit>& audits);
   void snapshot_if_due(Core&, const EntryPtr& entry);
   // Starts to denoise the job's film as it is now, at `spp` samples per pixel. Afterwards the error of its
-  // denoised layers is stored and reported to the farm. If denoising fails, the job is paused and says why.
+  // denoised layers is stored and reported to the farm. If denoising fails, the job is paused, with the
+  // reason in JobEntry::trouble.
   void check_denoised(Core&, const EntryPtr& entry, double spp);
-  // Starts to write the final image of a job that the farm has finished. The job is done when the image is
-  // written.
+  // Starts to write the final image of a job that the farm has finished. The job becomes `done` when the
+  // image is written.
   void finish(Core&, const EntryPtr& entry);
   void finish_again(Core&, const EntryPtr& entry);  // repeats finish() after it failed
   // Starts writing the current image of a failed or cancelled job, and frees the job's memory afterwards.
@@ -66,8 +67,8 @@ class ImageWriter {
   std::uint64_t last_final_ = 0;  // number of the latest request for a final image; guarded by the lock
 };
 
-// Makes the header of a final image, which describes the job. If the image has cryptomattes, reads the scene
-// for the names in them.
+// Makes the header of a final image, which describes the job. If the image has cryptomattes, the scene is
+// read for their names.
 Provenance provenance_of(const ReportFacts& facts, const BlobStore& blobs);
 // Returns the names for the identifiers of the cryptomattes. Reads the scene if the job has any; empty if
 // reading fails.

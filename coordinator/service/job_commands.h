@@ -27,8 +27,8 @@ class JobCommands {
 
   // Changes a job, or all frames of a sequence. Frames that have ended change only if they get more samples.
   Result<void> change(const JobId& id, const JobChange& change) const;
-  // Removes an ended job, or the ended frames of a sequence, with all results. Open ones are cancelled and
-  // kept.
+  // Removes an ended job, or the ended frames of a sequence, with all results. A job or frame that has not
+  // ended is cancelled and kept.
   Result<void> remove(const JobId& id) const;
   // Changes the state of a job. The caller must have checked that the change is possible.
   Result<void> become(Core& core, const EntryPtr& entry, JobState asked) const;

@@ -52,8 +52,8 @@ class Pictures {
     Film film;
     ReportFacts facts;
   };
-  // The denoised image of a job as viewers see it. For a running job an older image is shown again, unless
-  // its age is large compared to the time that denoising took. So several requests get the same image.
+  // The denoised image of a job for viewers. A running job's image is reused until its age is large compared
+  // to the time that denoising took, so several requests get the same image.
   struct DenoisedView {
     std::string key;  // names the image
     TimePoint made{};

@@ -61,7 +61,7 @@ PixelLayer denoised_layer() {
   return layer;
 }
 
-// A running job's denoised image is shown until it is this many times as old as the time that making it took.
+// A running job's denoised image is reused until its age is this many times the duration of denoising.
 constexpr int kDenoisedAge = 4;
 
 std::vector<std::uint8_t> tone_mapped(const PixelLayer& rgb, const LayerMosaic& mosaic, double stops) {
@@ -142,8 +142,8 @@ Result<std::vector<std::byte>> Pictures::pixels(const JobId& id, const PixelsAsk
     return mosaic.bytes();
   }
   if ((*entry)->assembly) {
-    // Only the requested tiles are shared with the film. So while they are read, memory of all other tiles
-    // can be freed.
+    // Only the rows of the requested tiles are shared with the film. While they are read, the memory of all
+    // other tiles can be freed.
     std::vector<TileRow> rows;
     for (int row = wanted.y0 / grid.tile; row * grid.tile < wanted.y1; ++row)
       rows.push_back({row, (*entry)->assembly->film().row(row)});

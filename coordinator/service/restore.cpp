@@ -6,6 +6,7 @@
 #include <set>
 #include <unordered_set>
 
+#include "common/base/clock.h"
 #include "common/base/log.h"
 #include "coordinator/admission/admission.h"
 #include "coordinator/domain/limits.h"
@@ -98,7 +99,7 @@ Result<void> Restore::take_up(Core& core, JobEntry& entry,
   if (auto loaded = load(core, entry); !loaded) return loaded;
   const bool begins_again =
       entry.assembly->film().samples() == 0 && (!entry.log || entry.log->found().empty());
-  // Pixels that are rendered again are the same as before, unless some were wrong
+  // Rendering again gives the same pixels, unless some were wrong
   if (has_quarantined(core.driver.farm(), entry))
     core.records.forget_wrong_pixels(entry);
   else if (begins_again)
@@ -111,7 +112,7 @@ Result<void> Restore::take_up(Core& core, JobEntry& entry,
   if (event.elapsed_seconds > 0) {
     entry.clock_zero = clock_.now() - from_seconds(event.elapsed_seconds);
     if (entry.stored.totals.began_unix == 0)
-      entry.stored.totals.began_unix = unix_now() - event.elapsed_seconds;
+      entry.stored.totals.began_unix = system_unix_seconds() - event.elapsed_seconds;
   }
   if (state == JobState::paused) entry.still_since = clock_.now();
   core.driver.replay(entry, std::move(event));
@@ -135,7 +136,7 @@ Result<void> Restore::load(Core& core, JobEntry& entry) const {
     if (!log) return tl::unexpected(log.error());
     entry.log = std::move(*log);
   }
-  // The snapshot may be older than the discovery that a worker is faulty. In this case the image is summed up
+  // The snapshot may contain results of a worker that was quarantined later. Then the image is summed up
   // again from the results of the other workers.
   if (has_quarantined(core.driver.farm(), entry))
     entry.begin_image();
@@ -166,8 +167,8 @@ void Restore::take_up_records(Core& core, JobEntry& entry, JobRestored& event) c
   const std::uint64_t spp = entry.stored.spp.value_or(kMaxSppWithoutLimit);
   JobTotals& totals = entry.stored.totals;
   totals.core_seconds = 0;
-  // Units that the loop has met. A unit of a full round is identified by its code alone, since there may be
-  // millions; a unit of a truncated round by its code and the end of its sample range.
+  // Units that the loop has counted. A unit of a full round is identified by its code alone, since there may
+  // be millions; a unit of a truncated round by its code and the end of its sample range.
   std::unordered_set<UnitCode> seen;
   std::set<std::pair<UnitCode, std::uint64_t>> seen_cut;
   seen.reserve(entry.log->found().size());

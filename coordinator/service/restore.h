@@ -1,6 +1,6 @@
-// Gives stored jobs to the farm again: at a restart, when a job of another coordinator is taken over, and
-// when an ended job is extended. Images come from snapshots. Results that a snapshot does not contain are
-// folded again from the logs of partials (the encoded results of units).
+// Adds stored jobs to the farm again: at a restart, when a job of another coordinator is taken over, and when
+// an ended job is extended. Images come from snapshots. Results that a snapshot does not contain are folded
+// again from the logs of partials (the encoded results of units).
 #pragma once
 
 #include <vector>

@@ -13,7 +13,7 @@
 namespace ls::coordinator {
 namespace {
 
-// If more background writes than this wait for the disk, results wait, too
+// While more background writes than this wait for the disk, no results are committed
 constexpr std::size_t kMaxBackgroundWrites = 4096;
 
 using Verdict = Wanted::Verdict;
@@ -92,7 +92,7 @@ void ResultPipeline::commit_loop(const std::stop_token& token) {
 }
 
 // Makes a batch of results durable, with one sync for each log file, and passes them to the farm. While the
-// disk syncs one batch, the next one collects, so a result waits for at most two syncs.
+// disk syncs one batch, results for the next one arrive, so a result waits for at most two syncs.
 void ResultPipeline::commit(std::vector<Checked> batch) {
   std::vector<Stored> stored = prepare(batch);
   append(batch, stored);
@@ -114,7 +114,8 @@ std::vector<ResultPipeline::Stored> ResultPipeline::prepare(const std::vector<Ch
     Stored& stored = all.emplace_back();
     stored.resumes = a.job->resumes;
     stored.at_seconds = a.job->elapsed(clock_.now());
-    // The farm is asked again, since its state may have changed while the result was verified.
+    // The farm's verdict is read again, since the farm's state may have changed while the result was
+    // verified.
     const Wanted wanted = farm.wanted(a.result.unit, a.from->numeric_class);
     const bool accept = wanted.verdict == Verdict::yes;
     const bool sound = !farm.quarantined(a.from->worker) && std::holds_alternative<Partial>(item.verified);
@@ -180,7 +181,7 @@ void ResultPipeline::accept(Core& core, Checked& item, std::optional<PartialLog:
   core.records.set_trouble("");
   const Wanted wanted = core.driver.farm().wanted(r.unit, a.from->numeric_class);
   const bool accepted = wanted.verdict == Verdict::yes;
-  // this copy is not in the log, because the farm did not want it when storing began
+  // this copy is not in the log, because the farm did not need it when storing began
   const bool lost = entry.log && !place;
   if (accepted && wanted.samples == a.expected.samples && !lost) {
     ++core.figures.accepted;
@@ -195,10 +196,10 @@ void ResultPipeline::accept(Core& core, Checked& item, std::optional<PartialLog:
           {std::move(std::get<Partial>(item.verified)), place, a.expected.samples, r.digest, r.health, a.at});
     }
   }
-  // The farm compares duplicates. Two kinds of results are only taken off their lease. One is a copy that the
-  // farm wants now, but that was not stored, since the farm did not want it when storing began. The other is
-  // a result of another numeric class: the farm knows only the worker's present class, which may be the job's
-  // if the worker has joined again meanwhile.
+  // The farm gets all other results, duplicates included, which it compares. Two kinds of results are only
+  // removed from their lease. One is a copy that the farm needs now, but that was not stored, since the farm
+  // did not need it when storing began. The other is a result of another numeric class: the farm has only the
+  // worker's present class, which may be the job's if the worker has joined again meanwhile.
   if ((accepted && lost) || wanted.verdict == Verdict::other_class)
     core.driver.run(LeaseCameBack{a.from->worker, {r.lease, {r.unit}}});
   else

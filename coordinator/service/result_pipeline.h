@@ -1,5 +1,5 @@
-// The path of a result: it is verified alone, made durable together with others, then reported to the farm
-// and acknowledged to its worker.
+// The path of a worker's result: each result is verified separately, made durable in a batch with others,
+// reported to the farm and acknowledged to its worker.
 #pragma once
 
 #include <functional>

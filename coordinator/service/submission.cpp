@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "common/base/clock.h"
 #include "common/base/log.h"
 #include "coordinator/admission/admission.h"
 #include "coordinator/service/core.h"
@@ -29,11 +30,10 @@ std::string clean_traceparent(const std::string& header) {
 }  // namespace
 
 tl::expected<JobId, Rejected> Submission::submit(const SubmitRequest& request) {
-  const auto refuse = [](const Error& error) { return tl::unexpected(Rejected{error, {}}); };
-  const double at = unix_now();
+  const double at = system_unix_seconds();
   const TimePoint began = clock_.now();
   if (request.spec.denoise)
-    if (const auto possible = denoising_.available(); !possible) return refuse(possible.error());
+    if (const auto possible = denoising_.available(); !possible) return rejected(possible.error());
   const auto in_use = blobs_.in_use();
   auto admitted = admit_all(request, blobs_);
   if (!admitted) return tl::unexpected(std::move(admitted.error()));
@@ -42,19 +42,19 @@ tl::expected<JobId, Rejected> Submission::submit(const SubmitRequest& request) {
   for (Admission& admission : *admitted) {
     if (const auto put = blobs_.put(admission.job.scene, std::as_bytes(std::span(admission.scene_json)));
         !put)
-      return refuse(put.error());
+      return rejected(put.error());
     admission.job.submitted_unix = at;
     admission.job.traceparent = traceparent;
     jobs.push_back(std::move(admission.job));
   }
   admitted->clear();
   const auto taken = take(std::move(jobs), request.spec.frames, began);
-  return taken ? tl::expected<JobId, Rejected>(*taken) : refuse(taken.error());
+  return taken ? tl::expected<JobId, Rejected>(*taken) : rejected(taken.error());
 }
 
 Result<JobId> Submission::submit_again(const JobId& before, const JobSpec& changes, const std::string& owner,
                                        const std::string& traceparent) {
-  const double at = unix_now();
+  const double at = system_unix_seconds();
   const TimePoint began = clock_.now();
   StoredJob model;
   {
@@ -76,7 +76,7 @@ Result<JobId> Submission::submit_again(const JobId& before, const JobSpec& chang
   return take(std::move(jobs), std::nullopt, began);
 }
 
-// Stores the jobs, either all or none, and gives them to the farm.
+// Stores the jobs, either all or none, and adds them to the farm.
 Result<JobId> Submission::take(std::vector<StoredJob> jobs, const std::optional<FrameRange>& range,
                                TimePoint began) {
   const auto core = core_.lock();

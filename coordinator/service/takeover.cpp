@@ -8,7 +8,7 @@
 
 namespace ls::coordinator {
 namespace {
-// Time until the next attempt to take over a job after the blob store did not answer
+// Time until the next attempt to take over a job if the blob store did not answer
 constexpr Duration kTakeOverPause = std::chrono::seconds(5);
 }  // namespace
 
@@ -63,7 +63,7 @@ void Takeover::take_over(Inheritance inheritance) {
     return;
   }
   if (core->jobs.find(id)) return;
-  // The folder is outdated: it is from a time when this coordinator owned the job before
+  // A folder that exists here is outdated: it is from an earlier time at which this coordinator owned the job
   files_.remove_folder(id);
   restore_.reopen_if_image_is_lost(job);
   const auto entry = restore_.add(*core, std::move(job), missing);

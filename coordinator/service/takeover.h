@@ -41,7 +41,7 @@ class Takeover {
   const Restore& restore_;
   BackgroundWrites& writes_;
   const Clock& clock_;
-  std::vector<Inheritance> later_;  // jobs whose takeover is to be repeated later; guarded by the lock
+  std::vector<Inheritance> later_;  // jobs whose takeover is repeated later; guarded by the lock
 };
 
 }  // namespace ls::coordinator

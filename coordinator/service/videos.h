@@ -24,7 +24,8 @@ class Videos {
   // Requests a video of the frames that are done now. It replaces an earlier video of the sequence.
   Result<VideoView> make(const JobId& sequence, const VideoAsked& asked);
   Result<VideoView> view(const JobId& sequence) const;
-  // Returns the file of a video that is ready. failed_precondition: there is none; the message says why.
+  // Returns the file of a video that is ready. failed_precondition: there is none; the message gives the
+  // reason.
   Result<std::filesystem::path> file(const JobId& sequence) const;
   void loop(const std::stop_token& stop);
 

@@ -46,8 +46,8 @@ bool well_formed(const WorkerId& id) {
          });
 }
 
-// Makes the id of a new worker. A worker that names its id continues where a broken connection ended. So
-// whoever knows an id could take over that worker's stream, and ids must not be guessable.
+// Makes the id of a new worker. A worker that sends its id continues after a broken connection. So anyone
+// with the id could take over that worker's stream, and ids must not be guessable.
 std::string new_worker_id(std::uint64_t start, std::uint64_t number) {
   std::random_device device;
   const std::uint64_t secret = (std::uint64_t{device()} << 32 | device()) & 0xffff'ffff'ffff;
@@ -89,8 +89,8 @@ Result<std::unique_ptr<WorkerSession>> WorkerSessions::connect(const WorkerHello
   WorkerTable& workers = core->workers;
   WorkerId id = hello.previous_id;
   const auto known = workers.find(id);
-  // If a worker of another name has this id already (as after a running machine was copied), the id stays
-  // with that worker, and this one gets a new id.
+  // If a worker of another name has this id already (for example, because a running machine was cloned), that
+  // worker keeps the id, and this one gets a new id.
   const bool taken = known != workers.end() && known->second.hello.name != hello.name;
   if (id.empty() || !well_formed(id) || taken)
     id.value = new_worker_id(options_.start, last_epoch_ & 0xffffffff);

@@ -25,8 +25,8 @@ class WorkerSessions {
         last_epoch_(options_.start << 32) {}
 
   Result<std::unique_ptr<WorkerSession>> connect(const WorkerHello& hello, std::shared_ptr<WorkerSink> sink);
-  // Tells the farm which workers have results that wait for memory in the coordinator, so that they do not
-  // count as late.
+  // Reports to the farm the workers whose results wait for memory in the coordinator, so that their leases
+  // are renewed.
   void report_held_back(Core& core) const;
   // Sessions may outlive this object. After abandon() their functions do nothing; close() closes their
   // streams.

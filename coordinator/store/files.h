@@ -47,9 +47,9 @@ Result<void> sync_folder(const std::filesystem::path& folder);
 // file at `path` has either its old or its new content.
 Result<void> write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
-// Does the same as write_atomically() for content too large for memory: the content is written piece by piece
-// to a file named PATH + `suffix`, which commit() renames to PATH. If the object is destroyed without a
-// commit, the temporary file is removed.
+// Like write_atomically(), for content too large for memory: the content is written piece by piece to a file
+// named PATH + `suffix`, which commit() renames to PATH. If the object is destroyed without a commit, the
+// temporary file is removed.
 class AtomicFile {
  public:
   static Result<AtomicFile> create(std::filesystem::path path, std::string_view suffix = ".tmp");

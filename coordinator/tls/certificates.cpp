@@ -14,7 +14,7 @@
 namespace ls::tls {
 namespace {
 
-// Certificates are valid from this many seconds before their issue, since a worker's clock may be behind
+// Certificates are valid from this many seconds before their issue, since a worker's clock may be slow
 constexpr std::int64_t kClocksDiffer = 3600;
 constexpr int kSerialBits = 127;
 

@@ -9,6 +9,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "common/base/helper_program.h"
+#include "common/base/secret.h"
 #include "coordinator/tls/certificates.h"
 
 namespace ls::tls {
@@ -18,13 +20,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxBytes = 1u << 20;
 constexpr std::int64_t kRenewBefore = 30 * kDay;
-
-struct Descriptor {
-  int fd = -1;
-  ~Descriptor() {
-    if (fd >= 0) ::close(fd);
-  }
-};
 
 tl::unexpected<Error> wrong(const fs::path& file, const std::string& why) {
   return fail(Errc::invalid_argument, fmt::format("'{}' {}", file.string(), why));
@@ -56,20 +51,9 @@ Result<std::string> read_pem(const fs::path& file, bool secret) {
   }
 }
 
-Result<void> write_pem(const fs::path& file, const std::string& text, mode_t mode) {
-  const std::string aside = file.string() + ".new";
-  ::unlink(aside.c_str());
-  const Descriptor out{::open(aside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode)};
-  if (out.fd < 0 || ::write(out.fd, text.data(), text.size()) != static_cast<ssize_t>(text.size()) ||
-      ::fsync(out.fd) != 0 || ::rename(aside.c_str(), file.c_str()) != 0)
-    return fail(Errc::resource_exhausted,
-                fmt::format("cannot write '{}': {}", file.string(), std::strerror(errno)));
-  return {};
-}
-
 Result<void> write_pair(const fs::path& folder, const std::string& name, const Certificate& pair) {
-  if (auto done = write_pem(folder / (name + ".key"), pair.key, 0600); !done) return done;
-  return write_pem(folder / (name + ".pem"), pair.cert, 0644);
+  if (auto done = write_private(folder / (name + ".key"), pair.key); !done) return done;
+  return write_private(folder / (name + ".pem"), pair.cert, 0644);
 }
 
 Result<Certificate> authority_of(const fs::path& folder, std::int64_t now) {

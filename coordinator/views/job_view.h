@@ -1,5 +1,5 @@
-// Views: what clients see of jobs, frames, tiles and workers. Also the changes that a user may request of a
-// job.
+// Views: the data of jobs, frames, tiles and workers for clients. Also the changes that a user may request of
+// a job.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +28,7 @@
 namespace ls::coordinator {
 
 // How the time of a job was spent, in core seconds of the workers (`merge`: of the coordinator). If the
-// coordinator is killed, the time since the job was last stored is lost, except for `render`.
+// coordinator is killed, all but `render` lose the time since the job was last stored.
 struct TimeSplit {
   double load = 0;      // fetching files
   double build = 0;     // parsing files, building worlds
@@ -60,7 +60,7 @@ struct ErrorFigures {  // Estimated errors of the image up to the last round tha
   double relmse = 0;
   // 95 % interval for the actual relMSE of this image
   double relmse_lo = 0, relmse_hi = 0;
-  // The same for the RMSE; both 0: it is not known
+  // The same for the RMSE; both 0: unknown
   double rmse_lo = 0, rmse_hi = 0;
 };
 // Error against a reference image, from which the reference's own noise is subtracted
@@ -121,7 +121,7 @@ struct JobView {
   std::string stopped;    // once done: "spp", "error", "time" or "user"
   double progress = 0;    // 0..1
   std::uint64_t spp = 0;  // samples per pixel: requested, or the limit
-  bool spp_asked = true;  // false: no number of samples was requested; its target error or its time ends it
+  bool spp_asked = true;  // false: no number of samples was requested; a target error or a time ends the job
   std::optional<double> target_error;  // relMSE at which the job is to end, if requested
   // the layers whose relMSE target_error limits
   TargetLayer target_layer = TargetLayer::raw;
@@ -181,10 +181,10 @@ struct JobChange {
   std::optional<JobState> state;  // the new state: paused, running or cancelled
   std::optional<int> priority;
   std::optional<std::uint64_t> spp;  // the new total of samples per pixel
-  // The new target error; only for a job that has one, and that was not ended by anything else. A smaller
-  // target resumes a job that reached the larger one
+  // The new target error; only for a job that has one and did not end for another reason. A smaller target
+  // resumes a job that reached the larger one
   std::optional<double> target_error;
-  // Pixels whose tiles are rendered before the others from now on; the inner nullopt ends that
+  // Pixels whose tiles are rendered before the others from now on; inner nullopt: no tile goes first any more
   std::optional<std::optional<PixelRect>> focus = {};
 };
 
@@ -263,5 +263,8 @@ struct Rejected {
   Error error;
   std::vector<Diagnostic> diagnostics;
 };
+inline tl::unexpected<Rejected> rejected(Error error) {
+  return tl::unexpected(Rejected{std::move(error), {}});
+}
 
 }  // namespace ls::coordinator

@@ -1,5 +1,4 @@
-// Writes views (what clients see of jobs, tiles and workers; job_view.h) as JSON and CSV. Missing values are
-// null.
+// Writes views (job_view.h) as JSON and CSV for clients. Missing values are null.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-// The two ends of a worker's stream, as the coordinator uses them: WorkerSink for sending and WorkerSession
-// for receiving. Also the check whether a worker may join.
+// The two directions of a worker's stream: the coordinator sends through a WorkerSink and receives through a
+// WorkerSession. Also the check whether a worker may join.
 #pragma once
 
 #include <functional>
@@ -28,10 +28,7 @@ class WorkerSession {
   virtual void receive(FromWorker message) = 0;
   // Takes a message without blocking. `next` is called when there is room for another message: during this
   // call, or later on another thread. It is never called if the coordinator closes first.
-  virtual void receive(FromWorker message, std::function<void()> next) {
-    receive(std::move(message));
-    next();
-  }
+  virtual void receive(FromWorker message, std::function<void()> next) = 0;
   virtual void disconnected() = 0;
 };
 

@@ -34,8 +34,8 @@ struct Delivery {            // a notification that waits to be sent
 };
 
 // One receiver's deliveries, in order, and the times of its retries. Later deliveries wait until the first is
-// accepted or dropped, so that "done" never arrives before "running". The state of a Line is a function of
-// the deliveries added, the outcomes reported and the times passed in. Not thread-safe.
+// accepted or dropped, so that "done" never arrives before "running". The state of a Line depends only on the
+// deliveries added, the outcomes reported and the times passed in. Not thread-safe.
 class Line {
  public:
   // Returns the delivery that was dropped because too many wait, else nullopt.
@@ -44,8 +44,8 @@ class Line {
   const Delivery* due(TimePoint now) const;
   // Returns the time from which due() will return a delivery; nullopt: there is none.
   std::optional<TimePoint> next_due() const;
-  // Note that the receiver has accepted the delivery that due() returned (taken), or that the attempt failed
-  // (failed). Both return the delivery when it leaves the queue: taken() always, failed() after kMaxAttempts
+  // taken() notes that the receiver has accepted the delivery that due() returned, failed() that the attempt
+  // failed. Both return the delivery if it leaves the queue: taken() always, failed() after kMaxAttempts
   // attempts.
   std::optional<Delivery> taken();
   std::optional<Delivery> failed(TimePoint now);

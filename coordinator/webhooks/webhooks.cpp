@@ -31,7 +31,7 @@ bool ended(const std::string& state) {
 
 }  // namespace
 
-// The known states of jobs, and the notifications that must still be sent.
+// The last reported states of jobs, and the notifications that must still be sent.
 struct webhooks::State {
   explicit State(webhooks::Outbox kept) : outbox(std::move(kept)), open(outbox.open_jobs()) {}
 
@@ -88,7 +88,7 @@ struct webhooks::State {
   std::map<std::string, std::string> states;  // last reported state of each job
   std::deque<Line> lines;                     // one line per receiver
   std::uint64_t last_number = 0;
-  Webhooks::Figures figures;
+  WebhookFigures figures;
 };
 
 class Webhooks::Impl {
@@ -127,23 +127,23 @@ class Webhooks::Impl {
       threads_.emplace_back([this, i](const std::stop_token& token) { deliver(i, token); });
   }
 
-  Figures figures() const {
+  WebhookFigures figures() const {
     const auto state = state_.lock();
-    Figures f = state->figures;
+    WebhookFigures f = state->figures;
     for (const Line& line : state->lines) f.waiting += line.waiting();
     return f;
   }
 
  private:
-  // Reports changes of jobs from before this start that a crash has left unreported.
+  // Reports ends of jobs from before this start that a crash left unreported.
   void catch_up(Coordinator& coordinator) {
     const std::set<JobId> open = state_.lock()->outbox.open_jobs();
     for (const JobId& job : open) {
       const auto view = coordinator.job(job);
       const std::string word(view ? to_string(view->state) : "");
       // If the previous run crashed after it had stored the notification of the job's end, but before it
-      // recorded that the job has ended, the notification is still pending. Then the end is only recorded,
-      // not reported again. The same for a job that no longer exists.
+      // recorded that the job has ended, the notification is still pending. Then the end is recorded and not
+      // reported again. A job that no longer exists is handled in the same way.
       if (!view || kept_.contains(job.value + "/" + word)) {
         const auto state = state_.lock();
         state->mark_ended(job);
@@ -260,7 +260,7 @@ class Webhooks::Impl {
 
 Webhooks::Webhooks(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Webhooks::~Webhooks() = default;
-Webhooks::Figures Webhooks::figures() const { return impl_->figures(); }
+WebhookFigures Webhooks::figures() const { return impl_->figures(); }
 
 std::string webhook_signature(const std::string& secret, std::int64_t unix_seconds, const std::string& body) {
   return fmt::format("t={},v1={}", unix_seconds,

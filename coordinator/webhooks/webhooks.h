@@ -15,8 +15,8 @@
 //
 // A receiver accepts a notification by a 2xx answer. After any other answer, or none within 15 s, the
 // notification is sent again, after pauses of 1, 2, 4 ... 300 s, until 20 attempts have failed; later
-// notifications to that receiver wait meanwhile. If a job's state changes twice in quick succession, possibly
-// only the second state is reported.
+// notifications to that receiver wait meanwhile. If a job's state changes twice in quick succession, only the
+// second state may be reported.
 #pragma once
 
 #include <filesystem>
@@ -46,13 +46,10 @@ class Webhooks {
     // Records a span for each attempt to deliver a notification of a traced job; null: none
     std::shared_ptr<trace::Tracer> tracer = nullptr;
   };
-  struct Figures {
-    std::uint64_t delivered = 0, failed_attempts = 0, given_up = 0, waiting = 0;
-  };
   // Starts the sending threads. Destroying the returned object stops them; the coordinator must outlive it.
   static Result<std::unique_ptr<Webhooks>> start(Coordinator& coordinator, Options options);
   ~Webhooks();
-  Figures figures() const;
+  WebhookFigures figures() const;
 
  private:
   class Impl;

@@ -9,10 +9,9 @@
 
 #include <jpeglib.h>
 
+#include "common/assets/grid_files.h"
 #include "common/assets/image.h"
 #include "common/assets/mesh.h"
-#include "common/assets/raw_grid.h"
-#include "common/assets/vol.h"
 #include "common/image/exr/exr_file.h"
 #include "common/image/exr/final_image.h"
 #include "tests/fuzz/all_targets.h"

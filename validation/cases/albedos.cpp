@@ -72,8 +72,8 @@ void deep(Table& t) {
           fmt::format("N17-white-slab-{:g}{}", tau, configuration.name()), "N17 N16 7.2",
           "A white slab this deep: paths of hundreds of vertices, ended by no cap.",
           [=] { return column(configuration, {.tau = tau}, false); }, grey(1 - white_transmittance(tau)),
-          // At depth 256 few paths are long enough to matter, and few pixels have one: a short first run
-          // would see none of them, or overestimate them.
+          // At depth 256 few paths are long enough to contribute, and few pixels have one. A short first run
+          // would find none of them, or overestimate them.
           {.slack = 1e-6, .slow = true, .paths = tau < 100 ? 0u : 1u << 17, .frames = tau < 100 ? 0u : 64u});
     }
   }

@@ -1,6 +1,6 @@
-// Three bugs that other renderers have had, each with cases that fail for it (docs/design/validation.md
-// describes the check): a phase function clamped to |g| = 0.99, 1 - exp of a thin depth, and 0 / 0 at null
-// collisions.
+// Three bugs that other renderers have had, each with cases that fail for a renderer that has it
+// (docs/design/validation.md describes how this is checked): a phase function clamped to |g| = 0.99, 1 - exp
+// of a thin depth, and 0 / 0 at null collisions.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -56,11 +56,10 @@ SceneBuilder row_of_voxels(float density, double sigma, bool by_shadow) {
   return builder;
 }
 
-// If the density of a voxel equals the bound of its macro cell, tentative collisions in it are never null
-// collisions. If the medium does not scatter either, probabilities normalised by "scattered or null" are 0 /
-// 0. This renderer's bounds are 4 ulps above the voxels, so the null share is never exactly 0; but for
-// densities of 2e-32 it is 1e-38, which becomes 0 when denormals are flushed (as in every thread of the
-// renderer).
+// If a voxel's density equals the majorant of its macro cell, no collision in it is a null collision. If the
+// medium does not scatter either, probabilities normalised by "scattered or null" are 0 / 0. This renderer's
+// majorants are 4 ulps above the voxels, so the null probability is never exactly 0. But for densities of
+// 2e-32 it is 1e-38, which becomes 0 when denormals are flushed, as in every thread of the renderer.
 void null_collisions(Table& t) {
   for (const bool by_shadow : {false, true})
     for (const bool tiny : {false, true}) {

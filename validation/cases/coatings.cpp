@@ -119,7 +119,8 @@ void coated(Table& t) {
 }
 
 // A thin sheet, and a plate with two faces of nearly_smooth(), in front of a black wall. The plate's facets
-// turn light by about alpha = 2e-3 rad, and Fresnel's terms change by the square of that.
+// deflect light by about alpha = 2e-3 rad; the relative change of its Fresnel terms is of the order of
+// alpha^2.
 void sheets(Table& t) {
   const auto add = [&](const char* name, SceneBuilder builder, double slack) {
     builder.shape(RectangleShape{}, translate({0, 0, -2}) * scale(20), builder.diffuse(0));

@@ -44,8 +44,8 @@ void nothing(Table& t) {
   }
 }
 
-// The radiance of a path of unit length through a medium that emits eps per length: L = eps (1 - e^-tau) /
-// sigma. It has no variance, except for the macro cells of grids that are sampled.
+// The radiance of a ray of unit length through a medium that emits eps per length: L = eps (1 - e^-tau) /
+// sigma. The estimate has no variance, except in macro cells of grids that a tracker samples.
 void emission(Table& t) {
   for (const Configuration& configuration : both_media()) {
     for (const double tau : kThin) {
@@ -103,11 +103,11 @@ void opaque(Table& t) {
     }
   }
   // The answers are 1 - sqrt(1 - a) H(1), Chandrasekhar 1950, to six digits, with a the albedo. From depth
-  // 1e5 on the mean free path is shorter than the offset of rays from surfaces (2^-20 of the world), so the
+  // 1e5 on, the mean free path is shorter than the offset of rays from surfaces (2^-20 of the world), so the
   // distance to the face must be measured from the path's true position. At depth 1e6 the mean free path is
-  // 17 ulps of float32 at the face's height. So next to the face the contribution is a trapezoidal sum over
-  // the float32 positions instead of an integral. For isotropic scattering, with the integral of E_2(z) dz,
-  // that sum is 3.1e-3 too large.
+  // 17 ulps of float32 at the face's height. Next to the face the renderer therefore sums over float32
+  // positions (a trapezoidal sum) instead of integrating. For isotropic scattering, with the integral of
+  // E_2(z) dz, that sum is 3.1e-3 too large.
   constexpr double kDigits = 2e-6, kPlaces = 3.1e-3;
   for (const Configuration& configuration : all_configurations()) {
     for (const double tau : {1e3, 1e5, 1e6}) {
@@ -132,8 +132,9 @@ void opaque(Table& t) {
 void shadows(Table& t) {
   for (const double tau : {20., 30., 80.}) {
     const double expected = std::exp(-tau) / (2 * kPi);
-    // The first term is for the factors. The second is the effect on e^-tau of a relative rounding error of
-    // the exponent of 2^-24.
+    // The first term is for the rounding of the factors. The second is for the exponent, the product of a
+    // coefficient and a length: the relative rounding error of each, 2^-24, changes e^-tau by a share of
+    // tau 2^-24.
     const double tolerance = kTenRoundings + 2 * tau * 0x1p-24;
     for (const Configuration& configuration : both_media()) {
       t.exact(fmt::format("N05-shadow-{:g}{}", tau, configuration.name()), "N5 N60",
@@ -148,9 +149,10 @@ void shadows(Table& t) {
               });
     }
   }
-  // Where the density varies, a shadow ray estimates its transmittance step by step. When little is left,
-  // Russian roulette ends most of these estimates (kRouletteDepth); their mean is right all the same. The
-  // density is 0, 1, 2, 3 at the centres of four voxels along z and constant beyond, so its integral is 1.5.
+  // Where the density varies, a shadow ray estimates its transmittance step by step. When little
+  // transmittance is left, Russian roulette ends most of these estimates (kRouletteDepth), which keeps their
+  // mean. The density is 0, 1, 2, 3 at the centres of four voxels along z and constant beyond, so its
+  // integral is 1.5.
   t.mean("N05-shadow-ramp-8/grid/volpath", "N5 7.6a",
          "A shadow ray through a ramp of densities, by residual tracking.",
          [] {

@@ -52,10 +52,10 @@ void atmospheres(Table& t) {
 }
 
 // The mean path length in a ball is 4V/S = 4R/3, whatever scatters inside (Blanco and Fournier 2003). So
-// mean(1 - L) = sigma_a 4R/3, minus a relative correction sigma_a <l^2> / (2 <l>), which is sigma_a times the
-// mean remaining path from inside. That path is 0.75 R without scattering, and diffusion adds about R^2
-// sigma_s / 5 = 0.4 R: below 2 R. The weight of a path is a product of albedos, each rounded by 2^-25, which
-// relative to sigma_a / sigma_t = 5e-4 is an error of 6e-5.
+// mean(1 - L) = sigma_a 4R/3, less a relative correction of sigma_a <l^2> / (2 <l>). That is sigma_a times
+// the mean remaining path length from a point inside: 0.75 R without scattering, to which diffusion adds
+// about R^2 sigma_s / 5 = 0.4 R, so less than 2 R. A path's weight is a product of albedos, each rounded by
+// 2^-25; relative to sigma_a / sigma_t = 5e-4 this is an error of 6e-5.
 void mean_paths(Table& t) {
   constexpr double kAbsorption = 1e-3, kScattering = 2, kDistance = 1000, kMargin = 1.01;
   for (const Configuration& configuration : all_configurations()) {

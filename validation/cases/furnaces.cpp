@@ -47,8 +47,9 @@ void white_sky(Table& t) {
     add("rotated-grid-in-sphere", builder);
   }
   {
-    // Three channels with a density each. And the same, absorbing, in balance with its surroundings: a medium
-    // whose source radiance equals the radiance around it is invisible, whatever its albedo.
+    // A grid with a density for each channel: without absorption, and (`warm`) with absorption and emission
+    // in balance with its surroundings. A medium whose source radiance equals the radiance around it is
+    // invisible, whatever its albedo.
     for (const bool warm : {false, true}) {
       SceneBuilder builder;
       const VolumeIndex v = builder.grid({12, 9, 7}, patchy(12 * 9 * 7 * 3, 5), kBox, 3);

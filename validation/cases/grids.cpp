@@ -145,9 +145,9 @@ void hot_voxels(Table& t) {
 }
 
 // Thin fog with a dense wall across it. The camera's ray stays three voxels away from the wall, and the light
-// that reaches it does not meet the wall, either. But macro cells on the ray contain part of the wall; with
-// their mean density nothing would get through. The light comes from a lamp in the fog and is scattered once:
-// the answer is the integral over the ray of sigma / (4 pi) e^-(sigma (t + r)) / r^2.
+// that reaches the ray does not cross the wall, either. But macro cells on the ray contain part of the wall;
+// if their mean density were used, no light would get through. The light comes from a lamp in the fog and is
+// scattered once: the answer is the integral over the ray of sigma / (4 pi) e^-(sigma (t + r)) / r^2.
 void beside_a_wall(Table& t) {
   constexpr int n = 33, wall = 16;
   constexpr double sigma = .5, density = 1e4;
@@ -249,9 +249,9 @@ void cut_in_pieces(Table& t) {
           grey(std::exp(-.25)));
     }
     for (const int pieces : {10, 1000}) {
-      // Each piece's length is a difference of float32 positions. The next piece begins at the position where
-      // it ends, so errors of positions do not add up; but each piece adds a rounding error of an ulp of the
-      // scene's size.
+      // Each piece's length is a difference of float32 positions. A piece begins at the position where the
+      // previous one ends, so errors of positions do not add up; but the length of each piece is rounded by
+      // an ulp of the scene's size.
       const double tolerance = 2e-6 + pieces * 0x1p-24;
       t.exact(fmt::format("N13-light-of-{}-pieces{}", pieces, configuration.name()), "N13 N42",
               "Light given off without extinction, summed up over pieces: the whole length.",
@@ -369,8 +369,8 @@ void no_densities(Table& t) {
   }
 }
 
-// A medium without extinction in red, almost opaque in blue. One randomly chosen channel decides how far a
-// path flies, and all channels weight the path.
+// A medium without extinction in red, almost opaque in blue. Free flights are sampled for one randomly chosen
+// (hero) channel, and the path's weight uses the pdfs of all channels.
 void heroes(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     t.mean("N15-hero-without-extinction" + configuration.name(), "N15 7.6a",

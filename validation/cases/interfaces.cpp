@@ -26,8 +26,8 @@ SceneBuilder plates(int m) {
 }
 SceneBuilder floor_behind(int boundaries) {
   SceneBuilder builder;
-  // A haze of optical depth 2e-4 fills the scene, because boundaries between two sides without a medium would
-  // be pruned.
+  // A haze of optical depth 2e-4 fills the scene, since pruning would remove boundaries without a medium on
+  // either side.
   const MediumIndex haze = builder.homogeneous(rgb(1e-5), rgb(0));
   builder.scene.sensor.medium = haze;
   builder.shape(RectangleShape{}, scale(30), builder.diffuse(.5)).exterior = haze;
@@ -58,7 +58,7 @@ void stacks(Table& t) {
       {.band = .002, .slack = 1e-3, .slow = true});
 }
 
-// A square as a mesh file. The faces `more` stand between its own two.
+// A square as an OBJ file of two triangles, with the faces `more` between them.
 SceneBuilder mesh(const std::string& more) {
   SceneBuilder builder;
   MeshShape m;

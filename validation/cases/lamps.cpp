@@ -59,8 +59,8 @@ void passing_by(Table& t) {
   }
   for (const Configuration& configuration : all_configurations()) {
     for (const double h : {1., .5, .01, 1e-4}) {
-      // In grids only volpath_distant_mis samples by angle: close to the lamp, flights of the other
-      // integrator find too little.
+      // In grids only volpath_distant_mis samples distances equi-angularly. The free flights of volpath have
+      // too few collisions close to the lamp.
       if (configuration.grid && !configuration.distant && h < .5) continue;
       t.mean(fmt::format("N22-passing-a-lamp-at-{:g}{}", h, configuration.name()), "N22 N23 7.6f",
              "A ray that passes a lamp at this distance, light scattered once.",
@@ -124,8 +124,8 @@ void from_afar(Table& t) {
                           rgb(1 / (2 * kPi * (1 - std::sqrt(.99)))));
              return builder;
            },
-           // The lamp's rim is 0.1 rad off the vertical, so the way down through the cube is longer by at
-           // most 0.005, times the extinction 0.01. Flights rarely scatter in a grid this thin.
+           // The lamp's rim is 0.1 rad off the vertical, so paths down through the cube are longer by at most
+           // 0.005, times the extinction 0.01. Free flights rarely scatter in a grid this thin.
            grey(lit_cube_answer(.01, 1)),
            {.slack = 5e-5,
             .slow = configuration.grid && !configuration.distant,
@@ -140,10 +140,10 @@ void enormous(Table& t) {
   const double cone = 2 * kPi * (1 - std::sqrt(1 - kSize * kSize / kFar / kFar)),
                disk = 2 * kPi * (1 - kFar / std::hypot(kFar, kSize)),
                square = 4 * std::atan(kSize * kSize / (kFar * std::sqrt(kFar * kFar + 2 * kSize * kSize)));
-  // The view is a line along z through the cube. Light that leans by q along it enters through the cube's
-  // side, instead of its top, if it reaches the view within q of that side. Then its path inside is some u <
-  // 1 instead of 1. At each end of the view this adds q int_0^1 (e^-u - e^-1) du = q (1 - 2 / e). `lean` is
-  // the mean of max(q, 0) over the light.
+  // The view is a line along z through the cube. Consider light tilted by the angle q along that line. Where
+  // it reaches the line within q of an end, it has entered through the cube's side instead of its top, so its
+  // path inside has a length u < 1 instead of 1. At each end this adds q int_0^1 (e^-u - e^-1) du = q (1 - 2
+  // / e). `lean` is the mean of max(q, 0) over the light.
   const auto leaning = [](double lean) {
     return 1 + lean * (std::exp(1.) - 2) * (1 + std::exp(-2.)) / -std::expm1(-2.);
   };
@@ -166,8 +166,8 @@ void enormous(Table& t) {
                             rgb(1 / light.solid_angle));
                return builder;
              },
-             // The light's rim is 0.01 rad off the vertical, 0.014 in the corners: ways down are longer by at
-             // most 1e-4.
+             // The light's rim is 0.01 rad off the vertical, 0.014 in the corners, so paths down through the
+             // cube are longer by at most 1e-4.
              grey(lit_cube_answer(1, 1) * leaning(light.lean)), {.slack = 1e-4});
   }
 }

@@ -155,8 +155,8 @@ void orders_apart(Table& t) {
         },
         reflected(irradiance));
   }
-  // A point light (delta light) reflected by a mirror (delta lobe): no sampling strategy finds it, and none
-  // divides by a density of 0.
+  // A point light (delta light) reflected by a mirror (delta lobe): no sampling strategy can find this path,
+  // and none may divide by a pdf of 0.
   t.exact("N32-lamp-in-a-mirror", "N32", "A point light in a mirror is not seen, and nothing goes wrong.",
           [](const Bench& b) {
             SceneBuilder builder;

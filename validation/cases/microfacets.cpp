@@ -50,8 +50,8 @@ void peaks(Table& t) {
         const double shape =
                          ggx ? std::pow(1 + s2, -2) * unmasked(alpha, view, view + 2 * off) : std::exp(-s2),
                      density = shape * std::pow(1 + tangent * tangent, 2) / (kPi * alpha * alpha);
-        // Directions are accurate to 2^-24. The error of a slope is this divided by alpha, and the exponent
-        // has the square of the slope.
+        // Directions are accurate to 2^-24, so the error of a slope is 2^-24 / alpha; the exponent contains
+        // the square of the slope.
         const double tolerance = 1e-5 + 2. * slopes * 4 * 0x1p-24 / alpha;
         t.exact(
             fmt::format("N34-{}-alpha-{:g}-{}", ggx ? "ggx" : "beckmann", alpha,

@@ -1,5 +1,5 @@
-// Media inside others, overlapping media, and boundaries in the same place: splitting a medium into parts
-// that touch, or into thinner media in the same place, must not change the light.
+// Nested and overlapping media, and coincident boundaries: splitting a medium into parts that touch, or into
+// thinner media in the same place, must not change the light.
 #include <fmt/format.h>
 
 #include <cmath>

@@ -26,9 +26,9 @@ void phase_peaks(Table& t) {
   }
 }
 
-// The share of the light scattered once that stays within an angle q of its direction. It is seen by looking
-// through the medium at a sun of that angular radius; phase-function sampling, light sampling, or both find
-// it.
+// The share of singly scattered light that is deflected by less than an angle q. The camera measures it
+// through the medium, looking at a sun of angular radius q, which phase function sampling, light sampling, or
+// both find.
 double share_within(double g, double degrees) {
   const double h = std::sin(degrees * kPi / 360), x = 2 * h * h;  // 1 - cos q
   return (1 - g) * (1 + g) / (2 * g) * (1 / (1 - g) - 1 / std::sqrt((1 - g) * (1 - g) + 2 * g * x));

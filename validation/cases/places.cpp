@@ -88,8 +88,8 @@ void panes_on_faces(Table& t) {
           });
 }
 
-// The answer is L + rho L + rho^2 L ... = 2, with L = 1 and rho = 1/2. So sampled directions that hit the
-// wall must also find the light, which is in the same place.
+// The walls emit L = 1 and reflect rho = 1/2, so the radiance is L + rho L + rho^2 L ... = 2. The emitting
+// shape and the reflecting one coincide, so sampled directions that hit the wall must also find the light.
 void lights_on_walls(Table& t) {
   for (const bool first : {false, true})
     t.mean(

@@ -104,7 +104,7 @@ void lights(Table& t) {
                spot = spot_answer(.5, .7);
   for (const bool grid : {false, true}) {
     for (const Setting& s : settings(grid)) {
-      // With these settings paths come near a light only by chance. A short pilot run misses such paths, or
+      // With these settings paths come near a light only by chance. A short pilot run finds no such path, or
       // overestimates their light.
       const bool by_chance =
           s.configuration.distance == DistanceSampling::exponential || (grid && !s.configuration.distant);

@@ -50,9 +50,9 @@ void semi_infinite(Table& t) {
          {.band = .01, .why_band = "paths of hundreds of scatterings", .slack = 1e-5, .slow = true});
 }
 
-// Adds a white disk of radius height / 20, `height` above the face at `foot`, and looks at its underside. The
-// disk gathers the cosine-weighted light of the whole face, so its radiance is the medium's reflectance in
-// uniform light, minus the little light that the disk itself blocks.
+// Adds a white disk of radius height / 20, at `height` above the face at `foot`, and points the camera at its
+// underside. The cosine-weighted light of the whole face falls on the disk, so the disk's radiance is the
+// medium's reflectance in uniform light, less the little light that the disk itself blocks.
 void add_small_plate(SceneBuilder& builder, const Vec3& foot, double height) {
   const double radius = height / 20, x = foot[0], y = foot[1], z = foot[2];
   builder.shape(DiskShape{}, translate({x, y, z + height}) * rotate_x(180) * scale(radius),
@@ -62,8 +62,8 @@ void add_small_plate(SceneBuilder& builder, const Vec3& foot, double height) {
 }
 
 // The spherical albedo of a half space, by a cube of side 1 and optical depth 40. The disk is 0.001 above the
-// face, which is 0.04 mean free paths. Its radius is 0.002 mean free paths, so its shadow takes a share of
-// about (0.002)^2 of what it sees. The share of its view that is beside the cube is (2 x 0.001)^2.
+// face, which is 0.04 mean free paths. Its radius is 0.002 mean free paths, so it shadows a share of about
+// (0.002)^2 of the light that it receives. Of its cosine-weighted view, (2 x 0.001)^2 lies beside the cube.
 void spherical(Table& t) {
   struct Row {
     double albedo, reflected;
@@ -92,8 +92,8 @@ std::string named(const char* what, const Slab& s, const char* side, const Confi
   return fmt::format("7.2-{}-a{:g}-tau{:g}-{}{}", what, s.albedo, s.tau, side, configuration.name());
 }
 
-// Where a slab transmits little light, by long paths only, the light is tested to 1 %. For the white slab of
-// depth 16 this is done in the faster configuration; the case of its reflectance R covers the other one.
+// Where a slab transmits little light, and only by long paths, the band is 1 %. For the white slab of depth
+// 16 this is done in the faster configuration; the case of its reflectance R covers the other one.
 MeanOptions of_little(double through, bool slow) {
   const bool little = through < .3;
   return {.band = little ? .01 : kBand,
@@ -126,9 +126,9 @@ void isotropic(Table& t) {
          grey(.267410), {.slack = kDigits * 10, .slow = true});
 }
 
-// A plate of reflectance 1/2 in the column above the slab, with the environment below. It gathers the slab's
-// light, cosine-weighted. With R and T the slab's reflectance and transmittance for diffuse light, the plate
-// is lit by B = T + R B / 2, and its radiance is B / 2.
+// A plate of reflectance 1/2 in the column above the slab, with the environment below, lit by the slab's
+// cosine-weighted light. With R and T the slab's reflectance and transmittance for diffuse light, the plate's
+// irradiance over pi is B = T + R B / 2, and its radiance is B / 2.
 SceneBuilder plate_above(const Configuration& configuration, Slab slab) {
   slab.wall = .5;
   SceneBuilder builder = column(configuration, slab, true);
@@ -223,7 +223,8 @@ SceneBuilder wide_slab(const Configuration& configuration, double tau, int scatt
   return builder;
 }
 
-// Returns 1 if a column (a slab between mirrors) is brighter with paths of one more scattering than `order`.
+// The figure is 1 if a column (a slab between mirrors) gets brighter when paths may scatter `order` + 1 times
+// instead of `order`.
 Figure more_light(const Bench& bench, int order) {
   double mean[2] = {0, 0};
   Figure f{.expected = 1};

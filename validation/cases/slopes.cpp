@@ -78,8 +78,8 @@ void lamps(Table& t) {
   }
 }
 
-// No surface ends the ray, so points on it cannot be sampled by their angle about the lamp: only free flights
-// come near it.
+// No surface ends the ray, so equi-angular sampling about the lamp is impossible: only free flights produce
+// collisions near the lamp.
 void without_end(Table& t) {
   const Rgb sigma{.5, 1, 2}, albedo{1, .8, .5};
   Channels expected;

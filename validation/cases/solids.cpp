@@ -22,11 +22,11 @@ constexpr std::array<std::array<double, 2>, 4> kGauss = {{{.06943184420297371, .
                                                           {.66999052179242813, .32607257743127307},
                                                           {.93056815579702629, .17392742256872693}}};
 
-// Sixteen unit cubes, each in a cell of 2 x 2 with black walls. Each is turned so that it is seen along one
-// direction of a quadrature over an octant (a cube looks the same from all eight), and is as bright as that
-// direction's weight. So the frame's mean is the mean over all directions of a cube's light, divided by its
-// mean projected area, S / 4 = 1.5. The cubes emit 1 per length and absorb nothing, so this is 4 V / S, the
-// mean path length.
+// Sixteen unit cubes, each in a cell of 2 x 2 with black walls. A quadrature over an octant has sixteen
+// directions (a cube looks the same from all eight octants). Each cube is turned so that it is seen along one
+// of them, and its emission is scaled by that direction's weight. So the frame's mean is the mean over all
+// directions of a cube's light, divided by its mean projected area, S / 4 = 1.5. The cubes emit 1 per length
+// and absorb nothing, so this is 4 V / S, the mean path length.
 SceneBuilder cubes(const Configuration& configuration, double sigma_s, double g) {
   SceneBuilder builder({16, 16});
   configuration.choose(builder);

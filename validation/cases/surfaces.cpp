@@ -15,7 +15,7 @@ BsdfIndex rough_mirror(SceneBuilder& builder, double alpha, Microfacet d = Micro
 }
 
 // A large rectangle in z = 0 with the material from `make`, seen `degrees` off its normal. Callers add what
-// is seen in it or through it.
+// it reflects or transmits.
 SceneBuilder sheet(double degrees, auto make) {
   SceneBuilder builder;
   builder.shape(RectangleShape{}, scale(1e3), make(builder));
@@ -188,7 +188,8 @@ void diffuse_sheets(Table& t) {
         return in_white(sheet(30, [](SceneBuilder& k) { return leaf(k, {.125, .75, .5}, {.875, .25, .5}); }));
       },
       grey(1), {.channels = true});
-  // A lamp of intensity 3 two units off: the irradiance is 3/4, and the sheet shows R or T of it over pi.
+  // A lamp of intensity 3 at distance 2: the irradiance is 3/4, and the sheet's radiance is that times R / pi
+  // or T / pi.
   for (const bool behind : {false, true})
     t.exact(behind ? "7.6g-leaf-before-a-lamp" : "7.6g-leaf-under-a-lamp", "7.6g",
             behind ? "A leaf with a point light behind it: T E / pi in every sample."
@@ -196,12 +197,12 @@ void diffuse_sheets(Table& t) {
             [behind](const Bench& b) {
               SceneBuilder builder = sheet(40, [](SceneBuilder& k) { return leaf(k, rgb(.25), rgb(.625)); });
               builder.scene.emitters.push_back(PointEmitter{{0, 0, behind ? -2. : 2.}, rgb(3)});
-              // The frame is 1e-4 wide on the sheet, of the distance 2: the cosine and the distance differ by
-              // 1e-9, and float32 by some 1e-6.
+              // The frame covers 1e-4 of the sheet at distance 2. Over it, cosine and distance vary by about
+              // 1e-9; float32 rounding is some 1e-6.
               return every_value(b, builder, 4, grey((behind ? .625 : .25) * .75 / kPi), 1e-5);
             });
-  // The wall of a ball is lit by a lamp in its middle through fog that absorbs, and is black to what comes
-  // back: seen from outside it shows T / pi times the light that is left.
+  // A lamp in the middle of a ball lights its wall through absorbing fog. The wall transmits T and reflects
+  // nothing, so its radiance outside is T / pi times the irradiance that the fog leaves.
   t.exact("7.6g-lampshade-full-of-smoke", "7.6g",
           "A ball of paper around a lamp in smoke that absorbs: T I e^-sigma / pi from outside, in every "
           "sample.",

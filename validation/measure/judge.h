@@ -36,8 +36,8 @@ struct ValidateCase {
 };
 
 // Judges a case whose figures are known: sets z, p, allowance and why. `freedom` is the degrees of freedom of
-// the standard error. `rounding` is the deviation allowed for float32 rounding. Without it, a figure whose
-// samples are all equal, with standard error 0, would fail by one ulp.
+// the standard error, `rounding` the deviation allowed for float32 rounding. Without that allowance, a figure
+// whose samples are all equal (standard error 0) would fail for an error of one ulp.
 void judge(ValidateCase& c, double freedom, double rounding);
 
 // Judges by equivalence, with the standard error's `freedom` degrees of freedom. Both intervals are widened

@@ -39,8 +39,8 @@ struct Sums {
   }
 };
 
-// Returns the weight of each row's pixels in the mean, 1 on average. For a spherical camera the weight is
-// proportional to the solid angle, so that the mean is over directions; otherwise all are equal.
+// Returns the weight in the mean of each row's pixels; the mean weight is 1. For a spherical camera a weight
+// is proportional to the pixel's solid angle, so that the mean is over directions; otherwise all are equal.
 std::vector<double> row_weights(const Scene& scene, FrameSize size) {
   std::vector<double> weights(static_cast<std::size_t>(size.height), 1);
   if (scene.sensor.projection != Projection::spherical) return weights;
@@ -94,8 +94,6 @@ std::string health_text(const render::Health& health) {
   return text;
 }
 
-void add(render::Health& sum, const render::Health& h) { sum.merge(h); }
-
 render::TileResult render_frame(const render::World& world, FrameSize size, SampleRange samples,
                                 int threads) {
   const auto width = static_cast<std::size_t>(size.width),
@@ -118,7 +116,7 @@ render::TileResult render_frame(const render::World& world, FrameSize size, Samp
   frame.sums.resize(kPlanes * count);
   std::size_t done = 0;
   for (const render::TileResult& band : bands) {
-    add(frame.health, band.health);
+    frame.health.merge(band.health);
     const std::size_t pixels = band.sums.size() / kPlanes;
     for (std::size_t plane = 0; plane < kPlanes; ++plane)
       std::copy_n(band.sums.begin() + static_cast<std::ptrdiff_t>(plane * pixels), pixels,
@@ -180,7 +178,7 @@ Result<Measured> measure_frames(const Scene& scene, const render::AssetFiles& fi
       all.mean[k] += before / static_cast<double>(i + 1);
       squares[k] += before * (frame->mean[k] - all.mean[k]);
     }
-    add(all.health, frame->health);
+    all.health.merge(frame->health);
     all.paths += frame->paths;
     all.seconds += frame->seconds;
   }

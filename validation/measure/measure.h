@@ -17,9 +17,9 @@ std::uint64_t samples_gone_wrong(const render::Health& health);
 // Returns the causes with their counts and the first location, such as "1 majorant_violation, first at pixel
 // (3, 5), sample 17".
 std::string health_text(const render::Health& health);
-void add(render::Health& sum, const render::Health& h);
 
-// Renders every pixel of `size`, one row per task; the planes of the sums cover the whole frame.
+// Renders every pixel of `size`, in bands of render::tile_alignment() rows, on `threads` threads; the planes
+// of the sums cover the whole frame.
 render::TileResult render_frame(const render::World& world, FrameSize size, SampleRange samples, int threads);
 
 // Returns the scene as a worker receives it: pruned (without what affects no pixel), written and read again.
@@ -40,8 +40,8 @@ struct Measured {
 };
 
 // Renders at least `paths` samples, spread evenly over the frame whatever its filter, and measures their
-// mean. If a frame has too few pixels for a standard error, more pixels are rendered; this does not change
-// the mean.
+// mean. If the frame has too few pixels to estimate a standard error, it is rendered with more pixels; this
+// does not change the mean.
 Result<Measured> measure(const Scene& scene, const render::AssetFiles& files, std::uint64_t paths,
                          std::uint64_t seed, int threads);
 

@@ -1,13 +1,13 @@
-// The part of the worker that has no sockets and no renderer. It takes leases from the coordinator through a
-// CoordinatorLink; a lease is a list of units, each one tile and one range of samples, that the worker is to
-// render. It fetches the files (blobs) of their jobs, lets a RenderBackend render the units on its own
-// threads, and keeps every result until the coordinator has acknowledged it.
+// The part of the worker that has no sockets and no renderer. It receives leases from the coordinator through
+// a CoordinatorLink. A lease is a list of units, each one tile and one round (range of samples), for this
+// worker to render. The agent fetches the files (blobs) of their jobs, calls a RenderBackend on its own
+// threads to render the units, and keeps every result until the coordinator has acknowledged it.
 //
 // Threads: run() is the control thread (connection, progress reports, timers). One loader thread fetches
 // blobs and prepares worlds (scenes that are built and ready to render) ahead of need. Each of `threads`
 // render threads takes the next unit as soon as it has delivered the previous one. One mutex guards the state
-// (worker/agent/held_leases.h, result_outbox.h). While it is held the agent makes no call that may block: it
-// calls only forget() and rss_bytes() of the backend, and no function of the link or the files.
+// (worker/agent/held_leases.h, result_outbox.h). While a thread holds it, it makes no call that may block: of
+// the backend it calls only forget() and rss_bytes(), of the link and the files nothing.
 #pragma once
 
 #include <cstdint>
@@ -33,10 +33,10 @@ struct AgentOptions {
   Duration backoff_most = std::chrono::seconds(10);
   // Pause after a problem of this machine, such as a full disk; grows up to backoff_most
   Duration trouble_first = std::chrono::seconds(1);
-  // The worker drains when it has held no units for this long, and run() ends with an error if it has not
-  // joined the coordinator by then. Zero: it waits for work without end
+  // If the worker has held no units for this long, it drains; if it has not joined the coordinator by then,
+  // run() ends with an error. Zero: no limit
   Duration idle_limit = Duration::zero();
-  // Time to deliver finished results when the worker drains; then run() ends with an error
+  // When the worker drains: the time to deliver finished results, after which run() ends with an error
   Duration drain_limit = std::chrono::seconds(60);
   std::shared_ptr<trace::Tracer> tracer;  // records spans of units and scenes; null: nothing is traced
   std::uint64_t backoff_seed = 0;         // seed of the jitter; should differ between the workers of a farm

@@ -33,8 +33,8 @@ struct Agent::Impl {
     std::uint64_t last_use = 0;  // value of the counter `uses` when the job was used last; the least recently
                                  // used job is forgotten first
     bool cancelled = false;
-    TimePoint retry_at{};  // time to load again after an interrupted transfer or a problem of this machine
-    std::string trouble;   // the problem of this machine that made the last attempt to load fail
+    TimePoint retry_at{};  // earliest next attempt to load, after a broken transfer or a fault of the machine
+    std::string trouble;   // the fault of this machine that made the last attempt to load fail
     UnitTimes unreported;  // time spent on loading the job, not yet reported to the coordinator
   };
   struct RenderSlot {
@@ -44,7 +44,7 @@ struct Agent::Impl {
     JobId last_job;
     TimePoint last_end{};
     double last_transfer = 0;  // seconds spent packing the previous unit's result
-    TimePoint began{};         // when the present unit began; set only if this worker is traced
+    TimePoint began{};         // when the current unit began; set only with a tracer
   };
   enum class Connection { down, opening, up };
 
@@ -75,32 +75,34 @@ struct Agent::Impl {
   void loading_failed(const JobId& id, UnitFailure failure);
   void postpone(const JobId& id, const Error& why);
   void hold_off(const JobId& id, const std::string& trouble);
-  // Describes the problems of this machine that recently kept it from loading jobs. Call with the mutex held.
+  // Returns a problem of this machine that recently kept it from loading a job; empty: there is none. Call
+  // with the mutex held.
   std::string trouble() const;
 
   // Render threads.
   void render_loop(RenderSlot& slot, std::stop_token token);
   std::optional<HeldLeases::Held> next_unit(RenderSlot& slot, std::stop_token token,
                                             std::shared_ptr<const LocalJob>& job);
-  // Call when the slot has just rendered a unit of `job` in `wall_seconds`, from its first sample to its
-  // last. Records and returns for how many seconds the slot had idled before, since the end of its previous
-  // unit. 0 if the previous unit was of another job.
+  // Call right after the slot has rendered a unit of `job`, which took `wall_seconds` from its first to its
+  // last sample. Records and returns the seconds that the slot idled between its previous unit and this one;
+  // 0, unrecorded, if the previous unit was of another job.
   double note_gap(RenderSlot& slot, const JobId& job, double wall_seconds);
   tl::expected<UnitResult, UnitFailure> rendered_unit(RenderSlot& slot, const LocalJob& job,
                                                       const HeldLeases::Held& held);
   tl::expected<UnitResult, UnitFailure> render(RenderSlot& slot, const LocalJob& job,
                                                const HeldLeases::Held& held);
-  // Record trace spans as children of the span `parent` or of the unit's lease. Called only if there is a
-  // tracer (agent_trace.cpp).
+  // Record trace spans as children of `parent` or of the span of the unit's lease. Call only with a tracer
+  // (agent_trace.cpp).
   void record(const char* name, const trace::SpanContext& parent, TimePoint begin, TimePoint end,
               trace::Attributes attributes, bool failed = false) const;
   void trace_unit(const RenderSlot& slot, const HeldLeases::Held& held,
                   tl::expected<UnitResult, UnitFailure>& outcome);
   void trace_sent(const UnitKey& unit);
-  // Returns the span of the lease of the job's first waiting unit; nullopt: nothing is traced.
+  // Returns the span of the lease that has the job's first waiting unit; nullopt: that lease is not traced,
+  // or no unit waits.
   std::optional<trace::SpanContext> trace_of(const JobId& job) const;
-  // A guard whose destructor records a trace span for the loading of a scene, unless `parent` (the span of a
-  // lease) is nullopt.
+  // A guard: its destructor records the trace span of loading a scene, as a child of `parent` (the span of a
+  // lease), unless `parent` is nullopt.
   struct LoadSpan {
     LoadSpan(const Impl& agent, const JobId& job, TimePoint begin);
     ~LoadSpan();
@@ -123,13 +125,13 @@ struct Agent::Impl {
   // Used by the control thread only.
   std::uint64_t connection_count = 0;
   Backoff backoff;
-  // Time of the next attempt to connect while the connection is down; time to give up while it is being
-  // opened.
+  // While the connection is down: the time of the next attempt to connect. While it is being opened: the time
+  // to give up.
   TimePoint connection_timer{};
   TimePoint up_since{};
   TimePoint next_progress{};
   TimePoint drain_deadline{};
-  TimePoint last_busy{};  // the last time when this worker was seen to hold units or results
+  TimePoint last_busy{};  // when this worker was last found to hold units or results
   std::optional<Result<void>> ended;
   WorkerId id;
 
@@ -142,7 +144,7 @@ struct Agent::Impl {
   HeldLeases table;
   Outbox outbox;
   std::map<JobId, Job> jobs;
-  // With a tracer: results that were not sent yet, with the spans of their leases and the times of packing
+  // For results of traced leases that are not sent yet: the span of the lease, and when the result was packed
   struct Unsent {
     trace::SpanContext lease;
     TimePoint since{};

@@ -15,8 +15,8 @@ namespace {
 constexpr std::size_t kWorldsKept = 2;
 constexpr std::size_t kBlobsTraced = 64;  // blobs of one scene that get a span each
 constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
-// A problem with loading a job is reported until this long after the next attempt was due. If that attempt
-// was not made, the worker has no more units of the job.
+// How long after Job::retry_at a problem with loading the job is still reported. If no new attempt was made
+// by then, the worker has no more units of the job.
 constexpr Duration kTroubleShown = std::chrono::seconds(30);
 
 // True if the error is a problem of this machine, such as a full disk, that must not count as a failure of
@@ -139,8 +139,8 @@ void Agent::Impl::load(const JobBrief& brief) {
   work.notify_all();
 }
 
-// Reports one unit of the job as failed and returns its other units to the coordinator. So a job that this
-// worker cannot load costs one failed attempt instead of hundreds.
+// Reports one unit of the job as failed and returns its other units to the coordinator. A job that this
+// worker cannot load thereby costs one failed attempt instead of hundreds.
 void Agent::Impl::loading_failed(const JobId& id, UnitFailure failure) {
   const std::lock_guard lock(mutex);
   loading.clear();

@@ -58,8 +58,8 @@ tl::expected<UnitResult, UnitFailure> Agent::Impl::rendered_unit(RenderSlot& slo
   return result;
 }
 
-// Lets the backend render the unit. If a backend in this process runs out of memory, the unit fails and the
-// process continues.
+// Renders the unit through the backend. If a backend in this process runs out of memory, the unit fails and
+// the process continues.
 tl::expected<UnitResult, UnitFailure> Agent::Impl::render(RenderSlot& slot, const LocalJob& job,
                                                           const HeldLeases::Held& held) {
   UnitFailure failure;

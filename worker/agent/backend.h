@@ -39,17 +39,17 @@ struct RenderedUnit {
   double cpu_seconds = 0;
   double wall_seconds = 0;  // wall-clock time from the first sample to the last
   Health health;
-  TechniqueSet techniques;  // those that the integrator uses for this world
+  TechniqueSet techniques;  // techniques that the integrator uses for this world
 };
 
 // Renders units. All calls block, and the agent makes them from several threads concurrently. If the caller
-// sets `stop`, render() should return early; its result is then ignored. A UnitFailure says whether the scene
-// is at fault.
+// sets `stop`, render() should return early; its result is then ignored. UnitFailure::scene_at_fault is true
+// if the scene caused the failure.
 class RenderBackend {
  public:
   virtual ~RenderBackend() = default;
   virtual Digest numeric_class() const = 0;
-  // Describes in words the machine and build that the numeric class stands for; empty: unknown
+  // Describes the numeric class (builds and CPUs that produce the same bits) in words; empty: unknown
   virtual std::string platform() const { return {}; }
   // Builds the job's world (its scene, ready to render). Does nothing if the world is already built. Returns
   // the reason if it cannot be built.
@@ -61,16 +61,16 @@ class RenderBackend {
   // Returns an error once the backend can no longer render anything. The worker then ends with this error,
   // and the units that failed because of it are not reported as failed.
   virtual std::optional<Error> broken() const { return std::nullopt; }
-  // Tells the backend that no further calls will come; calls that still block should return soon. May be
-  // called more than once.
+  // Ends the backend: no further calls follow, and calls that still block should return soon. May be called
+  // more than once.
   virtual void shutdown() {}
 };
 
 // A backend that renders in this process and can show which sample it is rendering.
 class LocalBackend : public RenderBackend {
  public:
-  // The same as render(), but also writes the sample being rendered to `where`, unless that is null. It is
-  // written with relaxed stores and may be read by another process.
+  // The same as render(), but also writes to `where`, unless that is null, which sample it is rendering. The
+  // stores are relaxed; another process may read them.
   virtual tl::expected<RenderedUnit, UnitFailure> render_marked(const LocalJob& job, const LeaseUnit& unit,
                                                                 const std::atomic<bool>& stop,
                                                                 render::Breadcrumb* where) = 0;

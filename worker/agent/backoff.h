@@ -1,5 +1,5 @@
-// Exponential back-off with jitter: the n-th wait is between 50 % and 100 % of first * 2^n, and at most
-// `most`. The jitter keeps a thousand workers from reconnecting at the same instant; it is seeded, so that
+// Exponential back-off with jitter: the n-th wait, from n = 0, is between 50 % and 100 % of min(first * 2^n,
+// `most`). The jitter keeps a thousand workers from reconnecting at the same instant; it is seeded, so that
 // tests can predict it.
 #pragma once
 

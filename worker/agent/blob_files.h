@@ -1,10 +1,9 @@
 // Provides the files of a job's blobs (its scene and assets). BlobFiles has two implementations: a cache that
-// fetches missing blobs from the coordinator (worker/cache), and files that are already local (`lightshaft
-// render`).
+// fetches missing blobs from the coordinator (worker/cache), and `lightshaft render`, whose files are local
+// already (cli/local).
 #pragma once
 
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <vector>
 
@@ -32,17 +31,6 @@ class BlobFiles {
   // Returns the digests of the blobs on this machine, at most `limit`, most recently used first. The worker's
   // hello sends this list to the coordinator.
   virtual std::vector<Digest> held(std::size_t limit) const = 0;
-};
-
-// Files that are already on this machine, by digest.
-class LocalFiles final : public BlobFiles {
- public:
-  explicit LocalFiles(std::map<Digest, std::filesystem::path> files) : files_(std::move(files)) {}
-  Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob) override;
-  std::vector<Digest> held(std::size_t limit) const override;
-
- private:
-  const std::map<Digest, std::filesystem::path> files_;
 };
 
 }  // namespace ls::worker

@@ -1,6 +1,6 @@
-// The leases by which the coordinator has assigned work to this worker, in order of arrival, and their units:
-// each unit is one tile and one range of samples to render. The class has no locks and no clock. A unit is
-// held only once: if a later lease contains it again, it belongs to that lease from then on.
+// The leases by which the coordinator has assigned work to this worker, in order of arrival, and their units.
+// A unit is one tile and one round (range of samples) to render. The class has no locks and no clock. A unit
+// is held only once: if a later lease contains it again, it belongs to that lease from then on.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ class HeldLeases {
   enum class State {
     waiting,
     running,
-    // The result of the unit waits to be acknowledged. The unit is rendered again only if the result is
-    // rejected.
+    // The unit's result is in the outbox, not acknowledged yet. The unit is rendered again only if the
+    // coordinator rejects the result.
     handed_in,
   };
   struct Held {
@@ -30,11 +30,11 @@ class HeldLeases {
     State state = State::waiting;
     // The trace span of the unit's present lease; nullopt: the lease is not traced
     std::optional<trace::SpanContext> trace = std::nullopt;
-    std::int64_t since_unix_ns = 0;  // when the unit came to this worker; 0: not noted
+    std::int64_t since_unix_ns = 0;  // when this worker received the unit; 0: not recorded
   };
 
-  // Adds the units of a lease. `handed_in(key)` must return whether the outbox has a result of that unit
-  // already. `trace`: the lease's span, if it is traced; `unix_ns`: the time now.
+  // Adds the units of a lease. `handed_in(key)` returns whether the outbox already has a result of that unit.
+  // `trace`: the lease's span, if it is traced; `unix_ns`: the current time.
   void add(const Lease& lease, const std::function<bool(const UnitKey&)>& handed_in,
            const std::optional<trace::SpanContext>& trace = std::nullopt, std::int64_t unix_ns = 0);
   // Returns the first waiting unit for whose job `ready` returns true, and marks the unit as running;
@@ -50,8 +50,8 @@ class HeldLeases {
   // Remove all units of a job or a lease, including running ones.
   void drop_job(const JobId& job);
   void drop_lease(const LeaseId& lease);
-  // Removes the units that have not been started (if `job` is given, only units of that job). Returns the
-  // messages that return their leases to the coordinator.
+  // Removes the waiting units (if `job` is given, only those of that job). Returns the messages that return
+  // them to the coordinator.
   std::vector<LeaseReturned> return_waiting(const JobId* job = nullptr);
 
   std::optional<Held> first_waiting(const JobId& job) const;

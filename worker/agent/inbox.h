@@ -1,6 +1,6 @@
-// The queue of events that wake the agent's control thread: messages from the coordinator, the loss of the
-// connection, or a nudge (a wake-up without content) from another thread. The link's observer shares
-// ownership of the queue, so that a late callback cannot reach a destroyed agent.
+// The queue of events for the agent's control thread: messages from the coordinator and the loss of the
+// connection. Another thread can also wake the control thread without an event (nudge). The link's observer
+// shares ownership of the queue, so that a late callback cannot reach a destroyed agent.
 #pragma once
 
 #include <condition_variable>

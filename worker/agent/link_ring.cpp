@@ -5,8 +5,8 @@
 
 namespace ls::worker {
 
-// An observer between a stream and the agent's observer. It notes facts from the messages that it passes on,
-// and reports the end of the stream only once.
+// Forwards a stream's messages to the agent's observer. Updates the State from Welcome, leases and
+// acknowledgements, and reports the end of the stream only once.
 class LinkRing::Watch final : public LinkObserver {
  public:
   Watch(std::shared_ptr<State> state, std::shared_ptr<LinkObserver> agent)

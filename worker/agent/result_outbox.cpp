@@ -34,15 +34,12 @@ bool Outbox::acknowledge(const UnitKey& unit) {
 }
 
 void Outbox::drop_job(const JobId& job) {
-  for (auto it = entries_.begin(); it != entries_.end();) {
-    if (it->unit.job != job) {
-      ++it;
-      continue;
-    }
-    bytes_ -= it->bytes;
-    if (!it->sent) --unsent_;
-    it = entries_.erase(it);
-  }
+  std::erase_if(entries_, [&](const Entry& entry) {
+    if (entry.unit.job != job) return false;
+    bytes_ -= entry.bytes;
+    if (!entry.sent) --unsent_;
+    return true;
+  });
 }
 
 std::vector<FromWorker> Outbox::take_unsent() {

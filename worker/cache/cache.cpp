@@ -35,8 +35,8 @@ class LockedFile final : public BlobFile {
 };
 
 // Maps a transfer error to one after which the agent tries again: codes other than unavailable and
-// resource_exhausted become internal. The blob may be missing, damaged or denied at the coordinator for a
-// time only.
+// resource_exhausted become internal. At the coordinator, the blob may be missing, damaged or denied only for
+// a time.
 Error passing(Error error) {
   const bool temporary = error.code == Errc::unavailable || error.code == Errc::resource_exhausted;
   if (!temporary) error.code = Errc::internal;

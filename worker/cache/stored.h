@@ -34,13 +34,13 @@ std::vector<StoredFile> stored_partials(const std::filesystem::path& folder);
 // Removes the file unless another process has it locked.
 bool remove_unused(const std::filesystem::path& path);
 
-// Removes the files of transfers that nobody can resume, because they were private to a process that has
+// Removes the files of transfers that cannot be resumed, because they were private to a process that has
 // ended.
 void remove_orphans(const std::filesystem::path& folder);
 
 // Locks the file `fd`, which was opened at `path`, by flock(2) without waiting; `how` is LOCK_SH or LOCK_EX.
 // `lost`: another process has the lock, or `path` no longer names the file that was opened. `failed`: the
-// file cannot be locked; errno says why.
+// file cannot be locked; errno has the reason.
 enum class Lock { taken, lost, failed };
 Lock lock_at(int fd, const std::filesystem::path& path, int how);
 

@@ -23,11 +23,10 @@ using child::Reply;
 using child::Request;
 using child::Slot;
 
-// If the child dies because of one unit, the other units that it was rendering are rendered again. A unit to
-// which this happens this many times in a row is reported as failed all the same. Each death of the child
-// also fails the unit that caused it, and after three failures the farm gives this worker no more units of
-// that job. So the limit is high enough that the farm stops the units at fault before an innocent one reaches
-// it.
+// How many times in a row the child may die because of other units while it renders a unit. Such a unit is
+// rendered again by the next child; after this many deaths it is reported as failed. Each death also fails
+// the unit that caused it, and after three failures the farm gives this worker no more units of that job. The
+// limit is so high that the farm does this before an innocent unit reaches it.
 constexpr int kInnocentDeaths = 64;
 
 std::size_t floats_of(const LocalJob& job, const LeaseUnit& unit) {
@@ -119,7 +118,7 @@ Result<std::shared_ptr<Process>> ChildBackend::living_process() {
   return process;
 }
 
-// Starts a child and waits for its hello. A failed start is repeated, because resources that it lacked
+// Starts a child and waits for its hello. Repeats a failed start, because the resources that were missing
 // (address space, descriptors) may be available a little later.
 Result<std::shared_ptr<Process>> ChildBackend::spawn_greeted() {
   Duration pause = options_.respawn_pause;
@@ -151,7 +150,7 @@ Result<void> ChildBackend::greet(Process& process) {
     if (first) why += "; run the worker with --fake to see whether the renderer is the cause";
     return fail(first || end.signal ? Errc::internal : Errc::unavailable, std::move(why));
   }
-  // Set by the first child, before any other thread was started
+  // The first child sets both, before any other thread is started
   if (numeric_class_ == Digest{}) {
     numeric_class_ = answer->reply.numeric_class;
     platform_ = answer->text;
@@ -219,7 +218,7 @@ tl::expected<std::shared_ptr<Process>, UnitFailure> ChildBackend::ready_process(
   return *process;
 }
 
-// Tells the child which jobs' worlds to free. False: the child is dead.
+// Requests the child to free the worlds of the jobs in `forgotten_`. False: the child is dead.
 bool ChildBackend::send_forgotten(Process& process) {
   std::vector<std::uint64_t> forgotten;
   {

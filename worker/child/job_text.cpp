@@ -36,7 +36,7 @@ Result<LocalJob> from_text(std::string_view text) {
     job.brief.needs = json.at("needs").get<std::string>();
     job.scene = json.at("scene_file").get<std::string>();
     for (const auto& blob : json.at("blobs")) {
-      // Checked here, because the library would convert 1e20, which does not fit any integer type.
+      // nlohmann::json would convert any number without an error, also 1e20, which fits no integer type.
       if (!blob.at(1).is_number_unsigned()) throw std::invalid_argument("the size of a file is no count");
       job.brief.assets.push_back({digest(blob.at(0)), blob.at(1), blob.at(2)});
     }

@@ -44,9 +44,8 @@ class TheirEnds {
   std::vector<int> fds_;
 };
 
-// True for environment variables that are passed to the child: only those that its libraries use. The agent's
-// environment may contain secrets (the join token, cloud keys) that a renderer of untrusted files must not
-// see.
+// True for environment variables that are passed to the child: only those that its libraries use. Others may
+// contain secrets of the agent (the join token, cloud keys), and the renderer reads untrusted files.
 bool may_see(std::string_view variable) {
   constexpr std::array kNames{"PATH=", "HOME=", "USER=", "TMPDIR=", "TZ=", "LANG=", "LANGUAGE="};
   constexpr std::array kFamilies{"LC_", "LD_", "MALLOC_", "GLIBC_TUNABLES=", "TBB_", "LIGHTSHAFT_LOG="};
@@ -127,8 +126,7 @@ Process::End Process::end() {
       end.signal = WTERMSIG(status);
       end.text = fmt::format("died of signal {} ({})", *end.signal, ::strsignal(*end.signal));
     } else {
-      end.exit_code = WEXITSTATUS(status);
-      end.text = fmt::format("ended with exit code {}", end.exit_code);
+      end.text = fmt::format("ended with exit code {}", WEXITSTATUS(status));
     }
   }
   end_ = end;

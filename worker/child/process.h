@@ -1,4 +1,4 @@
-// One render child process (see child.h), from spawn to exit, from the point of view of the agent's process.
+// The agent's handle of one render child process (see child.h), from spawn to exit.
 #pragma once
 
 #include <sys/types.h>
@@ -30,7 +30,7 @@ class Process {
     std::string text;
   };
   // Sends a request, followed by `text`, to the child on the channel `fd` and waits for the answer. Meanwhile
-  // it calls `watch` about every 50 ms, which may kill() the child. nullopt: the child died, or was killed
+  // it calls `watch` about every 50 ms; `watch` may kill() the child. nullopt: the child died, or was killed
   // for a malformed answer.
   std::optional<Answer> ask(int fd, Request request, const std::string& text, const Watch& watch);
 
@@ -39,7 +39,6 @@ class Process {
   // meanwhile.
   struct End {
     std::optional<int> signal;
-    int exit_code = 0;
     std::string text;
   };
   End end();
@@ -55,7 +54,7 @@ class Process {
   // Slot (render thread) whose lack of progress made the agent kill the child; -1: none
   std::atomic<int> hung_slot{-1};
   std::atomic<bool> garbled{false};    // true if the child was killed for a malformed answer
-  std::atomic<bool> preparing{false};  // true while a world is being built
+  std::atomic<bool> preparing{false};  // true while a world is being built, and if the child died then
   std::mutex prepared_mutex;
   // Numbers of the jobs whose scenes the child has built; guarded by prepared_mutex.
   std::set<std::uint64_t> prepared;

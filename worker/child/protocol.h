@@ -1,7 +1,7 @@
 // The protocol between agent and render child. Requests and replies are structs of fixed size over a socket
-// pair per channel: one channel for control and one for each slot (render thread). Shared memory holds, for
-// each slot, the pixel sums of the unit that it has rendered and the pixel and number of the sample that it
-// is rendering. Agent and child are the same executable, so plain structs suffice.
+// pair per channel: one channel for control and one for each slot (render thread). Each slot has an area of
+// shared memory, which holds the pixel sums of its finished unit, and the pixel and number of the sample that
+// it is rendering. Agent and child are the same executable, so plain structs suffice.
 #pragma once
 
 #include <atomic>
@@ -68,15 +68,14 @@ static_assert(std::is_trivially_copyable_v<Request> && std::is_trivially_copyabl
 // The data of one render thread that agent and child share. The shared memory is an array of these.
 struct Slot {
   render::Breadcrumb where;
-  std::atomic<std::int32_t> tile{-1}, round{-1};
   std::atomic<bool> stop{false};     // set by the agent
   std::atomic<bool> crashed{false};  // set by the child's signal handler if this thread crashed
   float sums[kSlotFloats];
 };
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
-// Send or receive all bytes and block until this is done; false: the other side has closed the channel. While
-// they wait they call `watch`, if given, about every 50 ms.
+// Block until all bytes are sent or received; false: the other side has closed the channel. Meanwhile they
+// call `watch`, if given, about every 50 ms.
 using Watch = std::function<void()>;
 bool send_all(int fd, const void* data, std::size_t bytes, const Watch& watch = {});
 bool receive_all(int fd, void* data, std::size_t bytes, const Watch& watch = {});

@@ -19,6 +19,8 @@
 #include <system_error>
 #include <vector>
 
+#include "common/base/helper_program.h"
+
 namespace ls::worker::child {
 namespace {
 
@@ -87,8 +89,8 @@ constexpr std::uint32_t kPlatform = AUDIT_ARCH_X86_64;
 constexpr std::uint32_t kPlatform = AUDIT_ARCH_AARCH64;
 #endif
 
-// A system call that is allowed or denied depending on one of its arguments. Only the lower 32 bits of the
-// argument are compared; the kernel ignores the others for these calls. Each call is listed once.
+// A system call that one of its arguments allows or denies. The filter compares only the lower 32 bits of the
+// argument; the kernel ignores the others for these calls. Each call is listed once.
 struct Decided {
   std::uint32_t call;
   unsigned argument;
@@ -106,7 +108,7 @@ std::vector<Decided> decided() {
 }
 
 // Appends the test of one call to the filter program. If the number of the system call matches, the argument
-// decides; otherwise the program continues after the test, with the number still loaded.
+// decides. Otherwise the program continues after the test, with the number still in the accumulator.
 void put(const Decided& d, std::vector<sock_filter>& program) {
   const auto n = static_cast<std::uint8_t>(d.values.size());
   program.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, d.call, 0, static_cast<std::uint8_t>(n + 3)));
@@ -153,13 +155,6 @@ constexpr std::uint64_t kTruncate = std::uint64_t{1} << 14;  // ABI 3, Linux 6.2
 constexpr std::uint64_t kFileRights =  // rights that apply to files; the rest apply to folders
     LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_EXECUTE | kTruncate;
 
-struct Descriptor {
-  int fd = -1;
-  ~Descriptor() {
-    if (fd >= 0) ::close(fd);
-  }
-};
-
 // Adds a rule that allows `rights` below `path`. A path that does not exist needs no rule.
 bool allow(int rules, const std::filesystem::path& path, std::uint64_t rights) {
   const Descriptor place{::open(path.c_str(), O_PATH | O_CLOEXEC)};
@@ -196,8 +191,8 @@ bool bound_files(const std::vector<std::filesystem::path>& readable, long abi) {
   // This program and the OpenVDB reader beside it are allowed, but not the folder that contains them.
   done &= allow(rules.fd, own, kRun);
   done &= allow(rules.fd, own.parent_path() / "lightshaft-vdb", kRun);
-  // Files that the dynamic loader and the thread library read. The parts of /proc about other processes are
-  // not among them.
+  // Files that the dynamic loader and the thread library read. They include no part of /proc about other
+  // processes.
   for (const char* path : {"/etc/ld.so.cache", "/etc/ld.so.preload", "/sys", "/proc/self", "/proc/cpuinfo",
                            "/proc/meminfo", "/proc/sys/vm", "/dev/urandom", "/dev/random"})
     done &= allow(rules.fd, path, kRead);
@@ -218,7 +213,7 @@ Sandboxed enter_sandbox(const std::vector<std::filesystem::path>& readable) {
   return {};
 #else
   const long abi = ::syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
-  // Comes before filter_calls(), so that the filter need not allow the system calls that this makes
+  // Called before filter_calls(): the filter then need not allow the system calls of bound_files().
   const bool files = bound_files(readable, abi);
   return {filter_calls(), files, files && abi >= 3};
 #endif

@@ -8,19 +8,19 @@
 namespace ls::worker::child {
 
 struct Sandboxed {
-  // True if the process can use no sockets; no tracing, signals or limits of other processes; no new
-  // namespaces, kernel modules, io_uring, or memory that outlives the process (seccomp).
+  // True if seccomp is in effect. It denies sockets; tracing, signalling and limiting other processes; new
+  // namespaces, kernel modules, io_uring, and memory that outlives the process.
   bool calls = false;
-  // True if the process can write no files, and read only the given folders and the system's libraries
-  // (Landlock).
+  // True if Landlock is in effect. It denies writing files, and reading any but those in the given folders
+  // and those that the system's libraries need.
   bool files = false;
   // True if the process also cannot truncate files that it may read (needs the Landlock of Linux 6.2)
   bool sizes = false;
 };
 
-// Restricts this process from now on. `readable` lists the folders in which it may read everything.
-// Restrictions that the kernel does not support are skipped; the result says which ones are in effect. Call
-// it while the process has one thread: other existing threads would stay unrestricted.
+// Restricts this process from now on. The process may read everything in the folders `readable`. Restrictions
+// that the kernel does not support are skipped; the result lists those in effect. Call it while the process
+// has one thread: other existing threads would stay unrestricted.
 Sandboxed enter_sandbox(const std::vector<std::filesystem::path>& readable);
 
 }  // namespace ls::worker::child

@@ -10,8 +10,8 @@ namespace ls::worker::child {
 
 // Restricts the child process. Call it at the child's start, before any thread is started. It forbids new
 // privileges and core files, limits the private writable memory to `memory_limit` bytes (0: no limit), and
-// sets up the signals. Besides standard input, output and error, exactly the file descriptors of
-// child/protocol.h must be open.
+// sets up the signals. Exactly these file descriptors must be open: standard input, output and error, and
+// those of child/protocol.h.
 void confine(std::uint64_t memory_limit);
 
 // Serves requests on the control channel and on `slots` render threads, each with its own channel, by calling

@@ -9,15 +9,14 @@
 #include "common/protocol/limits.h"
 #include "proto/convert.h"
 #include "worker/client/coordinator_stream.h"
-#include "worker/client/status.h"
 
 namespace ls::worker {
 namespace pb = ::lightshaft::farm::v1;
 namespace {
 
-// Time that one attempt to connect may take, including the TLS handshake. If it were shorter, a handshake
-// over a slow line, or with a coordinator that many workers join at once, would be cut off and begun anew
-// without end. If it were longer, the next attempt after a broken connection would come later.
+// Time that one attempt to connect may take, including the TLS handshake. A shorter limit would cut off
+// handshakes over a slow line, or with a coordinator that many workers join at once, again and again. A
+// longer one would delay the next attempt after a broken connection.
 constexpr int kConnectMs = 10'000;
 constexpr Duration kCloseLimit = std::chrono::seconds(2);
 

@@ -1,6 +1,6 @@
 // One gRPC stream to the coordinator. Messages to the coordinator are queued; the size of the agent's outbox
 // bounds the queue. Messages from the coordinator are passed to the observer. The object keeps itself alive
-// from StartCall to OnDone. The link must call close() before it lets go of the channel.
+// from StartCall to OnDone. The link must call close() before it releases the channel.
 #pragma once
 
 #include <condition_variable>
@@ -15,6 +15,9 @@
 
 namespace ls::worker {
 
+// Converts a gRPC status to an Error: the inverse of status_code() in coordinator/rpc/grpc_status.h.
+Error to_error(const grpc::Status& status);
+
 class WorkCall final
     : public grpc::ClientBidiReactor<lightshaft::farm::v1::FromWorker, lightshaft::farm::v1::ToWorker> {
  public:
@@ -22,8 +25,9 @@ class WorkCall final
                                          std::shared_ptr<LinkObserver> observer);
 
   void send(const FromWorker& message);
-  // Sends the queued messages, ends the stream and waits until it has ended and the observer has been told.
-  // If that takes longer than `at_most`, the stream is cancelled. Must not be called by the observer.
+  // Sends the queued messages, ends the stream, and waits until it has ended and the observer has been
+  // notified. If that takes longer than `at_most`, the stream is cancelled. Must not be called by the
+  // observer.
   void close(Duration at_most);
 
   void OnReadDone(bool ok) override;

@@ -1,16 +1,16 @@
 // Pixels of the fake renderer, for tests of everything around the renderer. They are a pure function of the
-// unit (one tile and one round, that is, range of samples). A sample is 21 bits of noise in [0, 1) plus a
-// gradient of the pixel. The samples of a unit are summed in double and rounded once, as the renderer does,
-// so the resulting floats have full mantissas.
+// unit (one tile and one round, that is, one range of samples). A sample is 21 bits of noise in [0, 1) plus a
+// gradient over the pixels. As in the renderer, the samples of a unit are summed in double and rounded to
+// float once, so the resulting floats have full mantissas.
 //
-// That alone does not reveal the order in which rounds are folded (added to the image): double sums of a few
+// Such sums cannot detect the order in which rounds are folded (added to the image): double sums of a few
 // floats of similar size are exact, hence equal in every order. Therefore one pixel in kFakeMarkerEvery is a
-// *marker*. Its samples are in [2^-47, 2^-46). In every group of kFakeMarkerRounds rounds one round also adds
-// a value of [1/2, 1) and a later round subtracts it again. While that value is in the sum, the sum keeps no
-// bit below 2^-53, so every fold in between is rounded, and the last bits of the finished pixel depend on
-// which rounds were folded before, between and after. Only the first two rounds of a tile may be swapped
-// undetected: a + b is b + a. If a job ends within a group, only markers whose two rounds are both folded can
-// detect the order.
+// *marker*. Its samples are in [2^-47, 2^-46). In every group of kFakeMarkerRounds rounds, one round also
+// adds a value in [1/2, 1), and a later round subtracts it again. While that value is in the sum, the sum
+// keeps no bit below 2^-53, so every fold in between rounds, and the last bits of the finished pixel depend
+// on which rounds were folded before, between and after. One swap goes undetected, that of a tile's first two
+// rounds, since a + b is b + a. If a job ends within a group, only markers whose two rounds are both folded
+// can detect the order.
 #pragma once
 
 #include <algorithm>
@@ -32,8 +32,8 @@ inline std::uint64_t fake_mix(std::uint64_t x) {  // the finaliser of splitmix64
   return x ^ (x >> 31);
 }
 
-// Returns a seed made of everything that identifies a unit's pixels except its position: the first 8 bytes of
-// the digests of scene and settings.
+// Returns a seed of a unit's pixels that is independent of tile and samples: from the first 8 bytes of the
+// digests of scene and settings.
 inline std::uint64_t fake_seed(const UnitHeader& header) {
   std::uint64_t scene = 0, settings = 0;
   std::memcpy(&scene, header.scene.bytes.data(), sizeof scene);

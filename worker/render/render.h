@@ -1,4 +1,4 @@
-// The renderer's public interface. It handles scenes, files and pixels, and does not know jobs or networks.
+// The renderer's public interface. It handles scenes, files and pixels, but not jobs or networks.
 #pragma once
 
 #include <atomic>
@@ -32,8 +32,8 @@ using AssetFiles = std::map<Digest, std::filesystem::path>;
 Result<std::shared_ptr<const World>> build_world(const Scene& scene, const RenderSettings& settings,
                                                  const AssetFiles& files, int threads);
 
-// The pixel and index of the sample that a thread is rendering, for crash reports; where pixels share paths,
-// a pixel of the square of 16 x 16 that is being rendered. The thread writes it with relaxed stores.
+// The pixel and index of the sample that a thread renders, for crash reports. With path reuse (path_reuse.h)
+// the pixel is one of the 16 x 16 square that the thread renders. The thread writes with relaxed stores.
 struct Breadcrumb {
   std::atomic<std::int32_t> x{-1}, y{-1};
   std::atomic<std::uint64_t> sample{0};
@@ -46,13 +46,14 @@ struct TileResult {
   bool stopped = false;  // true if `stop` was set: the sums are then not valid
 };
 
-// Renders the samples `samples` of each pixel of `tile` on the calling thread. The result is a pure function
-// of (world, tile, samples), unless `stop` becomes true. `breadcrumb` receives the sample that is being
-// rendered.
+// Renders the samples with the indices `samples` of each pixel of `tile` on the calling thread. The result is
+// a pure function of (world, tile, samples), unless `stop` becomes true. `breadcrumb` receives the sample
+// that is being rendered.
 TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, const std::atomic<bool>* stop,
                        Breadcrumb* breadcrumb);
 
-// Tiles whose sides are multiples of this number render no path that belongs to another tile.
+// With path reuse: the side, in pixels, of the squares whose pixels share paths; else 1. A tile that consists
+// of whole squares traces no path that belongs to another tile.
 int tile_alignment(const World& world);
 
 // Returns the names of the integrator variants that can render this world, cheapest first. A variant is the
@@ -80,7 +81,7 @@ struct WorldReport {
   struct Structure {
     std::string name;
     std::uint64_t bytes = 0;
-    std::string detail;  // for example "12 triangles"; if bytes is 0, the reason
+    std::string detail;  // for example "12 triangles"; if bytes is 0, the reason for it
   };
   std::vector<std::string> used, left_out;
   std::vector<Structure> structures;

@@ -28,7 +28,7 @@ using ls::denoise::Outcome;
 constexpr int kMaxMemoryMegabytes = 2048;
 
 // Limits this process: it is killed when its parent ends, or after `most_seconds` of wall-clock time. (A
-// limit of CPU time would not help: threads of the library that wait for each other for ever use none.)
+// limit of CPU time is not enough: deadlocked threads of the library use none.)
 void confine(unsigned most_seconds) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);

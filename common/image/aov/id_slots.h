@@ -1,11 +1,11 @@
-// IdSlots counts which objects a pixel shows, and in how many samples. It has a fixed number of slots
-// (identifier, count), and counts the samples that found no slot. An identifier is a float made from a name
-// as in Cryptomatte: normal, never 0. Slots have one canonical order: by count, largest first, then by the
-// bits of the identifier; unused slots are 0, 0.
+// IdSlots has the objects that a pixel shows, with their numbers of samples: a fixed number of slots
+// (identifier, count), and the number of samples that found no slot. An identifier is a float made from a
+// name as in Cryptomatte: normal, never 0. Slots have one canonical order: by count, largest first, then by
+// the bits of the identifier; unused slots are 0, 0.
 //
 // Adding two sets keeps the largest slots of both; the others are counted in `more`. While the samples of a
-// pixel show no more than kIdSlots objects in total, every count is exact, in whatever order the sets are
-// added; beyond that a count may be too low by at most `more`.
+// pixel show no more than kIdSlots objects in total, every count is exact for any order of additions; beyond
+// that a count may be too low by at most `more`.
 #pragma once
 
 #include <array>

@@ -15,7 +15,7 @@ namespace {
 constexpr double kNormal95 = 1.959964;
 constexpr double kLeastSpp = 8;  // with fewer samples, halves of one or two samples are too noisy
 constexpr double kPriorSpread = .15;
-// For forecasts: how much the slope varies, see kBend in the header
+// For forecasts: variation of the slope, derived in the header
 constexpr double kBend = .06;
 constexpr double kSlow = .85, kFast = 1.1;  // the verdict is slow below kSlow and fast above kFast
 constexpr std::size_t kMostPoints = 32;     // at most this many doublings of the sample count are used
@@ -77,8 +77,8 @@ std::optional<Matrix> factor(const std::vector<Log>& y, double bend) {
   return l;
 }
 
-// Returns L^-1 times the vector given by `value`. This transforms the points to independent ones of variance
-// 1.
+// Returns L^-1 times the vector given by `value`. This transforms the points to independent points of
+// variance 1.
 template <class Value>
 std::vector<double> whitened(const Matrix& l, const std::vector<Log>& y, const Value& value) {
   std::vector<double> out(y.size());

@@ -1,14 +1,14 @@
-// How an image's error falls with time, and when it will be low enough: a regression line of log error over
-// log time, and its extrapolation.
+// Convergence of an image's error: fits a line to log(error) as a function of log(time), and extrapolates it
+// to forecast when the error will reach a target.
 //
 // Checkpoints share samples: the checkpoint at m samples contains the samples of the one at n < m. Let D_n be
-// the half difference at n. With independent samples D_m is (n/m) D_n plus an independent rest, so corr(D_n,
-// D_m) = sqrt(n/m). For Gaussian D the estimates, sums of D^2, have the correlation n/m. Their logarithms are
-// fitted by generalised least squares (Aitken 1936) with this covariance; without it the slope's interval
-// would be far too narrow. The variance of one estimate is half of the variance that its interval shows: the
-// interval is for the realised error, so it also contains the variance of the realised error, which is as
-// large (error_estimate.h). Only checkpoints at doubling sample counts are used; those between them add
-// little.
+// half the difference of the two half images at n samples. If samples are independent, D_m is (n/m) D_n plus
+// an independent term, so corr(D_n, D_m) = sqrt(n/m). For Gaussian D the estimates, sums of D^2, have the
+// correlation n/m. The line is fitted to their logarithms by generalised least squares (Aitken 1936) with
+// this covariance; without it the slope's interval would be far too narrow. The width of an estimate's
+// interval gives twice the variance of the estimate, because it is an interval for the realised error, whose
+// own variance is equally large (error_estimate.h). So half of it is used here. Only checkpoints at doubling
+// sample counts are used; those between them add little.
 #pragma once
 
 #include <optional>
@@ -42,7 +42,7 @@ struct ConvergenceStatus {
     converging,  // as expected: the error falls like 1/N
     fast,        // faster than 1/N, as low-discrepancy points do on a smooth image
     heavy_tail,  // not to be trusted yet: few pixels carry the error, or it falls more slowly than 1/N
-    bias_floor,  // with a reference: the true error stays while the estimated one falls
+    bias_floor,  // with a reference: the true error is constant while the estimated one falls
   } kind = Kind::early;
   std::string words;
   bool trusted = true;  // false: the figures may be far off
@@ -53,11 +53,11 @@ const char* to_string(ConvergenceStatus::Kind kind);
 // trusted. If there are several reasons for distrust, the first one in this order is given: `doubt`, a bias
 // floor, the slope. A bias floor is a squared bias: the part of the true error that the estimated one lacks
 // and that does not fall with samples. Random differences between the two errors fall with samples, except
-// for the reference's own noise, which stays as well. A floor is reported if two conditions hold:
+// for the reference's own noise, which is constant as well. A floor is reported if two conditions hold:
 // - The latest true error exceeds the estimated one by four standard deviations (by chance: once in 30,000).
 //   The standard deviation combines the estimate's, from its interval on a logarithmic scale, and the noise
 //   of the reference.
-// - The excess falls more slowly than 1 / sqrt(N), which is half way between staying and falling like 1/N.
+// - The excess falls more slowly than 1 / sqrt(N), which is half way between a constant and 1/N.
 //   It is compared with the latest checkpoint that had at most half the samples.
 ConvergenceStatus judge(std::span<const ErrorPoint> points, const std::string& doubt);
 
@@ -66,18 +66,16 @@ struct Forecast {
   // Core seconds still needed, with their 95 % interval
   double core_seconds = 0, core_seconds_lo = 0, core_seconds_hi = 0;
 };
-// Forecasts what is needed until the estimated relMSE reaches `target`, rounded up to a whole round (range of
-// samples). Core seconds of 0: the target has been reached. nullopt: no point has a positive error and time.
-// The slope is the fitted one, moved towards 1 as far as the points leave it open (a Gaussian prior of mean 1
-// and standard deviation 0.15).
+// Forecasts the samples and time until the estimated relMSE reaches `target`, rounded up to a whole round
+// (range of samples). Core seconds of 0: the target has been reached. nullopt: no point has a positive error
+// and time. The slope is fitted with a Gaussian prior of mean 1 and standard deviation 0.15.
 //
 // Slopes change: the gain of low-discrepancy points on smooth parts of an image is used up eventually, and a
 // slope of 1.2 at 4 samples becomes 1.0 at 256 (the bench scene `tint`). A straight line through all
-// doublings would continue too steeply, and the better the points are known the more confidently it would do
-// so. So the slope is modelled as a Brownian motion in log time with a standard deviation of 0.05 per
-// doubling (kBend = .05 / sqrt(log 2)): a local linear trend (Harvey 1989, chapter 2.3). With time counted
-// from the last point, this adds b^2 u^2 (3 v - u) / 6 to the covariance of the points at times u <= v before
-// it, and b^2 u^3 / 3 to the variance at u after it.
+// doublings would be too steep and have too narrow an interval. So the slope is modelled as a Brownian motion
+// in log time with a standard deviation of 0.05 per doubling (kBend = .05 / sqrt(log 2)): a local linear
+// trend (Harvey 1989, chapter 2.3). With time counted from the last point, this adds b^2 u^2 (3 v - u) / 6 to
+// the covariance of the points at times u <= v before it, and b^2 u^3 / 3 to the variance at u after it.
 std::optional<Forecast> forecast_of(std::span<const ErrorPoint> points, double target);
 
 }  // namespace ls

@@ -16,8 +16,8 @@ namespace {
 constexpr int kReach = 2;                  // radius of the 5 x 5 window
 constexpr double k95 = 1.959963984540054;  // two-sided 95 % point of the normal distribution
 // The figures are not trusted if fewer than kFewPixels pixels carry the error: the scatter of their values
-// (sqrt(4/3/100) = 12 % of the sum) makes the sum unreliable. In small images a share of 1 / kPartOfSmall of
-// the pixels is enough, because in an image of 32 x 32 object edges alone sometimes carry the error.
+// (sqrt(4/3/100) = 12 % of the sum) makes the sum unreliable. In small images 1 / kPartOfSmall of the pixels
+// suffices, because object edges alone sometimes carry the error of a 32 x 32 image.
 constexpr double kFewPixels = 100, kPartOfSmall = 48;
 constexpr double kLargeShare = 0.1;  // largest share of the error in one pixel, for images with many pixels
 // In smooth parts of the image tr(V^2) is estimated both from fourth powers of D and from pairs of

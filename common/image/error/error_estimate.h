@@ -31,9 +31,9 @@
 // with k the third cumulant of a sample; the pixel's true value cancels in the difference. cov(D^2, S) is k /
 // N^2, and
 //   t = ((n D_n / N)^2 (n / N) - (o D_o / N)^2 (o / N)) (S_n - S_o)
-// has this expectation, so f'(m) g t is subtracted. (To first order, the squared difference of the last
-// samples is weighted by the weight from the earlier ones, and vice versa.) A weight changes by at most half
-// of itself. The first round has no earlier one and is not corrected.
+// has this expectation, so f'(m) g t is subtracted. (To first order, this weights D_n^2 by f computed from
+// the earlier samples, and D_o^2 by f computed from the last ones.) The correction changes the weight f of a
+// pixel by at most half of f. The first round has no earlier one and is not corrected.
 //
 // Interval of the realised error: d - e^2 = -ab, so Var(sum of d - sum of e^2) = sum of 4 v^2 exactly,
 // whatever the distribution of a and b. Over channels it is 4 tr(V^2), with V the covariance of the channels
@@ -47,12 +47,11 @@
 // for each pixel separately, whatever the tails of its noise and the noise of its neighbours. The
 // alternatives are worse: fourth powers of D depend on the tails; products of neighbours require noise that
 // varies slowly; and a choice between the two by g, which depends on the pixel's own D, would remove large D
-// from a sum. With low-discrepancy points the error of the whole is smaller than its parts suggest, by a
-// factor that cancels if it is the same for all pixels.
+// from a sum. With low-discrepancy points the error of all samples together is smaller than the errors of the
+// two parts suggest. This factor cancels in the relative variance if it is the same for all pixels.
 //
-// The first rounds have too few samples to be separated, and the last round may be truncated to a few
-// samples. In these cases two other estimates of tr(V^2) are used; each pixel takes a share g^2 of the first
-// and 1 - g^2 of the second:
+// If the last round, or the rounds before it, have too few samples for this, tr(V^2) is a weighted mean of
+// two other estimates. In each pixel the first has the weight g^2, the second 1 - g^2:
 //   From its own fourth powers, for Gaussian D: E[D_c^4] = 3 V_cc^2 and E[D_c^2 D_k^2] = V_cc V_kk (1 + 2
 //   r^2), where r is the correlation of two channels. Hence
 //     tr V^2 = sum_c E[D_c^4] / 3  +  sum_{c != k} E[D_c^2 D_k^2] r^2 / (1 + 2 r^2).
@@ -61,8 +60,8 @@
 //   cancels. With heavier tails than Gaussian, E[D^4] is larger than 3 v^2.
 //
 //   From pairs of neighbours, for any distribution: E[(D(p) . D(q))^2] = tr V(p) V(q), since their D are
-//   independent. This equals tr V^2 where the noise varies slowly. The noise does so where the image does,
-//   that is, where g is small.
+//   independent. This equals tr(V^2) where V varies slowly from pixel to pixel, as it does in smooth parts of
+//   the image, where g is small.
 // If the image's figures are not trusted (ImageError::trusted), the interval is from fourth powers alone, and
 // wider.
 #pragma once
@@ -96,7 +95,7 @@ struct NoiseSums {
   double edge_channel_fourth = 0, edge_pixel_fourth = 0;
   double flat_pairs = 0;  // sum over pixels of 1 - g^2 times the mean of (D(p) . D(q))^2
   double largest = 0;     // largest sum over channels of D^2 of one pixel
-  // These give tr(V^2). If the last round cannot be used, they are computed from the sums above
+  // tr(V^2) follows from these or, if the last round cannot be used, from the sums above
   ChangeSums changes;
   void add(const NoiseSums& other);
   bool operator==(const NoiseSums&) const = default;
@@ -114,7 +113,7 @@ struct TileError {
   std::uint64_t few_hits = 0;
   std::uint64_t lit = 0;  // number of pixels in which some sample found light
   NoiseSums plain;        // sums of D
-  NoiseSums relative;     // sums of D / sqrt(window^2 + 0.01)
+  NoiseSums relative;     // sums of sqrt(w) D, w = 1 / (m^2 + 0.01)
   double skew = 0;        // amount subtracted from relative.squares because the noise is skewed
   void add(const TileError& other);
   void subtract_skew(double part);
@@ -136,7 +135,7 @@ struct EarlierMeans {
 TileError estimate_error(const HalfMeans& halves, std::uint64_t spp, const EarlierMeans* earlier = nullptr);
 // Returns 1 / (m^2 + 0.01), minus the bias that noise of variance s2 in m causes.
 double relative_weight(double m, double s2);
-// True if pixel (x, y) counts in TileError::few_hits.
+// True if pixel (x, y) is counted in TileError::few_hits.
 bool has_few_hits(const HalfMeans& halves, int x, int y);
 
 // The error figures shown to the user.
@@ -151,7 +150,7 @@ struct ImageError {
   std::uint64_t few_hits = 0;  // number of pixels with few hits
   // False if few pixels carry the error, or if there is no light; then the intervals are unreliable.
   bool trusted = false;
-  std::string verdict;  // the reason for distrust in words; empty when trusted
+  std::string verdict;  // why the figures are not trusted, in words; empty when trusted
 };
 ImageError image_error(const TileError& sums);
 

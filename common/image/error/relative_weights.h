@@ -1,6 +1,6 @@
 // The weights of relMSE in one tile, as derived in error_estimate.h. The loops over rows have no branches, so
-// that the compiler vectorises them: the estimate is made for every unit (a range of samples of one tile)
-// that is added to the film, and must cost much less than rendering the unit.
+// that the compiler vectorises them: the film estimates the error after every unit (a range of samples of one
+// tile), which must cost much less than rendering the unit.
 #pragma once
 
 #include <vector>

@@ -28,8 +28,9 @@ inline constexpr const char* kFakePixels = "the pixels are made up by fake worke
 
 // The source of the header strings `lightshaft:...` of the final EXR, which docs/design/error.md lists. Some
 // strings come from the film instead: `:relmse`, `:relmse_ci95` ("LOW HIGH"), `:rmse`, `:rmse_ci95`,
-// `:few_hits` (pixels), `:verdict` ("trusted", or the reason why not) and `:tiles`. Without samples only
-// `:tiles` of these is written. `:pixels_without_samples` is written only if there are such pixels.
+// `:few_hits` (pixels), `:verdict` ("trusted", or the reason why not) and `:tiles`. If the film has no
+// samples, `:tiles` is the only one of these that is written. `:pixels_without_samples` is written only if
+// there are such pixels.
 struct Provenance {
   Digest scene;
   std::string settings_json;  // canonical RenderSettings

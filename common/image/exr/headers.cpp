@@ -110,9 +110,9 @@ bool preview(ByteCursor in) {
 }
 
 // Checks the size of an attribute's value against its type. The library reads most types by their contents
-// instead of the size in the header; if the two disagree it continues reading at a wrong place, where it may
-// take any four bytes for the size of a buffer to allocate. Always true for unknown types, whose bytes the
-// library just keeps.
+// instead of the size in the header; if the two disagree, it continues at a wrong position, where any four
+// bytes may become the size of a buffer to allocate. Always true for unknown types, whose bytes the library
+// just keeps.
 bool fills_its_size(std::string_view type, std::span<const std::byte> value) {
   const auto* fixed =
       std::find_if(std::begin(kFixed), std::end(kFixed), [&](const Fixed& f) { return f.type == type; });

@@ -1,5 +1,5 @@
-// Checks an EXR's headers before the library reads the file. The library allocates whatever the headers claim
-// (tables, buffers, strings), and a file of a few hundred bytes can claim terabytes.
+// Checks an EXR's headers before the library reads the file. The library allocates tables, buffers and
+// strings of the sizes that the headers claim, and a file of a few hundred bytes can claim terabytes.
 #pragma once
 
 #include <cstddef>

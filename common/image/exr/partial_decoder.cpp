@@ -1,7 +1,7 @@
 // Decodes partials (files with the pixel sums of one tile and range of samples), which are untrusted input. A
 // partial has exactly one form (uncompressed scanlines of known float channels under a known header). So it
-// is parsed byte by byte against that form, instead of by a library that accepts every EXR. Nothing is
-// allocated before the sizes are known to be those of the tile.
+// is parsed byte by byte against that form, instead of by a library that accepts every EXR. Memory is
+// allocated only after the sizes are found to be the tile's.
 #include "common/image/exr/partial_decoder.h"
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
-// Encodes partials (files with the pixel sums of one tile and range of samples) with OpenEXR. They are
-// decoded without that library, as untrusted input of one fixed form (partial_decoder.cpp).
+// Encodes partials (files with the pixel sums of one tile and range of samples) with OpenEXR. Partials are
+// decoded without that library, since they are untrusted input of one fixed form (partial_decoder.cpp).
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>

@@ -1,5 +1,5 @@
-// The layers of a film as rectangles of plain numbers at a mip level, for viewers that request only the
-// visible part.
+// The layers of a film as rectangles of numbers at a mip level, for viewers that request only the visible
+// part.
 //
 // Level 0 is the image. A pixel of level L represents a block of 2^L x 2^L pixels of the image (fewer at the
 // right and bottom edges). Pixels without samples are left out. If no pixel of the block has samples, the

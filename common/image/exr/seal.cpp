@@ -16,7 +16,7 @@
 namespace ls::exr {
 namespace {
 
-// Attributes that the seal does not cover: those about the storage of the pixels, and the seal itself.
+// Attributes that the seal does not cover: two about the storage of the pixels, and the seal itself.
 constexpr std::array<std::string_view, 3> kLeftOut = {"compression", "lineOrder", kSealName};
 
 // Returns the lines of a seal, keyed by the layer or header that they cover. A line of unknown form is its

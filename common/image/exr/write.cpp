@@ -15,7 +15,7 @@
 namespace ls {
 namespace {
 
-// A fast level: noise hardly compresses better at higher ones, and users wait for images
+// A fast level: higher levels hardly compress noise better, and users wait for images
 constexpr int kZipLevel = 2;
 
 std::vector<half> to_half(const std::vector<float>& values) {
@@ -107,8 +107,8 @@ Result<void> write_bands(Imf::OStream& out, const ExrBands& bands) {
   return each_band(bands, [&](const ExrPicture& rows, int y) { write_rows(file, rows, y); });
 }
 
-// A stream that writes to a sink. It can tell the library of an error only by an exception, so the sink's own
-// Error is kept in `trouble`.
+// A stream that writes to a sink. It can report an error to the library only by an exception, so it keeps the
+// sink's own Error in `trouble`.
 class SinkStream final : public Imf::OStream {
  public:
   explicit SinkStream(ByteSink& sink) : OStream("image"), sink_(sink) {}

@@ -55,11 +55,11 @@ class Film {
   const TileGrid& grid() const { return grid_; }
   AovSet aovs() const { return aovs_; }
 
-  // Folds the partial of round `round` of tile `tile`. The rounds of a tile must come in the order 0, 1, 2,
-  // ...; a truncated round only as the last. invalid_argument: the partial is not of this tile or round;
-  // failed_precondition: an earlier round is missing (the message names the next one); already_exists: this
-  // range of the round, or a longer one, has been folded before. On error the film is unchanged. `digest` is
-  // unit_digest(partial), if already known.
+  // Folds `partial` (adds the pixel sums of one round of one tile to the film). The rounds of a tile must
+  // come in the order 0, 1, 2, ... Only the last one may be truncated; a longer version of it replaces it.
+  // invalid_argument: the partial is not of this tile or round; failed_precondition: an earlier round is
+  // missing (the message names the next one); already_exists: the film has these samples of the round. On
+  // error the film is unchanged. `digest`: unit_digest(partial), for callers that have computed it.
   Result<TileError> fold(TileIndex tile, RoundIndex round, const Partial& partial);
   Result<TileError> fold(TileIndex tile, RoundIndex round, const Partial& partial, const Digest& digest);
 

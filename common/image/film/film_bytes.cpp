@@ -1,8 +1,9 @@
 // A tile of the film as bytes, for restarts: "LSTILE03", u32 tile, full rounds, 32 bytes chain, u64 s0, s1 of
 // the tail (0, 0: none), 32 bytes tail digest, f64 TileError::skew, 2 f64 plain.changes, 2 f64
-// relative.changes, 6 planes of doubles, with a tail 6 planes of floats; SHA-256 of everything before. With
+// relative.changes, 6 planes of doubles, with a tail 6 planes of floats; SHA-256 of all bytes before it. With
 // AOVs the planes of their sums follow the six, then those of identifiers in floats.
-// Little endian. The error figures are recomputed, except those that need the tile before its last round.
+// Little endian. The error figures that need the tile before its last round are stored; the others are
+// recomputed.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -55,7 +56,7 @@ class Reader {
     return Reader(body.subspan(magic.size()));
   }
   std::size_t left() const { return bytes_.size(); }
-  // Reads a number. Returns zero past the end, so callers must check ok() or left().
+  // Reads a number. Past the end it returns zero, so callers must check ok() or left().
   template <class T>
   T value() {
     T v{};

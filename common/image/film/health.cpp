@@ -159,8 +159,8 @@ std::string canonical_json(const Health& health) {
 Result<Health> parse_health(std::string_view text) {
   constexpr std::size_t kMostBytes = 64 << 10, kMostCauses = 64;
   if (text.size() > kMostBytes) return tl::unexpected(bad_health("the text is too long"));
-  // Our own texts are nested four levels deep. The callback stops at deeper ones before they cost stack or
-  // memory.
+  // Texts of this program are nested four levels deep. The callback drops deeper levels before they take
+  // stack or memory.
   bool deep = false;
   const auto shallow = [&](int depth, json::parse_event_t, json&) {
     deep = deep || depth > 4;

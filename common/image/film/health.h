@@ -66,7 +66,7 @@ struct HealthEntry {
 };
 
 struct Health {
-  // Totals over the causes: of rejected samples, and of the two kinds that are kept.
+  // Totals over the causes: `nonfinite` counts all rejected samples, the other two the cause of that name.
   std::uint64_t nonfinite = 0, negative = 0, majorant_violations = 0;
   std::map<HealthCause, HealthEntry> causes;
 

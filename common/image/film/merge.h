@@ -1,5 +1,5 @@
-// Folds (adds up in order) the partials of an image, files with the pixel sums of one tile and range of
-// samples, exactly as the coordinator does; for `lightshaft merge`.
+// Folds the partials of an image (files with the pixel sums of one tile and range of samples) into a film,
+// exactly as the coordinator does; for `lightshaft merge`.
 #pragma once
 
 #include <cstddef>
@@ -25,8 +25,8 @@ struct Merged {
   std::uint64_t duplicates = 0;  // number of equal partials that were dropped
 };
 
-// Groups the partials by tile and folds each tile's in the order of their first sample (s0). If a tile has
-// both a full round (range of samples) and a truncated one, uses the full one. Keeps the pixels of one
+// Groups the partials by tile and folds those of a tile in the order of their first sample (s0). If a tile
+// has both a full round (range of samples) and a truncated one, uses the full one. Keeps the pixels of one
 // partial in memory at a time. Errors name the files: partials of different scenes, settings or numeric
 // classes (machines of one class compute the same bits); frames or AOVs that differ; tiles that do not fit
 // one tiling; gaps and overlaps in a tile's samples; duplicates that differ; tiles of the frame without a

@@ -21,12 +21,12 @@
 // neighbours' s^2, which are independent of a. The remaining bias is of second order: for bright m it is 60
 // r^2 / m^4 of the value.
 //
-// The standard error that is given for these figures contains the reference's noise alone. Over channels (e -
-// a) . (e - b) has the variance 4 e'Ve + 4 tr V^2, with V the covariance of the reference. For Gaussian
-// noise, 4 ((x - ref) . s)^2 with the signs of s has this mean, because ref and A - B are independent. The
-// signs are not stored, so the sum of |x - ref| s is used, which is at least as large. It is right for grey
-// noise. For independent channels, with r much larger than e^2, it is a third too wide: the mean square of
-// the sum is then 3 + 6 (2 / pi)^2 instead of 3.
+// The standard error of these figures contains the reference's noise alone. Over channels (e - a) . (e - b)
+// has the variance 4 e'Ve + 4 tr V^2, with V the covariance of the reference. For Gaussian noise, 4
+// ((x - ref) . s)^2 with the signs of s has this mean, because ref and A - B are independent. The signs are
+// not stored, so the sum of |x - ref| s is used, which is at least as large. It is right for grey noise. For
+// independent channels, with r much larger than e^2, it is a third too wide: the mean square of the sum is
+// then 3 + 6 (2 / pi)^2 instead of 3.
 //
 // Without the layers stderr.R, G, B, s is 0, and the figures include an unknown amount of the reference's
 // noise. The difference of noisy numbers can be negative, and is then set to 0.

@@ -13,7 +13,7 @@ struct Box {  // a box parallel to the scene's axes
   bool operator==(const Box&) const = default;
 };
 Vec3 corner(const Box& b, int k);  // k is from 0 to 7
-Box grown(Box b, double by);       // enlarged to all sides
+Box grown(Box b, double by);       // enlarged on all sides
 bool touch(const Box& a, const Box& b);
 double largest_coordinate(const Box& b);
 

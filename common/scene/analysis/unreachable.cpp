@@ -12,9 +12,8 @@
 namespace ls::scene {
 namespace {
 
-// A distance relative to the largest coordinate. If two objects are at least this far apart, a ray that
-// starts on one of them cannot start inside the other, although its origin is offset: the distance is 16
-// times the renderer's offset.
+// A distance relative to the largest coordinate. It is 16 times the renderer's offset of ray origins. So if
+// two objects are at least this far apart, a ray from the surface of one cannot start inside the other.
 constexpr double kApart = 0x1p-16;
 Box with_margin(const Box& b, const Box& beside) {
   return grown(b, kApart * std::max(largest_coordinate(b), largest_coordinate(beside)));

@@ -10,7 +10,7 @@ namespace ls::scene {
 
 // Returns for each shape whether its interior medium can be removed without changing the image, provided that
 // nothing else refers to that medium. `scene` must be consistent. Paths begin at the camera, in the sensor's
-// medium. They enter another medium when they leave a surface towards its side, by reflection or
+// medium. A path enters another medium when it leaves a surface towards the medium's side, by reflection or
 // transmission. An interior can be removed for either of two reasons:
 // - The back of the surface is black: no path leaves the surface to that side.
 // - The shape is a sphere or cube that no light passes, and inside or on this shape there is no camera, no

@@ -32,15 +32,15 @@ class Sampler {
  public:
   Sampler(Translation& t, double seconds) : t_(t), seconds_(seconds) {}
 
-  // Returns the value of a sampler, an item of an animation's "samplers", at the moment. All nodes that it
-  // moves share this value. `is_rotation`: the value is a quaternion. Empty: the sampler is wrong, which has
-  // been reported.
+  // Returns the value of a sampler, an item of an animation's "samplers", at the moment. All nodes that the
+  // sampler animates share this value. `is_rotation`: the value is a quaternion. Empty: the sampler is wrong,
+  // which has been reported.
   std::shared_ptr<const Values> at(const Item& sampler, bool is_rotation) {
     const auto [known, is_new] = known_.try_emplace({sampler.identity(), is_rotation});
     if (!is_new) return known->second;
     Values values = read(sampler, is_rotation);
     numbers_ += values.size();
-    // The same limit as for the numbers in the file itself
+    // The same limit as for the values of the file's JSON
     if (numbers_ > kMaxGltfValues)
       values = wrong(sampler, fmt::format("animations give more than {} numbers at a time: split the scene",
                                           kMaxGltfValues));
@@ -84,7 +84,7 @@ class Sampler {
     const double s = (seconds_ - from) / step;
     if (way == "STEP") return part(next - 1, 0);
     if (is_cubic) {
-      // Hermite's spline, whose tangents are per second.
+      // Cubic Hermite spline; its tangents are per second.
       const Values a = part(next - 1, 1), leaving = part(next - 1, 2), arriving = part(next, 0);
       Values b = part(next, 1);
       const double s2 = s * s, s3 = s2 * s;
@@ -159,7 +159,7 @@ Poses read_poses(Translation& t, const Moment& moment) {
     for (const Item& channel : animation["channels"].list()) {
       if (t.report.full()) return out;
       const Item target = channel["target"], node = target["node"].in(t.root["nodes"]);
-      if (!node.given()) continue;  // an extension's channel
+      if (!node.given()) continue;  // the channel animates an extension's target, not a node
       const Item sampler = channel["sampler"].in(animation["samplers"]);
       if (!sampler.given()) {
         if (!channel["sampler"].given()) channel.error("a channel needs its sampler");

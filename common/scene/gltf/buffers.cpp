@@ -16,7 +16,7 @@
 namespace ls::scene::gltf {
 namespace {
 
-// glTF itself allows no larger file.
+// Largest length, offset and count in a file, by glTF's limit of 32 bits.
 constexpr std::size_t kMost = (std::size_t{1} << 32) - 1;
 
 struct Component {

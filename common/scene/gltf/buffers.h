@@ -1,4 +1,4 @@
-// The bytes of a glTF file: its buffers, and the numbers that accessors find in them.
+// Reads the buffers of a glTF file, and the numbers of its accessors.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ struct Numbers {
 
 class Buffers {
  public:
-  // `chunk`: the bytes behind the JSON of a .glb, which must outlive this.
+  // `chunk`: the content of the BIN chunk of a .glb; it must outlive this object.
   Buffers(const Item& root, AssetSource& assets, std::optional<std::string_view> chunk)
       : root_(root), assets_(assets), chunk_(chunk) {}
 
@@ -47,7 +47,7 @@ class Buffers {
   Item root_;
   AssetSource& assets_;
   std::optional<std::string_view> chunk_;
-  std::map<const Value*, std::optional<std::string>> read_;  // the buffers that are read, by their values
+  std::map<const Value*, std::optional<std::string>> read_;  // the buffers read so far, by their JSON values
   std::size_t total_bytes_ = 0, empty_elements_ = 0, read_numbers_ = 0;
 };
 

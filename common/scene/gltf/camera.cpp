@@ -12,13 +12,13 @@
 namespace ls::scene::gltf {
 namespace {
 
-constexpr int kHeight = 720, kWidth = 1280;  // pixels; glTF says nothing of them
+constexpr int kHeight = 720, kWidth = 1280;  // pixels; glTF does not specify the frame's size
 constexpr int kSamples = 64;
-constexpr double kFarthest = 1e7;  // of a camera without zfar
-// The camera of a scene that has none: from the front, the right and above.
+constexpr double kFarthest = 1e7;  // far clip plane of a camera without zfar
+// The default camera of a scene without cameras. kFrom is the direction to it: in front, to the right, above.
 constexpr Vec3 kFrom{{{.5, .35, 1}}};
 constexpr double kFov = 40;       // degrees, along the shorter side
-constexpr double kMargin = 1.05;  // of the scene's ball in the frame
+constexpr double kMargin = 1.05;  // camera distance; at 1 the scene's bounding sphere just fits the frame
 
 std::string name_of(const Translation& t, const Standing& camera) {
   const std::string own = camera.node["camera"].in(t.root["cameras"])["name"].text("");

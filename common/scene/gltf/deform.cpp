@@ -28,8 +28,9 @@ void put_unit(float* out, const Vec3& v) {
   for (std::size_t k = 0; k < 3; ++k) out[k] = static_cast<float>(length > 0 ? v[k] / length : v[k]);
 }
 
-// Transforms the normal n by m, and normalises it. Normals are transformed by the inverse transpose of m's
-// linear part; the cross products of the linear part's columns are the columns of a multiple of that matrix.
+// Transforms the normal n by m, and normalises it. Normals need the inverse transpose of m's linear part. Its
+// cofactor matrix, whose columns are cross products of the linear part's columns, is the determinant times
+// that; so for a negative determinant the sign is flipped.
 void turn_normal(const Transform& m, float* n) {
   const auto column = [&](std::size_t i) { return Vec3{{m.m[i], m.m[4 + i], m.m[8 + i]}}; };
   const Vec3 x = column(0), y = column(1), z = column(2);
@@ -71,7 +72,7 @@ bool add_targets(Translation& t, const Item& primitive, const std::vector<double
 
 bool add_skin(Translation& t, const Item& primitive, const std::vector<Transform>& joints, MadeMesh& mesh) {
   const Item attributes = primitive["attributes"];
-  std::vector<std::pair<std::vector<float>, std::vector<float>>> sets;  // four joints a corner, their shares
+  std::vector<std::pair<std::vector<float>, std::vector<float>>> sets;  // four joints and weights per corner
   for (;;) {
     const Item which = attributes[fmt::format("JOINTS_{}", sets.size())],
                shares = attributes[fmt::format("WEIGHTS_{}", sets.size())];
@@ -112,7 +113,7 @@ bool add_skin(Translation& t, const Item& primitive, const std::vector<Transform
         const Transform& joint = joints[static_cast<std::size_t>(index[k])];
         for (std::size_t e = 0; e < 16; ++e) blended.m[e] += double{weight[k]} * joint.m[e];
       }
-    if (total == 0) continue;  // no joint holds this corner
+    if (total == 0) continue;  // no joint moves this corner
     for (double& x : blended.m) x /= total;
     mirrored[i] = determinant3(blended) < 0;
     float* p = &mesh.positions[3 * i];

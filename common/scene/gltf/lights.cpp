@@ -28,7 +28,8 @@ void add_cone(Translation& t, const Item& spot, Element& out) {
 
 }  // namespace
 
-// A directional light has lux (irradiance), the others candela (intensity): our numbers are the same.
+// glTF gives directional lights in lux (irradiance) and other lights in candela (intensity). The numbers are
+// used unchanged.
 void add_light(Translation& t, const Standing& light) {
   const Item index = light.node.extension("KHR_lights_punctual")["light"];
   if (!index.given()) return light.node.error("KHR_lights_punctual needs the index of a light");

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::string_view kMagic = "glTF";
 constexpr std::size_t kHeaderBytes = 12, kChunkBytes = 8;
-constexpr double kFramesPerSecond = 24;  // of a sequence, unless -D fps says otherwise
+constexpr double kFramesPerSecond = 24;  // of a sequence, unless -D fps sets another rate
 constexpr std::uint32_t kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
 
 std::uint32_t word(std::string_view bytes, std::size_t at) {
@@ -34,7 +34,7 @@ struct Pieces {
   std::optional<std::string_view> chunk;
 };
 
-// Returns the parts. Error: a message that says what is wrong with the file.
+// Returns the parts. Error: a message about the fault of the file.
 tl::expected<Pieces, std::string> taken_apart(std::string_view file) {
   if (!file.starts_with(kMagic)) return Pieces{file, std::nullopt};
   if (file.size() < kHeaderBytes + kChunkBytes)
@@ -58,17 +58,11 @@ tl::expected<Pieces, std::string> taken_apart(std::string_view file) {
     if (is_first != (kind == kJsonChunk))
       return tl::unexpected(fmt::format("the first chunk of a .glb, and no other, is JSON"));
     if (is_first)
-      pieces.json = content.substr(0, content.find_last_not_of('\0') + 1);  // some pad it with zeros
+      pieces.json = content.substr(0, content.find_last_not_of('\0') + 1);  // some writers pad it with zeros
     if (kind == kBinaryChunk && !pieces.chunk) pieces.chunk = content;
     at += kChunkBytes + bytes;
   }
   return pieces;
-}
-
-std::size_t size_of(const Element& e) {
-  std::size_t n = 1;
-  for (const Element& child : e.children) n += size_of(child);
-  return n;
 }
 
 // The options that -D of the command line, or the defines of a job, set.

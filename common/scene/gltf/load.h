@@ -1,4 +1,5 @@
-// Reads files of glTF 2.0 into a Document of Mitsuba's dialect, as the other readers make one.
+// Reads a file of glTF 2.0 and translates it to a Document in Mitsuba's format, the common form of all
+// readers.
 #pragma once
 
 #include <string>
@@ -9,7 +10,7 @@
 namespace ls::scene::gltf {
 
 bool is_gltf(std::string_view file_name);  // by its ending, .gltf or .glb
-std::string too_large(std::size_t bytes);  // what to do about a file of so many
+std::string too_large(std::size_t bytes);  // message for a file that is too large
 
 // nullopt: the file cannot be read, which has been reported.
 std::optional<Document> load_document(std::string_view file_name, std::string_view text, AssetSource& assets,

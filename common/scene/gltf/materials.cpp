@@ -1,5 +1,5 @@
 // Materials. The choice of bsdfs is that of the Blender add-on for a Principled BSDF (blender/lightshaft/
-// materials.py), so that a file renders alike on both ways.
+// materials.py), so that a scene renders alike as glTF and through the add-on.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -151,7 +151,8 @@ class MaterialTranslator {
     Element glass = made("bsdf", smooth ? "dielectric" : "roughdielectric", at_);
     add(glass, "int_ior", ior_, at_);
     add(glass, "ext_ior", 1., at_);
-    // A ray through a body crosses its surface twice, so each crossing multiplies by the root of the colour.
+    // A ray through a body crosses its surface twice, so each crossing multiplies by the square root of the
+    // colour.
     Rgb passed{};
     for (std::size_t i = 0; i < 3; ++i) passed[i] = std::sqrt(std::max(base_.factor[i], 0.));
     add(glass, "specular_transmittance", passed, at_);
@@ -186,7 +187,7 @@ class MaterialTranslator {
     return id;
   }
 
-  // A transmitting surface without a volume is a thin sheet. What is metal does not transmit.
+  // A transmitting surface without a volume is a thin sheet. Metal does not transmit.
   Element sheet(Material& out) {
     if (!coat_.is(0) && transmission_.is(1))
       t_.warn_once(m_.extension("KHR_materials_clearcoat"), "a clear coat has no effect on a sheet of glass");

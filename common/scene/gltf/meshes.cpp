@@ -39,7 +39,7 @@ bool has_mirrored_uvs(const MadeMesh& mesh) {
     };
     const double area =
         (at(1, 0) - at(0, 0)) * (at(2, 1) - at(0, 1)) - (at(2, 0) - at(0, 0)) * (at(1, 1) - at(0, 1));
-    if (area > 0) return true;  // v points down, so that others are negative
+    if (area > 0) return true;  // v points down, so the area of a triangle that is not mirrored is negative
   }
   return false;
 }

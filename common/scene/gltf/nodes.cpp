@@ -202,8 +202,8 @@ class NodeReader {
   Translation& t_;
   const Poses& poses_;
   const Item nodes_;
-  std::map<const Value*, Transform> to_world_;                 // of the nodes that are in the scene
-  std::map<const void*, const std::vector<double>*> weights_;  // by what gives them: a list, or a sampler
+  std::map<const Value*, Transform> to_world_;                 // of the scene's nodes
+  std::map<const void*, const std::vector<double>*> weights_;  // by source: a list, or an animation's sampler
   std::map<const Value*, std::size_t> targets_;                // of meshes
   Stage stage_;
   std::vector<Item> top_;

@@ -17,7 +17,7 @@
 
 namespace ls::scene::gltf {
 
-inline constexpr double kDegrees = 180 / std::numbers::pi;  // of a radian
+inline constexpr double kDegrees = 180 / std::numbers::pi;  // degrees per radian
 
 // The scene as translated so far.
 struct Translation {
@@ -28,13 +28,13 @@ struct Translation {
   Element scene;
   std::size_t elements = 0;  // in `scene`
   bool has_light = false;
-  std::set<std::string> warned;                // texts of warnings that are given once a file
-  std::map<const Value*, std::string> images;  // names of the files of images that are read
+  std::set<std::string> warned;                // texts of warnings that are given once per file
+  std::map<const Value*, std::string> images;  // names of the files of the images read so far
 
   std::set<std::string> ids;
 
-  std::string fresh_id(std::string name);  // that name, or with a number behind it
-  void add(Element e);                     // to the scene, which may have kMaxElements
+  std::string fresh_id(std::string name);  // returns the name, with a number appended if it is taken
+  void add(Element e);                     // adds to the scene; an error above kMaxElements
   void warn_once(const Item& at, std::string text);
 };
 
@@ -56,11 +56,12 @@ Poses read_poses(Translation& t, const Moment& moment);
 //
 // Adds the morph targets, each multiplied by its weight.
 bool add_targets(Translation& t, const Item& primitive, const std::vector<double>& weights, MadeMesh& mesh);
-// Moves corners with their joints. Reverses the winding of triangles that most of their joints mirror.
-// `joints`: the matrix of each joint, from the mesh as stored to the world.
+// Skins the mesh: transforms each corner by the weighted mean of its joints' matrices. Reverses the winding
+// of a triangle if this mirrors most of its corners. `joints`: the matrix of each joint, from the space of
+// the stored mesh to the world.
 bool add_skin(Translation& t, const Item& primitive, const std::vector<Transform>& joints, MadeMesh& mesh);
 
-// placing.cpp: matrices.
+// In placing.cpp: transforms.
 Transform composed(const Vec3& move, const std::array<double, 4>& rotation, const Vec3& scale);
 Transform matrix_of(const std::array<double, 16>& by_columns);
 Transform local_transform(const Item& node, const Pose& pose);
@@ -68,7 +69,6 @@ Transform local_transform(const Item& node, const Pose& pose);
 // without scale and shear. nullopt: `to_world` is degenerate.
 std::optional<Transform> facing(const Transform& to_world);
 Transform looking(const Vec3& eye, const Vec3& target);
-void place(Element& parent, const Transform& to_world, const Span& at);
 
 struct Box {
   Vec3 low{{1e300, 1e300, 1e300}}, high{{-1e300, -1e300, -1e300}};
@@ -80,7 +80,7 @@ struct Box {
 // In textures.cpp: a value that is a constant, or the product of a constant and images.
 struct Source {
   std::array<double, 3> factor{1, 1, 1};
-  std::vector<Element> images;  // by which the factor is multiplied
+  std::vector<Element> images;  // multiply the factor
   bool is_constant() const { return images.empty(); }
   bool is_factor_one() const { return factor == std::array<double, 3>{1, 1, 1}; }
   bool is(double x) const { return is_constant() && factor == std::array<double, 3>{x, x, x}; }
@@ -108,13 +108,14 @@ struct Material {
   bool has_normal_map = false;
 };
 struct MeshKind {
-  bool colours = false, opacities = false;  // true if its corners have them
+  bool colours = false, opacities = false;  // true if the mesh's corners have them
   auto operator<=>(const MeshKind&) const = default;
 };
 class Materials {
  public:
   explicit Materials(Translation& t) : t_(t) {}
-  // `index`: the material of a primitive, which may have none. uv_set does not depend on `kind`.
+  // `index`: the member "material" of a primitive, which may be missing. Material::uv_set does not depend on
+  // `kind`.
   const Material& of(const Item& index, const MeshKind& kind);
   bool uses_opacity(const Item& index) const;
   std::size_t uv_set(const Item& index);
@@ -132,9 +133,9 @@ class Meshes {
     Item mesh, node;
     Transform to_world;
     const std::vector<double>* weights = nullptr;    // of morph targets, see Stage; nullptr: there are none
-    const std::vector<Transform>* joints = nullptr;  // of its skin, see add_skin(); then to_world is 1
+    const std::vector<Transform>* joints = nullptr;  // of its skin, see add_skin(); to_world is the identity
   };
-  // Adds all uses of meshes to the scene, those of one mesh as instances where they can be.
+  // Adds all uses of meshes to the scene. Several uses of one mesh become instances where possible.
   void add(const std::vector<Use>& uses);
   const Box& box() const { return box_; }
 
@@ -154,7 +155,7 @@ class Meshes {
   Translation& t_;
   Materials& materials_;
   std::size_t bytes_ = 0;  // of the files of all meshes
-  std::size_t parts_ = 0;  // primitives and their morph targets, those of each form of a mesh
+  std::size_t parts_ = 0;  // primitives and morph targets, counted for each skin and weights of a mesh
   Box box_;
 };
 
@@ -166,7 +167,7 @@ struct Standing {
 struct Stage {
   std::vector<Meshes::Use> meshes;
   std::vector<Standing> lights, cameras;
-  // Meshes::Use has pointers into these. Equal weights are stored once, however many nodes have them.
+  // Meshes::Use has pointers into these. Equal weights are stored once.
   std::map<const Value*, std::vector<Transform>> skins;
   std::set<std::vector<double>> weights;
 };
@@ -175,7 +176,8 @@ Stage read_nodes(Translation& t, const Poses& poses);
 // lights.cpp
 void add_light(Translation& t, const Standing& light);
 
-// In camera.cpp. Adds the camera of that name (empty: the first); if there is none, one that sees `box`.
+// In camera.cpp. Adds the camera with this name (empty: the first one); if there is none, adds a camera that
+// frames `box`.
 void add_camera(Translation& t, const std::vector<Standing>& cameras, const std::string& name,
                 const Box& box);
 

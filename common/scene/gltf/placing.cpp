@@ -8,12 +8,6 @@
 namespace ls::scene::gltf {
 namespace {
 
-std::optional<Vec3> unit(const Vec3& v) {
-  const double length = std::sqrt(dot(v, v));
-  if (!std::isnormal(length)) return std::nullopt;
-  return Vec3{{v[0] / length, v[1] / length, v[2] / length}};
-}
-
 Vec3 column(const Transform& t, std::size_t i) { return Vec3{{t.m[i], t.m[4 + i], t.m[8 + i]}}; }
 
 // Returns the transform of a camera at `at` that looks along `along`. Our cameras have +x on the left.
@@ -78,10 +72,6 @@ std::optional<Transform> facing(const Transform& to_world) {
 Transform looking(const Vec3& eye, const Vec3& target) {
   const Vec3 along{{target[0] - eye[0], target[1] - eye[1], target[2] - eye[2]}};
   return upright(eye, along, Vec3{{0, 1, 0}}).value_or(Transform{});
-}
-
-void place(Element& parent, const Transform& to_world, const Span& at) {
-  if (to_world != Transform{}) add_transform(parent, nullptr, "to_world", {matrix_step(to_world.m, at)});
 }
 
 void Box::include(const Vec3& p) {

@@ -76,7 +76,7 @@ std::string image_of(Translation& t, const Item& texture) {
   return t.images[image.identity()] = read_image(t, image);
 }
 
-// 10497 is repeat, 33071 the edge, 33648 mirrors.
+// glTF's wrap modes: 10497 repeats, 33071 clamps to the edge, 33648 mirrors.
 void add_sampler(Translation& t, const Item& sampler, Element& out) {
   const double s = sampler["wrapS"].number(10497), v = sampler["wrapT"].number(10497);
   if (s != v) t.warn_once(sampler, "wrapT is read as if it were the same as wrapS");
@@ -85,7 +85,7 @@ void add_sampler(Translation& t, const Item& sampler, Element& out) {
   if (sampler["magFilter"].number(9729) == 9728) add(out, "string", "filter_type", "nearest", out.at);
 }
 
-// KHR_texture_transform: scaled, turned counter-clockwise (v points down), moved.
+// KHR_texture_transform: scales, rotates counter-clockwise (v points down), then translates.
 void add_to_uv(const Item& transform, Element& out) {
   if (!transform.given()) return;
   const auto move = transform["offset"].numbers<2>({0, 0}), scale = transform["scale"].numbers<2>({1, 1});

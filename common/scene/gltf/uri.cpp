@@ -42,7 +42,7 @@ bool is_name(const std::string& name) {
   return is_text && !name.empty() && name.find_first_of("\t\r\n") == std::string::npos;
 }
 
-// "https://...", but not "C:/..." or "a:b".
+// True for "https://...", false for "C:/..." and "a:b".
 bool has_scheme(std::string_view uri) {
   const auto colon = uri.find("://");
   return colon != std::string_view::npos && colon > 1;

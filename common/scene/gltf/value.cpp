@@ -35,7 +35,7 @@ class Reading {
   const char** reached_;
 };
 
-// Takes the events of nlohmann's parser, and stops it at the limits.
+// Builds the tree from the events of nlohmann's parser, and stops the parser at the limits.
 class Builder {
  public:
   Builder(const char* begin, const char* const* reached) : begin_(begin), reached_(reached) {}

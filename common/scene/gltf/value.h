@@ -1,5 +1,5 @@
-// JSON as a tree of values that know their place in the text, for errors that have this place. Errors also
-// contain the path of the value, such as "materials[3].normalTexture".
+// JSON as a tree of values with their places in the text. Errors name the place and the path of a value, such
+// as "materials[3].normalTexture".
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace ls::scene::gltf {
 struct Member;
 struct Value {
   using List = std::vector<Value>;
-  using Members = std::vector<Member>;  // by name, as a file may have a million that are asked for often
+  using Members = std::vector<Member>;  // sorted by name, for binary search: a file may have a million
   std::size_t offset = 0;               // place in the text; for a member of an object, the place of its name
   std::variant<std::monostate, bool, double, std::string, List, Members> is;
 };
@@ -74,7 +74,7 @@ class Item {
   void read_numbers(std::vector<double>& all) const;
 
   const Value* value_;
-  const Value* near_;  // for the place: the value, or what should have it
+  const Value* near_;  // for at(): the value, or the nearest object or list around the missing value
   Report* report_;
 };
 

@@ -11,7 +11,7 @@
 namespace ls::scene::nori {
 namespace {
 
-// Returns the parameters of a Nori integrator, which are those of the integrator that it is translated to.
+// Returns the parameters of a Nori integrator: the parameters of the integrator to which it is translated.
 std::vector<Parameter> parameters_of(const IntegratorRow& row) {
   std::vector<Parameter> p;
   if (row.ours == "volpath_distant_mis") {
@@ -76,7 +76,7 @@ void add_lens(Element& out, Object& o) {
   const double radius = o.number("apertureRadius", 0);
   if (radius > 0 && !o.has("focusDistance")) o.missing("focusDistance");
   const double focus = o.number("focusDistance", 1);
-  if (!(radius > 0)) return;  // with a pinhole camera everything is in focus
+  if (!(radius > 0)) return;  // a pinhole camera has everything in focus
   for (Attribute& a : out.attributes)
     if (a.name == "type") a.value = "thinlens";
   add(out, "aperture_radius", radius, o.element().at);

@@ -28,14 +28,6 @@ std::string described(const Element& e) {
   return e.find("value") ? fmt::format("<{}> \"{}\"", e.tag, e.get("value")) : fmt::format("<{}>", e.tag);
 }
 
-std::string range_text(const Parameter& p) {
-  const std::string low =
-      std::isinf(p.range.min) ? "" : fmt::format("{} {} ", p.range.min, p.range.open_min ? "<" : "<=");
-  const std::string high =
-      std::isinf(p.range.max) ? "" : fmt::format(" {} {}", p.range.open_max ? "<" : "<=", p.range.max);
-  return fmt::format("{}{}{}", low, p.name, high);
-}
-
 // Returns the values in a property of this tag; nullopt: they cannot be parsed.
 std::optional<std::vector<double>> values_of(const Element& e) {
   const std::string_view text = e.get("value");
@@ -129,8 +121,8 @@ bool Object::fits(const Parameter& p, const Element& e) {
 bool Object::in_range(const Parameter& p, const Element& e, const std::vector<double>& values) {
   for (const double x : values)
     if (!p.range.contains(x)) {
-      report_.error(value_place(e, "value"),
-                    fmt::format("'{}' of {} is {}, out of its range {}", p.name, title(), x, range_text(p)));
+      report_.error(value_place(e, "value"), fmt::format("'{}' of {} is {}, out of its range {}", p.name,
+                                                         title(), x, range_text(p.name, p.range)));
       return false;
     }
   return true;
@@ -213,7 +205,7 @@ void Object::left_over(const Child& c) {
     if (p.name == name && !p.idle.empty())
       return report_.warning(value_place(*c.e, "name"),
                              fmt::format("'{}' of {} has no effect here: {}", name, title(), p.idle));
-    // The parameter is known, but nobody took it: with the other parameters it has no meaning.
+    // The parameter is known but was not taken: it has no meaning together with the other parameters.
     if (p.name == name)
       return report_.error(
           value_place(*c.e, "name"),

@@ -1,5 +1,5 @@
 // One object of a Nori file during translation to Mitsuba. Its parameters are taken by name and checked
-// against the table of parameters; parameters that nobody takes are reported.
+// against the table of parameters; parameters that are not taken are reported.
 #pragma once
 
 #include <optional>

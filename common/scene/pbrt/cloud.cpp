@@ -12,7 +12,7 @@ namespace {
 // frequency.
 constexpr double kFiner = 1.99;
 constexpr int kOctaves = 5;
-// How often points are moved by the slope of noise, and the frequency of that noise the first time.
+// Number of times that a point is moved by the gradient of noise, and the frequency of the first such noise.
 constexpr int kWarps = 2;
 constexpr double kWarpFrequency = 10;
 
@@ -29,10 +29,11 @@ double cells_per_unit(const Cloud& cloud) {
          (cloud.wispiness > 0 ? std::max(octaves, kWarpFrequency * kFiner) : octaves);
 }
 
-// With height the density falls in pieces of straight lines with corners at 0, 1/2 and 1, whatever the noise.
+// Least number of nodes per unit of height: besides the noise, the density has a piecewise linear falloff
+// with height, with corners at 0, 1/2 and 1.
 constexpr double kLeastPerHeight = 64;
 
-// Returns the grid with this many nodes a cell; nullopt if it has more than `most` nodes.
+// Returns the grid with `per_cell` nodes per cell; nullopt if it has more than `most` nodes.
 std::optional<CloudNodes> nodes_of(const Cloud& cloud, double per_cell, std::size_t most) {
   CloudNodes out;
   out.per_cell = per_cell;

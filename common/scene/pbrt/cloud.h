@@ -19,18 +19,18 @@ struct Cloud {
 // Returns the density at a point of the medium's own coordinates, without regard to the box.
 double density_at(const Cloud& cloud, const Vec3& p);
 
-// The nodes of a grid from face to face of the cloud's box, and how many of them are in a cell of its finest
-// noise, along an axis.
+// A grid whose outermost nodes are on the faces of the cloud's box. sides: nodes along each axis; per_cell:
+// nodes along an axis per cell of the finest noise.
 struct CloudNodes {
   std::array<int, 3> sides{};
   double per_cell = 0;
   std::size_t count() const { return std::size_t(sides[0]) * std::size_t(sides[1]) * std::size_t(sides[2]); }
 };
-// The number of nodes that resolves the noise well, and the least number that resolves it at all.
+// The value of per_cell that resolves the noise well, and the least one that resolves it at all.
 inline constexpr double kWantedPerCell = 4, kLeastPerCell = 2;
 
-// Returns the finest grid of at most kWantedPerCell nodes in a cell and of at most `most` nodes. nullopt:
-// even kLeastPerCell in a cell are more nodes than that.
+// Returns the finest grid with at most kWantedPerCell nodes per cell and at most `most` nodes in total.
+// nullopt: even with kLeastPerCell nodes per cell there are more.
 std::optional<CloudNodes> nodes_for(const Cloud& cloud, std::size_t most);
 
 MadeGrid cloud_grid(const Cloud& cloud, const CloudNodes& nodes);

@@ -11,11 +11,11 @@
 namespace ls::scene::pbrt {
 namespace {
 
-// The most nodes of one grid, and of all grids of clouds of a file.
+// Largest number of nodes of one grid, and of all grids of clouds in a file.
 constexpr std::size_t kMaxNodes = std::size_t{1} << 24, kMaxNodesOfAll = std::size_t{1} << 25;
 
-// Returns the name of the grid's file. It is made of the formula's parameters, so that a grid that is there
-// already, such as one that was sent to a coordinator, need not be computed: that takes seconds.
+// Returns the name of the grid's file. It is made from the formula's parameters, so that an existing grid,
+// such as one sent to a coordinator, is not computed again, which takes seconds.
 std::string name_of(const Cloud& c, const CloudNodes& nodes) {
   const std::string formula =
       fmt::format("cloud {} {} {} {} {} {}", c.density, c.wispiness, c.frequency, fmt::join(c.low, " "),

@@ -118,7 +118,7 @@ std::optional<Rgb> surface_colour(Translation& t, const Param& p) {
   if (p.type != "spectrum") return wrong(t, p, fmt::format("'{}' can't be given as {} here", p.name, p.type));
   const auto curve = curve_of(t, p);
   if (!curve) return std::nullopt;
-  // A constant curve is grey, even if it does not cover all wavelengths.
+  // A constant curve is a grey, even if it does not cover all wavelengths.
   const auto& v = curve->value;
   if (std::all_of(v.begin(), v.end(), [&](double x) { return x == v[0]; })) return Rgb{v[0], v[0], v[0]};
   return within_srgb(t, p, linear_srgb(*curve, Illuminant::d65));

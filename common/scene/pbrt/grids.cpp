@@ -1,4 +1,4 @@
-// Translates media of grids whose values stand in the scene's text.
+// Translates grid media whose values are in the scene's text.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -32,11 +32,12 @@ bool read_sides(MediumSource& m, std::array<int, 3>& sides) {
   return true;
 }
 
-// Checks that the parameter, if it is there, has `channels` numbers a voxel.
+// Checks that the parameter, if it is given, has `channels` numbers per voxel.
 bool fits(MediumSource& m, const Param* p, int channels, const std::array<int, 3>& sides) {
   const std::size_t wanted = std::size_t(channels) * product(sides);
   if (!p) return true;
-  // Sums and products of two of them stay within float32's range, in which grids are stored.
+  // With this limit, sums and products of two values stay within the range of float32, the type of stored
+  // grids.
   constexpr double kLargest = 1e18;
   const auto large =
       std::find_if(p->numbers.begin(), p->numbers.end(), [](double x) { return !(std::abs(x) <= kLargest); });
@@ -48,9 +49,8 @@ bool fits(MediumSource& m, const Param* p, int channels, const std::array<int, 3
 }
 
 // Returns the grid with a layer of voxels of the value `beyond` around it. In pbrt values are at the centres
-// of voxels, and values outside of the grid count as 0, so that they fade out over the last half voxel within
-// the box. The layer, as the border of the grid, has the same effect. value(voxel, channel) is the value in
-// the grid.
+// of voxels and 0 outside the grid, so interpolated values fall towards 0 over the last half voxel within the
+// box. This layer, as the grid's border, has the same effect. value(voxel, channel) is the value in the grid.
 template <class F>
 MadeGrid padded(const std::array<int, 3>& sides, int channels, F value, float beyond = 0) {
   MadeGrid g{{sides[0] + 2, sides[1] + 2, sides[2] + 2}, channels, {}};
@@ -89,9 +89,9 @@ class GridLight {
   }
 
  private:
-  // Adds factor(channel) times Lescale as a volume. Without Lescale pbrt has a grid of one voxel of the value
-  // 1 in its place (GridMedium::Create). As all grids do, that one fades to 0 half a voxel outside of the
-  // box: it is 1 in the middle of the box, 1/2 in the middle of a face, and 1/8 in a corner.
+  // Adds factor(channel) times Lescale as a volume. Without Lescale pbrt uses a grid of one voxel with the
+  // value 1 (GridMedium::Create). Like every grid it falls to 0 half a voxel outside the box: it is 1 in the
+  // middle of the box, 1/2 in the middle of a face, and 1/8 in a corner.
   template <class F>
   bool add_scales(Element& out, const char* name, int channels, F factor) {
     const std::array<int, 3> sides = scales_ ? sides_ : std::array{1, 1, 1};
@@ -136,8 +136,8 @@ class Colours {
     for (std::size_t i = 0; i < sum.values.size(); ++i) sum.values[i] += scattering_.values[i];
     return sum;
   }
-  // Returns the albedo of each channel if it is the same in all voxels that extinguish. Numbers in the text
-  // are rounded, which makes some difference if they are products of a density and a colour.
+  // Returns the albedo of each channel if it is the same in all voxels that extinguish. The comparison allows
+  // for the rounding of numbers in the text, which may be products of density and colour.
   std::optional<Rgb> one_albedo() const {
     constexpr double kRounding = 1e-5;
     Rgb all{};

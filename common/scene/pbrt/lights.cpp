@@ -93,20 +93,24 @@ class LightTranslator {
     return out;
   }
 
+  Element image_texture(const char* name) {  // the light's image, as our parameter `name`
+    const std::string file = p_.text("filename", "");
+    if (file.empty()) p_.missing("filename");
+    Element out = made("texture", "bitmap", p_.at());
+    set(out, "name", name, p_.at());
+    add(out, "string", "filename", file, p_.at());
+    add(out, "string", "filter_type", "nearest", p_.at());
+    add(out, "string", "wrap_mode", "clamp", p_.at());
+    return out;
+  }
+
   Element goniometric() {
     Element out = made("emitter", "goniometric", p_.at());
-    // pbrt's image has the y axis of the light in its middle.
+    // The middle of pbrt's image is the light's +y axis; that of ours is +z.
     const Transform axes{{1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 1}};
     place(out, multiply(ctm_.to, axes), p_.at());
     add(out, "intensity", colour("I"), p_.at());
-    const std::string file = p_.text("filename", "");
-    if (file.empty()) p_.missing("filename");
-    Element image = made("texture", "bitmap", p_.at());
-    set(image, "name", "texture", p_.at());
-    add(image, "string", "filename", file, p_.at());
-    add(image, "string", "filter_type", "nearest", p_.at());
-    add(image, "string", "wrap_mode", "clamp", p_.at());
-    add(out, std::move(image));
+    add(out, image_texture("texture"));
     return out;
   }
 
@@ -141,16 +145,10 @@ class LightTranslator {
     return out;
   }
 
-  // As the camera's, our projector's own x points to the left.
+  // Our projector's own +x points to the left, like the camera's.
   Element projection() {
-    Element out = made("emitter", "projector", p_.at()), image = made("texture", "bitmap", p_.at());
-    const std::string file = p_.text("filename", "");
-    if (file.empty()) p_.missing("filename");
-    set(image, "name", "irradiance", p_.at());
-    add(image, "string", "filename", file, p_.at());
-    add(image, "string", "filter_type", "nearest", p_.at());
-    add(image, "string", "wrap_mode", "clamp", p_.at());
-    add(out, std::move(image));
+    Element out = made("emitter", "projector", p_.at());
+    add(out, image_texture("irradiance"));
     add(out, "scale", p_.number("scale", 1) * t_.exposure(), p_.at());
     add(out, "fov", p_.number("fov", 90), p_.at());
     add(out, "string", "fov_axis", "smaller", p_.at());

@@ -87,12 +87,6 @@ class Loader {
     tokens_ = outer;
   }
 
-  static std::size_t size_of(const Element& e) {
-    std::size_t n = 1;
-    for (const Element& child : e.children) n += size_of(child);
-    return n;
-  }
-
   // Limits the number of elements. The limit is the same as for an XML file. Elements of a group are counted
   // individually.
   bool count_elements(const Token& token) {

@@ -1,4 +1,4 @@
-// Files that are written of the numbers in a scene's text.
+// Makes files from the numbers in a scene's text.
 #include "common/scene/made_files.h"
 
 #include "common/scene/pbrt/parts.h"

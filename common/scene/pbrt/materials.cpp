@@ -188,7 +188,7 @@ class MaterialTranslator {
 
   void add_alpha(Element& out, const Alpha& a) {
     add(out, "string", "distribution", "ggx", p_.at());
-    // The minimum is for a direction that is smooth while the other is rough.
+    // The lower bound applies if one direction is smooth and the other is rough.
     add(out, "alpha_u", std::max(a.first, 1e-4), p_.at());
     add(out, "alpha_v", std::max(a.second, 1e-4), p_.at());
   }

@@ -1,4 +1,4 @@
-// Translates media; those of grids are in grids.cpp and cloud_medium.cpp.
+// Translates media; grid media are in grids.cpp and cloud_medium.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -6,7 +6,7 @@
 
 namespace ls::scene::pbrt {
 
-// A MakeNamedMedium with the state that it stands in.
+// A directive MakeNamedMedium: the translation so far, its parameters, and the current transform.
 struct MediumSource {
   Translation& t;
   Params& p;
@@ -18,7 +18,7 @@ struct MediumSource {
   }
 };
 
-// Absorption and scattering in our terms.
+// Absorption and scattering as extinction and albedo.
 struct Coefficients {
   Rgb extinction{}, albedo{};
 };
@@ -29,15 +29,14 @@ void add_albedo(MediumSource& m, Element& out, const Rgb& albedo);
 void add_extinction(MediumSource& m, Element& out, const Rgb& extinction);
 
 // The integral of the CIE observer's y over wavelengths in nm, as pbrt-v4 has it (CIE_Y_integral in
-// src/pbrt/util/spectrum.h). pbrt scales the spectrum of a light so that its integral with y is 1, but
-// neither black bodies in media nor the Le of "rgbgrid" (GridMedium, NanoVDBMedium and RGBGridMedium in
-// src/pbrt/media.h). So their luminance is this times the luminance that the same spectrum has here, where
-// equal energy 1 at all wavelengths has luminance 1.
+// src/pbrt/util/spectrum.h). pbrt scales the spectrum of a light so that its integral with y is 1. It does
+// not scale black bodies in media and the Le of "rgbgrid" (GridMedium, NanoVDBMedium and RGBGridMedium in
+// src/pbrt/media.h). So their luminance in pbrt is kPhotometric times the luminance of the same spectrum
+// here, where a radiance of 1 at all wavelengths has luminance 1.
 inline constexpr double kPhotometric = 106.856895;
 
-// Adds what turns the values of a `temperature` into light as pbrt does: a body of (value -
-// temperatureoffset)
-// * temperaturescale kelvin, whose spectrum has the peak 1, times `factor`.
+// Adds the parameters that turn the values of `temperature` into emission as in pbrt: `factor` times the
+// spectrum, scaled to the peak 1, of a black body at (value - temperatureoffset) * temperaturescale kelvin.
 bool add_black_bodies(MediumSource& m, Element& out, double factor);
 
 // The grids' box in the medium's own coordinates.

@@ -1,5 +1,5 @@
-// The parameters of one pbrt object. Its reader takes the ones that it wants by name, checked against the
-// table of words.h; finish() reports those that the table does not have.
+// The parameters of one pbrt object. The object's reader takes parameters by name, checked against the table
+// of words.h; finish() reports those that the table lacks.
 #pragma once
 
 #include <optional>

@@ -26,7 +26,8 @@ Placed scaled(const Vec3& by);
 Placed turned(double degrees, const Vec3& axis);
 std::optional<Placed> looking(const Vec3& eye, const Vec3& target, const Vec3& up);
 std::optional<Placed> of_columns(const std::vector<double>& m);  // from 16 numbers, column by column
-// A transform without its scale, if that is the same along all axes; otherwise as it is, with scale 1.
+// A transform split into a rigid part and its scale. If the scale differs between axes, `rigid` is the whole
+// transform and `scale` is 1.
 struct Unscaled {
   Transform rigid;
   double scale = 1;
@@ -44,7 +45,7 @@ struct Material {
   bool has_texture = false;  // an image or a pattern depends on the uv of the shape
 };
 struct AreaLight {
-  Rgb radiance;  // if `power` is given, of a shape of the area power / pi
+  Rgb radiance;  // if `power` is given: for a shape of the area power / pi
   std::optional<double> power;
   Span at;
 };
@@ -58,7 +59,7 @@ struct Attributes {
   std::string inside, outside;  // names of media; empty: none
 };
 
-// The grid that was made of a cloud, and how many nodes it has.
+// The grid file that was made from a cloud; `nodes` is its number of nodes.
 struct MadeCloud {
   Cloud cloud;
   std::size_t nodes;
@@ -70,8 +71,8 @@ struct Translation {
   AssetSource& assets;
   Report& report;
   Element scene;
-  // The factor on all light, by the film and the camera's shutter. `lit` is true once light has been
-  // multiplied by it.
+  // exposure_factor: the factor on all light that follows from the film and the camera's shutter. `lit`: true
+  // once a light has been multiplied by it.
   double exposure_factor = 1;
   bool lit = false;
   double exposure() {
@@ -105,7 +106,6 @@ void add_value(Translation& t, Element& parent, Params& p, Names names, const Rg
 void add_scaled_value(Translation& t, Element& parent, Params& p, std::string_view name, const Rgb& fallback,
                       double scale);
 void refer(Element& parent, std::string_view name, std::string id, const Span& at);
-void place(Element& parent, const Transform& to_world, const Span& at);
 
 // In materials.cpp. Adds the material under this id.
 std::optional<Material> add_material(Translation& t, const std::string& id, Params& p);
@@ -130,8 +130,8 @@ struct Settings {
 double exposure_of(Settings& s);  // returns the factor on all light
 void add_settings(Translation& t, Settings& s, const Span& file);
 
-// In made_files.cpp: files made of numbers in the scene's text. The returned name is derived from the file's
-// bytes; empty: the file could not be kept, which was reported.
+// In made_files.cpp: files made from numbers in the scene's text. The returned name is derived from the
+// file's bytes; empty: the file could not be kept, which was reported.
 struct Mesh {
   std::vector<double> positions, normals, uvs;  // per corner: three, three and two numbers
   std::vector<double> indices;                  // three per triangle; integers in range

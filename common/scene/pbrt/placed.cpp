@@ -37,12 +37,6 @@ std::optional<Transform> inverse(Transform a) {
   return b;
 }
 
-std::optional<Vec3> unit(const Vec3& v) {
-  const double length = std::sqrt(dot(v, v));
-  if (!std::isnormal(length)) return std::nullopt;
-  return Vec3{{v[0] / length, v[1] / length, v[2] / length}};
-}
-
 }  // namespace
 
 Placed then(const Placed& outer, const Placed& inner) {

@@ -130,7 +130,7 @@ class ShapeTranslator {
            std::vector<double>{};
   }
 
-  // The areas in the world of what gives light by itself in pbrt: of each `size` triangles.
+  // Measures the areas in the world of the parts that are separate lights in pbrt: `size` triangles each.
   void measure(const Mesh& mesh, std::size_t size) {
     const auto corner = [&](std::size_t i) {
       const std::size_t at = 3 * static_cast<std::size_t>(mesh.indices[i]);
@@ -151,12 +151,17 @@ class ShapeTranslator {
     return file.empty() ? std::nullopt : std::optional(ply(file));
   }
 
-  std::optional<Element> triangles() {
+  const Param* take_corners() {  // null: there are none, which has been reported
     const Param* corners = p_.take("P");
-    if (!corners || corners->numbers.empty()) {
-      if (!corners) p_.missing("P");
-      return corners ? wrong(corners->at, "P has no corners") : std::nullopt;
-    }
+    if (!corners) p_.missing("P");
+    if (!corners || !corners->numbers.empty()) return corners;
+    wrong(corners->at, "P has no corners");
+    return nullptr;
+  }
+
+  std::optional<Element> triangles() {
+    const Param* corners = take_corners();
+    if (!corners) return std::nullopt;
     const std::size_t n = corners->numbers.size() / 3;
     Mesh mesh{corners->numbers, {}, {}, indices(n, 3)};
     for (const auto& [name, size, list] : {std::tuple{"N", std::size_t{3}, &mesh.normals},
@@ -178,8 +183,8 @@ class ShapeTranslator {
     return kept(with_default_uv(mesh));
   }
 
-  // The largest number of corners that are made of a shape's list of indices. The text of such a list takes 2
-  // bytes each, and a corner up to 200 in memory on the way to its file.
+  // Largest number of corners that are made from a shape's list of indices. An index takes as little as 2
+  // bytes of text, but its corner up to 200 bytes of memory until the file is written.
   static constexpr std::size_t kMaxOwnCorners = std::size_t{1} << 22;
   std::optional<Element> too_many_corners() {
     return wrong(p_.at(), fmt::format("{} has more than {} corners that need uv of their own: give uv, or a "
@@ -187,7 +192,7 @@ class ShapeTranslator {
                                       p_.title(), kMaxOwnCorners));
   }
 
-  // Gives each triangle corners of its own, with the uv that pbrt gives to triangles without any.
+  // Gives each triangle corners of its own, with pbrt's default uv of triangles.
   static Mesh with_default_uv(const Mesh& mesh) {
     Mesh out;
     for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
@@ -202,11 +207,8 @@ class ShapeTranslator {
   }
 
   std::optional<Element> patches() {
-    const Param* corners = p_.take("P");
-    if (!corners || corners->numbers.empty()) {
-      if (!corners) p_.missing("P");
-      return corners ? wrong(corners->at, "P has no corners") : std::nullopt;
-    }
+    const Param* corners = take_corners();
+    if (!corners) return std::nullopt;
     const std::vector<double>& x = corners->numbers;
     const std::vector<double> four = indices(x.size() / 3, 4);
     if (four.empty()) return std::nullopt;
@@ -236,8 +238,8 @@ class ShapeTranslator {
   }
 
   // In pbrt ReverseOrientation flips the normal, and mirroring a mesh leaves its normal on the original side.
-  // Our meshes without normals follow the order of corners, which mirroring reverses, and our mirrored
-  // spheres are inside out.
+  // The normals of our meshes without vertex normals follow the order of corners, which mirroring reverses,
+  // and our mirrored spheres are inside out.
   void orient(Element& out) {
     const bool mirrored = determinant3(a_.ctm.to) < 0;
     const std::string_view type = p_.row().type;
@@ -286,7 +288,7 @@ class ShapeTranslator {
     if (!outside.empty()) refer(out, "exterior", medium_id(outside), p_.at());
   }
 
-  // A Lambertian emitter of the area A and the radiance L gives pi A L.
+  // A Lambertian emitter of area A and radiance L has the power pi A L.
   Rgb radiance(const AreaLight& light) {
     if (!light.power) return light.radiance;
     const auto [least, most] = std::minmax_element(areas_.begin(), areas_.end());
@@ -308,7 +310,7 @@ class ShapeTranslator {
   const Attributes& a_;
   Placed to_world_;
   bool has_normals_ = false;
-  std::vector<double> areas_;  // of what gives light by itself; empty if they are not known
+  std::vector<double> areas_;  // of the separate lights, see measure(); empty if unknown
 };
 
 }  // namespace

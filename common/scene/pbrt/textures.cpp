@@ -60,7 +60,7 @@ Element image(Params& p) {
   const std::string wrap = p.text("wrap", "repeat");
   if (wrap != "repeat") add(out, "string", "wrap_mode", wrap, p.at());
   const std::string encoding = p.text("encoding", "sRGB");
-  // pbrt decodes all other 8-bit files as sRGB, whatever the scene says.
+  // pbrt decodes all other 8-bit files as sRGB, whatever `encoding` is.
   if (encoding == "linear" && has_ending(file, {".png"})) add(out, "boolean", "raw", "true", p.at());
   if (encoding != "linear" && encoding != "sRGB")
     p.error(p.at(),
@@ -106,11 +106,6 @@ void refer(Element& parent, std::string_view name, std::string id, const Span& a
   if (!name.empty()) set(ref, "name", std::string(name), at);
   set(ref, "id", std::move(id), at);
   add(parent, std::move(ref));
-}
-
-void place(Element& parent, const Transform& to_world, const Span& at) {
-  if (to_world == Transform{}) return;
-  add_transform(parent, nullptr, "to_world", {matrix_step(to_world.m, at)});
 }
 
 void add_texture(Translation& t, const std::string& name, Params& p) {

@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "common/base/suggest.h"
-#include "common/scene/reader/plugin_error.h"
 #include "common/scene/reader/reader.h"
 #include "common/scene/schema/integrators.h"
 #include "common/scene/schema/mitsuba_plugins.h"

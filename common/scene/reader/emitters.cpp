@@ -1,7 +1,6 @@
 // Reads emitters without a shape.
 #include <fmt/format.h>
 
-#include "common/scene/reader/plugin_error.h"
 #include "common/scene/reader/reader.h"
 #include "common/scene/xml/transform_element.h"
 

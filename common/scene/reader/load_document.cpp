@@ -20,7 +20,7 @@ constexpr std::string_view kFrameParameter = "frame";
 
 bool is_name_char(char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; }
 
-// The values of parameters `$name`. Substituted text is not searched again, so there is no recursion and no
+// The values of parameters `$name`. Substituted text is not substituted again, which excludes recursion and
 // exponential growth.
 class Parameters {
  public:
@@ -35,8 +35,7 @@ class Parameters {
     note_length(std::string(kFrameParameter));
   }
 
-  // Warns of parameters that were given from outside (-D) but not used: they are probably misspelt, but no
-  // reason to stop.
+  // Warns of parameters that were given from outside (-D) but not used: they are probably misspelt.
   void warn_of_unused(const Span& at) const {
     std::vector<std::string> known;
     for (const auto& [name, value] : values_)

@@ -1,7 +1,6 @@
 // Reads volumes, phase functions and media.
 #include <fmt/format.h>
 
-#include "common/scene/reader/plugin_error.h"
 #include "common/scene/reader/reader.h"
 #include "common/scene/xml/transform_element.h"
 
@@ -49,7 +48,7 @@ void need_inverse(const Transform& to_world, const Element& e, Report& report) {
     report.error(e.at, "to_world flattens this volume or leaves the range of numbers: it can't be inverted");
 }
 
-// The given parameters that need another one to have an effect. It must be constructed before parameters are
+// Records which given parameters have an effect only with another one. Construct it before parameters are
 // taken.
 struct Factors {
   explicit Factors(const Params& p)

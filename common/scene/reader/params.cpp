@@ -13,17 +13,7 @@
 #include "common/scene/xml/values.h"
 
 namespace ls::scene {
-namespace {
-
-std::string range_text(const Field& f) {
-  const std::string low =
-      std::isinf(f.range.min) ? "" : fmt::format("{} {} ", f.range.min, f.range.open_min ? "<" : "<=");
-  const std::string high =
-      std::isinf(f.range.max) ? "" : fmt::format(" {} {}", f.range.open_max ? "<" : "<=", f.range.max);
-  return fmt::format("{}{}{}", low, f.name, high);
-}
-
-}  // namespace
+namespace {}  // namespace
 
 Params::Params(Reader& reader, const Element& object) : reader_(reader), object_(object) {
   std::map<std::string_view, const Element*> names;
@@ -122,7 +112,7 @@ void Params::not_one_of(std::string_view name, const Element& e, const std::stri
 bool Params::in_range(const Field& f, const Element& e, double x) {
   if (f.range.contains(x)) return true;
   reader_.report().error(value_place(e, "value"), fmt::format("'{}' of {} is {}, out of its range {}", f.name,
-                                                              title(), x, range_text(f)));
+                                                              title(), x, range_text(f.name, f.range)));
   return false;
 }
 

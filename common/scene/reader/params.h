@@ -1,4 +1,5 @@
-// The parameters of one object. Its reader takes the ones that it knows; finish() reports the others.
+// The parameters of one object. The object's reader takes parameters by name; finish() reports those that
+// were not taken.
 #pragma once
 
 #include <fmt/format.h>
@@ -24,8 +25,8 @@ class Params {
   bool has(std::string_view name) const;
   // Returns the child of that name (a property, an object or a reference), and marks the name as known.
   const Element* take(std::string_view name);
-  // A nested object that no reader took by name, and the element in its place, which may be a reference to
-  // it.
+  // A nested object that was not taken by name, and the element that stands for it: the object, or a
+  // reference to it.
   struct Nested {
     const Element* object;
     const Element* use;
@@ -35,13 +36,13 @@ class Params {
   // Reports the parameters that no reader took.
   void finish();
 
-  // Each returns the value of a parameter that is no object. nullopt: the parameter is absent, or its type is
-  // wrong, which is reported.
+  // Each returns the value of a parameter that is not an object. nullopt: the parameter is absent, or its
+  // type is wrong, which is reported.
   std::optional<std::string> take_string(std::string_view name);
   std::optional<double> take_number(std::string_view name);
   std::optional<Transform> take_transform(std::string_view name);
 
-  // Used by Binder: these read `value` from `e`, in the notation of the value's type, and report errors.
+  // Used by Binder. Each reads `value` from `e`, in the notation of the value's type, and reports errors.
   void convert(const Field& f, const Element& e, double& value);
   void convert(const Field& f, const Element& e, int& value);
   void convert(const Field& f, const Element& e, bool& value);

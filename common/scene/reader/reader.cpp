@@ -6,6 +6,7 @@
 
 #include "common/base/frame_range.h"
 #include "common/base/suggest.h"
+#include "common/scene/analysis/shape_place.h"
 #include "common/scene/file_names.h"
 #include "common/scene/gltf/load.h"
 #include "common/scene/limits.h"
@@ -13,11 +14,21 @@
 #include "common/scene/pbrt/load.h"
 #include "common/scene/read.h"
 #include "common/scene/reader/unsupported.h"
+#include "common/scene/schema/mitsuba_plugins.h"
 #include "common/scene/schema/validate.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls {
 namespace scene {
+
+void unknown_plugin(const Element& e, Report& report) {
+  const std::string_view type = e.get("type");
+  const PluginRow* row = plugin_row(e.tag, type);
+  report.error(
+      value_place(e, "type"),
+      row ? fmt::format("the {} \"{}\" is not supported: {}", e.tag, type, row->note)
+          : fmt::format("there is no {} \"{}\"{}", e.tag, type, suggestion(type, read_plugins(e.tag))));
+}
 
 Reader::Reader(const Document& document, AssetSource& assets, Report& report)
     : document_(document), assets_(assets), report_(report), ids_(check_structure(document.root, report)) {}
@@ -32,6 +43,28 @@ Scene Reader::read() {
   warn_of_media_around_camera();
   if (!sensor_) report_.error(document_.root.at, "the scene has no <sensor>: nothing to see it with");
   return std::move(scene_);
+}
+
+// Warns if the camera is inside a shape with an interior medium but has no `medium` itself: as in Mitsuba,
+// the camera's medium is the sensor's `medium` alone.
+void Reader::warn_of_media_around_camera() {
+  if (!sensor_ || scene_.sensor.medium || report_.has_errors()) return;
+  const auto& m = scene_.sensor.to_world.m;
+  const Vec3 camera{m[3], m[7], m[11]};
+  for (std::size_t i = 0; i < scene_.shapes.size() && i < shape_elements_.size(); ++i) {
+    const Shape& s = scene_.shapes[i];
+    if (!s.interior || s.group || !invertible(s.to_world) || !holds(s, camera)) continue;
+    std::string id = "...";
+    for (const auto& [element, index] : media_)
+      if (index == s.interior && element->find("id")) id = element->get("id");
+    return report_.warning(
+        sensor_->at,
+        fmt::format(
+            "the camera is inside of a {} that holds a medium ({}), but its sensor names none, so that "
+            "it sees none up to the first boundary, as in Mitsuba: add <ref name=\"medium\" "
+            "id=\"{}\"/> to the sensor",
+            shape_elements_[i]->get("type"), report_.refer_to(shape_elements_[i]->at, sensor_->at), id));
+  }
 }
 
 // A reference at the top level is treated as the object that it refers to, as in any other parent element.
@@ -243,7 +276,7 @@ ReadResult read_scene(std::string_view file_name, std::string_view text, AssetSo
   scene::Report report(options.strict);
   ReadResult result;
   // The Python package converts a USD stage to XML and sends the XML under the stage's name. So a text with a
-  // <scene> is read whatever its name
+  // <scene> is read even if its name is that of another format
   const bool has_scene_element = text.substr(0, 4096).find("<scene") != text.npos;
   if (std::string why = scene::why_no_scene(file_name); !why.empty() && !has_scene_element) {
     const std::uint32_t file = report.add_file(scene::SourceText(std::string(file_name), ""));

@@ -1,5 +1,5 @@
-// Converts a Document to a Scene. The class Reader is the state shared by the readers of all kinds of
-// objects, which have one .cpp file per kind.
+// Converts a Document to a Scene. The class Reader reads all kinds of objects, each kind in a .cpp file of
+// its own, and holds the state that they share.
 #pragma once
 
 #include <initializer_list>
@@ -17,6 +17,9 @@
 #include "common/scene/xml/spectrum.h"
 
 namespace ls::scene {
+
+// Reports that the object's type is unsupported or unknown. The message for an unknown type has a suggestion.
+void unknown_plugin(const Element& e, Report& report);
 
 class Reader {
  public:
@@ -36,8 +39,8 @@ class Reader {
   std::optional<MediumIndex> medium(const Element& object, const Element& use);
 
   // A spectrum given as an object. Rgb: a colour for any use. LightColour: the colour of a light, allowed for
-  // emitters only. SpectralCurve: its colour depends on the use: a curve of light is converted as it is, any
-  // other one under D65.
+  // emitters only. SpectralCurve: the use determines the colour: a curve of light is converted as it is, any
+  // other curve is multiplied by D65.
   struct LightColour {
     Rgb value;
   };
@@ -156,7 +159,7 @@ class Reader {
   Memo<VolumeIndex> volumes_;
   Memo<PhaseIndex> phases_;
   Memo<MediumIndex> media_;
-  // The index of each shape group that was read; nullopt: the group has no shape, or is wrong.
+  // The indices of the shape groups read so far; nullopt: the group has no shape, or is wrong.
   std::unordered_map<const Element*, std::optional<GroupIndex>> groups_;
   std::optional<GroupIndex> group_;            // the group whose shapes are being read
   std::unordered_set<const Element*> merges_;  // the shapes "merge" that were read so far

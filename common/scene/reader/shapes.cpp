@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/scene/reader/plugin_error.h"
 #include "common/scene/reader/reader.h"
 #include "common/scene/schema/mesh_attributes.h"
 #include "common/scene/schema/mitsuba_plugins.h"

@@ -6,7 +6,6 @@
 
 #include "common/base/suggest.h"
 #include "common/scene/limits.h"
-#include "common/scene/reader/plugin_error.h"
 #include "common/scene/reader/reader.h"
 #include "common/scene/reader/unsupported.h"
 #include "common/scene/schema/bsdf_traits.h"
@@ -166,9 +165,9 @@ std::optional<BsdfIndex> Reader::read_bsdf_as<RoughThinDielectricBsdf>(const Ele
   return add_bsdf(e, b);
 }
 
-// Checks that a sheet sends back no more light than it gets, as far as its two colours are constant.
+// Checks that a sheet scatters no more light than it receives, if its two colours are constant.
 void Reader::check_sum(const Element& e, const DiffuseTransmissionBsdf& b) {
-  // Two shares that are written with six digits sum up to 1.000001 at most, and to a bit more in binary.
+  // Two shares written with six digits add up to at most 1.000001, and slightly more in binary.
   constexpr double kMost = 1 + 1.5e-6;
   const auto constant = [&](TextureIndex t) {
     return t.value < scene_.textures.size() ? std::get_if<ConstantTexture>(&scene_.textures[t.value])

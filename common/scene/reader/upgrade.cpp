@@ -18,8 +18,8 @@ constexpr Renamed kRenamed[] = {
     {"medium", "heterogeneous", "density", "sigma_t"},
 };
 
-// Values that have new names. The old filters differ from the new ones in minification, which more samples
-// compensate.
+// Values that have new names. The old filters also handled minification, for which the new ones need more
+// samples.
 constexpr struct {
   std::string_view tag, plugin, parameter, before, now;
 } kValues[] = {

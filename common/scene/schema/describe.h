@@ -1,18 +1,21 @@
-// The table of the scene language. For every type of scene.h it has the name, and for every field the name,
+// The table of the scene language. It lists every type of scene.h by name, and every field with its name,
 // unit, range, default (the value in a default-constructed struct, or Field::fallback for textures) and
 // meaning. Parameter reading, canonical JSON, hashing, docs/reference/scene-format.md and the random tests
 // all visit it:
 //
 //   describe(visitor, value)  calls  visitor.field(Field{...}, value.member)  for each member.
 //
-// The row of a type and its describe() stand together in the file of its family (describe_emitters.h, ...);
+// The row of a type and its describe() are in the file of the type's family (describe_emitters.h, ...);
 // describe_fields.h includes all of them. CONTRIBUTING.md lists the further steps for a new type.
 #pragma once
+
+#include <fmt/format.h>
 
 #include <array>
 #include <cmath>
 #include <concepts>
 #include <limits>
+#include <string>
 #include <string_view>
 #include <type_traits>
 #include <variant>
@@ -28,6 +31,12 @@ struct Range {
   bool open_min = false, open_max = false;
   bool contains(double x) const { return (open_min ? x > min : x >= min) && (open_max ? x < max : x <= max); }
 };
+// Returns "0 < NAME <= 1", for example.
+inline std::string range_text(std::string_view name, const Range& r) {
+  const std::string low = std::isinf(r.min) ? "" : fmt::format("{} {} ", r.min, r.open_min ? "<" : "<=");
+  const std::string high = std::isinf(r.max) ? "" : fmt::format(" {} {}", r.open_max ? "<" : "<=", r.max);
+  return fmt::format("{}{}{}", low, name, high);
+}
 inline constexpr Range kAny{};
 inline constexpr Range kNonNegative{.min = 0};
 inline constexpr Range kPositive{.min = 0, .open_min = true};
@@ -50,11 +59,11 @@ struct Field {
   // For a number or colour that Mitsuba does not have: the value for which the field is not written in files.
   double unwritten = std::numeric_limits<double>::quiet_NaN();
   bool number = false;  // true: a texture that is read as a scalar, not as a colour
-  // True for fields that were added when scenes already had digests, or that Mitsuba does not have. If such a
-  // field has its type's initial value (false, 0, empty), or as a colour the value `unwritten`, it is written
-  // neither in files nor in JSON, so it may be missing there.
+  // True for fields whose default must change neither files nor digests: fields that Mitsuba does not have,
+  // and fields that older scenes lack. If such a field has its type's initial value (false, 0, empty), or as
+  // a colour the value `unwritten`, it is written neither in files nor in JSON, so it may be missing there.
   bool elided = false;
-  // The integrators that have this parameter; the first is empty if all have it, the second if one has it
+  // The integrators that have this parameter. Both empty: all have it; the second empty: one has it.
   std::array<std::string_view, 2> only_of{};
 
   bool belongs_to(std::string_view integrator) const {
@@ -82,7 +91,7 @@ struct InfoOf;  // without a definition, so that a type without a row in the tab
 template <class T>
 inline constexpr TypeInfo kInfo = InfoOf<std::remove_const_t<T>>::value;
 
-// The row of a type: the members of its TypeInfo.
+// Adds the row of a type to the table. The arguments are the members of its TypeInfo.
 #define LS_TYPE(type, ...)                        \
   template <>                                     \
   struct InfoOf<type> {                           \
@@ -95,11 +104,12 @@ template <class... Kinds>
 struct KindsOf<std::variant<Kinds...>> {
   static constexpr std::array<std::string_view, sizeof...(Kinds)> names{kInfo<Kinds>.name...};
 };
-// Returns the names of the kinds of a variant, such as Medium, in its order.
+// The names of the kinds of a variant, such as Medium, in its order.
 template <class Variant>
 inline constexpr auto& kKindsOf = KindsOf<Variant>::names;
 
-// Calls f.template operator()<Kind>() for the kind of `Variant` that has this name. False: no kind has it.
+// Calls f.template operator()<Kind>() for the kind of `Variant` with this name. Returns false if there is
+// none.
 template <class Variant, class F>
 bool with_kind_named(std::string_view name, F f) {
   return [&]<class... Kinds>(std::type_identity<std::variant<Kinds...>>) {
@@ -110,7 +120,7 @@ bool with_kind_named(std::string_view name, F f) {
 template <class T, class U>
 concept Of = std::same_as<std::remove_const_t<T>, U>;
 
-// Returns the enumerators of an enumeration with their names.
+// NamesOf<E>::all has the enumerators of the enumeration E with their names.
 template <class E>
 struct Named {
   std::string_view name;

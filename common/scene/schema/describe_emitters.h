@@ -1,4 +1,4 @@
-// The table of emitters; see describe.h.
+// The parameters of emitters, with ranges, defaults and documentation (describe.h).
 #pragma once
 
 #include "common/scene/schema/describe.h"

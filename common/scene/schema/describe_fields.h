@@ -1,4 +1,4 @@
-// The whole table: of each kind of object, and of the scene that they make; see describe.h.
+// The whole table: all kinds of objects, and the scene that consists of them; see describe.h.
 #pragma once
 
 #include "common/scene/schema/describe_emitters.h"
@@ -37,93 +37,65 @@ void describe(V& v, T& i) {
           i.distance);
   v.field({.name = "heuristic", .doc = "weighs the two against each other", .only_of = {kDistantMis}},
           i.heuristic);
-  v.field({.name = "camera_points",
-           .doc = "points of a camera ray's way through a medium at which it looks for light; 0: "
-                  "as many as pay for the scene, perhaps none; -1: none, only where the ray is scattered",
-           .range = {-1, kMaxCameraPoints},
-           .elided = true,
-           .only_of = {"volpath"}},
-          i.camera_points);
+  // Describes the switch of a technique. The default, 0, uses it where it lowers the error at equal time, or
+  // wherever it is possible.
+  const auto technique = [&](std::string_view name, Range range, std::array<std::string_view, 2> only_of,
+                             std::string_view doc, auto& value) {
+    v.field({.name = name, .doc = doc, .range = range, .elided = true, .only_of = only_of}, value);
+  };
+  technique("camera_points", {-1, kMaxCameraPoints}, {"volpath"},
+            "points of a camera ray's way through a medium at which it looks for light; 0: "
+            "as many as pay for the scene, perhaps none; -1: none, only where the ray is scattered",
+            i.camera_points);
   v.field({.name = "phase_only",
            .doc = "in media with point, spot or projector lights too, directions are those of "
                   "the phase function and the material, none is aimed at such a light",
            .elided = true,
            .only_of = {"volpath"}},
           i.phase_only);
-  v.field({.name = "light_vertices",
-           .doc = "whether paths are connected to points that a directional emitter lights; 0: if "
-                  "that pays for the scene; -1: never; 1: always, as far as it is possible",
-           .range = {-1, 1},
-           .elided = true,
-           .only_of = {"volpath", "path"}},
-          i.light_vertices);
-  v.field(
-      {.name = "equiangular",
-       .doc = "whether light near lamps is looked for along whole ways through a medium; 0: "
-              "if that pays for the scene; -1: only where a ray is scattered, and nothing is aimed at lamps",
-       .range = {-1, 0},
-       .elided = true,
-       .only_of = {"volpath"}},
-      i.equiangular);
-  v.field({.name = "lamp_flights",
-           .doc = "whether a tenth of all flights through homogeneous media end near point, "
-                  "spot and projector lights; 0: if directions are aimed at these; -1: never",
-           .range = {-1, 0},
-           .elided = true,
-           .only_of = {"volpath"}},
-          i.lamp_flights);
-  v.field(
-      {.name = "light_tree",
-       .doc = "how one of 32 lights and more is chosen; 0: by distance, direction and power; -1: by power "
-              "alone",
-       .range = {-1, 0},
-       .elided = true},
-      i.light_tree);
-  v.field({.name = "path_reuse",
-           .doc = "how many pixels share what their paths find from the second scattering on, "
-                  "where media are homogeneous; 0: 16 if that pays for the scene, else "
-                  "none; -1 or 1: none",
-           .range = {-1, 64},
-           .elided = true,
-           .only_of = {"volpath", "path"}},
-          i.path_reuse);
-  v.field({.name = "shadow_roulette",
-           .doc = "whether shadow rays through grids that could bring little are traced at "
-                  "random; 0: where it is possible; -1: never",
-           .range = {-1, 0},
-           .elided = true,
-           .only_of = {"volpath"}},
-          i.shadow_roulette);
-  v.field({.name = "sky_samples",
-           .doc = "whether the first surface looks for a `constant` environment in a second "
-                  "direction; 0: in scenes without media, if that pays; -1: never",
-           .range = {-1, 0},
-           .elided = true,
-           .only_of = {"volpath", "path"}},
-          i.sky_samples);
-  v.field({.name = "sky_portals",
-           .doc = "whether directions towards the sky, an `envmap` or a `constant` environment, are also "
-                  "sampled through the openings by which its light enters the scene; 0: if that pays; -1: "
-                  "never; 1: where it is possible",
-           .range = {-1, 1},
-           .elided = true,
-           .only_of = {"volpath", "path"}},
-          i.sky_portals);
-  v.field({.name = "local_lights",
-           .doc = "whether 2 to 64 lights are chosen by which of them reach the place that is lit, as camera "
-                  "paths learned it; 0: if that pays; -1: never; 1: where it is possible",
-           .range = {-1, 1},
-           .elided = true,
-           .only_of = {"volpath", "path"}},
-          i.local_lights);
-  v.field({.name = "path_splitting",
-           .doc = "in scenes with grids, whether paths split at their first scattering if it "
-                  "is in a grid, and Russian roulette compares their weight with that behind the first "
-                  "scattering; 0: where it is possible; -1: never",
-           .range = {-1, 0},
-           .elided = true,
-           .only_of = {"volpath"}},
-          i.path_splitting);
+  technique("light_vertices", {-1, 1}, {"volpath", "path"},
+            "whether paths are connected to points that a directional emitter lights; 0: if "
+            "that pays for the scene; -1: never; 1: always, as far as it is possible",
+            i.light_vertices);
+  technique("equiangular", {-1, 0}, {"volpath"},
+            "whether light near lamps is looked for along whole ways through a medium; 0: "
+            "if that pays for the scene; -1: only where a ray is scattered, and nothing is aimed at lamps",
+            i.equiangular);
+  technique("lamp_flights", {-1, 0}, {"volpath"},
+            "whether a tenth of all flights through homogeneous media end near point, "
+            "spot and projector lights; 0: if directions are aimed at these; -1: never",
+            i.lamp_flights);
+  technique("light_tree", {-1, 0}, {},
+            "how one of 32 lights and more is chosen; 0: by distance, direction and power; -1: by power "
+            "alone",
+            i.light_tree);
+  technique("path_reuse", {-1, 64}, {"volpath", "path"},
+            "how many pixels share what their paths find from the second scattering on, "
+            "where media are homogeneous; 0: 16 if that pays for the scene, else "
+            "none; -1 or 1: none",
+            i.path_reuse);
+  technique("shadow_roulette", {-1, 0}, {"volpath"},
+            "whether shadow rays through grids that could bring little are traced at "
+            "random; 0: where it is possible; -1: never",
+            i.shadow_roulette);
+  technique("sky_samples", {-1, 0}, {"volpath", "path"},
+            "whether the first surface looks for a `constant` environment in a second "
+            "direction; 0: in scenes without media, if that pays; -1: never",
+            i.sky_samples);
+  technique("sky_portals", {-1, 1}, {"volpath", "path"},
+            "whether directions towards the sky, an `envmap` or a `constant` environment, are also "
+            "sampled through the openings by which its light enters the scene; 0: if that pays; -1: "
+            "never; 1: where it is possible",
+            i.sky_portals);
+  technique("local_lights", {-1, 1}, {"volpath", "path"},
+            "whether 2 to 64 lights are chosen by which of them reach the place that is lit, as camera "
+            "paths learned it; 0: if that pays; -1: never; 1: where it is possible",
+            i.local_lights);
+  technique("path_splitting", {-1, 0}, {"volpath"},
+            "in scenes with grids, whether paths split at their first scattering if it "
+            "is in a grid, and Russian roulette compares their weight with that behind the first "
+            "scattering; 0: where it is possible; -1: never",
+            i.path_splitting);
 }
 
 template <class V, Of<Asset> T>

@@ -1,4 +1,4 @@
-// The table of volumes, phase functions and media; see describe.h.
+// The parameters of volumes, phase functions and media, with ranges, defaults and documentation (describe.h).
 #pragma once
 
 #include "common/scene/schema/describe.h"

@@ -1,4 +1,4 @@
-// The table of shapes, camera and film; see describe.h.
+// The parameters of shapes, camera and film, with ranges, defaults and documentation (describe.h).
 #pragma once
 
 #include "common/scene/schema/describe.h"

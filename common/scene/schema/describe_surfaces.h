@@ -1,4 +1,4 @@
-// The table of surfaces; see describe.h.
+// The parameters of surfaces, with ranges, defaults and documentation (describe.h).
 #pragma once
 
 #include "common/scene/schema/describe.h"
@@ -43,8 +43,8 @@ void describe_metal(V& v, T& b) {
           b.specular_reflectance);
 }
 
-// Describes the boundary of a dielectric, or a sheet of it. `outside` and `through` are the meanings of
-// ext_ior and specular_transmittance.
+// Describes the parameters of a dielectric interface or of a thin dielectric sheet. `outside` and `through`
+// are the texts that document ext_ior and specular_transmittance.
 template <class V, class T>
 void describe_glass(V& v, T& b, std::string_view outside, std::string_view through) {
   v.field({.name = "int_ior", .doc = "index of refraction inside", .range = kPositive, .named_ior = true},

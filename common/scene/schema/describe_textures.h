@@ -1,4 +1,4 @@
-// The table of textures; see describe.h.
+// The parameters of textures, with ranges, defaults and documentation (describe.h).
 #pragma once
 
 #include "common/scene/schema/describe.h"

@@ -8,7 +8,8 @@
 namespace ls::scene {
 
 inline constexpr std::string_view kDistantMis = "volpath_distant_mis";
-// Nori's: direct light where mirrors and clear glass lead to, without media.
+// Nori's integrator: direct light at the first surface that is neither a mirror nor clear glass, without
+// media.
 inline constexpr std::string_view kWhitted = "whitted";
 
 struct IntegratorRow {
@@ -25,7 +26,7 @@ std::span<const IntegratorRow> integrators();
 const IntegratorRow* integrator_row(std::string_view name);  // returns nullptr for an unknown name
 
 // True if the integrator renders media, or is unknown; false for `path`, `whitted` and those that are read as
-// one of them. `name` is the dialect's, ours or Nori's.
+// one of them. `name` is Mitsuba's, ours or Nori's.
 bool sees_media(std::string_view name);
 
 // Integrators that contain another one and add something to its result; here the inner one is used alone.

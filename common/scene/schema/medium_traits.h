@@ -5,8 +5,8 @@
 
 namespace ls::scene {
 
-// Properties of a medium. False is certain; true may turn out to be false, since a grid file may contain only
-// zeros.
+// Properties of a medium. They are conservative: false is certain, but true may be wrong, since a grid file
+// may contain only zeros.
 struct MediumTraits {
   bool extinguishes = false;  // the extinction is above 0 somewhere
   bool scatters = false;

@@ -18,7 +18,7 @@ class Walk {
   template <class T>
   void field(const Field& f, const T& value) {
     const As before = as_;
-    // Textures inside a checkerboard are read in the same way as the checkerboard itself.
+    // Textures nested in a texture are read in the same way as the outer texture.
     if (in_texture_ == 0) as_ = f.number ? As::number : f.name == "normalmap" ? As::colour : As::any;
     go(value);
     as_ = before;

@@ -20,8 +20,8 @@ struct AttributeUse {
 
 // True if any texture of the scene reads an attribute; if not, the shapes need not be examined.
 bool any_attribute(const Scene& scene);
-// Return the attributes that a shape or a texture reads, sorted, without duplicates. They terminate for any
-// scene, including one with cycles, and ignore indices out of range.
+// Each returns the attributes that a shape or a texture reads, sorted, without duplicates. Scenes may have
+// cycles of textures and indices out of range, which are ignored.
 std::vector<AttributeUse> attribute_uses(const Scene& scene, const Shape& shape);
 std::vector<AttributeUse> attribute_uses(const Scene& scene, TextureIndex texture);
 

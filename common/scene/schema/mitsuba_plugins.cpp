@@ -238,11 +238,11 @@ bool has_row(const std::vector<PluginRow>& rows, std::string_view tag, std::stri
   return std::ranges::any_of(rows, [&](const PluginRow& r) { return r.tag == tag && r.name == name; });
 }
 
-// Adds those kinds of a variant that Mitsuba does not have, behind the rows of the same element.
+// Adds the kinds of a variant that Mitsuba does not have, after the rows of the same element.
 template <class... Kinds>
 void add_ours(std::vector<PluginRow>& rows, std::type_identity<std::variant<Kinds...>>) {
   for (const TypeInfo& kind : {kInfo<Kinds>...}) {
-    // A kind with `plugins` is read under those names alone.
+    // A kind with `plugins` is read under these names only.
     if (!kind.plugins.empty() || has_row(rows, kind.kind, kind.name)) continue;
     const auto last =
         std::find_if(rows.rbegin(), rows.rend(), [&](const PluginRow& r) { return r.tag == kind.kind; });

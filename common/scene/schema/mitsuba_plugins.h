@@ -1,6 +1,6 @@
-// Every plugin of Mitsuba's scene language by its name: what is read here, and why the others are not. One
-// table for the messages, the suggestions and docs/reference/mitsuba.md. Kinds of objects that Mitsuba does
-// not have are added to it from the table of the scene language (describe.h).
+// Every plugin of Mitsuba's scene language by name: whether it is read here and, if not, why. Messages,
+// suggestions and docs/reference/mitsuba.md use this one table. Kinds of objects that Mitsuba does not have
+// are added to it from the table of the scene language (describe.h).
 #pragma once
 
 #include <span>

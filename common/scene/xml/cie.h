@@ -7,7 +7,7 @@
 namespace ls::scene {
 
 struct CieRow {
-  std::array<double, 3> observer;  // the values x, y and z of the observer
+  std::array<double, 3> observer;  // the colour matching functions x, y and z
   double d65;                      // relative power; 100 at 560 nm
 };
 

@@ -1,5 +1,5 @@
 // A scene file as a tree of elements with their places in the text. Includes are inserted and $parameters
-// substituted, but nothing is interpreted yet.
+// substituted, but elements and values are not interpreted yet.
 #pragma once
 
 #include <map>

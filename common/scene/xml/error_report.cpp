@@ -25,7 +25,7 @@ void Report::warning(const Span& at, std::string text) {
 }
 
 void Report::add(Diagnostic::Severity severity, const Span& at, std::string text) {
-  // Errors and warnings are counted separately, so that many warnings never hide an error. take() applies the
+  // Errors and warnings are counted separately, so that warnings never displace an error. take() applies the
   // common limit.
   std::size_t& count = severity == Diagnostic::Severity::error ? errors_ : warnings_;
   if (count++ >= kMax) return;

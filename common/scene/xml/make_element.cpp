@@ -68,4 +68,14 @@ Element matrix_step(const std::array<double, 16>& m, const Span& at) {
   return step;
 }
 
+void place(Element& parent, const Transform& to_world, const Span& at) {
+  if (to_world != Transform{}) add_transform(parent, nullptr, "to_world", {matrix_step(to_world.m, at)});
+}
+
+std::size_t size_of(const Element& e) {
+  std::size_t n = 1;
+  for (const Element& child : e.children) n += size_of(child);
+  return n;
+}
+
 }  // namespace ls::scene

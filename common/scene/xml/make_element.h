@@ -25,6 +25,10 @@ void add_as(Element& parent, const Element* property, std::string name);
 // steps at all.
 void add_transform(Element& parent, const Element* transform, std::string name,
                    std::vector<Element> before = {});
+// Adds the <transform> "to_world"; adds nothing if it is the identity.
+void place(Element& parent, const Transform& to_world, const Span& at);
+// Returns the number of elements: this one and all below it.
+std::size_t size_of(const Element& e);
 Element matrix_step(const std::array<double, 16>& m, const Span& at);
 
 }  // namespace ls::scene

@@ -23,8 +23,8 @@ struct Span {
 
 class SourceText {
  public:
-  // Returns a name of what stands at an offset (a path in the document), with which messages about that place
-  // begin; an empty text: there is no such name.
+  // Returns the path in the document of the value at an offset. Messages about that place begin with it.
+  // Empty: there is no path.
   using PathOf = std::function<std::string(std::size_t)>;
   SourceText(std::string name, std::string text, PathOf path_of = {});
 

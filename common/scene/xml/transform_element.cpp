@@ -15,6 +15,12 @@ Vec3 cross(const Vec3& a, const Vec3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
+std::optional<Vec3> unit(const Vec3& v) {
+  const double length = std::sqrt(dot(v, v));
+  if (!std::isnormal(length)) return std::nullopt;
+  return Vec3{{v[0] / length, v[1] / length, v[2] / length}};
+}
+
 namespace {
 
 constexpr double kUnitSlack = 1e-3;  // tolerance for an axis written with three digits

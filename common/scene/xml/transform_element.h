@@ -8,6 +8,7 @@ namespace ls::scene {
 
 double dot(const Vec3& a, const Vec3& b);
 Vec3 cross(const Vec3& a, const Vec3& b);
+std::optional<Vec3> unit(const Vec3& v);  // nullopt: v has no length, or one that is not finite
 
 Transform multiply(const Transform& a, const Transform& b);
 Vec3 transform_point(const Transform& t, const Vec3& p);  // uses the affine part only
@@ -26,8 +27,8 @@ Transform read_transform(const Element& e, Report& report);
 // True if the singular values of the linear part are equal within the rounding of single precision: the
 // matrix scales equally in all directions.
 bool is_similarity(const Transform& t);
-// Returns the part of a 4 x 4 matrix that maps x and y to x and y, with their translation: what Mitsuba 3
-// uses for textures.
+// Returns the part of a 4 x 4 matrix that maps x and y to x and y, with their translation. Mitsuba 3 uses
+// this part for textures.
 UvTransform uv_part(const Transform& t);
 
 // Reads x, y, z or value="..." of <translate>, <rotate>, <scale>, <vector> or <point>; missing components

@@ -1,7 +1,7 @@
 // The farm is a state machine. It decides which worker renders which units (a unit is one round, that is
 // range of samples, of one tile), which results are folded (added to the job's image) and when, and when a
-// job ends. Its effects are a function of events and time: it does no I/O and has no threads, no clock, no
-// log. It is not thread-safe; the service guards it with one mutex.
+// job ends. Its effects depend only on events and time: it does no I/O and has no threads, no clock, no log.
+// It is not thread-safe; the service guards it with one mutex.
 //
 // effects = farm.handle(event, now); `now` never goes back.
 //
@@ -10,8 +10,8 @@
 // folds -> UnitFolded -> {Checkpoint, JobFinished...}. Several results of one unit may be under way at once:
 // the first UnitAccepted wins.
 //
-// The cost of one call of handle() does not depend on the number of tiles or units. Two things cost more: a
-// round that completes (checkpoint), and what happens once per job.
+// The cost of one call of handle() does not depend on the number of tiles or units, except when a round
+// completes (checkpoint) and for events that come once per job.
 #pragma once
 
 #include <cstdint>
@@ -42,7 +42,7 @@ struct Wanted {
     duplicate,    // its unit has an accepted result already: verify it and raise UnitAccepted, since the farm
                   // compares the two, but do not store it
     other_class,  // its numeric class (machines that compute the same bits) is not that of the job
-    no            // nobody needs it: acknowledge it to the worker and drop it
+    no            // not needed: acknowledge it to the worker and drop it
   };
   Verdict verdict = Verdict::no;
   SampleRange samples;  // the sample range that the job needs of this unit now
@@ -60,15 +60,13 @@ struct JobFigures {
   std::uint64_t units_queued = 0;  // units that wait for a worker: units_total - units_done - units_leased
   std::uint64_t units_folded = 0;
   RoundIndex rounds_complete = 0;  // number of rounds that the image has of every tile
-  int priority = 0;
   // Predicted CPU seconds of the units that are not done, from measured cost. 0: nothing has been measured
   // yet, or the end of an adaptive job (one with a target error) is not predicted yet.
   double core_seconds_left = 0;
-  double core_seconds_to_limit = 0;  // the same if every tile gets its full samples, whatever the error
+  double core_seconds_to_limit = 0;  // the same if every tile gets its full samples
   // Cores of the workers that hold its leases; each counts by the job's share of that worker's leases
   double cores = 0;
   double core_seconds_queued = 0;  // predicted CPU seconds of the units that wait for a worker
-  double seconds_per_sample = 0;   // mean CPU seconds per pixel sample; 0: nothing measured yet
   std::optional<TimePoint> first_ray;
   std::optional<Digest> numeric_class;
   std::optional<ClassShare> class_share;  // nullopt: the job is pinned to no class
@@ -95,7 +93,7 @@ class Farm {
     std::string lease_prefix = "l";
     ShareLimits limits = {};
     double audit_rate = 0;         // fraction of the accepted results that another worker is to render again
-    std::uint64_t audit_seed = 0;  // decides which results are audited; workers must not know it
+    std::uint64_t audit_seed = 0;  // decides which results are audited; secret from workers
   };
 
   Farm();
@@ -114,19 +112,16 @@ class Farm {
   // Returns the job's current plan, for storage: with changed priority and samples, and without a target
   // error or time limit that no longer applies.
   std::optional<JobPlan> plan(const JobId& id) const;
-  // Return an error if the event JobRetargeted or JobExtended would change nothing; the error says why.
+  // Return an error, with the reason, if the farm would ignore the event JobRetargeted or JobExtended.
   Result<void> may_retarget(const JobId& id, double target_error) const;
   Result<void> may_extend(const JobId& id, std::uint64_t spp) const;
-  std::vector<WorkerId> workers() const;
   std::optional<WorkerFigures> worker(const WorkerId& id) const;
   std::optional<TileFigures> tile(const JobId& id, TileIndex tile) const;
-  // Returns the workers that render the tile at the moment. Scans all leases of the job
-  std::vector<WorkerId> tile_workers(const JobId& id, TileIndex tile) const;
-  // Returns the reason why a job that could run has no worker, for the user: it names workers of another
-  // class, workers without its tags, and blocked or unhealthy ones. Empty if some worker may take it.
+  // Returns, for the user, why a job that could run has no worker: workers of another class, workers without
+  // its tags, and blocked or unhealthy ones. Empty if some worker may take it.
   std::string why_waiting(const JobId& id) const;
-  // Returns the core seconds of all users that have jobs at work, as FairShare counts them; for tests and
-  // metrics.
+  // Returns the core seconds of all users whose jobs have units to lease or leased units, as FairShare counts
+  // them; for tests and metrics.
   struct Shares {
     std::string owner;
     int priority = 0;

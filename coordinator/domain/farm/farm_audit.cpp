@@ -69,7 +69,7 @@ std::string audit_load(const std::string& whose, const Load& kept, const Load& c
   return "";
 }
 
-// Leased units and charged core seconds of each job, group and user, summed up from the leases to check the
+// Leased units and charged core seconds of each job, group and user, summed over the leases to check the
 // running totals
 struct Leased {
   std::map<JobSeq, Load> jobs;

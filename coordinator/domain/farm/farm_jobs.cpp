@@ -30,7 +30,7 @@ void Farm::State::set_state(Job& job, JobState to) {
 
 void Farm::State::refresh(Job& job) {
   const bool units = job.leasable() && !job.queue.empty(job.units);
-  // FairShare may have the job already, because of an audit that only some workers can do
+  // FairShare may list the job already, because of an audit that only some workers can render
   work_appeared |= units && !job.has_units;
   job.has_units = units;
   if (units || (job.leasable() && job.audit_waits()))
@@ -55,7 +55,7 @@ void Farm::State::on(const JobRestored& event) {
   if (is_closed(job.state)) return;
 
   // If a done job has lost its film (the sums of its samples), the number of samples of each tile is lost,
-  // too. The film is summed up again from the job's results.
+  // too. Then the film is summed up again from the job's results.
   const bool with_film = event.folded.size() == job.units.tiles() &&
                          std::any_of(event.folded.begin(), event.folded.end(), [](auto r) { return r > 0; });
   if (job.state == JobState::done && with_film) {
@@ -147,8 +147,8 @@ void Farm::State::on(const JobFocused& event) {
   job->look_at_focus();
 }
 
-// Forgets the job, but not which workers failed in it; failures stay on record until they are forgiven. A
-// worker that fails in two jobs is unhealthy, even if the first job is gone.
+// Forgets the job, but keeps the failures of workers in it until they are forgiven. A worker that fails in
+// two jobs is unhealthy, even if the first job is gone.
 void Farm::State::on(const JobForgotten& event) {
   Job* job = find(event.job);
   if (job == nullptr || !job->ended()) return;
@@ -167,7 +167,7 @@ void Farm::State::freeze(Job& job, StopReason reason) {
   for (TileIndex t = 0; t < begun.size(); ++t)
     begun[t] = std::max({job.queue.next(t), job.units.end_of_accepted(t), RoundIndex{1}});
   job.cut_off(begun, reason);
-  // This also adds accepted results to the image that the stop rule of a target error has held back
+  // This also adds accepted results that the stop rule of a target error has kept out of the image
   for (TileIndex t = 0; t < begun.size(); ++t) issue_folds(job, t);
   finish_if_complete(job);
   refresh(job);
@@ -184,10 +184,10 @@ void Farm::State::finish_if_complete(Job& job) {
   refresh(job);
 }
 
-void Farm::State::fail(Job& job, std::string error, std::optional<UnitFailure> failure) {
+void Farm::State::fail(Job& job, std::string error) {
   set_state(job, JobState::failed);
-  effects.emplace_back(JobFailed{job.plan.brief.job, std::move(error), std::move(failure)});
-  // If a job fails on every worker, the workers are not to blame: their failures are erased.
+  effects.emplace_back(JobFailed{job.plan.brief.job, std::move(error)});
+  // The failure of a job is not attributed to its workers: their failures in it are erased.
   for (const auto& [index, worker] : workers.all()) worker->failures.erase(job.seq);
   end(job);
 }

@@ -1,5 +1,5 @@
-// Leases units to workers and takes them back. No other file changes which leases exist, which units they
-// hold, or the amount of work of each worker.
+// Leases units to workers and takes them back. Only these functions change which leases exist, which units
+// they hold, and the amount of work of each worker.
 #include <algorithm>
 #include <limits>
 

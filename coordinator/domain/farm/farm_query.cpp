@@ -115,10 +115,9 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
   f.units_queued = job->queued();
   f.units_folded = job->units.folded_count();
   f.rounds_complete = job->units.rounds_complete();
-  f.priority = job->plan.priority;
-  f.seconds_per_sample = job->cost.per_sample();
+  const double per_sample = job->cost.per_sample();  // 0: nothing has been measured yet
   // Samples are averaged over all pixels. A round that misses some units counts in proportion to its finished
-  // units, as if all tiles had the same size.
+  // units; all tiles are taken to have the same size.
   const RoundIndex rounds = job->queue.longest();
   const double pixels = static_cast<double>(job->plan.grid.frame.width) * job->plan.grid.frame.height;
   const double left = static_cast<double>(job->units.tiles());
@@ -134,11 +133,11 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
   };
   if (!job->ended()) {
     const double planned = samples_of_last(f.units_total - f.units_done);
-    f.core_seconds_left = (job->adaptive_running() ? job->adaptive->samples_left().value_or(0) : planned) *
-                          f.seconds_per_sample;
+    f.core_seconds_left =
+        (job->adaptive_running() ? job->adaptive->samples_left().value_or(0) : planned) * per_sample;
     f.core_seconds_to_limit =
-        (job->adaptive_running() ? job->adaptive->samples_to_limit() : planned) * f.seconds_per_sample;
-    f.core_seconds_queued = samples_of_last(f.units_queued) * f.seconds_per_sample;
+        (job->adaptive_running() ? job->adaptive->samples_to_limit() : planned) * per_sample;
+    f.core_seconds_queued = samples_of_last(f.units_queued) * per_sample;
   }
   for (const auto& [index, leases] : job->load.leases_at) {
     const Worker& w = *state_->workers.all().at(index);
@@ -152,12 +151,6 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
     f.class_share = ClassShare{own.workers, all.workers, own.threads, all.threads};
   }
   return f;
-}
-
-std::vector<WorkerId> Farm::workers() const {
-  std::vector<WorkerId> ids;
-  for (const auto& [index, worker] : state_->workers.all()) ids.push_back(worker->id);
-  return ids;
 }
 
 std::optional<WorkerFigures> Farm::worker(const WorkerId& id) const {
@@ -174,22 +167,6 @@ std::optional<TileFigures> Farm::tile(const JobId& id, TileIndex tile) const {
   if (job == nullptr || tile >= job->units.tiles()) return std::nullopt;
   const RoundIndex rounds = job->units.folded(tile);
   return TileFigures{rounds, rounds == 0 ? 0 : cut_range(rounds - 1, job->spp).s1};
-}
-
-std::vector<WorkerId> Farm::tile_workers(const JobId& id, TileIndex tile) const {
-  std::vector<WorkerId> found;
-  const Job* job = state_->find(id);
-  if (job == nullptr) return found;
-  for (const auto& [code, holders] : job->out) {
-    if (tile_of(code) != tile) continue;
-    for (const LeaseSeq seq : holders.lease) {
-      if (seq == 0) continue;
-      const WorkerId& worker = state_->leases.find(seq)->worker->id;
-      if (std::find(found.begin(), found.end(), worker) == found.end()) found.push_back(worker);
-    }
-  }
-  std::sort(found.begin(), found.end());
-  return found;
 }
 
 std::string Farm::why_waiting(const JobId& id) const {

@@ -1,6 +1,6 @@
 // The state of the farm, and its reaction to each event. The functions are grouped by subject into the files
 // farm_jobs, farm_changes, farm_workers, farm_units, farm_leases, schedule, farm_stop and farm_trust. A unit
-// is one round (range of samples) of one tile; a lease is a list of units that one worker was told to render.
+// is one round (range of samples) of one tile; a lease is a list of units that is assigned to one worker.
 #pragma once
 
 #include <functional>
@@ -38,8 +38,8 @@ struct Farm::State {
 
   // State of the event being handled
   TimePoint now{};
-  // Time of the latest Tick. Whether a worker is still blocked is decided by this time, because blocks are
-  // lifted at ticks, when all workers are checked
+  // Time of the latest Tick. A worker's block is checked at this time, not `now`, because only a tick, which
+  // checks all workers, lifts blocks
   TimePoint ticked{};
   std::vector<Effect> effects;
   bool work_appeared = false;  // there may be units that any worker could take now
@@ -66,13 +66,13 @@ struct Farm::State {
   Job* find(const JobId& id) const;
   Job& add(JobPlan plan);
   void set_state(Job& job, JobState to);
-  // Tells FairShare whether the job has units to lease. Must be called after any change of the job's queue,
+  // Updates in FairShare whether the job has units to lease. Call it after any change of the job's queue,
   // state or window (how far ahead rounds may be leased)
   void refresh(Job& job);
   void restore_tile(Job& job, TileIndex tile, const JobRestored& event);
   void freeze(Job& job, StopReason reason);
   void finish_if_complete(Job& job);
-  void fail(Job& job, std::string error, std::optional<UnitFailure> failure);
+  void fail(Job& job, std::string error);
   void end(Job& job);  // takes back all leases of a job that has ended
 
   // farm_workers.cpp
@@ -110,17 +110,17 @@ struct Farm::State {
   // Returns a unit of the job that this worker may render again for an audit; nullopt if there is none.
   std::optional<UnitCode> audit_for(const Job& job, const Worker& worker) const;
   bool audit_from(Job& job, Worker& worker);
-  // True if this worker was told to render this unit, so that its result counts as a vote.
+  // True if this worker held or holds a lease on this unit, so that its result counts as a vote.
   bool was_asked(const Job& job, UnitCode code, WorkerIndex worker) const;
   void agreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
   void disagreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
   void claimed(Job& job, UnitCode code, const UnitAccepted& by);
   void undecided(Job& job, UnitCode code);
-  // The workers that could render the unit of an audit. `none`: no worker; `away`: only workers that are
-  // connected but get no work now; `there`: at least one that may begin.
+  // Which workers could render the unit of an audit. `none`: no worker; `away`: only connected workers that
+  // get no work now; `there`: at least one that may begin.
   enum class Deciders { none, away, there };
   Deciders deciders(const Job& job, const Audit& audit) const;
-  void settle_audits(Job& job);  // decides or drops the open audits that no worker can do
+  void settle_audits(Job& job);  // decides or drops the open audits that no worker can render
   void audit_failed(Job& job, UnitCode code, Worker& worker, LeaseRecord& lease);
   void close_audits(Job& job, const std::function<bool(UnitCode, const Audit&)>& which);
   void found_faulty(const UnitKey& unit, WorkerIndex faulty, std::string evidence);
@@ -133,8 +133,8 @@ struct Farm::State {
   // farm_stop.cpp. Levels, and groups of tiles that stop together, are those of the stop rule
   // (adaptive_stop.h).
 
-  // Passes the error of the tile after this round, which has just been added to the image, to the stop rule,
-  // which decides how many rounds tiles get. Then acts on its decision.
+  // Passes the tile's error after this round, which was just added to the image, to the stop rule, and
+  // applies the rule's decision on how many rounds the tiles get.
   void steer(Job& job, TileIndex tile, RoundIndex round);
   void judge(Job& job);  // judges the image at every level that all groups have reached
   // judges the image at the level that all groups have reached
@@ -156,19 +156,19 @@ struct Farm::State {
   void unload(Job& job, std::uint32_t units);
   void leave_load(Job& job, const Worker& worker);  // subtracts one of the job's leases from the worker's
                                                     // count
-  // Returns how many more of the job's units the worker may be leased under the limits on workers and units.
-  // Audits (second renderings, for comparison) are exempt: the farm orders them, not the user, and an audit
-  // that waited for the user's other work would delay the end of a finished job.
+  // Returns how many more of the job's units may be leased to the worker under the limits on workers and
+  // units. Audits (second renderings, for comparison) are exempt: the farm orders them, not the user, and an
+  // audit that waited for the user's other work would delay the end of a finished job.
   std::uint32_t room(const Job& job, const Worker& worker) const;
   bool limited(const Job& job) const;
   static bool has(const LeaseRecord& lease, UnitCode code);  // true if the unit is still leased under it
   // Removes the unit from the lease without queueing it. True if no other lease holds the unit.
   bool detach(LeaseRecord& lease, UnitCode code);
-  // Removes the unit from all leases because its result arrived. `by` is the worker that delivered it, null
-  // if unknown.
+  // Removes the unit from all leases because its result arrived. `by` is the worker that delivered the
+  // result; null: unknown.
   void settle_unit(Job& job, UnitCode code, const Worker* by);
-  // Takes those units of the lease for which `which` is true from the worker and queues them again. A lease
-  // without units ends. `send_worker`: the worker gets a message about it.
+  // Removes the units for which `which` is true from the lease and queues them again. A lease without units
+  // ends; if `send_worker`, its worker then gets a CancelLease.
   template <class Which>
   void free_units(LeaseRecord& lease, FreedCause why, bool send_worker, Which&& which);
   void free_lease(LeaseSeq seq, FreedCause why, bool send_worker);
@@ -187,14 +187,13 @@ struct Farm::State {
   void pin(Job& job, const Digest& numeric_class);  // does nothing if the job is pinned already
   bool lease_from(Job& job, Worker& worker);
   std::optional<UnitCode> next_for(Job& job, const Worker& worker);
-  // True if the unit is speculative (may turn out not to be needed) and the worker should not get it yet,
-  // because it still has enough to do. `units` and `cost` (predicted CPU seconds) are what the lease being
-  // made adds to what the worker holds.
+  // True if the unit is speculative (the job may end without it) and the worker has enough other work for
+  // now. `units` and `cost` (predicted CPU seconds) describe the lease being made so far.
   bool too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units, double cost) const;
   // True if a connected worker other than `but` may take units of the job and has not failed on this one.
   bool others_may_take(const Job& job, UnitCode code, const Worker& but) const;
-  // Near the end of a job: takes a lease that waits behind other work of its worker away from it, so that an
-  // idle worker can have its units. True if units were queued again.
+  // Near the end of a job: takes back a lease that waits behind other work of its worker, so that an idle
+  // worker can render its units. True if units were queued again.
   bool take_back_for_idle();
   bool untouched(const LeaseRecord& lease) const;  // true if its worker is still busy with earlier leases
   double waits_behind_others(const LeaseRecord& lease) const;

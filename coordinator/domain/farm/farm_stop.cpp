@@ -102,8 +102,8 @@ void Farm::State::take_marks(Job& job) {
 }
 
 void Farm::State::stop_at_level(Job& job) {
-  // Rounds whose addition to the image was requested stay in it. So if the target was raised, the image may
-  // have more rounds than the level needs.
+  // Rounds for which a Fold was requested stay in the image. So if the target was raised, the image may have
+  // more rounds than the level needs.
   std::vector<RoundIndex> ends = job.adaptive->ends();
   for (TileIndex t = 0; t < job.units.tiles(); ++t) ends[t] = std::max(ends[t], job.units.issued(t));
   job.cut_off(ends, StopReason::error);
@@ -112,10 +112,11 @@ void Farm::State::stop_at_level(Job& job) {
 }
 
 // Decides which units are still rendered before the time limit. Queued units are considered in the order of
-// rounds, and kept as long as their predicted cost fits the remaining time: the time of all cores until the
-// limit, minus the cost of the leased units. A unit is kept if at least half of it fits, so the job ends as
-// often before the limit as after it. Leased units stay leased, however long they take: dropping slow units
-// would bias the image. This function is called again until the limit, since predictions improve.
+// rounds, and kept as long as their predicted cost fits the remaining time: the time of all cores that may
+// render the job until the limit, minus the cost of its leased units. A unit is kept if at least half of it
+// fits, so the job ends as often before the limit as after it. Leased units stay leased, however long they
+// take: dropping slow units would bias the image. This function is called again until the limit, since
+// predictions improve.
 void Farm::State::plan_end(Job& job, TimePoint limit) {
   if (job.adaptive_running() || !job.cost.known()) return;
   if (job.stopping == StopReason::time) {

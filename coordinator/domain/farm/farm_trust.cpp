@@ -1,8 +1,8 @@
 // Audits detect faulty workers. A random share of the accepted results is rendered again by another worker,
 // and the two results are compared. Copies of slow units, which two workers render, are compared in the same
 // way. Only workers that held a lease on a unit may vote on it (VoterTable). If two results of a unit differ,
-// a third worker decides, and the outvoted one is quarantined: every tile that it has contributed to, in any
-// running job, is folded again from round 0.
+// a third worker decides, and the outvoted one is quarantined: every tile to which it contributed, in any job
+// that has not ended, is folded again from round 0 (in a job with a target error every tile).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -50,8 +50,8 @@ void Farm::State::consider_audit(Job& job, UnitCode code, WorkerIndex first) {
   work_appeared = true;
 }
 
-// Audits (units that are rendered again for comparison) that were open at the restart continue. No worker is
-// connected yet, so these audits get a deadline that leaves workers time to come back.
+// Continues the audits (units that are rendered again for comparison) that were open at the restart. No
+// worker is connected yet, so settle_audits() gives these audits some time before it drops them.
 void Farm::State::restore_audits(Job& job, const JobRestored& event) {
   for (const JobRestored::Audit& open : event.audits) {
     const UnitCode code = unit_code(open.round, open.tile);
@@ -198,7 +198,9 @@ void Farm::State::disagreed(Job& job, UnitCode code, const UnitAccepted& with, b
     }
   }
   if (!asked) return claimed(job, code, with);
-  Audit& audit = job.audits[code];
+  const auto [open, begun] = job.audits.try_emplace(code);
+  audited.asked += begun;
+  Audit& audit = open->second;
   audit.first = first.worker;
   audits_changed.insert(job.plan.brief.job);
   if (!audit.second) {
@@ -215,8 +217,8 @@ void Farm::State::disagreed(Job& job, UnitCode code, const UnitAccepted& with, b
                outvoted(with.unit, first.digest, workers.name_of(second), with.worker, claimed));
 }
 
-// Handles a result that differs from the accepted one and comes from a worker that was not asked for it. The
-// worker has chosen the unit itself, so its result is no vote. But the unit is audited, and if the auditor
+// Handles a result that differs from the accepted one and comes from a worker that held no lease on the unit.
+// The worker has chosen the unit itself, so its result is no vote. But the unit is audited: if the auditor
 // agrees with the accepted result, the worker that made the claim is faulty.
 void Farm::State::claimed(Job& job, UnitCode code, const UnitAccepted& by) {
   const std::pair claimed{workers.index_of(by.worker), by.digest};
@@ -245,8 +247,7 @@ void Farm::State::undecided(Job& job, UnitCode code) {
            "is not what it says: let each render the scene alone with `lightshaft render`, take the one "
            "whose pixels_sha256 is not the others' off the farm, and submit the job again",
            tile_of(code), round_of(code), workers.name_of(first.worker).value, first.digest.hex(),
-           workers.name_of(second.first).value, second.second.hex()),
-       std::nullopt);
+           workers.name_of(second.first).value, second.second.hex()));
 }
 
 void Farm::State::found_faulty(const UnitKey& unit, WorkerIndex faulty, std::string evidence) {

@@ -127,8 +127,8 @@ void Farm::State::on(const UnitFailed& event) {
   note_progress(*worker);
   const UnitCode code = unit_code(event.failure.unit.round, event.failure.unit.tile);
   if (event.failure.unit.tile >= job->units.tiles() || !job->queue.plans(code)) return;
-  // Only a worker that holds the unit can fail on it. If the unit was taken back, another worker renders it,
-  // and this report is ignored.
+  // Only the failure of a worker that holds the unit counts. If the unit was taken back, another worker
+  // renders it, and this report is ignored.
   LeaseRecord* lease = lease_of(*job, code, *worker);
   if (lease == nullptr) return;
   if (lease->audit) return audit_failed(*job, code, *worker, *lease);
@@ -150,8 +150,7 @@ void Farm::State::count_failure(Job& job, UnitCode code, Worker& worker, const U
   }
   const auto report = [&](const std::string& head) {
     const PixelRect rect = job.plan.grid.rect(tile_of(code));
-    fail(job, head + describe_failure(rect, job.range(code), job.failures.attempts(code), job.plan.replay),
-         failure);
+    fail(job, head + describe_failure(rect, job.range(code), job.failures.attempts(code), job.plan.replay));
   };
   // A single report that the scene is at fault does not fail the job: the worker may have bad memory or lie.
   // It counts like any other failure.

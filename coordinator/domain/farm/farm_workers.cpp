@@ -148,7 +148,8 @@ void Farm::State::expire_leases() {
     Worker& worker = *lease->worker;
     worker.pause = now - worker.progress_at >= kNoGrowthLimit ? Pause::stuck : Pause::silent;
     workers.settle(worker);
-    // The worker is not told: if it recovers and finishes before other workers do, its results are welcome.
+    // The worker gets no message: if it recovers and finishes before other workers do, its results are
+    // accepted.
     free_lease(lease->seq, FreedCause::deadline_passed, false);
   }
 }

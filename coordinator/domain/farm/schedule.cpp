@@ -23,10 +23,10 @@ double seconds_left(const Job& job, const Worker& worker, TimePoint now) {
   return std::max(0.0, seconds(*limit - now) - worker.seconds_until_free());
 }
 
-// Guided self-scheduling: a worker gets half of what an even split of the waiting units over all threads of
-// the farm (`farm_threads`) would give its threads. So all threads end at about the same time. A lease also
-// ends with the unit at which its predicted cost reaches `seconds`, a limit that shrinks shortly before the
-// job's time limit.
+// Guided self-scheduling: a worker gets half of its threads' share in an even split of the waiting units over
+// all threads of the farm (`farm_threads`). So all threads end at about the same time. A lease also ends with
+// the unit at which its predicted cost reaches `seconds`, a limit that shrinks shortly before the job's time
+// limit.
 LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, TimePoint now) {
   const std::uint64_t threads = static_cast<std::uint64_t>(worker.threads);
   const std::uint64_t halves = 2 * static_cast<std::uint64_t>(std::max(farm_threads, 1));
@@ -115,8 +115,8 @@ LeaseRecord* Farm::State::longest_waiting_for(const Worker& idle) {
   for (auto it = leases.all().rbegin(); it != leases.all().rend() && ++looked_at <= kSpeculationScan; ++it) {
     LeaseRecord& lease = it->second;
     const Job& job = *lease.job;
-    // The idle worker must be able to begin immediately: it has loaded the job's world, and nothing forbids
-    // it these units.
+    // The idle worker must be able to begin immediately: it has loaded the job's world and may take these
+    // units.
     if (lease.audit || lease.worker == &idle || !idle.warmed_up.contains(job.seq) ||
         !may_serve(job, idle, ticked) || !job.leasable() || room(job, idle) < lease.remaining)
       continue;
@@ -150,8 +150,8 @@ Farm::State::Takes Farm::State::takes(Job& job, const Worker& worker) {
 }
 
 // A worker that is alone in its numeric class (machines that compute the same bits) cannot be audited: no
-// other worker can check its results. So, if some class has several workers that fit the job, the job may be
-// pinned only to such a class. Without audits any class will do.
+// other worker can check its results. So, if another class has several workers that fit the job, the job may
+// not be pinned to this worker's class. Without audits any class will do.
 bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
   if (job.numeric_class || options.audit_rate <= 0 || workers.of_class(worker.numeric_class).workers > 1)
     return true;
@@ -166,10 +166,10 @@ bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
   return true;
 }
 
-// Returns the job whose units this worker gets next. This is the first job in turn, or a later one whose
-// world (loaded scene) the worker has, since loading costs time. But a later job must not be far ahead of its
-// fair share, and a first job that no worker renders is never passed over. Null if there is no job. Null also
-// if the worker will get units of the first job, but not yet: leases of another job would delay those.
+// Returns the job whose units this worker gets next; null: none. This is the first job in turn, or a later
+// one whose world (loaded scene) the worker has, since loading costs time. But a later job must not be far
+// ahead of its fair share, and the first job is not passed over while no worker renders it. Null also if the
+// worker will get units of the first job only later: leases of another job would delay these.
 Job* Farm::State::choose(const Worker& worker) {
   Job* fair = nullptr;
   Job* chosen = nullptr;
@@ -202,8 +202,8 @@ std::optional<UnitCode> Farm::State::next_for(Job& job, const Worker& worker) {
   return code && !out_of_time(job, worker, *code, now) ? code : std::nullopt;
 }
 
-// If a speculative unit (one that may turn out not to be needed) were leased early, it would delay units that
-// turn out to be needed, and it would more likely be dropped.
+// A speculative unit (the job may end without it) that is leased early delays units that turn out to be
+// needed, and is more likely to be dropped.
 bool Farm::State::too_early(const Job& job, const Worker& worker, UnitCode code, std::size_t units,
                             double cost) const {
   return !job.queue.wanted(code) &&

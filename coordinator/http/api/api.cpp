@@ -71,12 +71,7 @@ std::optional<Response> at_its_owner(coordinator::Coordinator& coordinator, cons
   return response;
 }
 
-Response options_response(const std::string& allow) {
-  Response response;
-  response.status = 204;
-  response.headers.emplace_back("Allow", allow);
-  return response;
-}
+Response options_response(const std::string& allow) { return {.status = 204, .headers = {{"Allow", allow}}}; }
 
 }  // namespace
 
@@ -111,7 +106,7 @@ std::variant<Response, Match> Api::admit_route(Request& request) {
       response.headers.emplace_back("Allow", "GET, HEAD, OPTIONS");
       return response;
     }
-    // Under /api only callers with a token may learn which addresses exist.
+    // Under /api only callers with a token get the 404 of an unknown address.
     if (!request.segments.empty() && request.segments.front() == "api")
       if (auto refused = refuse_caller(Access::token, request)) return *refused;
     return not_found(request);

@@ -37,7 +37,7 @@ class Api {
   Api(coordinator::Coordinator& coordinator, TokenRegistry& tokens, Limits limits, StaticFiles files,
       bool secure = false);
 
-  // Decides from the header alone what happens to the request, and sets request.caller. Returns the matching
+  // Decides from the header alone how the request is handled, and sets request.caller. Returns the matching
   // route, or a Response that the server sends without calling handle(): a static file, or an error (unknown
   // address, missing or insufficient token, too many requests, body too long).
   std::variant<Response, Match> admit(Request& request);
@@ -58,7 +58,7 @@ class Api {
   // Returns the sink for a body that is streamed (BodyKind::blob and archive), or the response that rejects
   // the request.
   std::variant<Response, std::unique_ptr<BodySink>> open_upload(const Match& match, const Request& request);
-  // Asks long-running work to end at its next step, because the coordinator stops.
+  // Requests that long-running work end at its next step; called when the coordinator stops.
   void ask_to_stop() { stop_.request_stop(); }
   std::stop_token stop_token() const { return stop_.get_token(); }
 
@@ -69,11 +69,11 @@ class Api {
   const Limits& limits() const { return limits_; }
   // Sets the function from which /metrics gets the webhook counters; call this before the first request. If
   // it is never called, /metrics has no webhook counters.
-  void webhooks(std::function<WebhookFigures()> figures) { webhooks_ = std::move(figures); }
+  void webhooks(std::function<coordinator::WebhookFigures()> figures) { webhooks_ = std::move(figures); }
   // The same for the counters of trace spans
   void traces(std::function<trace::Figures()> figures) { traces_ = std::move(figures); }
   std::optional<trace::Figures> traces() const { return traces_ ? std::optional(traces_()) : std::nullopt; }
-  std::optional<WebhookFigures> webhooks() const {
+  std::optional<coordinator::WebhookFigures> webhooks() const {
     return webhooks_ ? std::optional(webhooks_()) : std::nullopt;
   }
 
@@ -90,7 +90,7 @@ class Api {
   Limits limits_;
   StaticFiles files_;
   Counters counters_;
-  std::function<WebhookFigures()> webhooks_;
+  std::function<coordinator::WebhookFigures()> webhooks_;
   std::function<trace::Figures()> traces_;
   std::stop_source stop_;
 };

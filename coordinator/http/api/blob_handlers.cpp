@@ -25,8 +25,8 @@ struct ContentRange {
   bool is_last() const { return first + bytes == size; }
 };
 
-// Numbers above this are rejected. It is larger than any file, but small enough that sums of two such numbers
-// do not overflow.
+// Numbers above this are rejected. It exceeds the size of any file, and sums of two such numbers do not
+// overflow.
 constexpr std::uint64_t kMost = std::uint64_t{1} << 62;
 
 std::optional<std::uint64_t> number(std::string_view text) {
@@ -54,10 +54,7 @@ std::optional<ContentRange> parse_content_range(std::string_view value) {
 }
 
 Response stored(const Digest& digest, int status) {
-  Response response;
-  response.status = status;
-  response.headers.emplace_back("Location", "/api/v1/blobs/" + digest.hex());
-  return response;
+  return {.status = status, .headers = {{"Location", "/api/v1/blobs/" + digest.hex()}}};
 }
 
 std::optional<Response> over_limit(std::uint64_t received, std::uint64_t limit) {
@@ -118,14 +115,14 @@ void send_offset(Response& response, std::uint64_t offset, bool complete) {
   response.headers.emplace_back("Upload-Complete", complete ? "?1" : "?0");
 }
 
-// Makes the response that rejects a part. It tells the client the offset from which to continue.
+// Makes the response that rejects a part. It contains the offset from which the client should continue.
 Response refused_part(int status, std::string_view detail, std::uint64_t offset) {
   Response response = problem(status, detail);
   send_offset(response, offset, false);
   return response;
 }
 
-// Receives a part that exists already and ignores it. An answer before the end of the part would break the
+// Receives and ignores a part that exists already. An answer before the end of the part would break the
 // connection.
 class IgnoreSink final : public BodySink {
  public:

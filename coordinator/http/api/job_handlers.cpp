@@ -120,11 +120,9 @@ Result<coordinator::JobChange> read_change(std::string_view text) {
 
 template <class Body>
 Response file_response(std::string content_type, Body bytes, const std::string& name) {
-  Response response;
-  response.content_type = std::move(content_type);
-  response.headers.emplace_back("Content-Disposition", fmt::format("inline; filename=\"{}\"", name));
-  response.body = std::move(bytes);
-  return response;
+  return {.content_type = std::move(content_type),
+          .headers = {{"Content-Disposition", fmt::format("inline; filename=\"{}\"", name)}},
+          .body = std::move(bytes)};
 }
 
 }  // namespace
@@ -155,9 +153,7 @@ Response patch_job(Api& api, const Request& request, const JobId& id) {
 
 Response delete_job(Api& api, const Request&, const JobId& id) {
   if (const auto done = api.coordinator().remove(id); !done) return problem(done.error());
-  Response response;
-  response.status = 204;
-  return response;
+  return {.status = 204};
 }
 
 Response get_image_exr(Api& api, const Request&, const JobId& id) {

@@ -102,10 +102,7 @@ Response post_again(Api& api, const Request& request, const JobId& id) {
 Response get_thumbnail(Api& api, const Request&, const JobId& id) {
   auto image = api.coordinator().thumbnail_png(id);
   if (!image) return problem(image.error());
-  Response response;
-  response.content_type = "image/png";
-  response.body = std::move(*image);
-  return response;
+  return {.content_type = "image/png", .body = std::move(*image)};
 }
 
 }  // namespace ls::http

@@ -27,7 +27,7 @@ std::uint64_t files_in(const char* folder) {
   for (std::filesystem::directory_iterator at(folder, failed), end; !failed && at != end;
        at.increment(failed))
     ++count;
-  // The descriptor that this iteration itself opens is not counted
+  // Does not count the descriptor that this iteration itself opens
   return failed || count == 0 ? 0 : count - 1;
 }
 
@@ -174,7 +174,7 @@ void write_audits(std::string& out, const coordinator::AuditFigures& a) {
          "Tiles rendered again since such a worker had a hand in them.", a.tiles_discarded);
 }
 
-void write_webhooks(std::string& out, const WebhookFigures& w) {
+void write_webhooks(std::string& out, const coordinator::WebhookFigures& w) {
   head(out, "lightshaft_webhook_sendings_total", "counter",
        "Attempts to tell a receiver of a job's event; a failed one is tried again later.");
   fmt::format_to(std::back_inserter(out),
@@ -220,7 +220,7 @@ std::string metrics_text(std::span<const coordinator::JobView> jobs,
                          std::span<const coordinator::WorkerView> workers, std::uint64_t last_event,
                          const Counters& counters, const coordinator::StoreStatus& store,
                          const coordinator::FarmFigures& farm, const coordinator::AuditFigures& audits,
-                         const std::optional<WebhookFigures>& webhooks,
+                         const std::optional<coordinator::WebhookFigures>& webhooks,
                          const std::optional<trace::Figures>& traces) {
   std::string out;
   write_jobs(out, jobs);

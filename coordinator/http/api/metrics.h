@@ -42,12 +42,6 @@ class Counters {
   std::map<std::pair<Method, int>, std::uint64_t> requests_;
 };
 
-// Counts of notifications to webhooks (coordinator/webhooks) since the start: notifications accepted by a
-// receiver, attempts that failed, and notifications given up. Also the number that now wait to be sent.
-struct WebhookFigures {
-  std::uint64_t delivered = 0, failed_attempts = 0, given_up = 0, waiting = 0;
-};
-
 // Returns the text of /metrics. Without `webhooks` it has no webhook counters, without `traces` none of
 // spans.
 std::string metrics_text(std::span<const coordinator::JobView> jobs,
@@ -55,7 +49,7 @@ std::string metrics_text(std::span<const coordinator::JobView> jobs,
                          const Counters& counters, const coordinator::StoreStatus& store = {},
                          const coordinator::FarmFigures& farm = {},
                          const coordinator::AuditFigures& audits = {},
-                         const std::optional<WebhookFigures>& webhooks = std::nullopt,
+                         const std::optional<coordinator::WebhookFigures>& webhooks = std::nullopt,
                          const std::optional<trace::Figures>& traces = std::nullopt);
 
 }  // namespace ls::http

@@ -42,10 +42,7 @@ Response get_pixels(Api& api, const Request& request, const JobId& id) {
                                               level[0],
                                               {rect[0], rect[1], rect[2], rect[3]}});
   if (!pixels) return problem(pixels.error());
-  Response response;
-  response.content_type = "application/octet-stream";
-  response.body = std::move(*pixels);
-  return response;
+  return {.content_type = "application/octet-stream", .body = std::move(*pixels)};
 }
 
 }  // namespace ls::http

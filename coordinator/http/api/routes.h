@@ -1,5 +1,5 @@
-// The route table. It says for every address who may use it, how large the request's body may be and on which
-// threads the handler runs. openapi.json describes the same routes; a test compares the two.
+// The route table. For every address it gives the callers that may use it, the limit on the request's body
+// and the threads that run the handler. openapi.json describes the same routes; a test compares the two.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +28,7 @@ enum class Access {
 };
 std::string_view to_string(Access access);
 bool allows(Access access, Role role);
-// On which threads a route's handler runs: the network thread or one of three thread pools, so that slow work
+// The threads that run a route's handler: the network thread or one of three thread pools, so that slow work
 // never delays quick answers.
 enum class Executor {
   here,    // the network thread; the handler must not block

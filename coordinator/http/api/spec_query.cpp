@@ -76,7 +76,7 @@ Result<void> add_define(Json& defines, std::string_view text) {
 Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, const std::string& base) {
   auto whole = parse_spec_object(base);
   if (!whole) return tl::unexpected(whole.error());
-  // Errors in `base` are reported even if the query replaces the wrong value.
+  // An error in `base` is reported even if the query replaces the wrong value.
   if (const auto alone = job_spec_of(*whole); !alone) return alone;
   Json spec = Json::object();
   Json defines = Json::object();
@@ -102,7 +102,7 @@ Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, cons
   }
   if (!defines.empty()) (*whole)["defines"].update(defines);
   whole->update(spec);
-  // dump() would throw on invalid UTF-8, so this is replaced; no valid key or name contains it.
+  // Invalid UTF-8, on which dump() would throw, is replaced; no valid key or name contains it.
   return parse_job_spec(whole->dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 

@@ -13,10 +13,7 @@ namespace ls::http {
 namespace {
 
 Response no_content(std::string set_cookie) {
-  Response response;
-  response.status = 204;
-  response.headers.emplace_back("Set-Cookie", std::move(set_cookie));
-  return response;
+  return {.status = 204, .headers = {{"Set-Cookie", std::move(set_cookie)}}};
 }
 
 Response event_stream(const Request& request, std::string job) {
@@ -31,10 +28,7 @@ Response event_stream(const Request& request, std::string job) {
     stream.after_id = parse_number<std::uint64_t>(text);
     if (!stream.after_id) return problem(400, "Last-Event-ID must be the id of an event: a whole number");
   }
-  Response response;
-  response.content_type = "text/event-stream";
-  response.events = std::move(stream);
-  return response;
+  return {.content_type = "text/event-stream", .events = std::move(stream)};
 }
 
 }  // namespace
@@ -44,7 +38,7 @@ Response get_healthz(Api&, const Request&, const Params&) { return text_response
 Response get_readyz(Api& api, const Request&, const Params&) {
   std::string why_not;
   if (!api.coordinator().ready(&why_not)) return problem(503, "not ready: " + why_not);
-  // While Redis is unavailable jobs continue, so this is reported, but the coordinator stays ready for
+  // Jobs continue while Redis is unavailable, so the coordinator reports the trouble but stays ready for
   // clients.
   const std::string trouble = api.coordinator().store_status().trouble;
   return text_response(200, "text/plain", trouble.empty() ? "ready\n" : "ready, but: " + trouble + "\n");
@@ -162,9 +156,7 @@ Response post_token(Api& api, const Request& request, const Params&) {
 
 Response delete_token(Api& api, const Request&, const Params& params) {
   if (const auto done = api.tokens().revoke(params[0]); !done) return problem(done.error());
-  Response response;
-  response.status = 204;
-  return response;
+  return {.status = 204};
 }
 
 }  // namespace ls::http

@@ -50,11 +50,9 @@ Response get_video_mp4(Api& api, const Request&, const JobId& id) {
   if (!path) return problem(path.error());
   auto file = open_file_body(*path);
   if (!file) return problem(404, fmt::format("the video of job {} is gone: ask for it again", id.value));
-  Response response;
-  response.content_type = "video/mp4";
-  response.headers.emplace_back("Content-Disposition", fmt::format("inline; filename=\"{}.mp4\"", id.value));
-  response.body = std::move(*file);
-  return response;
+  return {.content_type = "video/mp4",
+          .headers = {{"Content-Disposition", fmt::format("inline; filename=\"{}.mp4\"", id.value)}},
+          .body = std::move(*file)};
 }
 
 }  // namespace ls::http

@@ -1,16 +1,15 @@
 #include "coordinator/http/auth/auth.h"
 
 #include <fmt/format.h>
-#include <openssl/evp.h>
-#include <openssl/hmac.h>
 #include <openssl/rand.h>
+#include <strings.h>
 
 #include <array>
 #include <charconv>
-#include <chrono>
 #include <nlohmann/json.hpp>
 
 #include "common/base/check.h"
+#include "common/base/clock.h"
 #include "common/base/digest.h"
 #include "common/base/secret.h"
 #include "coordinator/http/message/limits.h"
@@ -19,13 +18,6 @@
 namespace ls::http {
 namespace {
 
-bool iequals_prefix(std::string_view text, std::string_view lower_case_prefix) {
-  if (text.size() < lower_case_prefix.size()) return false;
-  for (std::size_t i = 0; i < lower_case_prefix.size(); ++i)
-    if ((text[i] | 0x20) != (lower_case_prefix[i] | 0x20)) return false;
-  return true;
-}
-
 bool unsafe(Method method) {
   return method != Method::get && method != Method::head && method != Method::options;
 }
@@ -33,10 +25,7 @@ bool unsafe(Method method) {
 }  // namespace
 
 UnixClock system_unix_clock() {
-  return [] {
-    const auto now = std::chrono::system_clock::now().time_since_epoch();
-    return static_cast<std::int64_t>(std::chrono::duration_cast<std::chrono::seconds>(now).count());
-  };
+  return [] { return system_unix_ns() / 1'000'000'000; };
 }
 
 Auth::Auth(const TokenRegistry& tokens, Options options, UnixClock now)
@@ -53,7 +42,7 @@ std::variant<Caller, Response> Auth::identify(const Request& request) {
         "the bearer token is none that this coordinator knows (the admin's is in its data folder, file "
         "'token')";
     std::string_view token = authorization;
-    if (!iequals_prefix(token, "bearer ")) return problem(401, kWrong);
+    if (token.size() < 7 || ::strncasecmp(token.data(), "bearer ", 7) != 0) return problem(401, kWrong);
     token.remove_prefix(7);
     while (token.starts_with(' ')) token.remove_prefix(1);
     return caller_of_token(request, token, kWrong);
@@ -135,7 +124,7 @@ bool Auth::cross_site(const Request& request) {
   if (site == "cross-site" || site == "same-site") return true;
   const std::string_view origin = request.header("origin");
   if (origin.empty()) return false;
-  // Compares host and port but not the scheme, since a proxy may accept TLS and forward plain HTTP.
+  // Compares host and port but not the scheme, since a proxy may receive TLS and forward plain HTTP.
   const std::size_t scheme = origin.find("://");
   return scheme == std::string_view::npos || origin.substr(scheme + 3) != request.header("host");
 }
@@ -170,14 +159,9 @@ std::string_view Auth::session_of(const Request& request) const {
 }
 
 std::string Auth::mac(std::string_view text) const {
-  Digest out;
-  unsigned size = 0;
-  const std::string& key = tokens_.session_key();
-  CHECK(HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()),
-             reinterpret_cast<const unsigned char*>(text.data()), text.size(), out.bytes.data(),
-             &size) != nullptr,
-        "HMAC failed");
-  return out.hex();
+  std::string out = hmac_sha256(tokens_.session_key(), text);
+  CHECK(!out.empty(), "HMAC failed");
+  return out;
 }
 
 void hide_work(coordinator::WorkerView& worker) {

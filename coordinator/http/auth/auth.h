@@ -76,7 +76,7 @@ class Auth {
   std::map<std::string, std::int64_t, std::less<>> revoked_;
 };
 
-// Clears the fields of `worker` that show what it does for other users' jobs.
+// Clears the fields of `worker` that describe its work for other users' jobs.
 void hide_work(coordinator::WorkerView& worker);
 
 // Returns the event without the parts that this caller may not see; nullopt: the caller may not see the event

@@ -12,6 +12,7 @@
 #include <cstring>
 
 #include "common/base/digest.h"
+#include "common/base/secret.h"
 
 namespace ls::http {
 namespace {
@@ -20,13 +21,6 @@ constexpr std::size_t kMinToken = 16, kMaxToken = 1024;
 constexpr std::size_t kMaxList = 1u << 20;
 
 std::string why() { return std::strerror(errno); }
-
-struct Descriptor {
-  int fd = -1;
-  ~Descriptor() {
-    if (fd >= 0) ::close(fd);
-  }
-};
 
 Result<std::string> read_token(int fd, const std::filesystem::path& file) {
   struct stat info {};
@@ -97,16 +91,6 @@ Result<std::string> read_list(const std::filesystem::path& file) {
   return text;
 }
 
-Result<void> write_private(const std::filesystem::path& file, std::string_view text) {
-  const std::string aside = file.string() + ".new";
-  ::unlink(aside.c_str());
-  Descriptor out{::open(aside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600)};
-  if (out.fd < 0 || ::write(out.fd, text.data(), text.size()) != static_cast<ssize_t>(text.size()) ||
-      ::fsync(out.fd) != 0 || ::rename(aside.c_str(), file.c_str()) != 0)
-    return fail(Errc::resource_exhausted, fmt::format("cannot write '{}': {}", file.string(), why()));
-  return {};
-}
-
 FileState file_state(const std::filesystem::path& file) {
   struct stat info {};
   if (::stat(file.c_str(), &info) != 0) return {};
@@ -114,14 +98,10 @@ FileState file_state(const std::filesystem::path& file) {
           std::int64_t{info.st_mtim.tv_sec} * 1'000'000'000 + info.st_mtim.tv_nsec};
 }
 
-FolderLock::FolderLock(const std::filesystem::path& folder) {
-  if (folder.empty()) return;
-  fd_ = ::open((folder / "secrets.lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
-  while (fd_ >= 0 && ::flock(fd_, LOCK_EX) != 0 && errno == EINTR) continue;
-}
-
-FolderLock::~FolderLock() {
-  if (fd_ >= 0) ::close(fd_);
+FolderLock::FolderLock(const std::filesystem::path& folder)
+    : file_(folder.empty() ? -1
+                           : ::open((folder / "secrets.lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600)) {
+  while (file_.fd >= 0 && ::flock(file_.fd, LOCK_EX) != 0 && errno == EINTR) continue;
 }
 
 }  // namespace ls::http

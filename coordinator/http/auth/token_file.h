@@ -7,12 +7,13 @@
 #include <string_view>
 
 #include "common/base/error.h"
+#include "common/base/helper_program.h"
 
 namespace ls::http {
 
-// Returns the secret in `file`; creates it (mode 0600) if it does not exist. Rejects a file that others may
-// read, or with fewer than 16 characters. The caller must hold the data folder's lock, so that two starts do
-// not race.
+// Returns the secret in `file`; creates the file (mode 0600) with a new secret if it does not exist. Rejects
+// a file that others may read, or with fewer than 16 characters. The caller must hold the data folder's lock,
+// so that two starts do not race.
 Result<std::string> read_or_make_token(const std::filesystem::path& file);
 
 // 256 random bits in hexadecimal.
@@ -21,10 +22,7 @@ Result<std::string> random_token();
 // Reads a small file. Others may be able to read it but not to write it. Empty if there is no file.
 Result<std::string> read_list(const std::filesystem::path& file);
 
-// Replaces the file in one step, with mode 0600: after a crash there is either the old or the new file.
-Result<void> write_private(const std::filesystem::path& file, std::string_view text);
-
-// Identifies a version of a file: if two of these differ, the file was replaced or written in between. All
+// Identifies a version of a file: if two states differ, the file was replaced or written in between. All
 // zero: there is no file.
 struct FileState {
   std::uint64_t inode = 0, size = 0;
@@ -35,16 +33,13 @@ FileState file_state(const std::filesystem::path& file);
 
 // Holds a lock on a folder while the object lives, so that other processes do not change the folder's secrets
 // meanwhile. The constructor blocks until it has the lock. If the folder is read-only, so that no lock file
-// can be created, there is no lock and no need of one. An empty path locks nothing.
+// can be created, no lock is needed or held. An empty path locks nothing.
 class FolderLock {
  public:
   explicit FolderLock(const std::filesystem::path& folder);
-  ~FolderLock();
-  FolderLock(const FolderLock&) = delete;
-  FolderLock& operator=(const FolderLock&) = delete;
 
  private:
-  int fd_ = -1;
+  Descriptor file_;
 };
 
 }  // namespace ls::http

@@ -1,7 +1,7 @@
-// All known tokens. The files DATA/token (the administrator's) and DATA/join-token (the workers') contain
+// All valid tokens. The files DATA/token (the administrator's) and DATA/join-token (the workers') contain
 // their tokens in the clear. For all other tokens DATA/tokens contains only the SHA-256, one per line: `ROLE
 // USER SHA256`, with USER `-` if the token has no user. Several coordinators may share one folder
-// (--secrets): before a coordinator checks a token, it rereads the file if another one has changed it.
+// (--secrets): before a coordinator checks a token, it rereads the file if the file has changed.
 #pragma once
 
 #include <filesystem>
@@ -70,8 +70,8 @@ class TokenRegistry {
   // The tokens, as of the last reading of the file.
   struct Tokens {
     void put(Role role, std::string user, const Digest& digest, bool of_file);
-    // Rereads the file if it has changed. If it cannot be read, the known tokens stay as they are, and the
-    // error is logged once.
+    // Rereads the file if it has changed. If the file cannot be read, `entries` stays as it is, and the error
+    // is logged once.
     void look_again();
     Result<void> read_all();
     Result<void> read_line(std::string_view line);

@@ -46,8 +46,8 @@ enum class Trouble { none, stopped, unreadable, list_too_long };
 struct Source {
   int fd = -1;
   std::int64_t size = 0, at = 0;
-  // How many more bytes of a zip's list of entries may be read. libarchive reads the list before the first
-  // entry and keeps it in memory, so its size must be limited.
+  // Limit on the bytes of a zip's list of entries that are still to be read. libarchive reads the list before
+  // the first entry and keeps it in memory, so its size must be limited.
   std::int64_t list_bytes_left = static_cast<std::int64_t>(kMaxArchiveList);
   bool reads_list = true;
   std::stop_token stop;

@@ -1,6 +1,6 @@
 // Reads a zip, or a tar (plain or gzip), entry by entry, each entry's bytes piece by piece; the only user of
-// libarchive. It knows nothing about bundles (bundle.h). It guarantees that a damaged archive is an error and
-// that memory stays bounded.
+// libarchive. It does not depend on bundles (bundle.h). A damaged archive gives an error, and memory stays
+// bounded.
 #pragma once
 
 #include <cstddef>

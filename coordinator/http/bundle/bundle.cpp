@@ -119,7 +119,7 @@ class Survey {
   }
 
   // True if this file may be the bundle's job.json. The file must be at the top, or directly in one of the
-  // first folders that have a job.json (if all files are in one folder, that folder counts as the top).
+  // first folders with a job.json, since a folder that contains all files counts as the top.
   bool may_be_job_file(const std::string& name) const {
     if (name == kBundleJobFile) return true;
     const std::size_t slash = name.find('/');

@@ -99,7 +99,7 @@ Result<JobFile> read_job_file(const std::string& text) {
     out.scene = scene->get<std::string>();
     job.erase(scene);
   }
-  // The keys of the spec are beside "scene" or, as in a JSON request, in an object "spec".
+  // The keys of the spec are at the same level as "scene" or, as in a JSON request, in an object "spec".
   if (const auto spec = job.find("spec"); spec != job.end()) {
     if (!spec->is_object() || job.size() != 1)
       return bad_bundle("'spec' in job.json must be an object, and the only key besides 'scene'");
@@ -109,8 +109,8 @@ Result<JobFile> read_job_file(const std::string& text) {
   return out;
 }
 
-// Returns the path of the file `name` relative to `folder` ("" or "a/b/"), as a scene in that folder would
-// contain it.
+// Returns the path of the file `name` relative to `folder` ("" or "a/b/"), the form in which a scene in that
+// folder names the file.
 std::string seen_from(std::string_view folder, std::string_view name) {
   std::size_t common = 0;
   for (std::size_t i = 0; i < std::min(folder.size(), name.size()) && folder[i] == name[i]; ++i)

@@ -1,5 +1,5 @@
-// Finds the parts of a bundle (a scene with its files) in the list of an archive's files. This part of
-// read_bundle() does not read the archive itself.
+// Finds the parts of a bundle (a scene with its files) in the list of an archive's files. It is a step of
+// read_bundle() and does not read the archive itself.
 #pragma once
 
 #include <map>
@@ -20,7 +20,7 @@ struct BundleFile {
 
 struct BundleContents {
   std::vector<BundleFile> files;  // in the archive's order
-  // The text of every file that may turn out to be the job.json.
+  // The text of every file that may be the bundle's job.json.
   std::map<std::string, std::string> job_files;
 };
 

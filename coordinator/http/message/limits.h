@@ -66,7 +66,7 @@ struct Limits {
   double idle_seconds = 60;    // a kept-alive connection is closed after this time without a request
   // A body (in either direction) is cut off when its transfer takes longer than body_grace_seconds + (bytes
   // so far) / min_rate. So a transfer of `length` bytes takes at most body_grace_seconds + length / min_rate,
-  // and a stalled one is cut off after the grace time, whatever length it announced.
+  // and a stalled one is cut off after the grace time, for any announced length.
   double body_grace_seconds = 15;
   double min_rate = 8u << 10;     // bytes per second
   double heartbeat_seconds = 15;  // interval of the comments that keep a silent event stream alive
@@ -83,7 +83,7 @@ struct Limits {
   int remote_threads = 8;   // for requests to other machines: blob stores, other coordinators
   int user_priority = 0;    // highest priority of jobs with a submit token
   int slow_threads = 4;     // for reading scenes, writing images and blobs
-  int bundle_threads = 2;   // for unpacking bundles, so that these never occupy all slow threads
+  int bundle_threads = 2;   // for unpacking bundles, which thus never occupy the slow threads
   // Folder for bundles while they are read; empty: the system's temporary folder
   std::filesystem::path spool;
 };

@@ -75,11 +75,7 @@ std::uint64_t Response::in_memory() const {
 }
 
 Response text_response(int status, std::string content_type, std::string body) {
-  Response response;
-  response.status = status;
-  response.content_type = std::move(content_type);
-  response.body = std::move(body);
-  return response;
+  return {.status = status, .content_type = std::move(content_type), .body = std::move(body)};
 }
 
 Response json_response(int status, std::string json) {

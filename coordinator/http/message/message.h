@@ -28,7 +28,7 @@ std::string_view to_string(Role role);  // returns "admin", ...
 std::optional<Role> parse_role(std::string_view name);
 
 struct Caller {
-  Role role = Role::join;  // worker, the role with the fewest rights, until the caller is identified
+  Role role = Role::join;  // the role with the fewest rights, until the caller is identified
   // Owner of the jobs that the caller submits; empty: the administrator with the token of the file `token`
   std::string user;
   std::string token_id;

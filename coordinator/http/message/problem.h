@@ -13,10 +13,10 @@ namespace ls::http {
 
 int status_of(Errc code);
 
-// Makes a response {type, title, status, detail}; `detail` says what happened, where, and what to do.
+// Makes a response {type, title, status, detail}; `detail` contains the cause, the place and the remedy.
 Response problem(int status, std::string_view detail);
 Response problem(const Error& error);
-// Returns a 429 that asks the client, by Retry-After, to wait for `wait_seconds`.
+// Returns a 429 with the header Retry-After: `wait_seconds`.
 Response too_many(int wait_seconds, std::string_view detail);
 // Returns the problem of a rejected scene. It has an additional member diagnostics: [{severity, file, line,
 // column, text, source_line, length}].

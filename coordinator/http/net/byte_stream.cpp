@@ -84,8 +84,8 @@ void Stream::close() {
 net::awaitable<void> Stream::send_goodbye() {
   error_code ec;
   if (through_tls_) {
-    // Do not wait for the client's close_notify (TLS's own end of the stream): the end of the socket shows
-    // the same. Bytes that still arrive are read without TLS and thrown away.
+    // Does not wait for the client's close_notify (the end of the stream in TLS), since the end of the socket
+    // is sufficient. Bytes that still arrive are read without TLS and discarded.
     SSL* raw = tls_->native_handle();
     SSL_set_shutdown(raw, SSL_get_shutdown(raw) | SSL_RECEIVED_SHUTDOWN);
     co_await tls_->async_shutdown(awaiting(ec));

@@ -147,9 +147,9 @@ net::awaitable<Response> Connection::handle_on_executor(const Match& match, cons
   co_return co_await run_on(shared_.remote, shared_.io, std::move(ask));
 }
 
-// Sets the deadline of the operations that follow. Asio gives single reads no deadline; so when it passes,
-// all pending operations on the socket are cancelled. The socket stays open, so that a client whose request
-// was too slow still gets an answer.
+// Sets the deadline of the operations that follow. Asio has no deadline for single reads; so when the
+// deadline passes, all pending operations on the socket are cancelled. The socket stays open, so that a
+// client whose request was too slow still gets an answer.
 void Connection::arm(SteadyClock::time_point deadline) {
   timed_out_ = false;
   deadline_ = deadline;
@@ -252,20 +252,20 @@ net::awaitable<Connection::Body> Connection::read_into(Parser& parser, BodySink&
     const Read read = co_await read_portion(parser, began, received);
     if (read == Read::ok && (chunk.size() == 0 || (chunk.size() < kBodyChunk && !parser.is_done()))) continue;
     disarm();
-    // If the read has failed, the rest of the body will not arrive. What has arrived still goes to the sink,
-    // so that an upload in parts makes progress even if no connection lasts for a whole chunk.
+    // If the read has failed, the rest of the body will not arrive. The sink still gets the bytes that have
+    // arrived, so that an upload in parts makes progress even if no connection lasts for a whole chunk.
     const auto paused = SteadyClock::now();
     std::optional<Response> refused;
     if (chunk.size() > 0) refused = co_await run_on(shared_.slow, shared_.io, append);
     if (read != Read::ok) co_return Body{read, {}};
     if (refused) co_return Body{Read::ok, std::move(refused)};
-    began += SteadyClock::now() - paused;  // the time spent on our disk does not count as the client's
+    began += SteadyClock::now() - paused;  // time spent on the disk does not count against the client
     chunk.clear();
   }
   co_return Body{};
 }
 
-// Reads more of the body, or its end.
+// Reads the next bytes of the body, or its end.
 net::awaitable<Read> Connection::read_portion(Parser& parser, SteadyClock::time_point began,
                                               std::uint64_t& received) {
   const std::size_t before = parser.get().body().size();
@@ -292,8 +292,8 @@ bool Connection::charge(std::uint64_t bytes) {
   return true;
 }
 
-// Counts the answer, unless it is small. An answer larger than kMaxAnswers is let through while no other
-// answer is counted.
+// Counts the answer, unless it is small. An answer larger than kMaxAnswers is allowed while no other answer
+// is counted.
 bool Connection::charge_answer(std::uint64_t bytes) {
   shared_.answers -= std::exchange(answer_charged_, 0);
   if (bytes <= kSmallAnswer) return true;
@@ -381,8 +381,8 @@ net::awaitable<bool> Connection::write_file(std::string_view head, const FileBod
   co_return true;
 }
 
-// Ends the answer, then reads on for a while and throws away what arrives. Closing the connection while the
-// client still sends would reset it, and the client would lose the answer.
+// Ends the answer, then reads on for a while and discards the bytes that arrive. Closing the connection while
+// the client still sends would reset it, and the client would lose the answer.
 net::awaitable<void> Connection::linger() {
   arm(SteadyClock::now() + steady_seconds(limits_.linger_seconds));
   co_await stream_.send_goodbye();

@@ -106,15 +106,15 @@ class Connection {
   net::awaitable<Body> read_into(Parser& parser, BodySink& sink);
   net::awaitable<Read> read_portion(Parser& parser, SteadyClock::time_point began, std::uint64_t& received);
   net::awaitable<bool> send_continue(const Request& request);
-  // Counts a request's body of this many bytes in Shared::buffered. False: all bodies together would exceed
-  // kMaxBuffered.
+  // Sets the size of this connection's request body in Shared::buffered. False: all bodies together would
+  // exceed kMaxBuffered.
   bool charge(std::uint64_t bytes);
 
   // Writing
   net::awaitable<bool> answer(const Request& request, const Response& response, bool keep_alive);
   net::awaitable<void> answer_unread(const Response& response);
   net::awaitable<void> answer_failed_read(Read read);
-  // Counts an answer of this many bytes in Shared::answers. False: all answers together would exceed
+  // Sets the size of this connection's answer in Shared::answers. False: all answers together would exceed
   // kMaxAnswers.
   bool charge_answer(std::uint64_t bytes);
   net::awaitable<bool> write_all(std::string_view head, std::span<const std::byte> body);

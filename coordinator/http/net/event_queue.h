@@ -23,9 +23,9 @@ class EventQueue {
     std::size_t bytes = 0;
   };
   // If `job` is set, the reader gets only the events of this job (and of its frames) and those that belong to
-  // no single job; if it is empty, all events. `after_id` is the id of the last event that the reader knows.
-  // If the first event pushed does not have the next id, the reader has missed events, and an event `reset`
-  // is sent to it first. `wake` is called when the queue is no longer empty.
+  // no single job; if it is empty, all events. `after_id` is the id of the last event that the reader has
+  // received. If the first event pushed does not have the next id, the reader has missed events and first
+  // gets an event `reset`. `wake` is called when the queue is no longer empty.
   EventQueue(Bounds bounds, std::string job, std::uint64_t after_id, std::function<void()> wake);
 
   // Adds an event; may be called on any thread, in the order of the events' ids. It never blocks. An event

@@ -28,8 +28,7 @@ struct Undo {
 
 struct Start {
   std::uint64_t after = 0;
-  // true: this coordinator never published the event id that the reader gives; it comes from another data
-  // folder
+  // true: this coordinator never published the event id in the request; the id comes from another data folder
   bool reset = false;
 };
 
@@ -111,8 +110,8 @@ net::awaitable<void> Connection::write_events(EventQueue& queue, const Caller& r
   }
 }
 
-// Waits for the end of an event stream's client. The client has nothing more to send after its request, so
-// whatever arrives (most likely the end of the connection) ends the stream.
+// Waits until the client of an event stream leaves. The client sends nothing after its request, so anything
+// that arrives (most likely the end of the connection) ends the stream.
 net::awaitable<void> Connection::reader_leaves() {
   std::array<char, 64> ignored{};
   error_code ec;

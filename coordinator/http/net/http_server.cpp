@@ -132,8 +132,8 @@ Result<std::unique_ptr<Server>> Server::listen(const std::string& address) {
   const Tcp::endpoint endpoint = found.begin()->endpoint();
   auto& acceptor = state->acceptor;
   acceptor.open(endpoint.protocol(), ec);
-  // SO_REUSEADDR allows binding to a port that an earlier process has just released, but not a second
-  // listener.
+  // SO_REUSEADDR allows binding to a port that an earlier process has just released; a second listener still
+  // fails.
   if (!ec) acceptor.set_option(Tcp::acceptor::reuse_address(true), ec);
   if (!ec) acceptor.bind(endpoint, ec);
   if (!ec) acceptor.listen(net::socket_base::max_listen_connections, ec);

@@ -1,5 +1,5 @@
 // The HTTP server loop: one network thread, small thread pools for the coordinator's work, and deadlines for
-// everything that a client can delay. Boost stays behind this header.
+// everything that a client can delay. This header does not include Boost.
 #pragma once
 
 #include <memory>

@@ -68,11 +68,7 @@ std::variant<Response, Request> to_request(const Parser& parser) {
   const auto method = parse_method(std::string_view(header.method_string()));
   if (!method) return problem(501, "this method is not known here");
   request.method = *method;
-  if (*method == Method::options && header.target() == "*") {
-    Response response;
-    response.status = 204;
-    return response;
-  }
+  if (*method == Method::options && header.target() == "*") return Response{.status = 204};
   auto target = parse_target(std::string_view(header.target()));
   if (!target) return problem(target.error());
   request.segments = std::move(target->segments);

@@ -16,7 +16,7 @@ struct EtaInputs {
   // Predicted core seconds until the job ends. For an adaptive job (one with a target error) this is the
   // scheduler's own prediction; 0: unknown
   double core_left = 0;
-  double core_to_limit = 0;  // the same until the sample limit, whatever the error; 0: unknown
+  double core_to_limit = 0;  // the same until the sample limit; 0: unknown
   // Target error (relMSE) and time budget (seconds since the first ray), if requested
   std::optional<double> target, time;
   double elapsed = 0;  // seconds since the first ray
@@ -37,10 +37,10 @@ struct Eta {
 };
 
 // The job ends by samples, target or time, whichever comes first. The core seconds until the target are
-// forecast at the last of `points` (convergence.h); the core seconds spent since then are subtracted. Until
-// the first checkpoint, adaptive jobs use the scheduler's own prediction, without an interval. Since a unit
-// runs on one thread, few units keep few threads busy, and at the end of a job with a target threads wait for
-// the last units. A forecast's interval is cut at the sample limit.
+// forecast from `points` (convergence.h), minus the core seconds spent since the last of them. Until the
+// first checkpoint, adaptive jobs use the scheduler's own prediction, without an interval. Since a unit runs
+// on one thread, few units keep few threads busy, and at the end of a job with a target threads wait for the
+// last units. A forecast's interval is cut at the sample limit.
 Eta eta_of(const EtaInputs& facts, std::span<const ErrorPoint> points);
 
 }  // namespace ls::coordinator

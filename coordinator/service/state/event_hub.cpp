@@ -58,7 +58,7 @@ void EventHub::publish(std::string type, std::string data, std::string job, std:
   const std::lock_guard lock(state_->mutex);
   State& s = *state_;
   if (s.next_id >= s.reserved_end) {
-    // If the store cannot reserve ids now, events are published nevertheless, but their ids may be used again
+    // Events are published even if the store cannot reserve ids now, but then their ids may be used again
     // after a crash.
     if (const auto first = s.reserve(limits::kEventIdBlock); !first)
       log_warn("", "cannot reserve event ids: " + first.error().message);
@@ -75,7 +75,7 @@ std::shared_ptr<void> EventHub::subscribe(std::uint64_t after_id,
   const std::uint64_t id = ++state_->last_listener;
   auto listener = std::make_shared<State::Listener>();
   // `after_id` may be greater than any id given so far, if it comes from a store that was lost. The listener
-  // must not wait until ids reach it.
+  // must not wait until ids exceed it.
   listener->next = std::min(after_id + 1, state_->next_id);
   listener->on_event = std::move(on_event);
   state_->listeners.emplace(id, std::move(listener));

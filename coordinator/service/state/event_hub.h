@@ -1,5 +1,5 @@
 // Publishes events to listeners. Events are numbered, and the latest ones are kept for readers that
-// reconnect. Listeners are called in order on a separate thread, so that none runs under a lock of the
+// reconnect. Listeners are called in order on a separate thread, so no listener runs under a lock of the
 // service.
 #pragma once
 

@@ -1,15 +1,10 @@
 #include "coordinator/service/state/job_entry.h"
 
 #include <algorithm>
-#include <chrono>
 
 #include "coordinator/admission/admission.h"
 
 namespace ls::coordinator {
-
-double unix_now() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 
 JobEntry::JobEntry(StoredJob job, TimePoint now)
     : stored(std::move(job)),

@@ -40,8 +40,8 @@ struct JobEntry {
   std::optional<ReferenceTiles> reference_tiles;
   // Noise of the reference image, estimated by the latest comparison; nullopt: unknown
   std::optional<ReferenceNoise> reference_noise;
-  // The denoised final image, until it is written; null: the job has no denoising, or the image is not made
-  // yet
+  // The denoised final image, until it is written; null: the job has no denoising, or the image is not
+  // computed yet
   std::shared_ptr<const Denoised> denoised;
   std::vector<ConvergencePoint> points;
   // Number of the current convergence curve. Points of an older curve, which had wrong or lost pixels, are
@@ -49,7 +49,7 @@ struct JobEntry {
   std::uint64_t curve = 0;
   // True if it has ended and only its files and its record remain: the farm has forgotten it
   bool unloaded = false;
-  // True if its user removed it, or another coordinator has it: nothing more is stored for it
+  // True if its user removed it, or another coordinator owns it: nothing more is stored for it
   bool removed = false;
   bool pin_unsaved = false;     // its numeric class is not stored yet, so its results cannot be stored either
   std::string audits;           // its open audits, as they were last written to disk (store/log/audit_file.h)
@@ -88,7 +88,5 @@ struct Sequence {
 
 // Returns all facts for the report except the digest of the pixels, which takes time.
 ReportFacts facts_of(const JobEntry& entry, TimePoint now);
-
-double unix_now();
 
 }  // namespace ls::coordinator

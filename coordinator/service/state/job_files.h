@@ -22,8 +22,8 @@ class JobFiles {
   bool on_disk() const { return !data_.empty(); }
   std::filesystem::path folder(const JobId& id) const { return data_ / "jobs" / id.value; }
   void remove_folder(const JobId& id) const;
-  // Removes the folder of a job that was removed. It is renamed first, so that a crash leaves nothing that
-  // looks like a job.
+  // Removes the folder of a job that was removed. It is renamed first, so that a crash leaves no partial job
+  // folder.
   void discard_folder(const JobId& id) const;
   void remove_discarded() const;  // removes folders that discard_folder() left when a crash interrupted it
   // If other coordinators share the store, removes the local files of jobs that others have taken over,

@@ -6,7 +6,7 @@
 namespace ls::coordinator {
 namespace {
 
-// The facts of a job that are known without making its view.
+// The facts of a job that need no view.
 struct Row {
   JobId id;
   const JobEntry* entry = nullptr;

@@ -11,7 +11,7 @@ namespace ls::coordinator {
 namespace {
 
 // Returns a random job id of 32 bits; if `wide`, of 64 bits. 64 bits avoid collisions in a store where other
-// coordinators make ids, too, without asking them.
+// coordinators make ids independently.
 JobId random_job_id(bool wide) {
   std::random_device device;
   return {wide ? fmt::format("j-{:08x}{:08x}", device(), device()) : fmt::format("j-{:08x}", device())};
@@ -73,7 +73,7 @@ JobId JobTable::unused_id() const {
   return id;
 }
 
-// The limit per user is lower than the limit for all users, so that no single user can use up all jobs.
+// The limit per user is lower than the limit for all users, so that no single user can reach the total limit.
 Result<void> JobTable::room_for(const std::string& owner, std::size_t jobs) const {
   if (jobs_.size() + jobs > limits::kMaxJobs)
     return fail(Errc::resource_exhausted,

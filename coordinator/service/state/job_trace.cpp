@@ -131,8 +131,8 @@ void JobTrace::result(const UnitResult& r, const WorkerId& worker, TimePoint che
       static_cast<std::int64_t>(std::min<std::uint64_t>(r.held_unix_ns, static_cast<std::uint64_t>(now_ns)));
   auto open = leases_.find(r.lease);
   if (open == leases_.end() && !r.lease.value.starts_with(tracing_.lease_prefix + "-")) {
-    // An earlier process of the coordinator granted this lease and did not live to record it. The number of
-    // such leases is bounded, since a lying worker can name any lease.
+    // An earlier process of the coordinator granted this lease and ended before it recorded the lease. The
+    // number of such leases is bounded, since a lying worker can name any lease.
     if (former_leases_ >= kMaxFormerLeases) return;
     ++former_leases_;
     OpenLease former{.worker = worker.value, .start_ns = held_ns > 0 ? held_ns : ns(checked)};
@@ -141,7 +141,7 @@ void JobTrace::result(const UnitResult& r, const WorkerId& worker, TimePoint che
   // A lying worker can name another worker's lease. The result is then not counted for that lease.
   const bool foreign = open != leases_.end() && open->second.worker != worker.value;
   if (open != leases_.end() && !foreign) {
-    // A worker may have begun the unit for an earlier lease, which ended when its connection broke.
+    // A worker may have begun the unit under an earlier lease, which ended when its connection broke.
     if (held_ns > 0) open->second.start_ns = std::min(open->second.start_ns, held_ns);
     open->second.start_ns = std::max(open->second.start_ns, start_ns_);
     open->second.end_ns = now_ns;

@@ -1,5 +1,5 @@
 // The trace spans that the coordinator records for one job: the job from its submission to its end, the
-// leases (lists of units that a worker was told to render), and steps such as adding a result to the image or
+// leases (lists of units that are assigned to one worker), and steps such as adding a result to the image or
 // writing the final image. A job that is not traced has no JobTrace.
 //
 // The ids of trace, job and leases are derived from the job's record and the lease's id, so that another
@@ -31,7 +31,8 @@ class JobTrace {
  public:
   // Null if the job is not traced: there is no tracer, or the sampler leaves the job out.
   static std::unique_ptr<JobTrace> begin(const Tracing& tracing, const StoredJob& job);
-  // Names the job's span to other programs, also after the job's end. nullopt: the job is not traced.
+  // Returns the job's span for use by other programs, also after the job's end. nullopt: the job is not
+  // traced.
   static std::optional<trace::SpanContext> context_of(const Tracing& tracing, const StoredJob& job);
 
   // Notes a change of the job, such as "running", on its span.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/base/clock.h"
 #include "common/image/error/convergence.h"
 #include "coordinator/admission/admission.h"
 #include "coordinator/domain/limits.h"
@@ -37,7 +38,7 @@ Eta JobViews::eta(const JobEntry& entry, const JobFigures& figures, const JobVie
   facts.core_seconds = v.core_seconds;
   facts.core_left = figures.core_seconds_left;
   facts.core_to_limit = figures.core_seconds_to_limit;
-  // The curve is that of the image itself: it does not show when the denoised layers reach a target.
+  // The curve has the errors of the image itself, which do not show when the denoised layers reach a target.
   if (job.spec.target_layer == TargetLayer::raw) facts.target = job.spec.target_error;
   facts.time = job.spec.time;
   facts.elapsed = v.elapsed_seconds;
@@ -141,7 +142,8 @@ JobView JobViews::sequence(const JobId& id, const Sequence& sequence, bool with_
   facts.warnings = sequence.warnings;
   facts.cores = farm_.cores_connected();
   facts.workers = farm_.workers_connected();
-  if (began > 0) facts.elapsed_seconds = std::max(0.0, (open || ended == 0 ? unix_now() : ended) - began);
+  if (began > 0)
+    facts.elapsed_seconds = std::max(0.0, (open || ended == 0 ? system_unix_seconds() : ended) - began);
   JobView view = sequence_view(facts, views);
   if (with_frames)
     for (const JobView& v : views) view.frames->all.push_back(frame_view(v));

@@ -1,5 +1,5 @@
-// Publishes changes of jobs and workers as events (event_hub.h). Events about a job's progress are held back
-// so that they keep a minimum distance; publish_due() sends them later.
+// Publishes changes of jobs and workers as events (event_hub.h). Events about a job's progress are sent at a
+// minimum interval; publish_due() sends those that were delayed.
 #pragma once
 
 #include <string>

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "common/base/clock.h"
 #include "common/base/failpoint.h"
 #include "common/base/log.h"
 
@@ -68,7 +69,7 @@ void Records::log(const JobId& id, std::string text) {
   }
   if (const auto lost = std::exchange(lines_left_out_, 0))
     text += fmt::format(" (before it {} lines of this and other logs were left out: the disk is slow)", lost);
-  writes_.push([this, id, line = LogLine{unix_now(), std::move(text)}] {
+  writes_.push([this, id, line = LogLine{system_unix_seconds(), std::move(text)}] {
     if (const auto added = store_.add_log(id, line); !added)
       log_warn(fmt::format("job={}", id.value), added.error().message);
   });

@@ -20,7 +20,7 @@ class Records {
   Records(JobStore& store, const JobTable& jobs, BackgroundWrites& writes)
       : store_(store), jobs_(jobs), writes_(writes) {}
 
-  // Stores the job's record. If this fails, returns false, and trouble() says why.
+  // Stores the job's record. If this fails, returns false, and trouble() gives the reason.
   bool put(const EntryPtr& entry);
   // Calls `changes`, and then stores all jobs for which it called put(), in one transaction: a sequence may
   // have thousands of frames.
@@ -39,10 +39,10 @@ class Records {
 
   void log(const JobId& id, std::string text);
   void add_point(const EntryPtr& entry, const ConvergencePoint& point);
-  // Drops the curve's points, which are of wrong or lost pixels. Checkpoints are taken again as the tiles'
+  // Drops the points of a curve that describe wrong or lost pixels. Checkpoints are taken again as the tiles'
   // results are added to the image again.
   void forget_curve(JobEntry& entry);
-  // Drops the curve's points and the errors of denoised layers, which are of wrong pixels.
+  // Drops the curve's points and the errors of denoised layers if they describe wrong pixels.
   void forget_wrong_pixels(JobEntry& entry);
   void set_reference_error(const JobId& id, double spp, const ReferenceError& error);
 

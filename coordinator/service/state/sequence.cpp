@@ -124,8 +124,8 @@ void add_up(JobView& v, std::span<const JobView> frames) {
   if (pixels > 0) v.spp_done /= pixels, v.progress /= pixels;
 }
 
-// Returns how many cores of the farm the sequence can use. The sequence's limits on workers and units bound
-// this number, and so do its remaining units, each of which runs on one thread.
+// Returns how many cores of the farm the sequence can use. The bounds are its limits on workers and units,
+// and its number of remaining units, since a unit runs on one thread.
 double cores_for(const JobView& v, const SequenceFacts& facts, std::uint64_t units_left) {
   double cores = facts.cores;
   if (v.max_workers && facts.workers > 0)

@@ -1,5 +1,5 @@
 // Runs ffmpeg as a child process that makes a video file of pictures. The program gets raw pixels through a
-// socket, so it never reads a file of a job. It is killed when it takes nothing for too long, when the
+// socket, so it never reads a file of a job. It is killed when it reads no pixels for too long, when the
 // video's time is up, or when the coordinator stops.
 #pragma once
 
@@ -20,7 +20,7 @@
 namespace ls::coordinator {
 
 // Returns the path of the program ffmpeg in the folders of PATH. failed_precondition: there is none; the
-// message says how to install it.
+// message explains how to install it.
 Result<std::string> find_ffmpeg();
 
 class VideoEncoder {
@@ -39,7 +39,7 @@ class VideoEncoder {
                                                      std::stop_token stop);
   ~VideoEncoder();  // kills the program if it runs
 
-  // Adds one picture: 8 bits of R, G and B of each pixel, row by row, as many as the size says.
+  // Adds one picture: 8 bits of R, G and B of each pixel, row by row, Asked::size in total.
   Result<void> add(std::span<const std::uint8_t> rgb);
   // Completes the file. Returns the program's own message if it failed.
   Result<void> finish();
@@ -47,7 +47,7 @@ class VideoEncoder {
  private:
   VideoEncoder(Asked asked, const Clock& clock, std::stop_token stop, int pixels, int errors, pid_t program);
   Result<void> wait_for(int fd, short events);
-  void hear();  // reads what the program says
+  void hear();  // reads the program's messages
   Error ended();
   int end();
 

@@ -25,9 +25,9 @@ class BlobStore {
   // may take seconds.
   virtual Result<void> answers() const { return {}; }
   // Verifies that the blob exists and that its bytes have its digest. The blob is read for this only once per
-  // process, and again if its file has changed since or if `again` is set (for callers that know of a reader
-  // who received wrong bytes). not_found: there is no such blob. failed_precondition: the blob is damaged; it
-  // has been moved aside and counts as missing.
+  // process, and again if its file has changed since or if `again` is set (for callers whose reader received
+  // wrong bytes). not_found: there is no such blob. failed_precondition: the blob is damaged; it has been
+  // moved aside and counts as missing.
   virtual Result<void> prove(const Digest& digest, [[maybe_unused]] bool again = false) const {
     return has(digest) ? Result<void>()
                        : fail(Errc::not_found, std::string("there is no blob ").append(digest.hex()));

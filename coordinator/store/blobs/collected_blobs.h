@@ -1,5 +1,5 @@
 // A blob store that removes unused blobs: files of rejected bundles, of removed jobs, of interrupted uploads.
-// A blob is removed when for the duration `keep` no job has needed it and nobody has requested it; an
+// A blob is removed when no job has needed it and no request has named it for the duration `keep`; an
 // interrupted upload is removed when it has not grown for that long. Both durations start again when the
 // coordinator is restarted. Thread-safe.
 //
@@ -70,7 +70,8 @@ class CollectedBlobs final : public BlobStore {
   mutable std::shared_mutex using_;
   mutable std::mutex mutex_;
   mutable std::condition_variable gone_;
-  // Blobs that are being removed, which may take a while; requests for them wait for the end of the removal.
+  // Blobs that are being removed, which may take a while; a request for one of them waits until it is
+  // removed.
   std::set<Digest> going_;
   mutable std::map<Digest, TimePoint> idle_;  // blobs that no job needs, and since when
   std::map<Digest, Unfinished> unfinished_;   // used by the sweeper only

@@ -96,8 +96,8 @@ std::filesystem::path DiskBlobs::path(const Digest& digest) const {
 
 bool DiskBlobs::has(const Digest& digest) const { return ::access(path(digest).c_str(), R_OK) == 0; }
 
-// Returns an error if the disk cannot be read now (EIO, ESTALE, EACCES): then it is unknown whether the blob
-// exists.
+// Returns an error if the disk cannot be read now (EIO, ESTALE, EACCES), so that it is unknown whether the
+// blob exists.
 Result<bool> DiskBlobs::find(const Digest& digest) const {
   if (has(digest)) return true;
   if (errno == ENOENT || errno == ENOTDIR) return false;
@@ -117,8 +117,8 @@ Result<std::uint64_t> DiskBlobs::size(const Digest& digest) const {
   return stamp->bytes;
 }
 
-// A blob that is read as a whole is hashed every time. A larger file, which is read in pieces, is hashed
-// completely before the first piece.
+// A blob that one call reads as a whole is hashed every time. A larger file, which is read in pieces, is
+// hashed completely before the first piece.
 Result<std::vector<std::byte>> DiskBlobs::read(const Digest& digest, std::uint64_t offset,
                                                std::uint64_t length) const {
   const auto seen = look_at(digest);

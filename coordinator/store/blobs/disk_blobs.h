@@ -28,7 +28,7 @@ struct FileStamp {
   bool operator==(const FileStamp&) const = default;
 };
 
-// Returns the file's present stamp; nullopt: it cannot be read, and errno says why.
+// Returns the file's present stamp; nullopt: it cannot be read; the reason is in errno.
 inline std::optional<FileStamp> stamp_of(const std::filesystem::path& path) {
   struct stat info {};
   if (::stat(path.c_str(), &info) != 0) return std::nullopt;
@@ -36,8 +36,8 @@ inline std::optional<FileStamp> stamp_of(const std::filesystem::path& path) {
                    info.st_ctim.tv_nsec};
 }
 
-// Remembers which files this process has read as a whole and found to match their digests, with each file's
-// stamp at that time. A file whose stamp has changed since must be read again. Thread-safe.
+// The files that this process has read as a whole and found to match their digests, with each file's stamp at
+// that time. A file whose stamp has changed since must be read again. Thread-safe.
 class VerifiedDigests {
  public:
   // True if this blob's file matched its digest when it had this stamp.
@@ -92,7 +92,7 @@ class DiskBlobs final : public BlobStore {
       : folder_(std::move(folder)), work_(std::move(work)) {}
   Result<FileStamp> look_at(const Digest& digest) const;
   // Moves the blob's file aside, if it still has the stamp `seen` that it had when it was read; `got` is the
-  // digest of the bytes read. Always returns an error, which says what is wrong and what to do.
+  // digest of the bytes read. Always returns an error, with the cause and the remedy.
   tl::unexpected<Error> set_aside(const Digest& digest, const FileStamp& seen, const Digest& got) const;
   // Moves a verified and synced file to its place.
   Result<void> place(const Digest& digest, const std::filesystem::path& from);

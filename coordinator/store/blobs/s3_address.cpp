@@ -13,8 +13,7 @@ namespace {
 
 constexpr std::string_view kScheme = "s3://";
 
-// Allows only characters that need no escaping in an address, so that the address that is signed equals the
-// one that is sent.
+// Allows only characters that need no escaping in an address, so that the signed address equals the sent one.
 bool plain(std::string_view text, std::string_view also) {
   return std::all_of(text.begin(), text.end(), [&](unsigned char c) {
     return std::isalnum(c) != 0 || also.find(static_cast<char>(c)) != std::string_view::npos;

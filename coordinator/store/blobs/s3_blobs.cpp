@@ -182,8 +182,8 @@ void S3Blobs::note_lost(const Digest& digest) const {
   there_.erase(digest);
 }
 
-// Remembers that the object in the S3 store is damaged. The object stays there, so that an operator can
-// examine it or replace it with the right one.
+// Notes that the object in the S3 store is damaged. The object stays there, so that an operator can examine
+// it or replace it with the right one.
 Error S3Blobs::note_damaged(const Digest& digest, const Error& why) const {
   const auto object = link_.look_at(key_of(digest));
   const std::lock_guard lock(mutex_);

@@ -1,5 +1,5 @@
-// Reads and writes objects in a bucket of an S3-compatible store. It has its own use of libcurl, which also
-// signs the requests (AWS Signature Version 4). Addresses are in path style: ENDPOINT/BUCKET/PREFIX/KEY.
+// Reads and writes objects in a bucket of an S3-compatible store. It calls libcurl directly, which also signs
+// the requests (AWS Signature Version 4). Addresses are in path style: ENDPOINT/BUCKET/PREFIX/KEY.
 // Thread-safe: each request has its own connection.
 #pragma once
 
@@ -41,7 +41,7 @@ Result<S3Keys> s3_keys_from_environment();
 struct S3Options {
   S3Address address;
   S3Keys keys;
-  // attempts, at most, of a request that fails for a reason that may pass: no answer, 429, 5xx
+  // greatest number of attempts of a request that fails for a transient reason: no answer, 429, 5xx
   int attempts = 6;
   Duration first_pause = std::chrono::milliseconds(100), longest_pause = std::chrono::seconds(5);
 };
@@ -59,8 +59,8 @@ class S3Link {
   Result<Object> look_at(const std::string& key) const;  // error not_found: there is no such object
   using Sink = std::function<Result<void>(std::span<const std::byte>)>;
   // Reads the whole object and passes its bytes to `sink`, in order. If an attempt fails, the next one reads
-  // the object from its start; `restart` is called before every attempt and must discard what `sink` has
-  // received.
+  // the object from its start; `restart` is called before every attempt and must discard the bytes that
+  // `sink` has received.
   Result<void> get(const std::string& key, const std::function<Result<void>()>& restart,
                    const Sink& sink) const;
   // Sends a file of `bytes` bytes, whose digest the store checks: in one request or, if the file is larger

@@ -79,13 +79,13 @@ Result<void> S3Link::send_parts(const std::string& key, const std::string& uploa
   // The store begins its answer before it has joined the parts, so an answer with status 200 may contain an
   // error.
   if (answer->status / 100 == 2 && xml_element(answer->text, "Code").empty()) return {};
-  // If the answer to an earlier attempt was lost, the upload may be complete and its id unknown to the store:
-  // then the object exists.
+  // If the answer to an earlier attempt was lost, the upload may be complete, and the store no longer accepts
+  // its id: then the object exists.
   if (const auto there = look_at(key); there && there->bytes == bytes) return {};
   return tl::unexpected(error_of(end, *answer));
 }
 
-// Tells the store to delete the parts sent so far. Otherwise it would keep them, invisible but charged for.
+// Deletes the parts sent so far in the store. Otherwise the store would keep them, invisible but charged for.
 void S3Link::give_up_parts(const std::string& key, const std::string& upload) const {
   const Request request{.method = "DELETE", .key = key, .query = "uploadId=" + percent_encode(upload)};
   const auto answer = ask(request);

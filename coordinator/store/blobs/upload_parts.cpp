@@ -35,7 +35,7 @@ class UploadParts::Part final : public BlobStore::Upload {
         path_(std::move(path)),
         publish_(std::move(publish)) {}
   ~Part() override {
-    // The sync keeps a power failure from losing bytes that were reported as received, in most cases
+    // With the sync, a power failure rarely loses bytes that were reported as received
     if (!ended_) ::fdatasync(file_.fd());
   }
 

@@ -33,7 +33,7 @@ struct StoreStatus {
   std::uint64_t behind = 0;  // number of jobs not completely mirrored
 };
 
-// The coordinator that owns a job, if several share a store
+// The coordinator that owns a job, if several coordinators share a store
 struct JobLocation {
   std::string http;    // http://HOST:PORT; empty: unknown
   bool alive = false;  // false: the coordinator is gone; another will take the job over, unless it has ended
@@ -102,7 +102,7 @@ struct StoredJob {
   std::uint64_t revision = 0;  // number of changes, in stores that count them (Redis)
   // Number of times the job has changed its owner, if several coordinators share a store (redis_members.h)
   std::uint64_t fence = 0;
-  bool damaged = false;  // true if its record cannot be read: only id, `failed` and `error` are known
+  bool damaged = false;  // true if its record cannot be read: only id, state (failed) and error are set
   bool operator==(const StoredJob&) const = default;
 };
 std::string to_json(const StoredJob& job);
@@ -163,7 +163,7 @@ class JobStore {
   struct Moved {
     // Quarantined by another coordinator; apply these before the rest
     std::vector<QuarantinedWorker> quarantined;
-    std::vector<JobId> lost;  // taken over by another coordinator: nothing is stored for them here any more
+    std::vector<JobId> lost;  // taken over by another coordinator: their updates are no longer stored here
     std::vector<Inherited> inherited;  // jobs from a coordinator that is gone; may include jobs lost before
   };
   virtual Moved moved() { return {}; }  // changes since the last call

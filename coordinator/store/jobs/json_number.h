@@ -12,8 +12,8 @@ namespace ls::coordinator {
 inline double finite(double value) { return std::isfinite(value) ? value : 0; }
 // null: written by a version that did not use finite().
 inline double number_of(const nlohmann::json& j) { return j.is_null() ? 0 : j.get<double>(); }
-// Throws for anything but an integer from 0 to 2^64 - 1. The library alone would convert 1e20, which does not
-// fit.
+// Throws for any value but an integer from 0 to 2^64 - 1. The library alone would convert 1e20, which does
+// not fit.
 inline std::uint64_t count_of(const nlohmann::json& j) {
   if (!j.is_number_unsigned()) throw std::invalid_argument("a count is not an integer from 0 to 2^64 - 1");
   return j.get<std::uint64_t>();

@@ -42,31 +42,15 @@ Error db_error(sqlite3* db, std::string_view what) {
   return {Errc::unavailable, fmt::format("cannot {}: {}", what, sqlite3_errmsg(db))};
 }
 
-// One SQL statement. Each call of bind() sets the next parameter.
+// One SQL statement with its parameters.
 class Statement {
  public:
-  Statement(const Db& db, const char* sql) : db_(db.get()) {
+  template <class... Parameters>
+  Statement(const Db& db, const char* sql, const Parameters&... parameters) : db_(db.get()) {
     sqlite3_stmt* raw = nullptr;
     sqlite3_prepare_v2(db.get(), sql, -1, &raw, nullptr);
     statement_.reset(raw);
-  }
-  Statement& bind(std::string_view text) {
-    sqlite3_bind_text(statement_.get(), ++bound_, text.data(), static_cast<int>(text.size()),
-                      SQLITE_TRANSIENT);
-    return *this;
-  }
-  Statement& bind(double value) {
-    sqlite3_bind_double(statement_.get(), ++bound_, value);
-    return *this;
-  }
-  Statement& bind(const std::optional<double>& value) {
-    if (value) return bind(*value);
-    ++bound_;  // a parameter that is not bound is null
-    return *this;
-  }
-  Statement& bind(std::int64_t value) {
-    sqlite3_bind_int64(statement_.get(), ++bound_, value);
-    return *this;
+    (bind(parameters), ...);
   }
   // Runs the statement up to its next row. True: there is a row; false: there are no more rows.
   Result<bool> step(std::string_view what) {
@@ -80,6 +64,15 @@ class Statement {
     while (stepped && *stepped) stepped = step(what);
     if (!stepped) return tl::unexpected(stepped.error());
     return {};
+  }
+  // Runs the statement and returns the result of read() for each row.
+  template <class Read>
+  Result<std::vector<std::invoke_result_t<Read>>> all(std::string_view what, Read read) {
+    std::vector<std::invoke_result_t<Read>> rows;
+    auto row = step(what);
+    for (; row && *row; row = step(what)) rows.push_back(read());
+    if (!row) return tl::unexpected(row.error());
+    return rows;
   }
   std::string text(int column) const {
     const auto* chars = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
@@ -95,6 +88,19 @@ class Statement {
   std::int64_t integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
 
  private:
+  void bind(std::string_view text) {
+    sqlite3_bind_text(statement_.get(), ++bound_, text.data(), static_cast<int>(text.size()),
+                      SQLITE_TRANSIENT);
+  }
+  void bind(double value) { sqlite3_bind_double(statement_.get(), ++bound_, value); }
+  void bind(const std::optional<double>& value) {
+    if (value)
+      bind(*value);
+    else
+      ++bound_;  // a parameter that is not bound is null
+  }
+  void bind(std::int64_t value) { sqlite3_bind_int64(statement_.get(), ++bound_, value); }
+
   sqlite3* db_;
   std::unique_ptr<sqlite3_stmt, FinalizeStatement> statement_;
   int bound_ = 0;
@@ -119,10 +125,8 @@ Result<void> all_or_nothing(const Db& db, const char* what, Work work) {
 Result<void> put(const Db& db, const StoredJob& job) {
   return Statement(db,
                    "INSERT INTO jobs(id, state, record) VALUES(?1, ?2, ?3) "
-                   "ON CONFLICT(id) DO UPDATE SET state = ?2, record = ?3")
-      .bind(job.id.value)
-      .bind(to_string(job.state))
-      .bind(to_json(job))
+                   "ON CONFLICT(id) DO UPDATE SET state = ?2, record = ?3",
+                   job.id.value, to_string(job.state), to_json(job))
       .run("store a job");
 }
 
@@ -154,15 +158,11 @@ class SqliteJobStore final : public JobStore {
 
   Result<std::vector<StoredJob>> jobs() const override {
     const auto db = db_.lock();
-    std::vector<StoredJob> all;
     Statement rows(*db, "SELECT record, id FROM jobs ORDER BY ordinal");
-    auto row = rows.step("read the jobs");
-    for (; row && *row; row = rows.step("read the jobs")) {
+    return rows.all("read the jobs", [&] {
       auto job = parse_stored_job(rows.text(0));
-      all.push_back(job ? std::move(*job) : damaged_job(rows.text(1), job.error()));
-    }
-    if (!row) return tl::unexpected(row.error());
-    return all;
+      return job ? std::move(*job) : damaged_job(rows.text(1), job.error());
+    });
   }
 
   Result<void> remove_jobs(std::span<const JobId> jobs) override {
@@ -171,7 +171,7 @@ class SqliteJobStore final : public JobStore {
       for (const JobId& job : jobs)
         for (const char* sql : {"DELETE FROM jobs WHERE id = ?", "DELETE FROM points WHERE job = ?",
                                 "DELETE FROM truths WHERE job = ?", "DELETE FROM log WHERE job = ?"})
-          if (auto done = Statement(*db, sql).bind(job.value).run("remove a job"); !done) return done;
+          if (auto done = Statement(*db, sql, job.value).run("remove a job"); !done) return done;
       return {};
     });
   }
@@ -181,60 +181,48 @@ class SqliteJobStore final : public JobStore {
     return Statement(
                *db,
                "INSERT INTO points(job, seconds, core_seconds, spp, rmse, relmse, relmse_lo, relmse_hi, "
-               "rmse_lo, rmse_hi) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
-        .bind(job.value)
-        .bind(p.seconds)
-        .bind(p.core_seconds)
-        .bind(p.spp)
-        .bind(p.error.rmse)
-        .bind(p.error.relmse)
-        .bind(p.error.relmse_lo)
-        .bind(p.error.relmse_hi)
-        .bind(p.error.rmse_lo)
-        .bind(p.error.rmse_hi)
+               "rmse_lo, rmse_hi) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+               job.value, p.seconds, p.core_seconds, p.spp, p.error.rmse, p.error.relmse, p.error.relmse_lo,
+               p.error.relmse_hi, p.error.rmse_lo, p.error.rmse_hi)
         .run("store a convergence point");
   }
 
   Result<void> set_reference_error(const JobId& job, double spp,
                                    const ReferenceError& reference_error) override {
     const auto db = db_.lock();
-    Statement insert(*db,
+    return Statement(*db,
                      "INSERT OR REPLACE INTO truths(job, spp, rmse, relmse, flip, mse_stderr, relmse_stderr) "
-                     "VALUES(?, ?, ?, ?, ?, ?, ?)");
-    insert.bind(job.value).bind(spp).bind(reference_error.rmse).bind(reference_error.relmse);
-    return insert.bind(reference_error.flip)
-        .bind(reference_error.mse_stderr)
-        .bind(reference_error.relmse_stderr)
+                     "VALUES(?, ?, ?, ?, ?, ?, ?)",
+                     job.value, spp, reference_error.rmse, reference_error.relmse, reference_error.flip,
+                     reference_error.mse_stderr, reference_error.relmse_stderr)
         .run("store a comparison with the reference");
   }
 
   Result<std::vector<ConvergencePoint>> points(const JobId& job) const override {
     const auto db = db_.lock();
-    std::vector<ConvergencePoint> all;
     Statement rows(*db,
                    "SELECT seconds, core_seconds, spp, points.rmse, points.relmse, relmse_lo, relmse_hi, "
                    "truths.rmse, truths.relmse, truths.flip, rmse_lo, rmse_hi, mse_stderr, relmse_stderr "
-                   "FROM points LEFT JOIN truths USING(job, spp) WHERE job = ? ORDER BY n");
-    rows.bind(job.value);
-    auto row = rows.step("read the convergence");
-    for (; row && *row; row = rows.step("read the convergence")) {
-      all.push_back({rows.real(0),
-                     rows.real(1),
-                     rows.real(2),
-                     {rows.real(3), rows.real(4), rows.real(5), rows.real(6), rows.real(10), rows.real(11)}});
+                   "FROM points LEFT JOIN truths USING(job, spp) WHERE job = ? ORDER BY n",
+                   job.value);
+    return rows.all("read the convergence", [&] {
+      ConvergencePoint p{
+          rows.real(0),
+          rows.real(1),
+          rows.real(2),
+          {rows.real(3), rows.real(4), rows.real(5), rows.real(6), rows.real(10), rows.real(11)}};
       if (!rows.null(7))
-        all.back().reference_error =
+        p.reference_error =
             ReferenceError{rows.real(7), rows.real(8), rows.known(9), rows.known(12), rows.known(13)};
-    }
-    if (!row) return tl::unexpected(row.error());
-    return all;
+      return p;
+    });
   }
 
   Result<void> remove_points(const JobId& job) override {
     const auto db = db_.lock();
     return all_or_nothing(*db, "remove the convergence of a job", [&]() -> Result<void> {
       for (const char* sql : {"DELETE FROM points WHERE job = ?", "DELETE FROM truths WHERE job = ?"})
-        if (auto done = Statement(*db, sql).bind(job.value).run("remove the convergence of a job"); !done)
+        if (auto done = Statement(*db, sql, job.value).run("remove the convergence of a job"); !done)
           return done;
       return {};
     });
@@ -242,60 +230,49 @@ class SqliteJobStore final : public JobStore {
 
   Result<void> add_log(const JobId& job, const LogLine& line) override {
     const auto db = db_.lock();
-    if (auto done = Statement(*db, "INSERT INTO log(job, unix, text) VALUES(?, ?, ?)")
-                        .bind(job.value)
-                        .bind(line.unix_time)
-                        .bind(line.text)
+    if (auto done = Statement(*db, "INSERT INTO log(job, unix, text) VALUES(?, ?, ?)", job.value,
+                              line.unix_time, line.text)
                         .run("store a log line");
         !done)
       return done;
     if (++log_lines_ % limits::kLogLinesKept != 0) return {};
     return Statement(*db,
                      "DELETE FROM log WHERE job = ?1 AND n NOT IN "
-                     "(SELECT n FROM log WHERE job = ?1 ORDER BY n DESC LIMIT ?2)")
-        .bind(job.value)
-        .bind(static_cast<std::int64_t>(limits::kLogLinesKept))
+                     "(SELECT n FROM log WHERE job = ?1 ORDER BY n DESC LIMIT ?2)",
+                     job.value, static_cast<std::int64_t>(limits::kLogLinesKept))
         .run("shorten a log");
   }
 
   Result<std::vector<LogLine>> log(const JobId& job) const override {
     const auto db = db_.lock();
-    std::vector<LogLine> all;
     Statement rows(
         *db,
         "SELECT unix, text FROM (SELECT n, unix, text FROM log WHERE job = ? ORDER BY n DESC LIMIT ?) "
-        "ORDER BY n");
-    rows.bind(job.value).bind(static_cast<std::int64_t>(limits::kLogLinesKept));
-    auto row = rows.step("read a log");
-    for (; row && *row; row = rows.step("read a log")) all.push_back({rows.real(0), rows.text(1)});
-    if (!row) return tl::unexpected(row.error());
-    return all;
+        "ORDER BY n",
+        job.value, static_cast<std::int64_t>(limits::kLogLinesKept));
+    return rows.all("read a log", [&] { return LogLine{rows.real(0), rows.text(1)}; });
   }
 
   Result<void> quarantine(const QuarantinedWorker& worker) override {
     const auto db = db_.lock();
-    return Statement(*db, "INSERT OR IGNORE INTO barred(worker, evidence) VALUES(?, ?)")
-        .bind(worker.worker.value)
-        .bind(worker.evidence)
+    return Statement(*db, "INSERT OR IGNORE INTO barred(worker, evidence) VALUES(?, ?)", worker.worker.value,
+                     worker.evidence)
         .run("store that a worker is quarantined");
   }
   Result<std::vector<QuarantinedWorker>> quarantined() const override {
     const auto db = db_.lock();
-    std::vector<QuarantinedWorker> all;
     Statement rows(*db, "SELECT worker, evidence FROM barred ORDER BY worker");
-    auto row = rows.step("read the quarantined workers");
-    for (; row && *row; row = rows.step("read the quarantined workers"))
-      all.push_back({{rows.text(0)}, rows.text(1)});
-    if (!row) return tl::unexpected(row.error());
-    return all;
+    return rows.all("read the quarantined workers", [&] {
+      return QuarantinedWorker{{rows.text(0)}, rows.text(1)};
+    });
   }
 
   Result<std::uint64_t> reserve(const std::string& counter, std::uint64_t amount) override {
     const auto db = db_.lock();
     Statement row(*db,
                   "INSERT INTO counters(name, value) VALUES(?1, ?2) "
-                  "ON CONFLICT(name) DO UPDATE SET value = value + ?2 RETURNING value");
-    row.bind(counter).bind(static_cast<std::int64_t>(amount));
+                  "ON CONFLICT(name) DO UPDATE SET value = value + ?2 RETURNING value",
+                  counter, static_cast<std::int64_t>(amount));
     const auto stepped = row.step("reserve ids");
     if (!stepped) return tl::unexpected(stepped.error());
     const auto value = static_cast<std::uint64_t>(row.integer(0));

@@ -1,6 +1,6 @@
 // A job store whose jobs are also in Redis. Every change goes to a durable local store first (SQLite), and a
 // separate thread copies it from there to Redis. So no decision of the farm waits for Redis. While Redis is
-// unavailable, its data are merely out of date; data that Redis has lost (its last second, or writes before a
+// unavailable, its data are out of date; data that Redis has lost (its last second, or writes before a
 // failover) are written again.
 //
 // Each record has a revision that increases with every change. At open() both sides are compared, and the
@@ -30,9 +30,9 @@ struct RedisStoreOptions {
 };
 
 // Opens a store that keeps its jobs in `local` and copies them to Redis. If Redis does not answer, the store
-// opens nevertheless and updates Redis later. There are two exceptions, with the error `unavailable`: if
-// `local` has no job, the jobs in Redis would be overlooked; if other coordinators share the Redis, this one
-// may no longer own the jobs in `local`.
+// still opens and updates Redis later, with two exceptions (error `unavailable`): if `local` has no job,
+// since the jobs in Redis would be overlooked; and if other coordinators share the Redis, since this one may
+// no longer own the jobs in `local`.
 Result<std::unique_ptr<JobStore>> open_redis_job_store(std::unique_ptr<JobStore> local,
                                                        RedisStoreOptions options);
 

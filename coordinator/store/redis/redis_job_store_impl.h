@@ -63,8 +63,8 @@ class RedisJobStore final : public JobStore {
 
   Result<void> remove_jobs(std::span<const JobId> jobs) override {
     const auto state = state_.lock();
-    // The jobs are marked as removed first. Redis still has them until it is updated, and the marks prevent
-    // that they are copied back from there.
+    // The jobs are marked as removed first. Redis still has them until it is updated; the marks prevent
+    // copying them back from there.
     for (const JobId& job : jobs)
       if (state->revisions.contains(job))
         if (auto marked = local_->reserve(removal_mark(job), 1); !marked)
@@ -161,10 +161,10 @@ class RedisJobStore final : public JobStore {
   void take_over(std::vector<TakenJob> taken) {
     for (TakenJob& one : taken) {
       StoredJob& job = one.job.job;
-      job.fence = one.fence;
+      job.fence = one.job.fence;
       auto kept = keep_inherited(*local_, one.job);
       const auto state = state_.lock();
-      // Redis says that this node owns the job. If it cannot be stored now, the members' thread calls this
+      // In Redis this node owns the job now. If the job cannot be stored here, the members' thread calls this
       // function again with it.
       if (!kept) {
         if (state->not_kept.empty())
@@ -185,8 +185,8 @@ class RedisJobStore final : public JobStore {
     for (const QuarantinedWorker& worker : workers) {
       const auto state = state_.lock();
       if (state->quarantined.contains(worker.worker)) continue;
-      // A quarantine that cannot be stored locally is applied nevertheless; after a restart it is read from
-      // Redis again.
+      // A quarantine applies even if it cannot be stored locally; after a restart it is read from Redis
+      // again.
       if (auto kept = local_->quarantine(worker); !kept) {
         log_error(fmt::format("worker={}", worker.worker.value), kept.error().message);
       }
@@ -206,7 +206,7 @@ class RedisJobStore final : public JobStore {
       const auto removed = local_->reserve(removal_mark(id), 0);
       if (!removed || *removed == 0) return !removed.has_value();
       state->due[id] = Due{};
-      state->due[id].removed = true;  // this node has removed the job, but Redis does not know yet
+      state->due[id].removed = true;  // this node has removed the job, but Redis still has it
       wake_.notify_one();
       return true;
     });
@@ -241,7 +241,7 @@ class RedisJobStore final : public JobStore {
     }
   };
 
-  // Facts about the jobs, and the changes that must still be sent to Redis
+  // Revisions and fences of the jobs, and the changes that must still be sent to Redis
   struct State {
     bool idle() const { return due.empty() && counters.empty() && quarantined_due.empty() && !all_due; }
 

@@ -35,7 +35,7 @@ void RedisJobStore::send_loop(const std::stop_token& token) {
 }
 
 // At shutdown, sends the changes that Redis still lacks. It tries twice, because the first attempt fails if
-// the connection broke unnoticed. Changes that remain unsent are on the disk.
+// the connection broke unnoticed. Unsent changes remain on the disk.
 void RedisJobStore::send_the_rest() {
   int failed = 0;
   for (bool more = true; more && failed < 2;) {
@@ -65,8 +65,8 @@ Result<void> RedisJobStore::send_once() {
   }
   if (auto same = check_memory(); !same) return same;
   if (auto all = note_all_behind(); !all) return all;
-  // Quarantined workers are sent before the jobs, so that a coordinator that takes over the jobs knows of
-  // them
+  // Quarantined workers are sent before the jobs, so that a coordinator that takes over the jobs gets them,
+  // too
   if (auto sent = send_quarantined(); !sent) return sent;
   if (auto sent = send_counters(); !sent) return sent;
   return send_jobs();

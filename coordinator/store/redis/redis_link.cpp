@@ -4,11 +4,15 @@
 #include <hiredis/hiredis.h>
 #include <sys/time.h>
 
+#include <algorithm>
+
 namespace ls::coordinator {
 namespace {
 
-// A reply that is deeper or longer than our commands can cause does not come from a Redis.
+// Replies to our commands are not nested deeper than this; deeper items are dropped.
 constexpr int kMaxDepth = 4;
+// At most this many commands are sent without waiting for an answer
+constexpr std::size_t kBatch = 256;
 
 timeval timeval_of(Duration d) {
   const auto us = std::chrono::duration_cast<std::chrono::microseconds>(d).count();
@@ -87,22 +91,26 @@ Result<Result<RedisReply>> RedisLink::next_reply() {
 
 Result<std::vector<Result<RedisReply>>> RedisLink::run_all(std::span<const Command> commands) {
   if (broken_) return tl::unexpected(connection_error());
-  for (const Command& command : commands) {
-    std::vector<const char*> words;
-    std::vector<std::size_t> lengths;
-    for (const std::string& word : command) {
-      words.push_back(word.data());
-      lengths.push_back(word.size());
-    }
-    if (redisAppendCommandArgv(context_.get(), static_cast<int>(words.size()), words.data(),
-                               lengths.data()) != REDIS_OK)
-      return tl::unexpected(connection_error());
-  }
   std::vector<Result<RedisReply>> replies;
-  for (std::size_t i = 0; i < commands.size(); ++i) {
-    auto reply = next_reply();
-    if (!reply) return tl::unexpected(reply.error());
-    replies.push_back(std::move(*reply));
+  while (replies.size() < commands.size()) {
+    const auto later = commands.subspan(replies.size());
+    const auto batch = later.first(std::min(kBatch, later.size()));
+    for (const Command& command : batch) {
+      std::vector<const char*> words;
+      std::vector<std::size_t> lengths;
+      for (const std::string& word : command) {
+        words.push_back(word.data());
+        lengths.push_back(word.size());
+      }
+      if (redisAppendCommandArgv(context_.get(), static_cast<int>(words.size()), words.data(),
+                                 lengths.data()) != REDIS_OK)
+        return tl::unexpected(connection_error());
+    }
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      auto reply = next_reply();
+      if (!reply) return tl::unexpected(reply.error());
+      replies.push_back(std::move(*reply));
+    }
   }
   return replies;
 }

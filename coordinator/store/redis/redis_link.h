@@ -17,7 +17,7 @@ struct redisContext;
 namespace ls::coordinator {
 
 // An address redis://[USER:PASSWORD@]HOST[:PORT][/DB]; an IPv6 host is in brackets. TLS (rediss://) is
-// rejected with a message that says so.
+// rejected with an explanation.
 struct RedisAddress {
   std::string host = "127.0.0.1";
   int port = 6379;
@@ -49,9 +49,9 @@ class RedisLink {
 
   using Command = std::vector<std::string>;  // the command's name and its arguments, which may have any bytes
   Result<RedisReply> run(const Command& command);
-  // Sends all commands without waiting in between and returns their replies in the same order. An error reply
-  // to one command becomes the error of that command's Result. An error of the connection fails the whole
-  // call; it is then unknown which commands Redis has carried out.
+  // Sends all commands, in batches without waiting in between, and returns their replies in the same order.
+  // An error reply to one command becomes the error of that command's Result. An error of the connection
+  // fails the whole call; it is then unknown which commands Redis has carried out.
   Result<std::vector<Result<RedisReply>>> run_all(std::span<const Command> commands);
 
   bool broken() const { return broken_; }  // true after a connection error: a new RedisLink is needed

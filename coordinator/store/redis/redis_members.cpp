@@ -3,10 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <condition_variable>
 #include <nlohmann/json.hpp>
 
 #include "common/base/log.h"
+#include "coordinator/base/work_queue.h"
+#include "coordinator/store/redis/redis_pull.h"
 
 namespace ls::coordinator {
 namespace {
@@ -66,8 +67,8 @@ redis.call('HSET', 'lightshaft:counters', 'shared-starts', start)
 return start
 )";
 
-// Returns the id that decides which node takes `job` over: for a frame the id of its sequence, because all
-// frames of a sequence must belong to one coordinator; else the job's own id.
+// Jobs of one group are taken over together. A frame's group is its sequence, because all frames of a
+// sequence must belong to one coordinator; any other job is its own group.
 JobId group_of(const JobId& job) {
   const auto frame = frame_of(job);
   return frame ? frame->sequence : job;
@@ -169,12 +170,9 @@ Result<void> RedisMembers::look_for_quarantined() {
 // heartbeat until the node has all of them, because no other node takes the jobs of a living node.
 Result<void> RedisMembers::look_for_stranded() {
   if (!own_unclear_ || !callbacks_.unknown) return {};
-  auto owned = link_->run({"SMEMBERS", "lightshaft:owned:" + options_.node});
-  if (!owned) return tl::unexpected(owned.error());
-  std::vector<JobId> ids;
-  for (const RedisReply& member : owned->items)
-    if (is_job_id(member.text)) ids.push_back({member.text});
-  const auto unknown = callbacks_.unknown(std::move(ids));
+  auto ids = job_ids(*link_, "lightshaft:owned:" + options_.node);
+  if (!ids) return tl::unexpected(ids.error());
+  const auto unknown = callbacks_.unknown(std::move(*ids));
   own_unclear_ = !unknown.empty();
   std::vector<TakenJob> taken;
   std::string stranded;
@@ -188,8 +186,7 @@ Result<void> RedisMembers::look_for_stranded() {
     }
     if (job->owner != options_.node) continue;
     const std::string from = job->from.empty() ? "of before" : job->from;
-    taken.push_back({std::move(*job), 0, from});
-    taken.back().fence = taken.back().job.fence;
+    taken.push_back({std::move(*job), from});
   }
   {
     const std::lock_guard lock(mutex_);
@@ -212,25 +209,21 @@ std::string RedisMembers::stranded() const {
 }
 
 Result<std::vector<JobId>> RedisMembers::left_unfinished(const std::string& dead) {
-  auto members = link_->run({"SMEMBERS", "lightshaft:owned:" + dead});
-  if (!members) return tl::unexpected(members.error());
-  std::erase_if(members->items, [](const RedisReply& member) { return !is_job_id(member.text); });
+  const auto ids = job_ids(*link_, "lightshaft:owned:" + dead);
+  if (!ids) return tl::unexpected(ids.error());
+  std::vector<RedisLink::Command> commands;
+  for (const JobId& id : *ids) commands.push_back({"HGET", redis_job_key(id), "state"});
+  const auto states = link_->run_all(commands);
+  if (!states) return tl::unexpected(states.error());
   std::map<JobId, std::vector<JobId>> groups;
   std::set<JobId> open;
-  for (std::size_t i = 0; i < members->items.size(); i += kAskedAtOnce) {
-    const std::size_t end = std::min(members->items.size(), i + kAskedAtOnce);
-    std::vector<RedisLink::Command> commands;
-    for (std::size_t k = i; k < end; ++k)
-      commands.push_back({"HGET", redis_job_key({members->items[k].text}), "state"});
-    auto states = link_->run_all(commands);
-    if (!states) return tl::unexpected(states.error());
-    for (std::size_t k = i; k < end; ++k) {
-      const auto& state = (*states)[k - i];
-      if (!state) return tl::unexpected(state.error());
-      const JobId id{members->items[k].text}, group = group_of(id);
-      groups[group].push_back(id);
-      if (state->text != "done" && state->text != "failed" && state->text != "cancelled") open.insert(group);
-    }
+  for (std::size_t i = 0; i < ids->size(); ++i) {
+    const auto& state = (*states)[i];
+    if (!state) return tl::unexpected(state.error());
+    const JobId& id = (*ids)[i];
+    groups[group_of(id)].push_back(id);
+    if (state->text != "done" && state->text != "failed" && state->text != "cancelled")
+      open.insert(group_of(id));
   }
   std::vector<JobId> unfinished;
   for (const JobId& group : open) {
@@ -257,8 +250,7 @@ Result<std::optional<TakenJob>> RedisMembers::take(const JobId& id, const std::s
   auto job = parse_redis_job(*fields);
   // This node owns the job by now; look_for_stranded() will check the job again.
   if (!job || job->job.id != id) return std::nullopt;
-  const std::uint64_t fence = job->fence;
-  return TakenJob{std::move(*job), fence, dead};
+  return TakenJob{std::move(*job), dead};
 }
 
 Result<void> RedisMembers::take_from(const std::string& dead) {
@@ -319,17 +311,15 @@ Result<std::optional<Member>> RedisMembers::owner_of(const JobId& id) {
 
 void RedisMembers::start() {
   beater_ = std::jthread([this](const std::stop_token& token) {
-    std::mutex mutex;
-    std::condition_variable_any woken;
-    std::unique_lock lock(mutex);
-    do {
+    const auto act = [this] {
       const auto done = beat();
       const std::string before = std::exchange(trouble_, done ? "" : done.error().message);
       if (before.empty() && !done)
         log_warn("store=redis",
                  trouble_ + "; this coordinator's jobs go on, and nobody can be seen or taken over from");
-    } while (!woken.wait_for(lock, token, options_.beat, [&] { return token.stop_requested(); }) &&
-             !token.stop_requested());
+    };
+    act();
+    every(options_.beat, token, act);
   });
 }
 

@@ -2,9 +2,9 @@
 // Each job belongs to one node: the job's hash in Redis names this owner and a fence, a number that increases
 // with every new owner. A heartbeat expires after MemberOptions::lease; a node counts as dead if
 // MemberOptions::looks consecutive polls find no heartbeat of it. The first node to notice takes over the
-// dead node's unfinished jobs one by one, each in one atomic step of Redis that also raises the fence. From
-// then on Redis rejects writes of the old owner (redis_records.h). If the old owner was only suspended, it
-// finds the jobs on its list of lost jobs and drops them.
+// dead node's unfinished jobs (sequences with all their frames) one by one, each in one atomic step of Redis
+// that also raises the fence. From then on Redis rejects writes of the old owner (redis_records.h). If the
+// old owner was only suspended, it finds the jobs on its list of lost jobs and drops them.
 //
 // All expiry times are Redis's own (PX), so the clocks of the machines need not agree.
 //
@@ -30,8 +30,8 @@
 namespace ls::coordinator {
 
 // Decides which coordinators count as dead: those without a heartbeat in `looks` consecutive polls. It counts
-// polls, not seconds. After this process or Redis was stopped for a while, the caller must call
-// begin_again(), or the pause counts against the others.
+// polls, not seconds. After a pause of this process or of Redis, the caller must call begin_again();
+// otherwise the pause counts against the other coordinators.
 class FailureDetector {
  public:
   explicit FailureDetector(int looks) : looks_(looks) {}
@@ -76,7 +76,6 @@ struct Member {
 
 struct TakenJob {
   RedisJob job;
-  std::uint64_t fence = 0;
   std::string from;  // the node that owned the job before
 };
 
@@ -112,15 +111,13 @@ class RedisMembers {
   Result<std::optional<Member>> owner_of(const JobId& id);
 
   // Sends a heartbeat, drops lost jobs, polls the other coordinators, and takes over the jobs of dead ones.
-  // Also completes takeovers of earlier calls that failed because the answer of Redis was lost or the job
-  // could not be stored.
+  // Also completes earlier takeovers that failed because the answer of Redis was lost or the job could not be
+  // stored.
   Result<void> beat();
   // Names a job that this node owns in Redis but cannot read there; empty: there is none.
   std::string stranded() const;
   // Starts the thread that calls beat() regularly.
   void start();
-
-  const std::string& node() const { return options_.node; }
 
  private:
   Result<RedisLink*> link();
@@ -141,7 +138,7 @@ class RedisMembers {
   std::set<std::string> settled_;      // dead nodes that have no jobs left to take over
   std::size_t lost_taken_ = 0;         // number of entries of the list of lost jobs handled so far
   std::int64_t quarantined_seen_ = 0;  // number of quarantined workers reported so far
-  bool own_unclear_ = true;            // true if this node may own jobs that it does not know of
+  bool own_unclear_ = true;            // true if this node may own jobs that it does not have
   std::set<JobId> unreadable_;         // unreadable jobs that were reported already
   std::uint64_t start_ = 0;
   std::string trouble_;

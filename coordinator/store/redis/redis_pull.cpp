@@ -11,20 +11,18 @@
 namespace ls::coordinator {
 namespace {
 
-// Added to counters read from Redis, which may have lost its last writes to them. Ids stay unique as long as
-// there are far fewer than a million reservations per second.
+// Added to counters read from Redis, which may have lost the last writes to them. Ids stay unique as long as
+// these writes reserved at most this many ids.
 constexpr std::uint64_t kCountsLost = 1'000'000;
 
-// Runs several commands in batches; an error of any of them fails the call.
+// Runs several commands; an error of any of them fails the call.
 Result<std::vector<RedisReply>> ask(RedisLink& link, std::span<const RedisLink::Command> commands) {
+  auto replies = link.run_all(commands);
+  if (!replies) return tl::unexpected(replies.error());
   std::vector<RedisReply> all;
-  for (std::size_t i = 0; i < commands.size(); i += kAskedAtOnce) {
-    auto replies = link.run_all(commands.subspan(i, std::min(kAskedAtOnce, commands.size() - i)));
-    if (!replies) return tl::unexpected(replies.error());
-    for (auto& reply : *replies) {
-      if (!reply) return tl::unexpected(reply.error());
-      all.push_back(std::move(*reply));
-    }
+  for (auto& reply : *replies) {
+    if (!reply) return tl::unexpected(reply.error());
+    all.push_back(std::move(*reply));
   }
   return all;
 }
@@ -32,14 +30,11 @@ Result<std::vector<RedisReply>> ask(RedisLink& link, std::span<const RedisLink::
 Result<std::vector<std::uint64_t>> revisions_of(RedisLink& link, std::span<const JobId> ids) {
   std::vector<RedisLink::Command> commands;
   for (const JobId& id : ids) commands.push_back({"HGET", redis_job_key(id), "revision"});
+  auto replies = link.run_all(commands);
+  if (!replies) return tl::unexpected(replies.error());
   std::vector<std::uint64_t> revisions;
-  for (std::size_t i = 0; i < commands.size(); i += kAskedAtOnce) {
-    const auto portion = std::span(commands).subspan(i, std::min(kAskedAtOnce, commands.size() - i));
-    auto replies = link.run_all(portion);
-    if (!replies) return tl::unexpected(replies.error());
-    // A revision that cannot be read counts as 0, so that the others are still read.
-    for (const auto& reply : *replies) revisions.push_back(reply ? counter_of(reply->text) : 0);
-  }
+  // A revision that cannot be read counts as 0, so that the others are still read.
+  for (const auto& reply : *replies) revisions.push_back(reply ? counter_of(reply->text) : 0);
   return revisions;
 }
 
@@ -84,14 +79,11 @@ Result<std::vector<JobId>> wanted_of(RedisLink& link, JobStore& local,
 }
 
 Result<std::vector<JobId>> wanted_ids(RedisLink& link, JobStore& local, std::span<const StoredJob> known) {
-  auto members = link.run({"SMEMBERS", kRedisJobs});
-  if (!members) return tl::unexpected(members.error());
+  const auto ids = job_ids(link, kRedisJobs);
+  if (!ids) return tl::unexpected(ids.error());
   std::map<JobId, std::uint64_t> here;
   for (const StoredJob& job : known) here[job.id] = job.revision;
-  std::vector<JobId> ids;
-  for (const RedisReply& member : members->items)
-    if (is_job_id(member.text)) ids.push_back({member.text});
-  return wanted_of(link, local, here, ids, "");
+  return wanted_of(link, local, here, *ids, "");
 }
 
 Result<void> take_jobs(RedisLink& link, JobStore& local, const std::vector<JobId>& wanted) {
@@ -120,6 +112,15 @@ Result<void> take_jobs(RedisLink& link, JobStore& local, const std::vector<JobId
 }
 
 }  // namespace
+
+Result<std::vector<JobId>> job_ids(RedisLink& link, const std::string& set_key) {
+  auto members = link.run({"SMEMBERS", set_key});
+  if (!members) return tl::unexpected(members.error());
+  std::vector<JobId> ids;
+  for (const RedisReply& member : members->items)
+    if (is_job_id(member.text)) ids.push_back({member.text});
+  return ids;
+}
 
 Result<void> keep_from_redis(JobStore& local, const RedisJob& job) {
   auto points = local.points(job.job.id);
@@ -181,12 +182,9 @@ Result<void> pull_owned(RedisLink& link, JobStore& local, const std::string& nod
              "another coordinator has taken it over while this one was away: dropped");
   if (auto removed = local.remove_jobs(gone); !removed) return removed;
 
-  auto owned = link.run({"SMEMBERS", "lightshaft:owned:" + node});
-  if (!owned) return tl::unexpected(owned.error());
-  std::vector<JobId> ids;
-  for (const RedisReply& member : owned->items)
-    if (is_job_id(member.text)) ids.push_back({member.text});
-  auto wanted = wanted_of(link, local, here, ids, node);
+  const auto ids = job_ids(link, "lightshaft:owned:" + node);
+  if (!ids) return tl::unexpected(ids.error());
+  auto wanted = wanted_of(link, local, here, *ids, node);
   if (!wanted) return tl::unexpected(wanted.error());
   return take_jobs(link, local, *wanted);
 }

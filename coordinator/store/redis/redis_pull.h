@@ -11,19 +11,23 @@
 
 namespace ls::coordinator {
 
+// Returns the ids in a set of Redis; other members are left out.
+Result<std::vector<JobId>> job_ids(RedisLink& link, const std::string& set_key);
+
 // Returns the name of the counter in the local store that marks a job as removed.
 std::string removal_mark(const JobId& job);
 
 // Copies jobs from Redis to `local`, with their points (of the convergence curve) and logs, and also the
-// counters. Copied are jobs that `local` never had, and those that Redis has in a higher revision than
-// `known`, the jobs of `local`. Records that cannot be read are reported and left where they are.
+// counters. It copies jobs that `local` never had, and jobs whose revision in Redis is higher than in
+// `known`, the jobs of `local`. Records that cannot be read are logged and stay in Redis.
 Result<void> pull_from_redis(RedisLink& link, JobStore& local, std::span<const StoredJob> known);
 
 // The same for several coordinators that share the Redis: copies the jobs that `node` still owns, and removes
 // from `local` those that another coordinator has taken over.
 Result<void> pull_owned(RedisLink& link, JobStore& local, const std::string& node);
 
-// Stores a job, its points and its log in `local`. If `local` has more points or log lines, these stay.
+// Stores a job, its points and its log in `local`. Points that `local` has stay, and so does its log unless
+// it is empty.
 Result<void> keep_from_redis(JobStore& local, const RedisJob& job);
 // Stores a job that another coordinator owned until now. It replaces everything that `local` has of the job.
 Result<void> keep_inherited(JobStore& local, const RedisJob& job);

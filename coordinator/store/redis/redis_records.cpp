@@ -16,9 +16,9 @@ using nlohmann::json;
 
 // Writes a job's changes if they are newer than the data in Redis, in one atomic step: no other write can
 // come between reading the revision and writing. ARGV: revision, id, fence, node, sequence or '', fields ...
-// The fence is a number that increases with every new owner of the job. If Redis has a higher fence than
-// this, a later owner has written the job. If it has a lower one, Redis has lost data or an earlier owner
-// wrote the job, and the revision in Redis does not count.
+// The fence is a number that increases with every new owner of the job. A higher fence in Redis means that a
+// later owner has written the job. A lower one means that Redis has lost data or that an earlier owner wrote
+// the job; then the revision in Redis does not count.
 constexpr const char* kPut = R"(
 local fence = tonumber(redis.call('HGET', KEYS[1], 'fence') or '0')
 local mine = tonumber(ARGV[3])

@@ -14,8 +14,6 @@ inline constexpr const char* kRedisJobs = "lightshaft:jobs";
 inline constexpr const char* kRedisMemory = "lightshaft:memory";
 inline constexpr const char* kRedisCounters = "lightshaft:counters";
 inline constexpr const char* kRedisQuarantined = "lightshaft:barred";  // hash: worker -> evidence
-// At most this many commands are sent without waiting for an answer
-inline constexpr std::size_t kAskedAtOnce = 256;
 std::string redis_job_key(const JobId& id);
 std::uint64_t counter_of(const std::string& text);  // returns 0 for a text that is not a number
 // True if the text has the form of a job's id. Ids become names of folders, so other texts found in Redis
@@ -40,7 +38,7 @@ enum class PutAnswer { later_revision = 0, put = 1, lost = -1 };
 // now, with a higher fence.
 RedisLink::Command put_command(const RedisUpdate& update);
 // Makes the commands that remove a job. `node` is set if coordinators share the Redis: jobs that another node
-// owns are then left alone.
+// owns then stay.
 std::vector<RedisLink::Command> remove_commands(const JobId& id, const std::string& node = "");
 
 std::string points_json(const std::vector<ConvergencePoint>& points);

@@ -114,11 +114,7 @@ LONE_INTERFACES = {
 # Tests of real threads and sockets may bound their patience by a clock; those of the state machine have a fake one.
 CLOCK_READERS = re.compile(r"^common/base/clock\.(h|cpp)$|(^|/)main\.cpp$|^tests/(?!unit/domain/)")
 CLOCK_EXCEPTIONS = {
-    "coordinator/http/auth/auth.cpp": "a session's end is a wall-clock date inside the cookie; the function is injected",
     "coordinator/http/net/connection.cpp": "deadlines of sockets, which Asio takes as points in time",
-    "cli/doctor/farm_facts.cpp": "the wall-clock time, to compare it with the coordinator's",
-    "cli/commands/farm_up_command.cpp": "the wall-clock time, by which Docker and Kubernetes say when a worker began",
-    "coordinator/service/state/job_entry.cpp": "the wall-clock time of a submission, for people",
     "coordinator/rpc/rpc_server.cpp": "gRPC's Shutdown takes a point in time",
     "worker/fake/fake.cpp": "plays a slow renderer",
 }

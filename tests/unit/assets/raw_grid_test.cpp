@@ -1,4 +1,4 @@
-#include "common/assets/raw_grid.h"
+#include "common/assets/grid_files.h"
 
 #include <gmock/gmock.h>
 

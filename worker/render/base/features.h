@@ -24,9 +24,9 @@ struct Features {
   // Vertices of paths are connected to points that a directional emitter lights (light_vertices.h).
   bool connected = false;
   // The integrator is `whitted`: a path continues only after mirrors and clear glass. At the first other
-  // surface it finds only the light that comes straight from lights, and ends.
+  // surface it adds the direct light and ends.
   bool whitted = false;
-  // Pixels share the parts of their paths from the second vertices on (path_reuse.h).
+  // Neighbouring pixels share the parts of their paths from the second vertex on (path_reuse.h).
   bool reuse = false;
   bool operator==(const Features&) const = default;
 

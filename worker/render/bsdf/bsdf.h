@@ -5,8 +5,8 @@
 //
 // Some surfaces have null transmission (mask, thin dielectric): part of the light passes straight through.
 // Paths and shadow rays pass such a surface without a vertex, so that next-event estimation reaches lights
-// behind it; eval() and sample() cover only the light that does not pass straight through. Their values are
-// not normalised to it: they remain fractions of all the light that arrives.
+// behind it. eval() and sample() cover only the remaining light. Their values are not renormalised: they are
+// fractions of all incident light.
 //
 // Local frame: z = shading normal, x and y = the tangents that anisotropy refers to. wo (towards the viewer
 // or the previous vertex) and wi (towards the next vertex or the light) are unit vectors that point AWAY from
@@ -37,7 +37,8 @@ struct BsdfEval {
 
 struct BsdfSample {
   V3 wi{0, 0, 1};
-  // F |cos wi| / pdf, including the choice of the lobe; for delta lobes the factor itself
+  // f |cos wi| / pdf, where pdf includes the probability of the lobe. For a delta lobe: its reflectance or
+  // transmittance over its probability.
   C3 weight{0, 0, 0};
   float pdf = 0;  // [1/sr], equal to eval(wi).pdf; for delta lobes the probability of the lobe
   bool delta = false;
@@ -78,8 +79,8 @@ class BsdfTable {
   bool is_null(BsdfIndex i) const;
   // True if there is a lobe that is not a delta, so that next-event estimation is useful
   bool has_smooth(BsdfIndex i) const;
-  // True if eval() depends on wo only by the side of the surface on which wo lies, and on wi only by its side
-  // and in proportion to its cosine
+  // True if f_cos and pdf depend on wo only through its side of the surface, and on wi only through its side
+  // and |cos wi|, to which they are proportional
   bool is_diffuse(BsdfIndex i) const;
   bool reads_uv(BsdfIndex i) const;      // true if some parameter is a texture
   bool anisotropic(BsdfIndex i) const;   // true if the tangents of the local frame matter

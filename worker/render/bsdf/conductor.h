@@ -53,7 +53,7 @@ struct RoughConductor : Conductor {
     const float D = facets.D(h), G = facets.G1_over_cos(wo) * facets.G1_over_cos(wi) * wi.z;
     return {metal.reflectance(dot(wo, h)) * (.25f * D * G), D * facets.pdf_over_D(wo)};
   }
-  // The weight is F G1(wi) times a ratio near 1, because D, which may be huge or lose digits, cancels out.
+  // The weight is F G1(wi) times a ratio near 1. D, which may be huge or lose digits, cancels.
   static std::optional<BsdfSample> sample_facets(const Metal& metal, const Microfacets& facets, const V3& wo,
                                                  const V2& u) {
     const V3 h = facets.sample_normal(wo, u);
@@ -73,8 +73,8 @@ using ConductorKinds = Kinds<Conductor, RoughConductor>;
 
 template <class Description>
 void set_metal(Conductor& m, const Description& b, MaterialBuilder& builder) {
-  // The largest index of a metal. With this index it reflects all but 4e-9 of the light, which float32 cannot
-  // tell from all of it; larger indices would overflow the fourth powers in fresnel_conductor.
+  // The largest index of a metal. A metal with this index reflects all but 4e-9 of the light, which is total
+  // reflection in float32; larger indices would overflow the fourth powers in fresnel_conductor.
   constexpr double kLargestIndex = 1e9;
   for (int c = 0; c < 3; ++c) {
     const double eta = b.eta[c], k = b.k[c];

@@ -9,14 +9,15 @@
 // m) = +-|wo + eta wi|:
 //   density of a refracted wi: (1 - F) D V dot(wo, m) eta^2 |dot(wi, m)| / q^2
 //   value f |cos wi|:          (1 - F) D G dot(wo, m) |dot(wi, m)| / (cos wo q^2)
-// where 1 / eta^2, for radiance, cancels the eta^2 of the value.
+// The value has the factor 1 / eta^2 of refracted radiance, which cancels the factor eta^2 of Walter's
+// formula.
 //
-// A rough sheet has the lobe of a rough mirror on both sides: transmitted light leaves in the directions of
-// reflected light, mirrored at the sheet, as in Burley 2015 ("Extending the Disney BRDF to a BSDF with
-// Integrated Subsurface Scattering") and KHR_materials_transmission of glTF. A facet reflects the share R of
-// a sheet, all reflections between its two sides included, and lets 1 - R through. Both sides have the same
-// index, so radiance has no factor. With wi' the direction wi, mirrored to the side of wo, and m = wo + wi',
-// normalised:
+// A rough sheet has the lobe of a rough mirror on both sides: the transmitted directions are the reflected
+// directions, mirrored at the sheet, as in Burley 2015 ("Extending the Disney BRDF to a BSDF with Integrated
+// Subsurface Scattering") and KHR_materials_transmission of glTF. A facet reflects the share R, which
+// includes all reflections between the two sides of the sheet, and transmits 1 - R. Both sides have the same
+// index, so radiance has no factor 1 / eta^2. With wi' the direction wi, mirrored to the side of wo, and m =
+// wo + wi', normalised:
 //   value f |cos wi|:          (R or 1 - R) D G / (4 cos wo),       density (R or 1 - R) D pdf_over_D(wo)
 #pragma once
 
@@ -160,7 +161,8 @@ struct RoughDielectric : Dielectric {
   };
 };
 
-// A thin sheet with rough sides. Where it is not rough it is a ThinDielectric, and light passes straight on.
+// A thin sheet with rough sides. Where its roughness is below kSpecularAlpha it behaves as a ThinDielectric:
+// transmitted light passes straight through.
 struct RoughThinDielectric : ThinDielectric {
   static constexpr bool kSmooth = true;
   Roughness roughness;
@@ -207,7 +209,7 @@ struct RoughThinDielectric : ThinDielectric {
  private:
   static V3 above(const V3& w) { return {w.x, w.y, std::abs(w.z)}; }
   struct Lobe {
-    float share;  // of the light at a facet seen at the cosine `cos`
+    float share;  // share of light that a facet at the cosine `cos` sends into the lobe
     C3 tint;
   };
   Lobe lobe_at(const Lookup& look, float cos, bool reflected) const {
@@ -272,7 +274,8 @@ inline std::variant<ThinDielectric, RoughThinDielectric> make_material(const Rou
   set_dielectric(m, b, builder);
   m.roughness = builder.roughness(b.distribution, b.alpha_u, b.alpha_v);
   if (m.roughness.always_mirror()) return static_cast<const ThinDielectric&>(m);
-  // Masking takes the same share of reflected and of transmitted light.
+  // Masking removes the same share of reflected and transmitted light, so both use the table of a rough
+  // mirror.
   if (b.multiple_scattering) m.energy = builder.energy(MaterialBuilder::EnergyOf::conductor, m.roughness, 1);
   return m;
 }

@@ -71,8 +71,9 @@ struct DiffuseTransmission : MaterialKind {
   }
 
  private:
-  // The two sides at one point, by whether light is reflected to them: the share of light that leaves there,
-  // and the chance of sampling it. Where textures sum up to more than 1, the shares are divided by the sum.
+  // The two lobes at one point: index 1 (true) is reflection, index 0 is transmission. `share` is the albedo
+  // of the lobe, and `chance` the probability of sampling it. Where the textures add up to more than 1, the
+  // shares are divided by the sum.
   struct Sides {
     C3 share[2];
     float chance[2];

@@ -18,7 +18,7 @@
 namespace ls::render {
 
 // Collects errors: only the first one is recorded, and building continues. So make_material() needs no error
-// handling of its own and reads as a table.
+// handling of its own.
 class MaterialBuilder {
  public:
   MaterialBuilder(const Scene& scene, const TextureTable& textures,
@@ -30,7 +30,7 @@ class MaterialBuilder {
   const std::optional<Error>& error() const { return error_; }
 
   Slot slot(TextureIndex t);
-  // Values outside [0, 1] are clamped, so that surfaces conserve energy, and counted.
+  // Clamps constant values to [0, 1], so that surfaces conserve energy, and counts the clamped slots.
   Slot reflectance(TextureIndex t);
   Roughness roughness(Microfacet distribution, TextureIndex u, TextureIndex v);
   Roughness roughness(Microfacet distribution, double alpha);
@@ -42,8 +42,8 @@ class MaterialBuilder {
   BsdfIndex side(BsdfIndex b);
   bool passes(BsdfIndex b) const { return traits_[b.value].passes; }
 
-  // The tables below take 30 ms to integrate. Materials with equal parameters share one, since scenes give
-  // many objects the same coat.
+  // A table takes about 30 ms to integrate. Materials with equal parameters share one table, since many
+  // objects of a scene often have the same coat.
   const RoughPlasticTable& coat(Microfacet type, double alpha, double eta);
   // Returns the table of multiple scattering between microfacets.
   enum class EnergyOf { conductor, dielectric, coat };

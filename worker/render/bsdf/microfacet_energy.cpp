@@ -10,10 +10,10 @@
 namespace ls::render {
 namespace {
 
-// The tables' intervals are at first the octaves between powers of two, kOctaves of them: near grazing angles
-// the functions vary on the scale of alpha, which is at least 1/1024. Each interval is halved at most
-// kDeepest times: 2^12 parts reach the resolution of float32. A table that has kMostEntries is not refined
-// further: with roughnesses beyond all measure the functions are nothing but rounding.
+// A table starts with kOctaves octaves between powers of two, since near grazing angles the functions vary on
+// the scale of alpha, which is at least 1/1024. Each interval is halved at most kDeepest times: 2^12 parts
+// reach the resolution of float32. A table with kMostEntries entries is not refined further, because at
+// extreme roughnesses the functions consist of rounding noise.
 constexpr int kOctaves = 16, kDeepest = 12;
 constexpr std::size_t kMostEntries = 1024;
 

@@ -1,13 +1,15 @@
-// Multiple scattering between microfacets, which single-scattering models lose. A factor restores its energy
-// (Turquin 2019, "Practical multiple scattering compensation for microfacet models"). Let E(mu) be the share
-// of light that leaves after one bounce in the absence of absorption, seen at the cosine mu:
+// Compensates the energy that single-scattering microfacet models lose, that of light scattered several times
+// between microfacets, by a factor (Turquin 2019, "Practical multiple scattering compensation for microfacet
+// models"). Let E(mu) be the share of light that leaves after one bounce in the absence of absorption, seen
+// at the cosine mu:
 //
 //   f' = f (1 + F' (1 - E) / E),   F' = F E_mean / (1 - F (1 - E_mean)),   E_mean = 2 int E mu dmu,
 //
-// where F is the mean Fresnel reflectance (times the tint): light that is masked hits the surface again, once
-// for each factor F (1 - E_mean) (Kulla and Conty 2017). Without absorption, F = 1, exactly the missing
-// energy is restored. For a dielectric E includes reflection and refraction, and nothing is absorbed. The
-// factor depends only on the viewer, so sampling does not change, and the BSDF is not reciprocal.
+// where F is the mean Fresnel reflectance (times the tint). Masked light hits the surface again; each further
+// bounce has the factor F (1 - E_mean), and F' is the sum of this series (Kulla and Conty 2017). Without
+// absorption, F = 1, the factor restores exactly the missing energy. For a dielectric E includes reflection
+// and refraction, and nothing is absorbed. The factor depends only on the viewer, so sampling does not
+// change, and the BSDF is not reciprocal.
 #pragma once
 
 #include <functional>

@@ -155,9 +155,10 @@ struct Mapped : MaterialKind {
   }
 
  private:
-  // Returns the frame in which the nested material is evaluated, relative to the surface's own frame. Its s
-  // is as close to the surface's as the mapped normal allows. With flip_invalid_normals a mapped normal that
-  // faces away from the viewer is rotated by half a turn about the surface's normal (Schuessler et al. 2017).
+  // Returns the frame in which the nested material is evaluated, relative to the surface's own frame. Its
+  // tangent s is as close to the surface's as the mapped normal allows. With flip_invalid_normals a mapped
+  // normal that faces away from the viewer is rotated by half a turn about the surface's normal (Schuessler
+  // et al. 2017).
   Frame frame(const Lookup& look, const V3& wo) const {
     V3 n = static_cast<const Map&>(*this).normal(look);
     if (flips && wo.z * dot(wo, n) <= 0) n = {-n.x, -n.y, n.z};
@@ -171,8 +172,8 @@ struct Mapped : MaterialKind {
     const float a2 = std::min(.125f * (n.x * n.x + n.y * n.y) / (n.z * n.z), 1.f);
     return a2 > 0 ? 2 / (1 + std::sqrt(1 + a2 * (wi.x * wi.x + wi.y * wi.y) / (wi.z * wi.z))) : 1;
   }
-  // True if a and b, the same direction in two frames, is on the same side of the surface in both. Otherwise
-  // light would leak through the surface.
+  // True if a and b, one direction in two frames, are on the same side of the surface. Otherwise light would
+  // leak through the surface.
   static bool same_side(const V3& a, const V3& b) { return a.z * b.z > 0; }
 };
 

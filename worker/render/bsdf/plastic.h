@@ -11,7 +11,7 @@ inline float coat_reflectance(float cos, float ior) {
   return static_cast<float>(fresnel_dielectric(cos, ior).reflectance);
 }
 
-// A plastic as seen from wo.
+// The parameters of a plastic at one point, for one direction wo.
 template <class Kind>
 struct SeenPlastic {
   const Kind& m;
@@ -72,7 +72,7 @@ struct CoatedDiffuse : MaterialKind {
   static constexpr bool kSmooth = true;
   Slot diffuse, specular;
   float ior = 1;                   // index of refraction inside over outside
-  float specular_weight = 1;       // probability of sampling the coat, before Fresnel
+  float specular_weight = 1;       // weight of the coat in lobe sampling, without its Fresnel term
   float internal_reflectance = 0;  // reflectance of the coat for diffuse light from inside
   bool nonlinear = false;
 
@@ -143,8 +143,8 @@ inline RoughPlastic make_material(const RoughPlasticBsdf& b, MaterialBuilder& bu
     return m;
   }
   m.energy = builder.energy(MaterialBuilder::EnergyOf::coat, b.distribution, b.alpha, eta);
-  // The share of diffuse light from inside that the coat reflects back. By reciprocity, light from inside is
-  // transmitted 1 / eta^2 times as much as light from outside.
+  // The share of diffuse light from inside that the coat reflects back. By reciprocity, the coat's
+  // transmittance for light from inside is 1 / eta^2 of that for light from outside.
   m.internal_reflectance = static_cast<float>(1 - m.energy->through.mean() / (eta * eta));
   return m;
 }

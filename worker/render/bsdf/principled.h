@@ -3,11 +3,11 @@
 // `principled`. It has four lobes: diffuse (with retro-reflection, sheen and an approximation of subsurface
 // scattering), a clear coat (GTR1), and GGX facets that reflect and, with spec_trans, refract.
 //
-// Sampling: a lobe is chosen from the parameters at wo; for the facets, first a visible normal and then, by
-// its Fresnel reflectance F, reflection or refraction. With m metallic, t spec_trans and b = (1 - m) t the
-// unnormalised probabilities are, from the front, 1 for the facets (of which 1 - b (1 - F) reflect), 1/4 of
-// the parameter clearcoat for the coat, and (1 - m) (1 - t) for the diffuse lobe; from behind there are only
-// the facets, of which F reflect.
+// Sampling: sample() first chooses a lobe from the parameters at wo. For the facets it then samples a visible
+// normal and chooses reflection or refraction by the Fresnel reflectance F of that normal. With m = metallic,
+// t = spec_trans and b = (1 - m) t, the unnormalised probabilities from the front are 1 for the facets (they
+// reflect with probability 1 - b (1 - F)), clearcoat / 4 for the coat, and (1 - m) (1 - t) for the diffuse
+// lobe. From behind there are only the facets, which reflect with probability F.
 #pragma once
 
 #include "worker/render/bsdf/material_builder.h"

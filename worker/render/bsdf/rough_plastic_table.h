@@ -23,9 +23,9 @@ struct RoughPlasticTable {
   }
 };
 
-// Mitsuba's definition of the material includes the nodes, the linear interpolation between them and the
-// internal reflectance 2 mean(R(mu_i) mu_i) over the nodes (a plain mean, not a quadrature: about 0.009 below
-// the integral). The values at the nodes are integrals over visible normals of (1 - F) G1(refracted) and F
+// Returns the table of Mitsuba's rough plastic. Mitsuba defines the nodes, the linear interpolation between
+// them, and the internal reflectance 2 mean(R(mu_i) mu_i) over the nodes (a plain mean, about 0.009 below the
+// integral). The values at the nodes are integrals over visible normals of (1 - F) G1(refracted) and F
 // G1(reflected), by Gauss-Legendre quadrature in double. If alpha < kSpecularAlpha, the coat is smooth. eta
 // is the index inside over the index outside.
 RoughPlasticTable make_rough_plastic_table(Microfacet type, double alpha, double eta);

@@ -39,7 +39,7 @@ double masking(Microfacet type, double alpha, double x, double y, double z) {
 }
 
 // Returns the share of the light from i = (sin, 0, cos) that a microfacet with the normal m = (mx, my, mz)
-// reflects or refracts as `way` says, times the masking of the new direction.
+// sends on by `way`, times the masking of the new direction.
 double sent_on(Way way, Microfacet type, double alpha, double eta, double sin, double cos, double mx,
                double my, double mz) {
   const double im = sin * mx + cos * mz;

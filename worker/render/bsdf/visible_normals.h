@@ -18,10 +18,10 @@ Quadrature gauss_legendre(int n);
 // or 1 (mirrored, that is, reflected without loss). F is the Fresnel reflectance.
 enum class Way { reflected, refracted, mirrored };
 
-// Returns the share of light at the cosine mu that leaves in this way without being masked: the mean over
-// visible normals of the weight times the masking of the new direction (for Beckmann by Mitsuba's fit). eta
-// is the index on the other side over the index on the side that the light comes from. If alpha <
-// kSpecularAlpha, the surface is treated as a plane.
+// Returns the share of light incident at the cosine mu that leaves by `way` after one bounce without being
+// masked: the mean over visible normals of the weight times the masking of the new direction (for Beckmann by
+// Mitsuba's fit). eta is the index on the other side over the index on the side of the incident light. If
+// alpha < kSpecularAlpha, the surface is a plane.
 double rough_share(Way way, Microfacet type, double alpha, double eta, double mu, const Quadrature& q);
 
 }  // namespace ls::render

@@ -24,8 +24,8 @@ constexpr char kDeviceConfig[] = "isa=avx2,max_isa=avx2,frequency_level=simd256,
 constexpr char kDeviceConfig[] = "set_affinity=0";  // one set of instructions: NEON
 #endif
 
-// A ray is written in 16-byte words, the units in which Embree reads it: a load that spans several smaller
-// stores has to wait for them.
+// set_ray() writes the ray in 16-byte words, as Embree reads it. A load that spans several smaller stores
+// cannot be forwarded from them and waits.
 using F32x4 = float __attribute__((vector_size(16)));
 using U32x4 = std::uint32_t __attribute__((vector_size(16)));
 void set_ray(RTCRay& r, const V3& o, const V3& d, float t_max) {

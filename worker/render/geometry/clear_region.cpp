@@ -6,7 +6,8 @@
 namespace ls::render {
 namespace {
 
-// By this share of its largest coordinate a region is shrunk. Rays leave surfaces by 2^-20 of theirs.
+// A region is shrunk by this share of its largest coordinate. The offset of a ray from a surface is only
+// 2^-20 of it.
 constexpr double kMargin = 0x1p-12;
 // Corners that are farther from a face's plane than this share of the largest coordinate do not belong to it.
 constexpr double kFlat = 0x1p-18;

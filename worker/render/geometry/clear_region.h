@@ -1,6 +1,6 @@
-// Convex regions in which no surface lies. A flight through a medium that begins and ends in such a region
-// meets no surface, so no ray has to be traced for it. A ray that leaves the region need not be
-// traced either, if nothing else is in its way.
+// Convex regions without surfaces in them. A flight through a medium that begins and ends in such a region
+// meets no surface, so no ray has to be traced for it. A ray that leaves the region need not be traced
+// either, if no other surface is in its way.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 namespace ls::render {
 
 // The inside of a sphere, or of a closed convex body with at most kMostPlanes faces, shrunk by more than the
-// offsets by which rays leave surfaces.
+// offset of rays that leave surfaces (offset_point).
 class ClearRegion {
  public:
   static constexpr std::size_t kMostPlanes = 6;
@@ -35,9 +35,9 @@ class ClearRegion {
     return true;
   }
 
-  // The distance along o + t d, where the region contains o and d is a unit vector, at which the ray leaves
-  // the enclosing body and goes on to infinity through a vacuum, without another surface in its way. Returns
-  // nullopt if that is not known.
+  // Requires that the region contains o and that d is a unit vector. If the ray o + t d leaves the enclosing
+  // body into a vacuum and certainly meets no other surface, returns the distance t at which it leaves the
+  // body, else nullopt.
   std::optional<float> way_out(const V3& o, const V3& d) const {
     if (!lets_out_ || may_meet_others(o, d)) return std::nullopt;
     const float t = distance_to_body(o, d);
@@ -48,7 +48,7 @@ class ClearRegion {
   ClearRegion() { normal_.fill(V3(0)); }
   bool add_plane(const V3d& n, double distance);
 
-  // True if the ray meets the box of all other surfaces.
+  // True if the ray meets the box around all other surfaces.
   bool may_meet_others(const V3& o, const V3& d) const {
     float from = 0, to = kInfinity;
     for (int k = 0; k < 3; ++k) {

@@ -1,8 +1,8 @@
 // Finds surfaces that coincide somewhere and of which at least one is null, that is, index-matched: the floor
-// under a box of fog, or boxes that share a face. A ray cannot tell which of them is first, and the offset
-// that moves its origin off one also moves it past the other. So the ray has to test for both
-// (medium_crossing.h). The surfaces are found once, when the world is built, so that only rays that hit them
-// take longer.
+// under a box of fog, or boxes that share a face. Ray intersection finds them in arbitrary order, and the
+// offset that moves a ray's origin off one of them also moves it past the others. So a ray that hits one of
+// them has to test for the others too (medium_crossing.h). The surfaces are found once, when the world is
+// built, so that only rays that hit them take longer.
 #pragma once
 
 #include "worker/render/geometry/geometry.h"

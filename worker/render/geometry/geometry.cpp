@@ -28,9 +28,9 @@ bool meet_triangle(const V3d& v0, const V3d& e1, const V3d& e2, const V3d& o, co
 }
 
 // Moves a hit away from the edges of its triangle. The BVH decides in float32 which triangle is hit; near an
-// edge exact arithmetic may place the point just outside. Rounding moves the point by at most sqrt(3) / 2
-// ulps; an ulp is 2^-24 of the reach (SurfaceHit::reach). If another wall of a room begins at the edge, this
-// may put the point behind that wall, and light would leak in. So points keep a distance of four ulps from
+// edge the exact hit may lie just outside of the triangle, and rounding moves it by at most sqrt(3) / 2 ulps
+// more (an ulp is 2^-24 of the reach, SurfaceHit::reach). If another wall of a room begins at the edge, the
+// point may then be behind that wall, and light would leak in. So points keep a distance of four ulps from
 // every edge. `twice_area` is twice the area of the triangle.
 [[gnu::noinline]] void keep_from_edges(const V3d& e1, const V3d& e2, double twice_area, float reach,
                                        Barycentric& b) {

@@ -30,7 +30,7 @@ struct SurfaceInfo {  // properties of a surface; a surface is one shape of the 
   // True if a ray that crosses the surface may enter another medium: the media on its two sides differ, or it
   // coincides with other surfaces (coincident_reach > 0), which may bound media of their own
   bool borders = false;
-  // True if the surface neither emits light nor lets it pass straight through, as most surfaces
+  // True for most surfaces: the surface neither emits light nor lets light pass straight through
   bool plain = false;
   bool crossed = false;  // true if some light gets to the other side of the surface
   // True if the surface is not closed: it has an edge, or it encloses a volume only together with other
@@ -58,7 +58,7 @@ struct SurfaceInfo {  // properties of a surface; a surface is one shape of the 
   // surface are within a factor of 16; 0 if each triangle has its own. For other shapes: a lower bound for
   // the reach of a hit.
   float reach = 0;
-  double edge = 0;  // a hit whose barycentric coordinates all exceed this is far enough from all edges
+  double edge = 0;  // a hit whose barycentrics all exceed this need not be moved off the edges
 };
 
 struct Sphere {

@@ -106,10 +106,10 @@ bool is_sheet(const LocalMesh& mesh) {
   return sum.length() > 1e-6 * area;
 }
 
-// Normals from a file decide which side of a triangle emits and is lit, even against its winding; but the
-// winding decides on which side each medium is. So the winding is made to follow the normals, and the media
-// swap sides with it. A mesh between different media stays unchanged if only some of its triangles wind
-// against their normals.
+// Makes the winding of triangles follow the vertex normals, and swaps the media of the two sides with it.
+// Normals from a file decide which side of a triangle emits and is lit, even against its winding, but the
+// winding decides on which side each medium is. A mesh between different media stays unchanged if only some
+// of its triangles wind against their normals.
 void follow_normals(const LocalMesh& mesh, SurfaceInfo& info, std::vector<std::uint32_t>& indices) {
   const auto opposes = [&](std::size_t i) {
     const std::uint32_t a = indices[i], b = indices[i + 1], c = indices[i + 2];

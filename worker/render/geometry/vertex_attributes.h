@@ -16,8 +16,8 @@ namespace ls::render {
 std::vector<std::string> attribute_names(const Scene& scene, const std::vector<scene::AttributeUse>& uses);
 
 // Checks that `mesh`, read from `file`, has the attributes that the textures in `uses` read, in the expected
-// size and range. If not, fails with invalid_argument; the message names the file and the attribute and says
-// what to do.
+// size and range. If not, fails with invalid_argument; the message names the file, the attribute and a
+// remedy.
 Result<void> check_attributes(const MeshData& mesh, std::string_view file, const Scene& scene,
                               const std::vector<scene::AttributeUse>& uses);
 

@@ -1,7 +1,7 @@
-// A strategy of path_tracer.h for light in media. On the camera's segments, before the first scattering, and
-// after mirrors and clear glass, it finds single-scattered light by next-event estimation at several points
-// of the segment (segment_nee.h), instead of at the vertex where the path's own flight ends. On other
-// segments it is the default strategy (vertex_nee.h).
+// A strategy of path_tracer.h for light in media. On segments that start at the camera or at a delta lobe
+// (mirror, smooth glass), light scattered on the segment is estimated by next-event estimation at several
+// points of the segment (segment_nee.h), instead of at the vertex where the free flight ends. On all other
+// segments the default strategy is used (vertex_nee.h).
 //
 // In a thin medium few flights end on the camera's segment, and the few that do carry all of its scattered
 // light: this is most of the noise of light shafts. Points on the segment exist in every sample, and share

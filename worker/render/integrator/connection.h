@@ -1,5 +1,5 @@
-// Part of path_tracer.h, which includes it: connections of a path's vertices to light vertices
-// (lights/light_vertices.h), and what paths that learn keep (Connections::Learner).
+// Part of path_tracer.h, which includes it: connects the vertices of a path to light vertices
+// (lights/light_vertices.h), and records what learning paths find (Connections::Learner).
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,8 @@ void PathTracer<F, Light>::arrive(const Vertex& from, const V3& p, const V3& ng)
     densities_ = SubpathDensities::extended(f, from.pdf, from.sum, ng, from.ng);
 }
 
-// While the choice of lights is learned: looks for each light by look_for(choice), and keeps what it finds.
+// Only while the choice of lights is learned: estimates the light of each light source by look_for(choice),
+// and records the estimates for `place`.
 template <Features F, template <Features> class Light>
 template <class LookFor>
 void PathTracer<F, Light>::learn_lights(const LightPlace& place, const LookFor& look_for) {
@@ -122,12 +123,12 @@ void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Sca
   light.distance = std::sqrt(r2);
   light.radiance = C3(1);
   light.target = y.p;
-  float cos_y = 1, camera_pdf = 0, light_pdf = 0;  // at y
+  float cos_y = 1, camera_pdf = 0, light_pdf = 0;  // at y: the pdfs of a camera path and of a light path
   if (y.medium == kNone) {
     // Rejects the directions in which next-event estimation would not find the sun (light_surface)
     const V3 to_x = y.hit.shading.to_local(-w), to_light = y.hit.shading.to_local(y.to_light);
     if ((to_light.z > 0) != (dot(y.to_light, y.hit.ng) > 0)) return;
-    if ((to_x.z > 0) != (dot(w, y.hit.ng) < 0)) return;  // a path from x would use ng as normal
+    if ((to_x.z > 0) != (dot(w, y.hit.ng) < 0)) return;  // a path from x would use ng as the shading normal
     cos_y = std::abs(dot(w, y.hit.ng));
     const BsdfIndex bsdf = world_.geometry.surfaces[y.hit.surface].bsdf;
     const BsdfEval f_y = world_.bsdfs.eval(bsdf, y.hit.uv_point(), to_x, to_light);
@@ -161,9 +162,9 @@ void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Sca
   --depth_;
 }
 
-// Light is scattered as camera paths are. At a surface the next direction is sampled as if the light came
-// from the camera. The BSDF is then evaluated with the two directions exchanged, because light travels the
-// other way.
+// A light path is scattered like a camera path: at a surface the next direction is sampled as if the light
+// came from the camera. The weight evaluates the BSDF with the two directions exchanged, because light
+// travels the other way.
 template <Features F, template <Features> class Light>
 template <class Keep>
 void PathTracer<F, Light>::follow_light(const SunMap::Ray& from, const Keep& keep) {
@@ -192,7 +193,7 @@ void PathTracer<F, Light>::follow_light(const SunMap::Ray& from, const Keep& kee
     hit.normal_replaced = false;
     const auto primitive = world_.accel.nearest(ray_.origin, ray_.d, kInfinity);
     if (!primitive || !world_.geometry.complete(*primitive, ray_.origin, ray_.d, hit)) return;
-    const Medium* medium = nullptr;  // that scatters the light; null: none
+    const Medium* medium = nullptr;  // the medium that scatters the light; null: a surface does
     if constexpr (F.media) {
       if (medium_.any()) {
         const Medium& around = world_.media[medium_.one()];
@@ -233,7 +234,7 @@ void PathTracer<F, Light>::follow_light(const SunMap::Ray& from, const Keep& kee
       const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), to_light, g.u(2), {g.u(0), g.u(1)});
       if (!s || s->delta) return;
       const V3 w = normalize(hit.shading.to_world(s->wi));
-      if ((s->wi.z > 0) != (dot(w, hit.ng) > 0)) return;  // a camera path from there would use ng as normal
+      if ((s->wi.z > 0) != (dot(w, hit.ng) > 0)) return;  // a camera path would use ng as the shading normal
       const BsdfEval f = world_.bsdfs.eval(surface.bsdf, hit.uv_point(), s->wi, to_light);
       beta_ *= f.f_cos * (std::abs(dot(w, hit.ng)) / (s->pdf * cosine));
       leave(s->pdf, f.pdf);

@@ -2,8 +2,8 @@
 // proportional to 1 / distance^2, where distance is the distance to the pivot. Positions are offsets x in [a,
 // b] along the segment, measured from the foot of the perpendicular from the pivot. The textbook difference
 // of arctangents cancels when both ends are far from the foot on one side; the forms used here do not (pdf
-// accurate to 4e-7 in float32). Of a light that shines into a cone, only the part of the segment inside the
-// cone is sampled.
+// accurate to 4e-7 in float32). If the light shines into a cone, only the part of the segment inside the cone
+// is sampled.
 #pragma once
 
 #include <algorithm>
@@ -87,7 +87,7 @@ class EquiAngular {
   }
 
   V3 d_, foot_;
-  float start_ = 0;  // of the segment; a is larger if the light does not reach it
+  float start_ = 0;  // position of the segment's start; a_ is larger if the light does not reach the start
   float a_ = 0, b_ = 0, distance_ = 0, angle_ = 0;
   bool uniform_ = false, limited_ = false;
 };

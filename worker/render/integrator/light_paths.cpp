@@ -30,24 +30,25 @@ constexpr std::uint64_t kLearningPathsPerPixel = 16;
 constexpr std::uint64_t kLearningBatch = 1 << 10;
 // Learning may stop after this many batches if connections clearly do not pay.
 constexpr std::uint64_t kFirstBatches = 4;
-// Portals are tried if at most this share of the directions that BSDFs and phase functions sample leads to
-// the sky. They pay if the noise of some pixels without them is more than kPortalGainThatPays times the noise
-// with them, and kShadowGainThatPays times where they add a light to a scene that had none to look for, since
-// then shadow rays are traced that were not before.
+// Portals are tried if at most the share kLeftThatPays of the directions that BSDFs and phase functions
+// sample leads to the sky. Portals pay if some pixels have more than kPortalGainThatPays times the noise
+// without them. In a scene that had no light to sample before, portals add shadow rays, so there they pay
+// only if the noise without them is more than kShadowGainThatPays times as high.
 constexpr double kLeftThatPays = .125;
 constexpr double kPortalGainThatPays = 1.1;
 constexpr double kShadowGainThatPays = 2;
 // Portals are learned from paths of at most this many segments.
 constexpr int kLongestPortalPath = 4;
 // The choice of lights by place is learned from camera paths of at most kLongestLocalLightPath segments,
-// which look for every light at each vertex: from kLocalLightPaths with few lights, from fewer with many. It
-// is tried if next-event estimation at these vertices has a mean square of more than kSpreadThatPays times
-// the square of its mean. It pays if the noise of direct light in some pixels is more than kLocalGainThatPays
-// times as high without it: a light that reaches the vertex costs more than one that does not, so samples
-// take up to 1.5 times as long, and few pixels hardly show the edges of small patches of light.
+// which sample every light at each vertex. There are at most kLocalLightPaths such paths, and fewer with many
+// lights (kLocalLightLooks). The choice is tried if next-event estimation at these vertices has a mean square
+// of more than kSpreadThatPays times the square of its mean. It pays if some pixels have more than
+// kLocalGainThatPays times the noise of direct light without it. This limit is high because a light that
+// reaches the vertex costs more than one that does not, so samples take up to 1.5 times as long, and because
+// the few pixels of a pilot hardly show the edges of small patches of light.
 constexpr std::uint64_t kLocalLightPaths = 1 << 14;
 constexpr std::uint64_t kLocalLightLooks = 1 << 17;  // lights times paths
-constexpr std::uint64_t kLocalLightTrial = 4;        // first, this part of the paths tells whether it pays
+constexpr std::uint64_t kLocalLightTrial = 4;        // 1 / this of the paths decides whether it is tried
 constexpr int kLongestLocalLightPath = 6;
 constexpr double kSpreadThatPays = 1.2;
 constexpr double kLocalGainThatPays = 3;
@@ -75,7 +76,7 @@ constexpr float kFaintConnection = .5f;
 constexpr std::uint64_t kLearningSeed = 0x5eed0f1ea2;
 constexpr std::uint64_t kSunRaySeed = 0x5eed0f5a1;
 
-// Which paths are traced, and what they record. All of them record the sun map.
+// The paths of one learning pass and the data that they record. All paths record the sun map.
 struct Lesson {
   bool sky = false, lights = false;  // record the light of the sky, and that of each light
   std::uint64_t first_path = 0, batch = kLearningBatch;
@@ -127,8 +128,8 @@ Learned learn_batch(const World& w, const Lesson& lesson, std::uint64_t first, s
   return learned;
 }
 
-// Traces camera paths up to the number `paths`. After the first kFirstBatches, `go_on` is asked whether to
-// trace the rest.
+// Traces the camera paths with the numbers from lesson.first_path up to `paths`. After the first
+// kFirstBatches batches, go_on(learner) decides whether to trace the rest.
 template <Features F, template <Features> class Light, class GoOn>
 Learned learn_with(const World& w, std::uint64_t paths, int threads, const GoOn& go_on,
                    const Lesson& lesson) {
@@ -219,8 +220,9 @@ LightVertices::Look look_of(const World& w, const LightVertex& y) {
     for (const V3& to : {V3(.5f, .5f, z), V3(-.5f, .5f, z), V3(.5f, -.5f, z), V3(-.5f, -.5f, z)})
       even += mean_component(eval(to).f_cos) * cosine / (4 * std::abs(z));
     look.even = light * std::max(even, kLeastReflected * cosine);
-    // A lobe around the mirrored direction, as high there as the BSDF. Its width is that for light along the
-    // normal: at other angles lobes of microfacets are as long as that and narrower by the cosine.
+    // A Henyey-Greenstein lobe around the mirrored direction, as high there as the BSDF. Its width is that of
+    // the BSDF for light along the normal. At other angles a microfacet lobe is as wide in one direction and
+    // narrower by the cosine in the other.
     const V3 mirrored(-to_light.x, -to_light.y, to_light.z);
     const BsdfEval at_peak = eval(mirrored);
     const float peak = mean_component(at_peak.f_cos), q = at_peak.pdf * cosine / kInvFourPi;
@@ -239,7 +241,7 @@ LightVertices::Look look_of(const World& w, const LightVertex& y) {
 
 void learn_connections(const IntegratorSettings& settings, int threads, World& w) {
   if (settings.light_vertices < 0 || !w.depth_allows(2)) return;
-  // Light vertices do not know how many surfaces the light has passed
+  // Light vertices do not record how many null-transmitting surfaces the light has passed
   if (w.passing_counts && w.null_transmission) return;
   // An open boundary encloses no volume, so a ray from the sun may find another medium behind it than a
   // camera path does
@@ -342,7 +344,8 @@ LightVertices trace_light_vertices(const World& w, std::uint64_t set) {
 
 namespace {
 
-// Sets up what needs the mean radiance of the image, in scenes with grids.
+// Sets up shadow roulette and path splitting, which need the mean radiance of the image, in scenes with
+// grids.
 void learn_roulette(const IntegratorSettings& settings, World& w) {
   if ((settings.shadow_roulette < 0 && settings.path_splitting < 0) || !w.depth_allows(1)) return;
   const auto mean = static_cast<float>(pilot_radiance(w, kLongestPilot).value_or(0));

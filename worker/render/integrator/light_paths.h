@@ -1,7 +1,8 @@
-// Camera paths that are traced before the first sample teach a world which portals the sky's light comes
-// through (lights/portals.h), which lights reach which places (lights/local_lights.h), whether to connect
-// paths to light vertices (lights/light_vertices.h), and which part of the sun's light the light vertices
-// need. The light vertices are traced here, too.
+// Camera paths are traced before the first sample to learn how the scene is lit: the portals through which
+// the sky's light enters (lights/portals.h), which lights reach which places (lights/local_lights.h), whether
+// connections to light vertices pay (lights/light_vertices.h), and from which part of the sun's light the
+// light vertices should be traced (SunMap). A technique pays if it reduces the noise by more than it costs.
+// The light vertices are traced here, too.
 #pragma once
 
 #include <cstdint>
@@ -16,18 +17,18 @@ namespace ls::render {
 // samples, a crop or the number of threads. The integrator must be `volpath` or `path`.
 void learn_connections(const IntegratorSettings& settings, int threads, World& w);
 
-// Sets the portals of a world's lights if they pay. The result depends on the same things as that of
-// learn_connections(), and the integrator must be one of the same.
+// Sets the portals of a world's lights if they pay. Depends on the same data, and requires the same
+// integrators, as learn_connections().
 void learn_portals(const IntegratorSettings& settings, int threads, World& w);
-// Lets lights be chosen by place if that pays or the settings ask for it. The result depends on the same
-// things as that of learn_connections(), and the integrator must be one of the same.
+// Enables the choice of lights by place if it pays or the settings request it. Depends on the same data, and
+// requires the same integrators, as learn_connections().
 void learn_local_lights(const IntegratorSettings& settings, int threads, World& w);
 
 // Traces the light vertices of one set (LightVertexCache). They depend only on the world, its seed and the
 // number of the set.
 LightVertices trace_light_vertices(const World& w, std::uint64_t set);
 
-// Returns the data by which LightVertices estimates how much a vertex contributes to other points.
+// Returns the data from which LightVertices estimates the contribution of a vertex to other points.
 LightVertices::Look look_of(const World& w, const LightVertex& y);
 
 }  // namespace ls::render

@@ -31,8 +31,9 @@ auto PathTracer<F, Light>::fly_through(const Medium& medium, const SurfaceHit* e
   const float t_max = end ? ray_.length_to(*end) : reach;
   const Segment segment{t_max, ray_.lead(), end};
   if constexpr (kFliesFirst) {
-    // The flight is cut off. One sampled again up to t_max may differ in a dense cell that t_max shortens
-    // (kExactDepth), and to choose between the two would be a bias.
+    // The flight that was sampled before the ray was traced is cut off at t_max. A flight sampled anew up to
+    // t_max may differ in a dense cell that t_max shortens (kExactDepth), and a choice between the two would
+    // be biased.
     if (flown)
       return collide(medium, segment, {}, flown->scattered && flown->t < t_max ? *flown : Flight{.t = t_max});
   }

@@ -1,6 +1,6 @@
-// Weights of two strategies that sample the same light, by their densities (multiple importance sampling:
-// Veach 1997, section 9.2). Any two weights that add up to 1 give the correct mean, and a wrong weight only
-// increases the variance. So the tests check weights and second moments
+// MIS weights for two strategies that sample the same light, computed from their densities (Veach 1997,
+// section 9.2). Any weights that add up to 1 are unbiased, so a wrong weight shows only in the variance, not
+// in the mean. Therefore the tests check the weights and second moments
 // (tests/unit/render/integrator/mis_test.cpp).
 #pragma once
 

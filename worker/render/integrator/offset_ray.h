@@ -1,8 +1,8 @@
 // A ray whose origin is moved off the surface that it leaves, so that it does not hit this surface again.
 //
 // `start` is the point on the path; `origin` is where the ray is traced from. If the surface bounds a medium,
-// the medium also fills the gap between the two, which may be longer than a mean free path (at an optical
-// depth of 1e6). So lengths within media are measured from `start`.
+// the offset between the two lies in the medium, and in a very dense medium it may exceed a mean free path.
+// So distances in media are measured from `start`.
 #pragma once
 
 #include <algorithm>

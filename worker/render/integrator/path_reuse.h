@@ -6,16 +6,16 @@
 // that path finds a second vertex y: the density of the direction, times that of a flight that ends at y,
 // times the probabilities of passing every null-transmitting surface on the way and of not passing the one at
 // y; 0 if something blocks the way. Each pixel i looks from x_i at the second vertex y_j of each path j of
-// its group, and weights what it sees by the balance heuristic over all paths that could have found it: light
-// that arrives at y_j along w has the estimate
+// its group, and weights the light from there by the balance heuristic over all paths that could have found
+// it: light that arrives at y_j along w has the estimate
 //   beta_i f(x_i, y_j) V(x_i, y_j) f(y_j, w) L(w) / sum over k of q_k(y_j) p_k(w),
 // where f are BSDFs or phase functions with cosines, V is the transmittance with the geometric terms, and
 // p_k(w) is the density with which path k continues along w from y_j. Light found by next-event estimation
 // has that technique's density in place of p_k, or in the sum with it where both can find it. The group needs
 // one shadow ray for each pair, and no path has to be followed again.
 //
-// A path whose weight becomes 0 ends there. So q_k(y) is 0 where x_k scatters no light from y, and p_k(w)
-// where y scatters none from w towards x_k.
+// A path whose weight becomes 0 ends there. So q_k(y) is 0 where x_k scatters no light from y, and p_k(w) is
+// 0 where y scatters no light from w towards x_k.
 //
 // The densities of flights must be known, so media are homogeneous. Light on the segment from the first to
 // the second vertex is not sampled equi-angularly: its density would have to be known for all k.
@@ -49,8 +49,8 @@ void PathTracer<F, Light>::begin_sharing(const SurfaceHit* hit, const Medium* me
   }
 }
 
-// After the direction of the first vertex was sampled by a smooth lobe: the weight of the path so far moves
-// to `scale`, and the densities become relative to their mean.
+// Called after a smooth lobe sampled the direction at the first vertex. Moves the weight of the path to
+// `scale`, and makes the densities relative to their mean.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::look_for_second() {
   sharing_.part = SharingPath::Part::second;
@@ -131,8 +131,8 @@ BsdfEval PathTracer<F, Light>::scattered_at_first(const V3& wi) {
   return {known->f_cos * cosine, known->pdf * cosine};
 }
 
-// Computes what this path's first vertex x sees of the vertex y of a tail. `own` is true for the path's own
-// tail, to which the way is known to be free.
+// Computes how the vertex y of a tail looks from this path's first vertex x. `own` is true for the path's own
+// tail, whose vertex y is visible from x.
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
   Look look;
@@ -187,12 +187,12 @@ auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
     passed_ = x.passed;
     sharing_.flight = C3(1);
     sharing_.crossed = 0;
-    // Without media no random numbers are drawn on the way
+    // Without media unoccluded() draws no random numbers
     RandomStream stream(0);
     if constexpr (F.media) stream = stream_.stream(1, Purpose::track_connect);
     through = unoccluded(x.at.p, origin, end, around, stream);
-    // Where surfaces passed count for the maximum depth, a tail is as long as the number passed before it
-    // allows, so only paths that passed as many can use it
+    // If passed surfaces count towards the maximum depth, the number passed before a tail limits the tail's
+    // length. So only paths that passed the same number can use the tail.
     if (is_black(through) || (world_.passing_counts && x.passed + sharing_.crossed != tail.passed))
       return look;
   }
@@ -229,7 +229,7 @@ class PathTracer<F, Light>::TowardsGroup {
     const PathVertex& y = giver.sharing_.tail.at;
     diffuse_ = !y.medium && giver.world_.geometry.surfaces[y.hit.surface].diffuse;
   }
-  // For a first vertex from which the second one is seen along d.
+  // Returns the value towards a first vertex; d is the direction from that vertex to the second vertex.
   BsdfEval operator()(const V3& d) {
     const PathVertex& y = giver_.sharing_.tail.at;
     const float z = diffuse_ ? dot(y.hit.shading.n, d) : 0;
@@ -246,10 +246,11 @@ class PathTracer<F, Light>::TowardsGroup {
   std::array<std::optional<BsdfEval>, 2> by_side_;
 };
 
-// Sorts the paths by what their first vertices can see of each other's second vertices: those in media by
-// their depth along the ray, then those on surfaces, then those that share nothing. The order of first
-// vertices on surfaces is kept: sorted, the same neighbours would always share, and their common errors would
-// show as spots. The depths of neighbours in media differ from sample to sample.
+// Sorts the paths so that neighbours can share much: first the paths whose first vertices are in media, by
+// depth along the ray; then those with first vertices on surfaces, in their given order; then those that
+// share nothing. If the vertices on surfaces were sorted too, the same neighbours would share in every
+// sample, and their common errors would show as spots. In media the depths, and so the neighbours, differ
+// from sample to sample.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::sort_to_share(std::span<PathTracer*> paths) {
   const auto key = [](const PathTracer* path) {

@@ -11,9 +11,10 @@
 //   Plan::matters()                                 true if vertices on this segment need a Vertex;
 //   Vertex vertex(path, medium, plan, t)            the data kept for the vertex at distance t;
 //   void at_vertex(path, medium, p, d)              adds light scattered at that vertex;
-//   Vertex::found_as_light(), (pivot)               total density of next-event estimation over that of the
-//                                                   flight, for lights without a position and for lights with
-//                                                   this pivot. 1 if default-constructed, as on surfaces;
+//   Vertex::found_as_light(), (pivot)               distance density of all next-event estimation, divided by
+//                                                   that of free flight: without argument for lights without
+//                                                   a position, else for a light with this pivot. It is 1 for
+//                                                   a default-constructed Vertex, as on surfaces;
 //   Vertex::light_chosen_first()                    true if the vertex's light was chosen by
 //                                                   Lights::choose_before_point().
 #pragma once
@@ -89,7 +90,7 @@ struct Connections {
     std::vector<Portals::Found> sky;
     double scatterings = 0;     // number of vertices
     double left = 0;            // number of those that the path left towards the sky
-    bool keeps_lights = false;  // true if all lights are looked for at each vertex, and kept in `lights`
+    bool keeps_lights = false;  // true if each vertex samples all lights and keeps their light in `lights`
     LightVisits lights;
 
     void found_sky(const V3& p, const V3& d, float found) {
@@ -132,7 +133,7 @@ class PathTracer {
   static constexpr bool kSplits = F.grids && !F.connected && !F.reuse;
   struct Vertex {  // where the current ray was scattered
     V3 p{0, 0, 0};
-    LightPlace place;   // by which lights are chosen for it
+    LightPlace place;   // the place by which lights are chosen
     V3 ng{0, 0, 0};     // with F.connected: the geometric normal
     float pdf = 0;      // of the sampled direction
     bool delta = true;  // sampled by a delta lobe or the camera: lights that are hit have full weight
@@ -145,15 +146,15 @@ class PathTracer {
     float roulette = 1;  // random number for Russian roulette, if scattered
   };
   using Within = std::conditional_t<F.overlaps, MediaState, OneMedium>;
-  // True if flights may be sampled before rays are traced: the strategies of other paths need to know where a
-  // segment ends.
+  // True if a flight may be sampled before its ray is traced. The strategies of other paths need the end of
+  // the segment first.
   static constexpr bool kFliesFirst =
       F.media && !F.aimed && !F.reuse && std::is_same_v<Light<F>, VertexNee<F>>;
 
   // Follows the path from its current vertex to its end. The first ray of the path ends at t_max.
   void go_on(float t_max);
   // Samples a free flight up to the surface hit at `end`, or, if `end` is null, up to the distance `reach`.
-  // If the flight was already sampled before the ray was traced (kFliesFirst), it is `flown`, without an end.
+  // If the flight was sampled before the ray was traced (kFliesFirst), `flown` is this flight; it has no end.
   Step fly(const SurfaceHit* end, float reach, const std::optional<Flight>& flown);
   Step fly_through(const Medium& medium, const SurfaceHit* end, float reach,
                    const std::optional<Flight>& flown);
@@ -189,7 +190,7 @@ class PathTracer {
                                                       const SurfaceInfo& surface, const V3& wo);
   template <class LookFor>
   void learn_lights(const LightPlace& place, const LookFor& look_for);
-  // By which place lights are chosen for the segment ahead.
+  // The place by which lights are chosen for the segment ahead.
   LightPlace place_on(const Segment& segment) const {
     return {Lights::place_on(ray_.start, ray_.d, segment.length), V3(0)};
   }
@@ -323,8 +324,8 @@ class PathTracer {
   LightSplit* split_;
   OffsetRay ray_;
   C3 beta_{1, 1, 1}, density_{1, 1, 1};
-  // Russian roulette may end the path if its throughput is below this (splitting.h). Where that depends on
-  // the first vertex, kNoReference up to there.
+  // Russian roulette may end the path if its throughput is below this (splitting.h). If it depends on the
+  // first vertex, it is kNoReference before that vertex.
   float reference_ = 1;
   static constexpr float kNoReference = -1;
   float eta_scale_ = 1;  // cancels the radiance scaling of refraction in Russian roulette
@@ -333,17 +334,17 @@ class PathTracer {
   int passed_ = 0;   // null boundaries and null transmissions so far
   int segment_ = 0;  // number of rays so far, including those after null crossings
   Within medium_;
-  bool looked_for_sky_ = false;   // true if the first vertex also looked for the constant environment
+  bool looked_for_sky_ = false;   // true if the first vertex also sampled the constant environment
   bool first_in_medium_ = false;  // with F.split: true if the first scattering was in a medium
   Vertex last_;
   SubpathDensities densities_;  // with F.connected: of the path up to the current vertex
   Connections connections_;
   SampleOutcome outcome_;
   MediumCounters counters_;
-  // With F.aimed: the distribution of directions near lamps at the current vertex, and the density of the
-  // BSDF or phase function over that with which the last direction was sampled. Russian roulette leaves this
-  // factor out: the closer to a lamp a direction is aimed, the smaller is the factor and the brighter what is
-  // there.
+  // With F.aimed: near_lamps_ is the distribution of directions near lamps at the current vertex, and aim_
+  // the density of the BSDF or phase function divided by the density with which the last direction was
+  // sampled. Russian roulette excludes this factor: the closer a direction is to a lamp, the smaller the
+  // factor is and the brighter the light that the direction leads to.
   LampDirections near_lamps_;
   float aim_ = 1;
   struct Nothing {};
@@ -544,8 +545,9 @@ void PathTracer<F, Light>::light_surface_by(const LightChoice& choice, const Sur
               [&] { return world_.bsdfs.eval(surface.bsdf, hit.uv_point(), wi, wo).pdf; });
 }
 
-// At the path's first vertex: looks for the constant environment in a second direction (sky_samples.h).
-// `numbers` are the random numbers of the path's own direction. Only in scenes without media.
+// At the path's first vertex: samples a second direction and adds half of the constant environment's light
+// from there (sky_samples.h). `numbers` are the random numbers of the path's own direction. Only in scenes
+// without media.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::look_for_sky(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo,
                                         Group numbers) {
@@ -563,7 +565,7 @@ void PathTracer<F, Light>::look_for_sky(const SurfaceHit& hit, const SurfaceInfo
   }
   sky.distance = kInfinity;
   sky.radiance = world_.lights.constant_environment();
-  // There are no media, so no random numbers are drawn on the way
+  // There are no media, so unoccluded() draws no random numbers
   const C3 arriving = unoccluded(hit.p, offset_point(hit, sky.direction), sky, medium_,
                                  stream_.stream(depth_, Purpose::track_shadow));
   if (!is_black(arriving)) add(beta_ * s->weight * arriving * .5f);
@@ -665,9 +667,9 @@ std::optional<BsdfSample> PathTracer<F, Light>::sample_bsdf(const SurfaceHit& hi
   return s;
 }
 
-// Decides whether the path passes straight through a null-transmitting surface. If so, this is no scattering:
-// it makes no vertex and does not increase the depth. A light that is hit behind the surface is weighted
-// against next-event estimation from the previous vertex, whose shadow rays pass the surface with the same
+// Decides whether the path passes straight through a null-transmitting surface. A path that passes makes no
+// vertex, and its depth does not increase. A light that it hits behind the surface is weighted against
+// next-event estimation from the previous vertex, whose shadow rays pass the surface with the same
 // transmission (through_boundaries). The random numbers are keyed by segment, since those of a vertex would
 // be used again at the next surface.
 template <Features F, template <Features> class Light>

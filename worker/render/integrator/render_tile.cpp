@@ -62,8 +62,8 @@ bool usable(const SampleOutcome& s) {
   return std::abs(c.x) <= kLargestRadiance && std::abs(c.y) <= kLargestRadiance &&
          std::abs(c.z) <= kLargestRadiance && s.cut_off == HealthCause::none;
 }
-// True if the sample is usable and needs no counting, as nearly every sample. Floats from 0 up to the limit
-// have the same order as their bit patterns; negative floats and NaN have larger patterns.
+// True for nearly every sample: it is usable and needs no counting. Floats from 0 up to the limit have the
+// same order as their bit patterns; negative floats and NaN have larger patterns.
 bool clean(const SampleOutcome& s) {
   const auto fine = [](float x) {
     return std::bit_cast<std::uint32_t>(x) <= std::bit_cast<std::uint32_t>(kLargestRadiance);
@@ -104,8 +104,8 @@ class Samples {
   }
 
  private:
-  // The set of light vertices of the previous even sample and of the previous odd one. The cache is asked
-  // only when the set changes (LightVertexCache).
+  // The set of light vertices of the previous even sample or of the previous odd one. A lookup in the
+  // LightVertexCache is needed only when the set changes.
   struct Kept {
     std::uint64_t set = 0;
     std::shared_ptr<const LightVertices> vertices;

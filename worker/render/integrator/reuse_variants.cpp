@@ -22,8 +22,8 @@ constexpr Features kSharedAndSplit{
 constexpr std::size_t kSharing = kUsualPathReuse;
 
 // The pilot renders some groups of pixels to find out whether sharing pays. It takes as many samples as a
-// quick image has: with fewer, more of the noise would be that of edges and soft shadows, which sharing does
-// not reduce.
+// quick image has: with fewer samples, more of the noise would come from edges and soft shadows, which
+// sharing does not reduce.
 constexpr std::uint64_t kSharingPilotSeed = 0x5eed0f9a7e;
 constexpr std::uint64_t kPilotGroups = 64;  // at most
 constexpr std::uint64_t kFewestPilotGroups = 4;
@@ -54,8 +54,8 @@ class Pilot {
     bool gains(double factor) const { return alone > factor * shared; }
   };
   // Renders one group of the pixels of a square that is chosen at random, with shared paths and without.
-  // `number` is that of the group, and the sample number that determines how the square is divided into
-  // groups.
+  // `number` is the number of the group, and also the sample number that determines how the square is divided
+  // into groups.
   Noise of_group(const Variant& sharing, std::uint64_t number) const {
     const FlushDenormals mode;
     RandomStream places(combine(kSharingPilotSeed, number));
@@ -139,9 +139,10 @@ void share_tails(const IntegratorSettings& settings, int threads, World& w) {
   const auto sharing =
       std::ranges::find_if(variants, [&](const Variant& v) { return v.covers.covers(need); });
   if (settings.path_reuse < 0 || settings.path_reuse == 1 || sharing == variants.end()) return;
-  // Each tail keeps one light that both ways can find (SharedTail::hit_pdf).
+  // A tail keeps one density of next-event estimation for light that is hit (SharedTail::hit_pdf), so at most
+  // one sampled light may be hit by paths that leave the scene.
   if (!w.lights.single_environment_sample() || !w.depth_allows(2)) return;
-  // Roulette at the first vertex would be a part of the densities
+  // Russian roulette at the first vertex would have to be a part of the densities
   if (w.rr_depth < 2) return;
   for (const SurfaceInfo& s : w.geometry.surfaces)
     // Rays from two sides may find different media behind an open boundary. A path may pass several surfaces

@@ -2,10 +2,10 @@
 // a medium is estimated by next-event estimation at points that are sampled for this purpose. The vertices at
 // which the path's own flights end do no next-event estimation.
 //
-// Points are sampled by (D) depth: the truncated exponential, in grids that of the macro cells' means
-// (optical_depth.h) mixed with a uniform density; and by (A) angle: equi-angularly about the light. Each
-// yields a separate point; `heuristic` weights their densities e_D and e_A against each other. (A) requires a
-// light with a position and a segment with an end; otherwise (D) is used alone.
+// There are two densities for points. (D) depth: a truncated exponential; in grids it uses the mean densities
+// of the macro cells (optical_depth.h) and is mixed with a uniform density. (A) angle: equi-angular about the
+// light. Each is used for points of its own. `heuristic` computes their MIS weights from the densities e_D
+// and e_A. (A) requires a light with a position and a finite segment; otherwise (D) is used alone.
 //
 // Phase-function sampling that hits a light is a third strategy. With f(t) the density of flights (in grids
 // that of the macro cells' means) and p_l, p_s the solid-angle densities of light and phase sampling,
@@ -46,7 +46,8 @@ class SegmentNee {
     float length = 0;
     float points = 1;  // number of points sampled by depth; one more is sampled by angle
 
-    // Vertices on surfaces have the same type; in media, worlds of this strategy choose by the table anyway.
+    // False, because vertices on surfaces have this type too. In media either answer gives the same
+    // probability, since worlds of this strategy never use the light tree there (Lights::use_tree_in_media).
     static bool light_chosen_first() { return false; }
     float found_as_light() const { return std::min(points * depth_ratio, kMaxRatio); }
     float found_as_light(const Pivot& pivot) const {

@@ -30,8 +30,8 @@ struct FirstVertex {
   C3 density{1, 1, 1};  // the path's density with each channel as the hero (medium.h), over their mean
   OneMedium around;     // the medium in front of the vertex
   int passed = 0;       // null crossings between the camera and the vertex
-  // On a diffuse surface: the BSDF for a direction along the normal, on its side or on the other, as far as
-  // it was asked for.
+  // A cache for a diffuse surface: the BSDF for a direction along the normal, on the normal's side [0] or on
+  // the other [1]; nullopt if it was not evaluated yet.
   std::array<std::optional<BsdfEval>, 2> by_side;
 };
 
@@ -40,8 +40,8 @@ struct SharedTail {
   bool usable = false;  // false: there is none, or it was not sampled by a smooth lobe
   PathVertex at;
   int passed = 0;  // null crossings between the camera and the vertex
-  // The way from the path's own first vertex: the media's optical depth in each channel; the null
-  // transmissions of surfaces, and the probability of passing them.
+  // Along the way from the path's own first vertex: the optical depth of the media in each channel, the null
+  // transmission of the surfaces, and the probability of passing them.
   C3 depth{0, 0, 0}, transmission{1, 1, 1};
   float passing = 1;
 

@@ -1,8 +1,8 @@
 // Chooses the pixels whose paths share their tails (path_reuse.h). The full frame is cut into squares
-// (blocks). For each sample the pixels of a block are put in random order, of which groups are made, so that
-// two pixels are rarely in the same group and their errors are nearly independent. Blocks begin at the corner
-// of the full frame and do not depend on tiles, so the pixels of a tile or crop are the same as those of the
-// whole image.
+// (blocks). For each sample the pixels of a block are put in random order and then divided into groups, so
+// that two pixels are rarely in the same group and their errors are nearly independent. Blocks begin at the
+// corner of the full frame and do not depend on tiles, so a tile or crop has the same pixels as the whole
+// image.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,8 @@
 namespace ls::render {
 
 // Sets `reuse` and Features::reuse of a world that is otherwise complete, if the densities of second vertices
-// are known in its scene, and if the settings ask for sharing or leave the choice to a pilot that finds that
-// sharing pays (reuse_variants.cpp).
+// are known in its scene, and if the settings request sharing or leave the decision to a pilot
+// (reuse_variants.cpp) that finds that sharing pays.
 void share_tails(const IntegratorSettings& settings, int threads, World& w);
 
 class SharingBlock {

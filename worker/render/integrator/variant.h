@@ -19,8 +19,8 @@ namespace ls::render {
 // Features::connected.
 using SampleFn = SampleOutcome (*)(const World&, int, int, std::uint64_t, LightSplit*, Connections);
 
-// Renders sample number `sample` of several pixels, at most kMostTogether. In groups of World::reuse, they
-// share what their paths find. `splits` has the light components of each, or is empty.
+// Renders sample number `sample` of several pixels, at most kMostTogether. The paths share the light that
+// they find, in groups of World::reuse pixels. `splits` has the light components of each pixel, or is empty.
 inline constexpr std::size_t kMostTogether = 256;
 struct PixelAt {
   int x, y;
@@ -91,8 +91,8 @@ std::span<const Variant> distant_variants();
 std::span<const Variant> reuse_variants();
 // The variants of the integrator `whitted`, which ignores media, cheapest first.
 std::span<const Variant> whitted_variants();
-// The variants of the integrators `volpath` (without and with Features::aimed) and `volpath_distant_mis`, and
-// of `whitted`, that also compute light components. Each has all other features.
+// The variants that also compute light components: one for each list of variants above, and kSplitVariant for
+// `volpath` without the features of these lists. Each has all features that its list supports.
 extern const Variant kSplitVariant, kAimedSplitVariant, kDistantSplitVariant, kConnectedSplitVariant,
     kReuseSplitVariant, kWhittedSplitVariant;
 

@@ -1,11 +1,12 @@
-// The default strategy of path_tracer.h for light in media: (1) next-event estimation at each vertex, and (3)
-// next-event estimation at points sampled equi-angularly about the light on each segment: in homogeneous
-// media for every light with a position; in grids, on the part of a segment that has any density, for point
-// lights (docs/decisions/0011-equi-angular-points-in-grids.md).
+// The default strategy of path_tracer.h for light in media. It combines (1) next-event estimation at each
+// vertex with (3) next-event estimation at points sampled equi-angularly about the light on each segment. In
+// homogeneous media (3) is used for every light with a position; in grids it is used for point lights, on the
+// part of a segment that has any density (docs/decisions/0011-equi-angular-points-in-grids.md).
 //
-// Strategy (2) is phase-function sampling that hits a light. For a vertex at distance t of a segment, (1) and
-// (2) share the density f(t) of free flight and (3) has e(t). With p_l, p_s the solid-angle densities of
-// light and direction sampling, the weights are, up to their common sum, (1) f p_l, (2) f p_s, (3) e p_l.
+// Strategy (2) is phase-function sampling that hits a light. At distance t on a segment, (1) and (2) sample t
+// with the free-flight density f(t), and (3) with the equi-angular density e(t). Let p_l and p_s be the
+// solid-angle densities of light sampling and phase-function sampling. The balance-heuristic weights are
+// proportional to (1) f p_l, (2) f p_s, (3) e p_l.
 // Only the ratio e / f matters: equiangular_ratio() below. In grids f is the density of flights through the
 // macro cells' means (optical_depth.h): weights need not use the true density, only the same function of the
 // vertex for all strategies.

@@ -128,7 +128,8 @@ struct MeshLight : SampledByPoint<MeshLight> {
   std::uint64_t extra_bytes() const { return cdf.size() * sizeof(double); }
 };
 
-// A sphere is sampled by directions to it. Its point is known only then, so the pivot is the centre.
+// A sphere is sampled by directions from the shaded point, so the pivot, which is needed before, is the
+// centre.
 struct SphereLight : AreaLight {
   std::uint32_t primitive = 0;
 

@@ -48,8 +48,8 @@ struct SunLight : LightKind {
     s.pdf = density * p;
     return s;
   }
-  // The radiance that a path finds if it leaves in this direction, weighted as Lights::environment says; p is
-  // the probability of choosing this light. Whether a direction d hits a sun with the axis a is decided by
+  // The radiance that a path finds if it leaves in this direction, weighted as in Lights::environment(); p is
+  // the probability of choosing this light. The test whether a direction d hits a sun with the axis a uses
   // the chord, |d - a|^2 = 2 (1 - cos), which keeps the digits that the cosine of a small angle loses.
   C3 found(const V3& direction, float pdf, float p) const {
     const V3 chord = direction + travel;
@@ -57,12 +57,12 @@ struct SunLight : LightKind {
   }
 };
 
-// The sky as next-event estimation samples it: an environment map, by its brightness, and with portals also
-// the directions that lead through those in front of a point. With portals the constant environment is part
-// of it.
+// The sky as a light for next-event estimation. An environment map is sampled by its brightness. If there are
+// portals in front of the shaded point, directions through them are sampled too. With portals the constant
+// environment is a part of this light.
 struct SkyLight : LightKind {
-  // With portals, the share of directions that is sampled by the map's brightness alone, so that every
-  // direction in which it shines has a density; and the number of words that choose this.
+  // With portals, the probability of sampling a direction by the map's brightness alone, so that every
+  // direction from which light comes has a positive density; and the number of random words that choose this.
   static constexpr float kByBrightness = .25f;
   static constexpr std::uint64_t kBrightnessWords = std::uint64_t{1} << 30;
 
@@ -105,7 +105,7 @@ struct SkyLight : LightKind {
   std::optional<V3> direction_at(const V3& x, const LightNumbers& numbers) const {
     if (map && !(portals && portals->any_in_front_of(x))) return map->sample(numbers.x, numbers.y);
     if (!map) return portals->sample(x, numbers.x, numbers.y);
-    // The position of the word among those that make the same choice is used again
+    // The position of the word among those that make the same choice is reused as a random word
     if (numbers.x < kBrightnessWords)
       return map->sample(static_cast<std::uint32_t>((std::uint64_t{numbers.x} << 32) / kBrightnessWords),
                          numbers.y);

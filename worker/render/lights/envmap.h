@@ -43,10 +43,10 @@ inline constexpr std::uint64_t kMaxEnvironmentPixels = std::uint64_t{1} << 25;
 class EnvironmentMap {
  public:
   // Makes the map from `image`, with radiances multiplied by `scale`. `name` is for messages. Negative values
-  // become 0 and are counted. Fails with invalid_argument on a value that is not finite or that, scaled,
-  // exceeds the largest radiance that a sample may have, on an image of fewer than 2 x 3 pixels, or of
-  // equal_area one that is not square, and on a to_world other than a rotation, reflection, translation and
-  // uniform scale. Fails with resource_exhausted on more than kMaxEnvironmentPixels.
+  // become 0 and are counted. Fails with invalid_argument if a value is not finite or, scaled, exceeds the
+  // largest radiance of a sample; if a latlong image has fewer than 2 x 3 pixels or an equal_area image is
+  // not square; or if to_world is not composed of rotation, reflection, translation and uniform scale. Fails
+  // with resource_exhausted if the image has more than kMaxEnvironmentPixels.
   static Result<EnvironmentMap> build(std::string_view name, ImageData image, double scale,
                                       const Transform& to_world, SkyMapping mapping = SkyMapping::latlong);
 

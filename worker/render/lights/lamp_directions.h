@@ -2,11 +2,11 @@
 // vertex's own distribution (the phase function or the BSDF) and of directions that pass close to a lamp (a
 // light without extent).
 //
-// Light that is scattered at the distance D from a lamp is as bright as 1 / D^2, and its integral along a ray
-// that passes the lamp at the distance D grows as 1 / D. From a vertex at the distance r, a ray at the angle
-// theta to the lamp passes it at D = r sin(theta). With a bounded density of directions, the second moment of
-// 1 / sin(theta) is infinite, which shows as fireflies. Directions of density 1 / sin(theta) make it finite
-// (Georgiev et al. 2013, "Joint Importance Sampling of Low-Order Volumetric Scattering", section 4).
+// The light scattered at distance D from a lamp is proportional to 1 / D^2. Its integral along a ray whose
+// smallest distance to the lamp is D is proportional to 1 / D, with D = r sin(theta) for a ray from a vertex
+// at distance r that makes the angle theta with the direction to the lamp. If directions are sampled with a
+// bounded density, the second moment of 1 / sin(theta) is infinite, which shows as fireflies. With a density
+// proportional to 1 / sin(theta) it is finite.
 #pragma once
 
 #include <array>
@@ -60,7 +60,7 @@ class LampDirections {
 
  private:
   // sin(theta) is bounded from below, since it is accurate only to about 1e-7. So very close to the lamp this
-  // is not quite the density of near(), but it is the same value for both strategies.
+  // differs from the density of near(), but all MIS weights use the same value.
   static float near_pdf(const V3& to_lamp, const V3& w) {
     const V3 c = cross(to_lamp, w);
     return kInvTwoPi * kInvPi / std::max(std::sqrt(dot(c, c)), 1e-6f);

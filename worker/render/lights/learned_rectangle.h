@@ -17,9 +17,9 @@ class LearnedRectangle {
   // Adds a point; a weight that is not positive and finite is ignored.
   void learn(V2 at, float weight);
   void add(const LearnedRectangle& other);  // adds the points that `other` has learned
-  // Makes the points a density; call once, after all points. The rectangle is that of the points, with a
-  // margin of a cell's side and `margin` on each side. The density's integral is 1 - `outside_share`, of
-  // which a share is uniform over the rectangle, for places where few points or none were learned.
+  // Converts the points to a density; call once, after all points. The rectangle is the bounding box of the
+  // points, enlarged on each side by the side of a cell and by `margin`. The integral of the density is 1 -
+  // `outside_share`. A share of the density is uniform over the rectangle, for places with few or no points.
   void finish(float margin, double outside_share);
 
   bool empty() const { return last_.empty(); }

@@ -1,5 +1,5 @@
 // The choice of a light: by the table of all lights or, if the shaded point is known, also by the tree or by
-// what was learned about its place. Each maps a word, a random integer of 32 bits, to a light.
+// the learned probabilities of its place. Each maps a word, a random integer of 32 bits, to a light.
 #include <algorithm>
 #include <cmath>
 
@@ -12,8 +12,8 @@ namespace {
 // The smallest number of lights with a position for which the tree is used
 // (docs/decisions/0008-many-lights.md). With fewer, the table is used alone.
 constexpr std::ptrdiff_t kTreeFrom = 32;
-// Of the words that choose lights in the tree, every kTableShare-th one chooses by the table instead. So no
-// light gets less than 1/16 of its probability in the table.
+// Every kTableShare-th of the words that choose lights in the tree chooses by the table instead. So no light
+// gets less than 1/16 of its probability in the table.
 constexpr std::uint64_t kTableShare = 16;
 
 }  // namespace

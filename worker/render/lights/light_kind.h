@@ -9,7 +9,7 @@
 //                                           samples the light that arrives at x; p is the probability with
 //                                           which this light was chosen
 //
-// Kinds that have a description in scenes (describe()) also have a make_light(), which makes them from it.
+// Kinds that correspond to an emitter of the scene format also have a make_light(), which converts it.
 #pragma once
 
 #include <algorithm>

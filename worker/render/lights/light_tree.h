@@ -11,10 +11,10 @@
 // n, or its opposite, and the direction to the centre, minus that radius; in a medium there is no cos i. A
 // light is sampled by descending from the root, choosing among children in proportion to their importance.
 //
-// Random words are split, not real numbers. The root has all 32-bit words, or as many as the caller gives it,
-// and each child gets a whole number of its parent's words. So the probability of a light is exactly the
-// number of words that reach it over the number of all words. All arithmetic is plain float32 and float64
-// without library functions other than square roots: the same on every machine.
+// Sampling splits random words instead of real numbers. The root has all 32-bit words, or as many as the
+// caller gives it, and each child gets a whole number of its parent's words. So the probability of a light is
+// exactly the number of words that reach it over the number of all words. All arithmetic is plain float32 and
+// float64 without library functions other than square roots: the same on every machine.
 #pragma once
 
 #include <cstdint>

@@ -9,8 +9,8 @@
 namespace ls::render {
 namespace {
 
-// The share of the sun map's rays that is uniform over the whole scene, so that light that no path found
-// while learning is connected too.
+// The share of the sun map's rays that is uniform over the whole scene, so that light vertices also cover
+// light that no learning path found.
 constexpr double kSceneShare = .05;
 constexpr float kSmallestMargin = 1e-4f;  // margin of the rectangle, as a share of the scene's radius
 // The largest |g| of a phase function in towards(): with sharper ones, rounding errors would dominate the
@@ -20,8 +20,8 @@ constexpr float kTiny = 1e-30f;
 // A glossy surface may reflect much light that arrives at a grazing angle, so towards() adds this constant to
 // the cosines.
 constexpr float kGrazing = .1f;
-// The share of choices that are uniform over all vertices that can be seen. It bounds the weight of vertices
-// that contribute more than estimated.
+// The share of choices that is uniform over the candidates with a positive estimate. It bounds the weight of
+// vertices that contribute more than estimated.
 constexpr float kAnyShare = .1f;
 
 }  // namespace

@@ -1,22 +1,23 @@
 // Light vertices: the points at which the light of a directional emitter, the sun, is scattered.
 //
-// A path that looks for the sun at its own vertices finds it only where a vertex happens to be lit. In a room
-// with a window few vertices are lit, and nearly all light that is scattered twice or more comes from them.
-// So paths are traced from the sun, their vertices are kept, and every vertex of a camera path is connected
-// to one of them: bidirectional path tracing (Veach 1997, ch. 10) with light subpaths that are kept and used
-// again by many paths (Keller 1997, "Instant radiosity"; Davidovic et al. 2014, "Progressive light transport
-// simulation on the GPU").
+// Next-event estimation at the vertices of a camera path finds the sun only where a vertex happens to be lit.
+// In a room with a window few vertices are lit, and nearly all light that is scattered twice or more comes
+// from them. So paths are traced from the sun, their vertices are kept, and every vertex of a camera path is
+// connected to one of them: bidirectional path tracing (Veach 1997, ch. 10) with light subpaths that are kept
+// and used again by many paths (Keller 1997, "Instant radiosity"; Davidovic et al. 2014, "Progressive light
+// transport simulation on the GPU").
 //
-// A path of several vertices can be found in several ways: the first k of its vertices are sampled from the
-// camera, and the others from the sun. If there are no others, the way is next-event estimation. All ways are
-// weighted by the balance heuristic. In a way that connects, each vertex has one of these densities:
+// The same path can be sampled by several strategies, which differ in k: the first k vertices are sampled
+// from the camera, the rest from the sun. If no vertex is sampled from the sun, the strategy is next-event
+// estimation. The strategies are weighted by the balance heuristic. For strategies that connect to a light
+// vertex, the density of a vertex is:
 //   the first vertex after the sun:
 //     kCandidates / (vertices per ray) * (rays per area of the sun's plane) * |cos_sun|,
 //   every other vertex, sampled from the sun or from the camera:
 //     pdf |cos| / r^2, with the density `pdf` of the direction in which the vertex before it scattered.
-// In a medium the cosines are 1. Transmittances and Russian roulette are left out of all densities, which is
-// right: weights need not use the true densities, only the same functions of the path for all ways to find
-// it.
+// In a medium the cosines are 1. All densities leave out transmittances and Russian roulette. The result is
+// still unbiased: weights need not use the true densities, only the same functions of the path for all
+// strategies.
 //
 // The sum over all light vertices is estimated by resampled importance sampling (Talbot et al. 2005): a block
 // of kCandidates vertices is chosen uniformly, and one of them in proportion to a cheap estimate of its
@@ -78,9 +79,9 @@ class SunMap {
 };
 
 // A subpath's share in the denominator of the balance heuristic, for subpaths from the camera and from the
-// sun. It is the sum, over all ways that find the same path with a shorter subpath from this end, of their
-// densities over that of the way with this subpath. It is computed vertex by vertex, as by Georgiev 2012,
-// "Implementing vertex connection and merging", eqs. 31 to 36.
+// sun. It is the sum, over all strategies that find the same path with a shorter subpath from this end, of
+// the density of that strategy over the density of the strategy with this subpath. It is computed vertex by
+// vertex, as by Georgiev 2012, "Implementing vertex connection and merging", eqs. 31 to 36.
 struct SubpathDensities {
   float last = 0;    // 1 / density of the last vertex
   float before = 0;  // the part of the vertices before it, without the factor `back` of sum()
@@ -127,11 +128,11 @@ class LightVertices {
  public:
   static constexpr std::size_t kCandidates = 32;
 
-  // The appearance of a light vertex from other points, by which choose() estimates its contribution. Up to
+  // The appearance of a light vertex from other points, from which choose() estimates its contribution. Up to
   // a common factor the radiance that leaves the vertex, times its cosine to the normal (1 in media), is
   //   even * cosine + lobe * 4 pi * (the Henyey-Greenstein phase function with parameter g),
-  // the latter for the angle between the direction in which light leaves and -axis. The lobe of a glossy
-  // surface has no cosine, as that of a microfacet distribution.
+  // where the phase function takes the angle between the outgoing direction and -axis. The lobe of a glossy
+  // surface has no cosine factor, like the lobe of a microfacet distribution.
   struct Look {
     V3 n{0, 0, 0};  // surfaces: the geometric normal, on the side that is lit
     // Surfaces: light may leave on the other side too, as through glass or where the shading normal is tilted
@@ -140,14 +141,14 @@ class LightVertices {
     V3 axis{0, 0, 1};
     float g = 0;
     // 1 / densities.sum(1 / (4 pi)). The larger it is, the better connections are compared with the other
-    // ways that find the light of the vertex.
+    // strategies that find the light of the vertex.
     float density = 0;
   };
   void add(const LightVertex& vertex, const Look& look);
   void finish();  // call once, after the last add()
 
   struct Choice {
-    const LightVertex* vertex = nullptr;  // null: no vertex can be seen from x
+    const LightVertex* vertex = nullptr;  // null: all candidates have the estimate 0
     float weight = 0;                     // 1 / (expected number of times that this vertex is chosen)
   };
   // Prefetches into the processor's caches the vertices that choose() will need for the same `block`.

@@ -60,8 +60,8 @@ class Lights {
   // Chooses a light before the shaded point is known: with probability 1/2 in proportion to power, else
   // uniformly.
   LightChoice choose(const LightNumbers& numbers) const { return chosen(numbers, draw(numbers.light)); }
-  // Chooses a light for a place: by what was learned about places like this (local_lights.h) or, if nothing
-  // was learned and there are many lights, by a tree (light_tree.h).
+  // Chooses a light for a place: by the probabilities learned for places like this (local_lights.h) or, if
+  // none were learned and there are many lights, by a tree (light_tree.h).
   LightChoice choose(const LightNumbers& numbers, const LightPlace& place) const {
     return chosen(numbers, alone_ ? only_one() : draw(numbers.light, place));
   }
@@ -69,7 +69,8 @@ class Lights {
   LightChoice choose_before_point(const LightNumbers& numbers, const LightPlace& place) const {
     return by_place(place) ? choose(numbers, place) : choose(numbers);
   }
-  // The place by which lights are chosen in media, if they are chosen by place there.
+  // The place of a segment in a medium, for choosing lights by place: its middle, or its start if it is
+  // infinite.
   static V3 place_on(const V3& start, const V3& direction, float length) {
     return std::isfinite(length) ? start + direction * (length / 2) : start;
   }
@@ -104,7 +105,8 @@ class Lights {
   }
   // The environment of constant radiance, as far as it is not sampled as a light
   const C3& constant_environment() const { return environment_; }
-  // The same light by the way in which it can be found. Requires single_environment_sample().
+  // The environment radiance, split by whether next-event estimation samples it. Requires
+  // single_environment_sample().
   struct EnvironmentParts {
     C3 unsampled;  // never sampled as a light
     C3 sampled;    // sampled as a light with the density `pdf`, per steradian
@@ -114,7 +116,8 @@ class Lights {
   // True if next-event estimation samples a direction by at most one light that paths can also hit when they
   // leave the scene: a sun with an extent, or the sky.
   bool single_environment_sample() const { return suns_.size() + (sky_.sampled() ? 1 : 0) <= 1; }
-  // Sets the radiance of the constant environment, and returns what it was. A scene without one has black.
+  // Sets the radiance of the constant environment and returns the old one, which is black in a scene without
+  // one.
   C3 exchange_constant_environment(const C3& radiance) { return std::exchange(environment_, radiance); }
   bool has_environment() const { return sky_.sampled() || !suns_.empty() || !is_black(environment_); }
   const EnvironmentMap* map() const { return map_.get(); }
@@ -135,9 +138,10 @@ class Lights {
   // True if set_local() may be called.
   bool can_be_local() const { return lights_.size() > 1 && lights_.size() <= LocalLights::kMostLights; }
   // The mean square of next-event estimation at these places, over the square of its mean, if the table
-  // chooses the light. It is at least 1, as where each light brings the share that it has in the table.
+  // chooses the light. It is at least 1, and is 1 where each light contributes in proportion to its
+  // probability in the table.
   double spread_over(const LightVisits& visits) const;
-  // From this call on, lights are chosen by what these visits tell; null: no longer.
+  // From this call on, lights are chosen by probabilities learned from these visits; null: no longer.
   void set_local(const LightVisits* visits);
   const LocalLights* local() const { return local_.get(); }
   // This light, as if it had been chosen with this probability.
@@ -216,8 +220,8 @@ class Lights {
   C3 environment_{0, 0, 0};
   std::unique_ptr<const EnvironmentMap> map_;
   std::unique_ptr<const Portals> portals_;
-  SkyLight sky_;                 // a copy of that among lights_, if it is there
-  std::uint32_t sky_index_ = 0;  // its place among lights_
+  SkyLight sky_;                 // a copy of the SkyLight in lights_, if there is one
+  std::uint32_t sky_index_ = 0;  // its index in lights_
   // If there are many lights, those with a position come first in the list and are in the tree. The first
   // words of the table choose these lights; at each point the tree redistributes these words among them,
   // except every kTableShare-th word, which the table keeps.

@@ -1,14 +1,15 @@
-// The choice of a light for a place, learned from the light that reaches places like it. In the
-// shade of a wall the sun is hardly chosen, however bright it is.
+// Chooses a light for next-event estimation with probabilities that depend on the place. They are learned
+// from the light that reached nearby places: in the shade of a wall the sun is rarely chosen.
 //
-// Camera paths visit places of the scene and look for every light there, by one shadow ray each. The visits
-// are divided by the side to which the surface faces (those in media apart), and then by planes across their
-// longest extent (a k-d tree), until each cell has few. Where the light of i has the values v_i (relative to
-// that of all lights together), the variance of next-event estimation with one light, chosen with the
-// probabilities p_i, is least for p_i proportional to the square root of the mean of v_i^2 (Vevoda,
-// Kondapaneni and Krivanek 2018, "Bayesian online regression for adaptive direct illumination sampling",
-// equation 9). A quarter of the choices is made by the table of all lights, so no light is chosen less than a
-// quarter as often as by that.
+// At the vertices of learning camera paths, one shadow ray per light measures the light that arrives. The
+// vertices are sorted into seven classes: six by the axis direction that their normal is closest to, one for
+// media. For each class a k-d tree, split at the median of the longest axis, has leaves with few vertices.
+// Let v_i be the light of light i over that of all lights, at the vertices of a leaf. Next-event estimation
+// with one light, chosen with the probabilities p_i, has the least variance for p_i proportional to the
+// square root of the mean of v_i^2 (Vevoda, Kondapaneni and Krivanek 2018, "Bayesian online regression for
+// adaptive direct illumination sampling", equation 9). These probabilities are mixed with those of the table
+// of all lights, which has the weight 1/4. So no light's probability is less than a quarter of that in the
+// table.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +27,7 @@ struct LightVisits {
     V3 p, n;  // n: the normal of its surface; 0 in a medium
   };
   std::vector<Place> places;
-  std::vector<float> values;  // those of all lights, for each place
+  std::vector<float> values;  // for each place, the share of each light in the arriving light
 
   // Adds a place unless it is dark, or a number is not finite. `found`: the light of each; not negative.
   void add(const V3& p, const V3& n, std::span<const float> found);
@@ -55,7 +56,7 @@ class LocalLights {
   struct Node {
     float plane = 0;
     std::uint32_t next =
-        0;  // the node below the plane, before the one above it; of a leaf, where its table begins
+        0;  // index of the child below the plane; the child above follows it. Leaf: start of its table
     std::uint8_t axis = kLeaf;  // of the plane
   };
   struct Builder;
@@ -63,7 +64,7 @@ class LocalLights {
   std::span<const std::uint32_t> table_at(const V3& p, const V3& n) const;
 
   std::size_t lights_;
-  std::vector<Node> nodes_;  // first those of the six sides, and of media
+  std::vector<Node> nodes_;  // first the roots of the seven classes
   std::vector<std::uint32_t> tables_;
   bool in_media_ = false;
 };

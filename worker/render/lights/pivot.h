@@ -1,4 +1,4 @@
-// The point about which segments of paths are sampled equi-angularly, and where its light goes.
+// The point on a light about which segments are sampled equi-angularly, and the cone into which it emits.
 #pragma once
 
 #include "worker/render/math/math.h"

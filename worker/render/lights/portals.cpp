@@ -20,8 +20,8 @@ constexpr double kOutliers = .01;
 // The planes that are tried for a face: from kBeyond of the box's side outside of it to the middle of the box
 constexpr int kPlanes = 40;
 constexpr float kBeyond = .1f;
-// A plane is divided into kCells x kCells cells to tell how close together the rays are on it. They cover
-// twice the face's width and height; the places of rays farther out are not learned.
+// A plane is divided into kCells x kCells cells to measure how concentrated the rays are on it. The cells
+// cover twice the face's width and height; the places of rays farther out are not learned.
 constexpr int kCells = 128;
 constexpr std::size_t kSide = 16;  // cells across and down a portal's rectangle
 // The margin of a portal's rectangle, as shares of the box's size and of its largest coordinate: the latter
@@ -62,8 +62,8 @@ struct Portals::Box {
     return r;
   }
   float side(int axis) const { return high[axis] - low[axis]; }
-  // The place at which a ray crosses a plane: in the plane, and as shares of the sides of the rectangle of
-  // the cells, from 0 to less than 1. nullopt: it does not cross the plane in this rectangle.
+  // The place at which a ray crosses a plane: in the plane, and relative to the rectangle of the cells, from
+  // 0 to less than 1 along each side. nullopt if the ray does not cross the plane in this rectangle.
   struct Place {
     V2 on_plane, of_box;
   };
@@ -97,8 +97,8 @@ std::optional<float> Portals::Plane::distance(const V3& p, const V3& d) const {
   return std::isfinite(t) && t > 0 ? std::optional(t) : std::nullopt;
 }
 
-// Rays are close together on a plane if the entropy of their light over its cells is small: e to the entropy
-// is the number of cells over which the same light, spread evenly, would have it.
+// Returns the plane with the smallest entropy of the rays' light over its cells. exp(entropy) is the number
+// of cells over which evenly spread light has the same entropy.
 std::optional<Portals::Plane> Portals::best_plane(const Box& box, int face, std::span<const Found> rays) {
   Plane plane;
   plane.axis = face / 2;

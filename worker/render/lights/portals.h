@@ -2,14 +2,15 @@
 //
 // Next-event estimation samples an environment map by its brightness alone. In a room that the sky lights
 // through a window, nearly all of these directions end at the walls. So camera paths are traced before the
-// first sample, and the rays along which they found the sky tell where it enters: for each face of a box
-// around the scene, a plane parallel to it is chosen on which the rays that leave through this face are
-// closest together. That is the plane of the window, or one near it. On this plane the places of the rays are
-// learned as a density; next-event estimation samples a place and thus a direction.
+// first sample, and the rays on which they reached the sky are kept. For each face of a box around most of
+// their origins, the rays that leave through this face are intersected with several planes parallel to it.
+// The plane on which the intersections are most concentrated (least entropy) is the plane of the window, or
+// near it. The density of the intersections on this plane is learned. Next-event estimation samples a point
+// of the plane with this density, and takes the direction to it.
 //
-// Portals that are drawn by hand are common (Bitterli, Novak and Jarosz 2015, "Portal-Masked Environment Map
-// Sampling"); these are found, need not cover all openings, and are one part of a mixture with the sampling
-// of the map (SkyLight).
+// Other renderers let the user place portals (Bitterli, Novak and Jarosz 2015, "Portal-Masked Environment Map
+// Sampling"). Here they are found automatically. They need not cover all openings, because SkyLight samples a
+// mixture of the portals and the map.
 #pragma once
 
 #include <cstdint>
@@ -55,7 +56,7 @@ class Portals {
   struct Portal {
     Plane plane;
     LearnedRectangle places;
-    float weight = 0;  // a portal is chosen with this over the sum of the weights of those in front of p
+    float weight = 0;  // a portal is chosen with probability weight / (sum over the portals in front of p)
   };
   struct Box;
   float weight_in_front_of(const V3& p) const;  // the sum over the portals in front of p

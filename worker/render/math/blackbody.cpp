@@ -50,8 +50,8 @@ C3 black_body_radiance(float kelvin) {
 
 C3 black_body_of_peak_one(float kelvin) {
   if (!(kelvin >= kColdest)) return {0, 0, 0};
-  // The radiance is at least 1e-30 and the peak at most 4e-15 kelvin^5. Both are far from the ends of
-  // double's range, but not their quotient from the ends of float's.
+  // Computed in double: the radiance is at least 1e-30 and the peak at most 4e-15 kelvin^5, far from the ends
+  // of double's range, but their quotient may be close to the ends of float's.
   const double per_peak = 1 / scene::black_body_peak(kelvin);
   const C3 whole = black_body_radiance(kelvin);
   C3 out;

@@ -12,7 +12,7 @@
 namespace ls::render {
 
 // Treats denormals as zero in this thread while the object lives, as Embree requires where rays are traced.
-// When it is destroyed, denormals work again, since folding (adding results to the image) needs them.
+// The destructor restores the previous mode, since folding (adding partials to the film) needs denormals.
 class FlushDenormals {
  public:
   FlushDenormals() : saved_(read()) { write(saved_ | kFlush); }

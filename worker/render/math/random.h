@@ -21,11 +21,11 @@ constexpr std::uint64_t combine(std::uint64_t a, std::uint64_t b) { return combi
 
 // Turns 32 random bits into a float in [0, 1). The upper 24 bits are kept, so the largest value is 1 - 2^-24.
 inline float unit_float(std::uint32_t bits) { return static_cast<float>(bits >> 8) * 0x1p-24f; }
-// Returns -log y for a uniform number y. Its complement x = 1 - y is given too; both are exact to full
-// relative precision. So optical depths below t occur with probability 1 - e^-t however small t is. y alone
-// does not suffice, because it is rounded near 1. Rounding changes log y and y - 1 in the same proportion, so
-// their ratio stays correct (W. Kahan's log1p; Goldberg 1991, theorem 4). This avoids a branch that half of
-// all calls would take.
+// Returns -log y for a uniform number y. The caller passes y and its complement x = 1 - y, both with full
+// relative precision. So optical depths below t occur with probability 1 - e^-t however small t is; y alone
+// would not suffice, because it is rounded near 1. Rounding changes log y and y - 1 in the same proportion,
+// so their ratio stays correct (W. Kahan's log1p; Goldberg 1991, theorem 4). This avoids a branch that half
+// of all calls would take.
 inline float minus_log(float y, float x) {
   const float rest = 1 - y;  // exact for y >= 1/2
   return rest > 0 ? -std::log(y) * (x / rest) : x;

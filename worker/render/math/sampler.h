@@ -52,7 +52,7 @@ class SampleStream {
   SampleStream(std::uint64_t seed, std::uint32_t x, std::uint32_t y, std::uint64_t sample)
       : SampleStream(combine(combine(seed, (std::uint64_t{y} << 32) | x), sample & 1), sample >> 1) {}
 
-  // The random numbers of a path into which a path with these numbers splits.
+  // Returns the random numbers of the second path, where a path with these numbers splits into two.
   SampleStream of_branch() const {
     SampleStream s(*this);
     s.sequence_ = combine(sequence_, kBranch);
@@ -68,8 +68,7 @@ class SampleStream {
                         kMixedSlots.value[static_cast<std::size_t>(vertex)][static_cast<int>(purpose)]))};
     return hashed(slot(vertex, purpose));
   }
-  // Returns a stream of unbounded length, for a tracker, which does not know in advance how many numbers it
-  // needs.
+  // Returns a stream of unbounded length, for a tracker, whose number of draws is random.
   RandomStream stream(int vertex, Purpose purpose) const {
     return RandomStream(combine(sample_, slot(vertex, purpose)));
   }

@@ -93,8 +93,8 @@ class EmissionWalk {
     if (m_.emission_kind != EmissionKind::per_length && !(cell && cell->hi > 0)) return false;
     if (!emitter_) return true;
     if (!emitter_->inside(at)) return false;
-    // If the emission grid has several channels, only the bound of the first one is at hand, so the cell is
-    // assumed to emit.
+    // `emitter_` walks the grid of the first channel. If the channels have different grids, the bounds of the
+    // others are unknown, so the cell is assumed to emit.
     if (m_.emitter[1] != m_.emitter[0]) return true;
     const float hi = emitter_->cell().hi;
     return m_.emission_kind == EmissionKind::black_body ? m_.kelvin_offset + m_.kelvin_scale * hi >= kColdest
@@ -144,7 +144,8 @@ class EmissionWalk {
     return a;
   }
 
-  // Adds the emission e times `share` to channel c, or to all channels if they have the same extinction.
+  // Adds the emission e, attenuated up to the interval and times `share`, to channel c, or to all channels if
+  // they have the same extinction.
   void add(int c, const V3d& e, double share) {
     if (channels_ == 1) {
       sum_ = sum_ + e * (through_[0] * share);

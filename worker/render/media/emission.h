@@ -1,10 +1,11 @@
-// Medium emission along a ray: the integral of transmittance times emission over the whole segment, not only
-// where a flight happens to collide. So it works where nothing is absorbed (a tracker has no collisions
-// there) as well as deep inside an opaque medium.
+// Medium emission along a ray: the integral of transmittance times emission over the whole segment, instead
+// of an estimate at the collisions of free flights. So it also works in media without extinction, in which
+// there are no collisions, and deep inside opaque media.
 //
-// In a homogeneous medium it has a closed form. In a grid the ray is divided into intervals that are short
-// compared with a voxel. Each interval has its exact optical depth (Grid::pass: no tracking noise) and one
-// emission sample per channel; the sum of unbiased terms is unbiased.
+// In a homogeneous medium it has a closed form. In a grid the ray is divided into intervals, at most one
+// voxel long where the fields vary. The optical depth of an interval is exact (Grid::pass). Each channel's
+// emission is estimated from one point of the interval, or two if the interval is optically thick and not
+// uniform; without extinction it is integrated exactly. Every term is unbiased, hence the sum is.
 #pragma once
 
 #include "worker/render/media/medium.h"

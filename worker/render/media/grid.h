@@ -39,8 +39,8 @@ class Grid {
   // `world_to_index` maps world points to index coordinates. The grid is 0 outside of [domain_lo, domain_hi]
   // (index coordinates; the domain may extend beyond the outermost nodes, where values are clamped).
   // `density_to_sigma` is the largest extinction per unit of value, in world units; it determines the size of
-  // macro cells. `wrap` says how the nodes continue beyond the ends. Unless it is `clamp`, values must be at
-  // cell centres: n nodes then have the domain [-1/2, n - 1/2].
+  // macro cells. `wrap` determines how the nodes continue beyond the ends. Unless it is `clamp`, values must
+  // be at cell centres: n nodes then have the domain [-1/2, n - 1/2].
   Grid(std::array<int, 3> size, std::vector<float> values, const Affine& world_to_index, V3d domain_lo,
        V3d domain_hi, double density_to_sigma, VolumeFilter filter = VolumeFilter::trilinear,
        Wrap wrap = Wrap::clamp);
@@ -58,7 +58,7 @@ class Grid {
     return nearest(index);
   }
   // Returns the value at any index coordinates, with the grid's own filter. Beyond the domain the grid
-  // continues as `wrap` says.
+  // continues according to `wrap`.
   float value_anywhere(const V3& index) const {
     LS_COUNT(density);
     const V3 q = wrap_ == Wrap::clamp ? index : wrapped(index);

@@ -5,8 +5,7 @@
 #include <algorithm>
 #include <span>
 
-#include "common/assets/raw_grid.h"
-#include "common/assets/vol.h"
+#include "common/assets/grid_files.h"
 #include "common/base/overloaded.h"
 #include "worker/render/media/vdb_process.h"
 

@@ -59,8 +59,9 @@ struct Medium {
   float kelvin_scale = 1, kelvin_offset = 0;
   bool peak_one = false;         // for black_body: spectra are divided by their peak
   const Grid* weight = nullptr;  // for black_body: a factor on the emission, 0 outside of this grid
-  // Where no surface lies inside the medium; null: not known. Set where flights may be sampled before it is
-  // known how far they can go: if light is looked for at vertices alone, and the medium does not glow.
+  // The region inside the medium in which no surface lies; null if unknown. It is set only if flights may be
+  // sampled before their rays are traced: if the medium does not emit, and light in it is sampled at vertices
+  // alone.
   const ClearRegion* clear = nullptr;
   int priority = 0;  // where media overlap, only those of the highest priority are in effect
   bool chromatic() const { return sigma_t.x != sigma_t.y || sigma_t.y != sigma_t.z || by_channel[0]; }

@@ -1,9 +1,9 @@
 // The media at a path's current position (docs/decisions/0010-media-boundaries.md).
 //
-// A boundary has an interior and an exterior medium, either of which may be none. For nested or intersecting
-// boundaries, the media at a point are the background's, plus the interior and minus the exterior of every
-// boundary around the point. So the result does not depend on the order in which a path crosses them. Of
-// these media, those of the highest priority are in effect, all of them together.
+// A boundary has an interior and an exterior medium, either of which may be none. Starting with the
+// background medium, each boundary that encloses a point adds its interior medium and removes its exterior
+// medium. So the media at a point do not depend on the order in which a path crosses boundaries. Only the
+// media of the highest priority among them are in effect; if there are several, they overlap.
 #pragma once
 
 #include <algorithm>

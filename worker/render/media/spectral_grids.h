@@ -1,11 +1,12 @@
 // The functions of medium.h (free flight, transmittance and passed()) for grids whose density differs between
 // channels, that is, from files with three channels.
 //
-// Each channel has its own local majorant. The majorant of the hero (the channel that decides distances:
-// medium.h) determines the tentative collisions and their type. For every other channel, the density with
-// which its majorants would give the same collisions goes into the flight's `density`: the transmittance of
-// its majorant, times its probabilities of null collisions. Dividing by the mean of these is the balance
-// heuristic over channels, which keeps weights below 3 where the quotients are unbounded.
+// Each channel has local majorants of its own. Those of the hero (the channel that decides distances:
+// medium.h) determine the tentative collisions and their type. The `density` of another channel is the
+// density with which the majorants of that channel would have given the same collisions: their transmittance
+// times the null-collision coefficients (majorant - density), relative to the same product of the hero.
+// Dividing by the mean over channels is the balance heuristic. It keeps weights below 3, whereas the ratios
+// alone are unbounded.
 #pragma once
 
 #include "worker/render/media/medium.h"

@@ -1,6 +1,7 @@
-// The memory limit (RLIMIT_DATA) of a process that loads OpenVDB files. The child process that reads the
-// files gets the memory that this process has not used of its limit. The child's reply, a mapped file, counts
-// towards the limit too, although the kernel does not count it.
+// The memory limit (RLIMIT_DATA) of a process that loads OpenVDB files. The child process that reads a file
+// may use as much memory as remains of this process's limit. The child's reply is a mapped file, which the
+// kernel does not count towards RLIMIT_DATA, so this process lowers its limit by the size of the file while
+// the file is mapped.
 #pragma once
 
 #include <sys/resource.h>

@@ -41,7 +41,7 @@ struct Entry {
   TextureFilter filter = TextureFilter::bilinear;
   Wrap wrap = Wrap::repeat;
   // Indices whose meaning depends on the kind: of a bitmap's texels, of the two textures of a checkerboard or
-  // a product, of the texture of a peak, or of an attribute's name.
+  // a product, of the texture of a peak or a hue, or of an attribute's name.
   std::uint32_t first = 0, second = 0;
   C3 value{0, 0, 0};  // the value of a constant; for other textures the mean
   UvAffine to_uv;
@@ -107,8 +107,8 @@ C3 hue_of(const C3& c) {
   return peak > 0 ? C3(c.x / peak, c.y / peak, c.z / peak) : C3(1, 1, 1);
 }
 
-// Computes the means of textures that contain others, after those of the contained ones. A chain of n
-// textures takes n passes; if some mean can never be computed, there is a cycle.
+// Computes the means of textures that contain others from the means of the contained ones. A chain of n
+// textures takes n passes; if the means still change after the last pass, there is a cycle or a longer chain.
 Result<void> resolve_nested(TextureTable::Data& data) {
   std::vector<int> depth(data.entries.size(), 0);
   for (int pass = 0; pass <= scene::kMaxReferenceDepth; ++pass) {

@@ -19,8 +19,8 @@ namespace {
 
 constexpr rlim_t kMostCpuSeconds = 900;  // far more than the few seconds that the largest grids take
 
-// Makes this process end when its parent ends, and limits its resources: to the needs of any valid file, and
-// to the memory that its parent has left.
+// Makes this process end when its parent ends, and limits its resources to those that a valid file can need
+// and to the memory that its parent has left.
 void confine(std::uint64_t most_values, std::uint64_t most_bytes) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);

@@ -1,7 +1,7 @@
 // Reader of NanoVDB files (.nvdb) of ABI 32, as written by NanoVDB of OpenVDB 9 to 11. Every offset is
-// checked, because NanoVDB's own reader trusts the file. A grid is a buffer with offsets between its nodes,
-// stored as a whole uncompressed, with zlib or with Blosc. The layout follows PNanoVDB.h, the library's
-// portable description of it.
+// checked, because NanoVDB's own reader trusts the file. A grid is a buffer with offsets between its nodes.
+// It is stored as a whole: uncompressed, or compressed by zlib or Blosc. The layout follows PNanoVDB.h, the
+// library's portable description of it.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // Decides at which additional points (camera_segment_nee.h) and in which additional directions
-// (lamp_directions.h) a world's paths look for light.
+// (lamp_directions.h) a world's paths sample light.
 #pragma once
 
 #include "common/scene/scene.h"

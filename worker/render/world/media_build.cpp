@@ -80,8 +80,8 @@ Result<Medium> homogeneous(const Scene& scene, const HomogeneousMedium& m, doubl
   return out;
 }
 
-// As the density_to_sigma of an emitter's grid this forces small macro cells, so that those without emission
-// can be skipped.
+// As the density_to_sigma of an emission grid, this value forces small macro cells, so that walks can skip
+// the cells without emission.
 constexpr double kFine = 1e30;
 // More than any component of a black body of peak 1: its XYZ are at most 1 each, and the positive elements of
 // a row of the matrix from XYZ to linear sRGB add up to less than this.

@@ -8,8 +8,7 @@
 namespace ls::render {
 
 // True if some point may be in several media, or in another medium than the one on its side of the boundary
-// crossed last. This is decided conservatively by bounding boxes: false is certain; an unnecessary true only
-// costs time.
+// crossed last. The test compares bounding boxes: false is certain; an unnecessary true only costs time.
 bool media_may_overlap(const World& w);
 
 // Returns the media that contain the camera. If the scene gives the sensor no medium, there are none, as in

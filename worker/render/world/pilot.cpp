@@ -19,7 +19,7 @@ constexpr std::uint64_t kPilotSeed = 0x5eed0f5ad0;
 constexpr std::uint64_t kPilotPaths = 1 << 10;
 constexpr std::uint64_t kPixelsPerPath = 16;
 constexpr std::uint64_t kFewestPaths = 16;
-// Pixels that tell the noise, and samples of each
+// Number of pixels from which the noise is estimated, and of samples of each
 constexpr std::uint64_t kNoisePixels = 128;
 constexpr std::uint64_t kNoiseSamples = 16;
 // pilot_pays(): the smallest frame, in pixels, and the largest number of shapes that light passes

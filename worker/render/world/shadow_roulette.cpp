@@ -3,7 +3,7 @@
 namespace ls::render {
 namespace {
 
-// Shadow rays that could bring less than this share of the mean radiance are traced at random.
+// Shadow rays that could add less than this share of the mean radiance are subject to Russian roulette.
 constexpr float kFaintShadowRay = 1;
 
 }  // namespace

@@ -1,8 +1,8 @@
-// Shadow rays through grids cost a large part of the time in clouds: each tracks the medium all the way to
-// the light. Many of them could bring little, because the phase function sends little light that way or
-// because the path has lost its weight. So a shadow ray whose light would be faint even if nothing dimmed it
-// is traced at random, with a probability in proportion to that light (Russian roulette: Arvo and Kirk 1990,
-// "Particle transport and image synthesis").
+// Russian roulette of shadow rays (Arvo and Kirk 1990, "Particle transport and image synthesis"). In clouds
+// shadow rays through grids cost a large part of the time, because each tracks the medium all the way to the
+// light. Many of them could add little light, because the phase function has a small value in that direction
+// or because the path has a small throughput. So a shadow ray whose light would be faint even without
+// attenuation is traced only with a probability in proportion to that light.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +16,8 @@ namespace ls::render {
 // times the second moment of the light that is found, in pixels of any brightness.
 inline constexpr float kLeastTraced = .25f;
 
-// The probability with which a shadow ray is traced that could bring `light`: the mean over the channels of
-// what it would add to the sample.
+// The probability with which a shadow ray is traced. `light` is the mean over the channels of the light that
+// the ray would add to the sample without attenuation.
 inline float shadow_ray_probability(float light, float faint_shadow) {
   return light < faint_shadow ? std::max(light / faint_shadow, kLeastTraced) : 1.f;
 }

@@ -7,7 +7,7 @@
 namespace ls::render {
 namespace {
 
-// The share of the direct light from which on second directions pay.
+// Second directions pay if more than this share of the direct light comes from the constant environment.
 constexpr double kSkyThatPays = .125;
 
 }  // namespace

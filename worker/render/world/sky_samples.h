@@ -1,10 +1,10 @@
-// Without portals (lights/portals.h) a sky of one radiance is not sampled as a light: directions that BSDFs
-// sample find it. Where much of the
-// direct light comes from such a sky, its visibility from the first vertex is most of the noise. There a
-// second direction is sampled at the first vertex, which only looks for the sky. The two random numbers that
-// place it in its lobe are 1 less those of the path's own direction, since a horizon that hides one direction
-// often leaves the other free (antithetic variates: Hammersley and Morton 1956). Each of the two directions
-// brings half of the sky's light.
+// A second direction towards a constant environment. Without portals (lights/portals.h) a sky of one radiance
+// is not sampled as a light: the directions that BSDFs sample find it. If much of the direct light comes from
+// such a sky, most of the noise comes from its visibility at the first vertex. So a second direction is
+// sampled there, and its ray only tests the visibility of the sky. Its two random numbers within the lobe are
+// 1 minus those of the path's own direction, since a horizon that hides one direction often leaves the other
+// free (antithetic variates: Hammersley and Morton 1956). Each of the two directions contributes half of the
+// sky's light.
 #pragma once
 
 #include "common/scene/scene.h"
@@ -12,11 +12,11 @@
 
 namespace ls::render {
 
-// Sets `sky_samples` of a world that is otherwise complete, if enough of the direct light that some camera
-// paths find comes from a constant environment. It depends only on the scene and the size of the full frame:
-// not on the seed, the number of samples or a crop. Not in scenes with media, where a ray to the sky may have
-// to track its transmittance, and not where paths are connected to light vertices: light vertices would have
-// to be traced just to measure that share.
+// Sets `sky_samples` of a world that is otherwise complete, if enough of the direct light of some camera
+// paths comes from a constant environment. It depends only on the scene and the size of the full frame: not
+// on the seed, the number of samples or a crop. It stays false in scenes with media, where a ray to the sky
+// may have to track its transmittance, and with connections to light vertices, because light vertices would
+// have to be traced just to measure that share.
 void learn_sky_samples(const IntegratorSettings& settings, World& w);
 
 }  // namespace ls::render

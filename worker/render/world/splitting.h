@@ -1,15 +1,16 @@
-// Splitting and Russian roulette of paths in scenes with grids, by what a path may add to its pixel, as in
-// "Adjoint-driven Russian roulette and splitting in light transport simulation" (Vorba and Krivanek 2016),
-// but with one guess per path instead of a learned field.
+// Splitting and Russian roulette of paths in scenes with grids, by the light that a path may add to its
+// pixel, as in "Adjoint-driven Russian roulette and splitting in light transport simulation" (Vorba and
+// Krivanek 2016), but with one estimate per path instead of a learned field.
 //
 // Splitting: a path whose first vertex is in a grid continues as two paths of half its weight. Nearly all of
-// the noise of such a path arises behind that vertex, and the work goes only to pixels that show a cloud.
+// the noise of such a path arises behind that vertex, and splitting adds work only in pixels that show a
+// cloud.
 //
-// Roulette: what a pixel shows is about in proportion to the throughput of its paths at their first vertex.
-// So Russian roulette compares the throughput of a path with that, and not with 1: a path that comes from
-// dark ground into a cloud would otherwise end with a probability that makes the few that go on far brighter
-// than their pixel. If the light that the path has found at its first vertex is brighter than the image is in
-// the mean, the pixel is bright too, and so roulette compares with that light.
+// Roulette: the brightness of a pixel is about in proportion to the throughput of its paths at their first
+// vertex. So Russian roulette compares the throughput of a path with the throughput at the first vertex, not
+// with 1. Compared with 1, most paths that come from dark ground into a cloud would end, and the few that
+// survive would be far brighter than their pixel. If the light found up to the first vertex is brighter than
+// the mean radiance of the image, the pixel is bright, and roulette compares with that light.
 #pragma once
 
 #include <algorithm>
@@ -19,8 +20,9 @@
 
 namespace ls::render {
 
-// The smallest and the largest reference. Paths that come from nearly black surfaces are not worth following
-// to their ends; and light found at the first vertex may be a bright spot in a dark pixel.
+// The smallest and the largest reference. The smallest ends paths that come from nearly black surfaces, which
+// are not worth following; the largest is a limit because light found at the first vertex may be a bright
+// spot in a dark pixel.
 inline constexpr float kDarkestReference = .05f;
 inline constexpr float kBrightestReference = 10;
 

@@ -50,9 +50,9 @@ class World {
   // True if there are homogeneous media and lights with a position: then segments are also sampled
   // equi-angularly.
   bool equiangular = false;
-  bool equiangular_points = false;  // the same for grids: true if there are point lights in or near them
-  // True if some surface has null transmission, or is passed and counts (`passing_counts`): shadow rays must
-  // account for both
+  bool equiangular_points = false;  // the same in grids: true if there are point lights in or near them
+  // True if shadow rays must account for surfaces that light passes: some surface has null transmission, or
+  // crossings of null boundaries count (`passing_counts`)
   bool null_transmission = false;
   // True if shadow rays are traced boundary by boundary, for null transmission or because they may cross
   // media.
@@ -66,20 +66,20 @@ class World {
   bool lamp_flights = false;  // a share of the flights through homogeneous media end near lamps
   int camera_points = 0;      // number of points on a segment (camera_segment_nee.h); 0: none
   // With Features::connected:
-  Lights::Directional sun;  // the light whose light vertices paths are connected to
+  Lights::Directional sun;  // the light that the light vertices come from
   SunMap sun_map;
   // The number of light vertices from which a connection chooses one, divided by the mean number of light
   // vertices that one ray of the sun leaves. A weight of multiple importance sampling needs the ratio.
   float connections_per_ray = 1;
   float faint = 0;  // connections that would add less than this are made at random (Russian roulette)
   mutable LightVertexCache light_vertices;  // safe from several threads
-  // With Features::grids: shadow rays that could bring less than this are traced at random
-  // (shadow_roulette.h); 0: all are traced.
+  // With Features::grids: shadow rays that could add less than this are traced at random (shadow_roulette.h);
+  // 0: all are traced.
   float faint_shadow = 0;
   // The mean radiance of the image, for Russian roulette (splitting.h); 0: roulette compares with 1
   float mean_radiance = 0;
   bool paths_split = false;  // paths split at their first vertex if it is in a grid (splitting.h)
-  // The first vertex on a surface looks for the constant environment in a second direction (sky_samples.h)
+  // True if the first vertex, on a surface, samples a second direction towards the sky (sky_samples.h)
   bool sky_samples = false;
   // With Features::reuse: the number of pixels whose paths share their tails (path_reuse.h)
   int reuse = 0;

@@ -104,12 +104,12 @@ bool a_point_shines_in_a_grid(const World& w) {
   });
 }
 
-// Finds where no surface lies inside media through which flights may be sampled before rays are traced. With
-// coloured extinction that would be wrong, since the weight of a flight that reaches a surface depends on the
-// distance.
+// Finds the regions without surfaces inside of media in which flights may be sampled before rays are traced.
+// With chromatic extinction this would be wrong, since the weight of a flight that reaches a surface depends
+// on the distance to the surface.
 void find_clear_regions(World& w) {
-  // Each try looks at all triangles and boxes, and with so many bodies each of them is a small part of the
-  // scene.
+  // The largest number of bodies to try. Each try examines all triangles and boxes, and if there are more
+  // bodies, each of them is a small part of the scene.
   constexpr int kMostBodies = 64;
   const auto wanted = [&](const SurfaceInfo& s) {
     if (!s.transition || s.interior == kNone || s.sheet || w.need.chromatic) return false;
@@ -129,8 +129,8 @@ void find_clear_regions(World& w) {
 }
 
 // Sets the camera and the position of the image in the full frame; returns the size of the full frame. A crop
-// renders the pixels of the full frame: the same samples give the same bits. If the image has
-// another size than the crop, the frame is scaled, and the image is the same part of it.
+// renders the pixels of the full frame: the same samples give the same bits. If the image has another size
+// than the crop, the frame is scaled, and the image is the same part of it.
 FrameSize place_camera(const Scene& scene, const RenderSettings& settings, World& w) {
   const FilmSettings& film = scene.film;
   FrameSize frame = settings.size;

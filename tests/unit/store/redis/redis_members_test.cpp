@@ -114,7 +114,7 @@ TEST_F(Members, TheJobsOfADeadOneAreTakenAtTheLookAfterWhichItCountsAsGone) {
 
   ASSERT_EQ(b.taken.size(), 1u);
   EXPECT_EQ(b.taken[0].job.job.id.value, "j-1");
-  EXPECT_EQ(b.taken[0].fence, 2u);
+  EXPECT_EQ(b.taken[0].job.fence, 2u);
   EXPECT_EQ(b.taken[0].from, "a");
   EXPECT_EQ(field("j-1", "owner"), "b");
 }
@@ -136,7 +136,7 @@ TEST_F(Members, AJobIsToldAsTakenThoughTheAnswerToItsTakingWasLost) {
 
   ASSERT_EQ(b.taken.size(), 1u) << "once";
   EXPECT_EQ(b.taken[0].job.job.id.value, "j-1");
-  EXPECT_EQ(b.taken[0].fence, 2u);
+  EXPECT_EQ(b.taken[0].job.fence, 2u);
   EXPECT_EQ(b.taken[0].from, "a");
 }
 
@@ -155,7 +155,7 @@ TEST_F(Members, AJobThatCouldNotBeKeptIsToldAgainUntilItIs) {
   for (int i = 0; i < 5; ++i) ASSERT_TRUE(b.members->beat());
 
   ASSERT_EQ(b.taken.size(), 3u);
-  EXPECT_EQ(b.taken[2].fence, 2u);
+  EXPECT_EQ(b.taken[2].job.fence, 2u);
   EXPECT_EQ(b.taken[2].from, "a");
 }
 
@@ -252,7 +252,7 @@ TEST_F(Members, AnHeirThatDiesIsInheritedFrom) {
   for (int look = 0; look < kLooks; ++look) ASSERT_TRUE(c.members->beat());
 
   ASSERT_EQ(c.taken.size(), 1u);
-  EXPECT_EQ(c.taken[0].fence, 3u);
+  EXPECT_EQ(c.taken[0].job.fence, 3u);
   EXPECT_EQ(put("b", "j-1", 2, 99), static_cast<int>(PutAnswer::lost));
 }
 

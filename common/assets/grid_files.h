@@ -1,0 +1,30 @@
+// Grids of voxels in two file formats, both little endian.
+//
+// Mitsuba's .vol, version 3: "VOL", byte 3, int32 type, int32 nx ny nz, int32 channels, six float32 (minimum
+// and maximum corner), then the values, x fastest. Types: 1 float32, 2 float16, 3 uint8 (0..255 for 0..1).
+//
+// Raw .bin: int32 nx, ny, nz; float32 minimum x, y, z and maximum x, y, z of the box in the world; nx ny nz
+// float32 values, x fastest or (called "x-major" by some converters) z fastest. The values are nodes: the
+// outermost ones are on the faces of the box. No bytes may follow.
+//
+// A value that is NaN or infinite is an error that names its voxel or node; negative values become 0 and are
+// counted. The result always has x fastest.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string_view>
+
+#include "common/assets/data.h"
+#include "common/scene/scene.h"
+
+namespace ls {
+
+Result<GridData> decode_vol(std::string_view name, std::span<const std::byte> file);  // 1 or 3 channels
+Result<GridData> load_vol(const std::filesystem::path& path, std::string_view name);
+
+Result<GridData> decode_raw_grid(std::string_view name, std::span<const std::byte> file, GridOrder order);
+Result<GridData> load_raw_grid(const std::filesystem::path& path, std::string_view name, GridOrder order);
+
+}  // namespace ls
