@@ -197,7 +197,8 @@ void add_farm_commands(CLI::App& app, Action& action) {
   CLI::App* fetch_command =
       add(app, action, "fetch", "the image of a job, finished or as it is", fetch, fetching, true);
   fetch_command
-      ->add_option("-o,--output", fetching->out, "the image; of a sequence every frame's, out_####.exr say")
+      ->add_option("-o,--output", fetching->out,
+                   "the image, .exr or .png; of a sequence every frame's, out_####.exr say")
       ->type_name("OUT.exr");
   fetch_command
       ->add_option("--report", fetching->report, "its report, too; with # in its name, every frame's")

@@ -93,7 +93,7 @@ tl::expected<CryptomatteManifests, coordinator::Rejected> manifests(const MergeF
                                                                     const Merged& merged) {
   const AovSet aovs = merged.film.aovs();
   const auto defines = parse_defines(flags.defines);
-  if (!defines) return tl::unexpected(coordinator::Rejected{defines.error(), {}});
+  if (!defines) return coordinator::rejected(defines.error());
   const auto scene =
       read_local_scene(flags.scene, *defines, false, flags.frame, aovs.any_of(aovs_of(AovKind::ids)));
   if (!scene) return tl::unexpected(scene.error());
@@ -108,7 +108,7 @@ tl::expected<CryptomatteManifests, coordinator::Rejected> manifests(const MergeF
 }
 
 int run(const MergeFlags& flags) {
-  if (const auto ok = check_output("-o", flags.out); !ok) return print_error(ok.error());
+  if (const auto ok = check_image(flags.out); !ok) return print_error(ok.error());
   if (!flags.report.empty())
     if (const auto ok = check_output("--report", flags.report); !ok) return print_error(ok.error());
   const auto files = files_of(flags.partials);
@@ -132,7 +132,11 @@ int run(const MergeFlags& flags) {
   }
   const auto image = final_exr(merged->film, provenance, flags.float_output);
   if (!image) return print_error(image.error());
-  if (const auto saved = save_result(flags.out, image->exr); !saved) return print_error(saved.error());
+  const bool png = image_format(flags.out) == ImageFormat::png;
+  const auto shown = png ? preview_png(merged->film, 0) : Result<std::vector<std::byte>>();
+  if (!shown) return print_error(shown.error());
+  if (const auto saved = save_result(flags.out, png ? *shown : image->exr); !saved)
+    return print_error(saved.error());
   const std::string digest = pixels_sha256(merged->film).hex();
   if (!flags.report.empty())
     if (const auto written = write_report(flags, *merged, digest, image->clamped); !written)
@@ -150,15 +154,13 @@ void add_merge(CLI::App& app, Action& action) {
   merge->add_option("partials", flags->partials, "partial images, or folders of them")
       ->required()
       ->type_name("PARTIAL.exr...");
-  merge->add_option("-o,--output", flags->out, "the image")->required()->type_name("OUT.exr");
+  merge->add_option("-o,--output", flags->out, "the image, .exr or .png")->required()->type_name("OUT.exr");
   merge->add_option("--report", flags->report, "write digest and error as JSON")->type_name("REPORT.json");
   merge
       ->add_option("--scene", flags->scene,
                    "what they were rendered from: gives mattes the names of things, which partials lack")
       ->type_name("SCENE");
-  merge->add_option("-D,--define", flags->defines, "sets the scene's $name")
-      ->allow_extra_args(false)
-      ->type_name("name=value");
+  add_defines(*merge, flags->defines);
   merge->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
   merge->add_flag("--float", flags->float_output, "32-bit pixels instead of half");
   merge->callback([flags, &action] { action = [flags] { return run(*flags); }; });

@@ -104,6 +104,7 @@ Result<void> check_frames_outputs(const FrameRange& frames, const LocalRenderOpt
         if (auto ok = check_output(option, of_frame(path, frame)); !ok) return ok;
     return {};
   };
+  if (const auto format = image_format(options.out); !format) return tl::unexpected(format.error());
   if (auto ok = check("-o", options.out, true); !ok) return ok;
   if (options.report)
     if (auto ok = check("--report", *options.report, true); !ok) return ok;
@@ -138,7 +139,7 @@ int run(const RenderFlags& flags) {
   if (frames && frames->count() > 1)
     return usage_error("--pixel and --sample are of one frame: name it, --frames 7 say");
   if (!one_sample) {
-    if (const auto ok = check_output("-o", options->out); !ok) return print_error(ok.error());
+    if (const auto ok = check_image(options->out); !ok) return print_error(ok.error());
     if (options->report)
       if (const auto ok = check_output("--report", *options->report); !ok) return print_error(ok.error());
     if (options->html)
@@ -160,8 +161,8 @@ void add_render(CLI::App& app, Action& action) {
       ->type_name("SCENE");
   render
       ->add_option("-o,--output", flags->out,
-                   "the image; default: the scene's name, with .exr, in this folder. Of a sequence: with # "
-                   "for the frame's number, out_####.exr say")
+                   "the image: .exr with all layers, or .png; default: the scene's name, with .exr, in this "
+                   "folder. Of a sequence: with # for the frame's number, out_####.exr say")
       ->type_name("OUT.exr");
   flags->job.add_to(*render);
   render->add_option("--threads", flags->threads, "default: all")->type_name("N");

@@ -33,22 +33,22 @@ Job submit_scene(const SubmitFlags& flags, const JobSpec& spec) {
   if (!scene) return tl::unexpected(scene.error());
   print_diagnostics(scene->warnings);
   auto api = FarmApi::open(flags.farm);
-  if (!api) return tl::unexpected(coordinator::Rejected{api.error(), {}});
+  if (!api) return coordinator::rejected(api.error());
   return api->submit(*scene, spec, [&](const std::string& line) {
     if (!flags.quiet) print_note(line);
   });
 }
 
 Job submit_bundle(const SubmitFlags& flags, const JobSpec& spec, const std::string& type) {
-  const auto refuse = [](Error error) { return tl::unexpected(coordinator::Rejected{std::move(error), {}}); };
   if (flags.job.strict)
-    return refuse(
+    return coordinator::rejected(
         {Errc::invalid_argument, "--strict: a bundle is read by the coordinator, which has no such choice"});
   std::error_code error;
   if (!std::filesystem::is_regular_file(flags.scene, error))
-    return refuse({Errc::invalid_argument, fmt::format("{}: there is no such file", flags.scene)});
+    return coordinator::rejected(
+        {Errc::invalid_argument, fmt::format("{}: there is no such file", flags.scene)});
   auto api = FarmApi::open(flags.farm);
-  if (!api) return refuse(api.error());
+  if (!api) return coordinator::rejected(api.error());
   auto job = api->submit_bundle(flags.scene, type, spec_query(spec, !flags.job.priority.empty()));
   if (!job) return job;
   if (const auto warnings = job->find("warnings"); warnings != job->end() && warnings->is_array())
@@ -69,12 +69,12 @@ int wait_and_fetch(const std::string& id, const SubmitFlags& flags) {
 
 // Uploads the reference before the job that refers to it.
 FarmApi::Answer<void> send_reference(const SubmitFlags& flags, JobSpec& spec) {
-  const auto refuse = [](Error error) { return tl::unexpected(coordinator::Rejected{std::move(error), {}}); };
   if (spec.frames && spec.frames->count() > 1)
-    return refuse({Errc::invalid_argument,
-                   "--reference is one image, and the job has several frames: submit them one by one"});
+    return coordinator::rejected(
+        {Errc::invalid_argument,
+         "--reference is one image, and the job has several frames: submit them one by one"});
   auto api = FarmApi::open(flags.farm);
-  if (!api) return refuse(api.error());
+  if (!api) return coordinator::rejected(api.error());
   const auto digest = api->upload(flags.reference, [&](const std::string& line) {
     if (!flags.quiet) print_note(line);
   });
@@ -139,7 +139,7 @@ void add_submit(CLI::App& app, Action& action) {
   submit->add_flag("--wait", flags->wait, "until the job is done");
   submit
       ->add_option("-o,--output", flags->out,
-                   "wait, then fetch the image; of a sequence every frame's, out_####.exr say")
+                   "wait, then fetch the image, .exr or .png; of a sequence every frame's, out_####.exr say")
       ->type_name("OUT.exr");
   submit
       ->add_option("--report", flags->report,

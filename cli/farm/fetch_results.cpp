@@ -32,7 +32,14 @@ struct Plan {
   std::vector<std::uint32_t> empty;  // frames that have no results
 };
 
-Result<Plan> plan_sequence(const std::string& id, const json& frames, const Results& wanted) {
+// Returns the path and parameters of the image within `job`. The PNG of a denoised job is the denoised image.
+std::string image_of(const json& job, const Results& wanted) {
+  if (image_format(wanted.image) != ImageFormat::png) return "/image.exr";
+  return flag_field(job, "denoise") ? "/image.png?layer=denoised" : "/image.png";
+}
+
+Result<Plan> plan_sequence(const std::string& id, const json& job, const Results& wanted) {
+  const json& frames = job["frames"];
   const auto list = frames.find("list");
   if (list == frames.end() || !list->is_array())
     return fail(Errc::internal, "the coordinator does not say which frames the job has");
@@ -52,11 +59,12 @@ Result<Plan> plan_sequence(const std::string& id, const json& frames, const Resu
       plan.empty.push_back(*number);
       continue;
     }
-    const auto add = [&](const char* option, const std::string& name, const char* what) {
-      plan.downloads.push_back(
-          {fmt::format("{}{}?frame={}", job_path(id), what, *number), option, numbered(name, *number)});
+    const auto add = [&](const char* option, const std::string& name, const std::string& what) {
+      const char join = what.find('?') == std::string::npos ? '?' : '&';
+      plan.downloads.push_back({fmt::format("{}{}{}frame={}", job_path(id), what, join, *number), option,
+                                numbered(name, *number)});
     };
-    if (!wanted.image.empty()) add("-o", wanted.image, "/image.exr");
+    if (!wanted.image.empty()) add("-o", wanted.image, image_of(job, wanted));
     if (reports) add("--report", wanted.report, "/report");
     if (!wanted.html.empty()) add("--html", wanted.html, "/report.html");
   }
@@ -65,9 +73,10 @@ Result<Plan> plan_sequence(const std::string& id, const json& frames, const Resu
   return plan;
 }
 
-Plan plan_image(const std::string& id, const Results& wanted) {
+Plan plan_image(const std::string& id, const json& job, const Results& wanted) {
   Plan plan;
-  if (!wanted.image.empty()) plan.downloads.push_back({job_path(id) + "/image.exr", "-o", wanted.image});
+  if (!wanted.image.empty())
+    plan.downloads.push_back({job_path(id) + image_of(job, wanted), "-o", wanted.image});
   if (!wanted.report.empty()) plan.downloads.push_back({job_path(id) + "/report", "--report", wanted.report});
   if (!wanted.html.empty()) plan.downloads.push_back({job_path(id) + "/report.html", "--html", wanted.html});
   return plan;
@@ -77,6 +86,8 @@ Plan plan_image(const std::string& id, const Results& wanted) {
 
 Result<void> check_outputs(const std::string& option, const std::string& name,
                            const std::optional<FrameRange>& frames) {
+  if (option == "-o")
+    if (const auto format = image_format(name); !format) return tl::unexpected(format.error());
   if (!frames) return check_output(option, name);
   if (option != "--report")
     if (auto ok = check_numbered(option, name, *frames); !ok) return ok;
@@ -89,12 +100,13 @@ Result<void> check_outputs(const std::string& option, const std::string& name,
 
 int fetch_results(FarmApi& api, const std::string& id, const Results& wanted) {
   if (wanted.image.empty() && wanted.report.empty() && wanted.html.empty()) return kOk;
+  if (const auto format = image_format(wanted.image); !format) return print_error(format.error());
   const auto call = [&](auto request) { return wanted.patient ? with_retries(request) : request(); };
   const auto job = call([&] { return api.get(job_path(id)); });
   if (!job) return print_rejected(job.error());
   const auto frames = job->find("frames");
-  const auto plan = frames != job->end() && frames->is_object() ? plan_sequence(id, *frames, wanted)
-                                                                : Result<Plan>(plan_image(id, wanted));
+  const auto plan = frames != job->end() && frames->is_object() ? plan_sequence(id, *job, wanted)
+                                                                : Result<Plan>(plan_image(id, *job, wanted));
   if (!plan) return print_error(plan.error());
   for (const Download& d : plan->downloads) {
     if (const auto ok = check_output(d.option, d.file); !ok) return print_error(ok.error());

@@ -20,8 +20,8 @@ Result<void> check_outputs(const std::string& option, const std::string& name,
                            const std::optional<FrameRange>& frames);
 
 // Downloads the results of job `id`; returns the exit code. For a sequence (a job with several frames),
-// downloads every frame that has data and names the others. A report name without # gets one report for the
-// whole sequence.
+// downloads every frame that has data; if any has none, prints the numbers of those frames and returns
+// kFailed. A report name without # gets one report for the whole sequence.
 int fetch_results(FarmApi& api, const std::string& id, const Results& results);
 
 }  // namespace ls::cli

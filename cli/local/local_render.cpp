@@ -157,8 +157,8 @@ class LocalRender {
       if (const auto fault = farm_->scene_fault()) return print_rejected(cli::scene_fault(scene_, *fault));
       return print_error({Errc::internal, view->error});
     }
-    // In this process nobody can resume a paused job. So the image is written as far as it is rendered, and
-    // the error ends the program.
+    // A paused job cannot be resumed in this process. So the image is written as far as it is rendered, and
+    // the program ends with the error.
     if (view->state == JobState::paused) {
       if (const auto written = write_results(true); !written) complain(written.error().message);
       return print_error({Errc::unavailable, view->error});
@@ -180,7 +180,9 @@ class LocalRender {
 
   Result<void> write_results(bool cut) {
     coordinator::Coordinator& coordinator = farm_->coordinator();
-    const auto image = coordinator.image_exr(job_);
+    const bool png = image_format(options_.out) == ImageFormat::png;
+    const auto image =
+        png ? coordinator.image_png(job_, 0, options_.spec.denoise) : coordinator.image_exr(job_);
     if (!image) return tl::unexpected(image.error());
     const auto saved = save_result(options_.out, *image);
     const auto report_text = write_report(cut, saved.has_value());

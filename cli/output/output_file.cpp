@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -29,6 +31,21 @@ Result<void> check_output(const std::string& option, const fs::path& file) {
     return fail(Errc::invalid_argument,
                 fmt::format("{} {}: cannot be written: {}", option, file.string(), std::strerror(errno)));
   return {};
+}
+
+Result<ImageFormat> image_format(const fs::path& file) {
+  std::string ending = file.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (ending.empty() || ending == ".exr") return ImageFormat::exr;
+  if (ending == ".png") return ImageFormat::png;
+  return fail(
+      Errc::invalid_argument,
+      fmt::format("-o {}: an image is written as .exr (all layers) or .png (8-bit colours)", file.string()));
+}
+
+Result<void> check_image(const fs::path& file) {
+  if (const auto format = image_format(file); !format) return tl::unexpected(format.error());
+  return check_output("-o", file);
 }
 
 Result<void> check_folder(const std::string& option, const fs::path& folder) {

@@ -19,6 +19,13 @@ namespace ls::cli {
 // in its folder; the file itself is not touched. `option` is the command line option that names the file, for
 // messages.
 Result<void> check_output(const std::string& option, const std::filesystem::path& file);
+// How an image file is written: all layers as EXR, or the colours as an 8-bit sRGB PNG.
+enum class ImageFormat { exr, png };
+// Returns the format from the file name's extension, in upper or lower case; EXR if it has none.
+// invalid_argument: it has the extension of another format.
+Result<ImageFormat> image_format(const std::filesystem::path& file);
+// check_output() and image_format() of the image that `-o` names.
+Result<void> check_image(const std::filesystem::path& file);
 Result<void> check_folder(const std::string& option, const std::filesystem::path& folder);
 // Checks the name of an output file that is written once per frame. invalid_argument: there are several
 // frames, and the name has no # to distinguish their files.
@@ -39,9 +46,9 @@ class PartialDir {
   static Result<PartialDir> open(std::filesystem::path folder);
 
   Result<void> keep(const UnitResult& result);
-  // Removes stored rounds that are not part of the image: a tile that reaches the target error may have
-  // rounds that were rendered ahead. `folded` is the number of rounds of each tile that are part of the
-  // image.
+  // Removes stored rounds that are not part of the image: when a tile reaches the target error, some of its
+  // later rounds may have been rendered already. `folded` is the number of rounds of each tile that are part
+  // of the image.
   Result<void> drop_unfolded(std::span<const RoundIndex> folded);
 
   std::filesystem::path path(TileIndex tile, RoundIndex round) const;

@@ -71,6 +71,12 @@ def lightshaft(*arguments, cwd=None, env=None, code=0, patience=PATIENCE):
     return done
 
 
+def png_size(data):
+    """Width and height."""
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
+
+
 def digest(done):
     """The pixels_sha256 that a command has printed."""
     lines = [line for line in done.stdout.splitlines() if line.startswith("pixels_sha256 ")]

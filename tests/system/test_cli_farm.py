@@ -2,12 +2,11 @@
 
 import json
 import os
-import struct
 import subprocess
 import urllib.request
 
 import pytest
-from cli_kit import FOG, digest, lightshaft, load, write_fog
+from cli_kit import FOG, digest, lightshaft, load, png_size, write_fog
 from local_farm import LocalFarm, bin_dir, wait_until
 
 
@@ -40,6 +39,9 @@ def test_submit_renders_the_pixels_of_render(rendering, tmp_path):
     assert (tmp_path / "farm.exr").stat().st_size > 1000
     assert call(rendering, "fetch", job, "-o", tmp_path / "again.exr").returncode == 0
     assert (tmp_path / "again.exr").read_bytes() == (tmp_path / "farm.exr").read_bytes()
+    call(rendering, "fetch", job, "-o", tmp_path / "again.png")
+    assert png_size((tmp_path / "again.png").read_bytes()) == (72, 40)
+    assert (tmp_path / "again.png").read_bytes() == rendering.request("GET", f"/api/v1/jobs/{job}/image.png")
     call(rendering, "fetch", job, "--html", tmp_path / "farm.html")
     assert alone in (tmp_path / "farm.html").read_text()
     assert "--html" in call(rendering, "fetch", job, code=2).stderr, "it has to be said what"
@@ -65,7 +67,7 @@ def test_a_farm_compares_with_a_reference_as_render_does(rendering, tmp_path):
                                          headers={"Authorization": f"Bearer {rendering.token}"})
         with urllib.request.urlopen(request) as answer:
             png = answer.read()
-        assert png.startswith(b"\x89PNG") and struct.unpack(">II", png[16:24]) == (72, 40)
+        assert png_size(png) == (72, 40)
 
 
 def test_a_reference_of_the_jobs_own_seed_is_warned_of(rendering, tmp_path):

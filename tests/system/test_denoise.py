@@ -31,6 +31,10 @@ def test_the_command_adds_layers_and_tells_their_error(fog, tmp_path):
     assert {types[f"denoised.{c}"] for c in "RGB"} == {"e"} and rows["denoised.R"] != rows["R"]
     assert strings["lightshaft:denoised_by"] == figures["by"]
     assert json.loads(strings["lightshaft:job"])["aov"] == ["denoising_albedo", "denoising_normal"]
+    # As a PNG it is the denoised image.
+    render(fog, tmp_path / "plain.png")
+    render(fog, tmp_path / "out.png", "--denoise")
+    assert (tmp_path / "out.png").read_bytes() != (tmp_path / "plain.png").read_bytes()
     # The same image again, from other threads and a child process: guides and denoised layers, too.
     render(fog, tmp_path / "again.exr", "--denoise", "--threads", 1, "--isolate")
     assert read(tmp_path / "again.exr")[0] == rows
@@ -77,6 +81,8 @@ def test_on_a_farm_image_picture_and_report_have_it(fog, tmp_path):
         assert "denoised" not in lightshaft("submit", fog, *to, "--spp", 16, "--wait").stderr
         picture = farm.request("GET", f"/api/v1/jobs/{job}/image.png?layer=denoised")
         assert picture.startswith(b"\x89PNG") and picture != farm.request("GET", f"/api/v1/jobs/{job}/image.png")
+        lightshaft("fetch", job, *to, "-o", tmp_path / "image.png")
+        assert (tmp_path / "image.png").read_bytes() == picture
         for path, status, words in ((f"/api/v1/jobs/{plain}/image.png?layer=denoised", 409, "was submitted without"),
                                     (f"/api/v1/jobs/{job}/image.png?layer=depth", 400, "'layer' must be")):
             with pytest.raises(HttpError) as refused:

@@ -3,12 +3,8 @@
 import json
 
 import pytest
+from cli_kit import png_size
 from local_farm import SCENE, HttpError
-
-
-def png_size(data):
-    assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
 
 
 def test_pages_of_hundreds_of_jobs_follow_one_another_without_gaps(farm):

@@ -7,7 +7,7 @@ import signal
 import subprocess
 
 import pytest
-from cli_kit import digest, lightshaft, load
+from cli_kit import digest, lightshaft, load, png_size
 from local_farm import PATIENCE, bin_dir, wait_until
 
 CONTRACT = {"spp", "samples", "load_seconds", "render_seconds", "core_seconds", "peak_rss_bytes", "rmse", "relmse",
@@ -50,6 +50,26 @@ def test_merged_partials_are_the_image(fog, expected, tmp_path):
     assert digest(merged) == expected
     assert load(tmp_path / "merged.json")["pixels_sha256"] == expected
     assert digest(lightshaft("merge", kept, "-o", tmp_path / "merged.exr")) == expected
+
+
+def test_an_image_that_ends_in_png_is_one(fog, expected, tmp_path):
+    shown, merged, kept = tmp_path / "out.PNG", tmp_path / "merged.png", tmp_path / "partials"
+
+    assert digest(lightshaft("render", fog, "-o", shown, "--spp", SPP, "--partial-dir", kept)) == expected
+    assert digest(lightshaft("merge", kept, "-o", merged)) == expected
+
+    assert png_size(shown.read_bytes()) == (72, 40)
+    assert shown.read_bytes() == merged.read_bytes()
+
+
+@pytest.mark.parametrize("command", ["render", "merge", "submit", "fetch"])
+def test_an_image_of_another_format_is_refused_at_once(fog, tmp_path, command):
+    image = tmp_path / "out.jpg"
+
+    refused = lightshaft(command, fog, "-o", image, env={**os.environ, "LIGHTSHAFT_URL": "http://127.0.0.1:9"}, code=2)
+
+    assert f"-o {image}: an image is written as .exr (all layers) or .png (8-bit colours)" in refused.stderr
+    assert not image.exists()
 
 
 def test_merge_names_a_gap(fog, tmp_path):
