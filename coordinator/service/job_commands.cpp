@@ -101,8 +101,8 @@ Result<std::vector<EntryPtr>> may_retarget(const Farm& farm, const JobId& id,
   return chosen;
 }
 
-// Returns all frames that have fewer than `spp` samples. Some may have them already, after a change that was
-// interrupted.
+// Returns the frames that do not have `spp` samples yet; others may have them already, after an interrupted
+// change.
 Result<std::vector<EntryPtr>> may_extend(const Farm& farm, const Sequence& sequence, std::uint64_t spp) {
   std::vector<EntryPtr> chosen;
   double woken = 0;
@@ -163,7 +163,7 @@ Result<void> JobCommands::change_job(Core& core, const EntryPtr& entry, const Jo
   if (change.state)
     if (auto ok = may_become(*entry, *change.state, change.spp || change.target_error); !ok) return ok;
   if (auto ok = check_focus(change, {entry}); !ok) return ok;
-  // All checks come first, so that a failed check leaves the job unchanged.
+  // The checks come first, so that a failed check leaves the job unchanged.
   if (change.spp)
     if (auto done = extend(core, *entry, *change.spp); !done) return done;
   if (change.target_error)
@@ -297,8 +297,8 @@ void JobCommands::drop(Core& core, const EntryPtr& entry) const {
   if (!entry->unloaded) core.driver.run(JobForgotten{id});
   core.jobs.remove(entry);
   log_info(fmt::format("job={}", id.value), "removed");
-  // Background writes of the job may still be queued. The folder is removed after them, with the files that
-  // they write.
+  // Background writes of the job may still be queued. The folder is removed after them, and so are the files
+  // that they write.
   writes_.push([this, id] {
     (void)store_.remove_job(id);
     files_.discard_folder(id);
@@ -334,6 +334,15 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
       return fail(Errc::failed_precondition,
                   fmt::format("all frames of job {} have ended: it is {}", id.value, to_string(state)));
   }
+  // Whether a frame can be extended is known only when it is loaded.
+  for (const EntryPtr& frame : extended) {
+    auto possible = restore_.wake(core, *frame);
+    if (possible) possible = farm.may_extend(frame->stored.id, *change.spp);
+    if (possible) continue;
+    for (const EntryPtr& loaded : extended)
+      if (!loaded->finishing) core.driver.unload(*loaded);
+    return tl::unexpected(in_frame(frame->stored.id, possible.error()));
+  }
   for (const EntryPtr& frame : extended)
     if (auto done = extend(core, *frame, *change.spp); !done)
       return tl::unexpected(in_frame(frame->stored.id, done.error()));
@@ -367,7 +376,7 @@ Result<void> JobCommands::set_priority_of_all(Core& core, const Entries& frames,
 }
 
 // Changes the state of the frames and stores them together. A frame whose image is being written is left
-// alone, unless the writing has failed and is to be repeated.
+// unchanged, unless the writing has failed and is to be repeated.
 Result<void> JobCommands::become_all(Core& core, const Entries& frames, JobState asked) const {
   Result<void> done;
   const auto saved = core.records.put_together([&] {

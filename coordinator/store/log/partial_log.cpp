@@ -20,8 +20,8 @@
 
 namespace ls::coordinator {
 
-// The binary header of a record in the partial log, which holds one partial: the encoded
-// pixel sums of one unit, that is of one tile and one range of samples.
+// The binary header of a record in the partial log, which holds one partial: the encoded pixel sums of one
+// unit, that is of one tile and one range of samples.
 constexpr std::uint32_t kPartialMagic = 0x3250534c;  // "LSP2"
 
 // Little endian, as on every supported machine.
@@ -117,32 +117,42 @@ std::optional<std::vector<RawHeader>> unpack_index(std::span<const std::byte> by
 
 constexpr std::uint64_t kHealthBytes = 64 << 10;
 
-// Returns the header at `offset`; nullopt if there is no valid header, or its record extends beyond the
-// file's `size` bytes.
-std::optional<RawHeader> header_at(const File& file, std::uint64_t offset, std::uint64_t size,
-                                   const std::filesystem::path& path) {
+// Returns the unit's health (counts of bad samples) at `offset`; nullopt: its text is damaged. unavailable:
+// the file cannot be read.
+Result<std::optional<Health>> health_at(const File& file, std::uint64_t offset, const RawHeader& raw,
+                                        const std::filesystem::path& path) {
+  if (raw.health_bytes == 0) return Health{};
+  const auto bytes = read_at(file, offset, raw.health_bytes, path);
+  if (!bytes) return tl::unexpected(bytes.error());
+  if (check_of(*bytes) != raw.health_check) return std::nullopt;
+  auto read = parse_health({reinterpret_cast<const char*>(bytes->data()), bytes->size()});
+  return read ? std::optional(std::move(*read)) : std::nullopt;
+}
+
+struct Scanned {
+  RawHeader raw;
+  Health health;
+};
+
+// Returns the record at `offset`, with verified checksums; nullopt: it is damaged, or extends beyond the
+// file's `size` bytes. unavailable: the file cannot be read.
+Result<std::optional<Scanned>> record_at(const File& file, std::uint64_t offset, std::uint64_t size,
+                                         const std::filesystem::path& path) {
   if (size - offset < sizeof(RawHeader)) return std::nullopt;
   const auto bytes = read_at(file, offset, sizeof(RawHeader), path);
-  if (!bytes) return std::nullopt;
+  if (!bytes) return tl::unexpected(bytes.error());
   RawHeader raw;
   std::memcpy(&raw, bytes->data(), sizeof raw);
   if (raw.magic != kPartialMagic || raw.header_check != header_check(raw)) return std::nullopt;
   if (raw.bytes > ls::limits::kPartialBytes || raw.health_bytes > kHealthBytes ||
       raw.bytes + raw.health_bytes > size - offset - sizeof raw)
     return std::nullopt;
-  return raw;
-}
-
-// Returns the unit's health (counts of bad samples) from the record at `offset`; nullopt: its text is
-// damaged.
-std::optional<Health> health_at(const File& file, std::uint64_t offset, const RawHeader& raw,
-                                const std::filesystem::path& path) {
-  Health health;
-  if (raw.health_bytes == 0) return health;
-  const auto bytes = read_at(file, offset, raw.health_bytes, path);
-  if (!bytes || check_of(*bytes) != raw.health_check) return std::nullopt;
-  auto read = parse_health({reinterpret_cast<const char*>(bytes->data()), bytes->size()});
-  return read ? std::optional(std::move(*read)) : std::nullopt;
+  const auto exr = read_at(file, offset + sizeof raw, raw.bytes, path);
+  if (!exr) return tl::unexpected(exr.error());
+  if (check_of(*exr) != raw.payload_check) return std::nullopt;
+  auto health = health_at(file, offset + sizeof raw + raw.bytes, raw, path);
+  if (!health) return tl::unexpected(health.error());
+  return *health ? std::optional(Scanned{raw, std::move(**health)}) : std::nullopt;
 }
 
 }  // namespace
@@ -165,10 +175,16 @@ Result<std::unique_ptr<PartialLog>> PartialLog::open(std::filesystem::path folde
   std::unique_ptr<PartialLog> log(new PartialLog(std::move(folder)));
   std::uint32_t count = 0;
   while (count < limits::kMaxSegments && ::access(log->segment_path(count).c_str(), F_OK) == 0) ++count;
-  for (std::uint32_t i = 0; i < count; ++i)
-    if (auto done = log->scan(i, i + 1 == count); !done) return tl::unexpected(done.error());
   if (count == 0) return log;
-  if (auto started = log->start_segment(count - 1); !started) return tl::unexpected(started.error());
+  bool complete = true;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const auto scanned = log->scan(i, i + 1 == count);
+    if (!scanned) return tl::unexpected(scanned.error());
+    complete = *scanned;
+  }
+  if (!complete) log->headers_.clear();
+  if (auto started = log->start_segment(complete ? count - 1 : count); !started)
+    return tl::unexpected(started.error());
   return log;
 }
 
@@ -181,48 +197,51 @@ bool PartialLog::scan_index(std::uint32_t segment, const File& file, std::uint64
   std::uint64_t at = 0;
   for (const RawHeader& raw : *headers) {
     auto health = health_at(file, at + sizeof(RawHeader) + raw.bytes, raw, segment_path(segment));
-    if (!health) {
+    if (!health || !*health) {
       found_.resize(before);
       return false;
     }
     found_.push_back(
-        {unpack(raw, std::move(*health)), {segment, at + sizeof(RawHeader), raw.bytes, raw.payload_check}});
+        {unpack(raw, std::move(**health)), {segment, at + sizeof(RawHeader), raw.bytes, raw.payload_check}});
     at += raw.record_bytes();
   }
   return true;
 }
 
-Result<void> PartialLog::scan(std::uint32_t segment, bool last) {
+// Reads the segment's records. False: new records must not follow in this segment, because a part of it
+// cannot be read now.
+Result<bool> PartialLog::scan(std::uint32_t segment, bool last) {
   const auto path = segment_path(segment);
   auto file = File::open(path, O_RDWR);
   if (!file) return tl::unexpected(file.error());
   struct stat info {};
   if (::fstat(file->fd(), &info) != 0) return tl::unexpected(errno_error("look at", path));
   const auto size = static_cast<std::uint64_t>(info.st_size);
-  if (!last && scan_index(segment, *file, size)) return {};
+  if (!last && scan_index(segment, *file, size)) return true;
   std::uint64_t at = 0;
+  const auto place = [&] { return fmt::format("file={} offset={} bytes={}", path.string(), at, size - at); };
   while (at < size) {
-    const auto raw = header_at(*file, at, size, path);
-    if (!raw) break;
-    if (last) {
-      const auto exr = read_at(*file, at + sizeof(RawHeader), raw->bytes, path);
-      if (!exr || check_of(*exr) != raw->payload_check) break;
+    auto record = record_at(*file, at, size, path);
+    if (!record) {
+      // The records may be sound, so none is cut off.
+      log_warn(place(),
+               record.error().message + ": the units of the records from here on are rendered again");
+      return false;
     }
-    auto health = health_at(*file, at + sizeof(RawHeader) + raw->bytes, *raw, path);
-    if (!health) break;
-    found_.push_back({unpack(*raw, std::move(*health)),
-                      {segment, at + sizeof(RawHeader), raw->bytes, raw->payload_check}});
-    if (last) headers_.push_back(*raw);
-    at += raw->record_bytes();
+    if (!*record) break;
+    auto& [raw, health] = **record;
+    found_.push_back(
+        {unpack(raw, std::move(health)), {segment, at + sizeof(RawHeader), raw.bytes, raw.payload_check}});
+    if (last) headers_.push_back(raw);
+    at += raw.record_bytes();
   }
-  if (at == size) return {};
-  // In a segment other than the last this is disk damage. The units behind it are rendered again, and the
-  // bytes are kept for examination.
-  log_warn(fmt::format("file={} offset={} bytes={}", path.string(), at, size - at),
-           last ? "cut a torn record" : "left out damaged records; their units are rendered again");
+  if (at == size) return true;
+  // In a segment other than the last, this is disk damage. The units of all records from here on are rendered
+  // again, and the bytes stay in the file for examination.
+  log_warn(place(), last ? "cut a torn record" : "left out damaged records; their units are rendered again");
   if (last && ::ftruncate(file->fd(), static_cast<off_t>(at)) != 0)
     return tl::unexpected(errno_error("truncate", path));
-  return {};
+  return true;
 }
 
 Result<void> PartialLog::start_segment(std::uint32_t segment) {
@@ -295,7 +314,7 @@ Result<void> PartialLog::sync() {
 }
 
 // Syncs the current segment. After a failed sync the system may have dropped data and still report success at
-// the next sync; so nothing more is written to this segment, and the next record opens another one.
+// the next sync; so this segment gets no more records, and the next record opens another one.
 Result<void> PartialLog::flush() {
   if (!std::exchange(unsynced_, false)) return {};
   auto done = sync_data(current_, segment_path(segment_));

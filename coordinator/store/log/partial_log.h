@@ -1,9 +1,9 @@
 // The accepted partials of one job, in append-only files FOLDER/partials-NNN.seg, called segments. A partial
-// is the pixel sums, encoded as EXR, of one unit (one tile and one range of samples). Each has a record: a
-// header of fixed size with a checksum, the EXR bytes, and the unit's health (counts of bad samples) as text
-// unless it is clean. Records written before sync() returned survive kill -9 and power loss; a torn record
-// behind them is detected at open() and cut off. Beside each full segment lies an index of its headers,
-// partials-NNN.idx.
+// is the pixel sums, encoded as EXR, of one unit (one tile and one range of samples). Each partial has a
+// record: a header of fixed size with a checksum, the EXR bytes, and, unless there are no bad samples, the
+// unit's health (counts of bad samples) as text. Records written before sync() returned survive kill -9 and
+// power loss; a torn record behind them is detected at open() and cut off. Beside each full segment lies an
+// index of its headers, partials-NNN.idx.
 //
 // One thread may call append() and sync(); any thread may call read().
 #pragma once
@@ -51,10 +51,11 @@ class PartialLog {
     Place place;
   };
 
-  // Reads the records of all segments in `folder`, in order. It checks the headers in all segments, but the
-  // EXR bytes only in the last one: a segment is synced before the next one begins, so only the last may end
-  // in a torn record. If there is no segment, nothing is created until the first append(), so that a waiting
-  // job has no files.
+  // Reads the records of all segments in `folder`, in order. EXR bytes are verified only in segments without
+  // an index, such as the last one: a segment is synced before it gets an index. A torn record at the end of
+  // the last segment is cut off. If a part of a segment cannot be read (an error of the disk), its records
+  // stay in the file but are not found, and new records go to another segment. If there is no segment,
+  // nothing is created until the first append(), so that a waiting job has no files.
   static Result<std::unique_ptr<PartialLog>> open(std::filesystem::path folder);
 
   const std::vector<Entry>& found() const { return found_; }  // records found by open()
@@ -71,7 +72,7 @@ class PartialLog {
   explicit PartialLog(std::filesystem::path folder);
   std::filesystem::path segment_path(std::uint32_t segment) const;
   std::filesystem::path index_path(std::uint32_t segment) const;
-  Result<void> scan(std::uint32_t segment, bool last);
+  Result<bool> scan(std::uint32_t segment, bool last);
   bool scan_index(std::uint32_t segment, const File& file, std::uint64_t size);
   void finish_segment();
   Result<void> start_segment(std::uint32_t segment);

@@ -367,6 +367,8 @@ TEST(FaultyWorker, ALateResultCountsSinceItsWorkerWasAsked) {
 
   ASSERT_EQ(of<WorkerFoundFaulty>(verdict).size(), 1u);
   EXPECT_EQ(of<WorkerFoundFaulty>(verdict)[0].worker.value, "x");
+  EXPECT_EQ(rig.farm.audits().asked, 1u);
+  EXPECT_EQ(rig.farm.audits().differ, 1u);
 }
 
 TEST(FaultyWorker, OneThatIsFoundElsewhereLosesWhatItHoldsAndWhatItHasRendered) {

@@ -196,6 +196,29 @@ TEST(Sequence, ExtendedGivesThePixelsOfOneRenderedSoAtOnce) {
   EXPECT_EQ(extend(*coordinator, id, 16).error().code, Errc::failed_precondition);
 }
 
+TEST(Sequence, IsNotExtendedInPartsIfAFrameHasMoreSamplesAlready) {
+  TempFolder dir;
+  auto coordinator = open_at(dir.path());
+  const JobId id = submit(*coordinator, frames(1, 3, 4));
+  FakeFarm farm(*coordinator, 1);
+  ASSERT_TRUE(farm.finish(id));
+  ASSERT_TRUE(extend(*coordinator, frame_job(id, 3), 32));
+  ASSERT_TRUE(farm.finish(id));
+
+  const auto refused = extend(*coordinator, id, 16);
+
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("frame 3"), std::string::npos) << refused.error().message;
+  for (std::uint32_t frame = 1; frame <= 2; ++frame) {
+    EXPECT_EQ(coordinator->job(frame_job(id, frame))->state, JobState::done);
+    EXPECT_EQ(coordinator->job(frame_job(id, frame))->spp, 4u);
+  }
+  ASSERT_TRUE(extend(*coordinator, id, 64));
+  ASSERT_TRUE(farm.finish(id));
+  for (std::uint32_t frame = 1; frame <= 3; ++frame)
+    EXPECT_EQ(pixels(*coordinator, frame_job(id, frame)), pixels_with_seed(frame, 64));
+}
+
 TEST(Sequence, WhatBelongsToOneImageAsksForTheFrame) {
   auto coordinator = open_at({});
   const JobId id = submit(*coordinator, frames(2, 3));

@@ -1,11 +1,26 @@
 #include "coordinator/store/log/partial_log.h"
 
 #include <gtest/gtest.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <fstream>
 
 #include "coordinator/base/limits.h"
 #include "tests/unit/store/temp_folder.h"
+
+namespace {
+off_t unreadable_from = -1;  // a disk error from this offset of every file on; -1: none
+}
+// Takes the place of the C library's function in this program.
+extern "C" ssize_t pread(int file, void* bytes, std::size_t count, off_t at) {
+  if (unreadable_from >= 0 && at >= unreadable_from) {
+    errno = EIO;
+    return -1;
+  }
+  return ::syscall(SYS_pread64, file, bytes, count, at);
+}
 
 namespace ls::coordinator {
 namespace {
@@ -136,6 +151,38 @@ TEST(PartialLog, CutsARecordWhosePayloadOrHeaderIsDamaged) {
     }
     EXPECT_EQ(PartialLog::open(dir.path()).value()->found().size(), 1u);
   }
+}
+
+TEST(PartialLog, LeavesRecordsThatTheDiskCannotReadNow) {
+  TempFolder dir;
+  fill(dir.path(), 3);
+  {
+    unreadable_from = kRecordBytes;
+    auto log = PartialLog::open(dir.path()).value();
+    unreadable_from = -1;
+    EXPECT_EQ(log->found().size(), 1u);
+    EXPECT_EQ(std::filesystem::file_size(dir.path() / "partials-000.seg"), 3 * kRecordBytes);
+    ASSERT_TRUE(log->append(record(7), payload(7)));
+    ASSERT_TRUE(log->sync());
+  }
+
+  const auto log = PartialLog::open(dir.path()).value();
+
+  std::vector<PartialRecord> records;
+  for (const auto& entry : log->found()) records.push_back(entry.record);
+  EXPECT_EQ(records, (std::vector{record(0), record(1), record(2), record(7)}));
+}
+
+TEST(PartialLog, VerifiesTheBytesOfASegmentWithoutAnIndex) {
+  TempFolder dir;
+  fill(dir.path(), 2);
+  std::filesystem::copy(dir.path() / "partials-000.seg", dir.path() / "partials-001.seg");
+  {
+    std::fstream file(dir.path() / "partials-000.seg", std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(kRecordBytes + 400);
+    file.put('!');
+  }
+  EXPECT_EQ(PartialLog::open(dir.path()).value()->found().size(), 3u);
 }
 
 TEST(PartialLog, NoticesDamageWhenAPartialIsRead) {
