@@ -51,8 +51,8 @@ struct Wrong {
 // With a single reference b = a, and its noise counts as error of the image.
 Wrong wrong(std::span<const float> pixels, const Reference& reference);
 
-// Returns the relMSE of the mean of the two references a and b, from their difference: the mean of (a - b)^2
-// / 4 over r^2 + 0.01, where r = (a + b) / 2. It is 0 for a single reference.
+// Returns the relMSE of the mean of the two references a and b, estimated from their difference: the mean of
+// ((a - b) / 2)^2 / (r^2 + 0.01), where r = (a + b) / 2. It is 0 for a single reference.
 double noise_of(const Reference& reference);
 
 }  // namespace ls::race

@@ -9,8 +9,8 @@
 namespace ls::race {
 namespace {
 
-// The part of a race with one seed: runs its lanes (a lane is one entrant with one seed) to the end. Adds
-// entrants that fail to `failures`.
+// The part of a race with one seed: runs its lanes (a lane is one entrant with one seed) to the end, and
+// records the entrants that failed in `failures`.
 class Heat {
  public:
   Heat(std::size_t seed, Lanes& out) : seed_(seed), out_(out) {}
@@ -77,8 +77,8 @@ class Sum {
   double weights_ = 0;
 };
 
-// Returns the entrant with the smallest estimated error of its final images. Entrants that did not render
-// everything do not count.
+// Returns the entrant whose final images have the smallest sum of estimated relMSE. Considers only entrants
+// that render everything that the scene has and that have an image for every seed. nullopt: there is none.
 std::optional<std::size_t> best_of(const Race& race, const Lanes& lanes, std::size_t seeds) {
   std::optional<std::size_t> best;
   double least = std::numeric_limits<double>::infinity();

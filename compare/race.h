@@ -36,7 +36,8 @@ struct Lanes {
 
 // Creates the racer that renders for an entrant with the seed of this index, loaded and ready.
 using MakeRacer = std::function<Result<std::unique_ptr<Racer>>(std::size_t entrant, std::size_t seed)>;
-// Called before each turn; `used` is the time that this lane has used so far, in seconds on the race's clock.
+// Called before each turn of a lane; `used` is the time that the lane has used so far, in seconds on the
+// race's clock.
 using Progress = std::function<void(std::size_t seed, std::size_t entrant, double used)>;
 
 // Runs the seeds one after the other. For one seed the entrants run in turns (schedule.h), beginning with

@@ -64,7 +64,8 @@ double load_average() {
   return ::getloadavg(&load, 1) == 1 ? load : -1;
 }
 
-// From proc(5): "cpu user nice system idle iowait irq softirq steal ...", in ticks, over all cores.
+// Reads the times of all cores together from the first line of /proc/stat, "cpu user nice system idle iowait
+// irq softirq steal ...", in ticks (proc(5)).
 Others::Times Others::taken() {
   constexpr int kFields = 8, kIdle = 3, kWaiting = 4;
   std::ifstream file("/proc/stat");

@@ -43,7 +43,7 @@ class Racer {
   // Runs the racer for one turn. An error ends its participation. failed_precondition: `stop` was set.
   virtual Result<void> take_turn(const std::atomic<bool>& stop) = 0;
   virtual std::vector<Checkpoint> checkpoints() const = 0;
-  // The files with the means of the two halves of the samples of the last image, written by keep().
+  // Returns the files, written by keep(), with the means of the two halves of the samples of the last image.
   virtual std::vector<std::filesystem::path> halves() const = 0;
   virtual std::vector<std::string> notes() const { return {}; }  // remarks for the report
 };

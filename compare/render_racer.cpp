@@ -122,7 +122,8 @@ class RenderRacer final : public Racer {
     return tile + 1 == entry_.grid.count();
   }
 
-  // Accumulates the sums of each half, which the film does not provide.
+  // Adds the partial (the pixel sums of one tile) to the frame's sums of each half of the samples. The film
+  // does not provide these.
   void add(const Partial& partial) {
     const PixelRect& rect = partial.header.tile;
     const auto pixels = static_cast<std::size_t>(rect.pixels());
@@ -155,8 +156,8 @@ class RenderRacer final : public Racer {
     return keep(file("b"), means(1, 2, spp / 2));
   }
 
-  // Returns the mean image of the halves [from, to), where 0 is half A and 1 half B. Together they have
-  // `samples` samples per pixel.
+  // Returns the mean image of one half of the samples, A (0, 1) or B (1, 2), or of both (0, 2), given as the
+  // range [from, to) of their indices. The range has `samples` samples per pixel in total.
   Pixels means(std::size_t from, std::size_t to, std::uint64_t samples) const {
     Pixels out(values());
     for (std::size_t i = 0; i < out.size(); ++i) {

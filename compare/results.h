@@ -30,15 +30,15 @@ struct Results {
   std::uint64_t first_seed = 0;  // the others follow consecutively
 };
 
-// A row per image, with the columns scene, entrant, seed, spp, wall_seconds, cpu_seconds, seconds (on the
-// race's clock), relmse, rmse, estimated_relmse, estimated_lo, estimated_hi, last.
+// Returns a table with a row per image and the columns scene, entrant, seed, spp, wall_seconds, cpu_seconds,
+// seconds (on the race's clock), relmse, rmse, estimated_relmse, estimated_lo, estimated_hi, last.
 std::string points_csv(const Results& results);
-// A row per entrant and scene, with the columns scene, entrant, seeds, spp, seconds, relmse, efficiency,
-// slope, ratio, spread; relmse, efficiency, slope and ratio are followed by the columns _lo and _hi of their
-// intervals.
+// Returns a table with a row per entrant and scene and the columns scene, entrant, seeds, spp, seconds,
+// relmse, efficiency, slope, ratio, spread; relmse, efficiency, slope and ratio are followed by the columns
+// _lo and _hi of their intervals.
 std::string summary_csv(const Results& results);
-// A row per prediction, with the columns scene, entrant, seed, spp, spent, target, predicted, lo, hi, actual,
-// within.
+// Returns a table with a row per prediction and the columns scene, entrant, seed, spp, spent, target,
+// predicted, lo, hi, actual, within.
 std::string forecasts_csv(const Results& results);
 
 std::string markdown(const Results& results);
@@ -51,7 +51,7 @@ std::map<std::string, std::string> files_of(const Results& results);
 std::string plot_svg(const Race& race);
 std::string file_name(const std::string& scene);
 
-// Shared by the HTML page and the Markdown page.
+// The functions below make the parts that the HTML page and the Markdown page share.
 
 report::LogPlot plot_of(const Race& race);
 std::string clock_words(const Conditions& conditions);  // "CPU seconds a thread, on 2 threads"

@@ -5,7 +5,8 @@
 namespace ls::race {
 namespace {
 
-// If a cut round would add less than 1 / kLeastShare of the existing samples, it is not rendered.
+// A round that was cut to the time left is not rendered if it would add less than 1 / kLeastShare of the
+// existing samples.
 constexpr std::uint64_t kLeastShare = 16;
 
 }  // namespace

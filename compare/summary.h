@@ -21,7 +21,7 @@ struct Row {
   // Mean over the seeds of the efficiency of the first entrant divided by that of this one. nullopt for the
   // first entrant.
   std::optional<Estimate> ratio;
-  double spread = 1;  // largest over smallest final relMSE: large if few pixels dominate
+  double spread = 1;  // largest final relMSE of a seed over the smallest: large if few pixels dominate
 };
 // Returns one row per entrant that finished, in the order of the entrants.
 std::vector<Row> rows_of(const Race& race);

@@ -118,8 +118,8 @@ std::string with_port(const std::string& address, int port) {
   return fmt::format("{}:{}", address.substr(0, address.rfind(':')), port);
 }
 
-// Starts notifications to the receivers in `flags`. Only the operator can name receivers. Notifications are
-// signed with the secret in DIR/webhook-secret.
+// Starts to notify the receivers named in `flags`. Only the operator can name receivers. Notifications are
+// signed with the secret in the file webhook-secret of the folder `data`.
 Result<std::unique_ptr<ls::coordinator::Webhooks>> start_webhooks(
     ls::coordinator::Coordinator& coordinator, const Flags& flags, const fs::path& data,
     const std::shared_ptr<ls::trace::Tracer>& tracer) {
@@ -135,8 +135,8 @@ Result<std::unique_ptr<ls::coordinator::Webhooks>> start_webhooks(
                                                         tracer});
 }
 
-// Returns a guard that limits wrong join tokens per address, with the same limits as for wrong tokens over
-// HTTP.
+// Returns a guard that limits how often an address may send a wrong join token (the token with which workers
+// join), by the same limits as for wrong tokens over HTTP.
 ls::coordinator::JoinGuard guard_of(const ls::http::Limits& limits) {
   const double a_minute = limits.wrong_tokens_per_minute;
   const auto throttle = std::make_shared<ls::http::Throttle>(

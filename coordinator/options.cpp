@@ -33,8 +33,9 @@ void add_limits(CLI::App& app, http::Limits& limits) {
   hidden("--http-bundle-bytes", limits.bundle_bytes, 1);
 }
 
-// Adds the options for scheduling (docs/design/scheduling.md): limits on workers and leased units per job and
-// per user, the highest priority that a user may set, the share of results that is audited, and --allow-fake.
+// Adds the options for scheduling (docs/design/scheduling.md): limits, per job and per user, on workers and
+// on units assigned to workers at the same time (a unit is one tile in one round of samples), the highest
+// priority that a user may set, the share of results that is audited, and --allow-fake.
 void add_shares(CLI::App& app, Flags& flags) {
   const auto limit = [&app](const char* name, std::uint32_t& value, const char* text) {
     app.add_option(name, value, text)->check(CLI::Range(0, 1'000'000))->capture_default_str();

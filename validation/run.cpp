@@ -22,8 +22,8 @@ using cli::ValidateCase;
 // Number of paths of a case's first run, which determines how many paths the case needs.
 constexpr std::uint64_t kPilotPaths = 1 << 13;
 // The number of paths is planned so that kSpare standard errors remain between the interval and the band's
-// end. In about one run of seven, chance uses up more than that; or the first run's estimate of the variance
-// was far off. Then the case is repeated, with kAgain to kMostAgain times as many paths, according to the
+// end. This margin is too small in about one run of seven, by chance, or if the first run underestimated the
+// variance. Then the case is repeated, with kAgain to kMostAgain times as many paths, according to the
 // better estimate.
 constexpr double kSpare = 1.5, kAgain = 2, kMostAgain = 16;
 // The degrees of freedom of the standard error that are assumed when the number of paths is planned.
@@ -138,7 +138,8 @@ class Runner {
   }
 
   double band() const { return case_->options.band * (options_.quick ? kQuickWidening : 1); }
-  // Returns the systematic part of an interval's half width: rounding, and the uncertainty of the answer.
+  // Returns the part of an interval's half width that does not depend on the number of paths: rounding, and
+  // the uncertainty of the answer.
   double unknown(double expected) const { return (kRounding + case_->options.slack) * std::abs(expected); }
 
   // Returns the factor on the number of paths that makes the interval fit into the band with kSpare standard

@@ -32,7 +32,7 @@ std::vector<cli::ValidateCase> run_cases(const Table& table, const RunOptions& o
 // Runs one case, judged with the same error probability as when the whole table is run.
 std::vector<cli::ValidateCase> run_case(const Table& table, std::size_t index, const RunOptions& options);
 
-// The probability with which each confidence interval of the table may miss the right answer.
+// Returns the probability with which each confidence interval of the table may miss the right answer.
 double level_of(const Table& table);
 
 bool asked_for(const std::string& id, const std::string& only);

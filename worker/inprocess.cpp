@@ -93,7 +93,7 @@ class InProcessBackend final : public LocalBackend {
   }
 
   void forget(const JobId& job) override {
-    std::vector<std::shared_ptr<const render::World>> last;  // frees the worlds, after the mutex was unlocked
+    std::vector<std::shared_ptr<const render::World>> last;  // destroyed after the mutex is unlocked
     const std::lock_guard lock(mutex_);
     std::erase_if(worlds_, [&](auto& entry) {
       const bool gone = entry.first.job == job;

@@ -1,4 +1,4 @@
-// lightshaft-worker: the agent, with a render child of this same executable.
+// lightshaft-worker: runs the agent, and a render child process of this same executable.
 // Exit codes: 0 drained cleanly, 1 failed, 2 bad usage.
 #include <fmt/format.h>
 #include <signal.h>

@@ -27,7 +27,8 @@ struct CompareFlags {
   bool strict = false, quiet = false;
 };
 
-// Sets `to` if the option was given.
+// Parses `text`, the value of the option `name`, into `to`; an empty text means that the option was not
+// given. Returns an error if it is not a whole number from `least` to `most`.
 Result<void> take(const char* name, const std::string& text, std::uint64_t least, std::uint64_t most,
                   std::uint64_t& to) {
   if (text.empty()) return {};

@@ -97,8 +97,8 @@ class SceneRace {
     return std::optional(race::combine(read));
   }
 
-  // Rejects a reference of the same scene and seed as an image of the race. The two would share their noise,
-  // and the image would seem much better than it is.
+  // Rejects a reference that was rendered from this scene with a seed that races, too. The reference would
+  // have the same noise as the image with that seed, and the image would seem much better than it is.
   Result<void> refuse_own_noise(const race::ReferenceFile& file) const {
     for (const Digest& scene : scenes_)
       for (std::size_t i = 0; i < options_.seeds; ++i)

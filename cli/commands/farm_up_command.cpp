@@ -36,7 +36,7 @@ struct FarmUpFlags {
   bool until_done = false;
 };
 
-// Checks the name, which is part of jobs' and workers' names, and of file names.
+// Checks the farm-up's name (--name), which becomes part of the names of jobs, workers and files.
 Result<void> check_name(const std::string& name) {
   const bool plain = !name.empty() && name.size() <= 40 && std::all_of(name.begin(), name.end(), [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';

@@ -33,8 +33,8 @@ FrameSize small(FrameSize size) {
   return {scaled(size.width), scaled(size.height)};
 }
 
-// Prepares the scene for tracing a small image. Whether pixels share paths normally depends on the size of
-// the image; the pixels of the small image share them exactly if those of the whole image do.
+// Builds the world for a small image of the scene. If path_reuse is 0, the decision whether pixels share the
+// tails of their paths depends on the image's size. So the decision for the whole image is used here, too.
 tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> small_world(
     LocalScene scene, const LocalWorld& whole) {
   int& path_reuse = scene.scene.integrator.path_reuse;

@@ -24,7 +24,8 @@ struct ValidateFlags {
   bool strict = false, quick = false;
 };
 
-// Records which renderer and options the figures come from, so that figures of different ones are not mixed.
+// Records the renderer and the options with which the figures were made, so that nobody mixes the figures of
+// two renderers.
 void add_origin(nlohmann::ordered_json& json, const ValidateFlags& flags) {
   json["build"] = render::kBuildId;
   json["numeric_class"] = render::numeric_class().hex();

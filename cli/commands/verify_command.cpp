@@ -78,7 +78,8 @@ std::string tile_verdict(const VerifiedTile& t) {
   return t.stopped ? "stopped" : t.wrong() ? "fail" : "pass";
 }
 
-// The results of two checks of the whole file: of its seal, and of the headers that can be computed again.
+// What is known about the file as a whole: whether it has a seal, and which layers and headers differ from
+// the seal or from their computed values.
 struct Contents {
   bool sealed = false;
   std::vector<std::string> changed;  // changed parts, such as "layer depth.Z"

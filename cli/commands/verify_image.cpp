@@ -74,7 +74,7 @@ std::vector<std::string> wrong_headers(const SealedImage& image, const Cryptomat
       if (t.spp == 0) missing += static_cast<std::uint64_t>(t.rect.pixels());
     }
     expected.merge(error_strings(sums, missing));
-    expected.erase("lightshaft:verdict");  // not compared, since it depends on the convergence curve, too
+    expected.erase("lightshaft:verdict");  // not compared: it also depends on the convergence curve
   }
   std::vector<std::string> wrong;
   for (const auto& [name, value] : expected) {

@@ -1,5 +1,5 @@
-// Judges the facts that `lightshaft doctor` has observed, by pure functions with one finding for each check.
-// Names and statuses are part of the JSON (docs/guide/command-line.md).
+// Judges the facts that `lightshaft doctor` has observed, by pure functions that return one finding for each
+// check. The findings' names and statuses are part of the JSON output (docs/guide/command-line.md).
 #pragma once
 
 #include <string>

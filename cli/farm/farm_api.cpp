@@ -167,7 +167,7 @@ FarmApi::Answer<void> FarmApi::download(const std::string& path, const std::file
 FarmApi::Answer<void> FarmApi::upload_missing(const LocalScene& scene, const JobSpec& spec,
                                               const Digest& text,
                                               const std::function<void(const std::string&)>& on_progress) {
-  // Null stands for the scene's text
+  // The files that the job needs, by digest. Null stands for the scene's text, which is in memory.
   std::map<std::string, const LocalFile*> by_digest{{text.hex(), nullptr}};
   for (const auto& [name, file] : scene.files)
     if (is_needed(scene, spec, file)) by_digest.emplace(file.digest.hex(), &file);

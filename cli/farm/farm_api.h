@@ -73,9 +73,9 @@ std::string job_path(const std::string& id);  // returns "/api/v1/jobs/ID", esca
 // Converts a response with an error status to an error, including its diagnostics.
 coordinator::Rejected problem_of(const HttpResponse& response);
 
-// For `submit` with an archive (a scene with its files), which is sent unchanged; the options are in the
-// query of the request. Returns "application/zip" or "application/x-tar" according to the file's name (.zip,
-// .tar, .tar.gz, .tgz); nullopt: the file is a scene, not an archive.
+// Returns the content type of an archive (a scene with its files) by its name: "application/zip" for .zip,
+// "application/x-tar" for .tar, .tar.gz and .tgz. nullopt: the file is a scene, not an archive. `submit`
+// sends an archive unchanged, with the options in the query of the request.
 std::optional<std::string> bundle_type(const std::string& file);
 
 // Returns the spec as query parameters, such as "?spp=8&define=a%3D1", or an empty text. Options that were

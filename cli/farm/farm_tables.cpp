@@ -54,7 +54,8 @@ std::string table(const std::vector<Row>& rows) {
   return out;
 }
 
-// Up to this number of frames are all listed. If there are more, those that are done or queued are left out.
+// A sequence with at most this many frames is listed completely. In a longer one, frames that are done or
+// queued are left out.
 constexpr std::size_t kMostFrames = 100;
 
 const json* frames_of(const json& job) {

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 constexpr long kConnectSeconds = 15;
 constexpr long kStallSeconds = 60;  // longest time without a byte of an answer
 constexpr long kRedirects = 3;
-constexpr long kWorkSeconds = 3600;  // the same for requests that the server takes long to process
+constexpr long kWorkSeconds = 3600;  // kStallSeconds for requests that take the server long to process
 
 struct CloseFile {
   void operator()(std::FILE* file) const { std::fclose(file); }
@@ -262,7 +262,7 @@ Result<HttpResponse> HttpClient::post_file(const std::string& path, const fs::pa
   state_->stall_seconds = kWorkSeconds;
   auto response = state_->send(path, file, content_type);
   state_->stall_seconds = kStallSeconds;
-  curl_easy_reset(state_->curl);  // needed if nothing was sent
+  curl_easy_reset(state_->curl);  // removes the method if send() failed before the request
   return response;
 }
 

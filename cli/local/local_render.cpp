@@ -40,8 +40,9 @@ Result<void> save_html_report(const std::filesystem::path& file, const coordinat
 
 constexpr auto kProgressPeriod = std::chrono::milliseconds(200);
 
-// Stores the results of units for uses other than the image: in the folder of --partial-dir. add() is called
-// on the worker agent's thread, everything else before that thread starts or after it has ended.
+// Stores the results of units (each the pixel sums of one tile and one range of samples) in the folder of
+// --partial-dir, if that option was given. add() is called on the worker agent's thread, everything else
+// before that thread starts or after it has ended.
 struct Keepers {
   std::optional<PartialDir> partials;
   std::mutex mutex;

@@ -34,8 +34,8 @@ struct LocalScene {
   std::vector<Diagnostic> warnings;
   std::map<std::string, LocalFile> files;  // assets and included scene files, by their names in the scene
   std::optional<std::uint32_t> frame;      // the frame for which the scene was read
-  // The assets that a job uses: first with an integrator that ignores media, second with any other. Assets
-  // that are not needed are not uploaded.
+  // The assets that a job uses: needed[0] with an integrator that ignores media, needed[1] with any other.
+  // Assets that are not needed are not uploaded.
   std::array<std::set<Digest>, 2> needed = {};
   std::shared_ptr<const KeptFolder> made = {};
 };

@@ -11,8 +11,8 @@ namespace {
 
 using nlohmann::json;
 
-// Reads a convergence status. `object` has the fields `trusted` and, under `kind_key`, the kind; older
-// coordinators send only the kind.
+// Reads the verdict on a job's convergence from `object`: under `kind_key` its kind, such as "heavy_tail",
+// under `words_key` its text, and the flag `trusted`. Older coordinators do not send the flag.
 Verdict verdict(const json& object, const char* kind_key, const char* words_key) {
   const std::string kind = text_field(object, kind_key);
   const bool untrusted = object.value("trusted", json()) == json(false);

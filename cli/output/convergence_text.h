@@ -28,10 +28,10 @@ std::string estimate_text(const nlohmann::json& job, const char* key, const char
 // `interval` is the key of the interval in `times`.
 std::string time_left_text(const nlohmann::json& job, const nlohmann::json& times, const char* key,
                            const char* interval = nullptr);
-// Returns the error against the reference image that `object` has under `key`: "0.0123"; or "below the
-// reference's noise", if the flag under the key `below` is set; or "0.0123 (not to be trusted: ...)" if
-// `same_seed`, since an image and a reference of the same seed share their noise. Empty: unknown. `digits` is
-// the number of significant digits.
+// Returns the error that `object` has under `key`, measured against the reference image: "0.0123"; or "below
+// the reference's noise", if the flag under the key `below` is set; or "0.0123 (not to be trusted: ...)" if
+// `same_seed`, since an image and a reference of the same seed share their noise. Empty: unknown. `digits`
+// is the number of significant digits.
 std::string reference_error_text(const nlohmann::json& object, const char* key, const char* below,
                                  bool same_seed, int digits = 3);
 // Returns one line on the error of a job's image; empty: unknown.

@@ -27,6 +27,6 @@ void print_report_health(const std::string& report);
 // Returns the digest of the pixels; empty: the report has none
 std::string pixels_digest(const std::string& report);
 
-std::uint64_t peak_rss_bytes();  // of this process or of one of its ended children, whichever had more
+std::uint64_t peak_rss_bytes();  // the larger peak: of this process, or of any ended child process
 
 }  // namespace ls::cli

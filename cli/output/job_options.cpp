@@ -11,7 +11,7 @@
 namespace ls::cli {
 namespace {
 
-// Splits "640x360" at `between`.
+// Parses two whole numbers with the character `between` between them, such as "640x360".
 std::optional<std::pair<int, int>> two_numbers(std::string_view text, char between) {
   const auto at = text.find(between);
   if (at == std::string_view::npos) return std::nullopt;

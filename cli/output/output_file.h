@@ -24,7 +24,7 @@ enum class ImageFormat { exr, png };
 // Returns the format from the file name's extension, in upper or lower case; EXR if it has none.
 // invalid_argument: it has the extension of another format.
 Result<ImageFormat> image_format(const std::filesystem::path& file);
-// check_output() and image_format() of the image that `-o` names.
+// Checks the name of the image that `-o` gives, by check_output() and image_format().
 Result<void> check_image(const std::filesystem::path& file);
 Result<void> check_folder(const std::string& option, const std::filesystem::path& folder);
 // Checks the name of an output file that is written once per frame. invalid_argument: there are several

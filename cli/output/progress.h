@@ -30,9 +30,10 @@ struct ProgressFigures {
 // Returns the line for the terminal: " 42 % [######          ] 26.9 spp  3.1 M samples/s  relMSE 0.0123
 // (0.0118 to 0.0129), target 0.001  4:12 left (3:06 to 5:30), 1:06 with 8 more". If it is longer than
 // `columns`, whole parts are omitted, in this order: the rate, the effect of more workers, the error's
-// interval, the bar, the forecast's interval, the target. The line of a doubtful job has "don't trust yet"
-// instead of intervals and, with a target, "at least 4:12 left"; these two are never omitted. If the target
-// means the denoised layers, the line has ", denoised at most 0.0012, target 0.001". `columns` 0: any length.
+// interval, the bar, the forecast's interval, the target. In the line of a doubtful job, "don't trust yet"
+// replaces the intervals and, if there is a target, "at least 4:12 left" replaces the remaining time; these
+// two texts are never omitted. If the target means the denoised layers, the line has ", denoised at most
+// 0.0012, target 0.001". `columns` 0: any length.
 std::string progress_line(const ProgressFigures& figures, int columns, bool with_bar = true);
 
 enum class ProgressForm {

@@ -8,7 +8,8 @@
 
 namespace ls::cli {
 
-// Identifies the workers of this farm-up: their names begin with "FARM-", and they run on `engine`.
+// Identifies the workers of this farm-up (all runs of `lightshaft farm up` under one name): their names
+// begin with "FARM-", and they run on `engine`.
 struct OurWorkers {
   std::string farm, engine;
 };
@@ -17,7 +18,7 @@ struct OurWorkers {
 // budget is used up.
 FarmApi::Answer<Demand> ask_demand(FarmApi& api, const OurWorkers& ours, Spending& spending);
 
-// The same, from the coordinator's answers to GET /api/v1/jobs and GET /api/v1/workers.
+// Does the same as ask_demand(), with the coordinator's answers to GET /api/v1/jobs and GET /api/v1/workers.
 Demand demand_of(const nlohmann::json& jobs, const nlohmann::json& workers, const OurWorkers& ours,
                  Spending& spending);
 

@@ -1,6 +1,6 @@
 // The interface between `lightshaft farm up` and an *engine*, which runs its workers: Slurm, ssh, Docker or
-// Kubernetes. Whatever can list, start and end instances of one program can be an engine. A *farm-up* is a
-// run of `lightshaft farm up`, with all earlier runs under the same name.
+// Kubernetes. Whatever can list, start and end instances of one program can be an engine. All runs of
+// `lightshaft farm up` under the same name, earlier ones and the current one, form one *farm-up*.
 #pragma once
 
 #include <fmt/format.h>
@@ -58,8 +58,8 @@ inline std::string worker_name(const std::string& farm, const std::string& id) {
 // Returns a new id of a worker in a container: eight random hexadecimal digits.
 inline std::string new_worker_id() { return fmt::format("{:08x}", std::random_device{}()); }
 
-// Writes FOLDER/NAME.log, the log of an ended worker. If that fails, the log is lost: a worker is removed all
-// the same.
+// Writes FOLDER/NAME.log, the log of an ended worker. If that fails, the log is lost; the caller removes the
+// worker in any case.
 inline void keep_log(const std::string& folder, const std::string& name, const std::string& text) {
   std::ofstream(fmt::format("{}/{}.log", folder, name)) << text;
 }

@@ -18,7 +18,7 @@ namespace {
 
 using nlohmann::json;
 
-// Waits between two checks, or until the user asks for the end.
+// The pause between two checks. It ends early if the user asks `farm up` to end.
 class Pause {
  public:
   void end() {
@@ -109,8 +109,8 @@ class FarmUp {
   }
 
  private:
-  // Reads the demand. While the coordinator does not answer, the number of workers does not change. Error: it
-  // has never answered.
+  // Reads the demand. While the coordinator does not answer, the number of workers does not change. Returns
+  // an error only if it has never answered.
   FarmApi::Answer<void> look_at_jobs() {
     auto asked = ask_demand(api_, {options_.limits.farm, version_}, spending_);
     if (asked) {

@@ -15,14 +15,14 @@ namespace ls::cli {
 struct FarmUpOptions {
   ScaleLimits limits;
   Budgets budgets;
-  bool until_done = false;       // end when no job is queued or running
+  bool until_done = false;       // end when every job has ended or used up its budget
   bool json = false;             // print the report as JSON at the end
   std::filesystem::path report;  // file with the costs so far; read at the start, to continue their sums, and
                                  // written after each check
 };
 
-// Returns the exit code. Before it returns, because of a signal or of until_done, it drains its workers: they
-// deliver their results and end.
+// Runs until a signal asks it to end or, with until_done, until every job has ended or used up its budget.
+// It then drains its workers (they deliver their results and end) and returns the exit code.
 int run_farm_up(FarmApi& api, Engine& engine, const FarmUpOptions& options, Interrupt& interrupt,
                 const Clock& clock);
 

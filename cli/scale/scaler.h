@@ -52,7 +52,8 @@ class Scaler {
   // `spent`: core seconds that our workers have cost so far. `workers`: all workers that the engine lists.
   ScaleActions decide(const Demand& demand, std::span<const EngineWorker> workers, double spent,
                       TimePoint now);
-  // For the end of the command: starts no worker, drains all, and kills those that take too long.
+  // Returns the actions for the end of the command: it starts no worker, drains all, and kills those that
+  // take too long to end.
   ScaleActions end(std::span<const EngineWorker> workers, TimePoint now);
   // Must be called if the engine could not start workers. The next attempt waits, longer with each failure.
   void start_failed(TimePoint now);
@@ -61,7 +62,8 @@ class Scaler {
 
   // A worker is started only if it can run for at least this many seconds within the budget.
   static constexpr double kWorthStarting = 60;
-  // Pause in seconds before the next attempt to start workers: after the first failure, and at most
+  // Pauses in seconds before the next attempt to start workers: the one after the first failure, which
+  // doubles with each further failure, and the longest
   static constexpr double kFirstPause = 5, kLongestPause = 600;
 
  private:

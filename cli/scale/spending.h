@@ -55,13 +55,13 @@ class Spending {
  private:
   struct Job {
     std::string name, owner;
-    double before = 0;  // core seconds before the first report
+    double before = 0;  // core seconds at the first report, which are not counted
     double now = 0;
   };
   struct Worker {
     std::string engine;
     double earlier = 0;          // core seconds of earlier processes with the same id
-    double before = 0, now = 0;  // of the present process; as in Job
+    double before = 0, now = 0;  // as in Job, for the process that runs now
   };
   Budgets budgets_;
   bool begun_ = false;

@@ -1,5 +1,6 @@
-// The results of the decoders, and limits for every file that a scene names. Sizes are checked against a
-// limit and against the available bytes before anything is allocated.
+// What the decoders of meshes, images and grids return, and the size limits of the files that a scene names.
+// A decoder checks the sizes in a file against these limits and against the number of available bytes before
+// it allocates memory.
 #pragma once
 
 #include <array>
@@ -27,12 +28,13 @@ inline constexpr std::uint64_t kMaxGridValues = std::uint64_t{1} << 31;
 struct MeshAttribute {
   std::string name;  // "vertex_..." or "face_..."
   std::uint32_t components = 1;
-  bool bytes = false;         // values are 0 to 255, as in the file
+  bool bytes = false;         // true: the values are 0 to 255, as in the file
   std::vector<float> values;  // one or three components per vertex or triangle, adjacent in memory
 };
 
-// A triangle mesh: three floats per vertex in `positions` and (if the file has any) in `normals`, two in
-// `uvs`; three indices per triangle, all below vertex_count(). The uvs are those of the file, without a flip.
+// A triangle mesh. `positions` and (if the file has any) `normals` have three floats per vertex, `uvs` two;
+// `indices` has three indices per triangle, all below vertex_count(). The uvs are those of the file: v is
+// not flipped.
 struct MeshData {
   std::vector<float> positions, normals, uvs;
   std::vector<std::uint32_t> indices;

@@ -44,7 +44,7 @@ Result<void> check_count(std::string_view name, std::uint64_t count) {
               fmt::format("'{}': {} values, more than the limit of {}", name, count, kMaxGridValues));
 }
 
-// The error of a value that is not finite, of the voxel or node (x, y, z).
+// Returns the error for a value that is not finite; (x, y, z) is its voxel or node.
 tl::unexpected<Error> bad_value(std::string_view name, const char* what, std::uint64_t x, std::uint64_t y,
                                 std::uint64_t z, float v) {
   return bad_grid(name, fmt::format("the {} ({}, {}, {}) is {}; repair the grid", what, x, y, z,

@@ -4,8 +4,8 @@
 // and maximum corner), then the values, x fastest. Types: 1 float32, 2 float16, 3 uint8 (0..255 for 0..1).
 //
 // Raw .bin: int32 nx, ny, nz; float32 minimum x, y, z and maximum x, y, z of the box in the world; nx ny nz
-// float32 values, x fastest or (called "x-major" by some converters) z fastest. The values are nodes: the
-// outermost ones are on the faces of the box. No bytes may follow.
+// float32 values, with x fastest or (called "x-major" by some converters) z fastest. The values are at
+// nodes, the outermost of which are on the faces of the box. No bytes may follow.
 //
 // A value that is NaN or infinite is an error that names its voxel or node; negative values become 0 and are
 // counted. The result always has x fastest.

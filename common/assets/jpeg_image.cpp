@@ -82,7 +82,7 @@ Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> 
     return bad("its size is not believable");
   if (pixels > max_pixels) return too_many_pixels(name, image.width, image.height, max_pixels);
   if (pixels / 64 / 64 >
-      file.size())  // an 8 x 8 block takes at least two bits, and up to 4 blocks share their chroma
+      file.size())  // a lenient limit: an 8 x 8 block takes at least two bits (up to 4 share their chroma)
     return bad("it is too short for its size");
   image.u8.resize(pixels * image.channels);
   if (!read_rows(d, image.u8.data(), std::size_t{image.width} * image.channels))

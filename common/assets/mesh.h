@@ -18,16 +18,16 @@ namespace ls {
 Result<MeshData> decode_obj(std::string_view name, std::span<const std::byte> file);
 
 // Reads a PLY file: ascii, binary_little_endian or binary_big_endian, version 1.0. It must have an element
-// `vertex` with x y z, optionally nx ny nz and (u v | s t | texture_u texture_v), and an element `face` with
-// the list vertex_indices or vertex_index. decode_ply_with() also reads the properties of the requested
-// `attributes` that exist (ply_attributes.h). Everything else is skipped. Attributes of a face become those
-// of each of its triangles.
+// `vertex` with x y z, optionally nx ny nz and (u v | s t | texture_u texture_v | texture_s texture_t), and
+// an element `face` with the list vertex_indices or vertex_index. decode_ply_with() also reads those of the
+// requested `attributes` (ply_attributes.h) that the file has. Everything else is skipped. Each triangle of a
+// polygon gets the attributes of the polygon.
 Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file);
 Result<MeshData> decode_ply_with(std::span<const std::string> attributes, std::string_view name,
                                  std::span<const std::byte> file);
 
-// Reads mesh number `index` of a file in Mitsuba's `.serialized` format, version 3 or 4. Vertex colours are
-// skipped.
+// Mitsuba's `.serialized` format, version 3 or 4. is_serialized() recognises it by the first bytes;
+// decode_serialized() reads mesh number `index` of the file and skips vertex colours.
 bool is_serialized(std::span<const std::byte> file);
 Result<MeshData> decode_serialized(std::string_view name, std::span<const std::byte> file, int index);
 

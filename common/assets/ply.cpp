@@ -56,7 +56,8 @@ struct Element {
   }
 };
 
-// Returns the place of a vertex property: positions 0-2, normals 3-5, uvs 6-7; -1: the property is skipped.
+// Returns the index of a vertex property: 0-2 for the position, 3-5 for the normal, 6-7 for uv; -1: it is
+// none of these.
 int vertex_slot(std::string_view name) {
   constexpr std::pair<std::string_view, int> kSlots[] = {
       {"x", 0}, {"y", 1}, {"z", 2}, {"nx", 3},        {"ny", 4},        {"nz", 5},        {"u", 6},
@@ -159,7 +160,8 @@ class PlyReader {
       if (!ok) return false;
     }
     if (mesh_.indices.empty() && mesh_.dropped_triangles == 0) return complain("has no faces");
-    // A file may have several elements of one name, such as 'face'
+    // Checked because a file may have several elements of one name, such as two elements 'face', of which
+    // only one has the attribute
     for (const MeshAttribute& a : mesh_.attributes)
       if (a.values.size() !=
           a.components * (a.name.starts_with("face_") ? mesh_.triangle_count() : mesh_.vertex_count()))
@@ -305,7 +307,7 @@ class PlyReader {
     return true;
   }
 
-  // The place in the mesh where a property of an element is stored, if it belongs to a requested attribute.
+  // The place in the mesh where the values of a property are stored: a component of a requested attribute.
   struct Place {
     int attribute = -1;  // index in mesh_.attributes; -1: none
     std::size_t component = 0;
@@ -344,7 +346,8 @@ class PlyReader {
         static_cast<float>(decoded(p.type->type, *v));
     return true;
   }
-  // Decodes a colour as Mitsuba 3.9 does: integers are sRGB codes, except bytes.
+  // Decodes a value of an attribute. As in Mitsuba 3.9, values of integer types are sRGB codes of colours,
+  // whatever the attribute's name. Bytes (u8) and floating-point numbers are returned as they are.
   static double decoded(Type t, double v) {
     constexpr std::pair<Type, double> kLargest[] = {{Type::i8, 127},
                                                     {Type::i16, 32767},
@@ -358,7 +361,8 @@ class PlyReader {
       }
     return v;
   }
-  // Stores a face's attributes once for each of its triangles. There may be no triangles.
+  // Copies the attributes of the last face, so that each of its triangles has them; removes them if the face
+  // has no triangles.
   void share_among_triangles(const std::vector<Place>& places, std::size_t triangles) {
     for (const Place& p : places) {
       if (p.attribute < 0 || p.component > 0) continue;

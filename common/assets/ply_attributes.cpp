@@ -24,7 +24,7 @@ std::optional<PlyAttribute> colour(std::span<const std::string_view> names) {
   return std::nullopt;
 }
 
-// Consecutive properties with the same prefix. Their last characters form the beginning of one of the
+// Consecutive properties with the same prefix, whose last characters form the beginning of one of the
 // sequences in kKinds.
 struct Run {
   std::string_view prefix;
@@ -61,7 +61,7 @@ std::vector<PlyAttribute> ply_attributes(std::span<const std::string_view> names
       run = {prefix, *kind, {i}};
     } else if (run.properties.size() < 4 && run.kind[run.properties.size()] == name.back()) {
       run.properties.push_back(i);
-    } else {  // not part of a sequence: it makes no attribute
+    } else {  // breaks the sequence: no property of this prefix makes an attribute
       done.insert(prefix);
       run = {};
     }

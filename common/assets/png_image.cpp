@@ -83,8 +83,8 @@ Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> f
   PngShape shape;
   if (!read_header(p, shape)) return bad(source.message);
   const std::uint64_t pixels = std::uint64_t{shape.width} * shape.height;
-  // Deflate packs at most 1032 to 1, and a palette of one bit expands to four bytes. A header that claims a
-  // larger image is rejected.
+  // Deflate packs at most 1032 bytes into one, and one bit of a palette image expands to four bytes, a
+  // factor of 32. A header that claims more than the file can contain is rejected.
   if (pixels == 0 || pixels > kMaxImagePixels ||
       shape.row_bytes * std::uint64_t{shape.height} / 1032 / 32 > file.size())
     return bad("its size is not believable");

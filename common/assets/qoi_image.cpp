@@ -47,7 +47,7 @@ class QoiDecoder {
         return more.has_value();
       }
       default:
-        run_ = low;  // and this pixel
+        run_ = low;  // the current pixel, and `low` more like it
         return true;
     }
   }

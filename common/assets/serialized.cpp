@@ -165,8 +165,8 @@ class SerializedReader {
     return false;
   }
 
-  // True if the counts in the header are possible: zlib packs at most 1032 to 1. Impossible counts are
-  // rejected before memory is allocated.
+  // True if the packed bytes can contain what the counts in the header announce: zlib packs at most 1032
+  // bytes into one. Other counts are rejected before memory is allocated.
   bool plausible(std::uint32_t flags, std::uint64_t vertices, std::uint64_t triangles) {
     const std::uint64_t per_vertex =
         3 + (flags & kHasNormals ? 3 : 0) + (flags & kHasUvs ? 2 : 0) + (flags & kHasColours ? 3 : 0);

@@ -53,7 +53,7 @@ std::uint32_t little_endian(std::span<const std::byte> b) {
   return x;
 }
 
-// Returns the colour in 2 bytes (5 bits per channel, 1 bit of alpha), 3 or 4 bytes.
+// Decodes a colour of 2 bytes (5 bits per channel, 1 bit of alpha), 3 bytes (no alpha) or 4 bytes.
 Codes colour_of(std::span<const std::byte> b) {
   const std::uint32_t x = little_endian(b);
   const auto code = [](std::uint32_t v) { return static_cast<std::uint8_t>(v); };
@@ -62,14 +62,14 @@ Codes colour_of(std::span<const std::byte> b) {
   return {of_five(10), of_five(5), of_five(0), code(x & 0x8000 ? 255 : 0)};
 }
 
-// Returns the bytes of one pixel after another.
+// Iterates over the pixels in the file: next() returns the bytes of one pixel after another.
 class PixelBytes {
  public:
   PixelBytes(std::span<const std::byte> data, std::size_t size, bool packed)
       : data_(data), size_(size), packed_(packed) {}
 
-  // Returns false if the data are certainly too short for `pixels`. Nothing is decoded: a packet has at least
-  // 1 + size bytes and at most 128 pixels.
+  // Returns false if the data are certainly too short for `pixels`. This compares only the least possible
+  // size: a packet has at least 1 + size bytes and at most 128 pixels.
   bool may_suffice(std::uint64_t pixels) const {
     return data_.size() >= (packed_ ? (pixels + 127) / 128 * (1 + size_) : pixels * size_);
   }

@@ -18,7 +18,7 @@ inline bool is_drawable(const MeshData& m, std::uint32_t a, std::uint32_t b, std
       if (!std::isfinite(p[i][k])) return false;
     }
   double area2 = 0;
-  for (int k = 0; k < 3; ++k) {  // differences of floats, whose products cannot underflow in double
+  for (int k = 0; k < 3; ++k) {  // in double the products of differences of floats cannot underflow
     const int u = (k + 1) % 3, v = (k + 2) % 3;
     const double n = (p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) - (p[1][v] - p[0][v]) * (p[2][u] - p[0][u]);
     area2 += n * n;

@@ -9,7 +9,7 @@ namespace ls {
 
 // The names of all steps, in the order in which a unit passes through them.
 inline constexpr std::string_view kSteps[] = {
-    // coordinator                            worker
+    // of the worker: lease-received to result-sent, and acknowledged-seen; of the coordinator: all others
     "lease-sent",        "lease-received",    "unit-rendered",    "result-sent",   "result-arrived",
     "result-checked",    "result-appended",   "result-durable",   "result-folded", "result-acknowledged",
     "acknowledged-seen", "checkpoint-stored", "snapshot-written", "image-written", "job-done",

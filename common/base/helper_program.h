@@ -30,8 +30,8 @@ class Descriptor {
 
 // Runs the program, waits for its end, and returns its wait status, as waitpid() gives it. The program
 // inherits only two files: `shared` as kHelperFd, and standard error. Of the environment it inherits only
-// the variables that the loader and the sanitizers read, so that it gets no secrets. internal: it could
-// not be started.
+// the variables that the loader, the allocator and the sanitizers read, so that it gets no secrets.
+// internal: it could not be started.
 Result<int> run_helper(const std::filesystem::path& program, std::vector<std::string> arguments, int shared);
 
 }  // namespace ls

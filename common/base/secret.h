@@ -30,7 +30,8 @@ Result<std::string> read_secret(const std::filesystem::path& file);
 inline constexpr std::size_t kPemBytes = 1u << 20;
 Result<std::string> read_pem(const std::filesystem::path& file);
 
-// Replaces the file in one step: after a crash there is either the old or the new file, with this mode.
+// Replaces the file in one step: after a crash there is either the old file, or the new one with the
+// permissions `mode`.
 Result<void> write_private(const std::filesystem::path& file, std::string_view text, mode_t mode = 0600);
 
 }  // namespace ls

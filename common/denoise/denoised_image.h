@@ -12,12 +12,13 @@
 //
 //   (A - D(A)) (B - D(B)) + (D(A) - D(B))^2 / 4  has the expectation of  ((x + y) / 2)^2,
 //
-// the squared error of D, for every denoiser. The product measures the errors that the denoiser makes in both
-// halves, the difference the errors that it makes in only one. Relative errors are weighted by 1 /
-// (D^2 + 0.01). This weight depends on D, so to first order the relative error is wrong by - x f' s Var, with
-// f' the derivative of the weight, s the share of a pixel's own noise in its denoised value, and Var the
-// variance of that noise: the figure is too low where the denoiser darkens, too high where it brightens, and
-// nearly right where s is small.
+// the squared error of D, for every denoiser. The product measures the errors that the denoiser makes in
+// both halves, the difference the errors that it makes in only one. Relative errors have the weight
+// f(D) = 1 / (D^2 + 0.01). This weight depends on D and so on the noise: to first order in the noise, the
+// relative error is wrong by - bias f' s Var, with `bias` the mean error of the denoiser, f' the derivative
+// of the weight, s the share of a pixel's own noise that remains in its denoised value, and Var the variance
+// of the noise of one half. So the figure is too low where the denoiser darkens, too high where it
+// brightens, and nearly right where s is small.
 //
 // Interval: the estimate differs from the realised squared error by n = a b - x b - a y. This n is nearly
 // uncorrelated between pixels: a pixel contributes only little to its neighbours' denoised values. If a share

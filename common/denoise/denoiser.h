@@ -29,9 +29,9 @@ struct NoisyImage {
 class Denoiser {
  public:
   // Finds the library and reads its version. `library` is its file; if it is empty, the library is searched
-  // for as described above. A library that hangs is ended after `least_seconds`, for large images later.
-  // failed_precondition: the library cannot be used on this machine; the message says why, and how to install
-  // it.
+  // for as described above. `least_seconds` is the time limit of denoise() for small images; it grows with
+  // the number of pixels. failed_precondition: the library cannot be used on this machine; the message says
+  // why, and how to install it. resource_exhausted: the library hung, or there was not enough memory.
   static Result<Denoiser> find(int threads, const std::string& library = {},
                                const std::filesystem::path& program = program_beside_us("lightshaft-denoise"),
                                int least_seconds = 600);

@@ -23,7 +23,7 @@ struct HealthNote {
 
 // Returns a note for each cause in `health`. `command` is replay_command() of the job.
 std::vector<HealthNote> health_notes(const Health& health, const std::string& command);
-// Merges the notes of frame number `frame`, `more`, into the notes of earlier frames, `notes`.
+// Adds `more`, the notes of frame number `frame`, to `notes`, those of earlier frames.
 void add_notes(std::vector<HealthNote>& notes, std::span<const HealthNote> more, std::uint32_t frame);
 
 // Returns {"clean", "nonfinite", "negative", "majorant_violations", "causes": [{"cause", "effect": "rejected"

@@ -10,8 +10,8 @@
 namespace ls {
 
 // Returns "lightshaft render SCENE" with all options that determine the value of a sample; each word is
-// quoted for a shell. `scene` is the job's name for its scene. `frame` is the frame number, for jobs with
-// frames.
+// quoted for a shell. `scene` is the name by which the job refers to its scene. `frame` is the frame number,
+// for jobs with frames.
 std::string replay_command(const std::string& scene, const JobSpec& spec,
                            std::optional<std::uint32_t> frame = {});
 // Returns the command for one sample of the pixel (x, y). `command` is a result of the function above.

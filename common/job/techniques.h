@@ -1,7 +1,8 @@
-// The integrators' sampling techniques for light that BSDF and phase function sampling and next-event
-// estimation at vertices find too rarely. A job's scene and files determine which of them it uses: the
-// workers choose them when they build the world, and report them with each result. A parameter of the scene's
-// integrator switches each technique off (docs/reference/scene-format.md, Integrators).
+// Additional sampling techniques of the integrators. They find light that is found too rarely by sampling
+// BSDFs and phase functions and by next-event estimation at vertices. Which of them a job uses depends on
+// its scene and files: the workers choose them when they build the world (the scene prepared for rendering),
+// and report them with each result. A parameter of the scene's integrator switches each technique off
+// (docs/reference/scene-format.md, Integrators).
 #pragma once
 
 #include <cstdint>

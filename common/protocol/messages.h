@@ -93,8 +93,8 @@ struct UnitResult {
   Health health;
   UnitTimes times;
   TechniqueSet techniques;  // techniques that the integrator uses in this job's world; empty: unknown
-  // If its lease is traced: when the worker received the unit, by its clock in nanoseconds since 1970; 0: not
-  // sent
+  // When the worker received the unit, by its clock, in nanoseconds since 1970; sent only if the lease is
+  // traced; 0: not sent
   std::uint64_t held_unix_ns = 0;
   bool operator==(const UnitResult&) const = default;
 };

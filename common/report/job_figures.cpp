@@ -13,7 +13,7 @@ namespace ls::report {
 namespace {
 
 struct Part {
-  const char* name;  // and the key in the report
+  const char* name;  // also the key in the report
   const char* meaning;
 };
 constexpr std::array kParts{

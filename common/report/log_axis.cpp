@@ -33,7 +33,8 @@ std::string time_label(double seconds) {
   return seconds < kDay ? fmt::format("{:g} h", seconds / kHour) : fmt::format("{:g} d", seconds / kDay);
 }
 
-// Returns the round times on the axis: if `coarse` only the main ones, otherwise also the intermediate ones.
+// Returns the usual times for labels (1 s, 10 s, 1 min, ...) that are on the axis: if `coarse` only the main
+// ones, otherwise also the intermediate ones.
 std::vector<double> usual_times(const LogAxis& axis, bool coarse) {
   std::vector<double> all;
   const auto take = [&](double unit, std::initializer_list<double> steps) {

@@ -54,7 +54,8 @@ inline constexpr std::size_t kMaxDiagnostics = 20;
 inline constexpr std::size_t kMaxExcerptBytes = 160;  // bytes of a source line that a message shows
 inline constexpr std::size_t kMaxSceneJsonBytes = std::size_t{256} << 20;
 inline constexpr int kMaxJsonNesting = 16;
-// Largest number of pairs of shapes that are compared to find whether one lets light into the other.
+// Largest number of pairs of shapes that are compared in the search for media that no light enters
+// (analysis/unreachable.cpp).
 inline constexpr std::uint64_t kMaxEntrances = std::uint64_t{1} << 23;
 
 }  // namespace ls::scene

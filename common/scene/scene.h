@@ -41,9 +41,10 @@ struct BitmapTexture {
   Channel channel = Channel::all;
   bool operator==(const BitmapTexture&) const = default;
 };
-// A checkerboard: color0 where floor(2 u') + floor(2 v') is even after to_uv, with u', v' taken modulo 1
-// (Mitsuba's `checkerboard`). If it is read as a scalar (roughness, opacity, weight of a blend, all
-// parameters of `principled` except its colour) color0 and color1 are swapped, as in Mitsuba 3.9.
+// A checkerboard: color0 where floor(2 u') + floor(2 v') is even, otherwise color1 (Mitsuba's
+// `checkerboard`). Here (u', v') is (u, v) transformed by to_uv, modulo 1. If it is read as a scalar
+// (roughness, opacity, weight of a blend, all parameters of `principled` except its colour) color0 and
+// color1 are swapped, as in Mitsuba 3.9.
 struct CheckerboardTexture {
   TextureIndex color0, color1;
   UvTransform to_uv;
@@ -256,7 +257,7 @@ struct HeterogeneousMedium {
   VolumeIndex sigma_t;
   VolumeIndex albedo;
   double scale = 1;
-  Rgb tint{1, 1, 1};  // grey if sigma_t is a grid of three channels
+  Rgb tint{1, 1, 1};  // must be grey if sigma_t is a grid of three differing channels
   PhaseIndex phase;
   std::optional<VolumeIndex> emission;         // radiance per scene unit, independent of extinction
   std::optional<VolumeIndex> source_radiance;  // emission per length is sigma_a times this
@@ -363,14 +364,14 @@ struct IntegratorSettings {
   int light_vertices = 0;
   // For "volpath" only. Lamps are point, spot and projector lights. equiangular: whether points on path
   // segments are sampled near lamps; if not, directions are not sampled towards lamps either. lamp_flights:
-  // whether a share of the free flights is sampled to end near lamps. 0: chosen for the scene; -1: never.
+  // whether a share of the free-flight distances is sampled near lamps. 0: chosen for the scene; -1: never.
   int equiangular = 0, lamp_flights = 0;
   int light_tree = 0;  // 0: a tree chooses among many lights; -1: lights are chosen by their power alone
   // For "volpath" and "path" only: the number of pixels that share the subpaths from the second vertex on. 0:
   // kUsualPathReuse or none, chosen for the scene; -1 or 1: none.
   int path_reuse = 0;
-  // For "volpath" only: whether Russian roulette applies to shadow rays through grids whose largest possible
-  // contribution is small. 0: chosen for the scene; -1: all are traced.
+  // For "volpath" only: whether Russian roulette applies to those shadow rays through grids that can only
+  // make a small contribution. 0: chosen for the scene; -1: all are traced.
   int shadow_roulette = 0;
   // For "volpath" and "path" only: whether the first surface of a path samples a second direction towards a
   // constant environment. 0: chosen for the scene; -1: it does not.
@@ -379,11 +380,13 @@ struct IntegratorSettings {
   // environment, are also sampled through the openings by which its light enters the scene. 0: chosen for the
   // scene; -1: never; 1: where possible.
   int sky_portals = 0;
-  // For "volpath" and "path" only: whether one of few lights is chosen by probabilities that camera paths
-  // learned for each place. 0: chosen for the scene; -1: never; 1: where possible.
+  // For "volpath" and "path" only: whether, in a scene with few lights, a light is chosen by probabilities
+  // that depend on the place and are learned from camera paths. 0: chosen for the scene; -1: never; 1: where
+  // possible.
   int local_lights = 0;
-  // For "volpath" only: whether, in scenes with grids, paths split at their first scattering and Russian
-  // roulette ends them by their possible contribution to the pixel. 0: chosen for the scene; -1: they do not.
+  // For "volpath" only: whether, in scenes with grids, paths may split at their first scattering, and
+  // Russian roulette may end them where their throughput is below that behind the first scattering
+  // (worker/render/world/splitting.h). 0: chosen for the scene; -1: neither.
   int path_splitting = 0;
   bool operator==(const IntegratorSettings&) const = default;
 };

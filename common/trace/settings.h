@@ -1,4 +1,4 @@
-// The destination of traces and which are recorded, set by the operator in OpenTelemetry's standard
+// Where traces are sent, and which traces are recorded. The operator sets both in OpenTelemetry's standard
 // environment variables (https://opentelemetry.io/docs/specs/otel/configuration/sdk-environment-variables/).
 #pragma once
 

@@ -1,5 +1,6 @@
-// The spans that wait to be sent. Its state depends only on its calls and the times passed in. It is bounded:
-// a span that finds no room is dropped and counted. Not thread-safe.
+// The queue of the spans that wait to be sent. Its state depends only on the calls of its functions and on
+// the times that they are given. It is bounded: a span that finds no room is dropped and counted. Not
+// thread-safe.
 #pragma once
 
 #include <cstddef>

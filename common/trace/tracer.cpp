@@ -76,12 +76,12 @@ std::int64_t Tracer::unix_ns(TimePoint at) const { return count(at) + offset_ns_
 
 Figures Tracer::figures() const { return queue_.lock()->figures(); }
 
-// Compares the two clocks. This is repeated, since the wall clock may be set and the monotonic clock stops
-// while the machine sleeps.
+// Measures the difference between the wall clock and the monotonic clock. This is repeated, since the wall
+// clock may be set and the monotonic clock stops while the machine sleeps.
 void Tracer::set_clock() {
   std::int64_t offset = 0, narrowest = std::numeric_limits<std::int64_t>::max();
-  // The clocks are read several times; the reading with the shortest gap between the two is used, since the
-  // thread was not interrupted during it.
+  // The wall clock is read between two readings of the monotonic clock, several times. The attempt with the
+  // shortest time between the two is used, since the thread was hardly interrupted during it.
   for (int i = 0; i < kClockReadings; ++i) {
     const std::int64_t before = count(options_.clock->now()), wall = options_.unix_ns(),
                        after = count(options_.clock->now());

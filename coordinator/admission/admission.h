@@ -22,8 +22,8 @@ struct Admission {
 // Reads the scene. The scene can use only the request's assets as files, so it can never read a path on this
 // machine. Only assets that the scene uses become part of the job; each must be in `blobs`. Stores nothing.
 // `frame` is the number of a frame of a sequence (a job with frames). The scene is then read for this frame,
-// and its seed is the job's plus this number: frames have independent noise, and a frame rendered alone has
-// the same pixels.
+// and the frame's seed is the job's seed plus this number. So frames have independent noise, and a frame that
+// is rendered alone has the same pixels.
 tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const BlobStore& blobs,
                                         std::optional<std::uint32_t> frame = {});
 
@@ -47,7 +47,7 @@ std::string replay_of(const StoredJob& job);
 // Returns the least memory, in bytes, that a worker needs for the job.
 std::uint64_t memory_need(const StoredJob& job);
 
-// Returns the settings of the stored job that the farm uses.
+// Returns those settings of the stored job that the farm uses.
 JobPlan plan_of(const StoredJob& job);
 
 }  // namespace ls::coordinator

@@ -8,7 +8,8 @@
 
 namespace ls::coordinator {
 
-// True if the settings include cryptomattes, so that the scene must be read with labels.
+// True if the settings include cryptomattes, so that the scene must be read with labels (the names of its
+// shapes and materials).
 inline bool wants_labels(const RenderSettings& settings) {
   return aovs_of(settings).any_of(aovs_of(AovKind::ids));
 }

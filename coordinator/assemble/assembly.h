@@ -35,7 +35,7 @@ class HealthTable {
   Health total() const;
 
   std::string save() const;
-  std::string save_tile(TileIndex tile) const;  // load() accepts the texts of all tiles one after the other
+  std::string save_tile(TileIndex tile) const;  // load() also accepts the joined texts of several tiles
   static std::optional<HealthTable> load(std::string_view text);  // nullopt: the text is damaged
   bool operator==(const HealthTable&) const = default;
 
@@ -125,8 +125,8 @@ class Assembly {
   const HealthTable& health() const { return health_; }
   UnitCosts& costs() { return costs_; }  // costs of accepted units, whether or not they are in the film
   void checkpoint_taken(std::span<const RoundIndex> rounds) { errors_.checkpoint_taken(rounds); }
-  // Returns for each tile how many of its rounds in the film a job of `spp` samples per pixel can use. A
-  // truncated last round that was cut for fewer samples does not count.
+  // Returns for each tile how many of its rounds in the film a job of `spp` samples per pixel can use. A last
+  // round that was truncated for another number of samples does not count.
   std::vector<RoundIndex> rounds_for(std::uint64_t spp) const;
   std::uint64_t folds_since_snapshot = 0;
 

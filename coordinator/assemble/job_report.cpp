@@ -49,8 +49,8 @@ json reference_of(const ReportFacts& facts, const std::optional<ReferenceError>&
           {"noise_relmse", noise ? number(noise->relmse) : json()}};
 }
 
-// Adds to the curve, at some checkpoints, the forecast of the cost of reaching the target from the points up
-// to there, so that users can judge the reliability of forecasts afterwards.
+// Adds to some checkpoints of the curve a forecast of the cost of reaching the target, made from the points
+// up to this checkpoint. Users can then judge afterwards how reliable forecasts were.
 void put_forecasts(json& curve, const std::vector<ConvergencePoint>& points, double target) {
   const std::vector<ErrorPoint> all = error_points(points);
   // A forecast is added each time the samples have doubled. Forecasts in between would add little, and each

@@ -27,8 +27,8 @@ void drop_rounds_before(RoundIndex next, std::vector<std::pair<RoundIndex, T>>& 
 
 class RoundErrors {
  public:
-  // If `keep_relative`, the relative error sums after all rounds are kept for good: the farm's rule that
-  // stops tiles at a target error needs them after a restart.
+  // If `keep_relative`, the relative error sums after all rounds are kept even when no checkpoint needs them:
+  // the farm's rule that stops tiles at a target error needs them after a restart.
   RoundErrors(TileIndex tiles, bool keep_relative) : tiles_(tiles), keep_relative_(keep_relative) {}
 
   // Adds the tile's error after this round. The rounds of a tile come in order. If a truncated round comes

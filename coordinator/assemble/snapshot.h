@@ -22,7 +22,7 @@ namespace ls::coordinator {
 
 struct TileSnapshot {
   TileIndex tile = 0;
-  std::function<std::vector<std::byte>()> film;  // the saver of the tile's pixels (Film::saver)
+  std::function<std::vector<std::byte>()> film;  // returns the bytes of the tile's pixels (Film::saver)
   std::vector<std::byte> errors;
   std::string health;
 };

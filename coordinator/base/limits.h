@@ -17,7 +17,7 @@ inline constexpr std::uint64_t kMaxBlobBytes = std::uint64_t{1} << 36;
 inline constexpr std::uint64_t kMaxBlobRead = std::uint64_t{256} << 20;  // bytes that one read() returns
 // Interrupted uploads that are kept so that they can be resumed
 inline constexpr std::size_t kMaxUnfinishedUploads = 1024;
-// Time between two checks for blobs that paused jobs need
+// A job is paused while a blob that it needs is missing. Time between two checks for these blobs
 inline constexpr Duration kMissingBlobLook = std::chrono::seconds(1);
 
 // Submission
@@ -38,15 +38,17 @@ inline constexpr std::size_t kMaxSequenceText = std::size_t{512} << 20;
 // Tiles of all frames together; each takes 24 bytes of memory from the start
 inline constexpr std::uint64_t kMaxSequenceTiles = std::uint64_t{1} << 24;
 inline constexpr std::size_t kMaxSequenceFiles = std::size_t{1} << 20;  // asset files of all frames together
-// Total pixels of the finished frames of a sequence that one change may resume
+// A change of a sequence may resume finished frames with at most this many pixels in total
 inline constexpr std::uint64_t kMaxWokenPixels = std::uint64_t{1} << 26;
-// Sequences with more frames than this send progress events less often
+// The more frames a sequence has, the fewer progress events it sends: with N frames at most one every
+// kProgressSeconds * (1 + N / kFramesPerEvent) seconds. Up to this many frames, the events that follow
+// submissions and commands of users are sent without delay
 inline constexpr std::size_t kFramesPerEvent = 2500;
 
 // Pictures and videos
 inline constexpr double kMaxExposure = 32;  // stops, positive or negative
 inline constexpr double kMinVideoFps = 1, kMaxVideoFps = 120;
-inline constexpr int kMaxVideoSide = 3840;  // pixels; larger images are shown at half the size, and so on
+inline constexpr int kMaxVideoSide = 3840;  // pixels; larger images are halved until they fit
 inline constexpr std::uint64_t kMaxVideoBytes = std::uint64_t{2} << 30;
 inline constexpr std::size_t kMaxVideosWaiting = 8;               // videos that wait while one is made
 inline constexpr Duration kMaxVideoTime = std::chrono::hours(1);  // time to make one video
@@ -73,7 +75,7 @@ inline constexpr int kVerifyThreads = 2;
 inline constexpr std::size_t kMaxWorkers = 16'384;
 
 // Snapshots of a job's image. A snapshot is taken when kSnapshotUnits units have been added to the image
-// since the previous one, or when kSnapshotSeconds have passed. Folding that many units again after a crash
+// since the previous one, or when kSnapshotSeconds have passed. Adding that many units again after a crash
 // takes about 2 s
 inline constexpr std::uint64_t kSnapshotUnits = 8192;
 inline constexpr double kSnapshotSeconds = 60;

@@ -116,8 +116,8 @@ class ByteBudget {
   bool closed_ = false;
 };
 
-// Calls act() again and again, each time after a pause of this length, until a stop is requested through
-// `token`. Blocks the calling thread.
+// Calls act() repeatedly, each time after waiting for `pause`, until a stop is requested through `token`.
+// Blocks the calling thread.
 template <class Act>
 void every(Duration pause, const std::stop_token& token, Act&& act) {
   std::mutex mutex;

@@ -5,25 +5,26 @@
 // The image's relMSE is the mean over its pixels. Take a group of p pixels whose relative variance per
 // sample, averaged over pixels and channels, is a. After n samples per pixel it adds p a / n to the sum over
 // the image's pixels, and it has cost p n samples. For a given total cost the sum is least if one more sample
-// lowers it equally in every group: where a / n^2 is equal, so n ~ sqrt(a). (Equal errors everywhere, n ~ a,
-// would cost as much as uniform sampling.) In rounds: let n_k be the samples per pixel up to the end of round
-// k. Group g continues after round k as long as its gain a / (n_k n_k+1), the error that the next round
-// removes per sample, exceeds a level common to all groups (marginal allocation, Fox 1966).
+// lowers it equally in every group: where a / n^2 is equal, so n is proportional to sqrt(a). (Equal errors in
+// all groups, with n proportional to a, would cost as much as uniform sampling.) In rounds: let n_k be the
+// samples per pixel up to the end of round k. Group g continues after round k as long as its gain
+// a / (n_k n_(k+1)), the error that the next round removes per sample, exceeds a level common to all groups
+// (marginal allocation, Fox 1966).
 //
 // The right level for a target is not known in advance, and must not depend on which results arrive first. So
 // the level falls step by step on a fixed grid, 2^(-j/4). At each level every group stops independently; when
 // all groups have stopped, the error of the image is predicted: either it meets the target, or the level
-// falls. Each state depends on the groups' errors alone, and the sequence of states does not even depend on
-// the target: a smaller target continues where a larger one ended, so an extended job has the same bits as
-// one that had the smaller target from the start.
+// falls. After which round each group stops at a level depends on the groups' errors alone, and the sequence
+// of levels does not even depend on the target: a smaller target continues where a larger one ended, so an
+// extended job has the same bits as one that had the smaller target from the start.
 //
 // The decision to stop after round k does not use the error after round k: a group's own last error would
 // bias the decision towards stopping. Instead the error after round k is predicted from the rounds before k,
 // with a variance that falls as 1/n. (Samplers that converge faster make the image better than requested.)
-// The image's error is predicted in the same way. If this prediction meets the target, the errors of the last
-// rounds are checked, too, and may make the image continue. No tile stops before kMinSppBeforeStop samples
-// per pixel. The cost per sample is taken to be equal everywhere: measured times would make pixels depend on
-// the machine. An unknown error (NaN) stops nothing.
+// The image's error is predicted in the same way. If this prediction meets the target, the error that was
+// estimated after the last rounds must meet it, too; otherwise the level falls. No tile stops before
+// kMinSppBeforeStop samples per pixel. The cost per sample is taken to be equal everywhere: measured times
+// would make pixels depend on the machine. An unknown error (NaN) stops nothing.
 //
 // Both this rule and the error estimates that it reads use only +, -, *, / and square roots, which give the
 // same bits on every machine: another coordinator that takes over the job makes the same decisions.
@@ -62,7 +63,7 @@ class AdaptiveStop {
   void folded(TileIndex tile, RoundIndex round, double rel_error_sum);
 
   // Returns the last round of the tile that is certain to be needed: rounds up to this one may be added to
-  // the image. If the image meets the target, this is the tile's last round.
+  // the image. If the image meets the target at the current level, this is the tile's last round.
   RoundIndex wanted(TileIndex tile) const { return groups_[group_of_[tile]].stop; }
 
   // Returns the group of tiles that stop together with this tile, including the tile itself.

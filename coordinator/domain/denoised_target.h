@@ -35,8 +35,9 @@ class DenoisedTarget {
   // `made` are the checks that are stored with the job.
   explicit DenoisedTarget(std::vector<DenoisedCheck> made = {}) : made_(std::move(made)) {}
 
-  // Decides whether the job ends at the level with `spp` samples per pixel. Levels come in order; the latest
-  // one may come again, with another target. `check`: the error of the denoised layers must be checked first.
+  // Decides whether the job ends at the level with `spp` samples per pixel. Calls must come in the order of
+  // levels; a call for the latest level may be repeated, with another target. `check`: the error of the
+  // denoised layers at this level must be checked first.
   enum class Answer { go_on, check, end };
   Answer judge(double spp, double target);
   void add(const DenoisedCheck& check);
@@ -45,7 +46,7 @@ class DenoisedTarget {
   // True if the level with `spp` samples per pixel is the latest one at which judge() requires a check.
   bool due(double spp) const { return spp == due_; }
 
-  // Predicts the factor by which the image's own error still falls until the job ends. Affects no pixel.
+  // Predicts the error of the image itself at the job's end, divided by its present error. Affects no pixel.
   double error_left(double target) const;
 
  private:

@@ -65,8 +65,8 @@ struct DropUnwanted {
   std::string why;
 };
 // Two results of one unit differ although they are of one numeric class (machines that compute the same
-// bits): a worker has bad memory or lies. A third worker decides (farm_trust.cpp); if there is none and the
-// second result is a vote, the job fails unless it has ended.
+// bits): a worker has bad memory or lies. A third worker decides (farm_trust.cpp); if there is none, and the
+// second result comes from a worker that held a lease on the unit, the job fails unless it has ended.
 struct DigestMismatch {
   UnitKey unit;
   Digest first, second;
@@ -92,17 +92,17 @@ struct Checkpoint {
   std::vector<RoundIndex> rounds;  // for each tile, how many of its rounds the checkpoint includes
   double spp = 0;                  // samples per pixel, mean over all pixels
 };
-// Compute the error of this job's denoised layers, to which its target error applies. The film is exactly
-// that of the level with `spp` samples per pixel, mean over all pixels, and stays so until the event
-// DenoisedChecked is raised. If the layers cannot be made, the service pauses the job; the farm repeats the
-// effect when the job is resumed.
+// Compute the error of this job's denoised layers, to which its target error applies. The film contains
+// exactly the rounds of the stop rule's current level (adaptive_stop.h), which has `spp` samples per pixel,
+// mean over all pixels. It does not change until the event DenoisedChecked is raised. If the layers cannot be
+// made, the service pauses the job; the farm repeats the effect when the job is resumed.
 struct CheckDenoised {
   JobId job;
   double spp = 0;
 };
 // The job has been extended, but its old sample count had truncated its last round, `round`. This round is
-// rendered again in full: the service replaces the part that is in the image (the tail), and the round's
-// partials are void.
+// rendered again in full: its pixel sums in the image (the tail) are replaced when the full round is added,
+// and its stored partials are void.
 struct ReopenRound {
   JobId job;
   RoundIndex round = 0;

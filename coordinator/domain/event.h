@@ -25,14 +25,14 @@ namespace ls::coordinator {
 struct JobPlan {
   JobBrief brief;
   TileGrid grid;
-  std::optional<std::uint64_t> spp;    // samples per pixel; nullopt: limits.h kMaxSppWithoutLimit
+  std::optional<std::uint64_t> spp;    // samples per pixel; nullopt: kMaxSppWithoutLimit (limits.h)
   std::optional<double> target_error;  // the job ends when the image has this relMSE
   bool target_denoised = false;        // target_error applies to the denoised layers instead
-  std::optional<double> time;          // the job ends this many seconds after the first ray
+  std::optional<double> time;          // the job ends this many seconds after the first ray, pauses excluded
   int priority = 0;                    // higher first
   std::vector<std::string> tags;       // a worker must have all of them
-  // Command that renders one sample again, to which the pixel and the sample are appended:
-  // common/job/replay_command.h
+  // Command that renders one sample again. replay_command() (common/job/replay_command.h) appends the pixel
+  // and the sample to it.
   std::string replay = "lightshaft render SCENE";
   // Limits and fair shares (fair_share.h, docs/design/scheduling.md)
   std::string owner;  // the user (JobView::owner); empty: the administrator, to whom no user limits apply
@@ -56,13 +56,14 @@ struct JobSubmitted {
   JobPlan plan;
 };
 
-// Sent after a restart, before any other event of the job.
+// Adds a stored job to the farm again, for example after a restart. It comes before any other event of the
+// job.
 struct JobRestored {
   struct Unit {
     TileIndex tile = 0;
     RoundIndex round = 0;
-    // The unit's sample range. If the job no longer needs this range (a truncated round that was extended
-    // since), the unit is ignored.
+    // The unit's sample range. The farm ignores the unit if the job needs another range now: the old sample
+    // count of the job had truncated the unit's round, and the job was extended since.
     SampleRange samples;
     Digest digest;
     WorkerId worker;
@@ -70,17 +71,17 @@ struct JobRestored {
   JobPlan plan;
   JobState state = JobState::queued;
   std::optional<StopReason> stopped;    // set for a job that is done
-  std::optional<Digest> numeric_class;  // the class that the job is pinned to
+  std::optional<Digest> numeric_class;  // the class of its results; nullopt: it has none yet
   std::vector<Unit> accepted;           // accepted results that still exist after the restart, in any order
-  // For each tile, how many rounds the restored image has, a truncated last round included. Empty: no image
-  // was restored. Required for a job that is done.
+  // For each tile, how many rounds the restored image has. A last round that the job's sample count truncates
+  // is included. Empty: no image was restored. Required for a job that is done.
   std::vector<RoundIndex> folded;
   // rel_error[round][tile]: UnitFolded::rel_error_sum of each round in the image; only for a job with a
   // target error
   std::vector<std::vector<double>> rel_error;
   double elapsed_seconds = 0;  // from the first ray until the restart
-  // An audit (an accepted result that another worker renders again) that was open at the restart
-  // (Farm::open_audits)
+  // An audit that was open at the restart (Farm::open_audits). In an audit another worker renders the unit of
+  // an accepted result again, for comparison.
   struct Audit {
     TileIndex tile = 0;
     RoundIndex round = 0;
@@ -123,9 +124,9 @@ struct JobRetargeted {
   JobId job;
   double target_error = 0;  // relMSE
 };
-// Raises the job's total of samples per pixel; the job may be running, paused or done. Once the job's end is
-// decided, its target error no longer applies, nor does a time limit that has passed: all tiles get the new
-// total.
+// Raises the job's total of samples per pixel; the job may be running, paused or done. If the last rounds of
+// all tiles are decided already, the job loses its target error, and all tiles get the new total. A time
+// limit that has passed is dropped, too.
 struct JobExtended {
   JobId job;
   std::uint64_t spp = 0;
@@ -184,8 +185,8 @@ struct LeaseCameBack {
 // Units
 
 // A verified result of this numeric class is about to be made durable. If the job has no class yet, it is
-// pinned to this one: from now on only workers of this class may render it. So its log never holds results of
-// two classes.
+// pinned to this one: from now on only workers of this class may render it. So the job's log never holds
+// results of two classes.
 struct ClassChosen {
   JobId job;
   Digest numeric_class;
@@ -210,8 +211,9 @@ struct UnitFolded {
   // TileError::relative.squares of common/image/error/error_estimate.h.
   double rel_error_sum = 0;
 };
-// The error of the denoised layers at a level of the stop rule, which the effect CheckDenoised (effect.h)
-// requested. It is stored already.
+// The error of the denoised layers has been computed, as the effect CheckDenoised (effect.h) requested. It is
+// the error at one level (a step of adaptive sampling, adaptive_stop.h). The service has already stored it
+// with the job.
 struct DenoisedChecked {
   JobId job;
   DenoisedCheck check;
@@ -223,7 +225,8 @@ struct UnitFailed {
   UnitFailure failure;
 };
 
-// Raised about once a second. Deadlines, speculation, forgiveness of failures and time limits depend on it.
+// Raised about once a second. Lease deadlines, copies of overdue units, forgiveness of failures and time
+// limits depend on it.
 struct Tick {};
 
 using Event =

@@ -1,6 +1,7 @@
 // Counts failed attempts to render a unit (one round of one tile). Decides when a unit has failed often
-// enough to fail its job, and when a worker gets no more units of a job. A lost worker, a missed deadline or
-// a returned lease is a failure of the infrastructure and is not counted.
+// enough to fail its job, and when a worker gets no more units of a job. Only failures to render count, not
+// those of the infrastructure: a lost worker, a missed deadline, or a lease (the list of units assigned to a
+// worker) that the worker gave back.
 #pragma once
 
 #include <algorithm>

@@ -1,13 +1,14 @@
-// Fair scheduling: the order in which jobs get leases. Higher priorities go first; within one priority, users
-// have equal shares, and so have the jobs of one user (a sequence counts as one job; its frames run in
-// order). Shares are measured in core seconds: those that results have reported plus those predicted for
-// leased units. The user or job with the smallest share goes next (start-time fair queueing, Goyal et al.
-// 1996, with measured instead of declared lengths).
+// Fair scheduling: the order in which units of jobs are leased, that is, assigned to workers. A unit is one
+// round (range of samples) of one tile. Higher priorities go first; within one priority, users have equal
+// shares, and so have the jobs of one user (a sequence counts as one job; its frames run in order). Shares
+// are measured in core seconds: those that results have reported plus those predicted for leased units. The
+// user or job with the smallest share goes next (start-time fair queueing, Goyal et al. 1996, with measured
+// instead of declared lengths).
 //
-// A user or job that arrives, or returns after a pause, starts at the share of the one that got the last
-// lease. So a user gains no turns by waiting, and loses none after having used the farm alone. If two users
-// both have work for all workers all the time, their shares differ by at most one lease each, plus errors of
-// prediction.
+// A user or job that arrives, or returns after a pause, starts at least at the share of the one that got the
+// last lease. So a user gains no turns by waiting, and loses none after having used the farm alone. If two
+// users both have work for all workers all the time, their shares differ by at most one lease each, plus
+// errors of prediction.
 //
 // Every operation costs O(log jobs).
 #pragma once
@@ -38,18 +39,18 @@ class FairShare {
   void charge(Job& job, double seconds);
   void spend(Job& job, double seconds);
   // Forgets users and groups without work whose share is not greater than the clock (the share of the user or
-  // group served most recently): if they come back, they start at the clock in any case. Also forgets all
-  // groups of a user without work.
+  // group served most recently): if they come back, they start at the clock whether or not their share was
+  // remembered. Also forgets all groups of a user without work.
   void tidy();
-  // leave() must be called before the job's priority changes, and enter() afterwards, which adds the core
-  // seconds of its leases at the new priority. The caller then offers the job again.
+  // Call leave() before the job's priority changes, and enter() afterwards: enter() adds the core seconds of
+  // the job's leases at the new priority. The caller then offers the job again.
   void leave(Job& job);
   void enter(Job& job);
 
   // Calls visit(job, lag) for the jobs that have units to lease, the next in turn first, until a call returns
-  // true; returns true if one did. `lag` is a number of core seconds: the excess of the job's user over the
-  // user who is first in turn, plus the excess of the job's group over the first group of that user. It is
-  // infinite below the highest priority that has units to lease.
+  // true; returns true if one did. `lag` is a number of core seconds: how much the share of the job's user
+  // exceeds that of the user who is first in turn, plus how much the share of the job's group exceeds that of
+  // the first group of the job's user. It is infinite below the highest priority that has units to lease.
   using Visit = std::function<bool(Job&, double lag)>;
   bool in_turn(const Visit& visit) const;
   // Notes that the job gets a lease: users and groups that arrive later start at the present shares of its

@@ -14,7 +14,8 @@ struct WebhookFigures {
   std::uint64_t delivered = 0, failed_attempts = 0, given_up = 0, waiting = 0;
 };
 
-// Why a unit (one round of one tile) left a worker's lease without a result.
+// Why a unit (one round of one tile) left a worker's lease (the list of units assigned to it) without a
+// result.
 enum class FreedCause {
   worker_lost,
   newer_stream,  // the worker has connected again
@@ -47,7 +48,7 @@ constexpr std::string_view to_string(FreedCause cause) {
   return "";
 }
 
-// Counters that the service keeps, of effects and of work outside the farm. All start at 0 when the
+// The service's counters of the effects that it has carried out and of its own work. All start at 0 when the
 // coordinator starts; members whose names end in _now are current values. A unit is one round (range of
 // samples) of one tile.
 struct FarmFigures {

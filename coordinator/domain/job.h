@@ -124,8 +124,8 @@ struct Audit {
   }
 };
 
-// A level of the adaptive stop rule (adaptive_stop.h). A checkpoint of the level's image is taken as soon as
-// the image has all its rounds.
+// A level of the adaptive stop rule (adaptive_stop.h). Its checkpoint is taken as soon as all its rounds are
+// in the image.
 struct LevelMark {
   std::vector<RoundIndex> rounds;  // for each tile, how many rounds it has at this level
   double spp = 0;                  // samples per pixel, mean over all pixels
@@ -162,7 +162,7 @@ struct Job {
   bool has_units = false;     // true if it had units to lease when this was last checked
   bool offered = false;       // true if FairShare lists it as a job that has units to lease
   double charge_out = 0;      // core seconds charged for units that are leased now (fair_share.h)
-  double checkpoint_spp = 0;  // samples per pixel at the last checkpoint of whole rounds
+  double checkpoint_spp = 0;  // samples per pixel at the latest checkpoint with the same rounds in all tiles
 
   std::optional<AdaptiveStop> adaptive;  // only for a job with a target error
   double level_seen = 0;                 // the level at which the image was judged most recently; 0: none
@@ -209,14 +209,15 @@ struct Job {
   void move_windows(int farm_threads);
   void move_window(TileIndex tile, int farm_threads);
   // Sets the end of each tile to ends[tile] rounds, unless it ends earlier already, and forgets accepted
-  // results of later rounds. `reason` is why the job ends. Does nothing if no tile ends earlier than before.
+  // results of later rounds. If this makes any tile end earlier, `stopping` becomes `reason`.
   void cut_off(const std::vector<RoundIndex>& ends, StopReason reason);
   void look_at_focus();  // applies JobPlan::focus to the order of the units
   void plan_all();       // sets every tile's end to the requested samples
   // Returns the time at which the job's time budget is used up; nullopt: the job has no time budget, or no
   // ray was traced yet.
   std::optional<TimePoint> time_limit(TimePoint now) const;
-  // Call stand_still() before and go_on() after a change of state that may stop or start the job's clock.
+  // stand_still() stops the job's clock at time `now`, and go_on() starts it again. Both do nothing if the
+  // clock is in that state already.
   void stand_still(TimePoint now);
   void go_on(TimePoint now);
 };

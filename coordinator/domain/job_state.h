@@ -1,4 +1,5 @@
-// The states of a job, as the farm decides them and users see them, with their names.
+// The states of jobs and workers, as the farm decides them, and the reasons why jobs stop, each with its name
+// for users.
 #pragma once
 
 #include <cstddef>
@@ -6,8 +7,8 @@
 
 namespace ls::coordinator {
 
-// `queued`: no unit has been leased yet. The last three are final, except that more samples or a smaller
-// target error resume a `done` job.
+// `queued`: no unit (round of a tile) has been assigned to a worker yet. The last three are final, except
+// that more samples or a smaller target error resume a `done` job.
 enum class JobState { queued, running, paused, done, failed, cancelled };
 constexpr std::string_view to_string(JobState state) {
   constexpr std::string_view kWords[] = {"queued", "running", "paused", "done", "failed", "cancelled"};
@@ -26,7 +27,8 @@ constexpr std::string_view to_string(StopReason reason) {
   return kWords[static_cast<std::size_t>(reason)];
 }
 
-// A worker is unhealthy if it failed in two jobs, or is quarantined. In the HTTP API this state is "sick".
+// A worker is unhealthy if it has failed repeatedly in two jobs (kUnhealthyJobs), or is quarantined. In the
+// HTTP API this state is "sick".
 enum class WorkerState { connected, draining, lost, unhealthy };
 constexpr std::string_view to_string(WorkerState state) {
   constexpr std::string_view kWords[] = {"connected", "draining", "lost", "sick"};

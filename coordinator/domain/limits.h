@@ -18,12 +18,12 @@ using namespace std::chrono_literals;
 // The sample limit, per pixel, of a job that gives only a target error or a time
 inline constexpr std::uint64_t kMaxSppWithoutLimit = 65536;
 
-// Digits of a numeric class in messages
+// Messages name a numeric class by this many hexadecimal digits
 inline constexpr std::size_t kClassDigits = 12;
 
 // Leases
 inline constexpr double kLeaseSeconds = 2.0;  // work that a lease should give to all threads of a worker
-// Lower bound for the share of a core that a worker's thread gets
+// The share of a core that a worker's thread gets (CoreShare in worker_table.h) is taken to be at least this
 inline constexpr double kLeastCoreShare = 1.0 / 64;
 // A lease has at most this many units, so that the message that assigns it stays well below 1 MiB
 inline constexpr std::uint32_t kMaxLeaseUnits = 1024;
@@ -31,11 +31,13 @@ inline constexpr std::uint32_t kMaxLeaseUnits = 1024;
 inline constexpr std::uint32_t kQueuedLeases = 3;
 // Units per thread that a worker holds, even if units take long: one that it renders, and one that waits
 inline constexpr std::uint32_t kUnitsAThread = 2;
-// Speculative units (the job may end without them) go only to workers whose queued work takes less than this
-// many seconds. With 0 a worker would idle between two small units until the next message.
+// A speculative unit (the job may end without it) goes only to a worker that holds fewer than kUnitsAThread
+// units per thread, or whose leased work takes less than this many seconds. With 0 a worker would idle
+// between two small units until the next message.
 inline constexpr double kSpeculativeSeconds = .05;
-inline constexpr std::uint32_t kMaxLeasesPerWorker = 64;  // applies near the end of a job, when a lease is a
-                                                          // single unit
+// A worker holds at most this many leases. This matters near the end of a job, when a lease may be a single
+// unit
+inline constexpr std::uint32_t kMaxLeasesPerWorker = 64;
 // A lease's deadline is this many times its predicted duration after it was granted, plus kDeadlineSlack and
 // perhaps kLoadSlack
 inline constexpr double kDeadlineFactor = 3.0;
@@ -85,7 +87,7 @@ inline constexpr RoundIndex kRoundsAhead = 64;  // bounds how many results wait 
 // Failures
 
 // A job fails when one of its units has failed on kUnitFailureWorkers distinct workers and in at least
-// kUnitFailureAttempts attempts. Fewer workers are enough if fewer are connected
+// kUnitFailureAttempts attempts. Fewer workers are enough if fewer connected workers could render the job
 inline constexpr std::uint32_t kUnitFailureWorkers = 3;
 inline constexpr std::uint32_t kUnitFailureAttempts = 2;
 // After this many failures a worker gets no more units of the job
@@ -95,8 +97,8 @@ inline constexpr std::uint32_t kUnhealthyJobs = 2;
 // A worker's failures are forgiven this long after the latest of them
 inline constexpr Duration kForgiveAfter = 1800s;
 inline constexpr Duration kForgetWorkerAfter = 3600s;  // a worker is forgotten this long after it was lost
-// Number of names of departed workers that are kept before unused ones are dropped
-// (WorkerTable::has_many_names)
+// Unused names of workers are dropped when the number of all names exceeds twice the number that the previous
+// such cleanup kept, plus this (WorkerTable::has_many_names)
 inline constexpr std::size_t kNamesKept = 256;
 inline constexpr std::uint32_t kMaxNamedWorkers = 8;  // one message names at most this many workers
 
@@ -105,14 +107,14 @@ inline constexpr std::uint32_t kMaxNamedWorkers = 8;  // one message names at mo
 // samples per pixel that every tile gets before its error may stop it
 inline constexpr std::uint64_t kMinSppBeforeStop = 64;
 inline constexpr int kMinStopPixels = 1024;  // fewest pixels in a group of tiles that stop together
-// Seconds of work that the leases of a worker hold. The end of a job is planned when its time limit is less
-// than twice this away.
+// Seconds of work that the leases of a worker hold. The last units of a job are chosen (farm_stop.cpp:
+// plan_end) when its time limit is at most twice this away.
 inline constexpr double kTimePlanned = kQueuedLeases * kLeaseSeconds;
 // The next checkpoint is made at a level of the stop rule with at least this many times the samples of the
 // previous checkpoint's level (except at the last level)
 inline constexpr double kCheckpointGrowth = 1.15;
-// The same for levels at which the error of the denoised layers is checked: denoising takes as long as a few
-// samples per pixel
+// The error of the denoised layers is checked again at a level with at least this many times the samples of
+// the previous check's level. The factor is larger, since denoising takes as long as a few samples per pixel
 inline constexpr double kDenoisedCheckGrowth = 1.4;
 
 }  // namespace ls::coordinator

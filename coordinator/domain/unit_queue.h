@@ -1,9 +1,9 @@
 // The units of a job that wait for a worker; a unit is one round (range of samples) of one tile. Each tile
 // has its own end, since the tiles of an adaptive job (one with a target error) stop after different numbers
 // of rounds. The waiting units of a tile are all rounds from `next` to its end, and earlier rounds that were
-// leased and came back without a result. Lower rounds go first, so that a complete picture is available
-// early. In an adaptive job some rounds are speculative: the job may end without them. They go after all
-// certain rounds, in the order in which the stop rule (adaptive_stop.h) would request them.
+// leased (assigned to a worker) and came back without a result. Lower rounds go first, so that a complete
+// picture is available early. In an adaptive job some rounds are speculative: the job may end without them.
+// They go after all certain rounds, in the order in which the stop rule (adaptive_stop.h) would request them.
 //
 // A focus is a set of tiles whose certain units go before those of all other tiles. It changes only the order
 // of units, not which units belong to the job and which of them are certain. The order of speculative units
@@ -218,7 +218,8 @@ class UnitQueue {
     if (perhaps_.size() > 2 * next_.size()) return offer_all_perhaps();
     perhaps_.push({gain(code), code});
   }
-  // Rebuilds perhaps_ without its outdated entries, which bounds their number.
+  // Rebuilds perhaps_ without its outdated entries. offer() calls it when perhaps_ has more than two entries
+  // per tile, so the number of entries is bounded.
   void offer_all_perhaps() {
     std::vector<Perhaps> all;
     for (TileIndex t = 0; t < tiles(); ++t) {
@@ -247,8 +248,8 @@ class UnitQueue {
     if (returned_count() == 0) return;
     for (RoundIndex k = round; k < next_[tile]; ++k) forget(unit_code(k, tile));
   }
-  // Moves the tile's returned units between the two sets when the end of its certain rounds changes from
-  // `from` to `to`.
+  // Moves units of the tile that came back between the set of certain units and that of speculative ones,
+  // when the end of the tile's certain rounds changes from `from` to `to`.
   void sort_returned(TileIndex tile, RoundIndex from, RoundIndex to) {
     if (returned_count() == 0) return;
     auto& surely = line_of(tile).returned;

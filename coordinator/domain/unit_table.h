@@ -26,7 +26,7 @@ inline constexpr WorkerIndex kNoWorker = ~WorkerIndex{0};
 class UnitTable {
  public:
   struct Result {
-    Digest digest;  // all zero: unknown (in the image since before a restart that lost the record)
+    Digest digest;  // all zero: unknown, since a restart found the unit in the image but not its record
     WorkerIndex worker = kNoWorker;
   };
 

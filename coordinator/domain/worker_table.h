@@ -90,9 +90,9 @@ struct Worker {
     const auto it = failures.find(job);
     return it != failures.end() && it->second.blocked_at(now);
   }
-  // True if the worker should get another lease: it holds fewer than kUnitsAThread units per thread, or fewer
-  // than kQueuedLeases leases with less work than that many full leases (kLeaseSeconds each). It never holds
-  // more than kMaxLeasesPerWorker leases.
+  // True if the worker should get another lease: it holds fewer than kUnitsAThread units per thread, or it
+  // holds fewer than kQueuedLeases leases, and its leased work takes less time than kQueuedLeases full leases
+  // (kLeaseSeconds each). It never holds more than kMaxLeasesPerWorker leases.
   bool wants_more() const {
     if (leases.size() >= kMaxLeasesPerWorker) return false;
     if (units_out < kUnitsAThread * static_cast<std::uint32_t>(threads)) return true;
@@ -116,15 +116,16 @@ class WorkerTable {
   Worker* find(const WorkerId& id);
   const Worker* find(const WorkerId& id) const;
   const WorkerId& name_of(WorkerIndex index) const { return ids_[index]; }
-  // Also accepts ids, from stored records, of workers that never connected to this farm
+  // Returns the index of this id, and gives it one if it has none. The id may come from a stored record and
+  // belong to a worker that never connected to this farm.
   WorkerIndex index_of(const WorkerId& id);
   void forget(Worker& worker);
   // True if it is time for keep_names(). Names accumulate: results refer to workers that are gone, and
   // preemptible workers bring new names every hour.
   bool has_many_names() const { return index_.size() > 2 * kept_ + kNamesKept; }
   std::size_t names() const { return index_.size(); }
-  // Forgets all names except those of known workers and of indices marked in `used`, and reuses their
-  // indices.
+  // Forgets all names except those of known workers and of indices marked in `used`. The indices of forgotten
+  // names are given to new names.
   void keep_names(std::vector<bool> used);
   std::vector<bool> no_index() const { return std::vector<bool>(ids_.size()); }
 
@@ -143,7 +144,8 @@ class WorkerTable {
   // Adds a measurement to the worker's core share
   void measured(Worker& worker, double cpu_seconds, double wait_seconds);
   void quarantine(Worker& worker);
-  // Workers that are connected and not quarantined: those of this numeric class, and all of them.
+  // of_class() counts the workers of this numeric class, of_all_classes() those of all classes. Both count
+  // only workers that are connected and not quarantined.
   struct Count {
     int workers = 0, threads = 0;
   };
@@ -171,7 +173,7 @@ bool holds(const Job& job, const Worker& worker);
 // True if the user requests no numeric class for the job, or that of this worker (JobPlan::class_asked).
 bool of_class_asked(const Job& job, const Worker& worker);
 // True if the worker has the job's numeric class (or may begin a job that has none yet), the requested class
-// and the job's tags, has enough memory, and is not quarantined. Whether the worker is busy does not matter.
+// and the job's tags, has enough memory, and is not quarantined. The worker may be busy or lost.
 bool fits(const Job& job, const Worker& worker);
 // True if the worker fits the job and may also take units of it now.
 bool may_serve(const Job& job, const Worker& worker, TimePoint now);

@@ -336,8 +336,9 @@ void FarmDriver::on(const CheckDenoised& e) {
   if (entry && entry->assembly) images_.check_denoised(core_, entry, e.spp);
 }
 
-// If a job ends by time or is cancelled, its final image may have more samples than its last checkpoint. The
-// curve then gets a last point for the final image, so that the curve agrees with the report.
+// If a job ends between two checkpoints (by time, by its user or by a failure), its final image has more
+// samples than its last checkpoint. The curve then gets a last point for the final image, so that the curve
+// agrees with the report. An image that misses samples in some pixels gets no such point.
 void FarmDriver::end_curve(const EntryPtr& entry) {
   if (entry->assembly->film().pixels_without_samples() > 0) return;
   const ImageError error = image_error(entry->assembly->film().error());

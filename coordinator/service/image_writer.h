@@ -1,5 +1,6 @@
 // Writes the files of a job, on the writer thread: the list of open audits (units that are rendered again for
-// comparison), snapshots from time to time, and at the end the final image and the report.
+// comparison), snapshots (the image so far, for a restart) from time to time, and at the end the final image
+// and the report.
 #pragma once
 
 #include "common/base/guarded.h"

@@ -14,7 +14,7 @@
 namespace ls::coordinator {
 namespace {
 
-// Checks the rules that jobs and sequences share.
+// Checks the rules that hold for changes of jobs and of sequences alike.
 Result<void> check(const JobChange& change) {
   if (change.priority && std::abs(std::int64_t{*change.priority}) > kMaxPriority)
     return fail(Errc::invalid_argument, fmt::format("priority must be within +-{}", kMaxPriority));

@@ -163,7 +163,8 @@ Result<std::string> Pictures::log(const JobId& id) const {
   return log_text(all);
 }
 
-// Frames without results have no pixel digest.
+// Returns the report of a sequence. Its pixels_sha256 is the digest of the frames' pixel digests, or null if
+// some frame is not done.
 std::string Pictures::sequence_report(const JobView& view) const {
   static constexpr const char* kKept[] = {"seed",
                                           "scene",

@@ -1,6 +1,7 @@
-// Compares pictures of jobs with their reference images, if they have any. The picture of every checkpoint is
-// compared on a separate thread, the comparing thread, since a comparison takes longer than a checkpoint. A
-// job's final image and report wait for its comparisons.
+// Compares pictures of jobs with their reference images, if they have any. The picture of every checkpoint (a
+// state of the image that becomes a point of the convergence curve) is compared on a separate thread, the
+// comparing thread, since a comparison takes longer than a checkpoint. A job's final image and report wait
+// for its comparisons.
 #pragma once
 
 #include <functional>

@@ -99,7 +99,9 @@ Result<void> Restore::take_up(Core& core, JobEntry& entry,
   if (auto loaded = load(core, entry); !loaded) return loaded;
   const bool begins_again =
       entry.assembly->film().samples() == 0 && (!entry.log || entry.log->found().empty());
-  // Rendering again gives the same pixels, unless some were wrong
+  // If some pixels were wrong, the points of the curve and the checks of the denoised layers describe them
+  // and are dropped. If the image is only lost, rendering again gives the same pixels, so the checks stay
+  // valid.
   if (has_quarantined(core.driver.farm(), entry))
     core.records.forget_wrong_pixels(entry);
   else if (begins_again)

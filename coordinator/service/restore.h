@@ -1,6 +1,7 @@
 // Adds stored jobs to the farm again: at a restart, when a job of another coordinator is taken over, and when
-// an ended job is extended. Images come from snapshots. Results that a snapshot does not contain are folded
-// again from the logs of partials (the encoded results of units).
+// an ended job is extended. Images come from snapshots (files with the image so far). Results that a snapshot
+// does not contain are read from the logs of partials (the encoded results of units) and added to the image
+// again.
 #pragma once
 
 #include <vector>

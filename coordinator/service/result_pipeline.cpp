@@ -43,7 +43,7 @@ void ResultPipeline::receive(const std::shared_ptr<Connection>& from, UnitResult
   {
     const auto core = core_.lock();
     core->figures.result_bytes += arrived.result.exr.size();
-    // The stream was replaced: the worker sends the result again over the newer one
+    // If the stream is closed already, the worker sends the result again over its next stream
     if (!from->open) return next();
     const Farm& farm = core->driver.farm();
     const UnitKey& unit = arrived.result.unit;
@@ -60,8 +60,8 @@ void ResultPipeline::receive(const std::shared_ptr<Connection>& from, UnitResult
     arrived.expected = {arrived.job->stored.scene, arrived.job->settings_digest, from->numeric_class,
                         wanted.rect, wanted.samples};
   }
-  // Space for the message and for the floats decoded from it. If there is no room, only this worker's stream
-  // waits; no thread blocks.
+  // The result needs memory for the message and for the floats decoded from it. If there is no room, only
+  // this worker's stream waits; no thread blocks.
   arrived.bytes = 2 * arrived.result.exr.size();
   const std::size_t bytes = arrived.bytes;
   from->held_back = true;

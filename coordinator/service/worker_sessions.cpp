@@ -62,7 +62,8 @@ class WorkerSessions::Session final : public WorkerSession {
       : sessions_(sessions), alive_(sessions.alive_), connection_(std::move(connection)) {}
   ~Session() override { disconnected(); }
   void receive(FromWorker message) override {
-    // This blocks until there is room, or until the coordinator ends, which breaks the promise.
+    // This blocks until there is room for the message, or until the coordinator ends: the std::promise is
+    // then destroyed, which also ends the wait.
     auto room = std::make_shared<std::promise<void>>();
     const auto granted = room->get_future();
     receive(std::move(message), [room = std::move(room)] { room->set_value(); });
@@ -149,8 +150,8 @@ void WorkerSessions::handle(Core& core, Connection& from, FromWorker message) {
       overloaded{[](const UnitResult&) {}, [](const WorkerHello&) {},
                  [&](const WorkerProgress& m) { note_progress(core, from, found->second, m); },
                  [&](const UnitFailure& m) {
-                   // The acknowledgement is sent first: sent later, the worker could mistake it for
-                   // the answer to its next attempt.
+                   // The acknowledgement is sent first: if it came later, the worker could mistake it for the
+                   // answer to its next attempt.
                    from.sink->send(ResultAck{m.unit, std::nullopt});
                    if (!core.jobs.find(m.unit.job)) return;  // unknown jobs have no log
                    core.records.log(m.unit.job, fmt::format("tile {} round {} failed on {}: {}", m.unit.tile,

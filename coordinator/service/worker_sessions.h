@@ -1,4 +1,5 @@
-// The streams of workers: how workers join, the messages that they send, and how they leave.
+// The streams of workers: how workers join, the messages that they send, and how they leave. A lease is a
+// list of units (rounds of tiles) that is assigned to one worker until a deadline.
 #pragma once
 
 #include <functional>

@@ -60,8 +60,8 @@ class AtomicFile {
   Result<void> write_at(std::uint64_t offset, std::span<const std::byte> bytes);
   Result<void> sync();
   Result<void> commit();  // includes sync()
-  // Like commit(), but without sync(). After a crash of this process the file has its new content; after a
-  // power failure it may have the old content or be missing.
+  // Like commit(), but without sync(). If this process is killed afterwards, the file has its new content;
+  // after a power failure it may have the old content, be incomplete or be missing.
   Result<void> commit_unsynced();
 
  private:
@@ -72,7 +72,8 @@ class AtomicFile {
   File file_;  // has no descriptor after a move or a commit
 };
 
-// Locks `folder` for this process until destroyed. failed_precondition if another process holds it.
+// Locks `folder` for this process until the returned file is destroyed. failed_precondition: another process
+// holds the lock.
 Result<File> lock_folder(const std::filesystem::path& folder);
 
 }  // namespace ls::coordinator

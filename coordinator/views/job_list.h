@@ -25,7 +25,7 @@ struct JobsAsked {
   std::function<bool(const std::string& owner)> visible;
   std::set<JobState> states;  // states to list; empty: all
   std::optional<std::string> owner;
-  std::string search;     // part of the name or the id; case does not matter
+  std::string search;     // part of the name or the id, in upper or lower case
   double since_unix = 0;  // lists only jobs submitted at this time or later
   JobOrder by = JobOrder::order;
   bool descending = false;

@@ -55,7 +55,8 @@ inline void TimeSplit::add(const TimeSplit& o) {
 
 inline constexpr int kMoreWorkers = 8;  // number of workers that JobView::eta_with_more assumes in addition
 
-struct ErrorFigures {  // Estimated errors of the image up to the last round that was complete in all tiles
+// Estimated errors of an image: at a checkpoint, or at the end of the job
+struct ErrorFigures {
   double rmse = 0;
   double relmse = 0;
   // 95 % interval for the actual relMSE of this image
@@ -208,7 +209,7 @@ struct PixelsAsked {
 struct VideoAsked {
   double fps = 24;        // pictures per second
   double exposure = 0;    // stops
-  bool denoised = false;  // the denoised images, of a job with JobSpec::denoise
+  bool denoised = false;  // true: shows the denoised images; requires JobSpec::denoise
 };
 enum class VideoState { none, waiting, making, ready, failed };
 struct VideoView {
@@ -256,8 +257,9 @@ struct SubmitRequest {
   // The files that the scene may name; their blobs must be in the store
   std::map<std::string, Digest> assets;
   JobSpec spec;
-  std::string owner = {};        // the user who submits it: JobView::owner
-  std::string traceparent = {};  // header of the request (common/trace/context.h); anything else is ignored
+  std::string owner = {};  // the user who submits it: JobView::owner
+  // Header `traceparent` of the user's request (common/trace/context.h); a malformed one is ignored
+  std::string traceparent = {};
 };
 struct Rejected {
   Error error;

@@ -1,5 +1,6 @@
 // The notifications that receivers have not accepted yet: a queue for each receiver in memory, and a copy on
-// disk. If the coordinator is killed, it sends them after its next start.
+// disk, in the folder DIR (webhooks in the folder of --data). If the coordinator is killed, it sends them
+// after its next start.
 //
 //   DIR/open/JOB               exists until a notification of the job's end has been stored
 //   DIR/RECEIVER/NUMBER.json   a delivery (one notification to one receiver) that is not accepted yet;

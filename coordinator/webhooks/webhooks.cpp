@@ -135,7 +135,8 @@ class Webhooks::Impl {
   }
 
  private:
-  // Reports ends of jobs from before this start that a crash left unreported.
+  // Reports the ends of jobs that an earlier run did not report because it was killed. Then notes the
+  // present states of all jobs, so that only later changes are reported.
   void catch_up(Coordinator& coordinator) {
     const std::set<JobId> open = state_.lock()->outbox.open_jobs();
     for (const JobId& job : open) {

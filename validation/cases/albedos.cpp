@@ -24,8 +24,8 @@ void white(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     for (const double tau : {1e-6, 1., 64.}) {
       for (const double g : {0., .9999}) {
-        // Russian roulette acts on paths of more than 1024 vertices, which then do not all weigh 1. At depth
-        // 64 with g = 0 such paths occur; in the other cases nearly all paths are shorter.
+        // Russian roulette acts on paths of more than 1024 vertices, so their weights are not all 1. At
+        // depth 64 with g = 0 such paths occur; in the other cases nearly all paths are shorter.
         if (tau > 1 && g == 0) continue;
         t.exact(fmt::format("N16-white-depth-{:g}-g-{:g}{}", tau, g, configuration.name()), "N16 N17 7.6c",
                 "Albedo 1 in a white sky: every path weighs 1 exactly, in every sample.",
@@ -60,8 +60,9 @@ void all_but_white(Table& t) {
   }
 }
 
-// The transmittance of a deep white slab at normal incidence, T = (4/3) K / (tau + 1.42089), with K = sqrt(3)
-// / 4 H(1), H(1) = 2.907811. Already at tau = 16 it equals the tabulated 0.096368 to all digits.
+// The transmittance of a deep white slab at normal incidence, T = (4/3) K / (tau + 1.42089), with
+// K = (sqrt(3) / 4) H(1) and H(1) = 2.907811. Already at tau = 16 it equals the tabulated 0.096368 to all
+// digits.
 double white_transmittance(double tau) { return std::sqrt(3.) / 3 * 2.907811 / (tau + 1.42089); }
 
 void deep(Table& t) {

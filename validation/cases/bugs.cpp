@@ -1,6 +1,6 @@
 // Three bugs that other renderers have had, each with cases that fail for a renderer that has it
-// (docs/design/validation.md describes how this is checked): a phase function clamped to |g| = 0.99, 1 - exp
-// of a thin depth, and 0 / 0 at null collisions.
+// (docs/design/validation.md describes how this is checked): a phase function clamped to |g| = 0.99, the
+// cancellation in 1 - exp(-tau) at small optical depths tau, and 0 / 0 at null collisions.
 #include <fmt/format.h>
 
 #include <cmath>

@@ -138,8 +138,9 @@ void sheets(Table& t) {
       1e-4);
 }
 
-// Plastic lit along its normal and seen at 60 degrees from it. Fresnel's amplitudes for these 60 degrees are
-// r_s = (cos i - n cos t) / (cos i + n cos t), and r_p likewise.
+// Plastic lit along its normal and seen at i = 60 degrees from it. With t the angle of refraction, the
+// amplitudes of Fresnel reflection are r_s = (cos i - n cos t) / (cos i + n cos t) and
+// r_p = (n cos i - cos t) / (n cos i + cos t).
 void plastic_by_the_sun(Table& t) {
   const double n = 1.5, ci = .5, ct = std::sqrt(1 - .75 / (n * n));
   const double rs = (ci - n * ct) / (ci + n * ct), rp = (n * ci - ct) / (n * ci + ct);

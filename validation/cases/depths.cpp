@@ -44,8 +44,9 @@ void nothing(Table& t) {
   }
 }
 
-// The radiance of a ray of unit length through a medium that emits eps per length: L = eps (1 - e^-tau) /
-// sigma. The estimate has no variance, except in macro cells of grids that a tracker samples.
+// The radiance of a ray of unit length through a medium that emits eps per length:
+// L = eps (1 - e^-tau) / sigma. The estimate has no variance, except in those macro cells of grids in which
+// a tracker (an algorithm that steps from collision to collision) samples free flights.
 void emission(Table& t) {
   for (const Configuration& configuration : both_media()) {
     for (const double tau : kThin) {
@@ -102,12 +103,12 @@ void opaque(Table& t) {
               });
     }
   }
-  // The answers are 1 - sqrt(1 - a) H(1), Chandrasekhar 1950, to six digits, with a the albedo. From depth
+  // The answers are 1 - sqrt(1 - a) H(1), with a the albedo (Chandrasekhar 1950), to six digits. From depth
   // 1e5 on, the mean free path is shorter than the offset of rays from surfaces (2^-20 of the world), so the
   // distance to the face must be measured from the path's true position. At depth 1e6 the mean free path is
-  // 17 ulps of float32 at the face's height. Next to the face the renderer therefore sums over float32
-  // positions (a trapezoidal sum) instead of integrating. For isotropic scattering, with the integral of
-  // E_2(z) dz, that sum is 3.1e-3 too large.
+  // 17 ulps of float32 at the face's height. Next to the face the renderer then computes a trapezoidal sum
+  // over float32 positions z instead of an integral over z. For isotropic scattering the integrand is
+  // E_2(z), the second exponential integral, and the sum is 3.1e-3 too large.
   constexpr double kDigits = 2e-6, kPlaces = 3.1e-3;
   for (const Configuration& configuration : all_configurations()) {
     for (const double tau : {1e3, 1e5, 1e6}) {

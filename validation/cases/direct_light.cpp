@@ -10,8 +10,8 @@ namespace ls::cases {
 namespace {
 
 void direct(Table& t) {
-  // BSDF sampling hits the smallest of these lights once in 40,000 paths, and finds a correspondingly small
-  // share of its light.
+  // BSDF sampling hits the smallest of these lights with one path in 40,000, so it contributes only a small
+  // share of the light.
   const auto add = [&](const char* name, SceneBuilder builder, double irradiance) {
     t.mean(std::string("7.6g-") + name, "7.6g N26", "Direct light on a floor, by the light's closed form.",
            std::move(builder), reflected(irradiance), {.slack = 5e-5});
@@ -68,9 +68,10 @@ void direct(Table& t) {
   }
 }
 
-// The reflectance of m plates of n = 1.5 at normal incidence, in front of black: 1 - T with T = (1 - r) / (1
-// + (2 m - 1) r), since each face reflects r = 0.04. For 500 plates, a thousand interfaces, T = 3 / 128. The
-// band, half a per cent of the reflectance, is a fifth of T. Paths have a thousand vertices on average.
+// The reflectance of m plates of n = 1.5 at normal incidence, in front of black, is 1 - T with
+// T = (1 - r) / (1 + (2 m - 1) r), since each face reflects r = 0.04. For 500 plates, a thousand interfaces,
+// T = 3 / 128. The band, half a per cent of the reflectance, is a fifth of T. Paths have a thousand vertices
+// on average.
 void plates(Table& table, int m) {
   SceneBuilder builder;
   const BsdfIndex glass = builder.glass(1.5), black = builder.diffuse(0);

@@ -91,7 +91,7 @@ void paths(Table& t) {
       }
 }
 
-// A furnace: everything is white, whatever the shape, the coat and the phase function.
+// A furnace: every pixel is white, with any shape, coating and phase function.
 void furnaces(Table& t) {
   for (const bool grid : {false, true})
     for (const double g : {-.5, .9})

@@ -11,9 +11,9 @@
 namespace ls::cases {
 namespace {
 
-// The unit cube with densities that vary along x only, seen along x in front of a white environment:
-// trilinear between the voxels' centres and constant in the outer halves, so that the mean of the voxels is
-// exactly the integral.
+// The unit cube with densities that vary along x only, seen along x in front of a white environment. They
+// are linear between the voxels' centres and constant in the outer halves of the first and last voxel, so
+// that the mean of the voxels is exactly the integral.
 SceneBuilder layered(const std::vector<float>& values, double sigma) {
   SceneBuilder builder;
   const BsdfIndex null = builder.null();
@@ -33,8 +33,8 @@ std::vector<float> sampled(F density, int n) {
   return v;
 }
 
-// The mean of the voxels is a midpoint sum of the density, which is accurate to f'' / (24 n^2): below 1e-6 of
-// the depth for 256 voxels.
+// The mean of the n voxels is a midpoint sum of the density f, with an error of about f'' / (24 n^2): below
+// 1e-6 of the depth for 256 voxels.
 void atmospheres(Table& t) {
   const auto add = [&](const char* name, const char* about, auto density, double depth) {
     t.mean(fmt::format("7.6a-{}/grid/volpath", name), "7.6a", about,
@@ -52,10 +52,10 @@ void atmospheres(Table& t) {
 }
 
 // The mean path length in a ball is 4V/S = 4R/3, whatever scatters inside (Blanco and Fournier 2003). So
-// mean(1 - L) = sigma_a 4R/3, less a relative correction of sigma_a <l^2> / (2 <l>). That is sigma_a times
-// the mean remaining path length from a point inside: 0.75 R without scattering, to which diffusion adds
-// about R^2 sigma_s / 5 = 0.4 R, so less than 2 R. A path's weight is a product of albedos, each rounded by
-// 2^-25; relative to sigma_a / sigma_t = 5e-4 this is an error of 6e-5.
+// mean(1 - L) = sigma_a 4R/3, less a relative correction of sigma_a <l^2> / (2 <l>), with l the length of a
+// path. That is sigma_a times the mean remaining path length from a point inside: 0.75 R without scattering,
+// to which diffusion adds about R^2 sigma_s / 5 = 0.4 R, so less than 2 R. A path's weight is a product of
+// albedos, each rounded by 2^-25; relative to sigma_a / sigma_t = 5e-4 this is an error of 6e-5.
 void mean_paths(Table& t) {
   constexpr double kAbsorption = 1e-3, kScattering = 2, kDistance = 1000, kMargin = 1.01;
   for (const Configuration& configuration : all_configurations()) {
@@ -85,8 +85,9 @@ void mean_paths(Table& t) {
   }
 }
 
-// A practically infinite medium of extinction 1, seen in all directions from (r, 0, 0): its black boundary is
-// so far away that e^(-2 kappa R) of the light is missing, kappa = 0.055 at albedo 0.999.
+// A practically infinite medium of extinction 1, seen in all directions from (r, 0, 0). It ends at a black
+// sphere of so large a radius R that only a share e^(-2 kappa R) of the light is missing, where kappa, the
+// rate at which fluence decays with distance, is 0.055 at albedo 0.999.
 SceneBuilder endless(double albedo, double r, MediumIndex* medium) {
   SceneBuilder builder({64, 64});
   *medium = builder.homogeneous(rgb(1), rgb(albedo));
@@ -126,8 +127,9 @@ void endless_medium(Table& t) {
   }
 }
 
-// A point light, which no camera sees directly: the answer is its fluence without the direct part e^-r / (4
-// pi r^2). The lower the albedo, the heavier the tails of the estimates, so only high albedos are tested.
+// A point light, which no camera sees directly: the answer is its fluence without the direct part
+// e^-r / (4 pi r^2). The lower the albedo, the heavier the tails of the estimates, so only high albedos are
+// tested.
 void endless_lamp(Table& t) {
   struct Row {
     double c, r;

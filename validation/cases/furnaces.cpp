@@ -60,8 +60,8 @@ void white_sky(Table& t) {
     }
   }
   {
-    // Some macro cells are so dense that the field is integrated voxel by voxel; in the others a tracker
-    // samples tentative collisions.
+    // Some macro cells are so dense that the field is integrated voxel by voxel; in the others a tracker (an
+    // algorithm that steps from collision to collision) samples tentative collisions.
     SceneBuilder builder;
     const VolumeIndex v = builder.grid({12, 9, 7}, patchy(12 * 9 * 7, 6), kBox);
     builder.container(CubeShape{}, {}, builder.null(), builder.heterogeneous(v, rgb(1), 30, .8));
@@ -123,7 +123,8 @@ void shining_walls(Table& t) {
     for (int i = 0; i < 6; ++i) {  // each at distance 1, facing the origin
       const Transform to_world = sides[i] * translate({0, 0, -1});
       if (i == 5) {
-        // The window to the environment, which ends the medium; its normal points inwards.
+        // The window, through which the environment is seen; the medium ends at it. Its normal points
+        // inwards.
         Shape& window = builder.shape(RectangleShape{}, to_world, open);
         window.exterior = m;
         window.is_medium_transition = true;

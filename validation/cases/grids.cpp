@@ -207,8 +207,8 @@ void along_faces(Table& t) {
           grey(shown(std::exp(-tau), shadow)));
     }
   }
-  // The density x y z over the unit cube, given at the grid's nodes. Along the diagonal, of length sqrt(3),
-  // it is t^3.
+  // The density x y z over the unit cube, given at the grid's nodes. On the diagonal, whose length is
+  // sqrt(3), it is t^3 at the share t of that length.
   for (const bool shadow : {false, true}) {
     t.mean(
         std::string("N12-corner-grid-diagonal") + way_of(shadow), "N12 7.6a",

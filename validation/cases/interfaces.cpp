@@ -108,7 +108,7 @@ void shapes(Table& t) {
         "A box as an instance, mirrored or squeezed, is the box there.",
         [m = maps[i]] { return placed(true, m); }, [m = maps[i]] { return placed(false, m); },
         {.band = .003});
-  // A scene of size `s`, and then a box in it that is squeezed by 1e6.
+  // First the whole scene is scaled by `s`, then a box in the scene is squeezed by 1e6.
   for (const double s : {1e-6, 1e6})
     t.same(
         fmt::format("N44-instance-scaled-{:g}", s), "N44 N4",

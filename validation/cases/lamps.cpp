@@ -82,8 +82,9 @@ void through_a_lamp(Table& t) {
        {Configuration{false, false}, Configuration{false, true}, kAngles, kAnglesInGrid}) {
     constexpr double kHalf = .01, kSigma = 1e-3;
     const double mean = 2 * std::log(1 + std::sqrt(2.)) / kHalf;
-    // The integral of dt / (D^2 + t^2) over -3..3 is pi / D - 2 / 3 up to terms of D^2; extinction acts over
-    // a length of about 3 + |t|.
+    // With t the position along the ray, the integral of dt / (D^2 + t^2) over -3..3 is pi / D - 2 / 3 up to
+    // terms of order D^2. Light that is scattered at t has travelled a length of about 3 + |t| in the
+    // medium; the answer takes 3 for all of it, since most is scattered close to the lamp.
     const double angles = kPi * mean - 2. / 3;
     t.mean(
         "N23-through-a-lamp" + configuration.name(), "N23",
@@ -141,9 +142,9 @@ void enormous(Table& t) {
                disk = 2 * kPi * (1 - kFar / std::hypot(kFar, kSize)),
                square = 4 * std::atan(kSize * kSize / (kFar * std::sqrt(kFar * kFar + 2 * kSize * kSize)));
   // The view is a line along z through the cube. Consider light tilted by the angle q along that line. Where
-  // it reaches the line within q of an end, it has entered through the cube's side instead of its top, so its
-  // path inside has a length u < 1 instead of 1. At each end this adds q int_0^1 (e^-u - e^-1) du = q (1 - 2
-  // / e). `lean` is the mean of max(q, 0) over the light.
+  // it reaches the line within q of an end, it has entered through the cube's side instead of its top, so
+  // its path inside has a length u < 1 instead of 1. At each end this adds
+  // q int_0^1 (e^-u - e^-1) du = q (1 - 2 / e). `lean` is the mean of max(q, 0) over the light.
   const auto leaning = [](double lean) {
     return 1 + lean * (std::exp(1.) - 2) * (1 + std::exp(-2.)) / -std::expm1(-2.);
   };

@@ -65,8 +65,8 @@ void huge(Table& t) {
            reflected(below_a_square(1 / height)), {.slack = 1e-5});
   }
   // The floor at the foot of an emitting wall that is 20 wide and 10 high. With b half the width, h the
-  // height and c the distance from the wall, the irradiance is atan(b / c) - c / r atan(b / r), r^2 = c^2 +
-  // h^2.
+  // height, c the distance from the wall and r^2 = c^2 + h^2, the irradiance is
+  // atan(b / c) - (c / r) atan(b / r).
   constexpr double kFar = 1e-2, kSide = 10, kR = 10.000005;
   t.mean("N27-at-the-foot-of-a-wall", "N27 7.6g", "A floor up to the very edge of a shining wall.",
          [] {
@@ -133,7 +133,7 @@ void of_nothing(Table& t) {
 }
 
 void orders_apart(Table& t) {
-  // Lamps with intensities from 1e-20 to 1e20: the sum of their light is that of the brightest few.
+  // Lamps with intensities from 1e-20 to 1e20; only the brightest few contribute to the sum noticeably.
   for (const bool tree : {false, true}) {
     const int count = tree ? 1000 : 4;
     double irradiance = 0;

@@ -66,7 +66,8 @@ void slabs_of_parts(Table& t) {
   });
 }
 
-// Overlapping media that scatter all light and absorb none, in a white sky: all is white, whatever overlaps.
+// Overlapping media that scatter all light and absorb none, in a white sky. Every pixel is white, in
+// whatever way the media overlap.
 void white_crowd(Table& t) {
   SceneBuilder builder;
   const BsdfIndex null = builder.null();

@@ -10,8 +10,8 @@
 namespace ls::cases {
 namespace {
 
-// A light straight ahead: it travels against the view, so it arrives scattered by 0 degrees. 4 pi p(0) = (1 +
-// g) / (1 - g)^2, which is 1.9999e8 at g = 0.9999.
+// A light straight ahead: it travels against the view, so it arrives scattered by 0 degrees. For the phase
+// function p, 4 pi p(0) = (1 + g) / (1 - g)^2, which is 1.9999e8 at g = 0.9999.
 void phase_peaks(Table& t) {
   const auto add = [&](const std::string& id, const char* rows, const Configuration& configuration,
                        double g) {
@@ -26,9 +26,9 @@ void phase_peaks(Table& t) {
   }
 }
 
-// The share of singly scattered light that is deflected by less than an angle q. The camera measures it
-// through the medium, looking at a sun of angular radius q, which phase function sampling, light sampling, or
-// both find.
+// Returns the share of singly scattered light that is deflected by less than an angle q. The camera measures
+// it by looking through the medium at a sun of angular radius q. Phase function sampling, light sampling or
+// both find the sun.
 double share_within(double g, double degrees) {
   const double h = std::sin(degrees * kPi / 360), x = 2 * h * h;  // 1 - cos q
   return (1 - g) * (1 + g) / (2 * g) * (1 / (1 - g) - 1 / std::sqrt((1 - g) * (1 - g) + 2 * g * x));

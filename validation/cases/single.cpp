@@ -49,8 +49,9 @@ SceneBuilder passing_lit(const Setting& s, const Rgb& sigma, const Rgb& albedo) 
   return builder;
 }
 
-// Returns the integral of sigma e^(-sigma (t + 3)) / (4 pi) arriving(t) dt along the ray: the radiance of
-// single scattering, if arriving(t) is the light that reaches the point t, from all directions.
+// Returns the integral of sigma e^(-sigma (t + 3)) / (4 pi) arriving(t) dt over t from -3 to 3, the
+// positions along the ray. This is the radiance of single scattering if arriving(t) is the light that
+// reaches the point t, from all directions.
 template <class F>
 double along(double sigma, F arriving) {
   return integrate([&](double t) { return sigma * std::exp(-sigma * (t + 3)) / (4 * kPi) * arriving(t); }, -3,

@@ -13,7 +13,7 @@
 namespace ls::cases {
 namespace {
 
-constexpr double kDigits = 5e-6;  // relative: half a unit of the tables' sixth decimal, in a value of 0.1
+constexpr double kDigits = 5e-6;  // half a unit of the tables' sixth decimal, relative to a value of 0.1
 
 void semi_infinite(Table& t) {
   struct Row {
@@ -37,8 +37,8 @@ void semi_infinite(Table& t) {
              grey(row.l_over_e), {.slack = row.digits});
     }
   }
-  // A white slab of optical depth 64: the half space's 0.336428 minus what the slab transmits, (4/3) K^2 /
-  // (tau + 1.42089) / pi with K = sqrt(3) / 4 H(1).
+  // A white slab of optical depth 64: the half space's 0.336428 minus what the slab transmits,
+  // (4/3) K^2 / (tau + 1.42089) / pi with K = (sqrt(3) / 4) H(1).
   const double k = std::sqrt(3.) / 4 * 2.907811;
   t.mean("7.1-normal-to-normal-a1/homogeneous/volpath", "7.1 N17", "The same of a white slab of depth 64.",
          [] {
@@ -92,8 +92,9 @@ std::string named(const char* what, const Slab& s, const char* side, const Confi
   return fmt::format("7.2-{}-a{:g}-tau{:g}-{}{}", what, s.albedo, s.tau, side, configuration.name());
 }
 
-// Where a slab transmits little light, and only by long paths, the band is 1 %. For the white slab of depth
-// 16 this is done in the faster configuration; the case of its reflectance R covers the other one.
+// Where a slab transmits little light, and only by long paths, the band is 1 %. The transmittance T of the
+// white slab of depth 16 is tested in the faster configuration only (by_both()); its reflectance R is tested
+// in both.
 MeanOptions of_little(double through, bool slow) {
   const bool little = through < .3;
   return {.band = little ? .01 : kBand,
@@ -127,8 +128,8 @@ void isotropic(Table& t) {
 }
 
 // A plate of reflectance 1/2 in the column above the slab, with the environment below, lit by the slab's
-// cosine-weighted light. With R and T the slab's reflectance and transmittance for diffuse light, the plate's
-// irradiance over pi is B = T + R B / 2, and its radiance is B / 2.
+// cosine-weighted light. With R and T the slab's reflectance and transmittance for diffuse light, and B the
+// plate's irradiance divided by pi, B = T + R B / 2. The plate's radiance is B / 2.
 SceneBuilder plate_above(const Configuration& configuration, Slab slab) {
   slab.wall = .5;
   SceneBuilder builder = column(configuration, slab, true);
@@ -188,8 +189,8 @@ void dielectric(Table& t) {
          grey(.10931), {.slack = 1e-4, .slow = true});
 }
 
-// The answer for single scattering, with a the albedo and mu the cosine of the incident light: R_1 = (a/2)
-// int mu / (1 + mu) (1 - e^(-tau (1 + 1/mu))) dmu.
+// The answer for single scattering, with a the albedo and mu the cosine of the incident light:
+// R_1 = (a/2) int_0^1 mu / (1 + mu) (1 - e^(-tau (1 + 1/mu))) dmu.
 double first_order(double albedo, double tau) {
   return albedo / 2 *
          integrate(
@@ -197,10 +198,10 @@ double first_order(double albedo, double tau) {
              1, 20'000);
 }
 
-// Reflection of a white half space along its normal by one to three scatterings: the first terms of 1 -
-// sqrt(1 - a) H(1) as a power series of the albedo a. The terms of H follow from its equation, H(mu) = 1 + a
-// / 2 mu H(mu) int H(m) / (mu + m) dm. The substitution m = x^2 removes the logarithm at the ends of the
-// integrals, so that Simpson's rule is accurate to 1e-8.
+// Reflection of a white half space along its normal by one to three scatterings: the first terms of
+// 1 - sqrt(1 - a) H(1) as a power series of the albedo a. The terms of H follow from its equation,
+// H(mu) = 1 + (a / 2) mu H(mu) int_0^1 H(m) / (mu + m) dm. The substitution m = x^2 removes the logarithm at
+// the ends of the integrals, so that Simpson's rule is accurate to 1e-8.
 std::array<double, 3> orders_of_endless() {
   const auto over = [](auto h, double mu) {
     return integrate([&](double x) { return h(x * x) / (mu + x * x) * 2 * x; }, 0, 1, 100);
@@ -244,7 +245,7 @@ Figure more_light(const Bench& bench, int order) {
 void orders(Table& t) {
   for (const Configuration& configuration : two_configurations()) {
     for (const double tau : {1., 4., 60.}) {
-      if (tau == 4 && configuration.grid) continue;  // the same flights as for 1 and 60
+      if (tau == 4 && configuration.grid) continue;  // its free flights are sampled as at depths 1 and 60
       t.mean(fmt::format("7.6h-once-tau{:g}{}", tau, configuration.name()), "7.6h",
              "What a slab reflects of light scattered once: .142015352, .153412899, (1 - ln 2) / 2.",
              [=] { return wide_slab(configuration, tau, 1); }, grey(first_order(1, tau)),

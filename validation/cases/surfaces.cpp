@@ -221,14 +221,15 @@ void rough_sheets(Table& t) {
     t.mean(fmt::format("N64-rough-sheet-in-white-{:g}", alpha), "N64 N38 7.6c",
            "A sheet of clear rough glass that loses nothing is as bright as a white sky.",
            [=] { return in_white(sheet(30, [=](SceneBuilder& k) { return pane(k, alpha, true); })); },
-           // kEnergyTolerance of the tables (worker/render/bsdf/microfacet_energy.h)
+           // The slack is kEnergyTolerance, the error of the energy tables
+           // (worker/render/bsdf/microfacet_energy.h).
            grey(1), {.slack = 5e-4});
   for (const double alpha : {.3, 1.})
     t.mean(fmt::format("N38-rough-sheet-{:g}", alpha), "N38",
            "A sheet of clear rough glass, scattered once: what a rough white metal leaves of a white sky, by "
            "quadrature.",
            [=] { return in_white(sheet(30, [=](SceneBuilder& k) { return pane(k, alpha); })); },
-           // As for N35-grazing-rough.
+           // The slack is the error of the midpoint rule, as in N35-grazing-rough.
            grey(unmasked_at(30, alpha)), {.slack = 2e-5});
   t.exact("N33-rough-sheet-alpha-0", "N33",
           "A rough sheet of roughness 5e-4 is the smooth sheet, bit for bit.", [](const Bench& b) {

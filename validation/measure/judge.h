@@ -42,8 +42,8 @@ void judge(ValidateCase& c, double freedom, double rounding);
 
 // Judges by equivalence, with the standard error's `freedom` degrees of freedom. Both intervals are widened
 // by `unknown`, the uncertainty of the answer. The interval at c.level must contain the answer, and the one
-// at c.band_level must lie inside the band around it, so too few samples fail. A standard error above
-// `rounding` with fewer than `least` degrees of freedom fails, too.
+// at c.band_level must lie inside the band around it, so a case with too few samples fails. A case also
+// fails if its standard error is above `rounding` and has fewer than `least` degrees of freedom.
 void judge_equivalence(ValidateCase& c, double freedom, double unknown, double rounding, double least);
 
 }  // namespace ls::cli

@@ -155,7 +155,8 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
   const JobId& id = assign.lease.job;
   if (assign.brief) {
     const auto it = jobs.find(id);
-    // A job with a known id but another brief is a different job: the coordinator's data were replaced.
+    // A job with a known id but another brief (its settings and files) is a different job: the coordinator's
+    // data were replaced.
     if (it != jobs.end() && it->second.brief != *assign.brief) {
       table.drop_job(id);
       outbox.drop_job(id);

@@ -15,12 +15,12 @@ namespace {
 constexpr std::size_t kWorldsKept = 2;
 constexpr std::size_t kBlobsTraced = 64;  // blobs of one scene that get a span each
 constexpr Duration kTransferRetry = std::chrono::milliseconds(500);
-// How long after Job::retry_at a problem with loading the job is still reported. If no new attempt was made
-// by then, the worker has no more units of the job.
+// A problem with loading a job is reported until this long after Job::retry_at, the time of the next
+// attempt. If no attempt was made by then, the worker has no more units of the job.
 constexpr Duration kTroubleShown = std::chrono::seconds(30);
 
-// True if the error is a problem of this machine, such as a full disk, that must not count as a failure of
-// units.
+// True if the error is a problem of this machine, such as a full disk. Such an error must not count as a
+// failure of the units that were to be rendered.
 bool of_this_machine(const Error& error) {
   return error.code == Errc::resource_exhausted || error.code == Errc::internal;
 }

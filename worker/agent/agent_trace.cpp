@@ -1,5 +1,6 @@
-// Records trace spans for the units that this worker renders and the scenes that it loads, as children of the
-// spans of their leases. Used only if the worker has a tracer.
+// Records trace spans for the units (each one tile and one range of samples) that this worker renders and
+// for the scenes that it loads. They are children of the spans of their leases (the lists of units assigned
+// to this worker). Used only if the worker has a tracer.
 #include <algorithm>
 #include <utility>
 
@@ -18,7 +19,8 @@ void Agent::Impl::record(const char* name, const trace::SpanContext& parent, Tim
                           .failed = failed});
 }
 
-// Call with the mutex held, before the unit leaves the table.
+// Records the spans of a unit: of rendering it and, unless it failed, of packing its result. Call with the
+// mutex held, before the unit leaves the table.
 void Agent::Impl::trace_unit(const RenderSlot& slot, const HeldLeases::Held& held,
                              tl::expected<UnitResult, UnitFailure>& outcome) {
   trace::Attributes attributes{{"lightshaft.job", held.key.job.value},

@@ -13,8 +13,9 @@
 
 namespace ls::worker {
 
-// A worker moves to the next coordinator after this many progress reports without a lease. An idle worker
-// sends a report every few seconds.
+// A worker moves to the next coordinator after this many progress reports in which it has no lease (no work
+// assigned to it) and waits for no acknowledgement of a result. An idle worker sends a report every few
+// seconds.
 inline constexpr int kIdleReports = 3;
 
 class LinkRing final : public CoordinatorLink {

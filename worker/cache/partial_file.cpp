@@ -42,8 +42,8 @@ Result<PartialFile> PartialFile::open(const std::filesystem::path& path) {
   return file;
 }
 
-// Creates a file whose name is that of `path` with a random suffix. The process id would not do as a suffix,
-// because workers in several containers may share the folder and have equal ids.
+// Creates a file whose name is that of `path` with a random suffix. The process id as a suffix would not be
+// unique, because workers in several containers may share the folder and have equal ids.
 Result<PartialFile> PartialFile::open_own(const std::filesystem::path& path) {
   std::string name = path.string() + ".XXXXXX";
   const int fd = ::mkostemp(name.data(), O_CLOEXEC);

@@ -23,10 +23,10 @@ using child::Reply;
 using child::Request;
 using child::Slot;
 
-// How many times in a row the child may die because of other units while it renders a unit. Such a unit is
-// rendered again by the next child; after this many deaths it is reported as failed. Each death also fails
-// the unit that caused it, and after three failures the farm gives this worker no more units of that job. The
-// limit is so high that the farm does this before an innocent unit reaches it.
+// How many children in a row may die because of other units while they render the same unit. The next child
+// renders the unit again; after the last of these deaths the unit is reported as failed. Each death also
+// fails the unit that caused it, and after three failures the farm gives this worker no more units of that
+// job. The limit is so high that the farm does this before an innocent unit reaches it.
 constexpr int kInnocentDeaths = 64;
 
 std::size_t floats_of(const LocalJob& job, const LeaseUnit& unit) {
@@ -150,7 +150,7 @@ Result<void> ChildBackend::greet(Process& process) {
     if (first) why += "; run the worker with --fake to see whether the renderer is the cause";
     return fail(first || end.signal ? Errc::internal : Errc::unavailable, std::move(why));
   }
-  // The first child sets both, before any other thread is started
+  // The first child determines numeric_class_ and platform_, before any other thread is started
   if (numeric_class_ == Digest{}) {
     numeric_class_ = answer->reply.numeric_class;
     platform_ = answer->text;

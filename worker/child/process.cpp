@@ -26,8 +26,8 @@ tl::unexpected<Error> system_error(const char* what, int error = errno) {
               fmt::format("cannot start the render child: {}: {}{}", what, std::strerror(error), help));
 }
 
-// The descriptors that the child will get, in the order of their numbers in the child, from kSharedMemoryFd
-// on.
+// Collects the file descriptors that the child will get, in the order of their numbers in the child. The
+// first one gets the number kSharedMemoryFd.
 class TheirEnds {
  public:
   TheirEnds() = default;

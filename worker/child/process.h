@@ -54,7 +54,7 @@ class Process {
   // Slot (render thread) whose lack of progress made the agent kill the child; -1: none
   std::atomic<int> hung_slot{-1};
   std::atomic<bool> garbled{false};    // true if the child was killed for a malformed answer
-  std::atomic<bool> preparing{false};  // true while a world is being built, and if the child died then
+  std::atomic<bool> preparing{false};  // true while the child builds a scene; stays true if it dies then
   std::mutex prepared_mutex;
   // Numbers of the jobs whose scenes the child has built; guarded by prepared_mutex.
   std::set<std::uint64_t> prepared;

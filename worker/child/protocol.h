@@ -1,7 +1,8 @@
 // The protocol between agent and render child. Requests and replies are structs of fixed size over a socket
 // pair per channel: one channel for control and one for each slot (render thread). Each slot has an area of
-// shared memory, which holds the pixel sums of its finished unit, and the pixel and number of the sample that
-// it is rendering. Agent and child are the same executable, so plain structs suffice.
+// shared memory, which holds the pixel sums of its finished unit (one tile and one range of samples), and
+// the pixel and number of the sample that it is rendering. Agent and child are the same executable, so plain
+// structs suffice.
 #pragma once
 
 #include <atomic>

@@ -89,8 +89,8 @@ constexpr std::uint32_t kPlatform = AUDIT_ARCH_X86_64;
 constexpr std::uint32_t kPlatform = AUDIT_ARCH_AARCH64;
 #endif
 
-// A system call that one of its arguments allows or denies. The filter compares only the lower 32 bits of the
-// argument; the kernel ignores the others for these calls. Each call is listed once.
+// A system call that is allowed or denied by the value of one of its arguments. The filter compares only the
+// lower 32 bits of the argument; the kernel ignores the others for these calls. Each call is listed once.
 struct Decided {
   std::uint32_t call;
   unsigned argument;

@@ -14,9 +14,9 @@ namespace ls::worker {
 namespace pb = ::lightshaft::farm::v1;
 namespace {
 
-// Time that one attempt to connect may take, including the TLS handshake. A shorter limit would cut off
-// handshakes over a slow line, or with a coordinator that many workers join at once, again and again. A
-// longer one would delay the next attempt after a broken connection.
+// Time that one attempt to connect may take, including the TLS handshake. With a shorter limit, handshakes
+// over a slow line, or with a coordinator that many workers join at once, would be cut off at every attempt.
+// A longer one would delay the next attempt after a broken connection.
 constexpr int kConnectMs = 10'000;
 constexpr Duration kCloseLimit = std::chrono::seconds(2);
 

@@ -7,10 +7,10 @@
 // floats of similar size are exact, hence equal in every order. Therefore one pixel in kFakeMarkerEvery is a
 // *marker*. Its samples are in [2^-47, 2^-46). In every group of kFakeMarkerRounds rounds, one round also
 // adds a value in [1/2, 1), and a later round subtracts it again. While that value is in the sum, the sum
-// keeps no bit below 2^-53, so every fold in between rounds, and the last bits of the finished pixel depend
-// on which rounds were folded before, between and after. One swap goes undetected, that of a tile's first two
-// rounds, since a + b is b + a. If a job ends within a group, only markers whose two rounds are both folded
-// can detect the order.
+// keeps no bit below 2^-53, so each addition is rounded, and the last bits of the finished pixel depend on
+// which rounds were folded before, between and after the two. One change of order goes undetected: the first
+// two rounds of a tile may be swapped, since a + b is b + a. If a job ends within a group, only markers
+// whose two rounds are both folded can detect the order.
 #pragma once
 
 #include <algorithm>

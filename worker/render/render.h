@@ -33,7 +33,8 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
                                                  const AssetFiles& files, int threads);
 
 // The pixel and index of the sample that a thread renders, for crash reports. With path reuse (path_reuse.h)
-// the pixel is one of the 16 x 16 square that the thread renders. The thread writes with relaxed stores.
+// the thread renders a square of 16 x 16 pixels together, and the pixel is one of these. The thread writes
+// with relaxed stores.
 struct Breadcrumb {
   std::atomic<std::int32_t> x{-1}, y{-1};
   std::atomic<std::uint64_t> sample{0};
@@ -43,7 +44,7 @@ struct TileResult {
   std::vector<float> sums;  // planes as in common/image/film/partial.h: six, plus those of the requested AOVs
   // The number of bad samples by cause, and where they are; corrected inputs of the scene are not included
   Health health;
-  bool stopped = false;  // true if `stop` was set: the sums are then not valid
+  bool stopped = false;  // true if render_tile() stopped early: the sums are then not valid
 };
 
 // Renders the samples with the indices `samples` of each pixel of `tile` on the calling thread. The result is
@@ -52,8 +53,9 @@ struct TileResult {
 TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, const std::atomic<bool>* stop,
                        Breadcrumb* breadcrumb);
 
-// With path reuse: the side, in pixels, of the squares whose pixels share paths; else 1. A tile that consists
-// of whole squares traces no path that belongs to another tile.
+// Returns the side, in pixels, of the squares of pixels that share the tails of their paths (path_reuse.h),
+// or 1 if the world does not use path reuse. A tile that consists of whole squares traces no paths of pixels
+// of other tiles.
 int tile_alignment(const World& world);
 
 // Returns the names of the integrator variants that can render this world, cheapest first. A variant is the
@@ -64,7 +66,8 @@ std::vector<std::string> all_variants(const World& world);  // all variants of t
 TileResult render_tile_as(const World& world, const std::string& variant, PixelRect tile,
                           SampleRange samples);
 
-// The value of one sample of one pixel, for rendering a single sample again.
+// The result of render_sample(), which renders a single sample of a pixel, so that a sample of an image can
+// be rendered again.
 struct SampleValue {
   double rgb[3];
   bool finite;    // false if the sample is rejected

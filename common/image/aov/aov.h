@@ -103,8 +103,8 @@ struct AovPlanes {
 };
 AovPlanes planes_of(AovSet set);
 
-// Bytes per pixel of a partial (and of a tail, the last round of a film if it is truncated), and of the
-// film's sums.
+// Bytes per pixel: of a partial or of a tail (the last round of a tile in the film, if it is truncated), and
+// of the film's sums.
 std::size_t partial_bytes_per_pixel(AovSet set);
 std::size_t film_bytes_per_pixel(AovSet set);
 

@@ -15,7 +15,8 @@ namespace {
 constexpr double kNormal95 = 1.959964;
 constexpr double kLeastSpp = 8;  // with fewer samples, halves of one or two samples are too noisy
 constexpr double kPriorSpread = .15;
-// For forecasts: variation of the slope, derived in the header
+// For forecasts: the slope changes by this standard deviation per square root of log time (b in
+// convergence.h)
 constexpr double kBend = .06;
 constexpr double kSlow = .85, kFast = 1.1;  // the verdict is slow below kSlow and fast above kFast
 constexpr std::size_t kMostPoints = 32;     // at most this many doublings of the sample count are used
@@ -51,17 +52,17 @@ double covariance(const Log& a, const Log& b) {
   return a.sigma * b.sigma * std::min(a.spp, b.spp) / std::max(a.spp, b.spp);
 }
 
-// Returns the covariance of the deviations of two errors from the line, at times u and v relative to the
-// line's reference point, if the slope of the line follows a Brownian motion. The motion has variance 1 per
-// unit of log time; deviations on different sides of the reference point are independent.
+// Returns the covariance that a varying slope adds to the errors at the log times u and v, counted from the
+// line's reference point. The slope follows a Brownian motion of variance 1 per unit of log time. Deviations
+// from the line on different sides of the reference point are independent.
 double bend_covariance(double u, double v) {
   if (u * v <= 0) return 0;
   const double near = std::min(std::abs(u), std::abs(v)), far = std::max(std::abs(u), std::abs(v));
   return near * near * (3 * far - near) / 6;
 }
 
-// Returns the lower Cholesky factor of the points' covariance, including a variation of the slope by `bend`;
-// nullopt if the covariance is not positive definite.
+// Returns the lower Cholesky factor of the points' covariance, to which a slope that varies by `bend` (as
+// kBend) contributes; nullopt if the covariance is not positive definite.
 using Matrix = std::array<std::array<double, kMostPoints>, kMostPoints>;
 std::optional<Matrix> factor(const std::vector<Log>& y, double bend) {
   Matrix l{};
@@ -77,8 +78,8 @@ std::optional<Matrix> factor(const std::vector<Log>& y, double bend) {
   return l;
 }
 
-// Returns L^-1 times the vector given by `value`. This transforms the points to independent points of
-// variance 1.
+// Returns L^-1 times the vector that has value(p) for each point p. In these coordinates the errors of the
+// points are independent and have the variance 1.
 template <class Value>
 std::vector<double> whitened(const Matrix& l, const std::vector<Log>& y, const Value& value) {
   std::vector<double> out(y.size());
@@ -97,8 +98,9 @@ double product(const std::vector<double>& a, const std::vector<double>& b) {
 }
 
 // The line log(relMSE) = a - slope * log(core seconds), fitted by generalised least squares; `l` is the
-// Cholesky factor of the points' covariance. A prior for the slope, of mean 1, is optional. Times are
-// relative to the last point, which makes a and slope nearly independent.
+// Cholesky factor of the points' covariance. The slope has a Gaussian prior of mean 1 and variance
+// 1 / prior_weight; 0: no prior. Times are relative to the last point, which makes a and slope nearly
+// independent.
 class Line {
  public:
   Line(const std::vector<Log>& points, const Matrix& l, double prior_weight, double bend)
@@ -124,9 +126,9 @@ class Line {
   struct Value {
     double mean = 0, sigma = 0;
   };
-  // Predicts the estimate at exp(later) times the samples of the last point: the value of the line, plus the
-  // part of the points' deviations from it that persists because samples are shared (Rasmussen and Williams
-  // 2006, section 2.7).
+  // Predicts the logarithm of the estimate at exp(later) times the samples of the last point: the value of
+  // the line, plus the part of the points' deviations from the line that persists because later checkpoints
+  // contain their samples (Rasmussen and Williams 2006, section 2.7).
   Value at(double later) const {
     const Log then{0, 0, y_.back().spp * std::exp(later), y_.back().sigma};
     const auto shared = whitened(l_, y_, [&](const Log& p) { return covariance(p, then); });
@@ -155,8 +157,8 @@ std::string words(double lo, double hi) {
 
 double excess(const ErrorPoint& p) { return *p.true_relmse - p.relmse; }
 
-// True if the true error of the last point stays above the estimated one by more than chance; see judge() in
-// the header.
+// True if the true error of the last point exceeds the estimated one by more than chance, and this excess
+// falls too slowly: the two conditions of judge() in the header.
 bool stands_on_a_floor(std::span<const ErrorPoint> points) {
   constexpr double kSigmas = 4;
   if (points.empty() || !usable(points.back()) || !points.back().true_relmse) return false;
@@ -174,8 +176,8 @@ bool stands_on_a_floor(std::span<const ErrorPoint> points) {
   return false;
 }
 
-// Returns the earliest time at which `value` has fallen to `wanted`. Times are logarithms, counted from the
-// last point.
+// Returns the log time at which value(log time) has fallen to `wanted`, counted from the last point and
+// never below 0.
 template <class Curve>
 double when(const Curve& value, double wanted) {
   constexpr double kMost = 60;  // reaching the value only after e^60 times as long counts as never
@@ -195,9 +197,9 @@ double end_of_round(double spp) {
   return static_cast<double>(round_range(round_count(samples) - 1).s1);
 }
 
-// Returns how much the cost of a sample varies between doublings of the number of samples: its standard
-// deviation over the last few doublings, relative to the mean cost of all samples so far. 0: there are too
-// few points.
+// Returns how much the cost of a sample varies: for each of the last few doublings of the number of samples,
+// its cost per sample is compared with the mean cost of all samples so far. The result is the root mean
+// square of the relative differences. 0: there are too few points.
 double cost_spread(std::span<const ErrorPoint> points) {
   constexpr int kDoublings = 4;
   const ErrorPoint& now = points.back();

@@ -32,7 +32,8 @@ struct Trend {
   double slope = 0, slope_lo = 0, slope_hi = 0;  // slope with its 95 % interval
   std::string verdict;                           // the trend in words
 };
-// Fits the trend. `points` are in order of samples. nullopt: fewer than three of them are usable.
+// Fits the trend. `points` are in order of samples. nullopt: there are fewer than three usable points at
+// doubling sample counts.
 std::optional<Trend> trend_of(std::span<const ErrorPoint> points);
 
 // How far an image's error figures can be trusted, as a status and as a sentence.
@@ -57,8 +58,8 @@ const char* to_string(ConvergenceStatus::Kind kind);
 // - The latest true error exceeds the estimated one by four standard deviations (by chance: once in 30,000).
 //   The standard deviation combines the estimate's, from its interval on a logarithmic scale, and the noise
 //   of the reference.
-// - The excess falls more slowly than 1 / sqrt(N), which is half way between a constant and 1/N.
-//   It is compared with the latest checkpoint that had at most half the samples.
+// - The excess falls more slowly than 1 / sqrt(N), which is half way between a constant and 1/N. To test
+//   this, it is compared with the excess at the latest checkpoint that had at most half the samples.
 ConvergenceStatus judge(std::span<const ErrorPoint> points, const std::string& doubt);
 
 struct Forecast {
@@ -67,15 +68,17 @@ struct Forecast {
   double core_seconds = 0, core_seconds_lo = 0, core_seconds_hi = 0;
 };
 // Forecasts the samples and time until the estimated relMSE reaches `target`, rounded up to a whole round
-// (range of samples). Core seconds of 0: the target has been reached. nullopt: no point has a positive error
-// and time. The slope is fitted with a Gaussian prior of mean 1 and standard deviation 0.15.
+// (range of samples). Core seconds of 0: the target has been reached. nullopt: no forecast is possible, for
+// example because the last point has fewer than 8 samples per pixel, no error above 0, or no time. The slope
+// is fitted with a Gaussian prior of mean 1 and standard deviation 0.15.
 //
 // Slopes change: the gain of low-discrepancy points on smooth parts of an image is used up eventually, and a
 // slope of 1.2 at 4 samples becomes 1.0 at 256 (the bench scene `tint`). A straight line through all
-// doublings would be too steep and have too narrow an interval. So the slope is modelled as a Brownian motion
-// in log time with a standard deviation of 0.05 per doubling (kBend = .05 / sqrt(log 2)): a local linear
-// trend (Harvey 1989, chapter 2.3). With time counted from the last point, this adds b^2 u^2 (3 v - u) / 6 to
-// the covariance of the points at times u <= v before it, and b^2 u^3 / 3 to the variance at u after it.
+// doublings would be too steep and have too narrow an interval. So the slope is modelled as a Brownian
+// motion in log time with a standard deviation of 0.05 per doubling: a local linear trend (Harvey 1989,
+// chapter 2.3). Let b = .05 / sqrt(log 2) (kBend), and let u and v be log times counted from the last point.
+// The motion adds b^2 u^2 (3 v - u) / 6 to the covariance of two points at u <= v before the last one, and
+// b^2 u^3 / 3 to the variance of a prediction at u after it.
 std::optional<Forecast> forecast_of(std::span<const ErrorPoint> points, double target);
 
 }  // namespace ls

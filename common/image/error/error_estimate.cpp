@@ -33,7 +33,8 @@ constexpr double kOneSided = 19;
 constexpr std::uint64_t kTellingSamples = 16;
 
 // Returns the expected amount by which skewed noise lowers the sum of squared relative errors (derived in
-// error_estimate.h). Summed column by column, so that the loop is vectorised.
+// error_estimate.h), as a negative number. The sum is accumulated per column, so that the loop is
+// vectorised.
 double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earlier,
                const RelativeWeights& w) {
   const double before = static_cast<double>(earlier.spp) / static_cast<double>(spp), last = 1 - before;
@@ -249,8 +250,9 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMea
             earlier->spp < spp,
         "{} and {} values of {} samples before {} of {}", earlier->halves.a.size(), earlier->halves.b.size(),
         earlier->spp, 3 * n, spp);
-  // With low-discrepancy points the error of the whole is smaller than the errors of its parts suggest, so a
-  // correction estimated from the parts must be limited.
+  // With low-discrepancy points the error of all samples together is smaller than the errors of the last
+  // round and of the samples before it suggest, so the correction, which is estimated from these two parts,
+  // must be limited.
   const double all = out.relative.squares;
   out.subtract_skew(std::clamp(skew_of(h, spp, *earlier, w), -all / 2, all / 2));
   send_changes(h, spp, *earlier, w.roots, out);
@@ -259,13 +261,15 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMea
 
 namespace {
 
-// Returns half the width of the 95 % interval of the logarithm of a sum of squares. A log scale keeps the
-// lower end above zero. The spread is itself an estimate. From fourth powers: for n equal Gaussian pixels
-// these have a relative variance of 96 / (9 n), and (sum x)^2 / sum x^2 = n / 3 = e, so they behave like a
-// chi square with e / 2 degrees of freedom. From changes: 4 products / squares^2 has a relative variance of
-// (8 + 4 - 8) / n (from the products, the square and their covariance), hence 3 e / 2 degrees; uneven noise
-// has fewer, but at least e / 2 in the scenes of tests/coverage. The factor is Student's t for these degrees,
-// to first order (Abramowitz and Stegun 26.7.5).
+// Returns half the width of the 95 % interval of the logarithm of a sum of squares. On a log scale the lower
+// end stays above zero. The spread is itself an estimate, so the factor is not the normal quantile but
+// Student's t, to first order in 1 / degrees of freedom (Abramowitz and Stegun 26.7.5). Let x be the sum of
+// D^2 over the channels of a pixel, and e = (sum x)^2 / (sum of x^2). If the spread is from fourth powers:
+// for n equal Gaussian pixels e is n / 3, and the sum of the fourth powers has a relative variance of
+// 96 / (9 n), so it behaves like a chi square with e / 2 degrees of freedom. If it is from changes:
+// 4 products / squares^2 has a relative variance of (8 + 4 - 8) / n (from the products, the square and their
+// covariance), hence 3 e / 2 degrees; uneven noise has fewer, but at least e / 2 in the scenes of
+// tests/coverage. So e / 2 is used for both.
 double half_width(const NoiseSums& s, bool trusted) {
   if (!(s.pixel_fourth > 0)) return 0;
   const double freedom = s.squares * s.squares / s.pixel_fourth / 2;

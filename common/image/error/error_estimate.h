@@ -19,21 +19,22 @@
 // In a flat or dark area g is near 0, and m does not depend on the pixel. Where the image's structure exceeds
 // its noise, g is near 1. A tile of one pixel uses S. The noise that remains in m has the variance s^2 = g^2
 // u + (1 - g)^2 u / n (n: the window's pixels). It would bias f = 1/(m^2 + c), c = 0.01, by f" s^2 / 2; this
-// is subtracted, within [f/2, 2 f]. The remaining bias is of second order: in the dark 3 s^4 / c^2 of the
-// value.
+// is subtracted, within [f/2, 2 f]. The remaining bias is of second order in s^2: for m = 0 it is 3 s^4 / c^2
+// relative to f.
 //
 // Skew: where g is near 1, the pixel's value enters its own weight, and the noise of rendered pixels is
-// skewed. A bright sample raises both D^2 and S, so the sum of f D^2 is too low, to first order by f'(m) g
-// cov(D^2, S). This relative error falls like 1/N (2 % at 64 samples, docs/design/error.md). It is estimated
-// from the samples of the last round (range of samples), which are independent of earlier ones. Let n of N
-// samples be in the last round and o before it, and let D and S be indexed by part. Then
+// skewed. A bright sample raises both D^2 and S, so the sum of f D^2 is too low: to first order in the noise
+// its error is f'(m) g cov(D^2, S), which is negative. Relative to the sum, this error falls like 1/N (2 %
+// at 64 samples, docs/design/error.md). It is estimated from the samples of the last round (range of
+// samples), which are independent of earlier ones. Of N samples, n are in the last round and o before it.
+// Let D_n and S_n be D and S of the last round alone, and D_o and S_o those of the earlier samples. Then
 //   E[D_n^2 (S_n - S_o)] = k / n^2  and  E[D_o^2 (S_o - S_n)] = k / o^2,
 // with k the third cumulant of a sample; the pixel's true value cancels in the difference. cov(D^2, S) is k /
 // N^2, and
 //   t = ((n D_n / N)^2 (n / N) - (o D_o / N)^2 (o / N)) (S_n - S_o)
-// has this expectation, so f'(m) g t is subtracted. (To first order, this weights D_n^2 by f computed from
-// the earlier samples, and D_o^2 by f computed from the last ones.) The correction changes the weight f of a
-// pixel by at most half of f. The first round has no earlier one and is not corrected.
+// has the expectation cov(D^2, S), so f'(m) g t is subtracted. (To first order, this weights D_n^2 by f
+// computed from the earlier samples, and D_o^2 by f computed from the last ones.) The correction changes the
+// weight f of a pixel by at most half of f. The first round has no earlier one and is not corrected.
 //
 // Interval of the realised error: d - e^2 = -ab, so Var(sum of d - sum of e^2) = sum of 4 v^2 exactly,
 // whatever the distribution of a and b. Over channels it is 4 tr(V^2), with V the covariance of the channels
@@ -45,10 +46,11 @@
 // independent samples: Var(A - A_o) = Var(A) n / o), and they are independent, since the halves are. So
 //   E[(alpha . beta)^2] = tr(V^2)   and   E[(alpha . alpha + beta . beta) / 2] = tr V,
 // for each pixel separately, whatever the tails of its noise and the noise of its neighbours. The
-// alternatives are worse: fourth powers of D depend on the tails; products of neighbours require noise that
-// varies slowly; and a choice between the two by g, which depends on the pixel's own D, would remove large D
-// from a sum. With low-discrepancy points the error of all samples together is smaller than the errors of the
-// two parts suggest. This factor cancels in the relative variance if it is the same for all pixels.
+// alternatives are worse: fourth powers of D depend on the tails, and products of neighbours require noise
+// that varies slowly. To choose one of these two by g does not help: g depends on the pixel's own D, so large
+// D would be missing from one of the sums. With low-discrepancy points the variance of all samples together
+// is smaller than the estimate of V from the two parts, by some factor. If this factor is the same for all
+// pixels, it cancels in the relative variance.
 //
 // If the last round, or the rounds before it, have too few samples for this, tr(V^2) is a weighted mean of
 // two other estimates. In each pixel the first has the weight g^2, the second 1 - g^2:
@@ -91,11 +93,12 @@ struct NoiseSums {
   double channel_fourth = 0;                      // sum over pixels and channels of D^4
   double pixel_fourth = 0;                        // sum over pixels of (sum over channels of D^2)^2
   double pair_covariance = 0, pair_variance = 0;  // numerator and denominator of r^2
-  // The two fourth powers above, but each pixel times g^2
+  // channel_fourth and pixel_fourth, but with each pixel weighted by g^2
   double edge_channel_fourth = 0, edge_pixel_fourth = 0;
-  double flat_pairs = 0;  // sum over pixels of 1 - g^2 times the mean of (D(p) . D(q))^2
-  double largest = 0;     // largest sum over channels of D^2 of one pixel
-  // tr(V^2) follows from these or, if the last round cannot be used, from the sums above
+  double flat_pairs = 0;  // sum over pixels p: (1 - g^2) times the mean over neighbours q of (D(p) . D(q))^2
+  double largest = 0;     // largest value of any pixel of (sum over channels of D^2)
+  // The sums for the interval of a trusted image. If the last round cannot be used, they are instead
+  // `squares` and the sum of tr(V^2) that is estimated from the sums above
   ChangeSums changes;
   void add(const NoiseSums& other);
   bool operator==(const NoiseSums&) const = default;
@@ -143,12 +146,14 @@ struct ImageError {
   double rmse = 0, rmse_lo = 0, rmse_hi = 0;  // 95 % interval for the realised error of this image
   double relmse = 0, relmse_lo = 0, relmse_hi = 0;
   double spp = 0;  // samples per pixel, mean over all pixels
-  // The number of pixels that carry the error: (sum of x)^2 / (sum of x^2), where x is the relative error of
-  // a pixel.
+  // The number of pixels that carry the error: (sum of x)^2 / (sum of x^2), where x is the squared relative
+  // error of a pixel.
   double effective_pixels = 0;
   double top_share = 0;        // share of the relative error in the worst pixel
   std::uint64_t few_hits = 0;  // number of pixels with few hits
-  // False if few pixels carry the error, or if there is no light; then the intervals are unreliable.
+  // False if the figures and their intervals are unreliable: no sample has found light; the halves do not
+  // differ and have fewer than 64 samples per pixel; few pixels carry the error; or single pixels differ far
+  // more than their neighbours do.
   bool trusted = false;
   std::string verdict;  // why the figures are not trusted, in words; empty when trusted
 };
@@ -168,8 +173,8 @@ class Checkpoints {
   // Declares that no more rounds will follow for this tile, unless folded() is called for it again.
   void stopped(TileIndex tile);
 
-  // complete() is the number of rounds that all tiles have reached; at() returns the image's figures at one
-  // of them.
+  // complete() is the number of checkpoints: rounds that every tile has reached or, having stopped earlier,
+  // will not render. at() returns the image's figures after one of these rounds.
   RoundIndex complete() const { return static_cast<RoundIndex>(done_.size()); }
   const TileError& at(RoundIndex round) const { return done_[round]; }
 

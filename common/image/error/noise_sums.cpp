@@ -59,7 +59,8 @@ struct Columns {
                 edge_pixel_fourth.data());
   }
 
-  // Adds the products of each pixel with the previous one in the row.
+  // Adds the products of each pixel and the previous one in the row, from which r^2 is computed
+  // (error_estimate.h).
   void add_pairs(const Values& v) {
     double* __restrict covariance = pair_covariance.data(), * __restrict variance = pair_variance.data();
     const std::size_t width = squares.size();

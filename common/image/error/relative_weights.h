@@ -12,9 +12,9 @@ namespace ls {
 // relMSE is a squared error divided by the sum of the squared true value and this constant.
 inline constexpr double kRelMseDenominator = 0.01;
 
-// The weights of each pixel of a tile. `roots` is the square root of the weight in each channel, `leans` the
-// derivative of that root by the pixel's own value (three planes each). `edges` is the square of the mean of
-// g over the channels, one plane.
+// The weights of the pixels of a tile. `roots` is the square root of the weight in each channel, `leans` the
+// derivative of the weight by the pixel's own value; both have three planes. `edges` has one plane: the
+// square of the mean of g over the channels.
 struct RelativeWeights {
   std::vector<double> roots, leans, edges;
 };

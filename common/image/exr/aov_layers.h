@@ -21,12 +21,12 @@ inline constexpr int kCryptomatteRanks =
 std::string layer_of(Aov aov);
 
 // Adds the film's AOVs to `picture`: channels NAME.R, NAME.X, ... and, for identifiers, NAME00.R to NAME02.A
-// with their header strings. All are 0 in pixels without a surface. Returns the number of values that
-// exceeded the largest half, 65504.
+// with their header strings. Pixels without a surface are 0 in the AOVs of surfaces (AovKind::of_hits,
+// of_all and ids). Returns the number of values whose magnitude exceeded 65504, the largest half.
 std::uint64_t add_aov_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
                              ExrPicture& picture);
 
-// Clamps the values to +-65504, the largest half; returns the number of clamped values.
+// Clamps the values to at most 65504, the largest half, in magnitude; returns the number of clamped values.
 std::uint64_t clamp_to_half(std::vector<float>& plane);
 
 }  // namespace ls

@@ -55,10 +55,11 @@ Result<RgbWithError> read_exr_with_error(std::span<const std::byte> bytes, const
 
 inline constexpr float kLargestHalf = 65504;
 
-// An image of several planes of the same size.
+// ExrPicture is an image of several planes of the same size. The type of a plane is that of its values in
+// the file.
 struct ExrHalf {
   std::vector<float> values;
-};  // rounded to half when the file is written; the caller must clamp to +-kLargestHalf
+};  // the file has halves; the caller must clamp the values to at most kLargestHalf in magnitude
 struct ExrFloat {
   std::vector<float> values;
 };
@@ -67,7 +68,7 @@ struct ExrUint {
 };
 struct ExrPicture {
   FrameSize size;
-  // By name: "R", "stderr.R", "spp", ...
+  // The planes, by the names of their channels: "R", "stderr.R", "spp", ...
   std::map<std::string, std::variant<ExrHalf, ExrFloat, ExrUint>> channels;
   std::map<std::string, std::string> strings;  // header attributes
 };

@@ -26,11 +26,11 @@ Digest pixels_sha256(const Film& film);
 // The text of the note (Provenance::notes) called `fake`, for an image that contains results of fake workers.
 inline constexpr const char* kFakePixels = "the pixels are made up by fake workers (--fake), not rendered";
 
-// The source of the header strings `lightshaft:...` of the final EXR, which docs/design/error.md lists. Some
-// strings come from the film instead: `:relmse`, `:relmse_ci95` ("LOW HIGH"), `:rmse`, `:rmse_ci95`,
-// `:few_hits` (pixels), `:verdict` ("trusted", or the reason why not) and `:tiles`. If the film has no
-// samples, `:tiles` is the only one of these that is written. `:pixels_without_samples` is written only if
-// there are such pixels.
+// The values of the header strings `lightshaft:...` of the final EXR that do not come from the film.
+// docs/design/error.md lists all of these strings. From the film come `:relmse`, `:relmse_ci95` ("LOW
+// HIGH"), `:rmse`, `:rmse_ci95`, `:few_hits` (pixels), `:verdict` ("trusted", or the reason why not) and
+// `:tiles`. If the film has no samples, `:tiles` is the only one of these that is written.
+// `:pixels_without_samples` is written only if there are such pixels.
 struct Provenance {
   Digest scene;
   std::string settings_json;  // canonical RenderSettings
@@ -46,13 +46,13 @@ struct Provenance {
   // Why sampling stopped before the requested samples, and the consequences; empty: not written
   std::string stopped = {};
   std::optional<ConvergenceStatus> convergence_status =
-      {};  // status that takes the convergence curve into account, which the film does not have
+      {};  // judged by the convergence curve, which the film does not have; used for `:verdict`
   std::map<std::string, double> figures = {};     // further numbers, by the name after "lightshaft:"
   std::map<std::string, std::string> notes = {};  // further texts, by the name after "lightshaft:"
 };
 struct FinalImage {
   std::vector<std::byte> exr;
-  std::uint64_t clamped = 0;  // number of values above 65504, the largest half
+  std::uint64_t clamped = 0;  // number of values whose magnitude exceeds 65504, the largest half
 };
 // Returns the layers of the final EXR of a film, or of one row of its tiles, with their header strings. Adds
 // the number of clamped values to `clamped`.

@@ -1,11 +1,11 @@
 // False-colour maps of an image's error and of its sample counts.
 //
 // Both use the same ramp from dark blue over green to yellow, on a logarithmic scale:
-//   error: each pixel's relative standard error, sqrt of the mean over channels of d w (error_estimate.h),
-//     averaged over 3 x 3 pixels of its tile, because a single pixel's difference of two halves is
-//     unreliable.
-//     10^-3 and less has the lowest colour, 1 and more the highest: three decades.
-//   samples: per pixel, 2 has the lowest colour, 2^14 the highest: thirteen doublings.
+//   error: each pixel's relative standard error. Its square is the mean over channels of D^2 / (S^2 + 0.01),
+//     with D the standard error and S the value of the pixel. The square is averaged over 3 x 3 pixels of the
+//     tile, because a single pixel's difference of two halves is unreliable.
+//     An error of 10^-3 or less has the lowest colour, 1 or more the highest: three decades.
+//   samples: 2 samples per pixel have the lowest colour, 2^14 the highest: thirteen doublings.
 // Magenta in the error map: pixels with too few hits (error_estimate.h). Tiles without samples are grey. The
 // maps have the image's size, so that they can be overlaid on it.
 #pragma once

@@ -35,8 +35,8 @@ struct PixelLayer {
   std::optional<Aov> aov;  // nullopt: the layer is computed from the colour
 };
 // Returns the layers: "rgb", "stderr" (the standard error of each value of rgb), "error" (the relative
-// standard error of the pixel, error_estimate.h), "spp", and the AOVs by the names of their layers in the
-// final EXR.
+// standard error of the pixel: the square root of the mean over channels of stderr^2 / (rgb^2 + 0.01)),
+// "spp", and the AOVs by the names of their layers in the final EXR.
 std::vector<PixelLayer> pixel_layers(AovSet aovs);
 // Returns the layer of this name. invalid_argument: there is no such layer; the message lists the layers.
 Result<PixelLayer> pixel_layer(AovSet aovs, std::string_view name);
@@ -76,7 +76,7 @@ class LayerMosaic {
   // out. `values`: the channels of each pixel of `rect`, row by row; if it is empty, nothing is added.
   void add(int level, const PixelRect& rect, std::span<const float> values);
   // Returns the channels of each pixel, row by row, as half floats or floats, little endian. Values that a
-  // half cannot represent are clamped to +-65504.
+  // half cannot represent are clamped to 65504 in magnitude.
   std::vector<std::byte> bytes() const;
 
  private:

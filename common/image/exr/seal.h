@@ -1,8 +1,9 @@
-// The seal of a final EXR: the header string `lightshaft:seal` has a line for every layer and every other
-// header attribute, sorted: "SHA-256 layer NAME" or "SHA-256 header NAME". A layer's digest is over its
-// values row by row, as 32-bit little-endian numbers (halves as floats); an attribute's digest is over its
-// type, a zero and its bytes in the file. The seal does not cover how the file stores its pixels
-// (compression, order of lines), so repacking does not break it. Used by the files of this folder only.
+// The seal of a final EXR is the header string `lightshaft:seal`. It has a line "SHA-256 header NAME" for
+// every header attribute that it covers, then a line "SHA-256 layer NAME" for every layer, both sorted by
+// name. A layer's digest is over its values row by row, as 32-bit little-endian numbers (halves as floats);
+// an attribute's digest is over its type, a zero and its bytes in the file. The seal does not cover itself,
+// nor the attributes about how the file stores its pixels (compression, order of lines), so repacking does
+// not break it. Used by the files of this folder only.
 #pragma once
 
 #include <ImfHeader.h>
@@ -21,7 +22,7 @@ inline constexpr const char* kSealName = "lightshaft:seal";
 class Seal {
  public:
   void add(const ExrPicture& rows);     // adds the next rows of every layer, from the top
-  void add(const Imf::Header& header);  // adds all attributes except the seal itself
+  void add(const Imf::Header& header);  // adds the attributes that the seal covers
   std::string text();                   // returns the seal; call once, at the end
 
  private:

@@ -74,8 +74,8 @@ class Film {
   std::uint64_t spp(TileIndex tile) const;
   // Error after the last fold; before the first, zeros and the number of pixels
   TileError error(TileIndex tile) const;
-  // Returns the digest of a chain over the unit digests in round order: c = SHA-256(c || unit digest),
-  // beginning with 32 zero bytes.
+  // Returns the digest of the chain of all folded rounds, the tail included: starting from 32 zero bytes,
+  // the digest c becomes SHA-256(c || unit digest) for one round after the other.
   Digest tile_digest(TileIndex tile) const;
   TilePixels pixels(TileIndex tile) const;
   TileAovs aov_pixels(TileIndex tile) const;

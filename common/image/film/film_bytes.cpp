@@ -1,9 +1,9 @@
-// A tile of the film as bytes, for restarts: "LSTILE03", u32 tile, full rounds, 32 bytes chain, u64 s0, s1 of
-// the tail (0, 0: none), 32 bytes tail digest, f64 TileError::skew, 2 f64 plain.changes, 2 f64
-// relative.changes, 6 planes of doubles, with a tail 6 planes of floats; SHA-256 of all bytes before it. With
-// AOVs the planes of their sums follow the six, then those of identifiers in floats.
-// Little endian. The error figures that need the tile before its last round are stored; the others are
-// recomputed.
+// A tile of the film as little-endian bytes, for restarts: "LSTILE03"; u32 index of the tile; u32 number of
+// full rounds; 32 bytes digest chain; u64 s0, s1 of the tail (0, 0: no tail); 32 bytes digest of the tail;
+// f64 TileError::skew; 2 f64 plain.changes; 2 f64 relative.changes; the full rounds: 6 colour planes and the
+// planes of AOV sums as doubles, then the planes of identifiers as floats; the tail, if there is one: the
+// same planes, all as floats; SHA-256 of all bytes before it. The error figures that need the tile before
+// its last round are stored; the others are recomputed.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -75,7 +75,7 @@ HealthCause cause_named(std::string_view word) {
   return HealthCause::unnamed;
 }
 
-// saturates, because another process may send any count
+// Returns the sum, or the largest number if it overflows: another process may send any count.
 std::uint64_t sum(std::uint64_t a, std::uint64_t b) {
   return a > std::numeric_limits<std::uint64_t>::max() - b ? std::numeric_limits<std::uint64_t>::max()
                                                            : a + b;

@@ -17,7 +17,7 @@
 namespace ls {
 
 // The causes of bad health. A new cause needs an entry here and a row in health.cpp (the compiler reports a
-// missing one). Causes are stored and sent by the names in these rows, so their order here does not matter.
+// missing one). Causes are stored and sent by the names in these rows, so their order here may change.
 enum class HealthCause : std::uint8_t {
   none,  // used for a good sample; a Health never contains it
   // Causes of rejected samples. Such a sample is counted and contributes zero to the sums. It remains one of
@@ -26,7 +26,7 @@ enum class HealthCause : std::uint8_t {
   not_a_number,
   infinite,
   too_large,          // larger than float sums of 2^31 samples can represent
-  too_many_surfaces,  // the path was cut off
+  too_many_surfaces,  // the path had more than 2^20 rays, or a shadow ray crossed more than 2^16 surfaces
   no_direction,
   nested_media,  // the path was inside more media at once than it can store
   // Causes of samples that are counted but kept, because rejecting them would bias the result.

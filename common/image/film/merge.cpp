@@ -105,8 +105,8 @@ class Merger {
 
   const std::string& name(const Entry& e) const { return sources_[e.source].name; }
 
-  // Chooses which partials of one tile are folded. Partials with the same range of samples must be equal; of
-  // several with the same start, the one with the longest range is kept.
+  // Chooses which partials of one tile are folded. Partials with the same range of samples must be equal. Of
+  // the partials that begin at the same sample, the one with the longest range is kept.
   Result<std::vector<Entry>> choose(std::vector<Entry> entries) {
     std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
       return std::tie(a.samples.s0, b.samples.s1) < std::tie(b.samples.s0, a.samples.s1);

@@ -13,7 +13,7 @@ inline bool lies_in(FrameSize frame, const PixelRect& rect) {
          rect.y1 <= frame.height;
 }
 
-// Returns the tiles that have pixels in a rectangle, which lies in the frame, row by row.
+// Returns the tiles that have pixels in `rect`, row by row. The rectangle must lie in the frame.
 inline std::vector<TileIndex> tiles_over(const TileGrid& grid, const PixelRect& rect) {
   std::vector<TileIndex> out;
   for (int row = rect.y0 / grid.tile; row * grid.tile < rect.y1; ++row)

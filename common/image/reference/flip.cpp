@@ -68,7 +68,8 @@ float hyab(const Triple& a, const Triple& b) {  // Abasi, Tehran and Fairchild 2
   return std::abs(a[0] - b[0]) + std::hypot(a[1] - b[1], a[2] - b[2]);
 }
 
-// [LDR] equations (8), (9): large differences are compressed into the range above kPt.
+// Maps a colour difference to [0, 1]: large differences are compressed into the range above kPt ([LDR]
+// equations (8), (9)).
 float redistributed(float difference, float largest) {
   const float e = std::pow(difference, kQc), bend = kPc * largest;
   return e < bend ? kPt / bend * e : kPt + (e - bend) / (largest - bend) * (1 - kPt);
@@ -91,7 +92,8 @@ Triple seen(const Planes& filtered, std::size_t i) {
   return hunt(lab(rgb));
 }
 
-// [HDR] section 3: the fit of Narkowicz 2015 to the ACES curve, including its exposure bias of 0.6.
+// The coefficients of the tone curve of [HDR] section 3: the fit of Narkowicz 2015 to the ACES curve,
+// including its exposure bias of 0.6.
 constexpr float kTone[6] = {.6F * .6F * 2.51F, .6F * .03F, 0, .6F * .6F * 2.43F, .6F * .59F, .14F};
 
 float tone_mapped(float v) {
@@ -131,7 +133,7 @@ std::vector<float> ldr_flip(const FlipImage& reference, const FlipImage& image, 
   std::vector<float> out(pixels);
   for (std::size_t i = 0; i < pixels; ++i) {
     const float colour = redistributed(hyab(seen(rf, i), seen(tf, i)), largest);
-    // [LDR] equations (12) to (14).
+    // The colour and feature errors are combined by [LDR] equations (12) to (14).
     const float feature = std::pow(features[i] * static_cast<float>(1 / std::numbers::sqrt2), kQf);
     out[i] = std::pow(colour, 1 - feature);
   }
@@ -146,8 +148,7 @@ FlipExposures flip_exposures(std::span<const float> rgb) {
   const auto middle = light.begin() + static_cast<std::ptrdiff_t>(light.size() / 2);
   std::nth_element(light.begin(), middle, light.end());
   const float median = *middle, most = *std::max_element(light.begin(), light.end());
-  // x is the larger of the two values at which the tone curve equals kLevel: a solution of a quadratic
-  // equation.
+  // x is the luminance that the tone curve maps to kLevel: the larger solution of a quadratic equation.
   constexpr float kLevel = .85F;
   const float a = kTone[0] - kLevel * kTone[3], b = kTone[1] - kLevel * kTone[4],
               c = kTone[2] - kLevel * kTone[5];

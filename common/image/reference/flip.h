@@ -35,8 +35,8 @@ struct FlipImage {
 std::vector<float> ldr_flip(const FlipImage& reference, const FlipImage& image,
                             float pixels_per_degree = kFlipPixelsPerDegree);
 
-// The exposures of HDR-FLIP in stops ([HDR] section 4): from the exposure that maps the brightest pixel of
-// the reference to 0.85, to the one that maps the median to 0.85.
+// The exposures of HDR-FLIP in stops ([HDR] section 4): `count` evenly spaced ones from `first`, which maps
+// the brightest pixel of the reference to 0.85, to `last`, which maps the median to 0.85.
 struct FlipExposures {
   float first = 0, last = 0;
   int count = 2;

@@ -82,7 +82,7 @@ TrueError true_error(const Reference& reference, std::span<const float> rgb) {
   const bool known = !reference.error.empty();
   double squares = 0, relative = 0, squares_variance = 0, relative_variance = 0;
   for (std::size_t pixel = 0; pixel < rgb.size(); pixel += 3) {
-    double product = 0, weighted = 0;  // sums of products of |x - ref| and s
+    double product = 0, weighted = 0;  // sums over the channels of |x - ref| s and of h |x - ref| s
     for (std::size_t i = pixel; i < pixel + 3; ++i) {
       const double d = double{rgb[i]} - reference.rgb[i], s = known ? reference.error[i] : 0;
       const double h = weight(reference, i);

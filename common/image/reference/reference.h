@@ -10,23 +10,24 @@
 //   (x - ref)^2 - s^2 = (x - A) (x - B) = (e - a) (e - b).
 //
 // a and b are independent with mean 0, so the expectation is e^2, whatever their distribution. With r =
-// Var((a + b) / 2) the variance is 4 e^2 r + 4 r^2 (half of the second term because s^2 itself is estimated
-// from one difference only).
+// Var((a + b) / 2) the variance is 4 e^2 r + 4 r^2. Half of the second term arises because s^2, as an
+// estimate of r, has noise itself: it is computed from one difference.
 //
 // The weight h is the mean of f(A) and f(B), f(m) = 1 / (m^2 + 0.01). The weight f(ref) would be biased:
-// where a and b are both large, f(ref) is small and (e - a) (e - b) is large. This adds up to f" r^2, many
-// times e^2 f in a noisy reference. In (e - a) (e - b) f(A), b is not in the weight and vanishes in the mean,
-// which leaves (e^2 - e a) f(A). The part with -e a averages out over an image whose errors have both signs.
-// The bias e^2 f" r of e^2 f(A) is subtracted within f (relative_weight()), where r comes from the
-// neighbours' s^2, which are independent of a. The remaining bias is of second order: for bright m it is 60
-// r^2 / m^4 of the value.
+// where a and b are both large, f(ref) is small and (e - a) (e - b) is large. This bias amounts to f" r^2,
+// many times e^2 f in a noisy reference. In (e - a) (e - b) f(A), b is not in the weight and vanishes in the
+// mean, which leaves (e^2 - e a) f(A). The part with -e a averages out over an image whose errors have both
+// signs. The part e^2 f(A) has the bias e^2 f" r. It is subtracted within f (relative_weight()), with r from
+// the s^2 of the neighbours, which are independent of a. The remaining bias is of second order in r: for
+// bright m it is 60 r^2 / m^4 of the value.
 //
 // The standard error of these figures contains the reference's noise alone. Over channels (e - a) . (e - b)
-// has the variance 4 e'Ve + 4 tr V^2, with V the covariance of the reference. For Gaussian noise, 4
-// ((x - ref) . s)^2 with the signs of s has this mean, because ref and A - B are independent. The signs are
-// not stored, so the sum of |x - ref| s is used, which is at least as large. It is right for grey noise. For
-// independent channels, with r much larger than e^2, it is a third too wide: the mean square of the sum is
-// then 3 + 6 (2 / pi)^2 instead of 3.
+// has the variance 4 e'Ve + 4 tr V^2, with V the covariance of the reference. Let d = x - ref, and
+// t = (A - B) / 2, so that s = |t|. For Gaussian noise 4 (d . t)^2 has this mean, because ref and A - B are
+// independent. The signs of t are not stored, so d . t is replaced by the sum over channels of |d| s, which
+// is at least as large. The result is right for grey noise. For independent channels, with r much larger
+// than e^2, the standard error is a third too large: the mean square of the sum is then 3 + 6 (2 / pi)^2
+// instead of 3.
 //
 // Without the layers stderr.R, G, B, s is 0, and the figures include an unknown amount of the reference's
 // noise. The difference of noisy numbers can be negative, and is then set to 0.

@@ -25,13 +25,13 @@ struct FileNeed {
 };
 
 struct Needs {
-  // True if the scene has media of a kind. media: any; grids: the density varies in space; chromatic: the
-  // extinction differs between channels; emission: they emit light; anisotropic: the phase function is not
-  // isotropic.
+  // Each is true if the scene has such media. media: media of any kind; grids: media with coefficients that
+  // vary in space; chromatic: media whose extinction differs between channels; emission: media that emit
+  // light; anisotropic: media with a phase function that is not isotropic.
   bool media = false, grids = false, chromatic = false, emission = false, anisotropic = false;
   bool camera_in_medium = false;
-  // boundaries: the scene has index-matched surfaces. null_transmission: it has surfaces through which a part
-  // of the light passes without a change of direction.
+  // boundaries: the scene has index-matched surfaces (bsdf "null"). null_transmission: it has other surfaces
+  // through which a part of the light passes without a change of direction.
   bool boundaries = false, null_transmission = false;
   bool lens = false, crop = false;
   // Number of objects of each type, by the type's name in describe.h. Types without objects are left out.
@@ -41,7 +41,8 @@ struct Needs {
   // True if the density of a heterogeneous medium is in a file. The file may have three channels, which makes
   // the medium chromatic; this is known only after reading it.
   bool density_files = false;
-  // True if all lights are points, spots, projectors or directions without extent, which no ray can hit.
+  // True if the scene has lights and none of them has an extent, so that no ray can hit one: they are
+  // points, spots, projectors or directions.
   bool only_delta_lights = false;
   std::vector<FileNeed> files;  // files in the scene's order
   bool operator==(const Needs&) const = default;
@@ -50,8 +51,8 @@ struct Needs {
   std::uint32_t sampled_lights() const;
 };
 
-// Computes the needs. `scene` must be consistent and compacted (validate.h). `sees_media` is false for the
-// integrator `path`, which ignores media.
+// Computes the needs. `scene` must be consistent and compacted (validate.h). `sees_media` is false for an
+// integrator that ignores media (`path`, `whitted`).
 Needs needs_of(const Scene& scene, bool sees_media);
 
 // Returns the needs as JSON with sorted keys and without spaces, so that equal needs give equal texts. The

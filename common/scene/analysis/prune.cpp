@@ -176,8 +176,9 @@ void Pruner::phases() {
   note("phase function", "its medium scatters no light", unasked);
 }
 
-// Replaces a bsdf by a simpler one with the same effect, by one step. Returns false if there is no such step.
-// A nested bsdf that remains keeps its constants, so that it scatters as before.
+// Replaces a blend or a mask whose weight or opacity is 0 or 1 everywhere by the only bsdf that has an
+// effect in it, which may again be a blend or a mask. Returns false for all other bsdfs, and leaves them
+// unchanged.
 bool Pruner::simplify(Bsdf& b) {
   if (const auto* blend = std::get_if<BlendBsdf>(&b)) {
     const bool first = everywhere(blend->weight, 0);
@@ -198,7 +199,8 @@ bool Pruner::simplify(Bsdf& b) {
   return false;
 }
 
-// Each step removes one level of nesting, and the depth of nesting is bounded.
+// Simplifies each bsdf as far as possible. Each step removes one level of nesting, and the depth of nesting
+// is bounded.
 void Pruner::materials() {
   for (Bsdf& b : s_.bsdfs)
     for (int step = 0; step < kMaxBsdfNesting && simplify(b); ++step) {

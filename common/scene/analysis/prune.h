@@ -27,9 +27,9 @@ struct Pruned {
   std::vector<LeftOut> left_out;  // removed objects, in a fixed order
 };
 
-// Properties of the integrator that pruning depends on. `media` is false for `path`, which ignores media.
-// `passing_counts` is true if surfaces that light passes unchanged count for the path's depth limit; such
-// surfaces then affect the image.
+// Properties of the integrator that pruning depends on. `media` is false for integrators that ignore media
+// (`path`, `whitted`). `passing_counts` is true if a path's depth limit also counts the surfaces that light
+// passes unchanged; then these surfaces affect the image.
 struct PrunedFor {
   bool media = true, passing_counts = false;
 };

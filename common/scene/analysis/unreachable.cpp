@@ -63,8 +63,8 @@ class Search {
   bool emits(MediumIndex m) const { return traits_of(s_.media[m.value], s_.volumes).emits; }
   static std::optional<Box> place_in_scene(const Shape& s) { return s.group ? std::nullopt : box_of(s); }
 
-  // True if light may enter through the shape or come from it. Surfaces without any effect are removed later
-  // (prune.cpp).
+  // True if light may enter through the shape or come from it. A null surface that bounds no medium does not
+  // count: prune.cpp removes it later.
   bool is_entrance(const Shape& s) const {
     const auto glowing = [&](const std::optional<MediumIndex>& m) { return m && emits(*m); };
     if (s.emitter || glowing(s.interior) || glowing(s.exterior)) return true;
@@ -79,7 +79,9 @@ class Search {
     return invertible(s.to_world) && determinant3(s.to_world) > 0 && (!mesh || mesh->face_normals);
   }
 
-  // True if the shape is closed, its interior medium is inside, and no light can be there.
+  // True if the shape is a sphere or cube and no light reaches the medium inside it: light does not pass its
+  // surface, neither it nor the medium emits, and no emitter and no other surface through or from which light
+  // may come is inside it or touches it. False if flipped normals put the interior medium on the outside.
   bool sealed(const Shape& s, std::size_t i, const Box& box) {
     const bool closed =
         std::holds_alternative<SphereShape>(s.geometry) || std::holds_alternative<CubeShape>(s.geometry);
@@ -95,8 +97,8 @@ class Search {
                        [&](const Entrance& e) { return e.shape != i && e.box && apart(box, e); });
   }
 
-  // True if the entrance (a surface through which light may come) does not touch the shape, whose box is
-  // `tight`: it lies beside the shape or encloses it.
+  // True if the entrance (a surface through or from which light may come) does not touch the shape whose box
+  // is `tight`: the entrance is beside the shape or encloses it.
   bool apart(const Box& tight, const Entrance& e) const {
     const Box box = with_margin(tight, *e.box);
     if (!touch(box, *e.box)) return true;

@@ -13,7 +13,8 @@ namespace {
 
 using Values = std::vector<double>;
 
-// Spherical linear interpolation between the quaternions `a` (s = 0) and `b` (s = 1), along the shorter arc.
+// Returns the spherical linear interpolation (slerp) between the quaternions `a` (s = 0) and `b` (s = 1),
+// along the shorter arc.
 Values turned(const Values& a, Values b, double s) {
   double cosine = 0;
   for (std::size_t i = 0; i < 4; ++i) cosine += a[i] * b[i];
@@ -40,7 +41,7 @@ class Sampler {
     if (!is_new) return known->second;
     Values values = read(sampler, is_rotation);
     numbers_ += values.size();
-    // The same limit as for the values of the file's JSON
+    // The limit is the same as for the values of the file's JSON.
     if (numbers_ > kMaxGltfValues)
       values = wrong(sampler, fmt::format("animations give more than {} numbers at a time: split the scene",
                                           kMaxGltfValues));
@@ -108,7 +109,7 @@ class Sampler {
   Translation& t_;
   const double seconds_;
   std::map<std::pair<const Value*, bool>, std::shared_ptr<const Values>> known_;
-  std::size_t numbers_ = 0;  // in all values of known_
+  std::size_t numbers_ = 0;  // how many numbers the values in known_ have together
 };
 
 // Returns the animations that `-D animation` chooses.

@@ -28,8 +28,9 @@ class Buffers {
   Buffers(const Item& root, AssetSource& assets, std::optional<std::string_view> chunk)
       : root_(root), assets_(assets), chunk_(chunk) {}
 
-  // Each returns nullopt if bytes are missing or have another type, which has been reported. `view` is the
-  // index of a buffer view, `accessor` that of an accessor; `types` lists the accepted types, such as "VEC3".
+  // Each reads from the buffers. nullopt: bytes are missing or have another type, which has been reported.
+  // `view` is the index of a buffer view, `accessor` that of an accessor; `types` lists the accepted types,
+  // such as "VEC3".
   std::optional<std::string_view> view(const Item& view);
   std::optional<Numbers<float>> floats(const Item& accessor, std::initializer_list<std::string_view> types);
   std::optional<std::vector<std::uint32_t>> indices(const Item& accessor);

@@ -18,7 +18,7 @@ constexpr double kFarthest = 1e7;  // far clip plane of a camera without zfar
 // The default camera of a scene without cameras. kFrom is the direction to it: in front, to the right, above.
 constexpr Vec3 kFrom{{{.5, .35, 1}}};
 constexpr double kFov = 40;       // degrees, along the shorter side
-constexpr double kMargin = 1.05;  // camera distance; at 1 the scene's bounding sphere just fits the frame
+constexpr double kMargin = 1.05;  // factor on its distance; at 1 the bounding sphere just fits the frame
 
 std::string name_of(const Translation& t, const Standing& camera) {
   const std::string own = camera.node["camera"].in(t.root["cameras"])["name"].text("");
@@ -99,7 +99,7 @@ class CameraTranslator {
     add(out, "far_clip", lens["zfar"].number(kFarthest), out.at);
   }
 
-  // Our orthographic camera covers [-1, 1] across the frame's width.
+  // Our orthographic camera covers [-1, 1] across the frame's width, so its transform is scaled by xmag.
   Element orthographic(const Item& lens, const Transform& to_world, const Span& at) {
     const double x = std::abs(lens["xmag"].number(0)), y = std::abs(lens["ymag"].number(0));
     Element out = made("sensor", "orthographic", at);

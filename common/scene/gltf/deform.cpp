@@ -28,9 +28,9 @@ void put_unit(float* out, const Vec3& v) {
   for (std::size_t k = 0; k < 3; ++k) out[k] = static_cast<float>(length > 0 ? v[k] / length : v[k]);
 }
 
-// Transforms the normal n by m, and normalises it. Normals need the inverse transpose of m's linear part. Its
-// cofactor matrix, whose columns are cross products of the linear part's columns, is the determinant times
-// that; so for a negative determinant the sign is flipped.
+// Transforms the normal n by m, and normalises it. A normal transforms by the inverse transpose of m's
+// linear part. This is the cofactor matrix, whose columns are cross products of the linear part's columns,
+// divided by the determinant. Of the determinant only the sign is applied, since the result is normalised.
 void turn_normal(const Transform& m, float* n) {
   const auto column = [&](std::size_t i) { return Vec3{{m.m[i], m.m[4 + i], m.m[8 + i]}}; };
   const Vec3 x = column(0), y = column(1), z = column(2);

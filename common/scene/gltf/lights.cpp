@@ -13,7 +13,8 @@ namespace {
 
 std::string text_of(const Vec3& v) { return fmt::format("{} {} {}", v[0], v[1], v[2]); }
 
-// The cone is dark beyond outerConeAngle and full within innerConeAngle, both from the axis.
+// Adds the two angles of a spot light, measured from its axis: full intensity within innerConeAngle, no
+// light beyond outerConeAngle.
 void add_cone(Translation& t, const Item& spot, Element& out) {
   const double outer = spot["outerConeAngle"].number(std::numbers::pi / 4);
   const double inner = spot["innerConeAngle"].number(0);

@@ -61,8 +61,8 @@ class MaterialTranslator {
     read_specular();
   }
 
-  // Computes seen_ior_, the index of refraction whose reflectance at normal incidence is `specularFactor`
-  // times that of ior_.
+  // Computes seen_ior_, the index of refraction whose reflectance at normal incidence is that of ior_ times
+  // specularFactor and the largest component of specularColorFactor, at most 0.99.
   void read_specular() {
     const Item specular = m_.extension("KHR_materials_specular");
     for (const char* name : {"specularTexture", "specularColorTexture"})
@@ -128,7 +128,7 @@ class MaterialTranslator {
     return out;
   }
 
-  // Burley's coat has an alpha from 0.1 (gloss 0) to 0.001 (gloss 1).
+  // Adds a clear coat. The coat of Burley's model has an alpha from 0.1 (gloss 0) to 0.001 (gloss 1).
   void add_coat(Element& out) {
     const Item coat = m_.extension("KHR_materials_clearcoat");
     const double roughness = coat["clearcoatRoughnessFactor"].number(0), alpha = roughness * roughness;
@@ -140,7 +140,7 @@ class MaterialTranslator {
       if (coat[name].given()) t_.warn_once(coat[name], fmt::format("{} has no effect here", name));
   }
 
-  // A solid body of glass, with the medium inside of it.
+  // Returns the surface of a solid body of glass, and adds the medium inside the body.
   Element body(Material& out) {
     out.interior = interior();
     const bool plain =
@@ -276,7 +276,7 @@ class MaterialTranslator {
   double ior_ = 1.5, seen_ior_ = 1.5;
 };
 
-// All textures of a material that are read.
+// Returns the textures of a material that this reader uses; some may be missing.
 std::vector<Item> textures_of(const Item& m) {
   const Item pbr = m["pbrMetallicRoughness"];
   return {pbr["baseColorTexture"],

@@ -43,8 +43,8 @@ class NodeReader {
     return {};
   }
 
-  // `hidden`: an ancestor is invisible (KHR_node_visibility), and so is this node; but it may be a joint of a
-  // visible mesh.
+  // `hidden`: an ancestor is invisible (KHR_node_visibility), so this node is invisible too. It still gets
+  // its transform, since it may be a joint of a visible mesh.
   void visit(const Item& index, const Transform& outer, std::size_t depth, bool hidden) {
     const Item node = index.in(nodes_);
     if (!node.given() || t_.report.full()) return;
@@ -131,7 +131,8 @@ class NodeReader {
     return found == poses_.end() ? kStill : found->second;
   }
 
-  // Returns the weights of morph targets; nullptr: there are no targets, or all weights are 0.
+  // Returns the weights of morph targets. nullptr: there are no targets, all weights are 0, or their number
+  // is wrong, which has been reported.
   const std::vector<double>* weights_of(const Item& mesh, const Item& node) {
     const auto& moved = pose_of(node).weights;
     const Item given = node["weights"].given() ? node["weights"] : mesh["weights"];

@@ -99,7 +99,8 @@ Source colour_source(Translation& t, const std::array<double, 3>& factor, const 
 void give(Element& parent, std::string_view name, const Source& source, const Span& at, double threshold = 0);
 Element vertex_attribute(std::string_view name, const Span& at);
 
-// In materials.cpp: a translated material, for meshes of one kind.
+// In materials.cpp: a translated material. It depends on whether the mesh has colours and opacities
+// (MeshKind).
 struct Material {
   std::string id;        // of its bsdf
   std::string interior;  // id of the medium within; empty: none
@@ -108,7 +109,7 @@ struct Material {
   bool has_normal_map = false;
 };
 struct MeshKind {
-  bool colours = false, opacities = false;  // true if the mesh's corners have them
+  bool colours = false, opacities = false;  // true if the corners (vertices) have them
   auto operator<=>(const MeshKind&) const = default;
 };
 class Materials {
@@ -155,7 +156,7 @@ class Meshes {
   Translation& t_;
   Materials& materials_;
   std::size_t bytes_ = 0;  // of the files of all meshes
-  std::size_t parts_ = 0;  // primitives and morph targets, counted for each skin and weights of a mesh
+  std::size_t parts_ = 0;  // primitives and morph targets; a mesh counts again for each skin and each weights
   Box box_;
 };
 

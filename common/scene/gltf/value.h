@@ -28,8 +28,9 @@ struct Member {
   Value value;
 };
 
-// Parses a JSON text, and adds it to the report as a file of that name whose diagnostics contain the paths of
-// values. nullptr: the text is malformed or beyond the limits, which has been reported.
+// Parses a JSON text. Adds the text to the report under this name; a diagnostic about it begins with the
+// path of the value that it concerns. nullptr: the text is malformed or beyond the limits, which has been
+// reported.
 std::shared_ptr<const Value> parse_json(std::string name, std::string text, Report& report);
 
 // Returns the path of the innermost value at or before `offset`, such as "materials[3].normalTexture"; ""

@@ -41,7 +41,8 @@ Element parallel(Object& o) {
   return out;
 }
 
-// Makes a disk-shaped light at infinity of the given radiance and angular radius thetaA.
+// Makes a light that is a disk at infinity with the given radiance and angular radius thetaA (degrees). At
+// 180 degrees it is a constant environment.
 Element disk(Object& o, Report& report) {
   need(o, "radiance");
   need(o, "thetaA");
@@ -59,7 +60,7 @@ Element disk(Object& o, Report& report) {
                              "is light from everywhere",
                              o.title(), angle));
   Element out = light("directional", o), mirror = made("scale", "", o.element().at);
-  // The direction of an emitter is that of its light, away from the disk
+  // A directional emitter's direction is that in which its light travels, away from the disk: z is mirrored.
   set(mirror, "value", "1 1 -1", o.element().at);
   add_transform(out, to_world, "to_world", {std::move(mirror)});
   const double sine = std::sin(angle * kDegree);

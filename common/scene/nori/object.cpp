@@ -41,7 +41,7 @@ std::optional<std::vector<double>> values_of(const Element& e) {
   }
   auto numbers = parse_numbers(text, 3);
   if (!numbers) return std::nullopt;
-  // a pair of values for u and v
+  // Two numbers are a pair of values for u and v.
   const bool pair = (e.tag == "point" || e.tag == "vector") && numbers->size() == 2;
   if (numbers->size() != 3 && !pair) return std::nullopt;
   return numbers;

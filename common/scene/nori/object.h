@@ -44,10 +44,11 @@ class Object {
 
   // Returns the nested objects with this tag, except those that are values of parameters.
   std::vector<const Element*> nested(std::string_view tag);
-  // returns the single nested object with this tag; a second one is reported
+  // Returns the nested object with this tag, or nullptr if there is none; a second one is reported.
   const Element* only(std::string_view tag);
   void finish();
-  // finish() for an unsupported object: reports only unknown parameters.
+  // Replaces finish() for an object of an unsupported type: reports only parameters that this type does not
+  // have.
   void finish_refused();
 
  private:

@@ -31,7 +31,7 @@ std::optional<Element> camera(const Element& e, const Element* sampler, Report& 
 
 struct Integrator {
   Element element;
-  // an option of Kombu, a descendant of Nori: the camera is inside the medium of the mesh around it
+  // An option of Kombu, a descendant of Nori: the camera is in the medium of the mesh that surrounds it.
   bool inmedium = false;
 };
 std::optional<Integrator> integrator(const Element& e, Report& report);

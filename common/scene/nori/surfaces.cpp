@@ -38,7 +38,7 @@ Element checkerboard(Object& o, const Mesh& mesh) {
   add(out, "color0", o.color("value1", {0, 0, 0}), o.element().at);
   add(out, "color1", o.color("value2", {1, 1, 1}), o.element().at);
   const auto scale = pair(o, "scale", 1), delta = pair(o, "delta", 0);
-  // Mitsuba's squares are half as wide as the period of its texture.
+  // Mitsuba's checkerboard has two squares per unit of u and of v, Nori's has one per `scale`.
   add_placement(out, {1 / (2 * scale[0]), (half_turn(mesh) / scale[0] - delta[0]) / 2, -1 / (2 * scale[1]),
                       (1 / scale[1] - delta[1]) / 2});
   return out;
@@ -88,9 +88,10 @@ Element dielectric(Object& o) {
   return out;
 }
 
-// Nori's microfacet bsdf is kd / pi + (1 - max kd) D F G / (4 cos cos). With m = max kd this is a mixture of
-// (1 - m) times the reflection and m times a diffuse surface of kd / m. F is the Fresnel term of a dielectric
-// from outside, which equals that of a conductor with a real index.
+// Nori's microfacet bsdf is kd / pi + (1 - m) D F G / (4 cos_i cos_o) with m = the largest channel of kd.
+// This is the mixture of (1 - m) times a rough reflection and m times a diffuse surface whose reflectance is
+// kd / m. F is the Fresnel term of a dielectric seen from outside, which equals that of a conductor with a
+// real index.
 std::optional<Element> microfacet(Object& o, const Mesh& mesh, Report& report) {
   const Span at = o.element().at;
   Element gloss = bsdf_of("roughconductor", o.element());
@@ -172,8 +173,8 @@ Element principled(Object& o, const Mesh& mesh, Report& report) {
   return out;
 }
 
-// Translates the blend of Kombu, a descendant of Nori. Its parts have names; its weight may be a texture
-// without a name.
+// Translates the blend of Kombu, a descendant of Nori. The two bsdfs in it have names; its weight may be a
+// texture without a name.
 std::optional<Element> blend(Object& o, const Mesh& mesh, Report& report) {
   Element out = bsdf_of("blendbsdf", o.element());
   const Element* fresnel = o.take("fresnel");

@@ -165,7 +165,8 @@ class SettingsTranslator {
     Element out = made("sensor", radius > 0 ? "thinlens" : "perspective", p.at());
     add(out, "fov", p.number("fov", 90), p.at());
     add(out, "string", "fov_axis", "smaller", p.at());
-    // A uniform scale only changes the size of the lens.
+    // A uniform scale of the camera only changes its lens radius and its focus distance, so it is applied to
+    // these.
     const auto [world, scale] = without_scale(s_.camera_ctm.from);
     const double focus = p.number("focaldistance", 1e6);
     if (radius > 0) {

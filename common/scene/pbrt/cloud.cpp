@@ -21,16 +21,16 @@ Vec3 plus(const Vec3& a, double x, const Vec3& b) {
 }
 Vec3 times(double x, const Vec3& a) { return Vec3{{x * a[0], x * a[1], x * a[2]}}; }
 
-// Returns how many cells of the finest noise there are per unit of length: of the last octave or, if points
-// are moved, of the last noise that moves them.
+// Returns how many cells the finest noise has per unit of length. The finest noise is the last octave or, if
+// noise also moves the points (wispiness > 0), the last noise that does so.
 double cells_per_unit(const Cloud& cloud) {
   const double octaves = std::pow(kFiner, kOctaves - 1);
   return std::abs(cloud.frequency) *
          (cloud.wispiness > 0 ? std::max(octaves, kWarpFrequency * kFiner) : octaves);
 }
 
-// Least number of nodes per unit of height: besides the noise, the density has a piecewise linear falloff
-// with height, with corners at 0, 1/2 and 1.
+// Least number of nodes per unit of height. They resolve the thinning of the density with height, which is
+// piecewise linear with corners at 0, 1/2 and 1.
 constexpr double kLeastPerHeight = 64;
 
 // Returns the grid with `per_cell` nodes per cell; nullopt if it has more than `most` nodes.
@@ -53,7 +53,7 @@ std::optional<CloudNodes> nodes_of(const Cloud& cloud, double per_cell, std::siz
 }  // namespace
 
 double density_at(const Cloud& cloud, const Vec3& p) {
-  if (p[1] <= 0) return 1;  // whatever the noise is
+  if (p[1] <= 0) return 1;  // the clamped sum below is 1 for any noise
   Vec3 q = times(cloud.frequency, p);
   if (cloud.wispiness > 0) {
     double strength = 0.05 * cloud.wispiness, frequency = kWarpFrequency;

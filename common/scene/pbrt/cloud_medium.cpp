@@ -14,8 +14,9 @@ namespace {
 // Largest number of nodes of one grid, and of all grids of clouds in a file.
 constexpr std::size_t kMaxNodes = std::size_t{1} << 24, kMaxNodesOfAll = std::size_t{1} << 25;
 
-// Returns the name of the grid's file. It is made from the formula's parameters, so that an existing grid,
-// such as one sent to a coordinator, is not computed again, which takes seconds.
+// Returns the name of the grid's file. It is a digest of the formula's parameters and the grid's size, so
+// that a grid that exists already, such as one sent to a coordinator, is found without computing it, which
+// would take seconds.
 std::string name_of(const Cloud& c, const CloudNodes& nodes) {
   const std::string formula =
       fmt::format("cloud {} {} {} {} {} {}", c.density, c.wispiness, c.frequency, fmt::join(c.low, " "),

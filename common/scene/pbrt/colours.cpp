@@ -12,8 +12,9 @@
 namespace ls::scene::pbrt {
 namespace {
 
-// Returns Y of a linear sRGB colour. The weights w invert linear_srgb(): they are orthogonal to the images of
-// X and Z, and their product with the image of Y is 1.
+// Returns the luminance Y of a linear sRGB colour, a weighted sum of its channels. The weights w follow from
+// linear_srgb(), which converts XYZ to sRGB: w is orthogonal to the colours of (1, 0, 0) and (0, 0, 1), and
+// its product with the colour of (0, 1, 0) is 1.
 double luminance(const Rgb& c) {
   static const Vec3 weights = [] {
     const auto column = [](const std::array<double, 3>& xyz) {

@@ -32,7 +32,8 @@ bool read_sides(MediumSource& m, std::array<int, 3>& sides) {
   return true;
 }
 
-// Checks that the parameter, if it is given, has `channels` numbers per voxel.
+// Checks that the parameter, if it is given, has `channels` numbers per voxel, none of them above kLargest
+// in magnitude.
 bool fits(MediumSource& m, const Param* p, int channels, const std::array<int, 3>& sides) {
   const std::size_t wanted = std::size_t(channels) * product(sides);
   if (!p) return true;
@@ -70,7 +71,7 @@ MadeGrid padded(const std::array<int, 3>& sides, int channels, F value, float be
 
 bool is_grey(const Rgb& c) { return c[0] == c[1] && c[1] == c[2]; }
 
-// The light of a "uniformgrid".
+// Translates the emission of a "uniformgrid".
 class GridLight {
  public:
   GridLight(MediumSource& m, const std::array<int, 3>& sides, const Box& box)
@@ -198,7 +199,7 @@ class Colours {
   const MadeGrid absorption_, scattering_;
 };
 
-// The light of an "rgbgrid".
+// Adds the emission of an "rgbgrid", an RGB value per voxel, to the medium's element.
 bool add_colours(MediumSource& m, Element& out, const Param& light, const std::array<int, 3>& sides,
                  const Box& box) {
   const double scale = m.p.number("Lescale", 1);

@@ -125,8 +125,8 @@ class LightTranslator {
     if (above_zero("illuminance", 0) > 0)
       p_.error(p_.at(), fmt::format("{} has an illuminance, which depends on its image's pixels: give scale",
                                     p_.title()));
-    // Only pbrt-v3 multiplies the image by L. finish() rejects the parameter beside a filename, as pbrt-v4
-    // does, and a mapname beside it.
+    // Only pbrt-v3, where the image is called mapname, multiplies it by L. With a filename (pbrt-v4) neither
+    // L nor mapname is taken, so finish() rejects them; pbrt-v4 rejects L there too.
     const bool is_square = p_.has("filename");
     const Rgb c = is_square ? times({1, 1, 1}, p_.number("scale", 1) * t_.exposure()) : colour("L");
     add(out, "string", "filename", p_.text(is_square ? "filename" : "mapname", ""), p_.at());
@@ -145,7 +145,7 @@ class LightTranslator {
     return out;
   }
 
-  // Our projector's own +x points to the left, like the camera's.
+  // +x of our projector points to the left, like our camera's, so x is mirrored.
   Element projection() {
     Element out = made("emitter", "projector", p_.at());
     add(out, image_texture("irradiance"));

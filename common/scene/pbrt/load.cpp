@@ -87,8 +87,8 @@ class Loader {
     tokens_ = outer;
   }
 
-  // Limits the number of elements. The limit is the same as for an XML file. Elements of a group are counted
-  // individually.
+  // Limits the number of elements as in an XML file (kMaxElements). Elements within a group are counted one
+  // by one.
   bool count_elements(const Token& token) {
     for (; counted_ < t_.scene.children.size(); ++counted_)
       if (t_.scene.children[counted_].get("type") != "shapegroup")
@@ -512,7 +512,8 @@ class Loader {
   Settings settings_;
   Attributes now_;
   std::vector<Saved> saved_;
-  std::size_t floor_ = 0;  // number of entries of saved_ that belong to the importing file
+  // Within an imported file: number of entries of saved_ that were begun outside, which it cannot end.
+  std::size_t floor_ = 0;
   std::map<std::string, Placed> systems_;
   std::optional<Element> group_;
   bool in_world_ = false, lost_ = false;

@@ -44,8 +44,8 @@ struct Box {
   Vec3 low{{0, 0, 0}}, high{{1, 1, 1}};
 };
 bool read_box(MediumSource& m, Box& box);  // from p0 and p1
-// border: a grid's voxels fill its box, except for the outermost layer. nodes: the outermost values lie on
-// the faces of the box.
+// How a grid fills its box. border: the outermost layer of voxels lies outside the box, all other voxels
+// fill it. nodes: the outermost values lie on the faces of the box.
 enum class Filling { border, nodes };
 void add_volume(MediumSource& m, Element& out, const char* name, const std::string& file, const Box& box,
                 Filling filling);

@@ -25,9 +25,9 @@ constexpr std::array<std::uint8_t, kPeriod> kPermutation{
     181, 199, 106, 157, 184, 84,  204, 176, 115, 121, 50,  45,  127, 4,   150, 254, 138, 236, 205, 93,
     222, 114, 67,  29,  24,  72,  243, 141, 128, 195, 78,  66,  215, 61,  156, 180};
 
-// The gradients, indexed by a hash of 16 values: the 12 directions from the centre of a cube to its edges,
-// and four of them again. pbrt and Perlin repeat different ones: pbrt has (0, 1, -1) instead of (0, -1, 1),
-// and another order.
+// The gradients, indexed by a hash with 16 values: the 12 directions from the centre of a cube to the
+// middles of its edges, four of which occur twice. This is pbrt's list. Perlin's has another order, and
+// repeats (0, -1, 1) instead of (0, 1, -1).
 constexpr std::array<std::array<std::int8_t, 3>, 16> kGradients{{{1, 1, 0},
                                                                  {-1, 1, 0},
                                                                  {1, -1, 0},

@@ -45,7 +45,7 @@ struct Material {
   bool has_texture = false;  // an image or a pattern depends on the uv of the shape
 };
 struct AreaLight {
-  Rgb radiance;  // if `power` is given: for a shape of the area power / pi
+  Rgb radiance;  // if `power` is given: the radiance that a shape of area power / pi would have
   std::optional<double> power;
   Span at;
 };
@@ -71,7 +71,7 @@ struct Translation {
   AssetSource& assets;
   Report& report;
   Element scene;
-  // exposure_factor: the factor on all light that follows from the film and the camera's shutter. `lit`: true
+  // exposure_factor: the film's settings and the camera's shutter multiply all light by this. `lit`: true
   // once a light has been multiplied by it.
   double exposure_factor = 1;
   bool lit = false;
@@ -87,9 +87,9 @@ struct Translation {
   void warn_once(const Span& at, std::string text);
 };
 
-// These functions are in colours.cpp. nullopt: the value was reported as wrong. Light of one colour has the
-// same luminance as in pbrt: an rgb is relative to the white of sRGB, all other values are scaled to
-// luminance 1.
+// These functions are in colours.cpp. nullopt: the value was reported as wrong. light_colour() keeps the
+// luminance that the light has in pbrt: an rgb is relative to the white of sRGB, and all other values are
+// scaled to luminance 1.
 std::optional<Rgb> light_colour(Translation& t, const Param& p);
 std::optional<Rgb> surface_colour(Translation& t, const Param& p);
 // Returns white if there is no such parameter
@@ -102,7 +102,7 @@ struct Names {
 };
 // Adds the parameter to `parent`, as a value or as a reference to a texture.
 void add_value(Translation& t, Element& parent, Params& p, Names names, const Rgb& fallback);
-// The same, multiplied by `scale`; the name is the same in both languages.
+// The same, with the value multiplied by `scale`; the parameter has the same name in pbrt and in Mitsuba.
 void add_scaled_value(Translation& t, Element& parent, Params& p, std::string_view name, const Rgb& fallback,
                       double scale);
 void refer(Element& parent, std::string_view name, std::string id, const Span& at);
@@ -127,7 +127,7 @@ struct Settings {
   Placed camera_ctm;
   std::string camera_medium;
 };
-double exposure_of(Settings& s);  // returns the factor on all light
+double exposure_of(Settings& s);  // returns Translation::exposure_factor
 void add_settings(Translation& t, Settings& s, const Span& file);
 
 // In made_files.cpp: files made from numbers in the scene's text. The returned name is derived from the

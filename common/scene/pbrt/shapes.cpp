@@ -108,7 +108,8 @@ class ShapeTranslator {
     return std::nullopt;
   }
 
-  // Returns the parameter `indices`. Returns an empty list if it is wrong, which is reported.
+  // Returns the parameter `indices`, which has `each` indices per face. If it is not given and the shape has
+  // only `each` corners, returns 0, 1, ... Empty: it is wrong or missing, which was reported.
   std::vector<double> indices(std::size_t corners, std::size_t each) {
     const Param* p = p_.take("indices");
     if (!p) {
@@ -130,7 +131,8 @@ class ShapeTranslator {
            std::vector<double>{};
   }
 
-  // Measures the areas in the world of the parts that are separate lights in pbrt: `size` triangles each.
+  // pbrt makes a separate light of each face, which is `size` triangles here. Measures the area of each face
+  // in the world.
   void measure(const Mesh& mesh, std::size_t size) {
     const auto corner = [&](std::size_t i) {
       const std::size_t at = 3 * static_cast<std::size_t>(mesh.indices[i]);
@@ -213,7 +215,7 @@ class ShapeTranslator {
     const std::vector<double> four = indices(x.size() / 3, 4);
     if (four.empty()) return std::nullopt;
     if (four.size() > kMaxOwnCorners) return too_many_corners();
-    // Each patch has corners of its own, as its uv go from 0 to 1.
+    // Each patch has corners of its own, as its u and v go from 0 to 1.
     Mesh mesh;
     for (std::size_t i = 0; i < four.size(); i += 4) {
       std::array<Vec3, 3> side;  // vectors from corner 0 to the corners 1, 2 and 3
@@ -281,7 +283,7 @@ class ShapeTranslator {
     }
     if (a_.inside == a_.outside) return;
     // A mirrored sphere of ours keeps its interior inside, whichever way its normals point. In pbrt the
-    // inside is where normals point away from.
+    // inside is the side that the normals point away from.
     const bool swapped = a_.reversed && determinant3(a_.ctm.to) * determinant3(to_world_.to) < 0;
     const std::string &inside = swapped ? a_.outside : a_.inside, &outside = swapped ? a_.inside : a_.outside;
     if (!inside.empty()) refer(out, "interior", medium_id(inside), p_.at());

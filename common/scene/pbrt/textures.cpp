@@ -71,8 +71,8 @@ Element image(Params& p) {
   return out;
 }
 
-// Translates a checkerboard. floor(s) + floor(t) of pbrt is floor(2 u') + floor(2 v') of half the
-// coordinates.
+// Translates a checkerboard. With the mapped coordinates (s, t), the squares follow in pbrt from
+// floor(s) + floor(t), here from floor(2 s) + floor(2 t), so the coordinates are halved.
 std::optional<Element> checks(Translation& t, Params& p) {
   Element out = made("texture", "checkerboard", p.at());
   const auto one = texture_of(t, p, "tex1", 1), two = texture_of(t, p, "tex2", 0);

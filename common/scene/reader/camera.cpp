@@ -76,8 +76,8 @@ void Reader::read_sensor_medium(Params& p, Sensor& s) {
   }
 }
 
-// Reads the field of view. Without `fov` it follows from a focal length on 35 mm film, over the diagonal of
-// 36 mm x 24 mm.
+// Sets the field of view if the file has no `fov`. It is the angle that the diagonal of 35 mm film, which has
+// 36 mm x 24 mm, covers at the focal length `focal_length`, by default 50 mm.
 void Reader::read_fov(Params& p, Sensor& s) {
   const bool has_fov = p.has("fov");
   const Element* given = p.take("focal_length");

@@ -12,7 +12,8 @@ void need_both(Params& p, const char* one, const char* other, Report& report) {
   report.error(p.object().at, fmt::format("{} needs {} and {}", p.title(), one, other));
 }
 
-// Reads sigma_a and sigma_s, or sigma_t and albedo; the other two are derived.
+// Checks that a medium of Mitsuba 0.x gives either sigma_a and sigma_s or sigma_t and albedo. Converts the
+// first pair to the second.
 void read_old_coefficients(Params& p, HomogeneousMedium& medium, Report& report) {
   const bool apart = p.has("sigma_a") || p.has("sigma_s"), together = p.has("sigma_t") || p.has("albedo");
   if (apart && together)
@@ -48,8 +49,8 @@ void need_inverse(const Transform& to_world, const Element& e, Report& report) {
     report.error(e.at, "to_world flattens this volume or leaves the range of numbers: it can't be inverted");
 }
 
-// Records which given parameters have an effect only with another one. Construct it before parameters are
-// taken.
+// Records which of the parameters are given that have an effect only together with another one. Construct it
+// before parameters are taken.
 struct Factors {
   explicit Factors(const Params& p)
       : light(p.has("emission_scale")), heat(p.has("temperature_scale") || p.has("temperature_offset")) {

@@ -165,7 +165,7 @@ std::optional<BsdfIndex> Reader::read_bsdf_as<RoughThinDielectricBsdf>(const Ele
   return add_bsdf(e, b);
 }
 
-// Checks that a sheet scatters no more light than it receives, if its two colours are constant.
+// Checks that a sheet with two constant colours scatters no more light than it receives.
 void Reader::check_sum(const Element& e, const DiffuseTransmissionBsdf& b) {
   // Two shares written with six digits add up to at most 1.000001, and slightly more in binary.
   constexpr double kMost = 1 + 1.5e-6;
@@ -358,7 +358,7 @@ std::optional<BsdfIndex> Reader::read_bsdf_as<BumpMapBsdf>(const Element& e) {
   return add_bsdf(e, b);
 }
 
-// Reads the texture of a bump map, which may have any name, or none.
+// Reads the texture of a bump map. The texture may have any name, or none.
 bool Reader::read_heights(Params& p, BumpMapBsdf& b) {
   const bool named = p.has("texture");
   bind(p, b);

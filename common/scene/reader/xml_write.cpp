@@ -152,8 +152,8 @@ class Writer {
   }
 
  private:
-  // Makes names unique, so that two assets of the same name are kept apart: by prefixes ("./" or "/") that do
-  // not change the path.
+  // Makes the names of assets unique, so that two assets of the same name stay apart. It adds prefixes ("./"
+  // or "/") that do not change the path.
   void name_assets() {
     std::map<std::string, int> seen;
     for (const Asset& a : scene_.assets) {
@@ -329,7 +329,7 @@ class Writer {
     if (x != f.unwritten) value("float", f.name, number(x));
   }
   void property(const Field& f, int x) {
-    // 0 is the default, and left out: no crop or an offset of 0, and the first mesh of a file.
+    // The default 0 is left out: it means no crop, an offset of 0, or the first mesh of a file.
     if (x == 0 && (f.name.starts_with("crop_") || f.name == "shape_index")) return;
     if (x == f.unwritten) return;
     value("integer", f.name, std::to_string(x));

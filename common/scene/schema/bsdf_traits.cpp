@@ -30,8 +30,8 @@ std::array<std::optional<BsdfIndex>, 2> nested_bsdfs(const Bsdf& bsdf) {
 
 namespace {
 
-// True if the number that `t` gives may be at most kStraightAlpha at some point. A colour counts as a mean of
-// its channels.
+// True if the texture, read as a number, may be at most kStraightAlpha at some point. It reads a colour as a
+// mean of the channels, which is that small only if one of the channels is.
 bool may_be_straight(TextureIndex t, const std::vector<Texture>& textures) {
   if (t.value >= textures.size()) return true;
   const auto* constant = std::get_if<ConstantTexture>(&textures[t.value]);

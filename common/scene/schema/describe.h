@@ -59,11 +59,12 @@ struct Field {
   // For a number or colour that Mitsuba does not have: the value for which the field is not written in files.
   double unwritten = std::numeric_limits<double>::quiet_NaN();
   bool number = false;  // true: a texture that is read as a scalar, not as a colour
-  // True for fields whose default must change neither files nor digests: fields that Mitsuba does not have,
-  // and fields that older scenes lack. If such a field has its type's initial value (false, 0, empty), or as
-  // a colour the value `unwritten`, it is written neither in files nor in JSON, so it may be missing there.
+  // True for fields that Mitsuba does not have or that older scenes lack. Such a field is written neither in
+  // files nor in JSON while it has its default, so scenes without it keep their files and digests. The
+  // default is `unwritten` for a colour that sets it, otherwise the type's initial value (false, 0, empty).
   bool elided = false;
-  // The integrators that have this parameter. Both empty: all have it; the second empty: one has it.
+  // The integrators that have this parameter: all of them if both names are empty, one if only the second is
+  // empty.
   std::array<std::string_view, 2> only_of{};
 
   bool belongs_to(std::string_view integrator) const {

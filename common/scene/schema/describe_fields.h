@@ -37,8 +37,8 @@ void describe(V& v, T& i) {
           i.distance);
   v.field({.name = "heuristic", .doc = "weighs the two against each other", .only_of = {kDistantMis}},
           i.heuristic);
-  // Describes the switch of a technique. The default, 0, uses it where it lowers the error at equal time, or
-  // wherever it is possible.
+  // Describes a parameter that switches a sampling technique on or off. With the default, 0, the technique
+  // is used where it lowers the error at equal render time or, for some techniques, wherever it is possible.
   const auto technique = [&](std::string_view name, Range range, std::array<std::string_view, 2> only_of,
                              std::string_view doc, auto& value) {
     v.field({.name = name, .doc = doc, .range = range, .elided = true, .only_of = only_of}, value);

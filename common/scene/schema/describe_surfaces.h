@@ -15,7 +15,7 @@ void describe_multiple_scattering(V& v, T& b) {
           b.multiple_scattering);
 }
 
-// Describes the roughness that differs along u and v, of several rough surfaces.
+// Describes the microfacet distribution and the roughnesses along u and v, which several rough BSDFs have.
 template <class V, class T>
 void describe_roughness(V& v, T& b) {
   v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);

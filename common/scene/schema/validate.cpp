@@ -141,8 +141,8 @@ class ValueChecker {
           wrong_ = "scene.bsdfs: a twosided bsdf holds one that lets light through, or another twosided";
     }
   }
-  // Checks that the shapes of a group are contiguous, that groups are in order and have shapes, and that none
-  // of these shapes emits.
+  // Checks that the shapes of each group are contiguous in the list and do not emit, that every group has a
+  // shape, and that groups come in the order of their indices.
   void check_groups() {
     std::size_t seen = 0;
     const std::optional<GroupIndex>* last = nullptr;

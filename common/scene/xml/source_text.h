@@ -23,15 +23,15 @@ struct Span {
 
 class SourceText {
  public:
-  // Returns the path in the document of the value at an offset. Messages about that place begin with it.
-  // Empty: there is no path.
+  // A function that returns the path in the document of the value at an offset. Messages about that place
+  // begin with the path. An empty function: the text has no paths.
   using PathOf = std::function<std::string(std::size_t)>;
   SourceText(std::string name, std::string text, PathOf path_of = {});
 
   const std::string& name() const { return name_; }
   const std::string& text() const { return text_; }
   // Returns line and column of a byte, both from 1. The column counts characters (UTF-8 code points), not
-  // bytes, which takes time proportional to the line's length.
+  // bytes. This takes time proportional to the line's length.
   SourcePlace place(std::size_t offset) const;
   int line(std::size_t offset) const;  // returns the line only, in constant time
   std::size_t index_bytes() const { return lines_before_.size() * sizeof lines_before_[0]; }

@@ -84,8 +84,9 @@ Rgb linear_srgb(const SpectralCurve& curve, Illuminant illuminant) {
 
 Rgb linear_srgb(const std::array<double, 3>& xyz) { return srgb_of(xyz); }
 
-// Planck's law has its peak where h c / (lambda k T) = 4.965..., the root of x = 5 (1 - e^-x): Wien's
-// displacement law. There it is 2 h c^2 (x k T / (h c))^5 / (e^x - 1).
+// At the temperature T, Planck's law has its peak at the wavelength lambda where x = h c / (lambda k T) is
+// 4.965..., the root of x = 5 (1 - e^-x) (Wien's displacement law). Its value there is
+// 2 h c^2 (x k T / (h c))^5 / (e^x - 1).
 double black_body_peak(double kelvin) {
   constexpr double kAtPeak = 4.965114231744276;
   return kFirst * std::pow(kAtPeak * kelvin / kSecond, 5) / std::expm1(kAtPeak);

@@ -165,12 +165,12 @@ double determinant3(const Transform& t) {
 }
 
 bool invertible(const Transform& t) {
-  // The inverse's determinant is 1/det: not finite if det is subnormal.
+  // A subnormal determinant is refused: its reciprocal, the determinant of the inverse, may be infinite.
   return std::all_of(t.m.begin(), t.m.end(), [](double x) { return std::isfinite(x); }) &&
          std::isnormal(determinant3(t));
 }
 
-// Checks M transpose(M) = 1.
+// Checks that M transpose(M) is the identity, where M is the linear part.
 bool is_rigid(const Transform& t) {
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t j = i; j < 3; ++j) {

@@ -3,7 +3,7 @@
 // job ends. Its effects depend only on events and time: it does no I/O and has no threads, no clock, no log.
 // It is not thread-safe; the service guards it with one mutex.
 //
-// effects = farm.handle(event, now); `now` never goes back.
+// Usage: effects = farm.handle(event, now). `now` must not decrease from call to call.
 //
 // The path of a result: a worker sends it -> the service calls wanted(), verifies the partial (the encoded
 // pixel sums of the unit) and makes it durable -> UnitAccepted -> {RecordUnit, Fold...} -> the assembler

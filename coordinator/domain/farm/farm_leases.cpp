@@ -1,5 +1,6 @@
-// Leases units to workers and takes them back. Only these functions change which leases exist, which units
-// they hold, and the amount of work of each worker.
+// Leases units (rounds of tiles) to workers and takes them back; a lease is a list of units that is assigned
+// to one worker. Only these functions change which leases exist, which units they hold, and the amount of
+// work of each worker.
 #include <algorithm>
 #include <limits>
 

@@ -116,8 +116,8 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
   f.units_folded = job->units.folded_count();
   f.rounds_complete = job->units.rounds_complete();
   const double per_sample = job->cost.per_sample();  // 0: nothing has been measured yet
-  // Samples are averaged over all pixels. A round that misses some units counts in proportion to its finished
-  // units; all tiles are taken to have the same size.
+  // samples_of_last(n) estimates the number of pixel samples in n units that are not done. It takes them to
+  // be the last n units in the order of rounds, and all tiles to have the same size.
   const RoundIndex rounds = job->queue.longest();
   const double pixels = static_cast<double>(job->plan.grid.frame.width) * job->plan.grid.frame.height;
   const double left = static_cast<double>(job->units.tiles());

@@ -38,11 +38,13 @@ struct Farm::State {
 
   // State of the event being handled
   TimePoint now{};
-  // Time of the latest Tick. A worker's block is checked at this time, not `now`, because only a tick, which
-  // checks all workers, lifts blocks
+  // Time of the latest Tick. Whether a worker is blocked from a job after failures is checked at this time,
+  // not `now`, because only a tick, which checks all workers, ends such blocks
   TimePoint ticked{};
   std::vector<Effect> effects;
-  bool work_appeared = false;  // there may be units that any worker could take now
+  // True if units may have appeared that some worker can take: dispatch() then considers all workers that
+  // want work, not only those in `dirty`
+  bool work_appeared = false;
   // a job was pinned to a class, and workers of this class that may not begin jobs can now take its units
   bool pinned_for_others = false;
   std::set<WorkerIndex> dirty;  // workers whose state has changed, so that they may want more work
@@ -162,7 +164,8 @@ struct Farm::State {
   std::uint32_t room(const Job& job, const Worker& worker) const;
   bool limited(const Job& job) const;
   static bool has(const LeaseRecord& lease, UnitCode code);  // true if the unit is still leased under it
-  // Removes the unit from the lease without queueing it. True if no other lease holds the unit.
+  // Removes the unit from the lease without queueing it. Returns true if no lease holds the unit any more;
+  // always false for an audit.
   bool detach(LeaseRecord& lease, UnitCode code);
   // Removes the unit from all leases because its result arrived. `by` is the worker that delivered the
   // result; null: unknown.

@@ -80,7 +80,8 @@ void Farm::State::on(const UnitFolded& event) {
   Job* job = find(event.unit.job);
   if (job == nullptr || job->ended() || event.unit.tile >= job->units.tiles()) return;
   const UnitCode code = unit_code(event.unit.round, event.unit.tile);
-  // The round was truncated when it was rendered, and needs more samples now
+  // If the ranges differ, the job was extended: this round was truncated when it was rendered, and is
+  // rendered again in full.
   if (event.samples != job->range(code)) return;
   const RoundIndex before = job->units.rounds_complete();
   if (!job->units.fold(event.unit.tile, event.unit.round, event.rel_error_sum)) return;

@@ -1,7 +1,8 @@
 // Decides which worker gets which units next; a unit is one round (range of samples) of one tile. Higher
 // priorities go first, and jobs of one priority get equal shares (fair_share.h). Within a job lower rounds go
 // first, so that a preview of the whole image is available early. Idle workers go before busy ones, and among
-// them those that have loaded the job's world. Leases shrink near the end of a job.
+// them those that have loaded the job's world. Leases (lists of units that are assigned to one worker) shrink
+// near the end of a job.
 #include <algorithm>
 #include <limits>
 
@@ -151,7 +152,7 @@ Farm::State::Takes Farm::State::takes(Job& job, const Worker& worker) {
 
 // A worker that is alone in its numeric class (machines that compute the same bits) cannot be audited: no
 // other worker can check its results. So, if another class has several workers that fit the job, the job may
-// not be pinned to this worker's class. Without audits any class will do.
+// not be pinned to this worker's class. Without audits the job may be pinned to any class.
 bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
   if (job.numeric_class || options.audit_rate <= 0 || workers.of_class(worker.numeric_class).workers > 1)
     return true;

@@ -99,7 +99,8 @@ class Api {
 // the log.
 Response guarded(std::string_view what, const std::function<Response()>& work);
 
-// True if the text has the characters and length of the ids made here. Any other text is no job's id.
+// True if the text has the form of the ids that coordinators make (1 to limits::kIdBytes letters, digits,
+// '-' and '_'). Any other text is no job's id.
 bool plausible_id(std::string_view id);
 
 // Returns the id of the job in a request's address. With ?frame=N the address names a sequence (a job with

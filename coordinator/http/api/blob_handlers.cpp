@@ -122,8 +122,8 @@ Response refused_part(int status, std::string_view detail, std::uint64_t offset)
   return response;
 }
 
-// Receives and ignores a part that exists already. An answer before the end of the part would break the
-// connection.
+// Receives and ignores a part of a blob that the store already has completely. An answer before the end of
+// the part would break the connection.
 class IgnoreSink final : public BodySink {
  public:
   IgnoreSink(const Digest& digest, std::uint64_t bytes) : digest_(digest), left_(bytes) {}

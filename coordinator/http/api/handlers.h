@@ -80,11 +80,12 @@ std::optional<Response> refuse_priority(const Api& api, const Caller& caller, in
 
 // spec_query.cpp: reads a job's spec (the settings in its submission: samples, size, seed, ...) from query
 // parameters, as in POST /api/v1/jobs?spp=64&size=320x240&define=NAME=VALUE&aov=a,b with an application/xml
-// body. Keys: spp, target_error, target_layer, time, seed, size, integrator, priority, float, frames,
-// max_workers, max_units, memory, numeric_class, reference, aov and tags (comma lists), define (may be
-// repeated). The key named by `also` is ignored; any other key, a repeated key, or a wrong value is an error
-// that names the key. Keys that the query lacks keep their values in `base`, the JSON of a spec. The query's
-// definitions are added to those of `base`; for a name in both, the query's value replaces the other.
+// body. Keys: spp, target_error, target_layer, time, seed, size, integrator, priority, float, denoise,
+// frames, max_workers, max_units, memory, numeric_class, reference, aov and tags (comma lists), define (may
+// be repeated). The key named by `also` is ignored; any other key, a repeated key, or a wrong value is an
+// error that names the key. Keys that the query lacks keep their values in `base`, the JSON of a spec. The
+// query's definitions are added to those of `base`; for a name in both, the query's value replaces the
+// other.
 Result<JobSpec> spec_from_query(const Fields& query, std::string_view also, const std::string& base = "{}");
 
 }  // namespace ls::http

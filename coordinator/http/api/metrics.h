@@ -16,7 +16,7 @@
 
 namespace ls::http {
 
-// Resources used by this process, according to Linux.
+// Resources used by this process, as Linux reports them.
 struct ProcessFigures {  // a value that could not be read is 0
   std::uint64_t resident_bytes = 0;
   std::uint64_t open_files = 0;
@@ -33,7 +33,7 @@ class Counters {
 
   std::atomic<std::uint64_t> connections{0};    // connections that are open now
   std::atomic<std::uint64_t> event_streams{0};  // event streams that are open now
-  // Number of readers that were disconnected because they were too slow
+  // Number of event streams that were closed because their readers were too slow
   std::atomic<std::uint64_t> events_dropped{0};
   std::atomic<std::uint64_t> body_bytes{0};  // bytes received in request bodies
 
@@ -42,8 +42,8 @@ class Counters {
   std::map<std::pair<Method, int>, std::uint64_t> requests_;
 };
 
-// Returns the text of /metrics. Without `webhooks` it has no webhook counters, without `traces` none of
-// spans.
+// Returns the text of /metrics. Without `webhooks` it has no counters of webhooks, without `traces` no
+// counters of trace spans.
 std::string metrics_text(std::span<const coordinator::JobView> jobs,
                          std::span<const coordinator::WorkerView> workers, std::uint64_t last_event,
                          const Counters& counters, const coordinator::StoreStatus& store = {},

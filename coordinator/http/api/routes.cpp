@@ -23,7 +23,8 @@ constexpr std::string_view kBundleTypes =
     "application/zip application/x-zip-compressed application/x-tar application/x-tar+gzip "
     "application/gzip application/x-gzip";
 
-// Handles a request about one job.
+// Handles a request about one job: calls `handler` with the job's id, or answers with an error if the address
+// names no job.
 template <auto handler>
 Response of_job(Api& api, const Request& request, const Params& params) {
   const auto id = job_of(request, params);

@@ -40,8 +40,8 @@ enum class BodyKind {
   none,      // a body is ignored
   buffered,  // the body is read into memory as a whole, at most Route::body_limit bytes
   blob,      // the body is streamed into the sink that Api::open_upload returns
-  // Like blob, but the sink's finish() unpacks an archive, which takes time. No route has this kind in the
-  // table; Api::body_kind chooses it for single requests
+  // Like blob, but the sink's finish() unpacks an archive, which takes time. No route in the table has this
+  // kind; Api::body_kind() chooses it for a request whose media type is in Route::unpacks
   archive,
 };
 

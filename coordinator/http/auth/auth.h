@@ -2,7 +2,8 @@
 //
 // The cookie's text is `expiry.nonce.token-id.mac`; the key of the MAC is TokenRegistry::session_key(). The
 // coordinator stores no open session, so sessions survive its restart. A session becomes invalid when its
-// token is revoked. Sessions closed by DELETE /session are remembered until they expire or the process ends.
+// token is revoked. Sessions closed by DELETE /session are remembered until they expire or the process ends,
+// but at most kMaxRevokedSessions of them.
 #pragma once
 
 #include <cstdint>
@@ -28,8 +29,8 @@ UnixClock system_unix_clock();
 class Auth {
  public:
   struct Options {
-    Pace requests{};      // how many requests each token, or each address without a token, may send
-    Pace failures{};      // how many wrong tokens each address may send
+    Pace requests{};      // limits the requests with one token or, without a token, from one address
+    Pace failures{};      // limits the wrong tokens from one address
     bool secure = false;  // requests arrive over TLS, so the cookie may be sent only over TLS
   };
   // `tokens` must outlive this.
@@ -72,7 +73,7 @@ class Auth {
   UnixClock now_;
   Throttle throttle_;
   mutable std::mutex mutex_;
-  // Closed sessions: the cookie's text and its expiry
+  // Closed sessions: the cookie's text, and the time until which it is remembered, in seconds since 1970
   std::map<std::string, std::int64_t, std::less<>> revoked_;
 };
 

@@ -1,4 +1,5 @@
-// Secrets in the data folder: one line with 256 random bits in hexadecimal, readable by the owner only.
+// Files of secrets (tokens, and the key that signs webhooks): one line with 256 random bits in hexadecimal,
+// readable by the owner only.
 #pragma once
 
 #include <cstdint>
@@ -16,10 +17,11 @@ namespace ls::http {
 // so that two starts do not race.
 Result<std::string> read_or_make_token(const std::filesystem::path& file);
 
-// 256 random bits in hexadecimal.
+// Returns 256 random bits in hexadecimal.
 Result<std::string> random_token();
 
-// Reads a small file. Others may be able to read it but not to write it. Empty if there is no file.
+// Reads a file of at most 1 MiB. Returns an empty text if there is no file. failed_precondition: users other
+// than the owner may write the file (they may read it), or it is too large or cannot be opened.
 Result<std::string> read_list(const std::filesystem::path& file);
 
 // Identifies a version of a file: if two states differ, the file was replaced or written in between. All

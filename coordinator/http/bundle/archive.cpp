@@ -46,8 +46,8 @@ enum class Trouble { none, stopped, unreadable, list_too_long };
 struct Source {
   int fd = -1;
   std::int64_t size = 0, at = 0;
-  // Limit on the bytes of a zip's list of entries that are still to be read. libarchive reads the list before
-  // the first entry and keeps it in memory, so its size must be limited.
+  // Number of bytes that libarchive may still read before the first entry. For a zip it reads the list of
+  // all entries first and keeps it in memory, so the size of that list must be limited.
   std::int64_t list_bytes_left = static_cast<std::int64_t>(kMaxArchiveList);
   bool reads_list = true;
   std::stop_token stop;

@@ -24,7 +24,7 @@ struct ArchiveEntry {
   // Size announced in the header; it differs from the actual size only in damaged archives
   std::optional<std::uint64_t> bytes;
   bool encrypted = false;
-  bool packed_oddly = false;  // true for an entry of a zip with another compression method than deflate
+  bool packed_oddly = false;  // true for an entry of a zip that is compressed, but not by deflate
 };
 
 class ArchiveReader {

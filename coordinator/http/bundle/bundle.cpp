@@ -118,8 +118,9 @@ class Survey {
     return {};
   }
 
-  // True if this file may be the bundle's job.json. The file must be at the top, or directly in one of the
-  // first folders with a job.json, since a folder that contains all files counts as the top.
+  // True if this file may be the bundle's job.json. That is a job.json at the top or, since a folder that
+  // contains all files counts as the top, one directly in a folder. When two such files were found, no more
+  // are kept from folders: no folder contains all files then.
   bool may_be_job_file(const std::string& name) const {
     if (name == kBundleJobFile) return true;
     const std::size_t slash = name.find('/');

@@ -9,14 +9,14 @@
 
 namespace ls::http {
 
-// Bodies, per route
+// Greatest body, per route
 inline constexpr std::uint64_t kMaxJobJson = 4u << 20;  // POST /jobs with application/json: names and digests
 inline constexpr std::uint64_t kMaxDigestList = 8u << 20;    // POST /blobs/missing
-inline constexpr std::uint64_t kMaxControlJson = 64u << 10;  // PATCH /jobs/ID
+inline constexpr std::uint64_t kMaxControlJson = 64u << 10;  // PATCH /jobs/ID and other short JSON
 inline constexpr std::uint64_t kMaxSessionJson = 4u << 10;   // POST /session
 
 // Contents of requests
-inline constexpr int kMaxJsonDepth = 16;             // bounds the depth of recursion when values are printed
+inline constexpr int kMaxJsonDepth = 16;             // levels of JSON; bounds the recursion that prints it
 inline constexpr std::size_t kMaxDigests = 100'000;  // digests in one POST /blobs/missing
 inline constexpr std::size_t kMaxAssetName = 1024;   // characters
 inline constexpr std::size_t kMaxTarget = 8u << 10;  // request target
@@ -73,15 +73,15 @@ struct Limits {
   // After an early rejection the rest of the body is read for this long: closing at once could lose the
   // answer
   double linger_seconds = 3;
-  // Requests per token, or per address without a token; 0: no limit. The burst is twice as large
+  // Requests with one token or, without a token, from one address; 0: no limit. The burst is twice as large
   double requests_per_second = 500;
-  // Requests with a wrong token, per address, with a burst of the same size. Further ones are answered with
-  // 429. 0: no limit
+  // Requests with a wrong token from one address; the burst has the same size. Further ones are answered
+  // with 429. 0: no limit
   double wrong_tokens_per_minute = 20;
   double stop_seconds = 5;  // how long a stopping coordinator waits for open requests
   int quick_threads = 2;    // for answers from memory
   int remote_threads = 8;   // for requests to other machines: blob stores, other coordinators
-  int user_priority = 0;    // highest priority of jobs with a submit token
+  int user_priority = 0;    // highest priority that a submit token may give to a job
   int slow_threads = 4;     // for reading scenes, writing images and blobs
   int bundle_threads = 2;   // for unpacking bundles, which thus never occupy the slow threads
   // Folder for bundles while they are read; empty: the system's temporary folder

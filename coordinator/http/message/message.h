@@ -29,7 +29,8 @@ std::optional<Role> parse_role(std::string_view name);
 
 struct Caller {
   Role role = Role::join;  // the role with the fewest rights, until the caller is identified
-  // Owner of the jobs that the caller submits; empty: the administrator with the token of the file `token`
+  // Owner of the jobs that the caller submits; empty: the token has no user, like the administrator's in the
+  // file `token`
   std::string user;
   std::string token_id;
   // True if the caller may see the jobs of the user `owner`.
@@ -46,7 +47,7 @@ struct FileBody {
   std::uint64_t size = 0;  // bytes
 };
 
-// not_found: there is no such file.
+// Opens a file as the body of a response. not_found: there is no such file.
 Result<FileBody> open_file_body(const std::filesystem::path& path);
 
 // Reads bytes from `offset` on and returns their number; 0: the file has become shorter, or cannot be read.
@@ -74,8 +75,8 @@ struct Request {
   std::optional<std::string_view> parameter(std::string_view name) const;
 };
 
-// The events that a stream of Server-Sent Events is to contain. If a Response has an EventStream, the events
-// follow it.
+// Selects the events of a stream of Server-Sent Events. If a Response has an EventStream, the server sends
+// these events after the header.
 struct EventStream {
   // Only events with higher ids; nullopt: only events that occur from now on
   std::optional<std::uint64_t> after_id;

@@ -80,8 +80,9 @@ class Connection {
   void cut();  // closes the connection immediately
 
  private:
-  // The result of reading a body. If `answer` is set, the body was rejected with it, and the client may still
-  // be sending the rest.
+  // The result of reading a body. If `answer` is set, it is the response to the request: the body was
+  // rejected, and the client may still be sending the rest; or it was streamed into a sink, which has
+  // processed all of it.
   struct Body {
     Read read = Read::ok;
     std::optional<Response> answer;

@@ -13,7 +13,8 @@
 namespace ls::http {
 namespace {
 
-// Its destructor cleans up however the stream ends, even if the server is destroyed while the stream waits.
+// Ends the bookkeeping of an event stream in its destructor, however the stream ends, even if the server is
+// destroyed while the stream waits.
 struct Undo {
   Shared& shared;
   net::steady_timer*& events_wait;

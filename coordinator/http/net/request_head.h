@@ -17,7 +17,7 @@ namespace beast = boost::beast;
 // The parser's body contains the bytes that were read and not yet removed from it.
 using Parser = beast::http::request_parser<beast::http::basic_dynamic_body<beast::flat_buffer>>;
 
-// Applies the limits to a new parser.
+// Sets a new parser's limit on the header. The body gets no limit here.
 void prepare(Parser& parser, const Limits& limits);
 
 enum class Read { ok, closed, too_slow, malformed, header_too_large };

@@ -35,8 +35,8 @@ std::optional<CoreSeconds> core_seconds_left(const EtaInputs& facts, std::span<c
 
 // How long threads wait at the end of a job with a target error, as multiples of a unit's duration u. (They
 // do not idle, but render units that will be dropped.) Until the last needed unit is done they wait between 0
-// and 1 u (Graham 1969: list scheduling of work W on P threads takes at most W / P + (1 - 1 / P) u). Before
-// that they wait as long for a thread to become free for this last unit. If the samples end the job, the
+// and 1 u (Graham 1969: list scheduling of work W on P threads takes at most W / P + (1 - 1 / P) u). Besides,
+// this last unit itself may wait for up to 1 u until a thread is free for it. If the samples end the job, the
 // number of units is known, and all threads end at about the same time.
 constexpr double kEven = 0, kLeastWait = 0, kMeanWait = .5, kMostWait = 2;
 

@@ -38,9 +38,10 @@ struct Eta {
 
 // The job ends by samples, target or time, whichever comes first. The core seconds until the target are
 // forecast from `points` (convergence.h), minus the core seconds spent since the last of them. Until the
-// first checkpoint, adaptive jobs use the scheduler's own prediction, without an interval. Since a unit runs
-// on one thread, few units keep few threads busy, and at the end of a job with a target threads wait for the
-// last units. A forecast's interval is cut at the sample limit.
+// first checkpoint, adaptive jobs use the scheduler's own prediction, without an interval. The prediction
+// takes into account that a unit runs on one thread, so that few units keep few threads busy, and that
+// threads wait for the last units at the end of a job with a target. A forecast's interval is cut at the
+// sample limit.
 Eta eta_of(const EtaInputs& facts, std::span<const ErrorPoint> points);
 
 }  // namespace ls::coordinator

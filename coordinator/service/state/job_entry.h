@@ -44,8 +44,8 @@ struct JobEntry {
   // computed yet
   std::shared_ptr<const Denoised> denoised;
   std::vector<ConvergencePoint> points;
-  // Number of the current convergence curve. Points of an older curve, which had wrong or lost pixels, are
-  // dropped
+  // Number of the current convergence curve. It rises when the curve is dropped because pixels were wrong or
+  // lost. Comparisons of an older curve that finish later are dropped
   std::uint64_t curve = 0;
   // True if it has ended and only its files and its record remain: the farm has forgotten it
   bool unloaded = false;
@@ -61,7 +61,7 @@ struct JobEntry {
   bool progress_due = false;
   JobState last_state = JobState::queued;  // its state when it was last published
   std::optional<TimePoint> clock_zero;     // zero of the job's clock, while it runs
-  // Since when its clock is stopped, because the job is paused; nullopt: it runs
+  // When its clock stopped because the job was paused; nullopt: the clock is not stopped
   std::optional<TimePoint> still_since;
   // Wall clock of the end of its rendering, in seconds since 1970. The record gets it when the job's end is
   // stored
@@ -71,7 +71,8 @@ struct JobEntry {
   std::uint64_t resumes = 0;  // how often it was resumed
   // For each leased unit (tile and round), the workers that it is leased to; for display
   std::map<std::pair<TileIndex, RoundIndex>, std::vector<WorkerId>> leased;
-  // Seconds on the job's clock of each durable result, while a restart replays the results
+  // For each durable result, the seconds on the job's clock when it was stored; set while a restart adds the
+  // results to the image again
   std::map<std::pair<TileIndex, RoundIndex>, double> replay_at;
   std::unique_ptr<JobTrace> trace;  // null: the job is not traced
 };

@@ -1,6 +1,7 @@
-// The folders of jobs in --data. DATA/jobs/ID contains the partial log and the snapshot film.snap, and for a
-// done job image.exr, report.json and the thumbnails made so far. There are no folders if everything is in
-// memory. The object does not change, so several threads may use it.
+// The folders of jobs in --data. DATA/jobs/ID contains the log of partials (the stored results of units) and
+// the snapshot film.snap (the image so far), and for a done job image.exr, report.json and the thumbnails
+// made so far. There are no folders if everything is in memory. The object does not change, so several
+// threads may use it.
 #pragma once
 
 #include <filesystem>
@@ -22,12 +23,12 @@ class JobFiles {
   bool on_disk() const { return !data_.empty(); }
   std::filesystem::path folder(const JobId& id) const { return data_ / "jobs" / id.value; }
   void remove_folder(const JobId& id) const;
-  // Removes the folder of a job that was removed. It is renamed first, so that a crash leaves no partial job
-  // folder.
+  // Removes the folder of a job that was removed. It is renamed first, so that after a crash no half-removed
+  // folder has the name of a job.
   void discard_folder(const JobId& id) const;
   void remove_discarded() const;  // removes folders that discard_folder() left when a crash interrupted it
-  // If other coordinators share the store, removes the local files of jobs that others have taken over,
-  // except finished images.
+  // If other coordinators share the store, removes the local folders of jobs that are not in `jobs`, because
+  // others have taken them over. Folders with a final image are kept.
   void remove_unknown(const std::vector<StoredJob>& jobs) const;
 
   // Creates a snapshot file of the job. Its name has this suffix until the snapshot is committed.

@@ -15,7 +15,8 @@ std::int64_t to_ns(double unix_seconds) {
   return static_cast<std::int64_t>(std::llround(std::clamp(unix_seconds, 0., 9e9) * 1e9));
 }
 
-// The id alone does not suffice: two farms that take part in one trace may each have a job of the same id.
+// Returns a text that identifies the job within its trace. The job's id alone does not suffice: two farms
+// that take part in one trace may each have a job of this id.
 std::string identity_of(const StoredJob& job) {
   return fmt::format("job {} {} {}", job.id.value, job.submitted_unix, job.scene.hex());
 }
@@ -75,8 +76,8 @@ JobTrace::JobTrace(const Tracing& tracing, const StoredJob& job, trace::SpanCont
       start_ns_(to_ns(std::max(job.submitted_unix, job.totals.ended_unix))),
       ended_(is_terminal(job.state)) {}
 
-// Converts a time for this job's spans. None of them is before the job's own start, which may come from
-// another clock.
+// Converts a time for this job's spans to nanoseconds since 1970. The job's own start may come from another
+// clock; a time before this start is replaced by the start.
 std::int64_t JobTrace::ns(TimePoint at) const { return std::max(tracing_.tracer->unix_ns(at), start_ns_); }
 
 void JobTrace::event(std::string name, TimePoint at) {

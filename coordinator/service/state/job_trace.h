@@ -45,7 +45,8 @@ class JobTrace {
   trace::SpanContext lease_begins(const Lease& lease, const WorkerId& worker, const std::string& worker_name,
                                   TimePoint now);
   // Records how a result was handled: its check began at `checked` and took `check_seconds`; then it was
-  // stored, until `now`. If it `failed`, its unit stays part of all its leases until units_freed().
+  // stored, until `now`. If it `failed`, it was not stored, and its unit stays part of every lease that holds
+  // it until units_freed().
   void result(const UnitResult& result, const WorkerId& worker, TimePoint checked, double check_seconds,
               TimePoint now, bool failed);
   void units_freed(const UnitsFreed& freed, TimePoint now);

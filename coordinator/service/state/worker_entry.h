@@ -1,5 +1,6 @@
 // A worker in the coordinator's memory, and its connection. Both are guarded by the service's mutex
-// (service/core.h), except for members that are marked otherwise.
+// (service/core.h), except for members that are marked otherwise. A lease is a list of units (rounds of
+// tiles) that is assigned to one worker.
 #pragma once
 
 #include <atomic>

@@ -20,10 +20,10 @@ namespace ls::coordinator {
 
 // An address s3://BUCKET[/PREFIX][?endpoint=URL][&region=NAME][&part-mib=N][&copies-mib=N]. The keys come
 // from the same environment variables as for other tools: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and, for
-// temporary keys, AWS_SESSION_TOKEN. AWS_REGION is used if the address has no region. The default endpoint is
-// Amazon's for the region.
+// temporary keys, AWS_SESSION_TOKEN. If the address names no region, the region is that in AWS_REGION, else
+// that in AWS_DEFAULT_REGION, else us-east-1. The default endpoint is Amazon's for the region.
 struct S3Address {
-  std::string bucket, prefix;  // without slashes at its ends; may be empty
+  std::string bucket, prefix;  // `prefix` has no slash at its ends and may be empty
   std::string endpoint, region;
   // Larger files are sent in parts of this size; 5 MiB to 5 GiB
   std::uint64_t part_bytes = std::uint64_t{64} << 20;

@@ -24,7 +24,8 @@ class UploadParts {
   // Implements BlobStore::resume_upload(). If there are limits::kMaxUnfinishedUploads incomplete blobs
   // already, first removes the one that has not grown for the longest time.
   Result<std::unique_ptr<BlobStore::Upload>> resume(const Digest& digest, std::uint64_t offset);
-  // Removes an incomplete blob. If its upload is in progress, the next bytes of that upload are rejected.
+  // Removes an incomplete blob. If its upload is in progress, the next bytes of that upload are rejected. A
+  // blob whose finish() is running stays.
   void remove(const Digest& digest);
   Result<std::vector<Digest>> list() const;
 

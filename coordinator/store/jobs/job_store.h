@@ -1,6 +1,7 @@
 // Stores everything about jobs except their pixels, which are in the log of partials (store/log). There are
-// two basic implementations: SQLite, and memory (for `lightshaft render`). Thread-safe. With SQLite, data
-// survive kill -9 and power loss once a put or add has returned.
+// two basic implementations: SQLite, and memory (for `lightshaft render`). A third, in store/redis, also
+// copies the data of another store to Redis. Thread-safe. With SQLite, data survive kill -9 and power loss
+// once a put or add has returned.
 #pragma once
 
 #include <cstdint>
@@ -53,9 +54,11 @@ struct JobTotals {
   std::uint64_t units = 0;          // number of units done
   std::uint64_t units_planned = 0;  // number of units that the job planned; 0: the same as `units`
   Health health;
-  TimeSplit time;                         // `render` is not set: it is core_seconds
+  TimeSplit time;                         // `render` is not set; its value is core_seconds
   double began_unix = 0, ended_unix = 0;  // wall clock of the first ray and of the end; 0: not yet
-  // ImageError::verdict and few_hits at the last checkpoint; empty and nullopt if there was no checkpoint.
+  // At the last checkpoint: why the image's error figures were not trusted (ImageError::verdict; empty: they
+  // were, or there was no checkpoint), and the number of pixels with few hits (ImageError::few_hits; nullopt:
+  // there was no checkpoint)
   std::string doubt;
   std::optional<std::uint64_t> few_hits;
   bool operator==(const JobTotals&) const = default;
@@ -66,17 +69,17 @@ struct StoredJob {
   std::string name;   // scene file name
   std::string owner;  // user name; empty: the administrator
   double submitted_unix = 0;
-  // The span of the program that submitted the job, to which the job's trace belongs
-  // (common/trace/context.h); empty: none
+  // W3C `traceparent` of the span in which another program submitted the job; the job's spans belong to its
+  // trace (common/trace/context.h). Empty: there is none
   std::string traceparent;
   Digest scene;  // digest of the scene's blob
   RenderSettings settings;
-  JobSpec spec;  // as requested by the user; with spp as last extended
+  JobSpec spec;  // as requested by the user; `spp` is the latest one if the job was extended
   // Samples per pixel to render; nullopt: an error target or a time limit ends the job.
   std::optional<std::uint64_t> spp;
   std::vector<BlobRef> assets;
   std::vector<std::string> warnings;
-  bool reference_same_seed = false;  // result of same_noise() for the job and its reference image
+  bool reference_same_seed = false;  // true: its reference image has the same scene and seed
   std::vector<std::string> features_used, features_left_out;
   std::string needs;  // canonical JSON (common/scene/analysis/needs.h)
   // JSON for the report: the renderer's features with reasons, and the pruned parts of the scene
@@ -85,15 +88,15 @@ struct StoredJob {
   std::optional<StopReason> stopped;
   std::string error;
   std::optional<Digest> numeric_class;
-  // Build of the worker to whose numeric class (machines that compute the same bits) the job is pinned, and
-  // platform of that class (WorkerHello)
+  // The job is pinned to a numeric class (machines that compute the same bits). These are the build of the
+  // worker that determined the class, and the platform of the class (WorkerHello)
   std::string build, platform;
   bool fake = false;  // true if pinned to a fake worker; then only fake workers may render its units
   JobTotals totals;
-  // techniques that its workers used, as far as they have reported them
+  // Rendering techniques that workers reported to use for this job
   TechniqueSet techniques;
-  // Errors of the denoised layers on which the end of the job was or will be decided
-  // (domain/denoised_target.h)
+  // The checks of the denoised layers' error made so far, if the job's target error applies to these layers
+  // (domain/denoised_target.h). They decide when the job ends
   std::vector<DenoisedCheck> denoised_checks;
   // Missing or damaged blobs: the job is paused until they are available
   std::set<Digest> missing_blobs;
@@ -140,7 +143,7 @@ class JobStore {
   virtual Result<std::vector<ConvergencePoint>> points(const JobId& job) const = 0;
   virtual Result<void> remove_points(const JobId& job) = 0;  // including their reference errors
 
-  // Adds a line to the job's log and drops the oldest lines, so that kLogLinesKept are left.
+  // Adds a line to the job's log. Of a longer log only the last kLogLinesKept lines are certain to stay.
   virtual Result<void> add_log(const JobId& job, const LogLine& line) = 0;
   virtual Result<std::vector<LogLine>> log(const JobId& job) const = 0;
 
@@ -158,7 +161,7 @@ class JobStore {
   // For a store that several coordinators share
   struct Inherited {
     StoredJob job;
-    std::string from;  // the coordinator that had it
+    std::string from;  // the coordinator that owned it before
   };
   struct Moved {
     // Quarantined by another coordinator; apply these before the rest

@@ -1,5 +1,5 @@
-// Numbers in records. JSON has no infinity: the library would write null, which could not be read back as a
-// number.
+// Numbers in records. JSON has no infinity and no NaN: the library would write null, which could not be read
+// back as a number. So finite() replaces them by 0.
 #pragma once
 
 #include <cmath>

@@ -20,11 +20,11 @@
 
 namespace ls::coordinator {
 
-// The binary header of a record in the partial log, which holds one partial: the encoded pixel sums of one
+// Marks the start of a record of the partial log. A record holds one partial: the encoded pixel sums of one
 // unit, that is of one tile and one range of samples.
 constexpr std::uint32_t kPartialMagic = 0x3250534c;  // "LSP2"
 
-// Little endian, as on every supported machine.
+// The header of a record as it is in the file: little endian, as on every supported machine.
 struct RawHeader {
   std::uint32_t magic = kPartialMagic, bytes = 0;
   std::uint32_t tile = 0, round = 0;
@@ -169,7 +169,7 @@ std::filesystem::path PartialLog::index_path(std::uint32_t segment) const {
 }
 
 Result<std::unique_ptr<PartialLog>> PartialLog::open(std::filesystem::path folder) {
-  // An existing `folder` is left to make_folder(), which checks that it is a folder
+  // If `folder` exists, make_folder() checks that it is a folder; otherwise the first append() makes it
   if (std::error_code error; std::filesystem::exists(folder, error) || error)
     if (auto made = make_folder(folder); !made) return tl::unexpected(made.error());
   std::unique_ptr<PartialLog> log(new PartialLog(std::move(folder)));

@@ -1,9 +1,9 @@
 // The accepted partials of one job, in append-only files FOLDER/partials-NNN.seg, called segments. A partial
 // is the pixel sums, encoded as EXR, of one unit (one tile and one range of samples). Each partial has a
-// record: a header of fixed size with a checksum, the EXR bytes, and, unless there are no bad samples, the
-// unit's health (counts of bad samples) as text. Records written before sync() returned survive kill -9 and
-// power loss; a torn record behind them is detected at open() and cut off. Beside each full segment lies an
-// index of its headers, partials-NNN.idx.
+// record: a header of fixed size with a checksum, the EXR bytes and, if the unit had bad samples, its health
+// (counts of bad samples) as text. Records written before sync() returned survive kill -9 and power loss; a
+// torn record behind them is detected at open() and cut off. Beside each full segment lies an index of its
+// headers, partials-NNN.idx.
 //
 // One thread may call append() and sync(); any thread may call read().
 #pragma once

@@ -22,7 +22,8 @@ struct RedisStoreOptions {
   RedisAddress address;
   RedisLink::Timeouts timeouts;
   Duration first_retry = std::chrono::milliseconds(100), longest_retry = std::chrono::seconds(2);
-  // Interval of the checks that Redis answers and still has its data, used while there are no changes to send
+  // While there are no changes to send, the store asks Redis at this interval for lightshaft:memory, to learn
+  // whether Redis answers and still has its data
   Duration check_every = std::chrono::seconds(1);
   // This coordinator's name among several that share the Redis (redis_members.h); empty: it shares the Redis
   // with no other.

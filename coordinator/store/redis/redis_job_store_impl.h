@@ -1,6 +1,7 @@
 // The class behind redis_job_store.h. redis_job_store.cpp opens the store, redis_job_store_send.cpp contains
 // the thread that updates Redis, and this header the functions that the coordinator's other threads call. A
-// node is one of several coordinators that share the Redis; the members' thread is that of RedisMembers.
+// node is one of several coordinators that share the Redis; the members' thread is the one that RedisMembers
+// starts (redis_members.h).
 #pragma once
 
 #include <fmt/format.h>
@@ -195,7 +196,7 @@ class RedisJobStore final : public JobStore {
     }
   }
 
-  // Returns those jobs of `ids`, the jobs that this node owns according to Redis, that this node does not
+  // `ids` are the jobs that this node owns according to Redis. Returns those of them that this node does not
   // have.
   std::vector<JobId> unknown(std::vector<JobId> ids) {
     const auto state = state_.lock();
@@ -281,9 +282,9 @@ class RedisJobStore final : public JobStore {
                 "another coordinator has it, and its record stays here: " + gone.error().message);
   }
 
-  // Stores an update by keep(), and marks by edit() which data of the job must be sent to Redis. Updates of a
-  // job that another coordinator owns now are ignored: if the job comes back, they must not be in the local
-  // store.
+  // Stores an update of a job by calling keep(), and marks by edit() which data of the job must be sent to
+  // Redis. Updates of a job that another coordinator owns now are ignored: if the job comes back, they must
+  // not be in the local store.
   template <class Keep, class Edit>
   Result<void> note(const JobId& job, Keep keep, Edit edit) {
     const auto state = state_.lock();

@@ -12,11 +12,11 @@
 namespace ls::coordinator {
 namespace {
 
-// lifetime of heir:NODE; longer than it takes to take over a batch of jobs
+// Lifetime of the key heir:NODE; it should be longer than it takes to take over all jobs of a dead node
 constexpr const char* kHeirMilliseconds = "15000";
 
-// Sends a node's heartbeat. ARGV: node, addresses, lease in ms, start, number of lost jobs handled. Returns
-// {lost jobs, node, alive, node, alive, ...}.
+// Sends a node's heartbeat. ARGV: node, addresses, lifetime of the heartbeat in ms, the node's number from
+// unique_start(), number of lost jobs handled. Returns {lost jobs, node, alive, node, alive, ...}.
 constexpr const char* kBeat = R"(
 redis.call('SET', 'lightshaft:alive:' .. ARGV[1], ARGV[2], 'PX', ARGV[3])
 redis.call('HSET', 'lightshaft:nodes', ARGV[1], ARGV[2])
@@ -49,8 +49,8 @@ if ARGV[4] ~= '' then redis.call('HSET', 'lightshaft:sequences', ARGV[4], ARGV[3
 return redis.call('HGETALL', key)
 )";
 
-// Ends the polling of a dead node that has no jobs left. ARGV: dead node. Its list of lost jobs is kept for a
-// week, in case the node comes back and reads it.
+// Ends the takeover from a dead node. ARGV: dead node. If the node has no jobs left, it is not polled any
+// more, and its list of lost jobs is kept for a week, in case the node comes back and reads it.
 constexpr const char* kSettle = R"(
 if redis.call('SCARD', 'lightshaft:owned:' .. ARGV[1]) == 0 and redis.call('EXISTS', 'lightshaft:alive:' .. ARGV[1]) == 0 then
   redis.call('HDEL', 'lightshaft:nodes', ARGV[1])
@@ -83,7 +83,7 @@ Result<RedisLink*> RedisMembers::link() {
   if (!link_ || link_->broken()) {
     link_.reset();
     absence_.begin_again();
-    // it is unknown whether Redis has carried out the last commands of the old connection
+    // It is unknown whether Redis has carried out the last commands sent over the old connection
     own_unclear_ = true;
     quarantined_seen_ = 0;  // the new connection may lead to another Redis
     auto fresh = RedisLink::connect(options_.address, options_.timeouts);

@@ -36,7 +36,7 @@ class FailureDetector {
  public:
   explicit FailureDetector(int looks) : looks_(looks) {}
 
-  // `known`: all coordinators, and whether each is alive. Returns those that count as dead.
+  // `known`: all other coordinators, and whether each is alive. Returns those that count as dead.
   std::vector<std::string> look(const std::map<std::string, bool>& known) {
     std::map<std::string, int> now;
     std::vector<std::string> gone;
@@ -114,7 +114,8 @@ class RedisMembers {
   // Also completes earlier takeovers that failed because the answer of Redis was lost or the job could not be
   // stored.
   Result<void> beat();
-  // Names a job that this node owns in Redis but cannot read there; empty: there is none.
+  // Returns a message about a job that this node owns in Redis but cannot read there; empty: there is no
+  // such job.
   std::string stranded() const;
   // Starts the thread that calls beat() regularly.
   void start();
@@ -136,7 +137,7 @@ class RedisMembers {
   std::unique_ptr<RedisLink> link_;  // link_ and the members below are used by the heartbeat thread only
   FailureDetector absence_;
   std::set<std::string> settled_;      // dead nodes that have no jobs left to take over
-  std::size_t lost_taken_ = 0;         // number of entries of the list of lost jobs handled so far
+  std::size_t lost_taken_ = 0;         // entries of the last list of lost jobs; the next heartbeat drops them
   std::int64_t quarantined_seen_ = 0;  // number of quarantined workers reported so far
   bool own_unclear_ = true;            // true if this node may own jobs that it does not have
   std::set<JobId> unreadable_;         // unreadable jobs that were reported already

@@ -53,8 +53,8 @@ Result<void> pull_counters(RedisLink& link, JobStore& local) {
   return {};
 }
 
-// Returns those jobs of `ids` that Redis has in a higher revision than `here` (revisions by id). Jobs that
-// were removed here are left out.
+// Returns those jobs of `ids` that `here` (revisions by id) lacks or has in a lower revision than Redis.
+// Jobs that were removed from `local` are not returned; they are removed from Redis, too.
 Result<std::vector<JobId>> wanted_of(RedisLink& link, JobStore& local,
                                      const std::map<JobId, std::uint64_t>& here,
                                      const std::vector<JobId>& ids, const std::string& node) {

@@ -11,7 +11,7 @@
 
 namespace ls::coordinator {
 
-// Returns the ids in a set of Redis; other members are left out.
+// Returns those members of a Redis set that have the form of a job's id.
 Result<std::vector<JobId>> job_ids(RedisLink& link, const std::string& set_key);
 
 // Returns the name of the counter in the local store that marks a job as removed.
@@ -22,8 +22,8 @@ std::string removal_mark(const JobId& job);
 // `known`, the jobs of `local`. Records that cannot be read are logged and stay in Redis.
 Result<void> pull_from_redis(RedisLink& link, JobStore& local, std::span<const StoredJob> known);
 
-// The same for several coordinators that share the Redis: copies the jobs that `node` still owns, and removes
-// from `local` those that another coordinator has taken over.
+// The same for several coordinators that share the Redis, but without the counters: copies the jobs that
+// `node` still owns, and removes from `local` those that another coordinator has taken over.
 Result<void> pull_owned(RedisLink& link, JobStore& local, const std::string& node);
 
 // Stores a job, its points and its log in `local`. Points that `local` has stay, and so does its log unless

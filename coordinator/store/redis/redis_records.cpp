@@ -38,7 +38,7 @@ end
 return 1
 )";
 
-// Removes a job. ARGV: id, node, sequence or ''.
+// Removes a job, unless another node owns it. ARGV: id, node, sequence or ''.
 constexpr const char* kRemove = R"(
 local owner = redis.call('HGET', KEYS[1], 'owner')
 redis.call('SREM', 'lightshaft:owned:' .. ARGV[2], ARGV[1])
@@ -166,8 +166,8 @@ Result<RedisJob> parse_redis_job(const RedisReply& fields) {
   auto job = parse_stored_job(values["record"]);
   if (!job) return tl::unexpected(job.error());
   RedisJob read{std::move(*job), {}, {}, values["owner"], values["from"], 0};
-  // The record contains the fence (number of the owner) of its last write; the hash contains that of the
-  // current owner.
+  // The record contains the fence (a number that increases with every new owner) of its last write; the hash
+  // contains the fence of the current owner.
   std::from_chars(values["fence"].data(), values["fence"].data() + values["fence"].size(), read.fence);
   read.job.fence = std::max(read.job.fence, read.fence);
   try {

@@ -34,8 +34,8 @@ struct RedisUpdate {
 };
 enum class PutAnswer { later_revision = 0, put = 1, lost = -1 };
 // Makes the command that writes `update`. Redis answers it with a PutAnswer. It changes nothing and answers
-// later_revision if Redis has a higher revision of the job, or lost if another coordinator owns the job by
-// now, with a higher fence.
+// later_revision if Redis has a higher revision of the job, or lost if the job has another owner or a higher
+// fence by now.
 RedisLink::Command put_command(const RedisUpdate& update);
 // Makes the commands that remove a job. `node` is set if coordinators share the Redis: jobs that another node
 // owns then stay.

@@ -1,5 +1,6 @@
-// Variants of structs, one struct per kind of light or material. Each family of kinds (such as area lights)
-// lists its kinds in its own file, so that adding a kind changes only the files of its family.
+// Builds a std::variant type from the structs of all kinds of light or material. Each family of kinds (such
+// as area lights) lists its kinds in its own file, so that adding a kind changes only the files of its
+// family.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
-// The surface scattering functions (BSDFs) of a scene, in one flat table by index. Each kind of material is a
-// struct in the file of its family (material.h). A texture is looked up only if it is not constant. The
-// values are those of Mitsuba 3 (separable Smith masking, its Beckmann rational fit, its rough plastic
+// The surface scattering functions (BSDFs) of a scene, in one flat table by index. Each kind of material is
+// a struct in the file of its family (material.h). A texture is looked up only if it is not constant. The
+// BSDF values are those of Mitsuba 3 (separable Smith masking, its Beckmann rational fit, its rough plastic
 // tables).
 //
 // Some surfaces have null transmission (mask, thin dielectric): part of the light passes straight through.
@@ -61,8 +61,9 @@ class BsdfTable {
   BsdfTable& operator=(BsdfTable&&) noexcept;
 
   // Builds the table of the scene's materials. `textures` must outlive it. Fails with invalid_argument if an
-  // index is out of range, if a material contains itself, if one side of a two-sided material lets light
-  // through, or if an index of refraction or a roughness is not a positive finite number.
+  // index is out of range, if a material contains itself or is nested more than scene::kMaxBsdfNesting
+  // levels deep, if one side of a two-sided material lets light through, or if a parameter, such as a
+  // roughness, is out of its range.
   static Result<BsdfTable> build(const Scene& scene, const TextureTable& textures);
 
   BsdfEval eval(BsdfIndex i, const UvPoint& uv, const V3& wo, const V3& wi) const;
@@ -77,10 +78,10 @@ class BsdfTable {
 
   // True for an index-matched boundary: light passes unchanged
   bool is_null(BsdfIndex i) const;
-  // True if there is a lobe that is not a delta, so that next-event estimation is useful
+  // True if the material has a lobe that is not a delta, so that next-event estimation is useful
   bool has_smooth(BsdfIndex i) const;
-  // True if f_cos and pdf depend on wo only through its side of the surface, and on wi only through its side
-  // and |cos wi|, to which they are proportional
+  // True if f_cos and pdf are |cos wi| times factors that depend only on the sides of the surface on which
+  // wo and wi are
   bool is_diffuse(BsdfIndex i) const;
   bool reads_uv(BsdfIndex i) const;      // true if some parameter is a texture
   bool anisotropic(BsdfIndex i) const;   // true if the tangents of the local frame matter
@@ -98,7 +99,8 @@ class BsdfTable {
                                          V2 u) const;
 
   std::vector<Material> materials_;
-  // The compensation tables of the materials with multiple_scattering; the materials point at them.
+  // The tables that compensate for energy lost between microfacets (microfacet_energy.h). The materials with
+  // multiple_scattering point at them.
   std::vector<std::unique_ptr<const MicrofacetEnergy>> energies_;
   const TextureTable* textures_ = nullptr;
   std::uint64_t clamped_ = 0;

@@ -5,8 +5,9 @@
 // absorbed: it would hit other microfacets, which this model leaves out.
 //
 // The formulas are relative to the side of wo, inside or outside: eta is the index on the other side over the
-// index on wo's side. With m the microfacet's normal, V = visible_over_D(wo) and q = dot(wo, m) + eta dot(wi,
-// m) = +-|wo + eta wi|:
+// index on wo's side. m is the microfacet's normal. V = G1(wo) / cos wo (visible_over_D() of microfacet.h),
+// so D V dot(wo, m) is the density of visible normals. F is the Fresnel reflectance at m, and G the masking.
+// q = dot(wo, m) + eta dot(wi, m), which is |wo + eta wi| or its negative. The formulas are:
 //   density of a refracted wi: (1 - F) D V dot(wo, m) eta^2 |dot(wi, m)| / q^2
 //   value f |cos wi|:          (1 - F) D G dot(wo, m) |dot(wi, m)| / (cos wo q^2)
 // The value has the factor 1 / eta^2 of refracted radiance, which cancels the factor eta^2 of Walter's
@@ -16,9 +17,10 @@
 // directions, mirrored at the sheet, as in Burley 2015 ("Extending the Disney BRDF to a BSDF with Integrated
 // Subsurface Scattering") and KHR_materials_transmission of glTF. A facet reflects the share R, which
 // includes all reflections between the two sides of the sheet, and transmits 1 - R. Both sides have the same
-// index, so radiance has no factor 1 / eta^2. With wi' the direction wi, mirrored to the side of wo, and m =
-// wo + wi', normalised:
-//   value f |cos wi|:          (R or 1 - R) D G / (4 cos wo),       density (R or 1 - R) D pdf_over_D(wo)
+// index, so radiance has no factor 1 / eta^2. Let wi' be wi mirrored to the side of wo, m the normalised sum
+// of wo and wi', and S = R if wi is on the side of wo, else 1 - R:
+//   value f |cos wi|:          S D G / (4 cos wo)
+//   density of wi:             S D pdf_over_D(wo)
 #pragma once
 
 #include "worker/render/bsdf/material_builder.h"
@@ -57,8 +59,9 @@ struct Dielectric : DielectricKind {
 };
 
 struct ThinDielectric : DielectricKind {
-  // Returns the reflectance of a thin sheet of a dielectric with all reflections between its two sides. With
-  // R the reflectance and T the transmittance of one side, it is R + T R T + T R^3 T + ... = 2 R / (1 + R).
+  // Returns the reflectance of a thin sheet of a dielectric, including all reflections between its two
+  // sides. With R the reflectance and T = 1 - R the transmittance of one side, it is
+  //   R + T R T + T R^3 T + ... = 2 R / (1 + R).
   float sheet_reflectance(float cos) const {
     const double r = fresnel_dielectric(std::abs(cos), ior).reflectance;
     return static_cast<float>(2 * r / (1 + r));
@@ -102,7 +105,7 @@ struct RoughDielectric : Dielectric {
  private:
   static V3 to_side(const V3& w, bool outside) { return {w.x, w.y, outside ? w.z : -w.z}; }
 
-  // The boundary seen from one side, with wo above the surface.
+  // The boundary as seen from the side of wo. Directions are mirrored, if necessary, so that wo has z > 0.
   struct Seen {
     Microfacets facets;
     C3 reflectance, transmittance;

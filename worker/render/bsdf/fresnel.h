@@ -35,10 +35,11 @@ inline DielectricFresnel fresnel_dielectric(double cos_i, double eta) {
   return f;
 }
 
-// Returns the diffuse reflectance of a smooth boundary for light from inside, where the index is eta times
-// that outside. The value for light from the less dense side is computed by Simpson's rule (the integrand 2 F
-// mu is smooth for an index above 1: relative error below 1e-7); the value for the denser side follows from
-// it by reciprocity.
+// Returns the reflectance of a smooth boundary for diffuse light from inside. eta is the index inside over
+// the index outside. For light from the side with the lower index this is twice the integral of F(mu) mu
+// over the cosine mu from 0 to 1, with F the Fresnel reflectance. Simpson's rule computes it with a relative
+// error below 1e-7, because F is smooth on that side. The reflectance for light from the other side follows
+// from it by reciprocity.
 inline double internal_diffuse_reflectance(double eta) {
   const double n = std::max(eta, 1 / eta);
   constexpr int kSteps = 256;

@@ -42,10 +42,12 @@ class MaterialBuilder {
   BsdfIndex side(BsdfIndex b);
   bool passes(BsdfIndex b) const { return traits_[b.value].passes; }
 
-  // A table takes about 30 ms to integrate. Materials with equal parameters share one table, since many
-  // objects of a scene often have the same coat.
+  // Returns the transmittance table of a rough plastic's coat (rough_plastic_table.h). Computing one takes
+  // about 30 ms, and many objects of a scene often have the same coat, so materials with equal parameters
+  // share one table.
   const RoughPlasticTable& coat(Microfacet type, double alpha, double eta);
-  // Returns the table of multiple scattering between microfacets.
+  // energy() returns the tables that compensate for light lost between the microfacets of a surface of the
+  // kind `of` (microfacet_energy.h). Materials with equal parameters share them.
   enum class EnergyOf { conductor, dielectric, coat };
   const MicrofacetEnergy* energy(EnergyOf of, const Roughness& roughness, double eta);
   const MicrofacetEnergy* energy(EnergyOf of, Microfacet type, double alpha, double eta);

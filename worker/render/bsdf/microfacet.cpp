@@ -22,10 +22,11 @@ double erf_inverse(double x) {
   return p * x;
 }
 
-// Visible slopes s have the density exp(-s^2) (cos - s sin)+, whose integral up to s is
-//   H(s) = cos sqrt(pi)/2 (1 + erf s) + sin/2 exp(-s^2),  s <= cot.
-// H(s) = u H(cot) is solved by Newton's method inside a shrinking bracket. The number of steps is bounded:
-// each step that does not converge quadratically halves the bracket, and 64 halvings exhaust a double.
+// The density of visible slopes s, which are at most cot = cos / sin, is proportional to the function
+// exp(-s^2) (cos - s sin). The integral of this function up to s is
+//   H(s) = cos sqrt(pi)/2 (1 + erf s) + sin/2 exp(-s^2).
+// H(s) = u H(cot) is solved by Newton's method inside a shrinking bracket, in at most 64 steps. A step that
+// would leave the bracket is replaced by one that halves it, and 64 halvings exhaust a double.
 double visible_slope(double cos_theta, double sin_theta, double u) {
   constexpr double kHalfSqrtPi = .886226925452758014;
   constexpr double kEnd = 6.5;  // exp(-42) is smaller than any float32 u > 0

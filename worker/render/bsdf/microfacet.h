@@ -43,8 +43,8 @@ inline float pdf_over_D(const V3& wo, float ax, float ay) {
   const float t = std::sqrt(sqr(ax * wo.x) + sqr(ay * wo.y) + wo.z * wo.z);
   return .5f / (bound_k(wo, ax, ay) * wo.z + t);
 }
-// Samples a microfacet normal that is visible from wo. u is in [0, 1)^2. k = 1 samples all visible normals; k
-// = bound_k() excludes normals that reflect wo downwards.
+// Samples a microfacet normal that is visible from wo. u is in [0, 1)^2. If k is 1, all visible normals are
+// sampled; if it is bound_k(), many of those that reflect wo downwards are left out.
 inline V3 sample_normal(const V3& wo, float ax, float ay, const V2& u, float k) {
   const V3 i = normalize(V3(ax * wo.x, ay * wo.y, wo.z));
   const float b = k * i.z;
@@ -67,7 +67,8 @@ inline float G1_over_cos(const V3& w, float ax, float ay) {
   const float a = w.z / s;
   return (3.535f + 2.181f * a) / ((1 + a * (2.276f + 2.577f * a)) * s);
 }
-// The exact G1 / cos: 1 / (projected area of the visible microfacets).
+// The exact G1 / cos. It is the inverse of the projected area of the microfacets that face w, per area of
+// the surface.
 inline float exact_G1_over_cos(const V3& w, float ax, float ay) {
   const float s = stretched_sine(w, ax, ay);
   if (w.z > 6 * s) return 1 / w.z;  // in float32 erf(6) is 1 and exp(-36) negligible

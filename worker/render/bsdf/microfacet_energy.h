@@ -1,15 +1,15 @@
-// Compensates the energy that single-scattering microfacet models lose, that of light scattered several times
-// between microfacets, by a factor (Turquin 2019, "Practical multiple scattering compensation for microfacet
-// models"). Let E(mu) be the share of light that leaves after one bounce in the absence of absorption, seen
-// at the cosine mu:
+// Single-scattering microfacet models lose the light that is scattered several times between microfacets.
+// Here a factor on the BSDF f compensates for it (Turquin 2019, "Practical multiple scattering compensation
+// for microfacet models"). Let E(mu) be the share of light that leaves after one bounce in the absence of
+// absorption, for a viewer at the cosine mu. The compensated BSDF is
 //
 //   f' = f (1 + F' (1 - E) / E),   F' = F E_mean / (1 - F (1 - E_mean)),   E_mean = 2 int E mu dmu,
 //
-// where F is the mean Fresnel reflectance (times the tint). Masked light hits the surface again; each further
-// bounce has the factor F (1 - E_mean), and F' is the sum of this series (Kulla and Conty 2017). Without
-// absorption, F = 1, the factor restores exactly the missing energy. For a dielectric E includes reflection
-// and refraction, and nothing is absorbed. The factor depends only on the viewer, so sampling does not
-// change, and the BSDF is not reciprocal.
+// where F is the mean Fresnel reflectance (times the tint). Masked light hits the surface again; each
+// further bounce has the factor F (1 - E_mean), and F' is the sum of this series (Kulla and Conty 2017). If
+// nothing is absorbed, that is, if F = 1, the factor restores exactly the missing energy. For a dielectric E
+// includes reflection and refraction, and nothing is absorbed. The factor depends only on the viewer, so
+// sampling does not change, and the BSDF is not reciprocal.
 #pragma once
 
 #include <functional>
@@ -43,8 +43,9 @@ class CosineTable {
   std::vector<float> x_, y_;
 };
 
-// The largest deviation from 1 of the light reflected by a surface without absorption that is lit by 1 from
-// everywhere (a white furnace). It covers the errors of the tables and of the quadrature behind them.
+// The largest error of the compensated energy: in a white furnace (radiance 1 from all directions) a surface
+// without absorption has the radiance 1 up to this error. It covers the errors of the tables and of the
+// quadrature by which they are computed.
 inline constexpr double kEnergyTolerance = 5e-4;
 
 struct MicrofacetEnergy {

@@ -13,8 +13,8 @@ inline std::optional<BsdfSample> sample_part(const Lookup& look, BsdfIndex part,
   return look.table.sample(part, uv, wo, u_lobe, u);
 }
 
-// A two-sided material. BsdfTable replaces it by the material of one side before it calls a kind's functions,
-// so those of this kind are never called. Neither of the two materials is two-sided.
+// A two-sided material. BsdfTable replaces it by the material of one side before it calls eval() or
+// sample(), so those of this kind are never called. Neither of the two materials is two-sided.
 struct TwoSided : MaterialKind {
   BsdfIndex front, back;
 
@@ -172,8 +172,8 @@ struct Mapped : MaterialKind {
     const float a2 = std::min(.125f * (n.x * n.x + n.y * n.y) / (n.z * n.z), 1.f);
     return a2 > 0 ? 2 / (1 + std::sqrt(1 + a2 * (wi.x * wi.x + wi.y * wi.y) / (wi.z * wi.z))) : 1;
   }
-  // True if a and b, one direction in two frames, are on the same side of the surface. Otherwise light would
-  // leak through the surface.
+  // True if one direction, with the components a in one frame and b in another, is on the same side of the
+  // surface in both. Callers drop other directions, along which light would leak through the surface.
   static bool same_side(const V3& a, const V3& b) { return a.z * b.z > 0; }
 };
 
@@ -185,8 +185,8 @@ struct BumpMap : Mapped<BumpMap> {
   static constexpr bool kReadsSlopes = true;
   float scale = 1;
 
-  // A bump map displaces the surface by h along its normal n. This changes the components along n of dp/du
-  // and dp/dv, to dh/du and dh/dv (Blinn 1978, without the change of n itself).
+  // A bump map displaces the surface by h along its normal n. This changes the components of dp/du and dp/dv
+  // along n from 0 to dh/du and dh/dv (Blinn 1978; the change of n itself is neglected).
   V3 normal(const Lookup& look) const {
     if (map.constant) return {0, 0, 1};
     const UvPoint& at = look.at;

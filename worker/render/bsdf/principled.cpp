@@ -18,9 +18,9 @@ float schlick(float cos, float eta) {
 }
 C3 schlick(const C3& f0, float w) { return f0 * (1 - w) + C3(w); }
 
-// The clear coat's facets (GTR with exponent 1), alpha from 0.1 to 0.001. Their normals m have the density
-// D(m) cos, with the cosine of m to the surface normal. D is computed from the tangential part of m, to avoid
-// cancellation near the normal.
+// The clear coat's facets (GTR with exponent 1). Their alpha is 0.1 at gloss 0 and 0.001 at gloss 1. Their
+// normals m have the density D(m) cos, where cos is the cosine between m and the surface normal. D is
+// computed from the tangential part of m, to avoid cancellation near the normal.
 struct CoatFacets {
   float a2;
   explicit CoatFacets(float gloss) : a2(sqr(mix(.1f, .001f, gloss))) {}

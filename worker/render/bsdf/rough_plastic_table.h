@@ -23,11 +23,12 @@ struct RoughPlasticTable {
   }
 };
 
-// Returns the table of Mitsuba's rough plastic. Mitsuba defines the nodes, the linear interpolation between
-// them, and the internal reflectance 2 mean(R(mu_i) mu_i) over the nodes (a plain mean, about 0.009 below the
-// integral). The values at the nodes are integrals over visible normals of (1 - F) G1(refracted) and F
-// G1(reflected), by Gauss-Legendre quadrature in double. If alpha < kSpecularAlpha, the coat is smooth. eta
-// is the index inside over the index outside.
+// Returns the table of Mitsuba's rough plastic. Mitsuba defines the nodes mu_i, the linear interpolation
+// between them, and the internal reflectance: twice the mean of R(mu_i) mu_i over the nodes, with R the
+// reflectance for light from inside (a plain mean, about 0.009 below the integral). Transmittance and R at a
+// node are integrals over visible normals, by Gauss-Legendre quadrature in double, of the facet's
+// transmittance or reflectance times the masking of the new direction (visible_normals.h). If alpha is below
+// kSpecularAlpha, the coat is smooth. eta is the index inside over the index outside.
 RoughPlasticTable make_rough_plastic_table(Microfacet type, double alpha, double eta);
 
 }  // namespace ls::render

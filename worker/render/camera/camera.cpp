@@ -40,8 +40,9 @@ Camera::Camera(const Sensor& s, FrameSize size, V3d center, double scale, const 
 }
 
 bool Camera::usable() const {
-  // Rays depend linearly on the positions on the film and on the lens, so testing the corners of film and
-  // lens suffices.
+  // Before their directions are normalised, the rays of perspective and orthographic cameras depend linearly
+  // on the positions on the film and on the lens, so testing a few extreme positions suffices. The rays of a
+  // spherical camera all start at one point.
   for (const double fx : {0., 1.})
     for (const double fy : {0., 1.})
       for (const V2& lens : {V2(0, 0), V2(0, 1), V2(1, 0), V2(1, 1)}) {

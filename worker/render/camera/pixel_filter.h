@@ -1,5 +1,5 @@
-// Reconstruction filters by importance sampling. Each sample belongs to one pixel, and its position is drawn
-// from the filter around that pixel; so no sample contributes to the pixels of another tile (Ernst,
+// Applies reconstruction filters by importance sampling. Each sample belongs to one pixel, and its position
+// is drawn from the filter around that pixel; so no sample contributes to the pixels of another tile (Ernst,
 // Stamminger, Greiner 2006). The scene reader rejects filters with negative lobes.
 #pragma once
 

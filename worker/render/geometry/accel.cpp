@@ -24,8 +24,8 @@ constexpr char kDeviceConfig[] = "isa=avx2,max_isa=avx2,frequency_level=simd256,
 constexpr char kDeviceConfig[] = "set_affinity=0";  // one set of instructions: NEON
 #endif
 
-// set_ray() writes the ray in 16-byte words, as Embree reads it. A load that spans several smaller stores
-// cannot be forwarded from them and waits.
+// set_ray() writes the ray in 16-byte words, as Embree reads it. If it wrote smaller words, the processor
+// could not forward them to a load that spans several of them, and the load would wait.
 using F32x4 = float __attribute__((vector_size(16)));
 using U32x4 = std::uint32_t __attribute__((vector_size(16)));
 void set_ray(RTCRay& r, const V3& o, const V3& d, float t_max) {
@@ -40,7 +40,7 @@ void set_ray(RTCRay& r, const V3& o, const V3& d, float t_max) {
 
 // True if Embree can trace a ray from o. Embree's behaviour is undefined for NaN, and Debian's build of it
 // aborts for rays whose origin is farther than 1.8e18. For rays transformed into instances, kLargestInverse
-// ensures the same.
+// (geometry_build.cpp) ensures the same.
 bool near_enough(const V3& o) { return dot(o, o) <= 1e18f; }  // within 1e9 times the world's size
 
 // The Embree scenes over one set of primitives: all of them, the opaque ones, and those that let light pass.
@@ -138,7 +138,9 @@ void attach(RTCDevice device, const Geometry& g, const PrimitiveSet& set, Scenes
   add_shapes(g.cylinders, set.cylinders, to.cylinders[side], kCylinders);
 }
 
-// Adds the primitives of `set` to the Embree scenes `to`. The caller then commits these scenes.
+// Creates the Embree scenes `to` and adds the primitives of `set` to them. `boundaries` is true if these
+// scenes need to separate primitives that let light pass, of `set` or of instances, from opaque ones. The
+// caller then adds any instances and commits the scenes.
 void fill(const Accel::State& st, const Geometry& g, const PrimitiveSet& set, bool boundaries, Scenes& to) {
   const RTCDevice device = st.device;
   // Only between() needs hits to be filtered (st.coincident). It traces `all`, which is the same scene as

@@ -12,7 +12,8 @@
 
 namespace ls::render {
 
-// The primitives that Accel::between() found on a line, at most kMost, ordered by kind, index and instance.
+// The primitives that Accel::between() found along a line, at most kMost, ordered by kind, index and
+// instance.
 struct CoincidentHits {
   static constexpr int kMost = 64;
   std::array<PrimitiveId, kMost> ids;
@@ -36,8 +37,8 @@ class Accel {
   // Returns the nearest primitive at a t in (0, t_max) that lets light pass straight through, completely or
   // partly.
   std::optional<PrimitiveId> nearest_boundary(const V3& o, const V3& d, float t_max) const;
-  // Returns all primitives on the straight line from a to b, at most CoincidentHits::kMost. Requires that
-  // build() was called with `coincident`.
+  // Returns the primitives that the straight line from a to b hits, at most CoincidentHits::kMost. Requires
+  // that build() was called with `coincident`.
   CoincidentHits between(const V3& a, const V3& b) const;
   // True if the ray o + t d hits an opaque primitive at a t in (0, t_max).
   bool occluded(const V3& o, const V3& d, float t_max) const;

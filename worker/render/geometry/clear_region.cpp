@@ -7,7 +7,7 @@ namespace ls::render {
 namespace {
 
 // A region is shrunk by this share of its largest coordinate. The offset of a ray from a surface is only
-// 2^-20 of it.
+// 2^-20 of that coordinate.
 constexpr double kMargin = 0x1p-12;
 // Corners that are farther from a face's plane than this share of the largest coordinate do not belong to it.
 constexpr double kFlat = 0x1p-18;
@@ -19,7 +19,8 @@ std::vector<std::uint32_t> triangles_of(const Geometry& g, std::uint32_t surface
   return found;
 }
 
-// True if each edge belongs to exactly two triangles. `corners` are three for each triangle.
+// True if each edge belongs to exactly two triangles. `corners` lists the three corners of each triangle in
+// turn.
 bool is_closed(const std::vector<V3d>& corners) {
   const auto start = [&](std::size_t edge) { return corners[edge]; };
   const auto end = [&](std::size_t edge) { return corners[edge % 3 == 2 ? edge - 2 : edge + 1]; };
@@ -100,7 +101,7 @@ std::optional<ClearRegion> ClearRegion::inside(const Geometry& g, std::uint32_t 
   return region.contains(V3(middle)) ? std::optional(region) : std::nullopt;
 }
 
-// Returns false if there are too many planes.
+// Adds the plane of a face; returns false if there are too many.
 bool ClearRegion::add_plane(const V3d& n, double distance) {
   if (planes_ == kMostPlanes) return false;
   normal_[planes_] = V3(n);

@@ -20,9 +20,10 @@ class ClearRegion {
  public:
   static constexpr std::size_t kMostPlanes = 6;
 
-  // The region inside of a surface that is not in a group. Returns nullopt if the surface is neither a sphere
-  // nor such a body, or if the box of another surface touches its box. `boxes` are those of all surfaces.
-  // media_overlap: true if another medium may fill the space outside although the surface names none.
+  // Returns the region inside of a surface. Returns nullopt if the surface is in a group, if it is neither a
+  // sphere nor such a body, or if the box of another surface touches its box. `boxes` holds the boxes of all
+  // surfaces. `media_overlap` is true if another medium may fill the space outside although the surface
+  // names no exterior medium.
   static std::optional<ClearRegion> inside(const Geometry& g, std::uint32_t surface,
                                            const std::vector<SurfaceBox>& boxes, bool media_overlap);
 

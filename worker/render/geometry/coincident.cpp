@@ -10,8 +10,8 @@
 namespace ls::render {
 namespace {
 
-// The largest number of pairs of shapes or flat pieces that are compared; this takes about half a second.
-// With more, all surfaces are treated as coincident.
+// The largest number of pairs of shapes or flat pieces that are compared. Comparing so many takes about half
+// a second. If there are more, all surfaces are treated as coincident.
 constexpr std::uint64_t kMaxSurfacePairs = std::uint64_t{1} << 27;
 
 struct Piece {  // a triangle, or half of the square about a disk

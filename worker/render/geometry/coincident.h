@@ -15,9 +15,10 @@ struct Coincidence {
 };
 
 // Sets SurfaceInfo::coincident_reach of the surfaces of g that coincide. It compares triangles and disks in
-// the same plane, spheres with spheres, and cylinders with cylinders. Instances that touch anything are
-// marked without comparison, and so is everything if there are too many pairs to compare. Marking a surface
-// that does not coincide costs rendering time and changes nothing else.
+// the same plane, spheres with spheres, and cylinders with cylinders. If the boxes of a null surface and of
+// another touch and one of the two is in an instance, both are marked without comparison. If there are too
+// many pairs to compare, all surfaces are marked. Marking a surface that does not coincide costs rendering
+// time and changes nothing else.
 Coincidence find_coincident(Geometry& g);
 
 }  // namespace ls::render

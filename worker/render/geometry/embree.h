@@ -17,7 +17,7 @@ using EmbreeContext = RTCIntersectContext;
 constexpr RTCSceneFlags kFilterOfQuery = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
 
 inline void embree_start(EmbreeContext& context) { rtcInitIntersectContext(&context); }
-// With a filter, the scene must have the flag kFilterOfQuery.
+// Requires that the scene has the flag kFilterOfQuery if `filter` is not null.
 inline void embree_intersect(RTCScene scene, EmbreeContext& context, RTCRayHit& ray,
                              RTCFilterFunctionN filter) {
   context.filter = filter;

@@ -249,9 +249,9 @@ namespace {
 // Returns the reach (SurfaceHit::reach) in the world of a hit p, with normal ng, in the instance i, where
 // `local` is its reach in the group's space. The BVH transforms the ray to the group's space in single
 // precision. Each component of the ray's origin is then a sum of four products, accurate to four ulps of the
-// sum of their absolute values. offset_point() moves rays by 16 ulps of the reach, so the reach must be a
-// quarter of that sum. In the world, the errors of the three components move the hit off the surface in
-// proportion to the components of the normal in the group's space. The reach in the group's space is
+// sum of their absolute values. offset_point() moves rays by 16 ulps of the reach, so the reach must be at
+// least a quarter of that sum. In the world, the errors of the three components move the hit off the surface
+// in proportion to the components of the normal in the group's space. The reach in the group's space is
 // transformed to the world in the same way.
 float reach_of(const PlacedInstance& i, const V3& p, const V3& ng, float local) {
   const auto& a = i.to_world.a;
@@ -320,8 +320,8 @@ double intersect(const Disk& s, const V3d& o, const V3d& d, double t_min, double
   return a * a + b * b <= 1 ? t : kInf;
 }
 
-// Computed in the plane perpendicular to the axis, relative to the ray's point nearest to the axis, as for
-// spheres. Both intersections are tried, because the cylinder has no caps.
+// Intersects in the plane perpendicular to the axis. As for spheres, distances are computed relative to the
+// ray's point nearest to the axis. Both intersections are tried, because the cylinder has no caps.
 double intersect(const Cylinder& s, const V3d& o, const V3d& d, double t_min, double t_max) {
   const V3d f = o - s.p0;
   const double dx = d.dot(s.u), dy = d.dot(s.v), dz = d.dot(s.axis);

@@ -71,7 +71,7 @@ struct Disk {  // points center + a u + b v with a^2 + b^2 <= 1
   V3d center, u, v, n;
   std::uint32_t surface = 0;
 };
-struct Cylinder {      // points p0 + z length + (u cos a + v sin a) radius, z in [0, 1]; no caps
+struct Cylinder {      // points p0 + z length axis + (u cos a + v sin a) radius, z in [0, 1]; no caps
   V3d p0, u, v, axis;  // unit vectors; u, v, axis may be left-handed: normals point away from the axis
   double radius = 1, length = 1;
   std::uint32_t surface = 0;
@@ -114,7 +114,7 @@ struct PrimitiveId {
 
 struct SurfaceHit {
   float t = 0;
-  V3 p;   // point on the surface, computed from barycentrics or the sphere's centre, not as o + t d
+  V3 p;   // point on the surface, computed from the shape's data (such as barycentrics), not as o + t d
   V3 ng;  // geometric normal, unit
   Frame shading;
   // True if `shading` has the normal ng because the interpolated normal would face away from the ray

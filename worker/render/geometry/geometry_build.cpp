@@ -91,8 +91,8 @@ Space world_space(const std::vector<Bounds>& meshes, const Bounds& all) {
   return unit_space(wide);
 }
 
-// True if the mesh is a sheet, that is, not closed: the area-weighted normals of a closed mesh add up to
-// zero.
+// True if the area-weighted normals of the mesh do not add up to zero. Such a mesh is a sheet, that is, not
+// closed: the normals of a closed mesh add up to zero.
 bool is_sheet(const LocalMesh& mesh) {
   V3d sum(0);
   double area = 0;
@@ -304,8 +304,9 @@ Result<PlacedInstance> place_instance(const Instance& instance, const Geometry& 
   out.to_world.b = (m.point(group.center) - g.center) * g.scale;
   if (!out.to_world.invertible()) return fail(Errc::invalid_argument, "its to_world has no inverse");
   out.to_local = out.to_world.inverse();
-  // The largest element of an inverse map. The BVH inverts the map itself, in float32, and cannot trace rays
-  // from too far away (near_enough() in accel.cpp), so the inverse must not be too large.
+  // The largest absolute value allowed in the matrix of an instance's inverse map. The BVH inverts the map
+  // itself, in float32, and cannot trace rays from too far away (near_enough() in accel.cpp), so the inverse
+  // must not be too large.
   constexpr double kLargestInverse = 5e8;
   const auto in_range = [](double x) { return std::abs(x) <= kLargestInverse; };
   if (!std::isnormal(static_cast<float>(out.to_world.determinant())) ||

@@ -19,8 +19,8 @@ LocalMesh rectangle() {
   return m;
 }
 
-// The cube's mesh of six faces. The uv of each face fill the unit square, with u along a and v along a x n,
-// where n is its normal (as in Mitsuba 3.9.1's cube).
+// The cube's mesh of six faces. The uv of each face fill the unit square. u increases along the edge
+// direction Face::a and v along a x n, where n is the normal of the face (as in Mitsuba 3.9.1's cube).
 LocalMesh cube() {
   struct Face {
     V3d n, a;
@@ -88,8 +88,8 @@ Result<Sphere> place_sphere(const SphereShape& s, const Affine& m) {
   return r;
 }
 
-// Places a cylinder. Its azimuth starts at an axis of the frame of Duff et al. 2017 about the direction from
-// p0 to p1 in the scene, as in Mitsuba.
+// Places a cylinder. Its azimuth starts, as in Mitsuba, at the first axis of the frame of Duff et al. 2017
+// about the direction from p0 to p1, before m transforms it.
 Result<Cylinder> place_cylinder(const CylinderShape& s, const Affine& m) {
   const V3d p0(s.p0[0], s.p0[1], s.p0[2]), d = V3d(s.p1[0], s.p1[1], s.p1[2]) - p0, n = d.normalized();
   const double sign = std::copysign(1., n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;

@@ -14,7 +14,7 @@ struct SurfaceBox {
   std::uint32_t surface = 0, instance = kNone;
   V3 lo, hi;
 
-  // True if the boxes overlap or are within a few ulps of each other.
+  // True if the boxes overlap or are closer to each other than 2^-18 of their largest coordinate.
   bool touches(const SurfaceBox& o) const {
     const float margin =
         0x1p-18f * std::max(std::max(largest(lo), largest(hi)), std::max(largest(o.lo), largest(o.hi)));
@@ -24,7 +24,7 @@ struct SurfaceBox {
 };
 
 // Returns the bounding boxes, in the world, of the surfaces for which `wanted` is true and that have
-// primitives. Returns nullopt if instances make the list too long to be useful.
+// primitives. Returns nullopt if instances make the list longer than 2^23 boxes.
 std::optional<std::vector<SurfaceBox>> surface_boxes(const Geometry& g,
                                                      const std::function<bool(const SurfaceInfo&)>& wanted);
 

@@ -37,8 +37,8 @@ V2 uv_of_sphere(const Geometry& g, const SurfaceHit& hit) {
   return sphere_uv(s, (p - s.center).normalized());
 }
 
-// The directional albedo of a surface, estimated from one sampled direction. Excludes the scaling of radiance
-// by refraction, and the light that passes straight through.
+// Estimates the directional albedo of a surface from one sampled direction. The albedo includes neither the
+// scaling of radiance by refraction nor the light that passes straight through (null transmission).
 C3 albedo_of(const World& w, const FirstSurface& first, const SampleStream& stream, const V3& d) {
   const SurfaceHit& hit = first.hit;
   const Group g = stream.group(0, Purpose::albedo);

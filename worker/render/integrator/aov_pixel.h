@@ -14,7 +14,8 @@
 
 namespace ls::render {
 
-// The uv of a hit, even if the surface's material does not need it.
+// Returns the uv of a hit. On spheres it is computed from the position, because SurfaceHit::uv is set there
+// only if a material or a light needs it.
 V2 uv_of(const Geometry& geometry, const SurfaceHit& hit);
 
 class AovPixel {

@@ -12,9 +12,10 @@
 
 namespace ls::render {
 
-// Sets `densities_` for the vertex p, which the path reaches from the vertex `from`. ng is the geometric
-// normal if p is on a surface, and 0 in a medium. `densities_` stays 0 if `from` is the camera or has
-// scattered the path by a delta lobe: then no connection of a shorter subpath finds the same path.
+// Sets `densities_` (the subpath's share in the balance heuristic: SubpathDensities) for the vertex p, which
+// the path reaches from the vertex `from`. ng is the geometric normal if p is on a surface, and 0 in a
+// medium. `densities_` stays 0 if `from` is the camera or has scattered the path by a delta lobe: then no
+// connection of a shorter subpath finds the same path.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::arrive(const Vertex& from, const V3& p, const V3& ng) {
   if (connections_.learner) ++connections_.learner->scatterings;
@@ -24,8 +25,9 @@ void PathTracer<F, Light>::arrive(const Vertex& from, const V3& p, const V3& ng)
     densities_ = SubpathDensities::extended(f, from.pdf, from.sum, ng, from.ng);
 }
 
-// Only while the choice of lights is learned: estimates the light of each light source by look_for(choice),
-// and records the estimates for `place`.
+// While the choice of lights by place is learned (lights/local_lights.h), estimates the light that each light
+// source adds at `place`, and records the estimates. look_for(choice) does the next-event estimation with one
+// light. At other times the function does nothing.
 template <Features F, template <Features> class Light>
 template <class LookFor>
 void PathTracer<F, Light>::learn_lights(const LightPlace& place, const LookFor& look_for) {
@@ -123,7 +125,8 @@ void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Sca
   light.distance = std::sqrt(r2);
   light.radiance = C3(1);
   light.target = y.p;
-  float cos_y = 1, camera_pdf = 0, light_pdf = 0;  // at y: the pdfs of a camera path and of a light path
+  // The densities with which, at y, a camera path samples the direction to the sun and a light path that to x
+  float cos_y = 1, camera_pdf = 0, light_pdf = 0;
   if (y.medium == kNone) {
     // Rejects the directions in which next-event estimation would not find the sun (light_surface)
     const V3 to_x = y.hit.shading.to_local(-w), to_light = y.hit.shading.to_local(y.to_light);
@@ -146,7 +149,7 @@ void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Sca
   float from_light = 0;
   if (densities_.last > 0)
     from_light = light_pdf * scattering.cosine(w) * densities_sum([&] { return scattering.back(w); });
-  // The balance heuristic's weight, divided by r^2 for the geometric term
+  // The weight by the balance heuristic, times the factor 1 / r^2 of the geometric term
   const float weight = 1 / (r2 + from_camera + from_light);
   C3 added = beta_ * value * y.light * (weight * choice.weight);
   const float size = mean(added);

@@ -1,9 +1,9 @@
-// Equi-angular distance sampling along a segment about a pivot (Kulla and Fajardo 2012): the density is
-// proportional to 1 / distance^2, where distance is the distance to the pivot. Positions are offsets x in [a,
-// b] along the segment, measured from the foot of the perpendicular from the pivot. The textbook difference
-// of arctangents cancels when both ends are far from the foot on one side; the forms used here do not (pdf
-// accurate to 4e-7 in float32). If the light shines into a cone, only the part of the segment inside the cone
-// is sampled.
+// Equi-angular distance sampling along a segment about a pivot, the point that stands for the light
+// (pivot.h). The method is that of Kulla and Fajardo 2012: the density is proportional to 1 / distance^2,
+// where distance is the distance to the pivot. Positions are offsets x in [a, b] along the segment, measured
+// from the foot of the perpendicular from the pivot. The textbook difference of arctangents cancels when both
+// ends are far from the foot on one side; the forms used here do not (pdf accurate to 4e-7 in float32). If
+// the light shines into a cone, only the part of the segment inside the cone is sampled.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 
 namespace ls::render {
 
-// The largest ratio of densities. Ratios are clamped to it, so that no product with one is 0 times infinity.
+// Ratios of densities are clamped to this value, so that no product with a ratio is 0 times infinity.
 inline constexpr float kMaxRatio = 1e30f;
 
 class EquiAngular {
@@ -60,12 +60,14 @@ class EquiAngular {
   }
 
  private:
-  // Limits [a, b] to the part inside the light's cone. Seen from the pivot, the segment spans angles of a
-  // half plane. The cone meets it where the cosine to the axis, m cos(angle - mid), is at least cos_reach; m
-  // is the length of the axis' projection onto the plane. Nothing is cut off if the line passes the pivot so
-  // closely that the direction of the foot is lost in rounding.
+  // Limits [a, b] to the part inside the light's cone. In the plane of the pivot and the segment, let `angle`
+  // be the angle at the pivot from the foot to a point of the segment, `mid` the angle from the foot to the
+  // projection of the cone's axis, and m the length of this projection. The direction to the point has the
+  // cosine m cos(angle - mid) to the axis, and the point is inside the cone where this is at least cos_reach.
+  // Nothing is cut off if the line passes the pivot so closely that the direction of the foot is lost in
+  // rounding.
   void keep_lit(const Pivot& pivot, const V3& off) {
-    constexpr float kCloseness = 1e-5f, kRightAngle = 1.57079f;  // atan(1 / kCloseness) is smaller
+    constexpr float kCloseness = 1e-5f, kRightAngle = 1.57079f;  // above all angles: atan(1 / kCloseness)
     const float size = std::max(std::abs(a_), std::abs(b_)), r = std::sqrt(dot(off, off));
     if (!(r > kCloseness * size)) return;
     limited_ = true;

@@ -21,19 +21,20 @@
 namespace ls::render {
 namespace {
 
-// Number of camera paths from which the sun map (the distribution of rays from the sun: SunMap) and the
-// portals are learned: at most these, and at most kLearningPathsPerPixel for each pixel of the full frame.
+// The largest numbers of camera paths from which the sun map (the distribution of rays from the sun: SunMap)
+// and the portals (openings to the sky: lights/portals.h) are learned. The number is also at most
+// kLearningPathsPerPixel for each pixel of the full frame.
 constexpr std::uint64_t kLearningPaths = 1 << 16;
 constexpr std::uint64_t kPortalPaths = 1 << 14;
 constexpr std::uint64_t kLearningPathsPerPixel = 16;
 // Paths are traced in batches of this many, on several threads.
 constexpr std::uint64_t kLearningBatch = 1 << 10;
-// Learning may stop after this many batches if connections clearly do not pay.
+// Learning stops after this many batches if they show that connections or portals do not pay (light_paths.h).
 constexpr std::uint64_t kFirstBatches = 4;
 // Portals are tried if at most the share kLeftThatPays of the directions that BSDFs and phase functions
-// sample leads to the sky. Portals pay if some pixels have more than kPortalGainThatPays times the noise
-// without them. In a scene that had no light to sample before, portals add shadow rays, so there they pay
-// only if the noise without them is more than kShadowGainThatPays times as high.
+// sample leads to the sky. Portals pay if the noise of some pixels is more than kPortalGainThatPays times as
+// high without portals as with them. In a scene in which next-event estimation had no light to sample before,
+// portals add shadow rays, so the factor there is kShadowGainThatPays.
 constexpr double kLeftThatPays = .125;
 constexpr double kPortalGainThatPays = 1.1;
 constexpr double kShadowGainThatPays = 2;
@@ -42,13 +43,13 @@ constexpr int kLongestPortalPath = 4;
 // The choice of lights by place is learned from camera paths of at most kLongestLocalLightPath segments,
 // which sample every light at each vertex. There are at most kLocalLightPaths such paths, and fewer with many
 // lights (kLocalLightLooks). The choice is tried if next-event estimation at these vertices has a mean square
-// of more than kSpreadThatPays times the square of its mean. It pays if some pixels have more than
-// kLocalGainThatPays times the noise of direct light without it. This limit is high because a light that
-// reaches the vertex costs more than one that does not, so samples take up to 1.5 times as long, and because
-// the few pixels of a pilot hardly show the edges of small patches of light.
+// of more than kSpreadThatPays times the square of its mean. It pays if the noise of the direct light of some
+// pixels is more than kLocalGainThatPays times as high without it. This limit is high for two reasons:
+// samples take up to 1.5 times as long, because a light that reaches the vertex costs more time than one that
+// does not; and the few pixels of a pilot hardly show the edges of small patches of light.
 constexpr std::uint64_t kLocalLightPaths = 1 << 14;
 constexpr std::uint64_t kLocalLightLooks = 1 << 17;  // lights times paths
-constexpr std::uint64_t kLocalLightTrial = 4;        // 1 / this of the paths decides whether it is tried
+constexpr std::uint64_t kLocalLightTrial = 4;        // 1 / (share of the paths that decide if it is tried)
 constexpr int kLongestLocalLightPath = 6;
 constexpr double kSpreadThatPays = 1.2;
 constexpr double kLocalGainThatPays = 3;
@@ -65,7 +66,7 @@ constexpr int kConnectedRoulette = 2;
 constexpr double kLitThatPays = .15;
 constexpr double kLightThatPays = .1;
 // Lower bound for the light that a surface vertex reflects, per unit cosine of the sun [1/sr]. A glossy
-// surface may reflect little in the four directions that are evaluated, but much in others.
+// surface may reflect little in the four directions that look_of() evaluates, but much in others.
 constexpr float kLeastReflected = .01f;
 // A shading normal counts as tilted if its cosine to the geometric normal is smaller than this.
 constexpr float kUntilted = .999999f;
@@ -76,7 +77,8 @@ constexpr float kFaintConnection = .5f;
 constexpr std::uint64_t kLearningSeed = 0x5eed0f1ea2;
 constexpr std::uint64_t kSunRaySeed = 0x5eed0f5a1;
 
-// The paths of one learning pass and the data that they record. All paths record the sun map.
+// The paths of one learning pass and the data that they record. All passes record where paths find the sun
+// (SunMap).
 struct Lesson {
   bool sky = false, lights = false;  // record the light of the sky, and that of each light
   std::uint64_t first_path = 0, batch = kLearningBatch;
@@ -128,8 +130,9 @@ Learned learn_batch(const World& w, const Lesson& lesson, std::uint64_t first, s
   return learned;
 }
 
-// Traces the camera paths with the numbers from lesson.first_path up to `paths`. After the first
-// kFirstBatches batches, go_on(learner) decides whether to trace the rest.
+// Traces the camera paths with the numbers from lesson.first_path up to `paths`, or up to the limit of
+// kLearningPathsPerPixel. After the first kFirstBatches batches, go_on(learner) decides whether to trace the
+// rest.
 template <Features F, template <Features> class Light, class GoOn>
 Learned learn_with(const World& w, std::uint64_t paths, int threads, const GoOn& go_on,
                    const Lesson& lesson) {
@@ -192,7 +195,8 @@ bool can_learn(const World& w) {
   return kAimed.covers(need);
 }
 
-// Uses the same features as camera paths do, because weights depend on how directions are sampled.
+// Traces a set of light vertices with the features of the camera paths, because weights depend on how
+// directions are sampled.
 LightVertices trace(const World& w, std::uint64_t seed, std::uint32_t set, std::uint64_t rays) {
   if (w.need.aimed) return trace_with<kAimed>(w, seed, set, rays);
   return w.need.media ? trace_with<kMedia>(w, seed, set, rays) : trace_with<kSurfaces>(w, seed, set, rays);
@@ -220,8 +224,9 @@ LightVertices::Look look_of(const World& w, const LightVertex& y) {
     for (const V3& to : {V3(.5f, .5f, z), V3(-.5f, .5f, z), V3(.5f, -.5f, z), V3(-.5f, -.5f, z)})
       even += mean_component(eval(to).f_cos) * cosine / (4 * std::abs(z));
     look.even = light * std::max(even, kLeastReflected * cosine);
-    // A Henyey-Greenstein lobe around the mirrored direction, as high there as the BSDF. Its width is that of
-    // the BSDF for light along the normal. At other angles a microfacet lobe is as wide in one direction and
+    // A Henyey-Greenstein lobe around the mirrored direction stands for the glossy part of the BSDF; there
+    // both parts together are as high as the BSDF. The lobe is as wide as that of the BSDF for light along
+    // the normal. For light at other angles a microfacet lobe has this width in one direction, and is
     // narrower by the cosine in the other.
     const V3 mirrored(-to_light.x, -to_light.y, to_light.z);
     const BsdfEval at_peak = eval(mirrored);
@@ -272,7 +277,7 @@ void learn_connections(const IntegratorSettings& settings, int threads, World& w
 
 namespace {
 
-constexpr int kLongestPilot = 64;  // paths in a white and dense medium have thousands of segments
+constexpr int kLongestPilot = 64;  // segments; paths in a white and dense medium have thousands
 
 std::unique_ptr<const Portals> find_portals(bool in_any_case, int threads, World& w) {
   const PilotSettings settings(w, kLearningSeed, kLongestPortalPath);
@@ -323,7 +328,7 @@ void learn_local_lights(const IntegratorSettings& settings, int threads, World& 
   LightVisits visits = visits_of(0, trial);
   if (!in_any_case) {
     if (!(w.lights.spread_over(visits) > kSpreadThatPays)) return;
-    // Direct light is not connected, so no light vertices need be traced
+    // Direct light is not connected, so no light vertices need to be traced
     const bool connected = std::exchange(w.need.connected, false);
     constexpr int kDirect = 2;  // segments of paths that show direct light
     const auto without = pilot_pixels(w, kDirect, threads);

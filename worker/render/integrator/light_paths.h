@@ -12,13 +12,15 @@
 
 namespace ls::render {
 
-// Sets `sun`, `sun_map`, `faint` and Features::connected of a world that is otherwise complete. The result
-// depends only on the scene, the depth limits and the size of the full frame: not on the seed, the number of
-// samples, a crop or the number of threads. The integrator must be `volpath` or `path`.
+// If connections to light vertices pay or the settings request them, sets `sun`, `sun_map`, `faint`,
+// `connections_per_ray` and Features::connected of a world that is otherwise complete, lowers its `rr_depth`,
+// and calls aim() again. The result depends only on the scene, the depth limits and the size of the full
+// frame: not on the seed, the number of samples, a crop or the number of threads. The integrator must be
+// `volpath` or `path`.
 void learn_connections(const IntegratorSettings& settings, int threads, World& w);
 
-// Sets the portals of a world's lights if they pay. Depends on the same data, and requires the same
-// integrators, as learn_connections().
+// Sets the portals of a world's lights if they pay or the settings request them. Depends on the same data,
+// and requires the same integrators, as learn_connections().
 void learn_portals(const IntegratorSettings& settings, int threads, World& w);
 // Enables the choice of lights by place if it pays or the settings request it. Depends on the same data, and
 // requires the same integrators, as learn_connections().

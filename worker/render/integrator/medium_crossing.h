@@ -31,9 +31,9 @@ auto PathTracer<F, Light>::fly_through(const Medium& medium, const SurfaceHit* e
   const float t_max = end ? ray_.length_to(*end) : reach;
   const Segment segment{t_max, ray_.lead(), end};
   if constexpr (kFliesFirst) {
-    // The flight that was sampled before the ray was traced is cut off at t_max. A flight sampled anew up to
-    // t_max may differ in a dense cell that t_max shortens (kExactDepth), and a choice between the two would
-    // be biased.
+    // The flight that was sampled before the ray was traced is cut off at t_max. A flight that is sampled
+    // anew up to t_max may differ from it, because t_max can shorten a dense cell so that a different
+    // algorithm is used there (kExactDepth), and a choice between the two flights would be biased.
     if (flown)
       return collide(medium, segment, {}, flown->scattered && flown->t < t_max ? *flown : Flight{.t = t_max});
   }
@@ -90,8 +90,8 @@ auto PathTracer<F, Light>::collide(const Medium& medium, Segment segment, const 
   return scatter_in(medium);
 }
 
-// Scatters the path at its vertex in the medium. If paths split there, first follows a second path from the
-// vertex to its end.
+// Scatters the path at its vertex in the medium. If paths split there (splitting.h), first follows a second
+// path from the vertex on, and adds the light that it finds.
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::scatter_in(const Medium& medium) -> Step {
   if constexpr (kSplits) {
@@ -338,9 +338,10 @@ auto PathTracer<F, Light>::through_all(const SurfaceHit& hit, const V3& w, const
 }
 
 // If `hit` is on a null surface that coincides with a scattering surface, replaces it by the hit on the
-// scattering one; the ray from o along d may have found either of them first. Otherwise fog on a floor would
-// let light through the floor, and a pane of glass on a null boundary would not attenuate the light. Shadow
-// rays end at t_max, in front of the surface of their light.
+// scattering one; the ray from o along d may have found either of them first. If the null surface were used,
+// the boundary of fog on a floor would let light through the floor, and a pane of glass on a null boundary
+// would not attenuate the light. Surfaces beyond t_max are ignored: shadow rays end there, in front of the
+// surface of their light.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::prefer_scatterer(SurfaceHit& hit, const V3& o, const V3& d, float t_max) const {
   const SurfaceInfo& s = world_.geometry.surfaces[hit.surface];

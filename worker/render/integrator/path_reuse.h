@@ -9,10 +9,11 @@
 // its group, and weights the light from there by the balance heuristic over all paths that could have found
 // it: light that arrives at y_j along w has the estimate
 //   beta_i f(x_i, y_j) V(x_i, y_j) f(y_j, w) L(w) / sum over k of q_k(y_j) p_k(w),
-// where f are BSDFs or phase functions with cosines, V is the transmittance with the geometric terms, and
-// p_k(w) is the density with which path k continues along w from y_j. Light found by next-event estimation
-// has that technique's density in place of p_k, or in the sum with it where both can find it. The group needs
-// one shadow ray for each pair, and no path has to be followed again.
+// where f are BSDFs or phase functions with cosines, V is the transmittance (0 if something blocks the way)
+// times the geometric term, and p_k(w) is the density with which path k continues along w from y_j. For light
+// found by next-event estimation, the density of next-event estimation replaces p_k or, if paths can also hit
+// the light, is added to p_k. The group needs one shadow ray for each pair, and no path has to be followed
+// again.
 //
 // A path whose weight becomes 0 ends there. So q_k(y) is 0 where x_k scatters no light from y, and p_k(w) is
 // 0 where y scatters no light from w towards x_k.
@@ -30,7 +31,7 @@
 
 namespace ls::render {
 
-// Records the first vertex of the path, if it is at depth 1.
+// Records the path's current vertex as its first vertex if it is at depth 1; else does nothing.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::begin_sharing(const SurfaceHit* hit, const Medium* medium) {
   FirstVertex& first = sharing_.first;
@@ -50,7 +51,8 @@ void PathTracer<F, Light>::begin_sharing(const SurfaceHit* hit, const Medium* me
 }
 
 // Called after a smooth lobe sampled the direction at the first vertex. Moves the weight of the path to
-// `scale`, and makes the densities relative to their mean.
+// SharingPath::scale, so that beta_ is the weight from the first vertex on, and makes the channels' densities
+// relative to their mean.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::look_for_second() {
   sharing_.part = SharingPath::Part::second;
@@ -220,8 +222,9 @@ BsdfEval PathTracer<F, Light>::scattered_at(const PathVertex& y, const V3& d, co
                            y.hit.shading.to_local(-d), y.hit.shading.to_local(w));
 }
 
-// The BSDF or phase function at the second vertex of a path's tail, for light from one direction, towards
-// the first vertices of a group. On a diffuse surface it is evaluated once for each side of the surface.
+// Evaluates the BSDF or phase function at the second vertex of the path `giver`, whose tail is shared, for
+// light from one direction, towards the first vertices of a group. On a diffuse surface it is evaluated once
+// for each side of the surface.
 template <Features F, template <Features> class Light>
 class PathTracer<F, Light>::TowardsGroup {
  public:

@@ -5,7 +5,8 @@
 // relative to that of the hero. A contribution is beta * light / mean(density): the balance heuristic over
 // channels. Direct light is found both by BSDF or phase-function sampling and by next-event estimation,
 // combined by the balance heuristic. At surfaces next-event estimation starts from the path's own vertices.
-// In media it is a strategy, `Light` (vertex_nee.h: the default; segment_nee.h), with these members:
+// In media next-event estimation is a strategy, `Light` (vertex_nee.h, the default; segment_nee.h;
+// camera_segment_nee.h), with these members:
 //   Plan ahead(path, medium, segment)               called before each flight through a medium: adds light
 //                                                   scattered once, anywhere on the segment;
 //   Plan::matters()                                 true if vertices on this segment need a Vertex;
@@ -77,7 +78,8 @@ class SegmentNee;
 // Data for paths of a scene with Features::connected, in addition to the world.
 struct Connections {
   const LightVertices* vertices = nullptr;  // null: paths are not connected
-  // Used while learning, else null: records where paths find light that connections could find, too.
+  // Records, in learning paths, where they find light that connections could find, too. `learner` is null for
+  // other paths.
   struct Learner {
     SunMap map;
     double light = 0;     // the sum of the light found
@@ -135,7 +137,7 @@ class PathTracer {
     V3 p{0, 0, 0};
     LightPlace place;   // the place by which lights are chosen
     V3 ng{0, 0, 0};     // with F.connected: the geometric normal
-    float pdf = 0;      // of the sampled direction
+    float pdf = 0;      // density of the sampled direction
     bool delta = true;  // sampled by a delta lobe or the camera: lights that are hit have full weight
     float sum = 0;      // with F.connected: SubpathDensities::sum()
     typename Light<F>::Vertex in_medium;
@@ -146,7 +148,7 @@ class PathTracer {
     float roulette = 1;  // random number for Russian roulette, if scattered
   };
   using Within = std::conditional_t<F.overlaps, MediaState, OneMedium>;
-  // True if a flight may be sampled before its ray is traced. The strategies of other paths need the end of
+  // True if a flight may be sampled before its ray is traced. Other features and strategies need the end of
   // the segment first.
   static constexpr bool kFliesFirst =
       F.media && !F.aimed && !F.reuse && std::is_same_v<Light<F>, VertexNee<F>>;
@@ -154,7 +156,8 @@ class PathTracer {
   // Follows the path from its current vertex to its end. The first ray of the path ends at t_max.
   void go_on(float t_max);
   // Samples a free flight up to the surface hit at `end`, or, if `end` is null, up to the distance `reach`.
-  // If the flight was sampled before the ray was traced (kFliesFirst), `flown` is this flight; it has no end.
+  // If the flight was sampled before the ray was traced (kFliesFirst), `flown` is this flight, whose length
+  // was not limited.
   Step fly(const SurfaceHit* end, float reach, const std::optional<Flight>& flown);
   Step fly_through(const Medium& medium, const SurfaceHit* end, float reach,
                    const std::optional<Flight>& flown);
@@ -162,7 +165,8 @@ class PathTracer {
   Flight flight_through(const Medium& medium, float t_max);
   Step collide(const Medium& medium, Segment segment, const typename Light<F>::Plan& plan,
                const Flight& flight);
-  // The medium if p is in its clear region, else null.
+  // Returns the medium of `in` if it is the only one and p is in its clear region (a part of the medium
+  // without surfaces: clear_region.h), else null.
   const Medium* clear_medium(const Within& in, const V3& p) const {
     if (!in.any() || in.several()) return nullptr;
     const Medium& m = world_.media[in.one()];
@@ -266,7 +270,7 @@ class PathTracer {
   bool is_leaving_second() const { return sharing_.part == SharingPath::Part::tail && depth_ == 2; }
   void keep_emitted(const C3& emitted, float pdf);
 
-  // The sum of densities_, with back() as `back`.
+  // Returns densities_.sum(back()). Calls back() only if the sum depends on it.
   template <class Back>
   float densities_sum(const Back& back) const {
     return densities_.sum(densities_.needs_back() ? back() : 0);
@@ -334,7 +338,7 @@ class PathTracer {
   int passed_ = 0;   // null boundaries and null transmissions so far
   int segment_ = 0;  // number of rays so far, including those after null crossings
   Within medium_;
-  bool looked_for_sky_ = false;   // true if the first vertex also sampled the constant environment
+  bool looked_for_sky_ = false;   // true if the first vertex sampled a second direction (look_for_sky)
   bool first_in_medium_ = false;  // with F.split: true if the first scattering was in a medium
   Vertex last_;
   SubpathDensities densities_;  // with F.connected: of the path up to the current vertex
@@ -459,9 +463,9 @@ std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay&
 }
 
 // A medium on the way contributes in proportion to the light that it scatters or absorbs: its albedo replaces
-// that of the surface behind, and it has no normal. The proportion is 1 - transmittance, which is exact in
-// homogeneous media. Sampled flights would make the guides noisy, and a denoiser keeps the noise of its
-// guides.
+// that of the surface behind, and it has no normal. The proportion is 1 - transmittance, and the
+// transmittance is exact in homogeneous media. If flights were sampled instead, the guides would be noisy,
+// and a denoiser keeps the noise of its guides.
 template <Features F, template <Features> class Light>
 DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
   constexpr int kGuideSegments = 16;
@@ -494,8 +498,8 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
     const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), hit.shading.to_local(-ray_.d), g.u(2),
                                        {g.u(0), g.u(1)});
     if (!s) break;
-    // Refraction scales radiance by eta^2. This factor is removed, since it is no property of the surface
-    // behind.
+    // Because refraction scales radiance, the weight has the factor 1 / eta^2. This factor is removed, since
+    // it is no property of the surface behind.
     beta_ *= s->weight * (s->transmitted ? s->eta * s->eta : 1.f);
     if (!s->delta) {
       guide.albedo += beta_;

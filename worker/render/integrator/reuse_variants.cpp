@@ -31,7 +31,7 @@ constexpr std::uint64_t kFewestPilotGroups = 4;
 // sample of each pixel.
 constexpr std::uint64_t kPixelsPerGroup = 1024;
 constexpr std::uint64_t kPilotSamples = 32;
-constexpr int kPilotDepth = 32;  // paths in a white and dense medium have thousands of segments
+constexpr int kPilotDepth = 32;  // segments; paths in a white and dense medium have thousands
 // Sharing pays if the noise (squared relative error) without it is more than this many times the noise with
 // it. A shared sample takes 1.4 to 2.4 times as long (docs/decisions/0036-path-reuse.md). The limit is low
 // because the few pixels of the pilot rarely show the rare bright paths that sharing helps most.
@@ -50,7 +50,7 @@ class Pilot {
   struct Noise {
     double shared = 0, alone = 0;
     bool usable = true;
-    // True if there is more than `factor` times as much noise without sharing.
+    // True if there is more than `factor` times as much noise without sharing as with it.
     bool gains(double factor) const { return alone > factor * shared; }
   };
   // Renders one group of the pixels of a square that is chosen at random, with shared paths and without.
@@ -146,7 +146,7 @@ void share_tails(const IntegratorSettings& settings, int threads, World& w) {
   if (w.rr_depth < 2) return;
   for (const SurfaceInfo& s : w.geometry.surfaces)
     // Rays from two sides may find different media behind an open boundary. A path may pass several surfaces
-    // that emit light, but a tail keeps only one.
+    // that emit light, but a tail keeps the light of only one.
     if ((s.transition && s.sheet) || ((s.null || s.null_transmission) && s.light != kNone)) return;
   const bool automatic = settings.path_reuse == 0;
   if (automatic && !sharing_pays(w, *sharing, threads)) return;

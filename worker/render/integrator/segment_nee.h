@@ -4,8 +4,9 @@
 //
 // There are two densities for points. (D) depth: a truncated exponential; in grids it uses the mean densities
 // of the macro cells (optical_depth.h) and is mixed with a uniform density. (A) angle: equi-angular about the
-// light. Each is used for points of its own. `heuristic` computes their MIS weights from the densities e_D
-// and e_A. (A) requires a light with a position and a finite segment; otherwise (D) is used alone.
+// light. Some points are sampled with (D), others with (A). Their MIS weights are computed from the densities
+// e_D and e_A by World::heuristic. (A) requires a light with a position and a finite segment; otherwise (D)
+// is used alone.
 //
 // Phase-function sampling that hits a light is a third strategy. With f(t) the density of flights (in grids
 // that of the macro cells' means) and p_l, p_s the solid-angle densities of light and phase sampling,
@@ -110,7 +111,8 @@ class SegmentNee {
   }
 
   // The mean over channels of density(sigma), where sigma is the channel's extinction. Each channel is
-  // weighted by its density of the path so far, relative to the hero's.
+  // weighted by the density of the path so far if that channel were the hero, relative to that of the actual
+  // hero.
   template <class Path, class Fn>
   static float over_channels(const Path& path, const Medium& medium, Fn density) {
     if constexpr (F.chromatic) {

@@ -72,7 +72,7 @@ struct SharingPath {
   FirstVertex first;
   SharedTail tail;
   C3 scale{1, 1, 1};   // the factor of light that counts for this pixel only
-  float survival = 1;  // factor of the path's weight in Russian roulette (survives)
+  float survival = 1;  // factor of the throughput that Russian roulette compares (size())
   // look_at() traces a shadow ray, which sets these two:
   C3 flight{1, 1, 1};  // the transmittance of its media times the probability of passing its surfaces
   int crossed = 0;     // number of surfaces that it passed

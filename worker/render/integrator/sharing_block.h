@@ -17,9 +17,10 @@
 
 namespace ls::render {
 
-// Sets `reuse` and Features::reuse of a world that is otherwise complete, if the densities of second vertices
-// are known in its scene, and if the settings request sharing or leave the decision to a pilot
-// (reuse_variants.cpp) that finds that sharing pays.
+// Makes pixels share the tails of their paths, by setting `reuse` and Features::reuse of a world that is
+// otherwise complete. This requires that the densities of second vertices are known in the scene. It is done
+// if the settings request it, or if they leave the decision to a pilot (reuse_variants.cpp) and the pilot
+// finds that sharing pays.
 void share_tails(const IntegratorSettings& settings, int threads, World& w);
 
 class SharingBlock {
@@ -42,7 +43,8 @@ class SharingBlock {
                                     column_ * kSide);
   }
   using Pixels = boost::container::static_vector<PixelAt, kMostTogether>;
-  // The pixels of the block in the order of the sample. They may be outside the image.
+  // Returns the pixels of the block in a random order, which depends on the sample. Pixels may be outside the
+  // image if it is a crop.
   Pixels in_order_of(std::uint64_t sample) const {
     Pixels order;
     for (int y = 0; y < height_; ++y)

@@ -1,6 +1,6 @@
 // The exponential density sigma e^(-sigma x) truncated to [0, length], written with expm1 and log1p so that
-// it is accurate from an optical depth sigma length of 1e-20, where it is uniform, to 1e6 (the textbook 1 -
-// exp is 0 in float32 for all depths below 6e-8).
+// it is accurate for optical depths sigma * length from 1e-20, where it is uniform, to 1e6. The textbook form
+// divides by 1 - exp(-sigma length), which is 0 in float32 for all depths below 6e-8.
 #pragma once
 
 #include <algorithm>
@@ -16,15 +16,15 @@ namespace ls::render {
 inline constexpr float kThinDepth = 1e-20f;
 
 // The density at x. Requires sigma >= 0, length > 0 (may be infinite) and x in [0, length]. Returns 0 if
-// sigma is 0 and length infinite, where no such density exists.
+// sigma is 0 and length infinite: then there is no density.
 inline float truncated_pdf(float sigma, float length, float x) {
   const float depth = sigma * length;
   if (!(depth > kThinDepth)) return 1 / length;
   return sigma * std::exp(-sigma * x) / -std::expm1(-depth);
 }
 
-// Samples x with that density from v, a uniform random number in (0, 1). The result is not finite if no such
-// density exists.
+// Samples x with the density truncated_pdf() from v, a uniform random number in (0, 1). The result is not
+// finite if no such density exists.
 inline float truncated_sample(float sigma, float length, double v) {
   const float depth = sigma * length;
   if (!(depth > kThinDepth)) return static_cast<float>(v) * length;

@@ -71,7 +71,7 @@ class VertexNee {
       return uses_equiangular(false) ? 1 + equiangular_ratio(pivot) : 1.f;
     }
     static float found_as_light() { return 1; }
-    // True if the light that was sampled for this vertex was chosen by Lights::choose_before_point().
+    // False: strategy (1) chooses its light for the vertex, not by Lights::choose_before_point().
     static bool light_chosen_first() { return false; }
   };
 

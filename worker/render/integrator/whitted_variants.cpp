@@ -5,7 +5,7 @@
 namespace ls::render {
 
 std::span<const Variant> whitted_variants() {
-  // Features::overlaps: where surfaces coincide, all of them are tested.
+  // Features::overlaps is for scenes with coincident surfaces: a ray that hits one of them tests all of them.
   static constexpr Variant kVariants[] = {
       variant<Features{.passing = true, .whitted = true}>("surfaces, whitted"),
       variant<Features{.overlaps = true, .passing = true, .whitted = true}>("coincident surfaces, whitted"),

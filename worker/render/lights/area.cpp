@@ -38,9 +38,10 @@ void AreaLight::set_emission(const AreaEmitter& e, float orientation, const Ligh
   if (uniform) value = world.textures.constant(radiance);
 }
 
-// The flux of a beam per unit radiance and area: 2 pi integral of share(c) c dc, where beam and cutoff are
-// cosines. With w = beam - cutoff and c = cutoff + w s between the two cosines, the integral is w
-// integral_0^1 s^p (cutoff + w s) ds + (1 - beam^2) / 2.
+// The flux of a beam per unit radiance and area is 2 pi times the integral of beam_share(c) c dc over the
+// cosine c to the normal. Let beam and cutoff be the cosines of the two angles, w = beam - cutoff and p the
+// falloff. With c = cutoff + w s between the two cosines, the integral is
+//   w integral_0^1 s^p (cutoff + w s) ds + (1 - beam^2) / 2.
 double AreaLight::beam_flux() const {
   if (!beam) return kPiD;
   const double cutoff = cos_cutoff, full = cos_beam, w = full - cutoff, p = falloff;

@@ -22,8 +22,8 @@ struct AreaLight : LightKind {
   bool beam = false;     // true if the radiance depends on the angle
   bool uniform = false;  // true if the light is neither textured nor a beam
   C3 value;              // the light's radiance if `uniform`
-  // For a beam. From cos_beam to cos_cutoff its radiance falls as a power of a term that is linear in the
-  // cosine
+  // For a beam: from cos_beam to cos_cutoff its radiance falls to 0 as the power `falloff` of a term that is
+  // linear in the cosine.
   float cos_cutoff = 0, cos_beam = 0, inv_transition = 0, falloff = 1;
   float sign = 1;   // orientation of the emitting side
   float reach = 1;  // the largest coordinate of the light's points, which bounds the rounding error
@@ -45,7 +45,8 @@ struct AreaLight : LightKind {
   // so that the shadow ray ends before the light.
   std::optional<LightSample> from_point(const LightWorld& world, const AreaPoint& y, const V3& x,
                                         float p) const;
-  // The density, per steradian at x, with which sample() finds the point `hit` in this direction.
+  // The density, per steradian at x, with which sample() finds the point `hit` in this direction, times p,
+  // the probability of choosing the light.
   float pdf(const LightWorld&, const SurfaceHit& hit, const V3& x, const V3& direction, float p) const {
     const V3 f = hit.p - x;
     const float cosine = std::abs(dot(direction, hit.ng));
@@ -55,7 +56,8 @@ struct AreaLight : LightKind {
   static V3 pivot_of(const LightWorld&, const SurfaceHit& hit) { return hit.p; }
 
  protected:
-  // Returns bounds with the box middle +- half and emission in all directions.
+  // Returns bounds whose box reaches from middle - half to middle + half, for a light with normals in all
+  // directions.
   LightBounds bounds_of(const LightWorld& world, const V3& middle, const V3& half) const;
   // Sets the members of the bounds that follow from the emission.
   void set_emission_bounds(const LightWorld& world, LightBounds& b) const;
@@ -128,8 +130,8 @@ struct MeshLight : SampledByPoint<MeshLight> {
   std::uint64_t extra_bytes() const { return cdf.size() * sizeof(double); }
 };
 
-// A sphere is sampled by directions from the shaded point, so the pivot, which is needed before, is the
-// centre.
+// A sphere is sampled by directions from the shaded point, so the pivot, which is needed before the shaded
+// point is known, is the centre.
 struct SphereLight : AreaLight {
   std::uint32_t primitive = 0;
 

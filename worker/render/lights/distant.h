@@ -117,8 +117,8 @@ struct SkyLight : LightKind {
 
 using DistantKinds = Kinds<DirectionalLight, SunLight, SkyLight>;
 
-// A disk of uniform radiance L and angular radius a gives a plane facing its centre the irradiance integral
-// of L cos = L 2 pi integral_0^a cos sin = L pi sin^2 a.
+// The irradiance that a disk of uniform radiance L and angular radius a gives a plane facing its centre is
+// the integral of L cos over the disk: 2 pi L integral_0^a cos t sin t dt = pi L sin^2 a.
 inline std::variant<DirectionalLight, SunLight> make_light(const DirectionalEmitter& e, const LightWorld&) {
   // The smallest sun [degrees]. Directions in float32 are accurate to 4e-6 degrees. A smaller disk becomes a
   // light of a single direction.

@@ -17,8 +17,10 @@
 //
 //   p(d) = words(j) words(i) 2^-64 / solid angle x l(x, t) / mean of l at the corners,
 //
-// with t = (z_j - z) / (z_j - z_j+1), which is exactly the distribution of the samples. As solid angle is
-// uniform in z, p is nearly proportional to the luminance of the map: t and v differ only next to the poles.
+// where words(j) and words(i) count the words that choose the row and the cell, l is the bilinear luminance,
+// and x and t = (z_j - z) / (z_j - z_j+1), both from 0 to 1, are the places in the cell by azimuth and by z.
+// This is exactly the distribution of the samples. As solid angle is uniform in z, p is nearly proportional
+// to the luminance of the map: t and v differ only next to the poles.
 //
 // equal_area, pbrt-v4's convention. A direction's place in the square image is that of equal_area.h, and its
 // radiance that of the texel there, unfiltered. A cell is a texel, its solid angle 4 pi / texels, and the

@@ -24,10 +24,10 @@ class LearnedRectangle {
 
   bool empty() const { return last_.empty(); }
   float density(V2 at) const;                              // 0 outside of the rectangle
-  double outside_share() const { return outside_share_; }  // as given, rounded to whole words
+  double outside_share() const { return outside_share_; }  // as given to finish(), rounded to 2^-32
 
-  // The place that `word`, 32 uniform random bits, chooses with the uniform numbers u; nullopt: none, which
-  // happens with the probability outside_share().
+  // Returns the place that `word` (32 uniform random bits) and the uniform numbers u choose. They choose no
+  // place (nullopt) with the probability outside_share().
   std::optional<V2> sample(std::uint32_t word, V2 u) const;
   // The same, with u.x taken from the position of `word` among those that choose its cell
   std::optional<V2> sample(std::uint32_t word, float v) const;

@@ -14,7 +14,7 @@
 // Sampling splits random words instead of real numbers. The root has all 32-bit words, or as many as the
 // caller gives it, and each child gets a whole number of its parent's words. So the probability of a light is
 // exactly the number of words that reach it over the number of all words. All arithmetic is plain float32 and
-// float64 without library functions other than square roots: the same on every machine.
+// float64 without library functions other than square roots, so the results are the same on every machine.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ struct LightBounds {
   V3 axis{0, 0, 1};       // axis of a cone that contains its emission directions (normals),
   float cos_spread = -1;  // cosine of the cone's half angle; -1: all directions
   float cos_reach = 0;    // cosine of the largest angle between a normal and the emitted light
-  double intensity = 0;   // intensity per steradian, in the brightest direction; positive and finite
+  double intensity = 0;   // luminous flux per steradian along a normal, by mean texels; positive and finite
 };
 
 class LightTree {

@@ -49,7 +49,7 @@ class SunMap {
   // that encloses the scene.
   SunMap(const V3& direction, float radius);
 
-  // Adds a point at which a path found the sun; a weight that is not finite is ignored
+  // Adds a point at which a path found the sun; a weight that is not positive and finite is ignored.
   void learn(const V3& p, float weight) { found_.learn(on_plane(p), weight); }
   void add(const SunMap& other) { found_.add(other.found_); }  // adds what `other`, of the same sun, learned
   void finish();  // call once, after all points: makes the map a density

@@ -24,7 +24,8 @@ void Lights::add_area(const Scene& scene, std::uint32_t shape, const SurfacePrim
   const auto finish = [&](auto& l) {
     const LightBounds box = l.bounds(world());
     l.reach = std::max(largest(box.low), largest(box.high));
-    // If a null surface coincides with the light's surface, shadow rays must end in front of both.
+    // If the light's surface is null, other surfaces may coincide with it. Shadow rays must then end in front
+    // of all of them.
     if (g.surfaces[shape].null) l.reach = std::max(l.reach, g.surfaces[shape].coincident_reach);
     add(std::move(l));
   };

@@ -90,11 +90,11 @@ class Lights {
   float pdf(const SurfaceHit& hit, const V3& x, const V3& direction, const LightPlace& place = {},
             bool before_point = false) const;
   Pivot pivot(const SurfaceHit& hit) const;
-  // Environment radiance for a path that leaves the scene from x in this direction (a unit vector), weighted
-  // against sampling the environment as a light at x, chosen by `place`. `pdf` is the density, per steradian,
-  // with which the path sampled the direction. Infinity gives the full radiance, for directions that were not
-  // sampled. Without portals a constant environment is never sampled as a light, since it is smooth and paths
-  // find it when they leave.
+  // Returns the radiance of the environment for a path that leaves the scene from x in this direction (a unit
+  // vector), weighted against next-event estimation at x, which chooses a light by `place`. `pdf` is the
+  // density, per steradian, with which the path sampled the direction. Infinity gives the full radiance, for
+  // directions that were not sampled. Without portals a constant environment is never sampled as a light,
+  // since it is smooth and paths find it when they leave.
   C3 environment(const V3& x, const V3& direction, float pdf, const LightPlace& place) const {
     const C3 beside = suns_.empty() ? environment_ : environment_ + suns(direction, pdf, place);
     if (!sky_.sampled()) return beside;
@@ -103,7 +103,8 @@ class Lights {
     const float as_light = light.pdf * probability_at(sky_index_, place);
     return beside + (as_light > 0 ? light.radiance * (1 / (1 + as_light / pdf)) : light.radiance);
   }
-  // The environment of constant radiance, as far as it is not sampled as a light
+  // The radiance of the constant environment; black while portals are set, since it is then sampled as a
+  // light.
   const C3& constant_environment() const { return environment_; }
   // The environment radiance, split by whether next-event estimation samples it. Requires
   // single_environment_sample().

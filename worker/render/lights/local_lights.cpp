@@ -16,7 +16,8 @@ constexpr std::ptrdiff_t kVisitsOfCell = 32;
 constexpr double kVisitsOfParent = 16;
 constexpr std::size_t kSides = 7, kInMedia = 6;
 
-// The side to which a normal faces: its longest component, and the sign of that. Points in media have none.
+// The class of a point by the side to which its normal faces: the axis of the normal's longest component, and
+// the sign of that. Points in media, which have no normal, are a class of their own.
 std::size_t side_of(const V3& n) {
   if (n == V3(0)) return kInMedia;
   const V3 size(std::abs(n.x), std::abs(n.y), std::abs(n.z));
@@ -87,14 +88,15 @@ struct LocalLights::Builder {
     for (const Index i : some) coordinates.push_back(visits.places[i].p[axis]);
     const auto middle = coordinates.begin() + std::ssize(coordinates) / 2;
     std::ranges::nth_element(coordinates, middle);
-    // Points on the plane are above it. If half of the points are at the low end, the rest is above.
+    // Points on the plane count as above it. If at least half of the points have the lowest coordinate, the
+    // plane is at the next higher one, so that all other points are above it.
     float plane = *middle;
     if (!(plane > low[axis])) {
       plane = high[axis];
       for (const float x : coordinates)
         if (x > low[axis]) plane = std::min(plane, x);
     }
-    // Stable, since means() depends on the order in the last bits
+    // Stable, since the last bits of means() depend on the order.
     const auto above = std::ranges::stable_partition(some, [&](Index i) {
                          return visits.places[i].p[axis] < plane;
                        }).begin();

@@ -29,7 +29,8 @@ struct LightVisits {
   std::vector<Place> places;
   std::vector<float> values;  // for each place, the share of each light in the arriving light
 
-  // Adds a place unless it is dark, or a number is not finite. `found`: the light of each; not negative.
+  // Adds a place, unless no light reaches it or a number is not finite. `found` is the light that arrives
+  // from each light source; no value is negative.
   void add(const V3& p, const V3& n, std::span<const float> found);
   void add(const LightVisits& more);
 };

@@ -12,20 +12,21 @@ namespace {
 
 // A face of the box gets a portal if more than this share of the sky's light leaves through it.
 constexpr double kLeastLight = .02;
-// A plane must have more than this share of its face's light pass through it. Light that was found between
-// the plane and the face does not.
+// More than this share of the light that leaves through a face must pass through the plane that is chosen for
+// the face. Rays that begin between the plane and the face do not pass through the plane.
 constexpr double kLeastThrough = .9;
 // The share of the rays' origins that lie beyond each face of the box
 constexpr double kOutliers = .01;
-// The planes that are tried for a face: from kBeyond of the box's side outside of it to the middle of the box
+// For each face kPlanes planes are tried, from kBeyond times the box's side outside of the face to the middle
+// of the box.
 constexpr int kPlanes = 40;
 constexpr float kBeyond = .1f;
 // A plane is divided into kCells x kCells cells to measure how concentrated the rays are on it. The cells
 // cover twice the face's width and height; the places of rays farther out are not learned.
 constexpr int kCells = 128;
 constexpr std::size_t kSide = 16;  // cells across and down a portal's rectangle
-// The margin of a portal's rectangle, as shares of the box's size and of its largest coordinate: the latter
-// is above the rounding of places
+// The margin of a portal's rectangle is the sum of these shares of the box's size and of its largest
+// coordinate. The second is larger than the rounding errors of places.
 constexpr float kLeastMargin = 1e-4f;
 constexpr float kRounding = 1e-5f;
 

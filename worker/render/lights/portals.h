@@ -35,7 +35,8 @@ class Portals {
   bool any() const { return !portals_.empty(); }
   // True if there is a portal in front of p: only then are directions sampled there.
   bool any_in_front_of(const V3& p) const { return weight_in_front_of(p) > 0; }
-  // Samples a direction at p by 64 uniform random bits. nullopt only if none is representable.
+  // Samples a direction at p by 64 uniform random bits. Returns nullopt if no portal is in front of p, or if
+  // rounding leaves no direction that meets the portal's plane.
   std::optional<V3> sample(const V3& p, std::uint32_t x, std::uint32_t y) const;
   // The density of sample() at p for the direction d, per steradian
   float pdf(const V3& p, const V3& d) const;

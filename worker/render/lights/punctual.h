@@ -129,7 +129,8 @@ struct GoniometricLight : Punctual<GoniometricLight> {
   V3 axis_u, axis_v, axis;
   TextureIndex image;
 
-  // Equal areas of the image are equal solid angles.
+  // Equal areas of the image are equal solid angles, so the mean of its texels is the mean over all
+  // directions.
   C3 mean_intensity(const LightWorld& world) const { return intensity * world.textures.mean(image); }
 
   bool dark(const LightWorld& world) const { return is_black(mean_intensity(world)); }

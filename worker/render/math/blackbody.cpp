@@ -10,8 +10,9 @@ namespace ls::render {
 namespace {
 
 // The nodes of the table are evenly spaced in log T, where T is the temperature. The second derivative, by
-// log T, of the logarithm of black-body radiation is at most c2 / (lambda T) = 200 (360 nm, 200 K), so linear
-// interpolation is off by 200 step^2 / 8 = 1e-4 and, from 500 K, by less than 4e-5.
+// log T, of the logarithm of black-body radiation is at most c2 / (lambda T), with c2 the second radiation
+// constant: 200 at 360 nm and 200 K. So linear interpolation between nodes that are `step` apart is off by
+// 200 step^2 / 8 = 1e-4 and, from 500 K, by less than 4e-5.
 constexpr int kNodes = 4096;
 constexpr double kHottest = 1e6;
 

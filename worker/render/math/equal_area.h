@@ -2,11 +2,12 @@
 // (Hemi)Sphere using SIMD"), turned as in pbrt-v4: the square's centre is +z, its corners are -z, the middles
 // of its right and its lower edge (1, 1/2) and (1/2, 1) are +x and +y.
 //
-// Derivation. In s = 2 p - 1 the hemisphere z > 0 is the diamond |s.x| + |s.y| < 1. In a quadrant of it let r
-// = |s.x| + |s.y| and t = |s.y| / r: the area element ds.x ds.y is r dr dt. With the azimuth phi = t pi / 2
-// and z = 1 - r^2 the solid angle dz dphi is 2 r dr times pi / 2 dt. So the solid angle is pi times the area
-// everywhere; the sphere has 4 pi and the square in s has 4. The hemisphere below is mirrored outwards across
-// the diamond's edges: (a, b) becomes (1 - b, 1 - a).
+// Derivation. For a place p in the square let s = 2 p - 1. In s, the hemisphere z > 0 is the diamond |s.x| +
+// |s.y| < 1. In a quadrant of it let r = |s.x| + |s.y| and t = |s.y| / r: the area element ds.x ds.y is r dr
+// dt. With the azimuth phi = t pi / 2 and z = 1 - r^2 the solid angle dz dphi is 2 r dr times pi / 2 dt. So
+// the solid angle is pi times the area everywhere; the sphere has 4 pi and the square in s has 4. The
+// hemisphere z < 0 is mirrored outwards across the diamond's edges: with a = |s.x| and b = |s.y|, the place
+// (a, b) becomes (1 - b, 1 - a).
 #pragma once
 
 #include <algorithm>

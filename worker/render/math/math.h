@@ -75,7 +75,7 @@ struct Frame {
   V3 to_world(const V3& l) const { return s * l.x + t * l.y + n * l.z; }
 };
 
-// Sine and cosine for |x| <= pi / 4 by Taylor series. The first omitted terms are below 2e-9 and 1e-10, so
+// Sine and cosine for |x| <= pi / 4 by Taylor series. The first omitted terms are below 2e-9 and 2e-10, so
 // both are accurate to float32 rounding (about one ulp), and identical on every machine.
 struct SinCos {
   float sin, cos;

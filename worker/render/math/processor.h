@@ -12,7 +12,7 @@
 namespace ls::render {
 
 // Treats denormals as zero in this thread while the object lives, as Embree requires where rays are traced.
-// The destructor restores the previous mode, since folding (adding partials to the film) needs denormals.
+// The destructor restores the previous mode, since adding pixel sums to the film needs denormals.
 class FlushDenormals {
  public:
   FlushDenormals() : saved_(read()) { write(saved_ | kFlush); }

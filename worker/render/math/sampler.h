@@ -68,7 +68,8 @@ class SampleStream {
                         kMixedSlots.value[static_cast<std::size_t>(vertex)][static_cast<int>(purpose)]))};
     return hashed(slot(vertex, purpose));
   }
-  // Returns a stream of unbounded length, for a tracker, whose number of draws is random.
+  // Returns a stream of unbounded length, for a tracker (an algorithm that steps through a medium from
+  // collision to collision), which draws a random number of values.
   RandomStream stream(int vertex, Purpose purpose) const {
     return RandomStream(combine(sample_, slot(vertex, purpose)));
   }

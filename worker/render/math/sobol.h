@@ -32,9 +32,9 @@ constexpr U scramble_reversed(U x, U seed) {
 
 namespace detail {
 
-// Direction numbers v[d][bit] for dimensions 1..3 (dimension 0 is the bit reversal of the index), from the
-// primitive polynomials and initial m of Joe and Kuo's table: (s, a, m) = (1, 0, {1}), (2, 1, {1, 3}), (3, 1,
-// {1, 3, 1}).
+// Direction numbers v[d][bit] for dimensions 2 to 4, which are d = 0 to 2 (dimension 1 is the bit reversal of
+// the index). They follow from the degrees s, the primitive polynomials a and the initial numbers m of Joe
+// and Kuo's table: (s, a, m) = (1, 0, {1}), (2, 1, {1, 3}), (3, 1, {1, 3, 1}).
 constexpr std::array<std::array<std::uint32_t, 32>, 3> direction_numbers() {
   constexpr std::uint32_t kInitial[3][3] = {{1, 0, 0}, {1, 3, 0}, {1, 3, 1}};
   constexpr int kDegree[3] = {1, 2, 3};

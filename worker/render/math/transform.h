@@ -38,8 +38,8 @@ struct Affine {
       if (!std::isfinite(v)) return false;
     return std::isfinite(b.x) && std::isfinite(b.y) && std::isfinite(b.z);
   }
-  // True if both the map and its inverse are finite. A subnormal determinant has no finite inverse; an
-  // overflowing one no finite map.
+  // True if both the map and its inverse are finite. False also if the determinant is subnormal or overflows,
+  // since the inverse cannot be computed then.
   bool invertible() const { return finite() && std::isnormal(determinant()) && inverse().finite(); }
   // Returns the inverse map. This map must be invertible.
   Affine inverse() const {

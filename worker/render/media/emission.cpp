@@ -17,8 +17,8 @@ constexpr double kNoBoundary = std::numeric_limits<double>::infinity();
 // grid.
 constexpr double kOpticalDepthVoxels = 1;
 
-// Walks along a ray through the cells of a grid. Positions are distances from the ray's origin: inside a
-// cell, in front of the grid, or past it.
+// Walks along a ray through the cells of a grid. The functions take positions as distances from the ray's
+// origin. A position may be in the current cell, in front of it, or past the grid.
 class Steps {
  public:
   Steps(const Grid& grid, const V3& o, const V3& d, float t_max) : walk_(grid, o, d, 0, t_max) {
@@ -32,8 +32,8 @@ class Steps {
   }
   bool past() const { return !more_; }
   bool inside(double at) const { return more_ && begin() <= at; }
-  // The distance from the ray's origin at which the next cell begins if `at` lies before it, or the current
-  // one ends.
+  // Returns the distance from the ray's origin at which the walk's cell begins, if `at` lies in front of it,
+  // or else ends.
   double boundary(double at) const { return !more_ ? kNoBoundary : begin() <= at ? end() : begin(); }
   double longest() const { return longest_; }
   const MacroCell& cell() const { return walk_.cell(); }
@@ -101,8 +101,8 @@ class EmissionWalk {
                                                         : hi > 0;
   }
 
-  // Returns the end of the interval that starts at `at`. `sampled` is the density grid's cell if the interval
-  // is to get an emission sample, else null.
+  // Returns the end of the interval that run() integrates from `at` on. `sampled` is the density grid's cell
+  // if the interval is to get an emission sample, else null.
   double end_of_constant_part(double at, const MacroCell* sampled) const {
     double to = std::min(end_, density_.boundary(at));
     if (emitter_) to = std::min(to, emitter_->boundary(at));
@@ -144,8 +144,8 @@ class EmissionWalk {
     return a;
   }
 
-  // Adds the emission e, attenuated up to the interval and times `share`, to channel c, or to all channels if
-  // they have the same extinction.
+  // Adds the emission e, times `share` and the transmittance up to the interval, to channel c, or to all
+  // channels if they have the same extinction.
   void add(int c, const V3d& e, double share) {
     if (channels_ == 1) {
       sum_ = sum_ + e * (through_[0] * share);
@@ -154,8 +154,8 @@ class EmissionWalk {
     }
   }
 
-  // Adds the emission of an interval [a, b] without density. There is only emission per length, whose
-  // integral over the grid is exact.
+  // Adds the emission of an interval [a, b] without extinction. There the medium emits only per length, and
+  // the integral of this emission over the grid is exact.
   void add_clear(double a, double b) {
     double field = b - a;
     for (int c = 0; c < 3; ++c) {
@@ -263,7 +263,8 @@ C3 emission_of_length(const Medium& m, float t_max) {
 
 C3 emission_of_grid(const Medium& m, const V3& o, const V3& d, float t_max, RandomStream stream) {
   if (m.by_channel[0]) {
-    // The emission of each channel is computed as if all channels had its density.
+    // One walk per channel: it computes the emission as if all channels had the density of this one, and
+    // only the result of this channel is used.
     C3 light;
     for (int c = 0; c < 3; ++c) {
       Medium one = m;

@@ -41,8 +41,9 @@ Grid::Grid(std::array<int, 3> size, std::vector<float> values, const Affine& wor
       exact_(world_to_index),
       filter_(filter),
       wrap_(wrap) {
-  // Within half a voxel of its ends a mirrored grid equals a clamped one; without interpolation, wrapping has
-  // no effect inside the domain. So only the case below needs the extra nodes.
+  // Within half a voxel of its ends a mirrored grid equals a clamped one; without interpolation, wrapping
+  // has no effect inside the domain. So only repeating with interpolation needs the extra nodes of
+  // repeat_ends().
   if (wrap == Wrap::repeat && filter == VolumeFilter::trilinear) repeat_ends();
   for (int k = 0; k < 3; ++k) {
     last_[k] = std::max(0, size_[k] - 2);
@@ -222,8 +223,8 @@ double Grid::exact_integral(const V3d& o, const V3d& d, double t0, double t1) co
   const V3d oi = exact_.point(o), di = exact_.vector(d);
   const Interval part = clip(V3d(lo_), V3d(hi_), oi, di, t0, t1);
   if (!(part.t0 < part.t1)) return 0;
-  // `cuts` contains all crossings of the planes that separate the field's polynomial pieces, in order;
-  // between two of them the field is one polynomial.
+  // `cuts` contains all crossings of the planes that separate the field's polynomial pieces, in order.
+  // Between two successive cuts the field is one polynomial.
   const double offset = filter_ == VolumeFilter::trilinear ? 0 : .5;
   std::vector<double> cuts{part.t0, part.t1};
   for (int k = 0; k < 3; ++k) {

@@ -154,8 +154,8 @@ class Grid {
 };
 
 // Traverses the macro cells along a ray: for (CellWalk w(grid, o, d, t0, t1); w.next();) use w.cell(),
-// [w.begin(), w.end()]. Distances and positions are relative to the point of entry, found in double: a
-// float32 distance from a far origin cannot resolve the voxels of a small grid
+// [w.begin(), w.end()]. Distances and positions are relative to the point of entry into the grid, which is
+// computed in double: a float32 distance from a far origin cannot resolve the voxels of a small grid
 // (docs/measurements/stability.md N11). Boundaries are computed from integer cell indices, never by
 // accumulating steps, and intervals never run backwards. A non-finite ray traverses nothing.
 class CellWalk {
@@ -210,8 +210,8 @@ inline CellWalk::CellWalk(const Grid& grid, const V3& o, const V3& d, float t0, 
   const V3d p = grid.exact_.point(V3d(o)), v = grid.exact_.vector(V3d(d));
   if (!std::isfinite(p.x + p.y + p.z + v.x + v.y + v.z)) return;
   // If a component of the direction is so small that the ray cannot cross a cell along that axis, the ray
-  // counts as parallel to that axis's faces of the domain. If it also starts outside of them, it misses the
-  // grid.
+  // counts as parallel to the two faces of the domain that are perpendicular to the axis. If it starts
+  // beyond one of these, it misses the grid.
   constexpr double kParallel = 1e-20;
   double from = t0, to = t1, inverse[3];
   for (int k = 0; k < 3; ++k) {

@@ -38,8 +38,8 @@ std::vector<float> channel(std::span<const float> interleaved, std::size_t c, st
   return values;
 }
 
-// Loads a .vol file or a raw grid. Its values are at nodes, the outermost of which are on the faces of its
-// own box.
+// Loads a .vol file or a raw grid. The values of a raw grid are at nodes, the outermost of which are on the
+// faces of the file's box.
 Result<LoadedVolume> vol_file(const GridVolume& v, const AssetLoader& files, V3d center, double scale,
                               double to_sigma) {
   auto path = files.path(v.file);

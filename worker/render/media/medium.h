@@ -41,8 +41,9 @@ struct Medium {
   C3 sigma_t{0, 0, 0}, sigma_s{0, 0, 0};
   const Grid* density = nullptr;
   // Set if the density differs between channels: one density grid per channel, all of the same shape and with
-  // macro cells of the same size. Then `density` is the mean of the three, which is used to place points, and
-  // sigma_t is the same for all channels (spectral_grids.h).
+  // macro cells of the same size. Then `density` is the mean of the three. It determines where points on a
+  // ray are sampled for next-event estimation (optical_depth.h); free flights and transmittance use the three
+  // grids. sigma_t is the same for all channels (spectral_grids.h).
   std::array<const Grid*, 3> by_channel{};
   std::array<const Grid*, 3> albedo{};  // null: the albedo is constant and already in sigma_s
   // For a grid with constant albedo, this is 1 - albedo, the share of extinction that is absorption. It is
@@ -140,8 +141,8 @@ Flight fly_homogeneous(const Medium& m, int hero, float depth, float t_max) {
 // tracker gets stuck in it however dense it is (1e9 collisions and more: docs/measurements/stability.md N10).
 inline constexpr float kExactDepth = 16;
 
-// Samples a free flight through a grid. `depth` is the optical depth up to the first tentative collision; the
-// random numbers of the others come from `stream`.
+// Samples a free flight through a grid. `depth` is the optical depth up to the first tentative collision;
+// the random numbers of later collisions come from `stream`.
 template <bool kChromatic, VolumeFilter kFilter>
 Flight fly_grid(const Medium& m, int hero, float depth, const V3& o, const V3& d, float t_max,
                 RandomStream stream, MediumCounters& counters) {
@@ -223,8 +224,8 @@ C3 transmittance_grid(const Medium& m, const V3& o, const V3& d, float t0, float
   const float s_max = kChromatic ? max_component(m.sigma_t) : m.sigma_t.x;
   if (!(s_max > 0)) return {1, 1, 1};
   constexpr int kChannels = kChromatic ? 3 : 1;
-  // The estimate is factor * exp(-sigma control). The control part is multiplied into the factors once it is
-  // deep, so that both parts stay within float32.
+  // The estimate is factor * exp(-sigma control). Once the control's optical depth exceeds `foldable`, its
+  // exponential is multiplied into the factors, so that both stay within float32.
   float control = 0, foldable = kRouletteDepth, factor[kChannels];
   for (float& x : factor) x = 1;
   // The optical depth of the residual up to the next collision; it carries over from cell to cell.
@@ -295,8 +296,8 @@ template <bool kChromatic>
 
 }  // namespace detail
 
-// Samples the distance to the next scattering along o + t d (d of unit length), if there is one before t_max.
-// The random word `bits` determines the first tentative collision, `stream` the others.
+// Samples the distance to the next scattering along o + t d (d of unit length), if there is one before
+// t_max. The random word `bits` determines the first tentative collision, and `stream` the later ones.
 template <Features F>
 Flight free_flight(const Medium& m, int hero, std::uint32_t bits, const V3& o, const V3& d, float t_max,
                    RandomStream stream, MediumCounters& counters) {

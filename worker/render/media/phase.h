@@ -1,6 +1,6 @@
 // The Henyey-Greenstein phase function. This form has no division by g and does not compute 1 - cos from a
-// rounded cosine, so it is exact for g = 0 and stable up to |g| = 0.99999. (Derivation: with x = 1 - cos, y =
-// 1 + cos the sampled quantities are rational in xi.)
+// rounded cosine, so it is exact for g = 0 and stable up to |g| = 0.99999. (Derivation: 1 - cos and 1 + cos
+// of the sampled angle are rational functions of the random number xi.)
 #pragma once
 
 #include "worker/render/base/work_counters.h"

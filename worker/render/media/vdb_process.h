@@ -1,8 +1,8 @@
-// Reads grids of .vdb and .nvdb files in a separate program, lightshaft-vdb, installed beside the executable.
-// OpenVDB trusts its input: a damaged or malicious file may make it crash, loop or write out of bounds. In a
-// separate process without secrets this leads only to an error message. The memory of the process and its
-// reply count towards the caller's limit. The separate process also keeps OpenVDB from being mapped into the
-// renderer (30 ms, 29 MB).
+// Reads grids of .vdb and .nvdb files in a separate program, lightshaft-vdb, installed beside the
+// executable. OpenVDB trusts its input: a damaged or malicious file may make it crash, loop or write out of
+// bounds. In a separate process without secrets this leads only to an error message. The memory of the
+// process and its reply count towards the caller's limit. The separate process also keeps OpenVDB from being
+// mapped into the renderer, which would take 30 ms and 29 MB.
 #pragma once
 
 #include <cstdint>

@@ -33,7 +33,7 @@ void add(Sha256& h, const std::vector<T>& values) {
 }
 
 // Adds values of the math library: those of every function that the renderer calls, at 4096 arguments each.
-// Square roots and divisions are exact on every machine.
+// Square roots and divisions are left out, because IEEE 754 fixes their results on every machine.
 void add_math(Sha256& h) {
   std::vector<float> v;
   RandomStream r(1);
@@ -74,7 +74,7 @@ void add_reciprocals(Sha256& h) {
   add(h, v);
 }
 
-// Adds the index of the triangle that each of 100,000 rays hits on a fixed bumpy mesh.
+// Adds the triangle that each of 100,000 rays hits on a fixed bumpy mesh, and the distance of the hit.
 void add_hits(Sha256& h) {
   constexpr int kSide = 48;
   Geometry g;
@@ -143,7 +143,7 @@ void add_sphere_hits(Sha256& h) {
   add(h, v);
 }
 
-// Adds one of each kind that the list lacks, with its default parameters.
+// Adds to the list one element, with default parameters, of each kind that it lacks.
 template <class... Kind>
 void add_missing_kinds(std::vector<std::variant<Kind...>>& list) {
   const auto add = [&](auto kind) {

@@ -1,6 +1,6 @@
-// Textures by index: constants, bitmaps, checkerboards, mesh attributes. Lookups follow Mitsuba 3: (u, v) =
-// (0, 0) is the UPPER left corner of the image (OBJ loading flips v), to_uv is applied first, sRGB is decoded
-// before filtering. Safe for any uv, including NaN.
+// Textures by index: constants, bitmaps, checkerboards, mesh attributes, and functions of other textures.
+// Lookups follow Mitsuba 3: (u, v) = (0, 0) is the UPPER left corner of the image (OBJ loading flips v),
+// to_uv is applied first, sRGB is decoded before filtering. Safe for any uv, including NaN.
 #pragma once
 
 #include <cstdint>
@@ -31,9 +31,10 @@ class TextureTable {
     const SurfaceAttributes* attributes = nullptr;
     std::span<const std::uint32_t> corners;  // three vertex indices per triangle
   };
-  // Builds the table of the scene's textures; `load` is called once for each file. Fails with
-  // invalid_argument if an index is out of range, if textures refer to each other in a cycle or deeper than
-  // kMaxReferenceDepth, or if a texel is NaN or infinite (the message names the file and the texel).
+  // Builds the table of the scene's textures; `load` is called once for each file and way in which textures
+  // read it (raw, alpha, channel). Fails with invalid_argument if an index is out of range, if textures
+  // refer to each other in a cycle or deeper than kMaxReferenceDepth, or if a texel is NaN or infinite (the
+  // message names the file and the texel).
   static Result<TextureTable> build(const Scene& scene, const ImageLoader& load) {
     return build(scene, load, MeshData{});
   }

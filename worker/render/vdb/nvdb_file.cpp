@@ -19,7 +19,7 @@ constexpr std::uint32_t kAbi = 32;
 // The largest number of bytes to which one compressed byte can expand: an upper bound for zlib (at most 1032)
 // and Blosc's codecs.
 constexpr std::uint64_t kMaxExpansion = 1100;
-// Blosc compresses a buffer in pieces of kBloscPiece bytes.
+// NanoVDB compresses a buffer by Blosc in pieces of kBloscPiece bytes.
 constexpr std::uint64_t kBloscPiece = std::uint64_t{1} << 30;
 
 enum Codec : std::uint16_t { kPlain, kZip, kBlosc };

@@ -11,9 +11,9 @@ namespace {
 // The number of points on a camera segment if points pay
 // (docs/decisions/0027-light-along-camera-segments.md).
 constexpr int kPointsThatPay = 2;
-// Points pay if the mean probability that a camera ray collides with a medium is below this. In denser media
-// the flights that end on the segment find the light often enough, unless connections to light vertices
-// (light_vertices.h) have removed most of the other noise.
+// Points pay if the mean probability that a camera ray collides with a medium, over the rays that meet one
+// (CameraCollisions::met), is below this. In denser media the flights that end on the segment find the light
+// often enough, unless connections to light vertices (light_vertices.h) have removed most of the other noise.
 constexpr float kThin = .35f;
 
 int points_for(const IntegratorSettings& settings, const World& w) {

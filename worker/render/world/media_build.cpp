@@ -19,12 +19,12 @@ Rgb times(const Rgb& a, const Rgb& b) { return {a[0] * b[0], a[1] * b[1], a[2] *
 // The largest extinction [1/world unit]. The products of larger values with a density and a length would
 // leave the range of float32.
 constexpr double kMaxExtinction = 1e30;
-// The largest emission. The integral of larger values along a ray would exceed the largest radiance of a
+// The largest emission. The integral of larger values along a ray could exceed the largest radiance of a
 // sample.
 constexpr double kMaxEmission = 1e25;
 
-// Returns the phase function i of the scene. Rejects a g that rounds to 1 in float32, like 0.99999999,
-// because for g = 1 the phase function does not exist.
+// Returns the phase function i of the scene. Rejects a g that rounds to 1 or -1 in float32, such as
+// 0.99999999, because the phase function does not exist for these.
 Result<HenyeyGreenstein> phase_of(const Scene& scene, PhaseIndex i) {
   const auto* hg = std::get_if<HgPhase>(&scene.phases.at(i.value));
   if (!hg) return HenyeyGreenstein{0};
@@ -51,7 +51,9 @@ Result<void> check_extinction(const Rgb& sigma, double largest, double world_sca
   return {};
 }
 
-// Sets the emission of m to `factor` times values that are at most `largest`.
+// Sets the emission of m to `factor`, and its kind (none if it emits nothing). When rendering, the emission
+// is multiplied by the value of a grid or by a black body's radiance; `largest` is the largest such value, 1
+// if there is none. Error: the product exceeds kMaxEmission.
 Result<void> shine(Medium& m, EmissionKind emission_kind, const Rgb& factor, double largest) {
   for (const double e : factor)
     if (!(e * largest <= kMaxEmission))
@@ -80,11 +82,12 @@ Result<Medium> homogeneous(const Scene& scene, const HomogeneousMedium& m, doubl
   return out;
 }
 
-// As the density_to_sigma of an emission grid, this value forces small macro cells, so that walks can skip
-// the cells without emission.
+// Emission grids are loaded with this value as their extinction per unit of value (density_to_sigma of Grid).
+// It makes their macro cells small, so that walks along rays can skip the cells without emission.
 constexpr double kFine = 1e30;
-// More than any component of a black body of peak 1: its XYZ are at most 1 each, and the positive elements of
-// a row of the matrix from XYZ to linear sRGB add up to less than this.
+// An upper bound of the linear sRGB components of a black body whose spectrum has the peak 1: its XYZ are at
+// most 1 each, and the positive elements of a row of the matrix from XYZ to linear sRGB add up to less than
+// this.
 constexpr double kBrightestOfPeakOne = 3.25;
 
 struct HeteroBuilder {
@@ -92,7 +95,7 @@ struct HeteroBuilder {
   const HeterogeneousMedium& m;
   const AssetLoader& files;
   World& w;
-  double per_unit;  // factor of the density without the tint, per world unit
+  double per_unit;  // extinction per unit of density, without the tint [1/world unit]
   Medium out;
   Rgb sigma{};  // out.sigma_t before rounding to float32
 

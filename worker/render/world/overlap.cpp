@@ -13,8 +13,8 @@ namespace ls::render {
 namespace {
 
 // The largest number of pairs of boxes to examine. Boxes are sorted by their start along x. Pairs that
-// overlap along x are examined until one touches, which takes n log n time unless many boxes overlap along x.
-// If there are more than kMaxBoxPairs such pairs, some are assumed to touch.
+// overlap along x are examined until a pair is found that touches, which takes n log n time unless many boxes
+// overlap along x. If there are more than kMaxBoxPairs such pairs, some are assumed to touch.
 constexpr std::size_t kMaxBoxPairs = std::size_t{1} << 24;
 
 bool any_touch(std::vector<SurfaceBox> boxes) {

@@ -13,8 +13,8 @@ bool media_may_overlap(const World& w);
 
 // Returns the media that contain the camera. If the scene gives the sensor no medium, there are none, as in
 // Mitsuba. Otherwise they are the sensor's `medium` and the interiors of the closed boundaries around the
-// camera. A boundary encloses the camera if at least two of three rays find this. The camera's position is
-// the origin of its central ray.
+// camera. A boundary counts as enclosing the camera if at least two of three rays leave it without having
+// entered it. The camera's position is the origin of its central ray.
 MediaState camera_media(const World& w);
 
 }  // namespace ls::render

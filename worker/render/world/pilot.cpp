@@ -14,8 +14,8 @@ namespace ls::render {
 namespace {
 
 constexpr std::uint64_t kPilotSeed = 0x5eed0f5ad0;
-// Number of camera paths: at most kPilotPaths, and one for each kPixelsPerPath pixels of the full frame. A
-// frame that would get fewer than kFewestPaths gets none.
+// The number of camera paths of pilot_radiance(): one for every kPixelsPerPath pixels of the full frame, but
+// at most kPilotPaths. A frame that would get fewer than kFewestPaths gets none.
 constexpr std::uint64_t kPilotPaths = 1 << 10;
 constexpr std::uint64_t kPixelsPerPath = 16;
 constexpr std::uint64_t kFewestPaths = 16;
@@ -30,7 +30,7 @@ std::uint64_t pixels_of(const World& w) {
   return static_cast<std::uint64_t>(w.frame.width) * static_cast<std::uint64_t>(w.frame.height);
 }
 
-// A pixel of the full frame, in the coordinates of the image
+// A random pixel of the full frame, in the coordinates of the image
 std::pair<int, int> somewhere(const World& w, RandomStream& places) {
   const auto among = [&](int n) { return static_cast<int>(places.next() % static_cast<std::uint64_t>(n)); };
   const int x = among(w.frame.width) - w.origin_x;

@@ -11,7 +11,8 @@
 
 namespace ls::render {
 
-// Sets the seed and the maximum path length of a pilot in the world; the destructor restores the world's own.
+// Sets the seed of a pilot in the world, and limits the length of paths to `max_depth` segments. The
+// destructor restores the world's own values.
 class PilotSettings {
  public:
   PilotSettings(World& w, std::uint64_t seed, int max_depth);
@@ -30,8 +31,8 @@ class PilotSettings {
 // scene.
 bool pilot_pays(const World& w);
 
-// The mean radiance, over the channels, of camera paths at random places of the full frame that end after at
-// most `max_depth` segments. nullopt for frames that are not worth the paths.
+// Returns the mean radiance, over the channels, of camera paths of at most `max_depth` segments at random
+// places of the full frame. Returns nullopt if the frame is too small to be worth these paths.
 std::optional<double> pilot_radiance(World& w, int max_depth);
 
 // The mean and the variance of the samples of one pixel

@@ -12,8 +12,8 @@
 
 namespace ls::render {
 
-// The smallest probability with which a shadow ray is traced. Roulette adds at most 1 / kLeastTraced - 1
-// times the second moment of the light that is found, in pixels of any brightness.
+// The smallest probability with which a shadow ray is traced. In pixels of any brightness, roulette adds to
+// the variance at most 1 / kLeastTraced - 1 times the second moment of the light that is found.
 inline constexpr float kLeastTraced = .25f;
 
 // The probability with which a shadow ray is traced. `light` is the mean over the channels of the light that

@@ -13,10 +13,11 @@
 namespace ls::render {
 
 // Sets `sky_samples` of a world that is otherwise complete, if enough of the direct light of some camera
-// paths comes from a constant environment. It depends only on the scene and the size of the full frame: not
-// on the seed, the number of samples or a crop. It stays false in scenes with media, where a ray to the sky
-// may have to track its transmittance, and with connections to light vertices, because light vertices would
-// have to be traced just to measure that share.
+// paths comes from a constant environment. The result depends only on the scene and the size of the full
+// frame: not on the seed, the number of samples or a crop. `sky_samples` stays false in scenes with media,
+// where a ray to the sky may have to track its transmittance. It also stays false with connections to light
+// vertices, because light vertices would have to be traced just to measure the share of the constant
+// environment.
 void learn_sky_samples(const IntegratorSettings& settings, World& w);
 
 }  // namespace ls::render

@@ -8,9 +8,9 @@
 //
 // Roulette: the brightness of a pixel is about in proportion to the throughput of its paths at their first
 // vertex. So Russian roulette compares the throughput of a path with the throughput at the first vertex, not
-// with 1. Compared with 1, most paths that come from dark ground into a cloud would end, and the few that
-// survive would be far brighter than their pixel. If the light found up to the first vertex is brighter than
-// the mean radiance of the image, the pixel is bright, and roulette compares with that light.
+// with 1. If it were compared with 1, most paths that come from dark ground into a cloud would end, and the
+// few that survive would be far brighter than their pixel. If the light found up to the first vertex is
+// brighter than the mean radiance of the image, the pixel is bright, and roulette compares with that light.
 #pragma once
 
 #include <algorithm>
@@ -20,9 +20,9 @@
 
 namespace ls::render {
 
-// The smallest and the largest reference. The smallest ends paths that come from nearly black surfaces, which
-// are not worth following; the largest is a limit because light found at the first vertex may be a bright
-// spot in a dark pixel.
+// Limits of the reference, the throughput with which roulette compares (roulette_reference()). The lower one
+// lets paths end that come from nearly black surfaces, which are not worth following. The upper one is needed
+// because light found at the first vertex may be a bright spot in a dark pixel.
 inline constexpr float kDarkestReference = .05f;
 inline constexpr float kBrightestReference = 10;
 

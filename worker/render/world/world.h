@@ -69,7 +69,7 @@ class World {
   Lights::Directional sun;  // the light that the light vertices come from
   SunMap sun_map;
   // The number of light vertices from which a connection chooses one, divided by the mean number of light
-  // vertices that one ray of the sun leaves. A weight of multiple importance sampling needs the ratio.
+  // vertices that one ray of the sun leaves. The weights of multiple importance sampling need this ratio.
   float connections_per_ray = 1;
   float faint = 0;  // connections that would add less than this are made at random (Russian roulette)
   mutable LightVertexCache light_vertices;  // safe from several threads

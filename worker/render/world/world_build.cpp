@@ -27,8 +27,8 @@ Features features_of(const scene::Needs& n) {
           .passing = n.boundaries || n.null_transmission};
 }
 
-// Returns the features that the finished world requires: never more than features_of() gives for the scene's
-// needs.
+// Returns the features that the finished world requires. Except for `overlaps` and `chromatic`, these are
+// never more than features_of() gives for the scene's needs.
 Features found_in(const World& w) {
   Features f;
   const auto& surfaces = w.geometry.surfaces;
@@ -55,7 +55,8 @@ Features found_in(const World& w) {
   return f;
 }
 
-// Sets the data that hits on each surface must contain.
+// Sets, for each surface, which data its hits must contain and which kinds of lobes its BSDF has. Also sets
+// World::null_transmission.
 void note_surface_needs(const Scene& scene, World& w) {
   for (std::size_t i = 0; i < w.geometry.surfaces.size(); ++i) {
     SurfaceInfo& s = w.geometry.surfaces[i];
@@ -104,12 +105,12 @@ bool a_point_shines_in_a_grid(const World& w) {
   });
 }
 
-// Finds the regions without surfaces inside of media in which flights may be sampled before rays are traced.
-// With chromatic extinction this would be wrong, since the weight of a flight that reaches a surface depends
-// on the distance to the surface.
+// Finds the regions inside media that contain no surfaces: there flights may be sampled before their rays are
+// traced. With chromatic extinction such flights would be wrong, since the weight of a flight that reaches a
+// surface depends on the distance to the surface.
 void find_clear_regions(World& w) {
-  // The largest number of bodies to try. Each try examines all triangles and boxes, and if there are more
-  // bodies, each of them is a small part of the scene.
+  // The largest number of bodies (surfaces that enclose a medium) to try. Each try examines all triangles and
+  // boxes, and if there are more bodies, each of them is a small part of the scene.
   constexpr int kMostBodies = 64;
   const auto wanted = [&](const SurfaceInfo& s) {
     if (!s.transition || s.interior == kNone || s.sheet || w.need.chromatic) return false;
