@@ -51,11 +51,16 @@ std::string no_channel(std::string_view name, const ChannelRow* row) {
 
 }  // namespace
 
-// Makes a name unique by appending its index in the list.
+// Returns the name, followed by a number if an earlier object has the name: the object's index in its list,
+// or the next number that is free. An empty name becomes the type and the index.
 std::string Reader::fresh_label(std::string name, std::string_view type, std::size_t index) {
   if (name.empty()) name = fmt::format("{}_{}", type, index);
-  if (!labels_.insert(name).second) labels_.insert(name = fmt::format("{}_{}", name, index));
-  return name;
+  if (labels_.insert(name).second) return name;
+  std::size_t& number = label_numbers_[name];  // names with smaller numbers are taken
+  number = std::max(number, index);
+  while (true)
+    if (auto numbered = fmt::format("{}_{}", name, number++); labels_.insert(numbered).second)
+      return numbered;
 }
 
 void Reader::label_shape(const Element& e) {

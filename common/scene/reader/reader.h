@@ -143,6 +143,7 @@ class Reader {
   const Element* integrator_ = nullptr;
   const Element* material_ = nullptr;  // material of the last shape read; nullptr: the default material
   std::unordered_set<std::string> labels_;
+  std::unordered_map<std::string, std::size_t> label_numbers_;  // name -> the next number to try
   // parts_: the films, filters and samplers at the top level. used_parts_: those that a sensor refers to.
   std::vector<const Element*> parts_;
   std::unordered_set<const Element*> used_parts_;

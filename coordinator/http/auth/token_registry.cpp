@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <utility>
 
 #include "common/base/check.h"
 #include "common/base/log.h"
@@ -99,12 +100,12 @@ Result<void> TokenRegistry::Tokens::read_all() {
   return {};
 }
 
-void TokenRegistry::Tokens::look_again() {
-  if (file.empty()) return;
-  const FileState now = file_state(file);
-  if (now == seen) return;
-  if (const auto read = read_all(); !read) log_error("", read.error().message);
-  seen = now;
+Result<void> TokenRegistry::Tokens::look_again() {
+  if (file.empty() || (trouble.empty() && file_state(file) == seen)) return {};
+  auto read = read_all();
+  const std::string before = std::exchange(trouble, read ? "" : read.error().message);
+  if (!read && trouble != before) log_error("", trouble);
+  return read;
 }
 
 Result<void> TokenRegistry::Tokens::read_line(std::string_view line) {
@@ -134,7 +135,7 @@ void TokenRegistry::Tokens::put(Role role, std::string user, const Digest& diges
 
 Guarded<TokenRegistry::Tokens>::Lock TokenRegistry::latest() const {
   auto tokens = tokens_.lock();
-  tokens->look_again();
+  (void)tokens->look_again();  // until the file is right again, the tokens are those of before
   return tokens;
 }
 
@@ -170,7 +171,8 @@ Result<TokenRegistry::Made> TokenRegistry::add(Role role, std::string user) {
   if (!token) return tl::unexpected(token.error());
   const auto tokens = tokens_.lock();
   const FolderLock others(tokens->file.parent_path());
-  tokens->look_again();
+  // save() replaces the file, so nothing in it may be unread.
+  if (auto read = tokens->look_again(); !read) return tl::unexpected(read.error());
   if (tokens->entries.size() >= kMaxTokens)
     return fail(Errc::resource_exhausted, fmt::format("there are {} tokens already", tokens->entries.size()));
   tokens->put(role, std::move(user), sha256(*token), false);
@@ -184,7 +186,8 @@ Result<TokenRegistry::Made> TokenRegistry::add(Role role, std::string user) {
 Result<void> TokenRegistry::revoke(std::string_view id) {
   const auto tokens = tokens_.lock();
   const FolderLock others(tokens->file.parent_path());
-  tokens->look_again();
+  // save() replaces the file, so nothing in it may be unread.
+  if (auto read = tokens->look_again(); !read) return tl::unexpected(read.error());
   auto& entries = tokens->entries;
   const auto found =
       std::find_if(entries.begin(), entries.end(), [&](const Entry& e) { return e.info.id == id; });

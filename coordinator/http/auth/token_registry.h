@@ -1,7 +1,8 @@
-// All valid tokens. The files DATA/token (the administrator's) and DATA/join-token (the workers') contain
-// their tokens in the clear. For all other tokens DATA/tokens contains only the SHA-256, one per line: `ROLE
-// USER SHA256`, with USER `-` if the token has no user. Several coordinators may share one folder
-// (--secrets): before a coordinator checks a token, it rereads the file if the file has changed.
+// All valid tokens. They are in files of one folder, here called DATA: that of --secrets or else of --data.
+// DATA/token (the administrator's) and DATA/join-token (the workers') contain their tokens in the clear. For
+// all other tokens DATA/tokens contains only the SHA-256, one per line: `ROLE USER SHA256`, with USER `-` if
+// the token has no user. Several coordinators may share the folder: before a coordinator checks a token, it
+// rereads DATA/tokens if that file has changed.
 #pragma once
 
 #include <filesystem>
@@ -28,7 +29,8 @@ struct TokenInfo {
   std::string id;  // the first 16 hex digits of its SHA-256
   Role role = Role::read;
   std::string user;
-  // True if the token is in DATA/token or DATA/join-token. It is then revoked only by deleting that file.
+  // True if the token is in DATA/token or DATA/join-token. Such a token is revoked only by deleting the file
+  // and restarting the coordinator.
   bool of_file = false;
 };
 
@@ -37,7 +39,8 @@ class TokenRegistry {
   // Makes a registry without files. If `join_token` is empty, no token lets a worker join.
   explicit TokenRegistry(std::string admin_token, std::string join_token = {});
   // Reads the folder's files; creates `token` and `join-token` if they are missing. failed_precondition:
-  // others may write a file (or, for secrets, read it), or a line is invalid; the message has its number.
+  // others may write `tokens`, or read or write one of the other two; or a line of `tokens` is invalid, and
+  // the message has its number.
   static Result<std::unique_ptr<TokenRegistry>> open(const std::filesystem::path& folder);
 
   // Returns the caller with this token; nullopt: the token is wrong. The search takes equally long in both
@@ -67,18 +70,19 @@ class TokenRegistry {
     TokenInfo info;
     Digest digest;
   };
-  // The tokens, as of the last reading of the file.
+  // The tokens of the files, as last read.
   struct Tokens {
     void put(Role role, std::string user, const Digest& digest, bool of_file);
-    // Rereads the file if it has changed. If the file cannot be read, `entries` stays as it is, and the error
-    // is logged once.
-    void look_again();
+    // Rereads the file if it has changed, or could not be read the last time. Error: it cannot be read, or
+    // has a wrong line. Then `entries` stays as it is, and the error is logged once.
+    Result<void> look_again();
     Result<void> read_all();
     Result<void> read_line(std::string_view line);
     Result<void> save();
 
     std::filesystem::path file;  // empty: the tokens are in memory only
     FileState seen;
+    std::string trouble;  // the error of the last reading; empty: none
     std::vector<Entry> entries;
   };
   Guarded<Tokens>::Lock latest() const;

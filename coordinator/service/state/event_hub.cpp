@@ -24,14 +24,29 @@ struct EventHub::State {
   std::uint64_t calling = 0;  // the listener being called; 0: none
   std::thread::id thread;
 
+  // Makes sure that next_id is reserved. If the store cannot reserve ids now, the next block of ids is used
+  // all the same, and may be used again after a crash.
+  void reserve_ids() {
+    while (next_id >= reserved_end) {
+      const auto first = reserve(limits::kEventIdBlock);
+      if (!first) {
+        log_warn("", "cannot reserve event ids: " + first.error().message);
+        reserved_end = next_id + limits::kEventIdBlock;
+        return;
+      }
+      next_id = std::max(next_id, *first + 1);
+      reserved_end = *first + 1 + limits::kEventIdBlock;
+    }
+  }
+
   // Returns the next event that a listener has not received, with that listener.
   std::optional<std::pair<std::uint64_t, StreamEvent>> due() {
     if (kept.empty()) return std::nullopt;
     for (auto& [id, listener] : listeners) {
       const std::uint64_t want = std::max(listener->next, kept.front().id);
       if (want > kept.back().id) continue;
-      const StreamEvent event = kept[static_cast<std::size_t>(want - kept.front().id)];
-      listener->next = want + 1;
+      const StreamEvent event = *std::ranges::lower_bound(kept, want, {}, &StreamEvent::id);
+      listener->next = event.id + 1;
       return std::pair(id, event);
     }
     return std::nullopt;
@@ -40,10 +55,7 @@ struct EventHub::State {
 
 EventHub::EventHub(Reserve reserve) : state_(std::make_shared<State>()) {
   state_->reserve = std::move(reserve);
-  if (const auto first = state_->reserve(limits::kEventIdBlock)) {
-    state_->next_id = *first + 1;
-    state_->reserved_end = *first + 1 + limits::kEventIdBlock;
-  }
+  state_->reserve_ids();
   thread_ = std::jthread([state = state_](const std::stop_token& token) { deliver(*state, token); });
   const std::lock_guard lock(state_->mutex);
   state_->thread = thread_.get_id();
@@ -57,13 +69,7 @@ void EventHub::close() {
 void EventHub::publish(std::string type, std::string data, std::string job, std::string owner) {
   const std::lock_guard lock(state_->mutex);
   State& s = *state_;
-  if (s.next_id >= s.reserved_end) {
-    // Events are published even if the store cannot reserve ids now, but then their ids may be used again
-    // after a crash.
-    if (const auto first = s.reserve(limits::kEventIdBlock); !first)
-      log_warn("", "cannot reserve event ids: " + first.error().message);
-    s.reserved_end += limits::kEventIdBlock;
-  }
+  s.reserve_ids();
   s.kept.push_back({s.next_id++, std::move(type), std::move(data), std::move(job), std::move(owner)});
   if (s.kept.size() > limits::kEventsKept) s.kept.pop_front();
   s.changed.notify_all();

@@ -95,6 +95,43 @@ TEST(TokenRegistry, NamesALineThatIsNone) {
   EXPECT_EQ((*TokenRegistry::open(dir.path()))->find("x")->role, Role::read);
 }
 
+TEST(TokenRegistry, ChangesNothingInAFileThatItCannotRead) {
+  TempFolder dir;
+  const auto file = dir.path() / "tokens";
+  const auto tokens = TokenRegistry::open(dir.path()).value();
+  const auto made = tokens->add(Role::submit, "anna").value();
+  const std::string sound = content(file), edited = sound + "boss ben " + sha256("ben").hex() + "\n";
+  write(file, edited);
+
+  const auto added = tokens->add(Role::submit, "cora");
+  const auto revoked = tokens->revoke(made.info.id);
+
+  ASSERT_FALSE(added);
+  EXPECT_NE(added.error().message.find("tokens:3:"), std::string::npos) << added.error().message;
+  EXPECT_FALSE(revoked);
+  EXPECT_EQ(content(file), edited);
+  EXPECT_TRUE(tokens->find(made.token)) << "the tokens of before count";
+
+  ::chmod(file.c_str(), 0620);  // another error, of which the file's time and size say nothing
+  EXPECT_FALSE(tokens->revoke(made.info.id));
+  write(file, sound);
+  EXPECT_TRUE(tokens->revoke(made.info.id));
+  EXPECT_FALSE(tokens->find(made.token));
+}
+
+TEST(TokenRegistry, ReadsAFileAgainThatItCouldNotRead) {
+  TempFolder dir;
+  const auto file = dir.path() / "tokens";
+  const auto tokens = TokenRegistry::open(dir.path()).value();
+  write(file, "read - " + sha256("x").hex() + "\n");
+  ::chmod(file.c_str(), 0620);
+  EXPECT_FALSE(tokens->find("x"));
+
+  ::chmod(file.c_str(), 0600);  // which changes neither size nor time
+
+  EXPECT_TRUE(tokens->find("x"));
+}
+
 TEST(TokenRegistry, RefusesAFileThatOthersMayWriteAndTokensThatAreOne) {
   TempFolder dir;
   write(dir.path() / "tokens", "");

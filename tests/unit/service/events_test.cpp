@@ -70,6 +70,49 @@ TEST(EventHub, KeepsABoundedHistoryAndStartsWithTheOldestKept) {
   EXPECT_EQ(reader.first(limits::kEventsKept).front().id, 11u);
 }
 
+// A store that counts reserved ids, and can fail.
+struct Ids {
+  std::uint64_t reserved = 0;
+  bool fails = false;
+
+  EventHub::Reserve reserve() {
+    return [this](std::uint64_t count) -> Result<std::uint64_t> {
+      if (fails) return fail(Errc::unavailable, "the disk is full");
+      reserved += count;
+      return reserved - count;
+    };
+  }
+};
+
+void publish(EventHub& hub, std::uint64_t count) {
+  for (std::uint64_t i = 0; i < count; ++i) hub.publish("job", "{}", "j");
+}
+
+TEST(EventHub, ReservesEveryIdAgainOnceTheStoreCan) {
+  Ids ids;
+  EventHub hub(ids.reserve());
+  publish(hub, limits::kEventIdBlock);
+  ids.fails = true;
+  publish(hub, 2 * limits::kEventIdBlock);
+  ids.fails = false;
+
+  publish(hub, limits::kEventIdBlock);
+
+  EXPECT_EQ(hub.last_id(), 4 * limits::kEventIdBlock);
+  EXPECT_GE(ids.reserved, hub.last_id());
+}
+
+TEST(EventHub, LeavesTheIdsOfAnEarlierStartOnceTheStoreCan) {
+  Ids ids{.reserved = 5 * limits::kEventIdBlock, .fails = true};
+  EventHub hub(ids.reserve());
+  publish(hub, limits::kEventIdBlock);
+  ids.fails = false;
+
+  publish(hub, 1);
+
+  EXPECT_EQ(hub.last_id(), 5 * limits::kEventIdBlock + 1);
+}
+
 TEST(EventHub, NothingComesOnceTheHandleIsGone) {
   EventHub hub(from_zero());
   Listener gone, stays;

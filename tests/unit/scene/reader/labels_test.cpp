@@ -71,6 +71,19 @@ TEST(Labels, AreIdsAndElseKindAndNumber) {
   EXPECT_EQ(deserialize_scene(serialize(s)).value(), s);
 }
 
+TEST(Labels, AreDifferentWhateverTheNames) {
+  const std::string mesh = R"(<shape type="ply"><string name="filename" value="mesh.ply"/></shape>)";
+
+  const auto r = read(with_sensor(R"(<shape type="sphere" id="mesh_2"/>)" + mesh + mesh + mesh +
+                                  R"(<shape type="sphere" id="mesh_4"/>)"),
+                      {.labels = true});
+
+  ASSERT_TRUE(r.scene) << messages(r);
+  std::vector<std::string> names;
+  for (const Label& label : r.scene->shape_labels) names.push_back(label.name);
+  EXPECT_THAT(names, testing::ElementsAre("mesh_2", "mesh", "mesh_3", "mesh_4", "mesh_4_4"));
+}
+
 TEST(Labels, AreNoPartOfASceneThatIsReadWithoutThem) {
   const Scene plain = read(with_sensor(std::string(kThings))).scene.value();
   Scene labelled = read(with_sensor(std::string(kThings)), {.labels = true}).scene.value();
