@@ -15,20 +15,28 @@
 // the squared error of D, for every denoiser. The product measures the errors that the denoiser makes in
 // both halves, the difference the errors that it makes in only one. Relative errors have the weight
 // f(D) = 1 / (D^2 + 0.01). This weight depends on D and so on the noise: to first order in the noise, the
-// relative error is wrong by - bias f' s Var, with `bias` the mean error of the denoiser, f' the derivative
-// of the weight, s the share of a pixel's own noise that remains in its denoised value, and Var the variance
-// of the noise of one half. So the figure is too low where the denoiser darkens, too high where it
-// brightens, and nearly right where s is small.
+// relative error is wrong by
+//
+//   -bias f' s Var,
+//
+// with `bias` the mean error of the denoiser, f' the derivative of the weight, s the share of a pixel's own
+// noise that remains in its denoised value, and Var the variance of the noise of one half. So the figure is
+// too low where the denoiser darkens, too high where it brightens, and nearly right where s is small.
 //
 // Interval: the estimate differs from the realised squared error by n = a b - x b - a y. This n is nearly
 // uncorrelated between pixels: a pixel contributes only little to its neighbours' denoised values. If a share
-// s of a pixel's own noise remains in its denoised value, so that x = s a and y = s b, then n = (1 - 2 s) a b
-// = (1 - s)^2 a b - s^2 a b. The first term is the product of the residuals. The second is as large as (D(A)
-// - D(B))^2 / sqrt(12) in the mean square (E (a - b)^4 = 12 Var^2 for Gaussian noise, more for heavier
-// tails). So the sum of both squares is at least n^2 in the mean; bias increases it and makes the interval
-// wider. Channels are summed before they are squared, since they share paths. No interval is given if the
-// number of pixels that carry the noise, (sum n^2)^2 / sum n^4, is below four: the variance of a single pixel
-// cannot be estimated from one pair of halves.
+// s of a pixel's own noise remains in its denoised value, so that x = s a and y = s b, then
+//
+//   n = (1 - 2 s) a b = (1 - s)^2 a b - s^2 a b.
+//
+// The square of such a difference is at most the sum of the squares of its two terms, which have the same
+// sign. The first term is the product of the residuals. The square of the second cannot be measured, but its
+// expectation can: s^4 Var^2, which for Gaussian noise is that of (D(A) - D(B))^4 / 12, since E (a - b)^4 =
+// 12 Var^2 (more with heavier tails). So the squared product plus (D(A) - D(B))^4 / 12 is, in the mean, at
+// least n^2; bias increases it and makes the interval wider. Channels are summed before they are squared,
+// since they share paths. No interval is given if the number of pixels that carry the noise,
+// (sum n^2)^2 / sum n^4, is below four: the variance of a single pixel cannot be estimated from one pair of
+// halves.
 #pragma once
 
 #include <algorithm>

@@ -1,10 +1,11 @@
 // A snapshot is a file with a job's image so far, tile by tile. Writing or reading it needs memory for one
 // tile besides the film (the image in memory). Each tile is saved in the state in which it was added to the
 // file, so folding (adding rounds of samples to the film) may continue meanwhile. After a restart, rounds
-// that were folded after the snapshot are folded again from the partials (the stored results). Format:
-//    "LSSNAP2\n", u64 length and name of the format, i32 width, height, tile, u32 AOVs; per tile u32 tile,
-//    u64 lengths of its three parts, and these: film (film_bytes.cpp), error sums, health; u32 2^32 - 1;
-//    SHA-256 of all preceding bytes
+// that were folded after the snapshot are folded again from the partials (the stored results). Layout:
+//    "LSSNAP2\n", u64 length and characters of `format` (the caller's string; with another one the file is
+//    rejected), i32 width, height and side of a tile, u32 AOVs; per tile u32 index, u64 lengths of its three
+//    parts, and the parts: pixel sums (film_bytes.cpp), error sums (RoundErrors), counts of bad samples
+//    (HealthTable); u32 2^32 - 1 as the end mark; SHA-256 of all preceding bytes
 #pragma once
 
 #include <filesystem>

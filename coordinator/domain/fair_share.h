@@ -48,9 +48,10 @@ class FairShare {
   void enter(Job& job);
 
   // Calls visit(job, lag) for the jobs that have units to lease, the next in turn first, until a call returns
-  // true; returns true if one did. `lag` is a number of core seconds: how much the share of the job's user
-  // exceeds that of the user who is first in turn, plus how much the share of the job's group exceeds that of
-  // the first group of the job's user. It is infinite below the highest priority that has units to lease.
+  // true; returns true if one did. `lag`, in core seconds, is the sum of two differences of shares: the job's
+  // user minus the user who is first in turn, and the job's group minus the first group in turn of that same
+  // user. A group is a sequence, or a job that belongs to none. The lag is infinite for jobs below the
+  // highest priority that has units to lease.
   using Visit = std::function<bool(Job&, double lag)>;
   bool in_turn(const Visit& visit) const;
   // Notes that the job gets a lease: users and groups that arrive later start at the present shares of its

@@ -61,8 +61,10 @@ double bend_covariance(double u, double v) {
   return near * near * (3 * far - near) / 6;
 }
 
-// Returns the lower Cholesky factor of the points' covariance, to which a slope that varies by `bend` (as
-// kBend) contributes; nullopt if the covariance is not positive definite.
+// Returns the lower Cholesky factor of the points' covariance, including that of a random change of the
+// slope, bend^2 bend_covariance() about the last point. `bend` is the standard deviation of the change per
+// square root of log time, like kBend; 0: the slope is constant. nullopt: the covariance is not positive
+// definite.
 using Matrix = std::array<std::array<double, kMostPoints>, kMostPoints>;
 std::optional<Matrix> factor(const std::vector<Log>& y, double bend) {
   Matrix l{};

@@ -56,8 +56,8 @@ const char* to_string(ConvergenceStatus::Kind kind);
 // and that does not fall with samples. Random differences between the two errors fall with samples, except
 // for the reference's own noise, which is constant as well. A floor is reported if two conditions hold:
 // - The latest true error exceeds the estimated one by four standard deviations (by chance: once in 30,000).
-//   The standard deviation combines the estimate's, from its interval on a logarithmic scale, and the noise
-//   of the reference.
+//   Two of them are added in quadrature: that of the estimate, from its interval on a logarithmic scale, and
+//   ErrorPoint::true_stderr, due to the noise of the reference.
 // - The excess falls more slowly than 1 / sqrt(N), which is half way between a constant and 1/N. To test
 //   this, it is compared with the excess at the latest checkpoint that had at most half the samples.
 ConvergenceStatus judge(std::span<const ErrorPoint> points, const std::string& doubt);

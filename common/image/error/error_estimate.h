@@ -13,28 +13,30 @@
 // which is local Wiener filtering (Lee 1980) with
 //   W   the mean of the 5 x 5 window without the pixel, clipped to the tile;
 //   u   the window's mean of D^2;
-//   v   the noise: u, or D^2 of the pixel where that exceeds T + u (a firefly has D^2 = (S - W)^2);
+//   v   the noise: u, or D^2 of the pixel if that exceeds T + u, as for a firefly: being in one half only, it
+//       has D^2 = (S - W)^2, so it does not count as structure;
 //   T   the image's structure: the window's variance of S minus its noise u; or (S - W)^2 where that
 //       exceeds 9 u and 9 D^2, three standard deviations, as for a small bright object.
 // In a flat or dark area g is near 0, and m does not depend on the pixel. Where the image's structure exceeds
-// its noise, g is near 1. A tile of one pixel uses S. The noise that remains in m has the variance s^2 = g^2
-// u + (1 - g)^2 u / n (n: the window's pixels). It would bias f = 1/(m^2 + c), c = 0.01, by f" s^2 / 2; this
-// is subtracted, within [f/2, 2 f]. The remaining bias is of second order in s^2: for m = 0 it is 3 s^4 / c^2
-// relative to f.
+// its noise, g is near 1. A tile of one pixel uses S. The noise that remains in m has the variance
+//   s^2 = g^2 u + (1 - g)^2 u / k,   k: the number of pixels from which W is computed.
+// It would bias the weight w = 1/(m^2 + c), c = 0.01, from here on called f(m), by f" s^2 / 2. This is
+// subtracted, and the result limited to [f/2, 2 f]. The remaining bias is of second order in s^2: for m = 0
+// it is 3 s^4 / c^2 relative to f.
 //
 // Skew: where g is near 1, the pixel's value enters its own weight, and the noise of rendered pixels is
 // skewed. A bright sample raises both D^2 and S, so the sum of f D^2 is too low: to first order in the noise
 // its error is f'(m) g cov(D^2, S), which is negative. Relative to the sum, this error falls like 1/N (2 %
 // at 64 samples, docs/design/error.md). It is estimated from the samples of the last round (range of
 // samples), which are independent of earlier ones. Of N samples, n are in the last round and o before it.
-// Let D_n and S_n be D and S of the last round alone, and D_o and S_o those of the earlier samples. Then
-//   E[D_n^2 (S_n - S_o)] = k / n^2  and  E[D_o^2 (S_o - S_n)] = k / o^2,
-// with k the third cumulant of a sample; the pixel's true value cancels in the difference. cov(D^2, S) is k /
-// N^2, and
-//   t = ((n D_n / N)^2 (n / N) - (o D_o / N)^2 (o / N)) (S_n - S_o)
-// has the expectation cov(D^2, S), so f'(m) g t is subtracted. (To first order, this weights D_n^2 by f
-// computed from the earlier samples, and D_o^2 by f computed from the last ones.) The correction changes the
-// weight f of a pixel by at most half of f. The first round has no earlier one and is not corrected.
+// Let D_n and S_n be D and S of the last round alone, and D_o and S_o those of the earlier samples. With K
+// the third cumulant of a sample (the pixel's true value cancels in the differences),
+//   E[D_n^2 (S_n - S_o)] = K / n^2,   E[D_o^2 (S_o - S_n)] = K / o^2,   cov(D^2, S) = K / N^2.
+// So cov(D^2, S) is the expectation of
+//   t = ((n D_n / N)^2 (n / N) - (o D_o / N)^2 (o / N)) (S_n - S_o),
+// and f'(m) g t is subtracted. (To first order, this weights D_n^2 by f computed from the earlier samples,
+// and D_o^2 by f computed from the last ones.) The correction changes the weight f of a pixel by at most half
+// of f. The first round has no earlier one and is not corrected.
 //
 // Interval of the realised error: d - e^2 = -ab, so Var(sum of d - sum of e^2) = sum of 4 v^2 exactly,
 // whatever the distribution of a and b. Over channels it is 4 tr(V^2), with V the covariance of the channels

@@ -33,7 +33,9 @@ double cells_per_unit(const Cloud& cloud) {
 // piecewise linear with corners at 0, 1/2 and 1.
 constexpr double kLeastPerHeight = 64;
 
-// Returns the grid with `per_cell` nodes per cell; nullopt if it has more than `most` nodes.
+// Returns the sides of a grid that samples the cloud's density with `per_cell` nodes along an axis per cell
+// of the finest noise (in y also with at least kLeastPerHeight nodes per unit of length). nullopt: the grid
+// would have more than `most` nodes.
 std::optional<CloudNodes> nodes_of(const Cloud& cloud, double per_cell, std::size_t most) {
   CloudNodes out;
   out.per_cell = per_cell;

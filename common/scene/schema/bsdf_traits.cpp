@@ -30,8 +30,9 @@ std::array<std::optional<BsdfIndex>, 2> nested_bsdfs(const Bsdf& bsdf) {
 
 namespace {
 
-// True if the texture, read as a number, may be at most kStraightAlpha at some point. It reads a colour as a
-// mean of the channels, which is that small only if one of the channels is.
+// True if alpha, given by the texture, may be kStraightAlpha or less at some point. A texture that is not
+// constant is not examined: it may. A constant colour stands for a mean of its channels, which is that small
+// only if at least one channel is.
 bool may_be_straight(TextureIndex t, const std::vector<Texture>& textures) {
   if (t.value >= textures.size()) return true;
   const auto* constant = std::get_if<ConstantTexture>(&textures[t.value]);

@@ -28,10 +28,11 @@ bool meet_triangle(const V3d& v0, const V3d& e1, const V3d& e2, const V3d& o, co
 }
 
 // Moves a hit away from the edges of its triangle. The BVH decides in float32 which triangle is hit; near an
-// edge the exact hit may lie just outside of the triangle, and rounding moves it by at most sqrt(3) / 2 ulps
-// more (an ulp is 2^-24 of the reach, SurfaceHit::reach). If another wall of a room begins at the edge, the
-// point may then be behind that wall, and light would leak in. So points keep a distance of four ulps from
-// every edge. `twice_area` is twice the area of the triangle.
+// edge the exact hit may lie just outside of the triangle, and rounding the point to float32 moves it by up
+// to sqrt(3) 2^-24 reach more. `reach` is SurfaceHit::reach, the largest coordinate in the computation. If
+// another wall of a room begins at the edge, the point may then be behind that wall, and light would leak in.
+// So points keep a distance of 2^-22 reach from every edge, but at most a quarter of the triangle's height
+// over it. `twice_area` is twice the area of the triangle.
 [[gnu::noinline]] void keep_from_edges(const V3d& e1, const V3d& e2, double twice_area, float reach,
                                        Barycentric& b) {
   const double w = 1 - b.u - b.v;

@@ -197,7 +197,7 @@ V2 sphere_uv(const Sphere& s, const V3d& n);
 inline float largest(const V3& v) { return std::max(std::abs(v.x), std::max(std::abs(v.y), std::abs(v.z))); }
 
 // Moves the point p on a surface of geometric normal ng off the surface, to the side that `w` points to, by
-// 16 ulps, where an ulp is 2^-24 of the reach. Rounding moves p off the surface by at most sqrt(3) / 2 ulps.
+// 16 ulps, where an ulp is 2^-24 of the reach. Rounding moves p off the surface by at most sqrt(3) ulps.
 // The BVH subtracts the ray's origin from a triangle's corners and finds the distance of the triangle's plane
 // by products of these differences. Each difference of two coordinates is at most twice the reach and
 // accurate to half an ulp of its value, and so are the six products and sums that follow; all errors together

@@ -10,17 +10,18 @@
 // where columns wrap around, and at v = y / (height - 1): the first and last rows are the poles themselves.
 // Between texels radiance is bilinear in u and v.
 //
-// Sampling. A cell lies between four neighbouring texels. One 32-bit word chooses a row of cells and another
-// a cell of the row, each in proportion to (mean luminance of the corners) x (solid angle), rounded to whole
-// words; within the cell the density is bilinear between the luminances at its corners, over the azimuth and
-// the cosine z of the polar angle. Per steradian it is, in row j and cell i,
+// Sampling. A cell lies between four neighbouring texels. One 32-bit random number (a word) chooses a row of
+// cells, and another a cell of the row. The probabilities are proportional to (mean luminance of the corners)
+// x (solid angle), rounded to multiples of 2^-32. Within a cell, the density over azimuth and z, the cosine
+// of the polar angle, is proportional to l, the bilinear interpolation of the luminances at the corners. So
+// the pdf per steradian, in row j and cell i, is
 //
-//   p(d) = words(j) words(i) 2^-64 / solid angle x l(x, t) / mean of l at the corners,
+//   p(d) = P(j) P(i | j) / solid angle x l(x, t) / mean of l at the corners,
 //
-// where words(j) and words(i) count the words that choose the row and the cell, l is the bilinear luminance,
-// and x and t = (z_j - z) / (z_j - z_j+1), both from 0 to 1, are the places in the cell by azimuth and by z.
-// This is exactly the distribution of the samples. As solid angle is uniform in z, p is nearly proportional
-// to the luminance of the map: t and v differ only next to the poles.
+// where P are the rounded probabilities, and x (in azimuth) and t = (z_j - z) / (z_j - z_j+1), both from 0 to
+// 1, are the position in the cell. sample() has exactly this pdf. It is nearly proportional to the luminance
+// of the map: the map is interpolated in the polar angle instead of z, but within a cell one is almost a
+// linear function of the other, except next to the poles.
 //
 // equal_area, pbrt-v4's convention. A direction's place in the square image is that of equal_area.h, and its
 // radiance that of the texel there, unfiltered. A cell is a texel, its solid angle 4 pi / texels, and the
