@@ -78,8 +78,8 @@ std::string tile_verdict(const VerifiedTile& t) {
   return t.stopped ? "stopped" : t.wrong() ? "fail" : "pass";
 }
 
-// What is known about the file as a whole: whether it has a seal, and which layers and headers differ from
-// the seal or from their computed values.
+// The result of checking a whole file: whether it has a seal, and the layers and headers that differ from the
+// seal or from their computed values.
 struct Contents {
   bool sealed = false;
   std::vector<std::string> changed;  // changed parts, such as "layer depth.Z"

@@ -1,4 +1,4 @@
-// What the decoders of meshes, images and grids return, and the size limits of the files that a scene names.
+// The data that decoders of meshes, images and grids return, and size limits of the files that a scene names.
 // A decoder checks the sizes in a file against these limits and against the number of available bytes before
 // it allocates memory.
 #pragma once

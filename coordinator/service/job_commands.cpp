@@ -334,7 +334,7 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
       return fail(Errc::failed_precondition,
                   fmt::format("all frames of job {} have ended: it is {}", id.value, to_string(state)));
   }
-  // Whether a frame can be extended is known only when it is loaded.
+  // The farm can check a frame only when it is loaded. All frames are checked before the first is extended.
   for (const EntryPtr& frame : extended) {
     auto possible = restore_.wake(core, *frame);
     if (possible) possible = farm.may_extend(frame->stored.id, *change.spp);

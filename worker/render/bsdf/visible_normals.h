@@ -14,8 +14,8 @@ struct Quadrature {
 // Returns the Gauss-Legendre quadrature with n nodes on [0, 1].
 Quadrature gauss_legendre(int n);
 
-// What happens to light at a microfacet. It determines the facet's weight: F (reflected), 1 - F (refracted),
-// or 1 (mirrored, that is, reflected without loss). F is the Fresnel reflectance.
+// The interaction of light with a microfacet. It determines the facet's weight: F (reflected), 1 - F
+// (refracted), or 1 (mirrored, that is, reflected without loss). F is the Fresnel reflectance.
 enum class Way { reflected, refracted, mirrored };
 
 // Returns the share of light incident at the cosine mu that leaves by `way` after one bounce without being

@@ -94,7 +94,7 @@ class SegmentNee {
   }
 
   template <class Path>
-  // Nothing to do: ahead() has added all light
+  // Does nothing, because ahead() has added all light
   static void at_vertex(Path&, const Medium&, const V3&, const V3&) {}
 
  private:
