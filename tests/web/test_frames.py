@@ -181,6 +181,21 @@ def test_the_keyboard_scrubs_plays_and_steps(farm, dashboard):
     page.wait(f"location.hash === '#/jobs/{SEQUENCE}/3'")
 
 
+def test_playing_goes_on_if_it_is_started_before_the_event_of_the_new_address(farm, dashboard):
+    page = film(farm, dashboard)
+    record_pictures(page)
+
+    page.evaluate("""(() => {
+      const scrub = document.getElementById('scrub');
+      scrub.value = '2';
+      for (const event of ['input', 'change']) scrub.dispatchEvent(new Event(event));
+      document.querySelector('.play').click();
+    })()""")
+
+    page.wait("['frame1', 'frame2'].every((frame) => window.seen.some((one) => one.endsWith(frame)))")
+    assert page.evaluate("document.querySelector('.play').innerText") == "Pause"
+
+
 def test_playing_waits_for_pictures_and_never_skips_one(farm, dashboard):
     page = film(farm, dashboard)
     record_pictures(page)

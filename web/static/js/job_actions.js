@@ -4,7 +4,7 @@ import { doneFrames, withJob, withOpen, withUi } from "./state.js";
 
 const kVideoPauseMs = 1000;
 
-export function makeJobActions({ get, set, attempt, api, snapshot }) {
+export function makeJobActions({ get, set, attempt, api, snapshot, showRoute }) {
   async function change(id, wanted) {
     set(withUi(get(), { busy: id, confirming: null }));
     const changed = await attempt(() => api.setState(id, wanted));
@@ -21,13 +21,12 @@ export function makeJobActions({ get, set, attempt, api, snapshot }) {
     if (frame) turnTo(frameHref(open.id, frame.frame));
   }
 
-  /** What is seen of the film stays until the page shows the frame: main.js ends it when the address changes. */
+  /** The page shows the frame at once: the event of the address comes later, and would end a film that the user has started meanwhile. */
   function turnTo(href) {
-    const { film: before } = get().open;
     if (window.location.hash === href) film(null);
     else {
-      if (before) film({ ...before, playing: false });
       window.location.replace(href);
+      showRoute();
     }
   }
 

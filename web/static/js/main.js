@@ -239,7 +239,7 @@ window.addEventListener("hashchange", () => {
 
 // ---- actions ----
 
-const seam = { get: () => state, set, attempt, api, snapshot };
+const seam = { get: () => state, set, attempt, api, snapshot, showRoute };
 const actions = {
   signIn,
   signOut: async () => {
