@@ -11,7 +11,7 @@
 #include <cstring>
 #include <fstream>
 
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 
 namespace ls::race {
 namespace {

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "common/report/log_plot.h"
-#include "common/report/words.h"
+#include "common/report/number_text.h"
 
 namespace ls::race {
 namespace {

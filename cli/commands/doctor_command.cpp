@@ -10,7 +10,7 @@
 #include "cli/farm/farm_api.h"
 #include "cli/output/console.h"
 #include "cli/output/reply_fields.h"
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 
 namespace ls::cli {
 namespace {

@@ -15,7 +15,7 @@
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
 #include "common/base/parse_number.h"
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 #include "common/job/limits.h"
 #include "coordinator/base/limits.h"
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "cli/output/console.h"
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 
 namespace ls::cli {
 namespace {

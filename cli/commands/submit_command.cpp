@@ -10,7 +10,7 @@
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 #include "common/image/reference/reference.h"
 
 namespace ls::cli {

@@ -7,7 +7,7 @@
 #include "cli/local/local_scene.h"
 #include "cli/output/console.h"
 #include "cli/output/output_file.h"
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 #include "validation/nori_test_run.h"
 #include "validation/run.h"
 #include "worker/machine.h"

@@ -17,7 +17,7 @@
 #include "cli/output/console.h"
 #include "cli/output/interrupt.h"
 #include "cli/output/job_options.h"
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 #include "common/scene/analysis/prune.h"
 #include "common/scene/json/serialize.h"
 #include "coordinator/admission/cryptomatte_manifests.h"

@@ -9,9 +9,9 @@
 #include "cli/output/console.h"
 #include "cli/output/convergence_text.h"
 #include "cli/output/reply_fields.h"
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 #include "common/image/exr/final_image.h"
-#include "common/report/words.h"
+#include "common/report/number_text.h"
 
 namespace ls::cli {
 namespace {

@@ -13,7 +13,7 @@
 #include "common/scene/analysis/prune.h"
 #include "common/scene/file_names.h"
 #include "common/scene/folder_assets.h"
-#include "common/scene/gltf/load.h"
+#include "common/scene/gltf/asset.h"
 #include "common/scene/limits.h"
 #include "common/scene/schema/integrators.h"
 

@@ -8,7 +8,7 @@
 #include <exception>
 #include <new>
 
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 
 namespace ls::cli {
 namespace {

@@ -6,7 +6,7 @@
 #include <charconv>
 #include <optional>
 
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 
 namespace ls {
 namespace {

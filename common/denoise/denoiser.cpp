@@ -15,7 +15,7 @@
 #include <memory>
 
 #include "common/base/check.h"
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 #include "common/denoise/exchange.h"
 
 namespace ls {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "common/base/shell_word.h"
+#include "common/base/safe_text.h"
 
 namespace ls {
 

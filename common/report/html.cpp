@@ -4,7 +4,7 @@
 #include <openssl/evp.h>
 
 #include "common/base/digest.h"
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 
 namespace ls::report {
 namespace {

@@ -6,8 +6,8 @@
 #include "common/report/html.h"
 #include "common/report/job_sections.h"
 #include "common/report/log_plot.h"
+#include "common/report/number_text.h"
 #include "common/report/phrases.h"
-#include "common/report/words.h"
 
 namespace ls::report {
 namespace {

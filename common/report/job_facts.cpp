@@ -5,7 +5,7 @@
 #include "common/image/exr/final_image.h"
 #include "common/report/html.h"
 #include "common/report/job_sections.h"
-#include "common/report/words.h"
+#include "common/report/number_text.h"
 
 namespace ls::report {
 namespace {

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "common/report/words.h"
+#include "common/report/number_text.h"
 
 namespace ls::report {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <string_view>
 
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 #include "common/scene/limits.h"
 
 namespace ls {

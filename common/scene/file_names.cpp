@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include "common/base/shell_word.h"
+#include "common/base/safe_text.h"
 
 namespace ls::scene {
 

@@ -4,7 +4,7 @@
 
 #include "common/base/overloaded.h"
 #include "common/base/parse_number.h"
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 
 namespace ls::trace {
 namespace {

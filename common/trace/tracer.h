@@ -14,7 +14,7 @@
 #include "common/base/clock.h"
 #include "common/base/guarded.h"
 #include "common/http/post.h"
-#include "common/trace/settings.h"
+#include "common/trace/otel_settings.h"
 #include "common/trace/span.h"
 #include "common/trace/span_queue.h"
 
@@ -64,8 +64,8 @@ class Tracer {
   std::jthread thread_;
 };
 
-// Returns a tracer if the environment names a collector (settings.h), else null. `program` and `version`: of
-// this program.
+// Returns a tracer if the environment names a collector (otel_settings.h), else null. `program` and
+// `version`: of this program.
 Result<std::shared_ptr<Tracer>> tracer_from_environment(const std::string& program,
                                                         const std::string& version,
                                                         const std::string& instance);

@@ -11,7 +11,7 @@
 #include "coordinator/service/blob_watch.h"
 #include "coordinator/service/core.h"
 #include "coordinator/service/pictures.h"
-#include "coordinator/service/state/job_list.h"
+#include "coordinator/service/state/job_views.h"
 #include "coordinator/service/submission.h"
 #include "coordinator/service/takeover.h"
 #include "coordinator/service/videos.h"

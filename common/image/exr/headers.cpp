@@ -7,7 +7,7 @@
 #include <iterator>
 #include <optional>
 
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 #include "common/image/exr/byte_cursor.h"
 
 namespace ls::exr {

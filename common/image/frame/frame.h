@@ -1,6 +1,8 @@
 // Pixel rectangles and the tiling of a frame.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <string>
@@ -22,7 +24,7 @@ struct PixelRect {
   bool operator==(const PixelRect&) const = default;
 };
 // Returns "[x0,y0,x1,y1]", for messages.
-std::string show(const PixelRect& r);
+inline std::string show(const PixelRect& r) { return fmt::format("[{},{},{},{}]", r.x0, r.y0, r.x1, r.y1); }
 
 using TileIndex = std::uint32_t;
 

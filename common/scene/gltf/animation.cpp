@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "common/base/suggest.h"
-#include "common/scene/gltf/parts.h"
+#include "common/scene/gltf/translation.h"
 #include "common/scene/limits.h"
 
 namespace ls::scene::gltf {

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "common/base/suggest.h"
-#include "common/scene/gltf/parts.h"
+#include "common/scene/gltf/translation.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene::gltf {

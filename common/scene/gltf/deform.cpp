@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "common/scene/gltf/parts.h"
+#include "common/scene/gltf/translation.h"
 #include "common/scene/limits.h"
 #include "common/scene/xml/transform_element.h"
 

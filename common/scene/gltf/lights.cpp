@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "common/scene/gltf/parts.h"
+#include "common/scene/gltf/translation.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene::gltf {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/scene/gltf/parts.h"
+#include "common/scene/gltf/translation.h"
 
 namespace ls::scene::gltf {
 namespace {

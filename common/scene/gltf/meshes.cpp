@@ -5,7 +5,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "common/scene/gltf/parts.h"
+#include "common/scene/gltf/translation.h"
 #include "common/scene/limits.h"
 #include "common/scene/made_files.h"
 #include "common/scene/xml/transform_element.h"

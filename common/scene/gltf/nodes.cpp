@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <set>
 
-#include "common/scene/gltf/parts.h"
+#include "common/scene/gltf/translation.h"
 #include "common/scene/limits.h"
 #include "common/scene/xml/transform_element.h"
 

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/scene/gltf/parts.h"
+#include "common/scene/gltf/translation.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene::gltf {

@@ -5,7 +5,7 @@
 #include <cctype>
 #include <cmath>
 
-#include "common/scene/gltf/parts.h"
+#include "common/scene/gltf/translation.h"
 #include "common/scene/gltf/uri.h"
 #include "common/scene/made_files.h"
 #include "common/scene/xml/transform_element.h"

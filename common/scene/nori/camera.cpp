@@ -3,7 +3,7 @@
 
 #include "common/base/suggest.h"
 #include "common/image/frame/render_limits.h"
-#include "common/scene/nori/parts.h"
+#include "common/scene/nori/translators.h"
 #include "common/scene/schema/integrators.h"
 #include "common/scene/xml/transform_element.h"
 #include "common/scene/xml/values.h"

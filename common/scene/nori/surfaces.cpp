@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "common/scene/nori/parts.h"
+#include "common/scene/nori/translators.h"
 #include "common/scene/xml/transform_element.h"
 #include "common/scene/xml/values.h"
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "common/scene/nori/parts.h"
+#include "common/scene/nori/translators.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene::nori {

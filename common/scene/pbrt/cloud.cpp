@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/scene/pbrt/noise.h"
-
 namespace ls::scene::pbrt {
 namespace {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/scene/pbrt/parts.h"
+#include "common/scene/pbrt/object_translation.h"
 #include "common/scene/xml/spectrum.h"
 #include "common/scene/xml/transform_element.h"
 #include "common/scene/xml/values.h"

@@ -1,7 +1,7 @@
 // Makes files from the numbers in a scene's text.
 #include "common/scene/made_files.h"
 
-#include "common/scene/pbrt/parts.h"
+#include "common/scene/pbrt/object_translation.h"
 
 namespace ls::scene::pbrt {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "common/base/suggest.h"
-#include "common/scene/pbrt/parts.h"
+#include "common/scene/pbrt/object_translation.h"
 
 namespace ls::scene::pbrt {
 namespace {

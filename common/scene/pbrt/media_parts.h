@@ -2,7 +2,7 @@
 // returns false after it has reported an error of the medium.
 #pragma once
 
-#include "common/scene/pbrt/parts.h"
+#include "common/scene/pbrt/object_translation.h"
 
 namespace ls::scene::pbrt {
 

@@ -1,4 +1,4 @@
-#include "common/scene/pbrt/noise.h"
+#include "common/scene/pbrt/cloud.h"
 
 #include <array>
 #include <cmath>

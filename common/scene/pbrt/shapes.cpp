@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "common/scene/pbrt/parts.h"
+#include "common/scene/pbrt/object_translation.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene::pbrt {

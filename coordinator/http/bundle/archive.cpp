@@ -13,7 +13,7 @@
 #include <cstring>
 #include <string_view>
 
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 #include "coordinator/http/message/limits.h"
 
 namespace ls::http {

@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 #include "common/job/limits.h"
 #include "common/scene/xml/source_text.h"
 #include "coordinator/http/bundle/bundle_layout.h"

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 #include "common/job/limits.h"
 #include "coordinator/http/message/limits.h"
 

@@ -1,4 +1,4 @@
-#include "coordinator/service/state/job_list.h"
+#include "coordinator/service/state/job_views.h"
 
 #include <algorithm>
 #include <cctype>

@@ -4,7 +4,9 @@
 #include "coordinator/domain/farm/farm.h"
 #include "coordinator/service/state/eta.h"
 #include "coordinator/service/state/job_entry.h"
+#include "coordinator/service/state/job_table.h"
 #include "coordinator/service/state/worker_entry.h"
+#include "coordinator/views/job_list.h"
 
 namespace ls::coordinator {
 
@@ -22,5 +24,9 @@ class JobViews {
   const Farm& farm_;
   const Clock& clock_;
 };
+
+// Selects and orders the jobs that a client's list shows. Makes views only of the jobs on the page, unless
+// the order needs the views of all.
+JobsPage list_jobs(JobTable& jobs, const JobViews& views, const JobsAsked& asked);
 
 }  // namespace ls::coordinator

@@ -7,7 +7,7 @@
 #include <new>
 
 #include "cli/output/progress.h"
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 
 namespace ls::cli {
 namespace {

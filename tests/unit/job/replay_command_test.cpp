@@ -8,8 +8,7 @@
 #include <array>
 #include <cstdio>
 
-#include "common/base/plain_text.h"
-#include "common/base/shell_word.h"
+#include "common/base/safe_text.h"
 #include "common/job/health_notes.h"
 
 namespace ls {

@@ -13,10 +13,18 @@
 
 #include "worker/render/geometry/accel_shapes.h"
 #include "worker/render/geometry/embree.h"
-#include "worker/render/geometry/primitive_side.h"
 
 namespace ls::render {
 namespace {
+
+// One side of a range of primitives: side 0 contains the opaque ones, side 1 those that let light pass.
+struct Side {
+  std::uint32_t first, last;
+  std::uint32_t count() const { return last - first; }
+};
+Side side_of(const PrimitiveRange& r, int side) {
+  return side ? Side{r.passing, r.last} : Side{r.first, r.passing};
+}
 
 #ifdef __x86_64__
 constexpr char kDeviceConfig[] = "isa=avx2,max_isa=avx2,frequency_level=simd256,set_affinity=0";

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "worker/render/integrator/variant.h"
-#include "worker/render/math/rounded.h"
+#include "worker/render/math/math.h"
 
 namespace ls::render {
 namespace {

@@ -8,9 +8,16 @@
 #include <algorithm>
 
 #include "worker/render/geometry/geometry.h"
-#include "worker/render/media/segment.h"
 
 namespace ls::render {
+
+// The part of a ray from the path's current position, in a medium, to the next surface.
+struct Segment {
+  float length;  // infinite if the ray hits no surface
+  // The part of the length between the path's position and the offset origin of the ray
+  float lead;
+  const SurfaceHit* end;  // hit on the surface at the end; nullptr: there is none
+};
 
 struct OffsetRay {
   V3 start{0, 0, 0}, origin{0, 0, 0}, d{0, 0, 1};

@@ -36,7 +36,6 @@
 #include "worker/render/integrator/vertex_nee.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/medium_stack.h"
-#include "worker/render/media/segment.h"
 #include "worker/render/world/splitting.h"
 #include "worker/render/world/world.h"
 
@@ -776,7 +775,7 @@ bool PathTracer<F, Light>::survives(float u) {
 
 }  // namespace ls::render
 
-#include "worker/render/integrator/connection.h"
 #include "worker/render/integrator/medium_crossing.h"
 #include "worker/render/integrator/path_reuse.h"
 #include "worker/render/integrator/shadow_ray.h"
+#include "worker/render/integrator/vertex_connection.h"

@@ -11,8 +11,8 @@
 #include "worker/render/integrator/light_paths.h"
 #include "worker/render/integrator/sharing_block.h"
 #include "worker/render/integrator/variant.h"
+#include "worker/render/math/math.h"
 #include "worker/render/math/processor.h"
-#include "worker/render/math/rounded.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {

@@ -21,10 +21,10 @@
 
 #include "worker/render/integrator/equiangular.h"
 #include "worker/render/integrator/mis.h"
+#include "worker/render/integrator/offset_ray.h"
 #include "worker/render/integrator/truncated_exponential.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/optical_depth.h"
-#include "worker/render/media/segment.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {

@@ -17,9 +17,9 @@
 
 #include "worker/render/base/features.h"
 #include "worker/render/integrator/equiangular.h"
+#include "worker/render/integrator/offset_ray.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/optical_depth.h"
-#include "worker/render/media/segment.h"
 #include "worker/render/world/shadow_roulette.h"
 #include "worker/render/world/world.h"
 

@@ -85,6 +85,14 @@ inline SinCos sin_cos_eighth(float x) {
   return {x + x * y * (-1.f / 6 + y * (1.f / 120 + y * (-1.f / 5040 + y * (1.f / 362880)))),
           1 + y * (-.5f + y * (1.f / 24 + y * (-1.f / 720 + y * (1.f / 40320 + y * (-1.f / 3628800)))))};
 }
+// Converts a sum of samples to the float32 that is stored in a partial (the pixel sums of one unit: one tile
+// and range of samples). Denormals become 0, so that the result does not depend on whether the process that
+// adds up the partials treats denormals as 0.
+inline float rounded(double sum) {
+  const auto f = static_cast<float>(sum);
+  return std::abs(f) < 0x1p-126f ? 0.f : f;
+}
+
 // Returns the point of the unit circle at angle 2 pi u, u in [0, 1]. u is reduced exactly to the nearest
 // quarter turn.
 inline V2 unit_circle(float u) {

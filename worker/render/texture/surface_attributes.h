@@ -34,7 +34,18 @@ struct SurfaceAttributes {
 
   bool empty() const { return channels.empty(); }
   std::uint64_t bytes() const { return values.size() * sizeof(C3); }
-  void find_means();
+  void find_means() {
+    std::vector<V3d> sums(names.size(), V3d(0, 0, 0));
+    std::vector<double> counts(names.size(), 0);
+    for (std::uint32_t i : first_of)
+      for (; i != kNoChannel; i = channels[i].next) {
+        const Channel& c = channels[i];
+        for (std::uint32_t k = 0; k < c.count; ++k) sums[c.name] += V3d(values[c.first + k]);
+        counts[c.name] += c.count;
+      }
+    for (std::size_t i = 0; i < sums.size(); ++i)
+      means.push_back(counts[i] > 0 ? C3(sums[i] / counts[i]) : C3(0));
+  }
   // Returns the value at the point `at` of the attribute whose number in `names` is `name`. `corners`
   // contains three vertex indices per triangle. The value is black if the surface has no such attribute.
   C3 value(std::uint32_t name, const FacePoint& at, std::span<const std::uint32_t> corners) const {

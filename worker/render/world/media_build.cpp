@@ -1,4 +1,4 @@
-#include "worker/render/world/media_build.h"
+#include "worker/render/world/world_build.h"
 
 #include <fmt/format.h>
 

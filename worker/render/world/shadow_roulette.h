@@ -15,6 +15,8 @@ namespace ls::render {
 // The smallest probability with which a shadow ray is traced. In pixels of any brightness, roulette adds to
 // the variance at most 1 / kLeastTraced - 1 times the second moment of the light that is found.
 inline constexpr float kLeastTraced = .25f;
+// Shadow rays that could add less than this share of the mean radiance are subject to Russian roulette.
+inline constexpr float kFaintShadowRay = 1;
 
 // The probability with which a shadow ray is traced. `light` is the mean over the channels of the light that
 // the ray would add to the sample without attenuation.
@@ -24,6 +26,9 @@ inline float shadow_ray_probability(float light, float faint_shadow) {
 
 // Sets `faint_shadow` of a world with grids and without light vertices, which is otherwise complete.
 // `mean_radiance` is that of the image.
-void learn_shadow_roulette(const IntegratorSettings& settings, float mean_radiance, World& w);
+inline void learn_shadow_roulette(const IntegratorSettings& settings, float mean_radiance, World& w) {
+  if (settings.shadow_roulette < 0 || !w.lights.can_sample()) return;
+  w.faint_shadow = kFaintShadowRay * mean_radiance;
+}
 
 }  // namespace ls::render

@@ -11,7 +11,6 @@
 #include "worker/render/geometry/coincident.h"
 #include "worker/render/geometry/surface_boxes.h"
 #include "worker/render/world/aim.h"
-#include "worker/render/world/media_build.h"
 #include "worker/render/world/overlap.h"
 #include "worker/render/world/world.h"
 

@@ -1,7 +1,7 @@
 // Skins, morph targets and animations of glTF: the corners and the transforms that they give.
 #include <cmath>
 
-#include "common/scene/gltf/parts.h"
+#include "common/scene/gltf/translation.h"
 #include "tests/unit/scene/gltf/gltf_testing.h"
 
 namespace ls {

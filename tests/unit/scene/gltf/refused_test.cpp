@@ -1,7 +1,7 @@
 // glTF's files: what is refused, where, and with what advice; and what no file may do.
 #include <functional>
 
-#include "common/scene/gltf/words.h"
+#include "common/scene/gltf/support_table.h"
 #include "common/scene/limits.h"
 #include "tests/unit/scene/gltf/gltf_testing.h"
 

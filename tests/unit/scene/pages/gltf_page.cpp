@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include "common/scene/gltf/words.h"
+#include "common/scene/gltf/support_table.h"
 #include "tests/unit/scene/pages/pages.h"
 
 namespace ls::scene {
@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::string_view kGltfHead = R"(# Scenes of glTF
 
-<!-- Made by gltf_markdown() from the table in common/scene/gltf/words.cpp; do not edit. -->
+<!-- Made by gltf_markdown() from the table in common/scene/gltf/support_table.cpp; do not edit. -->
 
 A scene file whose name ends in `.gltf` or `.glb` is read as glTF 2.0, and becomes the same scene that our XML describes: every
 command takes it, and `lightshaft convert` writes it as XML. Errors name the file, the line of its JSON and the path of the value, as in

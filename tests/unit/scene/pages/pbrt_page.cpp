@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
-#include "common/scene/pbrt/words.h"
+#include "common/scene/pbrt/vocabulary.h"
 #include "tests/unit/scene/pages/pages.h"
 
 namespace ls::scene {
@@ -14,7 +14,7 @@ using pbrt::Word;
 
 constexpr std::string_view kPbrtHead = R"(# Scenes of pbrt
 
-<!-- Made by pbrt_markdown() from the table in common/scene/pbrt/words.cpp; do not edit. -->
+<!-- Made by pbrt_markdown() from the table in common/scene/pbrt/vocabulary.cpp; do not edit. -->
 
 A scene file whose name ends in `.pbrt` is read as pbrt-v4 reads it, and becomes the same scene that our XML describes:
 every command takes it, and `lightshaft convert` writes it as XML. What is not in this table is an error with its place;

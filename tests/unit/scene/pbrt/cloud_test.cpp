@@ -7,8 +7,6 @@
 #include <cmath>
 #include <random>
 
-#include "common/scene/pbrt/noise.h"
-
 namespace ls::scene::pbrt {
 namespace {
 

@@ -1,6 +1,6 @@
 // pbrt's files: what is refused, where, and with what advice.
 #include "common/scene/limits.h"
-#include "common/scene/pbrt/words.h"
+#include "common/scene/pbrt/vocabulary.h"
 #include "tests/unit/scene/pbrt/pbrt_testing.h"
 
 namespace ls {

@@ -1,5 +1,8 @@
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -36,6 +39,11 @@ bool is_shown(std::uint32_t code) {
   return !within(0, 0x1F) && !within(0x7F, 0x9F) && !within(0x2028, 0x202E) && !within(0x2066, 0x2069);
 }
 
+bool needs_no_quotes(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+         std::string_view("%+,-./:=@_").find(c) != std::string_view::npos;
+}
+
 }  // namespace
 
 std::string plain_text(std::string_view text) {
@@ -51,6 +59,25 @@ std::string plain_text(std::string_view text) {
     text.remove_prefix(bytes);
   }
   return plain;
+}
+
+std::string shell_word(std::string_view text) {
+  if (!text.empty() && std::all_of(text.begin(), text.end(), needs_no_quotes)) return std::string(text);
+  // True if there are characters that are unsafe for a terminal
+  const bool escapes = plain_text(text) != text;
+  std::string word = escapes ? "$'" : "'";
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (!escapes)
+      c == '\'' ? word.append("'\\''") : word.append(1, c);
+    else if (c == '\'' || c == '\\')
+      word.append(1, '\\').append(1, c);
+    else if (byte < 0x20 || byte >= 0x7f)
+      word += fmt::format("\\{:03o}", byte);
+    else
+      word += c;
+  }
+  return word + "'";
 }
 
 }  // namespace ls

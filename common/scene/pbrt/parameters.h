@@ -1,5 +1,5 @@
 // The parameters of one pbrt object. The object's reader takes parameters by name, checked against the table
-// of words.h; finish() reports those that the table lacks.
+// of vocabulary.h; finish() reports those that the table lacks.
 #pragma once
 
 #include <optional>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/scene/pbrt/tokens.h"
-#include "common/scene/pbrt/words.h"
+#include "common/scene/pbrt/vocabulary.h"
 #include "common/scene/scene_values.h"
 
 namespace ls::scene::pbrt {

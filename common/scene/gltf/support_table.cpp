@@ -1,4 +1,4 @@
-#include "common/scene/gltf/words.h"
+#include "common/scene/gltf/support_table.h"
 
 #include <algorithm>
 #include <iterator>

@@ -1,4 +1,4 @@
-#include "common/report/words.h"
+#include "common/report/number_text.h"
 
 #include <fmt/chrono.h>
 

@@ -1,4 +1,4 @@
-#include "common/scene/pbrt/load.h"
+#include "common/scene/pbrt/description.h"
 
 #include <fmt/format.h>
 
@@ -12,7 +12,7 @@
 #include "common/base/suggest.h"
 #include "common/scene/file_names.h"
 #include "common/scene/limits.h"
-#include "common/scene/pbrt/parts.h"
+#include "common/scene/pbrt/object_translation.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene::pbrt {

@@ -9,7 +9,7 @@
 
 #include "common/scene/made_files.h"
 #include "common/scene/pbrt/cloud.h"
-#include "common/scene/pbrt/params.h"
+#include "common/scene/pbrt/parameters.h"
 #include "common/scene/read.h"
 #include "common/scene/xml/make_element.h"
 

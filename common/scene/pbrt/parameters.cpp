@@ -1,4 +1,4 @@
-#include "common/scene/pbrt/params.h"
+#include "common/scene/pbrt/parameters.h"
 
 #include <fmt/format.h>
 

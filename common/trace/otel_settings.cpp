@@ -1,4 +1,4 @@
-#include "common/trace/settings.h"
+#include "common/trace/otel_settings.h"
 
 #include <fmt/format.h>
 #include <strings.h>

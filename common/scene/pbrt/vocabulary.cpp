@@ -1,4 +1,4 @@
-#include "common/scene/pbrt/words.h"
+#include "common/scene/pbrt/vocabulary.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "common/scene/gltf/load.h"
+#include "common/scene/gltf/asset.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -7,11 +7,11 @@
 #include <cstring>
 
 #include "common/base/parse_number.h"
-#include "common/base/plain_text.h"
+#include "common/base/safe_text.h"
 #include "common/base/suggest.h"
 #include "common/scene/file_names.h"
-#include "common/scene/gltf/parts.h"
-#include "common/scene/gltf/words.h"
+#include "common/scene/gltf/support_table.h"
+#include "common/scene/gltf/translation.h"
 #include "common/scene/limits.h"
 
 namespace ls::scene::gltf {
