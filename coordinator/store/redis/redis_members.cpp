@@ -12,8 +12,12 @@
 namespace ls::coordinator {
 namespace {
 
-// Lifetime of the key heir:NODE; it should be longer than it takes to take over all jobs of a dead node
+// Lifetime of the key heir:NODE. Every job that is taken renews it, so it should be longer than the time
+// between two of them, in which kTakenAtOnce jobs are stored here.
 constexpr const char* kHeirMilliseconds = "15000";
+// Number of jobs after which a takeover stores what it has taken and sends a heartbeat. A heartbeat is due
+// long before thousands of jobs are taken and stored, and without it this node would count as dead itself.
+constexpr std::size_t kTakenAtOnce = 64;
 
 // Sends a node's heartbeat. ARGV: node, addresses, lifetime of the heartbeat in ms, the node's number from
 // unique_start(), number of lost jobs handled. Returns {lost jobs, node, alive, node, alive, ...}.
@@ -32,10 +36,14 @@ end
 return answer
 )";
 
-// Takes over a job. ARGV: job, dead node, node that takes it, sequence or ''. Returns nothing if the dead
-// node is alive again or no longer owns the job.
+// Takes over a job and renews the key heir:NODE. ARGV: job, dead node, node that takes it, sequence or '',
+// lifetime of the key in ms. Returns nothing if the dead node is alive again or no longer owns the job, and
+// -1 if the node that takes the job is not the heir any more: two heirs would share the frames of a sequence.
 constexpr const char* kTake = R"(
 local key = 'lightshaft:job:' .. ARGV[1]
+local heir = 'lightshaft:heir:' .. ARGV[2]
+if redis.call('GET', heir) ~= ARGV[3] then return -1 end
+redis.call('PEXPIRE', heir, ARGV[5])
 if redis.call('EXISTS', 'lightshaft:alive:' .. ARGV[2]) == 1 then return {} end
 if redis.call('HGET', key, 'owner') ~= ARGV[2] then
   redis.call('SREM', 'lightshaft:owned:' .. ARGV[2], ARGV[1])
@@ -49,9 +57,11 @@ if ARGV[4] ~= '' then redis.call('HSET', 'lightshaft:sequences', ARGV[4], ARGV[3
 return redis.call('HGETALL', key)
 )";
 
-// Ends the takeover from a dead node. ARGV: dead node. If the node has no jobs left, it is not polled any
-// more, and its list of lost jobs is kept for a week, in case the node comes back and reads it.
+// Ends the takeover from a dead node. ARGV: dead node, its heir. If the node has no jobs left, it is not
+// polled any more, and its list of lost jobs is kept for a week, in case the node comes back and reads it.
+// Returns 0, and does nothing, if another node is the heir by now.
 constexpr const char* kSettle = R"(
+if redis.call('GET', 'lightshaft:heir:' .. ARGV[1]) ~= ARGV[2] then return 0 end
 if redis.call('SCARD', 'lightshaft:owned:' .. ARGV[1]) == 0 and redis.call('EXISTS', 'lightshaft:alive:' .. ARGV[1]) == 0 then
   redis.call('HDEL', 'lightshaft:nodes', ARGV[1])
   redis.call('EXPIRE', 'lightshaft:lost:' .. ARGV[1], 604800)
@@ -243,9 +253,12 @@ Result<std::optional<TakenJob>> RedisMembers::take(const JobId& id, const std::s
     return std::nullopt;
   const auto frame = frame_of(id);
   own_unclear_ = true;
-  auto fields = link_->run(
-      {"EVAL", kTake, "0", id.value, dead, options_.node, frame ? frame->sequence.value : std::string()});
+  auto fields = link_->run({"EVAL", kTake, "0", id.value, dead, options_.node,
+                            frame ? frame->sequence.value : std::string(), kHeirMilliseconds});
   if (!fields) return tl::unexpected(fields.error());
+  if (fields->number == -1)
+    return fail(Errc::failed_precondition,
+                fmt::format("another coordinator goes on taking over the jobs of coordinator {}", dead));
   if (fields->items.empty()) return std::nullopt;
   auto job = parse_redis_job(*fields);
   // This node owns the job by now; look_for_stranded() will check the job again.
@@ -263,9 +276,24 @@ Result<void> RedisMembers::take_from(const std::string& dead) {
   }
   auto unfinished = left_unfinished(dead);
   if (!unfinished) return tl::unexpected(unfinished.error());
+  for (std::span<const JobId> left(*unfinished); !left.empty();) {
+    const auto now = left.first(std::min(left.size(), kTakenAtOnce));
+    left = left.subspan(now.size());
+    if (auto taken = take_some(now, dead); !taken) return taken;
+    if (left.empty()) break;
+    if (auto known = send_heartbeat(); !known) return tl::unexpected(known.error());
+  }
+  auto done = link_->run({"EVAL", kSettle, "0", dead, options_.node});
+  if (!done) return tl::unexpected(done.error());
+  if (done->number != 0) settled_.insert(dead);
+  return {};
+}
+
+// Takes over these jobs, and stores those that it got even if it fails at one.
+Result<void> RedisMembers::take_some(std::span<const JobId> ids, const std::string& dead) {
   std::vector<TakenJob> taken;
   std::optional<Error> cut;
-  for (const JobId& id : *unfinished) {
+  for (const JobId& id : ids) {
     auto job = take(id, dead);
     if (!job) {
       cut = job.error();
@@ -278,10 +306,7 @@ Result<void> RedisMembers::take_from(const std::string& dead) {
              fmt::format("coordinator {} is gone: {} of its jobs are taken over", dead, taken.size()));
     callbacks_.taken(std::move(taken));
   }
-  if (cut) return tl::unexpected(*cut);
-  settled_.insert(dead);
-  auto done = link_->run({"EVAL", kSettle, "0", dead});
-  return done ? Result<void>() : tl::unexpected(done.error());
+  return cut ? Result<void>(tl::unexpected(*cut)) : Result<void>();
 }
 
 Result<std::optional<Member>> RedisMembers::owner_of(const JobId& id) {

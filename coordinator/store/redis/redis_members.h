@@ -21,6 +21,7 @@
 #include <mutex>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -126,6 +127,7 @@ class RedisMembers {
   Result<void> look_for_quarantined();
   Result<void> look_for_stranded();
   Result<void> take_from(const std::string& dead);
+  Result<void> take_some(std::span<const JobId> ids, const std::string& dead);
   Result<std::vector<JobId>> left_unfinished(const std::string& dead);
   Result<std::optional<TakenJob>> take(const JobId& id, const std::string& dead);
   bool readable(const JobId& id, const Result<RedisJob>& job, const char* what_of_it);

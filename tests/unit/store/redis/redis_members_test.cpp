@@ -39,6 +39,7 @@ struct OneMember {
   std::vector<std::vector<QuarantinedWorker>> quarantined;
   std::set<JobId> known;
   bool keeps = true;  // what it is told to take
+  std::function<void()> on_taken = [] {};
   std::unique_ptr<RedisMembers> members;
 };
 
@@ -66,6 +67,7 @@ class Members : public testing::Test {
                          if (one.keeps) one.known.insert(job.job.job.id);
                          one.taken.push_back(std::move(job));
                        }
+                       one.on_taken();
                      },
                      [&one](const std::vector<LostJob>& jobs) {
                        one.lost.insert(one.lost.end(), jobs.begin(), jobs.end());
@@ -238,6 +240,47 @@ TEST_F(Members, OfSeveralHeirsOneTakesEachJob) {
 
   EXPECT_EQ(b.taken.size() + c.taken.size(), 20u);
   EXPECT_EQ(ask({"SCARD", "lightshaft:owned:a"}).number, 0);
+}
+
+TEST_F(Members, ALongTakeoverRenewsItsClaimAndSendsHeartbeats) {
+  add("a");
+  auto& b = add("b");
+  for (int i = 1; i <= 300; ++i) ASSERT_EQ(put("a", frame_job({"j-film"}, i).value, 1), 1);
+  lease_ends("a");
+  std::vector<std::int64_t> claims, beats;  // what the last pause before this one has left
+  b.on_taken = [&] {
+    claims.push_back(ask({"PTTL", "lightshaft:heir:a"}).number);
+    beats.push_back(ask({"EXISTS", "lightshaft:alive:b"}).number);
+    ask({"PEXPIRE", "lightshaft:heir:a", "5000"});
+    lease_ends("b");
+  };
+
+  for (int look = 0; look < kLooks; ++look) ASSERT_TRUE(b.members->beat());
+
+  EXPECT_EQ(b.taken.size(), 300u);
+  ASSERT_GT(claims.size(), 2u) << "it looks up several times";
+  for (const std::int64_t claim : claims) EXPECT_GT(claim, 5000);
+  for (const std::int64_t beat : beats) EXPECT_EQ(beat, 1);
+  EXPECT_EQ(ask({"EXISTS", "lightshaft:heir:a"}).number, 0) << "it is done";
+}
+
+TEST_F(Members, WhoHasLostItsClaimTakesNoMore) {
+  add("a");
+  auto &b = add("b"), &c = add("c");
+  for (int i = 1; i <= 300; ++i) ASSERT_EQ(put("a", frame_job({"j-film"}, i).value, 1), 1);
+  lease_ends("a");
+  b.on_taken = [&] { ask({"SET", "lightshaft:heir:a", "c"}); };
+
+  for (int look = 1; look < kLooks; ++look) ASSERT_TRUE(b.members->beat());
+  EXPECT_FALSE(b.members->beat());
+  const std::size_t before = b.taken.size();
+  EXPECT_LT(before, 300u);
+  EXPECT_EQ(ask({"GET", "lightshaft:heir:a"}).text, "c") << "the claim of another stays";
+  EXPECT_TRUE(b.members->beat());
+  for (int look = 0; look < kLooks; ++look) ASSERT_TRUE(c.members->beat());
+
+  EXPECT_EQ(b.taken.size(), before);
+  EXPECT_EQ(c.taken.size(), 300 - before);
 }
 
 TEST_F(Members, AnHeirThatDiesIsInheritedFrom) {
