@@ -28,9 +28,13 @@ Result<std::shared_ptr<const StoredLayers::Small>> StoredLayers::small(TileIndex
   auto made = std::make_shared<Small>();
   std::size_t bytes = 0;
   for (const PixelLayer& layer : layers_) {
+    const auto pixels = values->values(layer);
+    std::vector<std::byte>& kept = made->emplace_back();
+    if (pixels.empty()) continue;
     LayerMosaic mosaic(layer, grid_.frame, kKeptLevel, small_rect(tile));
-    mosaic.add(0, values->rect(), values->values(layer));
-    bytes += made->emplace_back(mosaic.bytes()).size();
+    mosaic.add(0, values->rect(), pixels);
+    kept = mosaic.bytes();
+    bytes += kept.size();
   }
   const std::lock_guard lock(mutex_);
   const auto [place, fresh] = small_.emplace(tile, std::move(made));

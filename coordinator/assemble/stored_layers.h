@@ -28,7 +28,9 @@ class StoredLayers {
   std::size_t bytes() const;  // bytes kept in memory
 
  private:
-  using Small = std::vector<std::vector<std::byte>>;  // pixels of each layer at mip level kKeptLevel
+  // Pixels of each layer at mip level kKeptLevel; empty if the tile has no samples. Its identifiers would be
+  // zeros then, which would hide those of its neighbours at a coarser level.
+  using Small = std::vector<std::vector<std::byte>>;
   static constexpr int kKeptLevel = 2;
   Result<TileLayers> read(TileIndex tile) const;
   PixelRect small_rect(TileIndex tile) const;

@@ -14,11 +14,11 @@ constexpr TileGrid kStoredGrid{{75, 50}, 32};
 constexpr AovSet kStoredAovs = AovSet().with(Aov::position).with(Aov::material_id);
 constexpr PixelRect kStoredWhole{0, 0, 75, 50};
 
-// All tiles but the second have samples.
-Film film() {
+// All tiles but one have samples.
+Film film_without(TileIndex empty) {
   Film film(kStoredGrid, kStoredAovs);
   for (TileIndex t = 0; t < kStoredGrid.count(); ++t)
-    if (t != 1)
+    if (t != empty)
       EXPECT_TRUE(film.fold(t, 0,
                             fake_partial({sha256("scene"), sha256("settings"), sha256("class"),
                                           kStoredGrid.rect(t), cut_range(0, 16)},
@@ -28,7 +28,8 @@ Film film() {
 
 class StoredLayersTest : public ::testing::Test {
  protected:
-  StoredLayersTest() {
+  StoredLayersTest() { keep(); }
+  void keep() const {
     auto file = SnapshotFile::create(path, ".new", kStoredGrid, kStoredAovs, "f").value();
     const RoundErrors errors(kStoredGrid.count(), false);
     for (TileIndex t = 0; t < kStoredGrid.count(); ++t)
@@ -50,7 +51,7 @@ class StoredLayersTest : public ::testing::Test {
 
   const TempFolder folder;
   const std::filesystem::path path = folder.path() / "film.snap";
-  const Film rendered = film();
+  Film rendered = film_without(1);
 };
 
 TEST_F(StoredLayersTest, AreThoseOfTheFilmInMemory) {
@@ -78,6 +79,24 @@ TEST_F(StoredLayersTest, OfHighLevelsDifferByNoMoreThanARoundingToHalf) {
     ASSERT_EQ(std::isnan(found[i]), std::isnan(wanted[i]));
     // A half has 11 bits: what is averaged is off by up to 2^-11 of it, and so is each of the two results.
     if (!std::isnan(found[i])) EXPECT_NEAR(found[i], wanted[i], 3 * std::ldexp(wanted[i], -11));
+  }
+}
+
+TEST_F(StoredLayersTest, OfATileWithoutSamplesHideNoIdentifierOfItsNeighbours) {
+  rendered = film_without(0);
+  keep();
+  const auto stored = open();
+  ASSERT_TRUE(stored);
+  const PixelLayer ids = pixel_layer(kStoredAovs, "crypto_material").value();
+  for (const int level : {5, 6, 7}) {
+    const FrameSize size = level_size(kStoredGrid.frame, level);
+    const PixelRect rect{0, 0, size.width, size.height};
+
+    const auto found = stored->pixels(ids, level, rect).value();
+
+    EXPECT_EQ(found, from_memory(ids, level, rect)) << level;
+    // A pixel of level 5 is one tile, and the first of them has nothing to show.
+    EXPECT_EQ(layer_floats(ids, found)[0] != 0, level > 5) << level;
   }
 }
 
