@@ -11,6 +11,7 @@
 namespace ls {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 Health of(HealthCause cause, int x, int y, std::uint64_t sample) {
@@ -144,6 +145,8 @@ TEST(Health, AUnitCanOnlyTellOfItself) {
 TEST(Health, SaysWhatIsWrongInASentence) {
   EXPECT_EQ(sentence(HealthCause::not_a_number, 1), "1 sample was not a number (NaN); it counts as zero");
   EXPECT_EQ(sentence(HealthCause::infinite, 1204), "1,204 samples were infinite; they count as zero");
+  EXPECT_THAT(sentence(HealthCause::too_many_surfaces, 2),
+              AllOf(HasSubstr("more than 1,048,576 rays"), HasSubstr("more than 65,536 surfaces")));
   EXPECT_THAT(sentence(HealthCause::majorant_violation, 2), HasSubstr("may be biased"));
   EXPECT_THAT(sentence(HealthCause::negative_density, 2), HasSubstr("of volumes of the scene were made 0"));
 }
