@@ -53,7 +53,8 @@ std::variant<Caller, Response> Auth::identify(const Request& request) {
         401,
         "send 'Authorization: Bearer TOKEN' (the admin's: file 'token' in the coordinator's data folder), "
         "or trade it for a session cookie at POST /api/v1/session");
-  auto caller = caller_of_session(session);
+  const auto open = parse_session(session);
+  auto caller = open && !is_closed(*open) ? tokens_.by_id(open->token_id) : std::nullopt;
   if (!caller) return problem(401, "the session has ended; log in again");
   const bool same_site = !request.header("origin").empty() || !request.header("sec-fetch-site").empty();
   if (unsafe(request.method) && (!same_site || cross_site(request)))
@@ -108,13 +109,20 @@ std::string Auth::cookie(std::string_view value, std::int64_t seconds) const {
 }
 
 std::string Auth::close_session(const Request& request) {
-  const std::string session(session_of(request));
-  if (caller_of_session(session)) {
+  if (const auto session = parse_session(session_of(request)); session && !is_closed(*session)) {
     const std::lock_guard lock(mutex_);
     const std::int64_t now = now_();
-    std::erase_if(revoked_, [now](const auto& entry) { return entry.second < now; });
-    if (revoked_.size() >= kMaxRevokedSessions) revoked_.erase(revoked_.begin());
-    revoked_.emplace(session, now + kSessionSeconds);
+    for (auto token = closed_.begin(); token != closed_.end();) {
+      auto& [sessions, refused_until] = token->second;
+      sessions.erase(sessions.begin(), sessions.lower_bound({now + 1, ""}));
+      token = sessions.empty() && refused_until <= now ? closed_.erase(token) : std::next(token);
+    }
+    Closed& closed = closed_[std::string(session->token_id)];
+    closed.sessions.emplace(session->expiry, session->text);
+    if (closed.sessions.size() > kMaxClosedSessions) {
+      closed.refused_until = closed.sessions.begin()->first;
+      closed.sessions.erase(closed.sessions.begin());
+    }
   }
   return cookie("", 0);
 }
@@ -129,19 +137,22 @@ bool Auth::cross_site(const Request& request) {
   return scheme == std::string_view::npos || origin.substr(scheme + 3) != request.header("host");
 }
 
-std::optional<Caller> Auth::caller_of_session(std::string_view session) const {
-  const std::size_t last = session.rfind('.');
+std::optional<Auth::Session> Auth::parse_session(std::string_view cookie) const {
+  const std::size_t last = cookie.rfind('.');
   if (last == std::string_view::npos) return std::nullopt;
-  const std::string_view text = session.substr(0, last);
-  if (!equal_secret(session.substr(last + 1), mac(text))) return std::nullopt;
-  std::int64_t expiry = 0;
-  std::from_chars(text.data(), text.data() + text.size(), expiry);
-  if (expiry <= now_()) return std::nullopt;
-  {
-    const std::lock_guard lock(mutex_);
-    if (revoked_.find(session) != revoked_.end()) return std::nullopt;
-  }
-  return tokens_.by_id(text.substr(text.rfind('.') + 1));
+  const std::string_view text = cookie.substr(0, last);
+  if (!equal_secret(cookie.substr(last + 1), mac(text))) return std::nullopt;
+  Session session{.text = text, .token_id = text.substr(text.rfind('.') + 1)};
+  std::from_chars(text.data(), text.data() + text.size(), session.expiry);
+  return session.expiry > now_() ? std::optional(session) : std::nullopt;
+}
+
+bool Auth::is_closed(const Session& session) const {
+  const std::lock_guard lock(mutex_);
+  const auto closed = closed_.find(session.token_id);
+  return closed != closed_.end() &&
+         (session.expiry <= closed->second.refused_until ||
+          closed->second.sessions.contains({session.expiry, std::string(session.text)}));
 }
 
 std::string_view Auth::session_of(const Request& request) const {

@@ -2,8 +2,9 @@
 //
 // The cookie's text is `expiry.nonce.token-id.mac`; the key of the MAC is TokenRegistry::session_key(). The
 // coordinator stores no open session, so sessions survive its restart. A session becomes invalid when its
-// token is revoked. Sessions closed by DELETE /session are remembered until they expire or the process ends,
-// but at most kMaxRevokedSessions of them.
+// token is revoked. Sessions closed by DELETE /session are remembered until they expire or the process ends.
+// If a token has more than kMaxClosedSessions of them, its sessions that are as old as the one that is
+// forgotten are refused, whether they were closed or not: a closed session never becomes valid again.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +12,10 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 
 #include "coordinator/http/auth/throttle.h"
@@ -60,7 +63,14 @@ class Auth {
  private:
   std::variant<Caller, Response> caller_of_token(const Request& request, std::string_view token,
                                                  std::string_view wrong);
-  std::optional<Caller> caller_of_session(std::string_view session) const;
+  // A session whose cookie has a valid MAC
+  struct Session {
+    std::int64_t expiry = 0;  // in seconds since 1970
+    std::string_view text;    // the cookie's text up to the MAC
+    std::string_view token_id;
+  };
+  std::optional<Session> parse_session(std::string_view cookie) const;
+  bool is_closed(const Session& session) const;
   std::string_view session_of(const Request& request) const;
   std::string mac(std::string_view text) const;
   std::string cookie(std::string_view value, std::int64_t seconds) const;
@@ -73,8 +83,11 @@ class Auth {
   UnixClock now_;
   Throttle throttle_;
   mutable std::mutex mutex_;
-  // Closed sessions: the cookie's text, and the time until which it is remembered, in seconds since 1970
-  std::map<std::string, std::int64_t, std::less<>> revoked_;
+  struct Closed {
+    std::set<std::pair<std::int64_t, std::string>> sessions;  // expiry and text
+    std::int64_t refused_until = 0;  // sessions that expire at this time or earlier are refused
+  };
+  std::map<std::string, Closed, std::less<>> closed_;  // by the token's id; each session has not expired yet
 };
 
 // Clears the fields of `worker` that describe its work for other users' jobs.

@@ -48,7 +48,7 @@ inline constexpr std::uint64_t kSmallAnswer = 64u << 10;
 inline constexpr std::uint64_t kLingerBytes = 16u << 20;
 
 inline constexpr std::int64_t kSessionSeconds = 12 * 3600;
-inline constexpr std::size_t kMaxRevokedSessions = 10'000;
+inline constexpr std::size_t kMaxClosedSessions = 1000;  // of one token
 
 // Limits that tests and the operator's config file may change
 struct Limits {

@@ -81,6 +81,26 @@ TEST_F(AuthTest, RefusesAChangedOrExpiredOrClosedSession) {
   EXPECT_EQ(status(Method::get, {{"cookie", cookie()}}), 200);
 }
 
+// One with read rights, say, that opens and closes sessions all day to bring back what was closed before.
+TEST_F(AuthTest, AClosedSessionStaysClosedHoweverManyAreClosedAfterIt) {
+  const auto close = [&](const std::string& session) {
+    auth.close_session(request(Method::del, "/api/v1/session", {{"cookie", session}}));
+  };
+  const auto reader = tokens.add(Role::read, "");
+  ASSERT_TRUE(reader);
+  const std::string of_admin = cookie(), first = cookie(reader->token), open = cookie(reader->token);
+  close(first);
+  now += 60;
+
+  for (std::size_t i = 0; i < 2 * kMaxClosedSessions; ++i) close(cookie(reader->token));
+
+  EXPECT_EQ(status(Method::get, {{"cookie", first}}), 401);
+  EXPECT_EQ(status(Method::get, {{"cookie", open}}), 401) << "as old as one that is not remembered";
+  EXPECT_EQ(status(Method::get, {{"cookie", of_admin}}), 200) << "of another token";
+  now += 1;
+  EXPECT_EQ(status(Method::get, {{"cookie", cookie(reader->token)}}), 200) << "a new one";
+}
+
 TEST_F(AuthTest, SurvivesARestartOfTheCoordinator) {
   const std::string before = cookie();
 
