@@ -119,10 +119,11 @@ class Survey {
   }
 
   // True if this file may be the bundle's job.json. That is a job.json at the top or, since a folder that
-  // contains all files counts as the top, one directly in a folder. When two such files were found, no more
-  // are kept from folders: no folder contains all files then.
+  // contains all files but litter counts as the top, one directly in a folder. When two such files were
+  // found, no more are kept from folders: no folder contains all files then.
   bool may_be_job_file(const std::string& name) const {
     if (name == kBundleJobFile) return true;
+    if (is_litter(name)) return false;
     const std::size_t slash = name.find('/');
     return slash != std::string::npos && name.substr(slash + 1) == kBundleJobFile &&
            contents.job_files.size() < 2;

@@ -24,9 +24,6 @@ std::string shown(std::string_view name) {
   return fmt::format("\"{}\"", plain_text(name.substr(0, kMaxAssetName)));
 }
 
-// True for files that file managers add to archives and that no scene uses.
-bool is_litter(std::string_view name) { return name.starts_with("__MACOSX/") || name.starts_with('.'); }
-
 // Returns "FOLDER/" if all files lie in one folder FOLDER, else "".
 std::string top_of(const std::vector<BundleFile>& files) {
   std::string top;
@@ -156,6 +153,8 @@ Result<Bundle> sorted_out(const BundleContents& contents) {
   if (!found) return bad_entry(job.scene.value_or(""), "is named by job.json as the scene, but is not in it");
   return bundle;
 }
+
+bool is_litter(std::string_view name) { return name.starts_with("__MACOSX/") || name.starts_with('.'); }
 
 tl::unexpected<Error> bad_bundle(std::string text) {
   return fail(Errc::invalid_argument, "the bundle: " + std::move(text));

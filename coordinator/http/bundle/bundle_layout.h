@@ -26,6 +26,9 @@ struct BundleContents {
 
 Result<Bundle> sorted_out(const BundleContents& contents);
 
+// True for files that file managers add to archives and that no scene uses. `name` is as in BundleFile.
+bool is_litter(std::string_view name);
+
 // Make errors of the kind invalid_argument whose text begins with "the bundle: "; bad_entry() also names the
 // entry.
 tl::unexpected<Error> bad_bundle(std::string text);

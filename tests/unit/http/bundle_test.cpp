@@ -156,6 +156,13 @@ TEST_F(Bundles, MayNameTheirSceneAndSpecInAJobFile) {
   ASSERT_TRUE(nested) << nested.error().message;
   EXPECT_EQ(nested->scene, "f/a.xml");
   EXPECT_EQ(parse_job_spec(nested->spec)->seed, 5u);
+
+  const auto with_litter = read(kTar, {{"__MACOSX/job.json", "{"},
+                                       {".git/job.json", "{"},
+                                       {"f/a.xml", "1"},
+                                       {"f/job.json", R"({"seed": 5})"}});
+  ASSERT_TRUE(with_litter) << with_litter.error().message;
+  EXPECT_EQ(parse_job_spec(with_litter->spec)->seed, 5u);
 }
 
 TEST_F(Bundles, WithAWrongJobFileAreRefused) {
