@@ -165,9 +165,19 @@ double determinant3(const Transform& t) {
 }
 
 bool invertible(const Transform& t) {
+  const auto finite = [](double x) { return std::isfinite(x); };
   // A subnormal determinant is refused: its reciprocal, the determinant of the inverse, may be infinite.
-  return std::all_of(t.m.begin(), t.m.end(), [](double x) { return std::isfinite(x); }) &&
-         std::isnormal(determinant3(t));
+  const double d = determinant3(t);
+  if (!std::all_of(t.m.begin(), t.m.end(), finite) || !std::isnormal(d)) return false;
+  // The inverse may overflow although the determinant is normal: the renderer, which computes it by these
+  // products too, would refuse the matrix only when it builds the world.
+  const Vec3 a{t.m[0], t.m[4], t.m[8]}, b{t.m[1], t.m[5], t.m[9]}, c{t.m[2], t.m[6], t.m[10]},
+      moved{t.m[3], t.m[7], t.m[11]};
+  for (const Vec3& cofactors : {cross(b, c), cross(c, a), cross(a, b)}) {
+    const Vec3 row{cofactors[0] * (1 / d), cofactors[1] * (1 / d), cofactors[2] * (1 / d)};
+    if (!std::all_of(row.begin(), row.end(), finite) || !finite(dot(row, moved))) return false;
+  }
+  return true;
 }
 
 // Checks that M transpose(M) is the identity, where M is the linear part.

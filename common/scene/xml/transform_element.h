@@ -15,8 +15,8 @@ Vec3 transform_point(const Transform& t, const Vec3& p);  // uses the affine par
 Vec3 transform_vector(const Transform& t, const Vec3& v);
 double determinant3(const Transform& t);  // determinant of the linear part
 
-// True if all elements are finite and the determinant of the linear part is a normal number: not 0,
-// subnormal or infinite.
+// True if all elements of the matrix and of its inverse are finite, and the determinant of the linear part is
+// a normal number: not 0, subnormal or infinite.
 bool invertible(const Transform& t);
 // True if the matrix consists only of translation, rotation and reflection, up to 1e-3 as Mitsuba 3 requires
 // of sensors.

@@ -55,6 +55,22 @@ TEST(Transforms, MatricesAreRowByRow) {
   EXPECT_EQ(of("<matrix value=\"1,0,0,9,0,1,0,8,0,0,1,7,0,0,0,1\"/>").m[7], 8);
 }
 
+TEST(Transforms, WithoutAFiniteInverseAreRefused) {
+  const auto made = [](double x, double y, double z, double move) {
+    return Transform{{x, 0, 0, move, 0, y, 0, 0, 0, 0, z, 0, 0, 0, 0, 1}};
+  };
+
+  EXPECT_TRUE(scene::invertible(made(1e-100, 1, 1e100, 7)));
+  EXPECT_FALSE(scene::invertible(made(0, 1, 1, 0)));
+  EXPECT_FALSE(scene::invertible(made(1e-310, 1, 1, 0))) << "its determinant is subnormal";
+  EXPECT_FALSE(scene::invertible(made(1e-310, 1, 1e10, 0))) << "its determinant is normal, 1 / 1e-310 is not";
+  EXPECT_FALSE(scene::invertible(made(1e-200, 1, 1, 1e200))) << "1e200 / 1e-200 overflows";
+  EXPECT_NE(read(with_sensor("<shape type=\"cube\"><transform name=\"to_world\"><scale value=\"1e-310, 1, "
+                             "1e10\"/></transform></shape>"))
+                .diagnostics.size(),
+            0u);
+}
+
 TEST(Transforms, AnAxisThatMitsubaWouldShearByIsWarnedAbout) {
   const auto warnings = [](const std::string& step) {
     return read(with_sensor("<shape type=\"cube\"><transform name=\"to_world\">" + step +
