@@ -18,10 +18,14 @@ constexpr std::uint64_t kTableShare = 16;
 
 }  // namespace
 
+bool Lights::enough_for_tree() const {
+  return std::count_if(lights_.begin(), lights_.end(), has_place) >= kTreeFrom;
+}
+
 // Moves the lights with a position to the front of the list, where build_tree() expects them, unless they are
 // too few for a tree. Area lights have a position and are already first, so their order does not change.
 void Lights::sort_places_first() {
-  if (std::count_if(lights_.begin(), lights_.end(), has_place) < kTreeFrom) return;
+  if (!enough_for_tree()) return;
   std::stable_partition(lights_.begin(), lights_.end(), has_place);
 }
 

@@ -17,6 +17,7 @@
 // float64 without library functions other than square roots, so the results are the same on every machine.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -49,6 +50,7 @@ class LightTree {
   std::uint64_t words_of(std::uint32_t light, std::uint64_t words, const V3& x, const V3& n) const;
 
   bool empty() const { return nodes_.empty(); }
+  std::size_t lights() const { return trails_.size(); }
   std::uint64_t bytes() const {
     return nodes_.size() * sizeof(Node) + trails_.size() * sizeof(std::uint64_t);
   }

@@ -132,6 +132,8 @@ class Lights {
   // integrators that do not sample points on segments: for such points the light is chosen before the point.
   void use_tree_in_media() { tree_in_media_ = true; }
   bool has_tree() const { return !tree_.empty(); }
+  std::size_t in_tree() const { return tree_.lights(); }  // number of lights in the tree
+  bool enough_for_tree() const;                           // counts the lights with a position
   // True if lights are chosen by the tree at some places. `media`: the scene has media.
   bool uses_tree(bool media) const {
     return has_tree() && (!local_ || (media && tree_in_media_ && !local_in_media()));

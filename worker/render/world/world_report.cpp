@@ -47,8 +47,9 @@ std::vector<WorldReport::Structure> structures_of(const World& w) {
           {"majorant cells", cells, grids},
           {"light table", w.lights.table_bytes(), counted(w.lights.count(), "light")},
           {"light tree", w.lights.tree_bytes(),
-           w.lights.has_tree() ? counted(w.lights.count(), "light")
-                               : "too few lights with a place to choose among"}};
+           w.lights.has_tree()          ? counted(w.lights.in_tree(), "light")
+           : w.lights.enough_for_tree() ? "switched off"
+                                        : "too few lights with a place to choose among"}};
 }
 
 }  // namespace

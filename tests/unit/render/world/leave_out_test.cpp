@@ -124,6 +124,23 @@ TEST(LeaveOut, AWorldHasNoStructureThatItsSceneDoesNotUse) {
   EXPECT_GT(many.at("light tree"), 0u);
 }
 
+TEST(LeaveOut, TheTreeOfLightsSaysWhatItHasOrWhyItIsNone) {
+  const auto tree_of = [](int lamps, int setting) {
+    const auto world = test::world_of(with(plain_room(), [&](SceneBuilder& k) {
+      for (int i = 0; i < lamps; ++i) k.scene.emitters.push_back(PointEmitter{{1. * i, -1, 3}, {1, 1, 1}});
+      k.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, {1, 1, 1}});
+      k.scene.integrator.light_tree = setting;
+    }));
+    for (const auto& s : describe(*world).structures)
+      if (s.name == "light tree") return s.detail;
+    return std::string();
+  };
+
+  EXPECT_EQ(tree_of(100, 0), "102 lights") << "two are the room's, and the distant one is not in it";
+  EXPECT_EQ(tree_of(100, -1), "switched off");
+  EXPECT_EQ(tree_of(3, 0), "too few lights with a place to choose among");
+}
+
 TEST(LeaveOut, TheCheapestInstantiationIsTheOneThatTheNeedsName) {
   const auto variant = [](const SceneBuilder& builder) { return describe(*test::world_of(builder)).variant; };
   EXPECT_EQ(variant(plain_room()), "surfaces");
