@@ -96,14 +96,19 @@ struct ProjectorLight : Punctual<ProjectorLight> {
   Pivot pivot(const LightWorld&, const LightNumbers&) const { return {position, axis, cos_corner()}; }
   bool dark(const LightWorld& world) const { return is_black(value) || is_black(world.textures.mean(image)); }
   double power(const LightWorld& world) const {
-    // The area of the image on the plane at distance 1, or its solid angle
+    return luminance(value * world.textures.mean(image)) * (even ? solid_angle() : area());
+  }
+  // Those of the image: its area on the plane at distance 1, and its solid angle
+  double area() const { return double{4 * tan_x * tan_y}; }
+  double solid_angle() const {
     const double x2 = tan_x * tan_x, y2 = tan_y * tan_y;
-    const double extent =
-        even ? 4 * std::asin(std::sqrt(x2 * y2 / ((1 + x2) * (1 + y2)))) : double{4 * tan_x * tan_y};
-    return luminance(value * world.textures.mean(image)) * extent;
+    return 4 * std::asin(std::sqrt(x2 * y2 / ((1 + x2) * (1 + y2))));
   }
   LightBounds bounds(const LightWorld& world) const {
     LightBounds b = bounds_of(value * world.textures.mean(image));
+    // The mean over its directions: towards the corners of a wide image the intensity is far higher than
+    // along the axis (see towards()).
+    if (!even) b.intensity *= area() / solid_angle();
     b.axis = axis;
     b.cos_spread = cos_corner();
     b.cos_reach = 1;

@@ -116,6 +116,36 @@ TEST(Projector, AsIntensityIsEvenInAllDirections) {
     }
 }
 
+// By this intensity the light tree chooses. Were it that along the axis, a wide projector would be chosen too
+// seldom where its corners shine.
+TEST(Projector, HasTheMeanIntensityOfItsDirectionsInTheTree) {
+  for (const bool even : {false, true}) {
+    ProjectorEmitter e;
+    e.fov = 120;
+    e.as_intensity = even;
+    const SceneBuilder builder = projecting(slide(), e);
+    const LightBench b(builder);
+    const LightWorld lit{b.world->geometry, b.world->textures};
+    const ProjectorLight light = make_light(std::get<ProjectorEmitter>(builder.scene.emitters.front()), lit);
+
+    constexpr int kSteps = 300;  // a multiple of the texels in both directions
+    double intensity = 0, directions = 0;
+    for (int i = 0; i < kSteps; ++i)
+      for (int j = 0; j < kSteps; ++j) {
+        const float x = light.tan_x * (2 * (i + .5f) / kSteps - 1),
+                    y = light.tan_y * (2 * (j + .5f) / kSteps - 1);
+        const V3 w = normalize(light.axis + light.axis_u * x + light.axis_v * y);
+        const double z = dot(w, light.axis);
+        intensity += luminance(light.towards(lit, w)) * z * z * z;
+        directions += z * z * z;
+      }
+    const double mean = intensity / directions;
+
+    // The steps are squares that the middle stands for: to (width of a step)^2, which is 1e-4.
+    EXPECT_NEAR(light.bounds(lit).intensity, mean, 1e-4 * mean) << even;
+  }
+}
+
 TEST(Projector, StandsUpright) {
   ProjectorEmitter e;
   e.to_world = test::look_at({0, 0, 0}, {0, 0, 1}, {0, 1, 0});  // its left is +x
