@@ -150,6 +150,29 @@ TEST(Bitmap, LoadsAFileOnceHoweverManyTexturesUseIt) {
   EXPECT_EQ(t->bytes(), 4u * 4 * 3 * sizeof(float));
 }
 
+TEST(Bitmap, DecodesAFileOnceInHoweverManyWaysItIsRead) {
+  Scene s = with(BitmapTexture{{0}});
+  for (const bool raw : {true, false, true}) {
+    BitmapTexture t{{0}, TextureFilter::nearest};
+    t.raw = raw;
+    t.channel = Channel::red;
+    s.textures.push_back(t);
+    t.channel = Channel::all;
+    s.textures.push_back(t);
+  }
+  int loads = 0;
+  const auto t = TextureTable::build(s, [&](const Asset&) { return ++loads, Result<ImageData>(ramp()); });
+
+  ASSERT_TRUE(t);
+  EXPECT_EQ(loads, 1);
+  EXPECT_EQ(t->bytes(), 2u * (4 * 4 * 3 + 4 * 4) * sizeof(float)) << "each way is kept once";
+  for (std::uint32_t i = 0; i < s.textures.size(); ++i) {
+    const bool one = std::get<BitmapTexture>(s.textures[i]).channel == Channel::red;
+    EXPECT_EQ(t->eval({i}, {.6f, .9f}).x, i == 0 ? t->eval({0}, {.6f, .9f}).x : 2.f) << i;
+    EXPECT_EQ(t->eval({i}, {.6f, .9f}).z, one ? 2.f : 1.f) << i;
+  }
+}
+
 TEST(Checkerboard, ChoosesAsMitsubaDoes) {
   const auto board = [](const UvTransform& to_uv) {
     Scene s;

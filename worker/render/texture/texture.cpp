@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <set>
 #include <tuple>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "common/base/overloaded.h"
@@ -59,24 +61,52 @@ struct TextureTable::Data {
 
 namespace {
 
-using TexelsKey = std::tuple<std::uint32_t, bool, bool, Channel>;  // asset, raw, alpha, channel
+// Makes the texels of bitmaps. Bitmaps that read a file in the same way share their texels, and a file that
+// is read in several ways is decoded once; its decoded image is kept only until the last of these.
+class TexelsLoader {
+ public:
+  TexelsLoader(const Scene& scene, const ImageLoader& load, TextureTable::Data& data)
+      : scene_(scene), load_(load), data_(data) {
+    std::set<Key> keys;
+    for (const Texture& t : scene.textures)
+      if (const auto* b = std::get_if<BitmapTexture>(&t))
+        if (keys.insert(key_of(*b)).second) ++left_[b->file.value];
+  }
 
-Result<std::uint32_t> load_texels(const Scene& scene, const BitmapTexture& b, const ImageLoader& load,
-                                  TextureTable::Data& data, std::map<TexelsKey, std::uint32_t>& loaded) {
-  if (b.file.value >= scene.assets.size())
-    return fail(Errc::invalid_argument,
-                fmt::format("a bitmap names file {} of {}", b.file.value, scene.assets.size()));
-  const TexelsKey key{b.file.value, b.raw, b.alpha, b.channel};
-  if (const auto it = loaded.find(key); it != loaded.end()) return it->second;
-  const Asset& asset = scene.assets[b.file.value];
-  auto image = load(asset);
-  if (!image) return tl::unexpected(image.error());
-  auto texels = make_texels(asset.name, std::move(*image), b.raw, b.alpha, b.channel);
-  if (!texels) return tl::unexpected(texels.error());
-  data.clamped += texels->clamped;
-  data.texels.push_back(std::move(*texels));
-  return loaded[key] = static_cast<std::uint32_t>(data.texels.size() - 1);
-}
+  Result<std::uint32_t> texels_of(const BitmapTexture& b) {
+    if (b.file.value >= scene_.assets.size())
+      return fail(Errc::invalid_argument,
+                  fmt::format("a bitmap names file {} of {}", b.file.value, scene_.assets.size()));
+    if (const auto it = made_.find(key_of(b)); it != made_.end()) return it->second;
+    const Asset& asset = scene_.assets[b.file.value];
+    auto image = image_of(b.file.value, asset);
+    if (!image) return tl::unexpected(image.error());
+    auto texels = make_texels(asset.name, std::move(*image), b.raw, b.alpha, b.channel);
+    if (!texels) return tl::unexpected(texels.error());
+    data_.clamped += texels->clamped;
+    data_.texels.push_back(std::move(*texels));
+    return made_[key_of(b)] = static_cast<std::uint32_t>(data_.texels.size() - 1);
+  }
+
+ private:
+  using Key = std::tuple<std::uint32_t, bool, bool, Channel>;  // asset, raw, alpha, channel
+  static Key key_of(const BitmapTexture& b) { return {b.file.value, b.raw, b.alpha, b.channel}; }
+
+  Result<ImageData> image_of(std::uint32_t file, const Asset& asset) {
+    const bool last = --left_[file] == 0;
+    auto decoded = decoded_.extract(file);
+    Result<ImageData> image = decoded ? Result<ImageData>(std::move(decoded.mapped())) : load_(asset);
+    if (image && !last) decoded_.emplace(file, *image);
+    return image;
+  }
+
+  const Scene& scene_;
+  const ImageLoader& load_;
+  TextureTable::Data& data_;
+  std::map<std::uint32_t, int> left_;  // of each file, the ways to read it that are still to come
+  std::map<std::uint32_t, ImageData> decoded_;
+  std::map<Key, std::uint32_t> made_;
+};
 
 // Makes the entry of a mesh_attribute texture. If no mesh has the attribute, the texture is never evaluated:
 // Geometry::build rejects meshes that use the texture but lack the attribute.
@@ -177,7 +207,7 @@ Result<TextureTable> TextureTable::build(const Scene& scene, const ImageLoader& 
   TextureTable table;
   Data& data = *table.data_;
   data.meshes = meshes;
-  std::map<TexelsKey, std::uint32_t> loaded;
+  TexelsLoader loader(scene, load, data);
   const auto constant = [](const ConstantTexture& t) -> Result<Entry> {
     Entry e;
     e.value = {static_cast<float>(t.value[0]), static_cast<float>(t.value[1]),
@@ -189,7 +219,7 @@ Result<TextureTable> TextureTable::build(const Scene& scene, const ImageLoader& 
   const auto bitmap = [&](const BitmapTexture& t) -> Result<Entry> {
     const auto to_uv = affine(t.to_uv);
     if (!to_uv) return tl::unexpected(to_uv.error());
-    const auto texels = load_texels(scene, t, load, data, loaded);
+    const auto texels = loader.texels_of(t);
     if (!texels) return tl::unexpected(texels.error());
     return Entry{Kind::bitmap, t.filter, t.wrap, *texels, 0, data.texels[*texels].mean, *to_uv};
   };
