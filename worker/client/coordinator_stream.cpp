@@ -88,7 +88,7 @@ void WorkCall::close(Duration at_most) {
   if (done_changed_.wait_for(state, at_most, done)) return;
   context_->TryCancel();
   release_hold(*state);
-  done_changed_.wait(state, done);  // bounded: keepalive closes dead connections (client.cpp)
+  done_changed_.wait(state, done);  // short: a cancelled call ends here, whatever the network does
 }
 
 void WorkCall::OnReadDone(bool ok) {
