@@ -78,15 +78,10 @@ Result<std::vector<JobId>> wanted_of(RedisLink& link, JobStore& local,
   return wanted;
 }
 
-Result<std::vector<JobId>> wanted_ids(RedisLink& link, JobStore& local, std::span<const StoredJob> known) {
-  const auto ids = job_ids(link, kRedisJobs);
-  if (!ids) return tl::unexpected(ids.error());
-  std::map<JobId, std::uint64_t> here;
-  for (const StoredJob& job : known) here[job.id] = job.revision;
-  return wanted_of(link, local, here, *ids, "");
-}
-
-Result<void> take_jobs(RedisLink& link, JobStore& local, const std::vector<JobId>& wanted) {
+// Copies the jobs. Of those that `here` lacks, `local` may have points and a part of the log, if the process
+// was killed while it copied them; they are replaced.
+Result<void> take_jobs(RedisLink& link, JobStore& local, const std::map<JobId, std::uint64_t>& here,
+                       const std::vector<JobId>& wanted) {
   std::vector<RedisLink::Command> commands;
   for (const JobId& id : wanted) commands.push_back({"HGETALL", redis_job_key(id)});
   auto replies = ask(link, commands);
@@ -106,7 +101,9 @@ Result<void> take_jobs(RedisLink& link, JobStore& local, const std::vector<JobId
     return a.job.submitted_unix < b.job.submitted_unix;
   });
   for (const RedisJob& job : jobs)
-    if (auto taken = keep_from_redis(local, job); !taken) return taken;
+    if (auto taken = here.contains(job.job.id) ? keep_from_redis(local, job) : keep_inherited(local, job);
+        !taken)
+      return taken;
   if (!jobs.empty()) log_info("store=redis", fmt::format("{} jobs taken from Redis", jobs.size()));
   return {};
 }
@@ -127,19 +124,24 @@ Result<void> keep_from_redis(JobStore& local, const RedisJob& job) {
   if (!points) return tl::unexpected(points.error());
   auto log = local.log(job.job.id);
   if (!log) return tl::unexpected(log.error());
-  if (auto put = local.put_job(job.job); !put) return put;
-  for (std::size_t i = points->size(); i < job.points.size(); ++i)
-    if (auto added = local.add_point(job.job.id, job.points[i]); !added) return added;
-  if (!log->empty()) return {};
-  for (const LogLine& line : job.log)
-    if (auto added = local.add_log(job.job.id, line); !added) return added;
-  return {};
+  for (std::size_t i = points->size(); i < job.points.size(); ++i) {
+    const ConvergencePoint& point = job.points[i];
+    if (auto added = local.add_point(job.job.id, point); !added) return added;
+    if (!point.reference_error) continue;
+    if (auto set = local.set_reference_error(job.job.id, point.spp, *point.reference_error); !set) return set;
+  }
+  if (log->empty())
+    for (const LogLine& line : job.log)
+      if (auto added = local.add_log(job.job.id, line); !added) return added;
+  // The record is last: from then on the job counts as copied. If the process were killed before it had the
+  // points and the log, the next start would not copy them, and a later change would replace those in Redis.
+  return local.put_job(job.job);
 }
 
 std::string removal_mark(const JobId& job) { return "removed:" + job.value; }
 
 Result<void> keep_inherited(JobStore& local, const RedisJob& job) {
-  // The local data are from an earlier ownership of the job.
+  // The local data are from an earlier ownership of the job, or from a copy that was not finished.
   if (auto removed = local.remove_job(job.job.id); !removed) return removed;
   return keep_from_redis(local, job);
 }
@@ -155,9 +157,13 @@ Result<void> pull_quarantined(RedisLink& link, JobStore& local) {
 Result<void> pull_from_redis(RedisLink& link, JobStore& local, std::span<const StoredJob> known) {
   if (auto quarantined = pull_quarantined(link, local); !quarantined) return quarantined;
   if (auto counters = pull_counters(link, local); !counters) return counters;
-  auto wanted = wanted_ids(link, local, known);
+  const auto ids = job_ids(link, kRedisJobs);
+  if (!ids) return tl::unexpected(ids.error());
+  std::map<JobId, std::uint64_t> here;
+  for (const StoredJob& job : known) here[job.id] = job.revision;
+  auto wanted = wanted_of(link, local, here, *ids, "");
   if (!wanted) return tl::unexpected(wanted.error());
-  return take_jobs(link, local, *wanted);
+  return take_jobs(link, local, here, *wanted);
 }
 
 Result<void> pull_owned(RedisLink& link, JobStore& local, const std::string& node) {
@@ -186,7 +192,7 @@ Result<void> pull_owned(RedisLink& link, JobStore& local, const std::string& nod
   if (!ids) return tl::unexpected(ids.error());
   auto wanted = wanted_of(link, local, here, *ids, node);
   if (!wanted) return tl::unexpected(wanted.error());
-  return take_jobs(link, local, *wanted);
+  return take_jobs(link, local, here, *wanted);
 }
 
 Result<std::set<JobId>> jobs_behind(RedisLink& link, std::span<const std::pair<JobId, std::uint64_t>> known) {
