@@ -55,6 +55,9 @@ constexpr double kSpreadThatPays = 1.2;
 constexpr double kLocalGainThatPays = 3;
 // A batch ends after this many vertices, since paths may be long.
 constexpr double kLearningVertices = 1 << 15;
+// A batch also ends after this many rays and boundaries on shadow rays: between two vertices a path may pass
+// any number of boundaries. In few scenes do paths pass 1,024 each, as those of such a batch.
+constexpr std::uint64_t kLearningRaysOfBatch = 1 << 20;
 constexpr std::uint64_t kSunRays = 1 << 14;  // rays of the sun for one set of light vertices
 // Number of rays from which the mean number of light vertices per ray of the sun is estimated.
 constexpr std::uint64_t kLearningRays = 1 << 12;
@@ -116,13 +119,18 @@ template <Features F, template <Features> class Light>
 Learned learn_batch(const World& w, const Lesson& lesson, std::uint64_t first, std::uint64_t end) {
   const FlushDenormals mode;
   Learned learned(w, lesson);
-  for (std::uint64_t i = first; i < end && learned.learner.vertices <= kLearningVertices; ++i) {
+  std::uint64_t rays = 0;
+  const auto goes_on = [&] {
+    return learned.learner.vertices <= kLearningVertices && rays <= kLearningRaysOfBatch;
+  };
+  for (std::uint64_t i = first; i < end && goes_on(); ++i) {
     const SampleStream stream(kLearningSeed, 0, 0, 2 * i);
     const Group at = stream.group(0, Purpose::guide), lens = stream.group(0, Purpose::camera);
     const CameraRay ray =
         w.camera.ray(at.u(0) * w.frame.width, at.u(1) * w.frame.height, {lens.u(2), lens.u(3)});
-    const SampleOutcome out =
-        PathTracer<F, Light>(w, stream, nullptr, {.learner = &learned.learner}).trace(ray);
+    PathTracer<F, Light> path(w, stream, nullptr, {.learner = &learned.learner});
+    const SampleOutcome out = path.trace(ray);
+    rays += path.rays();
     ++learned.paths;
     const double radiance = double{mean_component(out.radiance)};
     if (out.cut_off == HealthCause::none && std::isfinite(radiance)) learned.radiance += radiance;

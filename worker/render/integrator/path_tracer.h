@@ -125,6 +125,8 @@ class PathTracer {
   static void sort_to_share(std::span<PathTracer*> paths);
   static void share(std::span<PathTracer* const> group);
   const SampleOutcome& outcome() const { return outcome_; }
+  // With F.connected: the number of rays of the path so far, and of boundaries that its shadow rays passed.
+  std::uint64_t rays() const { return static_cast<std::uint64_t>(segment_) + boundaries_; }
 
  private:
   friend class Light<F>;
@@ -333,9 +335,10 @@ class PathTracer {
   static constexpr float kNoReference = -1;
   float eta_scale_ = 1;  // cancels the radiance scaling of refraction in Russian roulette
   int hero_ = 0;
-  int depth_ = 0;    // scatterings so far
-  int passed_ = 0;   // null boundaries and null transmissions so far
-  int segment_ = 0;  // number of rays so far, including those after null crossings
+  int depth_ = 0;                 // scatterings so far
+  int passed_ = 0;                // null boundaries and null transmissions so far
+  std::uint64_t boundaries_ = 0;  // with F.connected: those that shadow rays passed
+  int segment_ = 0;               // number of rays so far, including those after null crossings
   Within medium_;
   bool looked_for_sky_ = false;   // true if the first vertex sampled a second direction (look_for_sky)
   bool first_in_medium_ = false;  // with F.split: true if the first scattering was in a medium

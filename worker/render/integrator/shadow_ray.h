@@ -76,6 +76,7 @@ C3 PathTracer<F, Light>::through_boundaries(C3 value, const V3& start, const V3&
       if constexpr (F.reuse) sharing_.flight *= null_transmission.probability;
       if (is_black(value)) return value;
     }
+    if constexpr (F.connected) ++boundaries_;
     if constexpr (F.reuse) ++sharing_.crossed;
     if constexpr (F.media) medium = beyond(hit, surface, d, d, medium);
     if constexpr (F.overlaps) {

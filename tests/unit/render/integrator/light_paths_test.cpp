@@ -8,6 +8,7 @@
 
 #include "tests/support/render_check.h"
 #include "tests/support/sunny_room.h"
+#include "worker/render/base/work_counters.h"
 #include "worker/render/integrator/light_paths.h"
 #include "worker/render/lights/light_vertices.h"
 
@@ -218,6 +219,32 @@ TEST(LightPaths, GiveTheSameBitsByEveryVariant) {
     EXPECT_EQ(sums, expected) << name;
   }
 }
+
+#ifdef LIGHTSHAFT_COUNT
+
+// 2,000 panes that nothing stops at stand between the camera and a floor in the sun, in thin fog.
+TEST(LightPaths, LearnNoLongerWherePathsPassThousandsOfBoundaries) {
+  constexpr int kPanes = 2000;
+  SceneBuilder b({8, 8});
+  b.look({0, 0, 4}, {0, 0, 0}, 20, {0, 1, 0});
+  b.container(CubeShape{}, test::scale(9), b.null(), b.homogeneous({.001, .001, .001}, {.9, .9, .9}));
+  b.shape(RectangleShape{}, test::scale(5), b.diffuse(.5));
+  for (int i = 0; i < kPanes; ++i)
+    b.shape(RectangleShape{}, test::translate({0, 0, 1 + .001 * i}) * test::scale(5), b.null());
+  b.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, {1, 1, 1}});
+  b.scene.integrator.light_vertices = 1;
+  b.scene.integrator.path_reuse = b.scene.integrator.camera_points = -1;
+  work_counters() = {};
+
+  test::world_of(b);
+
+  // A path passes the panes twice, down and up, and its shadow ray once: a third of the limit of 2^20 is left
+  // for shadow rays. All 1,024 paths would have 2 million.
+  EXPECT_GT(work_counters().boundary_rays, 300'000u);
+  EXPECT_LT(work_counters().boundary_rays, 400'000u);
+}
+
+#endif
 
 }  // namespace
 }  // namespace ls::render
