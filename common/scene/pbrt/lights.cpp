@@ -27,6 +27,7 @@ class LightTranslator {
     if (type == "distant") return distant();
     if (type == "projection") return projection();
     if (type == "goniometric") return goniometric();
+    if (type == "infinite") read_portal();
     return p_.has("filename") || p_.has("mapname") ? image() : constant();
   }
 
@@ -112,6 +113,22 @@ class LightTranslator {
     add(out, "intensity", colour("I"), p_.at());
     add(out, image_texture("texture"));
     return out;
+  }
+
+  // pbrt shows nothing of the map in other directions than through the portal. In a closed room whose only
+  // opening is the portal, the walls hide these directions anyway. So the map is read as a whole.
+  void read_portal() {
+    if (!p_.has("portal")) return;
+    const Param* portal = p_.take("portal");
+    if (!portal) return;
+    if (portal->numbers.size() != 12)
+      return p_.error(portal->at, fmt::format("'portal' of {} has {} numbers: give the 12 of its 4 corners",
+                                              p_.title(), portal->numbers.size()));
+    t_.report.warning(portal->at,
+                      fmt::format("'portal' of {} is read as if it were not there: pbrt shows the light only "
+                                  "through the portal, here it comes from all directions. Both are the same "
+                                  "in a closed room whose only opening is the portal",
+                                  p_.title()));
   }
 
   Element constant() {

@@ -340,7 +340,9 @@ void add_lights(std::vector<Row>& r) {
            Words{{"illuminance", "float", "", "in place of the colour's brightness; refused with an image"},
                  {"filename", "string", "", "a square equal-area image, +z in its centre; without L"},
                  {"mapname", "string", "", "an image in latitude-longitude form (pbrt-v3), +z above"},
-                 {"portal", "point3", "", "leave it out: all of the map gives light here", kRefused},
+                 {"portal", "point3", "",
+                  "4 corners; read with a warning: all of the map gives light here, which is the same in a "
+                  "closed room whose only opening is the portal"},
                  {"samples", "integer", "", kSampling, kIgnored},
                  {"nsamples", "integer", "", kSampling, kIgnored}}});
   r.push_back({"LightSource", "projection", true, "a `projector` with `as_intensity`",

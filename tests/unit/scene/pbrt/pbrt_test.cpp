@@ -251,6 +251,26 @@ TEST(Pbrt, MapsByLatitudeHaveTheirTopAtZ) {
   EXPECT_EQ(map.to_world.m[9], 1) << "its +y becomes +z";
 }
 
+TEST(Pbrt, APortalIsAWarningAndLeavesTheWholeMap) {
+  const std::string corners = R"( "point3 portal" [ 0 0 0  1 0 0  1 1 0  0 1 0 ])";
+  for (const std::string light : {R"(LightSource "infinite" "string filename" "wood.png")",
+                                  R"(LightSource "infinite" "rgb L" [ 1 2 3 ])"}) {
+    const ReadResult with = read_pbrt(pbrt_scene(light + corners + "\nShape \"sphere\"")),
+                     without = read_pbrt(pbrt_scene(light + "\nShape \"sphere\""));
+
+    ASSERT_TRUE(with.scene && without.scene) << messages(with) << messages(without);
+    EXPECT_TRUE(without.diagnostics.empty()) << messages(without);
+    EXPECT_EQ(digest_of(*with.scene), digest_of(*without.scene));
+    ASSERT_EQ(with.diagnostics.size(), 1) << messages(with);
+    EXPECT_TRUE(says(messages(with),
+                     "warning: 'portal' of LightSource \"infinite\" is read as if it were "
+                     "not there: pbrt shows the light only through the portal, here it comes "
+                     "from all directions. Both are the same in a closed room whose only "
+                     "opening is the portal"))
+        << messages(with);
+  }
+}
+
 TEST(Pbrt, ProjectionsAreOfTheSameIntensityAtAllAngles) {
   const Scene s = pbrt(
       "Translate 1 2 3 Scale 2 2 2 LightSource \"projection\" \"string filename\" \"wood.png\" \"float fov\" "
