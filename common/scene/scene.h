@@ -193,10 +193,20 @@ struct PrincipledBsdf {
   TextureIndex spec_tint, sheen, sheen_tint, flatness, clearcoat, clearcoat_gloss;
   bool operator==(const PrincipledBsdf&) const = default;
 };
+// A metal with GGX facets under a dielectric coat with GGX facets. eta and k are those of the metal against a
+// vacuum.
+struct CoatedConductorBsdf {
+  double int_ior = 1.49, ext_ior = 1.000277;
+  double coat_alpha = 0;
+  double alpha_u = .1, alpha_v = .1;
+  Rgb eta{0, 0, 0}, k{1, 1, 1};
+  TextureIndex specular_reflectance;
+  bool operator==(const CoatedConductorBsdf&) const = default;
+};
 using Bsdf = std::variant<DiffuseBsdf, ConductorBsdf, RoughConductorBsdf, DielectricBsdf, RoughDielectricBsdf,
                           ThinDielectricBsdf, PlasticBsdf, RoughPlasticBsdf, NullBsdf, TwoSidedBsdf, MaskBsdf,
                           BlendBsdf, NormalMapBsdf, BumpMapBsdf, PrincipledBsdf, DiffuseTransmissionBsdf,
-                          RoughThinDielectricBsdf>;
+                          RoughThinDielectricBsdf, CoatedConductorBsdf>;
 
 // Volumes and media.
 //

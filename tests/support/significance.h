@@ -62,7 +62,7 @@ struct Share {
   std::string_view file;
   int tests;
 };
-inline constexpr std::array kShares = {Share{Family::chi_square, "bsdf/sampling", 231},
+inline constexpr std::array kShares = {Share{Family::chi_square, "bsdf/sampling", 240},
                                        Share{Family::chi_square, "sampling/phases", 20},
                                        Share{Family::chi_square, "sampling/lights", 18},
                                        Share{Family::chi_square, "sampling/choice", 13},

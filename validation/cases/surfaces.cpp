@@ -242,6 +242,67 @@ void rough_sheets(Table& t) {
           });
 }
 
+BsdfIndex coated_metal(SceneBuilder& builder, double ior, double coat_alpha, double alpha, const Rgb& eta,
+                       const Rgb& k) {
+  return builder.bsdf(CoatedConductorBsdf{ior, 1, coat_alpha, alpha, alpha, eta, k, builder.texture(rgb(1))});
+}
+
+// At right angles, of a coat of 1.5 over a metal of the index 3 + 4i: F = 0.04, and R is that of the index
+// (3 + 4i) / 1.5.
+void coated_metals(Table& t) {
+  constexpr double F = .04, a = 2, b = 8. / 3;
+  constexpr double R = ((a - 1) * (a - 1) + b * b) / ((a + 1) * (a + 1) + b * b);
+  const Rgb eta = rgb(3), k = rgb(4), white_eta = rgb(0), white_k = rgb(1);
+  t.exact("N36-coated-metal", "N36 7.6g",
+          "A smooth metal under a smooth coat, from above in a white sky: F + T^2 R / (1 - F R).",
+          [=](const Bench& b) {
+            return every_value(
+                b, in_white(sheet(0, [=](SceneBuilder& s) { return coated_metal(s, 1.5, 0, 0, eta, k); })),
+                16, grey(F + (1 - F) * (1 - F) * R / (1 - F * R)), 1e-6);
+          });
+  for (const double degrees : {30., 89.})
+    t.exact(
+        fmt::format("N64-coated-metal-white-{:g}", degrees), "N64 N35",
+        "A metal that absorbs nothing under a smooth coat, in a white sky: 1.", [=](const Bench& b) {
+          return every_value(
+              b,
+              in_white(sheet(
+                  degrees, [=](SceneBuilder& s) { return coated_metal(s, 1.5, 0, 0, white_eta, white_k); })),
+              16, grey(1), 1e-6);
+        });
+  // A lamp of intensity 3 at distance 2 gives the irradiance 3/4. In the direction of the lamp the facets of
+  // alpha .02 have the value R D / 4 with D = 1 / (pi alpha^2), which the coat multiplies by T^2 / (n^2 (1 -
+  // F R)). What stays in the coat is 3e-6 of that.
+  t.exact(
+      "7.6g-coated-metal-under-a-lamp", "7.6g",
+      "A rough metal under a smooth coat, with a lamp behind the viewer: the facets' value through the coat.",
+      [=](const Bench& b) {
+        SceneBuilder builder =
+            sheet(0, [=](SceneBuilder& s) { return coated_metal(s, 1.5, 0, .02, eta, k); });
+        builder.scene.emitters.push_back(PointEmitter{{0, 0, 2}, rgb(3)});
+        return every_value(b, builder, 4,
+                           grey((1 - F) * (1 - F) / (2.25 * (1 - F * R)) * R / (4 * kPi * 4e-4) * .75), 3e-5);
+      });
+  t.exact("N36-coat-of-air", "N36", "A coat of its surroundings' index is not there, bit for bit.",
+          [=](const Bench& b) {
+            const SceneBuilder metal =
+                before_a_wall(sheet(0, [](SceneBuilder& s) { return rough_mirror(s, .2); }));
+            return same_bits(
+                b,
+                before_a_wall(sheet(
+                    0, [=](SceneBuilder& s) { return coated_metal(s, 1, .3, .2, white_eta, white_k); })),
+                metal, 16);
+          });
+  t.exact("N33-coated-metal-alpha-0", "N33", "A coat and a metal of roughness 5e-4 are smooth, bit for bit.",
+          [=](const Bench& b) {
+            const auto scene = [=](double alpha) {
+              return before_a_wall(
+                  sheet(0, [=](SceneBuilder& s) { return coated_metal(s, 1.5, alpha, alpha, eta, k); }));
+            };
+            return same_bits(b, scene(5e-4), scene(0), 16);
+          });
+}
+
 }  // namespace
 
 void add_surfaces(Table& t) {
@@ -249,6 +310,7 @@ void add_surfaces(Table& t) {
   indices(t);
   diffuse_sheets(t);
   rough_sheets(t);
+  coated_metals(t);
 }
 
 }  // namespace ls::cases

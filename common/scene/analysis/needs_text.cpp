@@ -62,7 +62,8 @@ class Words {
         "spheres, disks, cylinders");
     say("instances of groups", n_.instances, "instances");
     say("dielectrics", count<DielectricBsdf, RoughDielectricBsdf>(n_.materials), "materials");
-    say("rough surfaces", count<RoughConductorBsdf, RoughPlasticBsdf, RoughDielectricBsdf>(n_.materials),
+    say("rough surfaces",
+        count<RoughConductorBsdf, RoughPlasticBsdf, RoughDielectricBsdf, CoatedConductorBsdf>(n_.materials),
         "materials");
     say("principled materials", count<PrincipledBsdf>(n_.materials), "materials");
     say("multiple scattering between microfacets", n_.compensated, "materials");

@@ -33,6 +33,7 @@ class MaterialTranslator {
     if (type == "diffuse" || type == "matte") return both_sides(diffuse());
     if (type == "coateddiffuse") return both_sides(coated());
     if (type == "conductor") return both_sides(conductor());
+    if (type == "coatedconductor") return both_sides(coated_conductor());
     if (type == "mirror") return both_sides(mirror());
     if (type == "mix") return mix(m);
     m.transmits = true;
@@ -85,7 +86,31 @@ class MaterialTranslator {
     if (p_.has("reflectance"))
       by_reflectance(out);
     else
-      by_indices(out);
+      by_indices(out, "eta", "k");
+    return out;
+  }
+
+  Element coated_conductor() {
+    const auto coat = roughness("interface."), metal = roughness("conductor.");
+    Element out = with_eta(made("bsdf", "coatedconductor", p_.at()), "interface.eta");
+    if (coat.first != coat.second)
+      p_.error(p_.at(), fmt::format("{} has two roughnesses of the interface: only one is known of a coat. "
+                                    "Give interface.roughness",
+                                    p_.title()));
+    add(out, "coat_alpha", is_smooth(coat) ? 0. : coat.first, p_.at());
+    add(out, "alpha_u", is_smooth(metal) ? 0. : metal.first, p_.at());
+    add(out, "alpha_v", is_smooth(metal) ? 0. : metal.second, p_.at());
+    // pbrt divides both by the index of the coat, also those that it makes of a reflectance. So does the
+    // bsdf.
+    if (p_.has("reflectance"))
+      by_reflectance(out);
+    else
+      by_indices(out, "conductor.eta", "conductor.k");
+    if (!is_smooth(coat) || !is_smooth(metal))
+      t_.warn_once(
+          p_.at(),
+          "a rough \"coatedconductor\" is approximated: pbrt follows light at random between coat and "
+          "metal, here a formula describes it (docs/design/coated-metal.md says how far they differ)");
     return out;
   }
 
@@ -102,8 +127,8 @@ class MaterialTranslator {
     add(out, "k", k, p_.at());
   }
 
-  void by_indices(Element& out) {
-    const Param *eta = p_.take("eta"), *k = p_.take("k");
+  void by_indices(Element& out, std::string_view eta_name, std::string_view k_name) {
+    const Param *eta = p_.take(eta_name), *k = p_.take(k_name);
     const auto metal_of = [](const Param* p, std::string_view which) {
       if (!p) return std::string("Cu");
       if (p->texts.size() != 1 || !p->texts[0].starts_with("metal-")) return std::string();
@@ -117,13 +142,13 @@ class MaterialTranslator {
       return;
     }
     if (metal != same)
-      return p_.error(p_.at(), fmt::format("eta and k of {} are not of one metal: give both of the same, or "
+      return p_.error(p_.at(), fmt::format("{} and {} of {} are not of one metal: give both of the same, or "
                                            "both as numbers",
-                                           p_.title()));
+                                           eta_name, k_name, p_.title()));
     if (std::find(std::begin(kMetals), std::end(kMetals), metal) == std::end(kMetals))
-      return p_.error(eta->at, fmt::format("there is no metal \"{}\" in the table (Ag, Al, Au, Cu): give eta "
-                                           "and k as rgb",
-                                           metal));
+      return p_.error(eta->at, fmt::format("there is no metal \"{}\" in the table (Ag, Al, Au, Cu): give {} "
+                                           "and {} as rgb",
+                                           metal, eta_name, k_name));
     add(out, "string", "material", metal, p_.at());
   }
 
@@ -164,8 +189,10 @@ class MaterialTranslator {
   using Alpha = std::pair<double, double>;
   static bool is_smooth(const Alpha& a) { return a.first < kSmooth && a.second < kSmooth; }
 
-  Alpha roughness() {
-    const auto one = [&](std::string_view name, double fallback) {
+  // The names of the parameters begin with `layer`.
+  Alpha roughness(std::string_view layer = "") {
+    const auto one = [&](std::string_view what, double fallback) {
+      const std::string name = fmt::format("{}{}", layer, what);
       const Param* p = p_.take(name);
       if (!p) return fallback;
       if (p->type == "texture") {
@@ -193,15 +220,15 @@ class MaterialTranslator {
     add(out, "alpha_v", std::max(a.second, 1e-4), p_.at());
   }
 
-  Element with_eta(Element out) {
+  Element with_eta(Element out, std::string_view name = "eta") {
     double eta = 1.5;
-    if (const Param* p = p_.take("eta")) {
+    if (const Param* p = p_.take(name)) {
       if (p->type != "spectrum" && p->numbers.size() == 1) {
         eta = p->numbers[0];
       } else if (p->texts.size() == 1) {
         eta = glass(*p);
       } else {
-        p_.error(p->at, fmt::format("'eta' of {} wants one number or the name of a glass", p_.title()));
+        p_.error(p->at, fmt::format("'{}' of {} wants one number or the name of a glass", name, p_.title()));
       }
     }
     add(out, "int_ior", eta, p_.at());

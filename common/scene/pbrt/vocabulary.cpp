@@ -11,6 +11,7 @@ constexpr auto kRefused = Word::Use::refused;
 constexpr std::string_view kColour = "rgb|spectrum|blackbody";
 constexpr std::string_view kTextured = "rgb|spectrum|texture";
 constexpr std::string_view kNumber = "float|texture";
+constexpr std::string_view kRemap = "alpha is the square root of the roughness; false: alpha itself";
 constexpr std::string_view kSampling = "it only steers sampling, which is chosen here";
 
 Words operator+(Words a, const Words& b) {
@@ -45,11 +46,10 @@ Words film_words() {
 Words shape_words() { return {{"alpha", kNumber, "1", "opacity: a mask around the material"}}; }
 
 Words remapped() {
-  return {
-      {"roughness", kNumber, "0", "of both directions"},
-      {"uroughness", kNumber, "roughness", "along u"},
-      {"vroughness", kNumber, "roughness", "along v"},
-      {"remaproughness", "bool", "true", "alpha is the square root of the roughness; false: alpha itself"}};
+  return {{"roughness", kNumber, "0", "of both directions"},
+          {"uroughness", kNumber, "roughness", "along u"},
+          {"vroughness", kNumber, "roughness", "along v"},
+          {"remaproughness", "bool", "true", kRemap}};
 }
 
 Words material_words() {
@@ -253,6 +253,24 @@ void add_materials(std::vector<Row>& r) {
                      {"k", kColour, "metal-Cu-k", "imaginary part"},
                      {"reflectance", "rgb|spectrum", "", "at right angles, instead of eta and k"}} +
                    remapped() + material_words()});
+  r.push_back(
+      {"Material", "coatedconductor", true,
+       "`coatedconductor`, on both sides; with a warning that it is approximated, unless coat and metal are "
+       "smooth",
+       Words{
+           {"interface.eta", "float|spectrum", "1.5", "index of refraction of the coat"},
+           {"interface.roughness", kNumber, "0", "of the coat"},
+           {"interface.uroughness", kNumber, "interface.roughness", "along u; as along v, or it is refused"},
+           {"interface.vroughness", kNumber, "interface.roughness", "along v"},
+           {"conductor.eta", kColour, "metal-Cu-eta", "real part of the metal's index of refraction"},
+           {"conductor.k", kColour, "metal-Cu-k", "imaginary part"},
+           {"reflectance", "rgb|spectrum", "",
+            "of the metal without the coat, at right angles, instead of conductor.eta and conductor.k"},
+           {"conductor.roughness", kNumber, "0", "of the metal, in both directions"},
+           {"conductor.uroughness", kNumber, "conductor.roughness", "along u"},
+           {"conductor.vroughness", kNumber, "conductor.roughness", "along v"},
+           {"remaproughness", "bool", "true", kRemap}} +
+           layer_words() + material_words()});
   r.push_back({"Material", "mirror", true, "`conductor` without loss (pbrt-v3), on both sides",
                Words{{"Kr", kTextured, "0.9", "colour"},
                      {"bumpmap", "texture", "", "an image of heights: a bumpmap around it"}}});
@@ -274,7 +292,6 @@ void add_materials(std::vector<Row>& r) {
                      {"transmittance", kTextured, "0.25", "colour of the light that passes"},
                      {"scale", "float", "1", "factor on both"}} +
                    material_words()});
-  r.push_back({"Material", "coatedconductor", false, "write it as \"conductor\" without the coat", {}});
   r.push_back({"Material", "subsurface", false, "write a \"dielectric\" with a medium inside", {}});
   for (const auto type : {"hair", "measured"})
     r.push_back({"Material", type, false, "this kind of scattering is not known here: choose another", {}});

@@ -245,6 +245,22 @@ std::optional<BsdfIndex> Reader::read_bsdf_as<RoughConductorBsdf>(const Element&
   return add_bsdf(e, b);
 }
 
+template <>
+std::optional<BsdfIndex> Reader::read_bsdf_as<CoatedConductorBsdf>(const Element& e) {
+  Params p(*this, e);
+  CoatedConductorBsdf b;
+  read_metal_preset(p, b.eta, b.k);
+  if (p.has("alpha") && (p.has("alpha_u") || p.has("alpha_v")))
+    report_.error(e.at, fmt::format("{} gives both alpha and alpha_u, alpha_v", p.title()));
+  bind(p, b);
+  if (const Element* alpha = p.take("alpha")) {
+    p.convert({.name = "alpha", .doc = "", .range = kNonNegative}, *alpha, b.alpha_u);
+    b.alpha_v = b.alpha_u;
+  }
+  p.finish();
+  return add_bsdf(e, b);
+}
+
 // Returns the nested bsdfs in the order of the file. Those of a blend are ordered by name if both have one,
 // as in Mitsuba.
 std::optional<std::vector<BsdfIndex>> Reader::read_inner_bsdfs(Params& p, std::size_t at_least,

@@ -160,6 +160,33 @@ void describe(V& v, T& b) {
   describe_multiple_scattering(v, b);
 }
 
+LS_TYPE(
+    CoatedConductorBsdf, "bsdf", "coatedconductor", "",
+    "metal under a dielectric coat, GGX facets on both (docs/design/coated-metal.md); `alpha` sets both "
+    "alpha_u and alpha_v. A roughness below a thousandth is smooth, and without a contrast of indices it is "
+    "the metal alone. Our own: Mitsuba has no such plugin")
+template <class V, Of<CoatedConductorBsdf> T>
+void describe(V& v, T& b) {
+  v.field(
+      {.name = "int_ior", .doc = "index of refraction of the coat", .range = kPositive, .named_ior = true},
+      b.int_ior);
+  v.field({.name = "ext_ior", .doc = "index of refraction outside", .range = kPositive, .named_ior = true},
+          b.ext_ior);
+  v.field({.name = "coat_alpha", .doc = "roughness of the coat; 0 is smooth", .range = kNonNegative},
+          b.coat_alpha);
+  v.field({.name = "alpha_u", .doc = "roughness of the metal along u; 0 is smooth", .range = kNonNegative},
+          b.alpha_u);
+  v.field({.name = "alpha_v", .doc = "roughness of the metal along v", .range = kNonNegative}, b.alpha_v);
+  v.field({.name = "eta",
+           .doc = "real part of the metal's index of refraction, of which int_ior is divided out; or "
+                  "`material`",
+           .range = kNonNegative},
+          b.eta);
+  v.field({.name = "k", .doc = "imaginary part, likewise; or `material`", .range = kNonNegative}, b.k);
+  v.field({.name = "specular_reflectance", .doc = "factor on the metal's reflection", .range = kUnit},
+          b.specular_reflectance);
+}
+
 LS_TYPE(NullBsdf, "bsdf", "null", "", "index-matched boundary of a medium: light passes unchanged")
 template <class V, Of<NullBsdf> T>
 void describe(V&, T&) {}

@@ -19,6 +19,7 @@ ELEMENTS: dict[str, tuple[str, ...]] = {
     "catmullrom": ("rfilter",),
     "checkerboard": ("texture",),
     "circular": ("bsdf",),
+    "coatedconductor": ("bsdf",),
     "coating": ("bsdf",),
     "collimated": ("emitter",),
     "conductor": ("bsdf",),

@@ -146,6 +146,11 @@ Scene random_sheet(Dice& d) {
   const double a = d.alpha(), b = d.uniform() < .5 ? a : d.alpha(), n = d.ior();
   return rough_sheet(d.facets(), a, b, n, d.rgb(), d.rgb());
 }
+Scene random_coated_metal(Dice& d) {
+  const double a = d.alpha(), b = d.uniform() < .5 ? a : d.alpha(), n = d.ior();
+  return coated(d.alpha(), a, b, {4 * d.unit(), 4 * d.unit(), 1}, {4 * d.unit(), 0, 4 * d.unit()}, n,
+                d.rgb());
+}
 // Beckmann's masking is a fit that exceeds the exact one by up to .35 % (see microfacet.h).
 constexpr double kFit = .0035;
 const Kind kKinds[] = {
@@ -156,6 +161,7 @@ const Kind kKinds[] = {
     {"thin glass", [](Dice& d) { return thin_glass(d.ior(), d.rgb(), d.rgb()); }, true, 0},
     {"leaf", random_leaf, true, 0},
     {"sheet", random_sheet, true, kFit},
+    {"coated metal", random_coated_metal, false, 0},
     // Coat and base are coupled by the dialect's tables, whose internal reflectance is a plain mean (see
     // rough_plastic_table.h): a base may give back up to 1.5 % more than the coat lets in.
     {"plastic", random_plastic, false, .015},

@@ -101,6 +101,12 @@ inline Scene thin_glass(double ior, const Rgb& reflectance = {1, 1, 1},
   add(s, ThinDielectricBsdf{ior, 1, texture(s, reflectance), texture(s, transmittance)});
   return s;
 }
+inline Scene coated(double coat, double au, double av, const Rgb& eta, const Rgb& k, double ior = 1.5,
+                    const Rgb& tint = {1, 1, 1}) {
+  Scene s;
+  add(s, CoatedConductorBsdf{ior, 1, coat, au, av, eta, k, texture(s, tint)});
+  return s;
+}
 inline Scene leaf(const Rgb& reflectance, const Rgb& transmittance) {
   Scene s;
   add(s, DiffuseTransmissionBsdf{texture(s, reflectance), texture(s, transmittance)});

@@ -13,7 +13,7 @@
 namespace ls::render::test {
 namespace {
 
-constexpr int kMaterials = 50;
+constexpr int kMaterials = 53;
 const double kViewCosines[] = {.98, .5, .1};
 const double kViewCosinesFromBehind[] = {-.95, -.6, -.2};
 
@@ -49,6 +49,9 @@ void add_more(std::vector<Named>& all) {
   one_sided("diffuse and metal",
             blend(diffuse({.2, .6, .4}),
                   rough_metal(Microfacet::beckmann, .3, .3, {1.5, 1.5, 1.5}, {0, 0, 0}), .4));
+  one_sided("rough gold under a smooth coat", coated(0, .3, .3, kGoldEta, kGoldK));
+  one_sided("smooth gold under a rough coat", coated(.3, 0, 0, kGoldEta, kGoldK));
+  one_sided("brushed metal under a rough coat", coated(.2, .4, .1, {0, 0, 0}, {1, 1, 1}, 1.9, {.9, .8, .7}));
   wide("leaf", leaf({.2, .5, .1}, {.3, .4, .9}));
   wide("leaf that only transmits", leaf({0, 0, 0}, {.5, .5, .5}));
   for (const auto& [d, name] :

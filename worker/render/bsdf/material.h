@@ -1,6 +1,7 @@
 // A material in the form that the inner loop uses: one of the kinds of all families.
 #pragma once
 
+#include "worker/render/bsdf/coated_conductor.h"
 #include "worker/render/bsdf/conductor.h"
 #include "worker/render/bsdf/dielectric.h"
 #include "worker/render/bsdf/diffuse.h"
@@ -11,7 +12,9 @@
 namespace ls::render {
 
 struct BsdfTable::Material {
-  VariantOf<DiffuseKinds, ConductorKinds, DielectricKinds, PlasticKinds, NestedKinds, PrincipledKinds> kind;
+  VariantOf<DiffuseKinds, ConductorKinds, DielectricKinds, PlasticKinds, NestedKinds, PrincipledKinds,
+            CoatedConductorKinds>
+      kind;
 };
 
 }  // namespace ls::render

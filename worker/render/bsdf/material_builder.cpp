@@ -67,6 +67,13 @@ const RoughPlasticTable& MaterialBuilder::coat(Microfacet type, double alpha, do
   return it->second;
 }
 
+const CoatedConductorTables& MaterialBuilder::coated_conductor(
+    const std::array<float, 4>& parameters, const std::function<CoatedConductorTables()>& make) {
+  const auto it = coated_conductors_.find(parameters);
+  return it != coated_conductors_.end() ? it->second
+                                        : coated_conductors_.emplace(parameters, make()).first->second;
+}
+
 const MicrofacetEnergy* MaterialBuilder::energy(EnergyOf of, const Roughness& r, double eta) {
   if (refused()) return nullptr;
   if (!r.u.constant || !r.v.constant || r.u.value.x != r.v.value.x) {

@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -52,6 +54,11 @@ class MaterialBuilder {
   const MicrofacetEnergy* energy(EnergyOf of, const Roughness& roughness, double eta);
   const MicrofacetEnergy* energy(EnergyOf of, Microfacet type, double alpha, double eta);
 
+  // Returns the tables of a coated metal with these parameters, which `make` makes. Materials with equal
+  // parameters share the work.
+  const CoatedConductorTables& coated_conductor(const std::array<float, 4>& parameters,
+                                                const std::function<CoatedConductorTables()>& make);
+
   std::uint64_t clamped() const { return clamped_; }
   std::vector<std::unique_ptr<const MicrofacetEnergy>> take_energies() { return std::move(energies_); }
 
@@ -64,6 +71,7 @@ class MaterialBuilder {
   std::map<std::tuple<Microfacet, double, double>, RoughPlasticTable> coats_;
   std::map<std::tuple<EnergyOf, Microfacet, double, double>, const MicrofacetEnergy*> known_energies_;
   std::vector<std::unique_ptr<const MicrofacetEnergy>> energies_;
+  std::map<std::array<float, 4>, CoatedConductorTables> coated_conductors_;
 };
 
 }  // namespace ls::render

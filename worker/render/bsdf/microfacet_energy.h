@@ -65,6 +65,16 @@ struct MicrofacetEnergy {
   std::size_t bytes() const { return missing.bytes() + missing_behind.bytes() + through.bytes(); }
 };
 
+// What is tabulated of a coat over a metal that absorbs nothing (coated_conductor.h).
+struct CoatedConductorTables {
+  CosineTable through, reflected;  // T and F over the cosine outside; only of a rough coat
+  CosineTable staying;             // Q
+  float staying_mean = 0;          // 2 int Q mu dmu
+  // Of diffuse light inside: what the coat reflects, what leaves through it, and what the metal's facets do
+  // not lose
+  float internal = 0, leaving = 1, metal_albedo = 1;
+};
+
 MicrofacetEnergy conductor_energy(Microfacet type, double alpha);
 // eta is the index inside over the index outside.
 MicrofacetEnergy dielectric_energy(Microfacet type, double alpha, double eta);

@@ -171,6 +171,8 @@ void add_bsdf_samples(Sha256& h) {
   scene.bsdfs.push_back(DiffuseTransmissionBsdf{smooth, colour});
   scene.bsdfs.push_back(RoughThinDielectricBsdf{Microfacet::ggx, smooth, rough, 1.5, 1, colour, colour});
   scene.bsdfs.push_back(PlasticBsdf{1.5, 1, true, colour, colour});
+  scene.bsdfs.push_back(CoatedConductorBsdf{1.5, 1, 0, 0, 0, eta, k, colour});
+  scene.bsdfs.push_back(CoatedConductorBsdf{1.5, 1, .1, .2, .3, eta, k, colour});
   scene.bsdfs.push_back(NormalMapBsdf{colour, {0}});
   add_missing_kinds(scene.bsdfs);
   const auto textures = TextureTable::build(scene, {});

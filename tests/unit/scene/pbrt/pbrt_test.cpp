@@ -469,6 +469,57 @@ TEST(Pbrt, ReflectanceOfAConductorIsThatAtRightAngles) {
     EXPECT_NEAR(metal.k[i] * metal.k[i] / (4 + metal.k[i] * metal.k[i]), want[i], 1e-12);
 }
 
+const CoatedConductorBsdf& coated(const Scene& s, std::size_t shape) {
+  return std::get<CoatedConductorBsdf>(
+      s.bsdfs.at(std::get<TwoSidedBsdf>(s.bsdfs.at(s.shapes.at(shape).bsdf.value)).front.value));
+}
+
+TEST(Pbrt, CoatedConductorsHaveACoatAndAMetal) {
+  const Scene s = pbrt(R"(
+Material "coatedconductor" Shape "sphere"
+Material "coatedconductor" "float interface.eta" 1.3 "float interface.roughness" 0.04 "spectrum conductor.eta" "metal-Au-eta"
+  "spectrum conductor.k" "metal-Au-k" "float conductor.uroughness" 0.25 "float conductor.vroughness" 0.01 "float thickness" 2
+  "integer maxdepth" 5 "integer nsamples" 2 "float g" 0.3 Shape "sphere"
+Material "coatedconductor" "bool remaproughness" false "float interface.roughness" 0.25 "float conductor.roughness" 0.125
+  "rgb reflectance" [ 0.2 0.5 0.8 ] Shape "sphere"
+Material "coatedconductor" "spectrum interface.eta" "glass-BK7" Shape "sphere")");
+
+  const CoatedConductorBsdf& plain = coated(s, 0);
+  EXPECT_EQ(plain.int_ior, 1.5);
+  EXPECT_EQ(plain.ext_ior, 1);
+  EXPECT_EQ(plain.coat_alpha, 0);
+  EXPECT_EQ(plain.alpha_u, 0);
+  EXPECT_EQ(plain.alpha_v, 0);
+  EXPECT_EQ(plain.eta[0], .20101) << "copper";
+  const CoatedConductorBsdf& gold = coated(s, 1);
+  EXPECT_EQ(gold.int_ior, 1.3);
+  EXPECT_EQ(gold.coat_alpha, .2);
+  EXPECT_EQ(gold.alpha_u, .5);
+  EXPECT_EQ(gold.alpha_v, .1);
+  EXPECT_EQ(gold.eta[0], .14304);
+  const CoatedConductorBsdf& given = coated(s, 2);
+  EXPECT_EQ(given.coat_alpha, .25);
+  EXPECT_EQ(given.alpha_u, .125);
+  EXPECT_EQ(given.alpha_v, .125);
+  const Rgb want{.2, .5, .8};
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_NEAR(given.k[i] * given.k[i] / (4 + given.k[i] * given.k[i]), want[i], 1e-12);
+  EXPECT_EQ(given.eta, (Rgb{1, 1, 1}));
+  EXPECT_EQ(coated(s, 3).int_ior, 1.5168);
+}
+
+TEST(Pbrt, OnlyRoughCoatedConductorsWarnOfTheirModel) {
+  const auto said = [](const std::string& parameters) {
+    return messages(
+        read_pbrt(pbrt_scene("Material \"coatedconductor\" " + parameters + " Shape \"sphere\"")));
+  };
+  EXPECT_EQ(said(""), "");
+  EXPECT_EQ(said("\"float interface.roughness\" 0.0000001"), "") << "alpha is below 0.001";
+  for (const char* rough : {"\"float interface.roughness\" 0.1", "\"float conductor.roughness\" 0.1",
+                            "\"float conductor.vroughness\" 0.1"})
+    EXPECT_TRUE(says(said(rough), "warning: a rough \"coatedconductor\" is approximated")) << rough;
+}
+
 TEST(Pbrt, MixTakesTheAmountOfTheSecond) {
   const Scene s = pbrt(R"(MakeNamedMaterial "a" "string type" "diffuse"
 MakeNamedMaterial "b" "string type" "conductor"

@@ -278,6 +278,43 @@ TEST(Surfaces, PrincipledHasMitsubasDefaults) {
               HasSubstr("gives both eta and specular"));
 }
 
+TEST(Surfaces, ACoatedConductorHasASmoothCoatAndAMetalThatReflectsAll) {
+  const Scene plain = scene_with_bsdf("<bsdf type=\"coatedconductor\"/>");
+  const auto& p = surface_bsdf<CoatedConductorBsdf>(plain);
+  EXPECT_EQ(p.int_ior, 1.49);
+  EXPECT_EQ(p.ext_ior, 1.000277);
+  EXPECT_EQ(p.coat_alpha, 0);
+  EXPECT_EQ(p.alpha_u, .1);
+  EXPECT_EQ(p.alpha_v, .1);
+  EXPECT_EQ(p.eta, (Rgb{0, 0, 0}));
+  EXPECT_EQ(p.k, (Rgb{1, 1, 1}));
+  EXPECT_EQ(surface_colour(plain, p.specular_reflectance), (Rgb{1, 1, 1}));
+  const Scene given = scene_with_bsdf(
+      "<bsdf type=\"coatedconductor\"><string name=\"material\" value=\"Au\"/><string name=\"int_ior\" "
+      "value=\"water\"/><float name=\"alpha\" value=\"0\"/><float name=\"coat_alpha\" value=\".2\"/></bsdf>");
+  const auto& g = surface_bsdf<CoatedConductorBsdf>(given);
+  EXPECT_EQ(g.int_ior, 1.333);
+  EXPECT_EQ(g.coat_alpha, .2);
+  EXPECT_EQ(g.alpha_u, 0);
+  EXPECT_EQ(g.alpha_v, 0);
+  EXPECT_EQ(g.eta[0], .14304);
+  EXPECT_EQ(deserialize_scene(serialize(given)).value(), given);
+  EXPECT_EQ(must_read(write_xml(given)), given);
+}
+
+TEST(Surfaces, ACoatedConductorRefusesWhatCannotBe) {
+  const auto error = [](const char* parameters) {
+    return surface_error(fmt::format("<bsdf type=\"coatedconductor\">{}</bsdf>", parameters));
+  };
+  EXPECT_THAT(error("<float name=\"alpha\" value=\".1\"/><float name=\"alpha_u\" value=\".1\"/>"),
+              HasSubstr("gives both alpha and alpha_u, alpha_v"));
+  EXPECT_THAT(error("<float name=\"alpha\" value=\"-.1\"/>"), HasSubstr("0 <= alpha"));
+  EXPECT_THAT(error("<float name=\"coat_alpha\" value=\"-.1\"/>"), HasSubstr("0 <= coat_alpha"));
+  EXPECT_THAT(error("<float name=\"int_ior\" value=\"0\"/>"), HasSubstr("int_ior"));
+  EXPECT_THAT(error("<string name=\"material\" value=\"Au\"/><rgb name=\"k\" value=\"1\"/>"),
+              HasSubstr("gives both a material and eta or k"));
+}
+
 TEST(Surfaces, PrincipledIsTwoSidedOnlyByItsGlass) {
   EXPECT_EQ(surface_error("<bsdf type=\"twosided\"><bsdf type=\"principled\"><float name=\"spec_trans\" "
                           "value=\"0\"/></bsdf></bsdf>"),
