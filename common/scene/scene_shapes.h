@@ -40,13 +40,14 @@ struct MeshShape {
 };
 using Geometry = std::variant<RectangleShape, CubeShape, SphereShape, DiskShape, MeshShape, CylinderShape>;
 
-// Light from a shape's surface, emitted on the side of the normal only. If beam_width is set, the light is a
-// beam: at an angle a from the normal, in degrees, it has the full radiance for a within beam_width and zero
-// beyond cutoff_angle; in between it is the full radiance times s^falloff with s = (cos a - cos cutoff_angle)
-// / (cos beam_width - cos cutoff_angle).
+// Light from a shape's surface, emitted on the side of the normal or, if two_sided, on both sides. If
+// beam_width is set, the light is a beam: at an angle a from the normal, in degrees, it has the full radiance
+// for a within beam_width and zero beyond cutoff_angle; in between it is the full radiance times s^falloff
+// with s = (cos a - cos cutoff_angle) / (cos beam_width - cos cutoff_angle).
 struct AreaEmitter {
   TextureIndex radiance;
   double cutoff_angle = 90, beam_width = 90, falloff = 1;
+  bool two_sided = false;
   bool operator==(const AreaEmitter&) const = default;
 };
 

@@ -192,11 +192,9 @@ AreaLight area_light(Translation& t, Params& p) {
   std::optional<double> power;
   // pbrt ignores a value of 0 or less.
   if (const double given = p.has("power") ? p.number("power", 0) : 0; given > 0) power = given;
-  if (p.boolean("twosided", false))
-    p.error(p.at(), fmt::format("{} shines from both sides, which no light does here: {}", p.title(),
-                                p.row().find("twosided")->meaning));
+  const bool two_sided = p.boolean("twosided", false);
   p.finish();
-  return {c, power, p.at()};
+  return {c, power, two_sided, p.at()};
 }
 
 }  // namespace ls::scene::pbrt

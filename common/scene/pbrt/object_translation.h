@@ -45,8 +45,9 @@ struct Material {
   bool has_texture = false;  // an image or a pattern depends on the uv of the shape
 };
 struct AreaLight {
-  Rgb radiance;  // if `power` is given: the radiance that a shape of area power / pi would have
+  Rgb radiance;  // if `power` is given: the radiance of a shape whose shining sides have the area power / pi
   std::optional<double> power;
+  bool two_sided = false;
   Span at;
 };
 

@@ -246,7 +246,8 @@ class ShapeTranslator {
     const bool mirrored = determinant3(a_.ctm.to) < 0;
     const std::string_view type = p_.row().type;
     const bool by_corners = (type == "trianglemesh" && !has_normals_) || type == "bilinearmesh";
-    const bool has_sides = a_.light || a_.inside != a_.outside || a_.material.transmits;
+    const bool has_sides =
+        (a_.light && !a_.light->two_sided) || a_.inside != a_.outside || a_.material.transmits;
     if (mirrored && has_sides && (!by_corners || a_.reversed))
       p_.error(p_.at(),
                fmt::format("{} is mirrored by its transform, and its sides matter, as it gives light, "
@@ -279,6 +280,7 @@ class ShapeTranslator {
     if (a_.light && !a_.material.null) {
       Element area = made("emitter", "area", a_.light->at);
       add(area, "radiance", radiance(*a_.light), a_.light->at);
+      if (a_.light->two_sided) add(area, "boolean", "two_sided", "true", a_.light->at);
       add(out, std::move(area));
     }
     if (a_.inside == a_.outside) return;
@@ -303,7 +305,7 @@ class ShapeTranslator {
                            areas_.empty() ? "its area is in its file" : "its triangles differ in area"));
       return light.radiance;
     }
-    const double factor = *light.power / (std::numbers::pi * *most);
+    const double sides = light.two_sided ? 2 : 1, factor = *light.power / (std::numbers::pi * *most * sides);
     return {light.radiance[0] * factor, light.radiance[1] * factor, light.radiance[2] * factor};
   }
 

@@ -376,16 +376,16 @@ void add_lights(std::vector<Row>& r) {
     r.push_back(
         {"AreaLightSource", type, true, "an `area` in each shape that follows",
          light_words("L") +
-             Words{
-                 {"twosided", "bool", "false", "give the back a shape of its own with ReverseOrientation"},
-                 {"power", "float", "",
-                  "luminous power of each sphere, disk, cylinder, patch or triangle: L is multiplied by "
-                  "power / "
-                  "(pi area). Of a quadric the area is that without its transform, as in pbrt; triangles of "
-                  "different areas, and plymesh, are refused"},
-                 {"filename", "string", "", "a light's image is not read", kRefused},
-                 {"samples", "integer", "", kSampling, kIgnored},
-                 {"nsamples", "integer", "", kSampling, kIgnored}}});
+             Words{{"twosided", "bool", "false", "`two_sided`: the back shines, too"},
+                   {"power", "float", "",
+                    "luminous power of each sphere, disk, cylinder, patch or triangle: L is multiplied by "
+                    "power / "
+                    "(pi area), half of that if it is twosided. Of a quadric the area is that without its "
+                    "transform, as in pbrt; triangles of "
+                    "different areas, and plymesh, are refused"},
+                   {"filename", "string", "", "a light's image is not read", kRefused},
+                   {"samples", "integer", "", kSampling, kIgnored},
+                   {"nsamples", "integer", "", kSampling, kIgnored}}});
 }
 
 void add_media(std::vector<Row>& r) {

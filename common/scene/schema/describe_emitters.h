@@ -6,8 +6,9 @@
 namespace ls::scene {
 
 LS_TYPE(AreaEmitter, "emitter", "area", "",
-        "light from the front of the shape that it stands in. `cutoff_angle`, `beam_width` and `falloff` are "
-        "our own: they make each point of it a spot light, whose radiance between the two angles is "
+        "light from the front of the shape that it stands in. `two_sided`, `cutoff_angle`, `beam_width` and "
+        "`falloff` are our own. The angles make each point of it a spot light, whose radiance between the "
+        "two angles is "
         "multiplied by s^falloff, s = (cos a - cos cutoff_angle) / (cos beam_width - cos cutoff_angle)")
 template <class V, Of<AreaEmitter> T>
 void describe(V& v, T& e) {
@@ -27,6 +28,7 @@ void describe(V& v, T& e) {
           e.beam_width);
   v.field({.name = "falloff", .doc = "exponent between the two", .range = {0, 1000}, .unwritten = 1},
           e.falloff);
+  v.field({.name = "two_sided", .doc = "the back shines like the front", .elided = true}, e.two_sided);
 }
 
 LS_TYPE(ConstantEmitter, "emitter", "constant", "", "the same radiance from everywhere around")

@@ -9,10 +9,15 @@ V3 absolute(const V3& v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)};
 // cancellation (docs/measurements/stability.md N26). The value is 2 (all directions) if the inner side emits
 // and x is inside, and 0 (none) if x cannot see the emitting side. Points on the surface itself, up to a few
 // ulps of their coordinates, count as being on the emitting side, so that sampling and density agree on them.
+bool is_inside(const Sphere& s, float reach, float sign, const V3& x) {
+  const V3d f = s.center - V3d(x);
+  const double margin = std::max(0., s.radius - double{sign} * 0x1p-20 * double{reach});
+  return f.dot(f) < margin * margin;
+}
 float one_minus_cos(const Sphere& s, float reach, float sign, const V3& x) {
   const V3d f = s.center - V3d(x);
-  const double d2 = f.dot(f), margin = std::max(0., s.radius - sign * 0x1p-20 * reach);
-  const bool inside = d2 < margin * margin;
+  const double d2 = f.dot(f);
+  const bool inside = is_inside(s, reach, sign, x);
   if (inside != (sign < 0)) return 0;
   if (inside) return 2;
   const double sin2 = std::min(1., s.radius * s.radius / d2);
@@ -25,6 +30,7 @@ void AreaLight::set_emission(const AreaEmitter& e, float orientation, const Ligh
   radiance = e.radiance;
   textured = !world.textures.is_constant(radiance);
   sign = orientation;
+  two_sided = e.two_sided;
   beam = e.beam_width < 90;
   if (beam) {
     const double cutoff = std::cos(e.cutoff_angle * (kPiD / 180)),
@@ -50,7 +56,8 @@ double AreaLight::beam_flux() const {
 
 std::optional<LightSample> AreaLight::from_point(const LightWorld& world, const AreaPoint& y, const V3& x,
                                                  float p) const {
-  const V3 target = offset_point(y.p, y.n, reach, y.n);
+  const V3 n = two_sided && dot(x - y.p, y.n) < 0 ? -y.n : y.n;
+  const V3 target = offset_point(y.p, n, reach, n);
   const V3 f = target - x;
   const float d2 = dot(f, f);
   if (!(d2 > 0)) return std::nullopt;
@@ -59,7 +66,7 @@ std::optional<LightSample> AreaLight::from_point(const LightWorld& world, const 
   s.direction = f / d;
   s.distance = d;
   s.target = target;
-  const float cosine = -dot(s.direction, y.n);
+  const float cosine = -dot(s.direction, n);
   if (!(cosine > 0)) return std::nullopt;
   s.radiance = emitted(world, y.uv, &y.face, cosine);
   if (beam && is_black(s.radiance)) return std::nullopt;
@@ -83,15 +90,13 @@ LightBounds AreaLight::bounds_of(const LightWorld& world, const V3& middle, cons
 LightBounds ParallelogramLight::bounds(const LightWorld& world) const {
   LightBounds b =
       bounds_of(world, corner + (axis_u + axis_v) * .5f, (absolute(axis_u) + absolute(axis_v)) * .5f);
-  b.axis = normal;
-  b.cos_spread = 1;
+  set_normals(normal, 1, b);
   return b;
 }
 
 LightBounds DiskLight::bounds(const LightWorld& world) const {
   LightBounds b = bounds_of(world, center, absolute(axis_u) + absolute(axis_v));
-  b.axis = normal;
-  b.cos_spread = 1;
+  set_normals(normal, 1, b);
   return b;
 }
 
@@ -130,8 +135,7 @@ LightBounds MeshLight::bounds(const LightWorld& world) const {
   const V3d axis = sum.normalized();
   double spread = 1;
   for (std::uint32_t k = 0; k < triangles; ++k) spread = std::min(spread, axis.dot(normal(k).normalized()));
-  b.axis = V3(axis) * sign;
-  b.cos_spread = static_cast<float>(std::max(-1., spread));
+  set_normals(V3(axis) * sign, static_cast<float>(std::max(-1., spread)), b);
   return b;
 }
 
@@ -158,11 +162,18 @@ AreaPoint MeshLight::point(const LightWorld& world, const LightNumbers& numbers)
   return y;
 }
 
+// The side whose light arrives at x: 1 is the outer one. A point on a surface that shines on both sides
+// counts as inside: the inner side is seen from its own points, the outer one is not, as it is convex.
+float SphereLight::side_of(const Sphere& s, const V3& x) const {
+  if (!two_sided) return sign;
+  return is_inside(s, reach, -1, x) ? -1.f : 1.f;
+}
+
 std::optional<LightSample> SphereLight::sample(const LightWorld& world, const LightNumbers& numbers,
                                                const V3& x, float p) const {
   const Sphere& sphere = world.geometry.spheres[primitive];
   const V2 u = numbers.unit();
-  const float cone = one_minus_cos(sphere, reach, sign, x);
+  const float side = side_of(sphere, x), cone = one_minus_cos(sphere, reach, side, x);
   if (!(cone > 0)) return std::nullopt;
   const V3 axis = normalize(V3(sphere.center - V3d(x)));
   const float one_minus = cone * u.x, cosine = 1 - one_minus;
@@ -173,7 +184,7 @@ std::optional<LightSample> SphereLight::sample(const LightWorld& world, const Li
   s.direction = normalize(frame.to_world({sine * std::cos(angle), sine * std::sin(angle), cosine}));
   constexpr double kEndless = std::numeric_limits<double>::infinity();
   double t = intersect(sphere, V3d(x), V3d(s.direction), 0, kEndless);
-  if (sign < 0) {
+  if (side < 0) {
     // If x is inside, the ray ends at the far wall of the sphere, even if rounding has put x just outside of
     // the near wall.
     const double far = intersect(sphere, V3d(x), V3d(s.direction), t, kEndless);
@@ -184,18 +195,19 @@ std::optional<LightSample> SphereLight::sample(const LightWorld& world, const Li
   const double along = std::isfinite(t) ? t : std::max(0., (sphere.center - V3d(x)).dot(V3d(s.direction)));
   const V3d n = (V3d(x) + V3d(s.direction) * along - sphere.center).normalized();
   const V3 y(sphere.center + n * sphere.radius);
-  const V3 target = offset_point(y, V3(n), reach, V3(n) * sign), f = target - x;
+  const V3 target = offset_point(y, V3(n), reach, V3(n) * side), f = target - x;
   s.distance = std::sqrt(dot(f, f));
   s.target = target;
   s.pdf = p / (kTwoPi * cone);
-  const float facing = beam ? -sign * dot(V3(n), s.direction) : 1.f;
+  const float facing = beam ? -side * dot(V3(n), s.direction) : 1.f;
   s.radiance = emitted(world, textured ? sphere_uv(sphere, n) : V2(0, 0), nullptr, facing);
   if (!(s.distance > 0) || !std::isfinite(s.pdf) || (beam && is_black(s.radiance))) return std::nullopt;
   return s;
 }
 
 float SphereLight::pdf(const LightWorld& world, const SurfaceHit&, const V3& x, const V3&, float p) const {
-  const float cone = one_minus_cos(world.geometry.spheres[primitive], reach, sign, x);
+  const Sphere& sphere = world.geometry.spheres[primitive];
+  const float cone = one_minus_cos(sphere, reach, side_of(sphere, x), x);
   return cone > 0 ? p / (kTwoPi * cone) : 0;
 }
 

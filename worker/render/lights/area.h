@@ -25,14 +25,15 @@ struct AreaLight : LightKind {
   // For a beam: from cos_beam to cos_cutoff its radiance falls to 0 as the power `falloff` of a term that is
   // linear in the cosine.
   float cos_cutoff = 0, cos_beam = 0, inv_transition = 0, falloff = 1;
-  float sign = 1;   // orientation of the emitting side
-  float reach = 1;  // the largest coordinate of the light's points, which bounds the rounding error
+  bool two_sided = false;  // true if the other side emits the same light
+  float sign = 1;          // orientation of the emitting side
+  float reach = 1;         // the largest coordinate of the light's points, which bounds the rounding error
   double area = 0;
 
   void set_emission(const AreaEmitter& emitter, float orientation, const LightWorld& world);
   bool dark(const LightWorld& world) const { return !(area > 0) || is_black(world.textures.mean(radiance)); }
   double power(const LightWorld& world) const {
-    return luminance(world.textures.mean(radiance)) * beam_flux() * area;
+    return luminance(world.textures.mean(radiance)) * beam_flux() * area * (two_sided ? 2 : 1);
   }
   // The radiance at `uv` and `face` towards a viewer whose direction has the cosine `cosine` > 0 to the
   // normal.
@@ -59,6 +60,12 @@ struct AreaLight : LightKind {
   // Returns bounds whose box reaches from middle - half to middle + half, for a light with normals in all
   // directions.
   LightBounds bounds_of(const LightWorld& world, const V3& middle, const V3& half) const;
+  // Adds the cone of the normals of the emitting side. The normals of both sides are in all directions.
+  void set_normals(const V3& axis, float cos_spread, LightBounds& b) const {
+    if (two_sided) return;
+    b.axis = axis;
+    b.cos_spread = cos_spread;
+  }
   // Sets the members of the bounds that follow from the emission.
   void set_emission_bounds(const LightWorld& world, LightBounds& b) const;
   float beam_share(float cosine) const {
@@ -143,6 +150,9 @@ struct SphereLight : AreaLight {
                                     float p) const;
   float pdf(const LightWorld& world, const SurfaceHit& hit, const V3& x, const V3& direction, float p) const;
   LightBounds bounds(const LightWorld& world) const;
+
+ private:
+  float side_of(const Sphere& s, const V3& x) const;
 };
 
 using AreaKinds = Kinds<ParallelogramLight, MeshLight, SphereLight, DiskLight, CylinderLight>;

@@ -520,6 +520,25 @@ TEST(Pbrt, OnlyRoughCoatedConductorsWarnOfTheirModel) {
     EXPECT_TRUE(says(said(rough), "warning: a rough \"coatedconductor\" is approximated")) << rough;
 }
 
+TEST(Pbrt, LightsOfTwoSidesShineOnBothAndHalveTheirPower) {
+  const Scene s = pbrt(R"(
+AreaLightSource "diffuse" "rgb L" [ 1 1 1 ] "bool twosided" true Shape "disk"
+AreaLightSource "diffuse" "rgb L" [ 1 1 1 ] Shape "disk"
+AreaLightSource "diffuse" "float power" 12 "bool twosided" true Shape "disk" "float radius" 2
+Scale -1 1 1 Shape "sphere")");
+
+  const auto value = [&](std::size_t i) {
+    return std::get<ConstantTexture>(s.textures.at(s.shapes.at(i).emitter->radiance.value)).value[1];
+  };
+  EXPECT_TRUE(s.shapes.at(0).emitter->two_sided);
+  EXPECT_FALSE(s.shapes.at(1).emitter->two_sided);
+  EXPECT_TRUE(s.shapes.at(2).emitter->two_sided);
+  EXPECT_EQ(value(0), value(1));
+  // power / (pi area) / 2 of the disk of area 4 pi, whose white has the luminance 1
+  EXPECT_NEAR(value(2), 12 / (8 * std::numbers::pi * std::numbers::pi), 1e-5);
+  EXPECT_TRUE(s.shapes.at(3).emitter->two_sided) << "a mirrored one is read, as its sides do not matter";
+}
+
 TEST(Pbrt, MixTakesTheAmountOfTheSecond) {
   const Scene s = pbrt(R"(MakeNamedMaterial "a" "string type" "diffuse"
 MakeNamedMaterial "b" "string type" "conductor"

@@ -44,7 +44,6 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"Shape \"trianglemesh\" \"point3 P\" [ 0 0 0 1 0 ]", "no multiple of 3"},
         Case{"Shape \"trianglemesh\" \"point3 P\" [ ]", "P has no corners"},
         Case{"AreaLightSource \"diffuse\" Scale -1 1 1 Shape \"sphere\"", "is mirrored by its transform"},
-        Case{"AreaLightSource \"diffuse\" \"bool twosided\" true Shape \"sphere\"", "shines from both sides"},
         Case{"LightSource \"infinite\" \"string filename\" \"wood.png\" \"rgb L\" [ 1 2 3 ]",
              "has no effect beside the others"},
         Case{"LightSource \"infinite\" \"string filename\" \"wood.png\" \"string mapname\" \"wood.png\"",

@@ -58,6 +58,19 @@ TEST(Emitters, AnAreaLightMayBeABeam) {
   EXPECT_THAT(refused(float_named("cutoff_angle", "120")), HasSubstr("out of its range"));
 }
 
+TEST(Emitters, AnAreaLightMayShineOnBothSides) {
+  const std::string on = "<boolean name=\"two_sided\" value=\"true\"/>",
+                    shape = "<shape type=\"disk\"><emitter type=\"area\">";
+  const Scene plain = must_read(with_sensor(shape + "</emitter></shape>")),
+              both = must_read(with_sensor(shape + on + "</emitter></shape>"));
+
+  EXPECT_FALSE(plain.shapes.at(0).emitter->two_sided);
+  EXPECT_TRUE(both.shapes.at(0).emitter->two_sided);
+  EXPECT_EQ(serialize(plain).find("two_sided"), std::string::npos);
+  EXPECT_EQ(deserialize_scene(serialize(both)).value(), both);
+  EXPECT_EQ(must_read(write_xml(both)), both);
+}
+
 TEST(Emitters, WhatIsOurOwnIsWrittenOnlyWhereItSaysSomething) {
   const std::string disk = "<shape type=\"disk\"><emitter type=\"area\">", end = "</emitter></shape>";
   const auto written = [](const std::string& objects) { return write_xml(must_read(with_sensor(objects))); };

@@ -1,0 +1,167 @@
+// Area lights whose back shines like their front.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/render/light_bench.h"
+
+namespace ls::render {
+namespace {
+
+using test::SceneBuilder;
+using test::operator*;
+using test::translate;
+
+SceneBuilder two_sided(const ls::Geometry& g, const Transform& t, bool flip = false) {
+  SceneBuilder builder = area(g, t, flip);
+  builder.scene.shapes[0].emitter->two_sided = true;
+  return builder;
+}
+
+// On its axis a disk of radius 1 gives pi / (1 + h^2), and a square of half side 1 gives
+// 4 X / sqrt(1 + X^2) atan(X / sqrt(1 + X^2)) with X = 1 / h.
+TEST(TwoSidedLight, GivesTheSameIrradianceOnBothSides) {
+  for (const bool flip : {false, true})
+    for (const double h : {2., -2., .5, -.5}) {
+      const V3 down(0, 0, h > 0 ? -1 : 1);
+      const double x = 1 / std::abs(h), root = std::hypot(1, x);
+
+      expect_close(LightBench(two_sided(DiskShape{}, {}, flip)).irradiance({0, 0, h}, down),
+                   M_PI / (1 + h * h));
+      expect_close(LightBench(two_sided(RectangleShape{}, {}, flip)).irradiance({0, 0, h}, down),
+                   4 * x / root * std::atan(x / root));
+    }
+}
+
+// Inside a sphere of radius 1 the irradiance is pi, at the distance d outside it is pi / d^2.
+TEST(TwoSidedLight, ASphereShinesInwardsAndOutwards) {
+  const LightBench bench(two_sided(SphereShape{}, {}));
+
+  for (const V3d& x : {V3d(0, 0, 0), V3d(.3, -.5, .2), V3d(0, 0, -.999), V3d(0, 0, -1)})
+    expect_close(bench.irradiance(x, {0, 0, 1}, 256), M_PI);
+  for (const double d : {1.5, 4.}) expect_close(bench.irradiance({0, 0, d}, {0, 0, -1}), M_PI / (d * d));
+}
+
+// A cylinder of radius 1 and length 2 h about the z axis, seen from its middle: what lies at the height z in
+// a ring of the width dz has the form factor for a plane with the normal along z, and the upper half gives pi
+// (1 - share of the open end) with the end a disk at h: pi - pi / (1 + h^2).
+TEST(TwoSidedLight, ACylinderShinesInwards) {
+  const double h = 1.5;
+  const LightBench bench(two_sided(CylinderShape{{0, 0, -h}, {0, 0, h}, 1}, {}));
+
+  expect_close(bench.irradiance({0, 0, 0}, {0, 0, 1}, 512), M_PI - M_PI / (1 + h * h));
+}
+
+TEST(TwoSidedLight, AHitHasTheRadianceAndDensityOfItsSample) {
+  const Transform turned = test::rotate_x(170);
+  const ls::Geometry kinds[] = {RectangleShape{}, DiskShape{}, CubeShape{}, SphereShape{},
+                                CylinderShape{{0, 0, -1}, {0, 0, 1}, .5}};
+  for (const ls::Geometry& g : kinds)
+    for (const V3d& place : {V3d(.3, .2, -4), V3d(.3, .2, 4), V3d(.1, .2, -.3)}) {
+      const LightBench b(two_sided(g, turned));
+      const V3 x = b.at(place);
+      RandomStream r(5);
+      int hits = 0;
+      for (int i = 0; i < 4000; ++i) {
+        const auto s =
+            b.world->lights.sample(b.world->lights.choose(numbers(0, r.uniform(), r.uniform())), x);
+        if (!s) continue;
+        const auto primitive = b.world->accel.nearest(x, s->direction, kInfinity);
+        SurfaceHit hit;
+        if (!primitive || !b.world->geometry.complete(*primitive, x, s->direction, hit)) continue;
+        // Another face is in front, or beside it at an edge. Samples end 2^-20 of the world before the light.
+        if (std::abs(hit.t - s->distance) > 1e-5f * s->distance + 4e-6f) continue;
+        const float c = std::abs(dot(hit.ng, s->direction));
+        if (c < .05f) continue;
+        ++hits;
+        ASSERT_EQ(b.world->lights.emitted(hit, -s->direction), s->radiance) << g.index();
+        // As of beams: cosines are good to 2^-20 of the world in a length of 1/100 of it.
+        ASSERT_NEAR(b.world->lights.pdf(hit, x, s->direction) / s->pdf, 1, 1e-4 / c) << g.index();
+      }
+      EXPECT_GT(hits, 300) << g.index() << " " << place.z;
+    }
+}
+
+TEST(TwoSidedLight, OnlyItsOwnBackShines) {
+  SceneBuilder builder = two_sided(RectangleShape{}, {});
+  builder.lamp(RectangleShape{}, translate({5, 0, 0}));
+  const LightBench b(builder);
+  for (const double x : {0., 5.})
+    for (const float way : {1.f, -1.f}) {
+      const V3 from = b.at({x + .1, .2, 3. * double{way}}), d(0, 0, -way);
+      const auto primitive = b.world->accel.nearest(from, d, kInfinity);
+      SurfaceHit hit;
+      ASSERT_TRUE(primitive && b.world->geometry.complete(*primitive, from, d, hit));
+      EXPECT_EQ(b.world->lights.emitted(hit, -d).x, x == 5 && way < 0 ? 0 : 1) << x << " " << way;
+    }
+}
+
+// Of two lights of the same area and radiance, one of both sides, the latter is chosen with the probability
+// 1/2 * 2/3 + 1/2 * 1/2 = 7/12.
+TEST(TwoSidedLight, HasThePowerOfTwo) {
+  SceneBuilder builder = two_sided(RectangleShape{}, {});
+  builder.lamp(RectangleShape{}, translate({5, 0, 0}));
+  const LightBench b(builder);
+
+  EXPECT_NEAR(b.world->lights.choose(numbers(0, 0, 0)).probability, 7. / 12, 1e-6);
+}
+
+// Beams of 30 degrees to both sides: pi sin^2 of the flux of a plain light each.
+TEST(TwoSidedLight, ABeamShinesBothWays) {
+  SceneBuilder builder = two_sided(RectangleShape{}, test::scale(.5));
+  builder.scene.shapes[0].emitter->cutoff_angle = builder.scene.shapes[0].emitter->beam_width = 30;
+  const LightBench b(builder);
+  for (const double degrees : {5., 29., 31., 149., 151., 175.}) {
+    const double a = degrees * M_PI / 180, d = 1000;
+    const V3 towards(std::sin(a), 0, std::cos(a));
+    const double lit = degrees < 30 || degrees > 150 ? std::abs(std::cos(a)) / (d * d) : 0;
+    // As of beams: seen from there the light is 1 / 1000 rad wide.
+    EXPECT_NEAR(b.irradiance(V3d(towards) * d, -towards, 32).mean, lit, 2e-3 / (d * d)) << degrees;
+  }
+}
+
+// 40 of them in a plane, chosen by the tree, and 20 faint ones that only shine down: the irradiance on both
+// sides is the sum of that of each.
+TEST(TwoSidedLight, ManyAreFoundFromBehindByTheTree) {
+  SceneBuilder builder;
+  constexpr double kSize = .05, kHeight = 3, kFaint = .01;
+  double of_all = 0, of_faint = 0;
+  for (int i = 0; i < 60; ++i) {
+    const bool faint = i >= 40;
+    const double x = .3 * (i % 8) - 1, y = .3 * (i / 8) - .6;
+    const Transform at = translate({x, y, 0}) * test::scale(kSize);
+    if (faint)
+      builder.lamp(RectangleShape{}, at, {kFaint, kFaint, kFaint}).flip_normals = true;
+    else
+      builder.lamp(RectangleShape{}, at).emitter->two_sided = true;
+    // A small light gives L A cos^2 / d^2, up to (size / d)^2 = 3e-4 of it.
+    const double d2 = x * x + y * y + kHeight * kHeight,
+                 e = 4 * kSize * kSize * kHeight * kHeight / (d2 * d2);
+    (faint ? of_faint : of_all) += e * (faint ? kFaint : 1);
+  }
+  const LightBench b(builder);
+  ASSERT_TRUE(b.world->lights.has_tree());
+  for (const float side : {1.f, -1.f}) {
+    const V3 x = b.at({0, 0, kHeight * double{side}}), n(0, 0, -side);
+    const double expected = of_all + (side < 0 ? of_faint : 0);
+    RandomStream r(3);
+    double sum = 0, square = 0;
+    constexpr int kN = 20000;
+    for (int i = 0; i < kN; ++i) {
+      const LightNumbers words{static_cast<std::uint32_t>(r.uniform() * 0x1p32), 0x80000000u, 0x80000000u};
+      const auto c = b.world->lights.choose(words, {x, n});
+      const auto s = b.world->lights.sample(c, x);
+      const double e = s ? double{s->radiance.x * std::max(0.f, dot(n, s->direction)) / s->pdf} : 0;
+      sum += e / kN;
+      square += e * e / kN;
+    }
+    const double deviation = std::sqrt(square - sum * sum);
+    EXPECT_NEAR(sum, expected, 5 * deviation / std::sqrt(kN) + 1e-3 * expected) << side;
+    // A tree that knew only the fronts would choose the faint ones from behind, and leave the others to the
+    // sixteenth that goes by the table: a deviation of four times the mean.
+    EXPECT_LT(deviation, sum) << side;
+  }
+}
+
+}  // namespace
+}  // namespace ls::render
