@@ -13,21 +13,25 @@ namespace ls::test {
 
 inline constexpr std::uint64_t kRandom = 12;  // scenes beside the different ones
 
-// The different scenes and random ones that can be built, with a film of 12 x 12.
+// A random scene with a film of 12 x 12; nothing if it can't be built.
+inline std::optional<NamedScene> calm_scene(std::uint64_t seed) {
+  const RandomScene s = random_scene(seed, {.wild = 0, .calm = true});
+  SceneBuilder builder;
+  builder.scene = s.scene;
+  builder.files = s.assets.files();
+  builder.scene.film.size = {12, 12};
+  builder.scene.film.crop_offset = {0, 0};
+  builder.scene.film.crop_size = {0, 0};
+  if (!render::build_world(builder.scene, settings_of(builder.scene), builder.files, 1)) return std::nullopt;
+  return NamedScene{fmt::format("random scene {}", seed), builder};
+}
+
+// The different scenes and random ones that can be built.
 inline std::vector<NamedScene> scenes() {
   std::vector<NamedScene> all = different_scenes();
   const auto [first, count] = scenes_to_try(kRandom);
-  for (std::uint64_t seed = first; seed < first + count; ++seed) {
-    const RandomScene s = random_scene(seed, {.wild = 0, .calm = true});
-    SceneBuilder builder;
-    builder.scene = s.scene;
-    builder.files = s.assets.files();
-    builder.scene.film.size = {12, 12};
-    builder.scene.film.crop_offset = {0, 0};
-    builder.scene.film.crop_size = {0, 0};
-    if (!render::build_world(builder.scene, settings_of(builder.scene), builder.files, 1)) continue;
-    all.push_back({fmt::format("random scene {}", seed), builder});
-  }
+  for (std::uint64_t seed = first; seed < first + count; ++seed)
+    if (auto s = calm_scene(seed)) all.push_back(std::move(*s));
   return all;
 }
 
