@@ -208,6 +208,14 @@ inline V3 offset_point(const V3& p, const V3& ng, float reach, const V3& w) {
 inline V3 offset_point(const SurfaceHit& hit, const V3& w) {
   return offset_point(hit.p, hit.ng, hit.reach, w);
 }
+// The same for a point where a ray from x ends: the differences then contain coordinates of x, which may be
+// far larger than those of the surface.
+inline V3 offset_target(const V3& p, const V3& ng, float reach, const V3& x, const V3& w) {
+  return offset_point(p, ng, std::max(reach, largest(x)), w);
+}
+inline V3 offset_target(const SurfaceHit& hit, const V3& x, const V3& w) {
+  return offset_target(hit.p, hit.ng, hit.reach, x, w);
+}
 // Returns SurfaceHit::reach, the magnitude that bounds the rounding error of p, for a shape that is
 // intersected in double precision. p is rounded to float32, so its largest coordinate counts in full. `size`,
 // the largest distance of p from the shape's reference point, counts times 2^-28: an ulp of double is 2^-29

@@ -171,7 +171,7 @@ auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
     // A path from x would use the geometric normal at y, because the shading normal faces away from it
     if ((back.z > 0) != (dot(w, y.hit.ng) < 0)) return look;
     cosine = std::abs(dot(w, y.hit.ng));
-    end.target = offset_point(y.hit, -w);
+    end.target = offset_target(y.hit, x.at.p, -w);
     const SurfaceInfo& surface = world_.geometry.surfaces[y.hit.surface];
     if (surface.null_transmission)
       pdf *= 1 - world_.bsdfs.null_transmission(surface.bsdf, y.hit.uv_point(), back).probability;

@@ -138,7 +138,7 @@ void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Sca
     value *= f_y.f_cos * cos_y;
     camera_pdf = direction_pdf(y.p, f_y.pdf, y.to_light);
     if (densities_.last > 0) light_pdf = world_.bsdfs.eval(bsdf, y.hit.uv_point(), to_light, to_x).pdf;
-    light.target = offset_point(y.hit, -w);
+    light.target = offset_target(y.hit, start, -w);
   } else {
     const float phase = world_.media[y.medium].phase.value(w, y.to_light);
     value *= phase;

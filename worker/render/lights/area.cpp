@@ -57,7 +57,7 @@ double AreaLight::beam_flux() const {
 std::optional<LightSample> AreaLight::from_point(const LightWorld& world, const AreaPoint& y, const V3& x,
                                                  float p) const {
   const V3 n = two_sided && dot(x - y.p, y.n) < 0 ? -y.n : y.n;
-  const V3 target = offset_point(y.p, n, reach, n);
+  const V3 target = offset_target(y.p, n, reach, x, n);
   const V3 f = target - x;
   const float d2 = dot(f, f);
   if (!(d2 > 0)) return std::nullopt;
@@ -195,7 +195,7 @@ std::optional<LightSample> SphereLight::sample(const LightWorld& world, const Li
   const double along = std::isfinite(t) ? t : std::max(0., (sphere.center - V3d(x)).dot(V3d(s.direction)));
   const V3d n = (V3d(x) + V3d(s.direction) * along - sphere.center).normalized();
   const V3 y(sphere.center + n * sphere.radius);
-  const V3 target = offset_point(y, V3(n), reach, V3(n) * side), f = target - x;
+  const V3 target = offset_target(y, V3(n), reach, x, V3(n) * side), f = target - x;
   s.distance = std::sqrt(dot(f, f));
   s.target = target;
   s.pdf = p / (kTwoPi * cone);
