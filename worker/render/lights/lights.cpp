@@ -31,9 +31,7 @@ void Lights::add_area(const Scene& scene, std::uint32_t shape, const SurfacePrim
   };
   auto light = make_area_light(scene.shapes[shape], shape, primitives, world());
   std::visit(finish, light);
-  if (lights_.size() == lights) return;
-  g.surfaces[shape].light = lights;
-  any_two_sided_ = any_two_sided_ || scene.shapes[shape].emitter->two_sided;
+  if (lights_.size() > lights) g.surfaces[shape].light = lights;
 }
 
 Result<void> Lights::add_map(const Scene& scene, const EnvmapEmitter& emitter, const ImageLoader& images) {
@@ -141,7 +139,7 @@ std::optional<LightSample> Lights::sample(const LightChoice& c, const V3& x) con
 C3 Lights::emitted(const SurfaceHit& hit, const V3& w) const {
   const std::uint32_t i = geometry_->surfaces[hit.surface].light;
   const float cosine = dot(hit.ng, w);
-  if (i == kNone || (!(cosine > 0) && !any_two_sided_)) return {0, 0, 0};
+  if (i == kNone) return {0, 0, 0};
   return with_area(hit, [&](const AreaLight& l) {
     return cosine > 0 || (l.two_sided && cosine < 0) ? l.emitted(world(), hit.uv, &hit.face, std::abs(cosine))
                                                      : C3(0);

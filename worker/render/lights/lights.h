@@ -233,7 +233,6 @@ class Lights {
   std::uint64_t tree_words_ = 0, table_words_ = 0;
   bool tree_in_media_ = false;
   bool any_with_place_ = false;
-  bool any_two_sided_ = false;  // true if an area light shines on both sides
   std::uint64_t left_out_ = 0, clamped_ = 0;
 };
 
