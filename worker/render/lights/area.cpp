@@ -205,9 +205,14 @@ std::optional<LightSample> SphereLight::sample(const LightWorld& world, const Li
   return s;
 }
 
-float SphereLight::pdf(const LightWorld& world, const SurfaceHit&, const V3& x, const V3&, float p) const {
+float SphereLight::pdf(const LightWorld& world, const SurfaceHit& hit, const V3& x, const V3& direction,
+                       float p) const {
   const Sphere& sphere = world.geometry.spheres[primitive];
-  const float cone = one_minus_cos(sphere, reach, side_of(sphere, x), x);
+  const float side = side_of(sphere, x);
+  // Rays that pass the near wall of a sphere that lets light through meet the far wall from inside. Sampling
+  // finds the side that x sees alone.
+  if (two_sided && dot(direction, hit.ng) * sign * side > 0) return 0;
+  const float cone = one_minus_cos(sphere, reach, side, x);
   return cone > 0 ? p / (kTwoPi * cone) : 0;
 }
 

@@ -82,6 +82,42 @@ TEST(TwoSidedLight, AHitHasTheRadianceAndDensityOfItsSample) {
     }
 }
 
+// From outside only the near wall is sampled.
+TEST(TwoSidedLight, TheFarWallOfASphereIsFoundByDirectionsAlone) {
+  for (const bool flip : {false, true}) {
+    const LightBench b(two_sided(SphereShape{}, {}, flip));
+    const V3 outside = b.at({0, 0, 3}), inside = b.at({0, 0, 0}), down(0, 0, -1);
+    SurfaceHit near, far;
+    ASSERT_TRUE(
+        b.world->geometry.complete(*b.world->accel.nearest(outside, down, kInfinity), outside, down, near));
+    ASSERT_TRUE(
+        b.world->geometry.complete(*b.world->accel.nearest(inside, down, kInfinity), inside, down, far));
+
+    EXPECT_GT(b.world->lights.pdf(near, outside, down), 0);
+    EXPECT_EQ(b.world->lights.pdf(far, outside, down), 0);
+    EXPECT_GT(b.world->lights.pdf(far, inside, down), 0);
+    EXPECT_EQ(b.world->lights.emitted(far, -down).x, 1);
+  }
+}
+
+// A floor of albedo 1/2 under a sphere of radius 1/2 at height 4 that lets light through: each ray towards it
+// meets the near wall and the far one, so the irradiance is 2 pi (r / d)^2, and the radiance half of that
+// over pi.
+TEST(TwoSidedLight, BothWallsOfAClearSphereLightTheFloor) {
+  SceneBuilder builder({1, 1});
+  Shape& lamp = builder.lamp(SphereShape{}, translate({0, 0, 4}) * test::scale(.5));
+  lamp.emitter->two_sided = true;
+  lamp.bsdf = builder.bsdf(NullBsdf{});
+  builder.shape(RectangleShape{}, {}, builder.diffuse(.5));
+  builder.look({3, 0, 1}, {0, 0, 0}, .2);
+
+  const test::Estimate e = test::estimate(builder, 1 << 16);
+
+  // 0.2 degrees are 0.006 at the floor, which changes the irradiance by (0.006 / 4)^2
+  EXPECT_NEAR(e.mean[0], 1. / 64, 5 * e.standard_error[0] + 1e-5 / 64);
+  EXPECT_LT(e.standard_error[0], .01 / 64);
+}
+
 TEST(TwoSidedLight, OnlyItsOwnBackShines) {
   SceneBuilder builder = two_sided(RectangleShape{}, {});
   builder.lamp(RectangleShape{}, translate({5, 0, 0}));
