@@ -135,7 +135,7 @@ V3 at_cosine(double mu, double phi) {
           static_cast<float>(mu)};
 }
 
-// What a rough coat reflects and lets through of light from one side, over the cosine there.
+// The shares of light from one side that a rough coat reflects and lets through, by the cosine there.
 struct RoughShares {
   CosineTable reflected, refracted;
 

@@ -65,7 +65,7 @@ struct MicrofacetEnergy {
   std::size_t bytes() const { return missing.bytes() + missing_behind.bytes() + through.bytes(); }
 };
 
-// What is tabulated of a coat over a metal that absorbs nothing (coated_conductor.h).
+// The tables of a coat over a metal that absorbs nothing (coated_conductor.h).
 struct CoatedConductorTables {
   CosineTable through, reflected;  // T and F over the cosine outside; only of a rough coat
   CosineTable staying;             // Q

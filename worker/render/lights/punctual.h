@@ -98,7 +98,7 @@ struct ProjectorLight : Punctual<ProjectorLight> {
   double power(const LightWorld& world) const {
     return luminance(value * world.textures.mean(image)) * (even ? solid_angle() : area());
   }
-  // Those of the image: its area on the plane at distance 1, and its solid angle
+  // The image's area on the plane at distance 1, and its solid angle
   double area() const { return double{4 * tan_x * tan_y}; }
   double solid_angle() const {
     const double x2 = tan_x * tan_x, y2 = tan_y * tan_y;
