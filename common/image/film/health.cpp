@@ -33,8 +33,7 @@ constexpr std::array kRows{
         "sample was cut off: its path had more than 1,048,576 rays, or a shadow ray of it crossed more than "
         "65,536 surfaces",
         "samples were cut off: their paths had more than 1,048,576 rays, or a shadow ray of them crossed "
-        "more "
-        "than 65,536 surfaces"},
+        "more than 65,536 surfaces"},
     Row{HealthCause::no_direction, "no_direction", kRejected, "sample went on in a direction that is none",
         "samples went on in a direction that is none"},
     Row{HealthCause::nested_media, "nested_media", kRejected,

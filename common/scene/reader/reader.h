@@ -83,6 +83,8 @@ class Reader {
   template <class Kind>
   std::optional<BsdfIndex> read_bsdf_as(const Element& e);
   template <class T>
+  void bind_alphas(Params& p, T& b, const Range& range);
+  template <class T>
   void bind_rough(Params& p, T& b);
   TextureIndex old_number(const Element& e, TextureIndex t);
   void check_multiple_scattering(const Element& e, TextureIndex alpha_u, TextureIndex alpha_v);

@@ -131,17 +131,22 @@ void Reader::check_multiple_scattering(const Element& e, TextureIndex alpha_u, T
                                     e.get("type")));
 }
 
-// Reads all fields that the table has for T, a rough surface; `alpha` sets alpha_u and alpha_v.
+// Reads all fields that the table has for T; `alpha` sets alpha_u and alpha_v.
 template <class T>
-void Reader::bind_rough(Params& p, T& b) {
-  const Element& e = p.object();
+void Reader::bind_alphas(Params& p, T& b, const Range& range) {
   if (p.has("alpha") && (p.has("alpha_u") || p.has("alpha_v")))
-    report_.error(e.at, fmt::format("{} gives both alpha and alpha_u, alpha_v", p.title()));
+    report_.error(p.object().at, fmt::format("{} gives both alpha and alpha_u, alpha_v", p.title()));
   bind(p, b);
   if (const Element* alpha = p.take("alpha")) {
-    p.convert({.name = "alpha", .doc = "", .range = kPositive}, *alpha, b.alpha_u);
+    p.convert({.name = "alpha", .doc = "", .range = range}, *alpha, b.alpha_u);
     b.alpha_v = b.alpha_u;
   }
+}
+
+template <class T>
+void Reader::bind_rough(Params& p, T& b) {
+  bind_alphas(p, b, kPositive);
+  const Element& e = p.object();
   b.alpha_u = old_number(e, b.alpha_u);
   b.alpha_v = old_number(e, b.alpha_v);
   if (b.multiple_scattering) check_multiple_scattering(e, b.alpha_u, b.alpha_v);
@@ -250,13 +255,7 @@ std::optional<BsdfIndex> Reader::read_bsdf_as<CoatedConductorBsdf>(const Element
   Params p(*this, e);
   CoatedConductorBsdf b;
   read_metal_preset(p, b.eta, b.k);
-  if (p.has("alpha") && (p.has("alpha_u") || p.has("alpha_v")))
-    report_.error(e.at, fmt::format("{} gives both alpha and alpha_u, alpha_v", p.title()));
-  bind(p, b);
-  if (const Element* alpha = p.take("alpha")) {
-    p.convert({.name = "alpha", .doc = "", .range = kNonNegative}, *alpha, b.alpha_u);
-    b.alpha_v = b.alpha_u;
-  }
+  bind_alphas(p, b, kNonNegative);
   p.finish();
   return add_bsdf(e, b);
 }

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <complex>
-#include <ctime>
 #include <random>
 #include <vector>
 
@@ -342,24 +341,13 @@ TEST(CoatedConductor, RefusesRoughnessesAndIndicesThatAreNone) {
   }
 }
 
-// CPU time of this thread alone, against that of one material: neither the machine nor its load matters.
 TEST(CoatedConductor, AlikeOnesAreTabulatedOnce) {
   const auto seconds = [](double alpha, int count) {
-    Scene s = coated(alpha, alpha, alpha, kGoldEta, kGoldK);
-    s.bsdfs.resize(static_cast<std::size_t>(count), s.bsdfs[0]);
-    const auto now = [] {
-      timespec t{};
-      clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-      return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-    };
-    const double start = now();
-    bench(s);
-    return now() - start;
+    return seconds_to_build(coated(alpha, alpha, alpha, kGoldEta, kGoldK), count);
   };
   seconds(.21, 1);
   const double one = seconds(.22, 1);
   EXPECT_LT(seconds(.23, 100), 20 * one);
-  std::printf("[  tables  ] %.1f ms\n", 1e3 * one);
 }
 
 }  // namespace

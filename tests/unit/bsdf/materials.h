@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "common/base/clock.h"
 #include "common/scene/schema/bsdf_traits.h"
 #include "worker/render/bsdf/bsdf.h"
 
@@ -51,6 +52,15 @@ inline std::unique_ptr<Bench> bench(Scene scene, const ImageData& image = {}) {
   b->bsdfs = std::move(*bsdfs);
   b->bsdf = {static_cast<std::uint32_t>(b->scene.bsdfs.size() - 1)};
   return b;
+}
+
+// CPU time of this thread for building `count` materials like the one of `scene`. Tests compare it with that
+// of one material, so that neither the machine nor its load matters.
+inline double seconds_to_build(Scene scene, int count) {
+  scene.bsdfs.resize(static_cast<std::size_t>(count), scene.bsdfs[0]);
+  const double start = thread_cpu_seconds();
+  bench(std::move(scene));
+  return thread_cpu_seconds() - start;
 }
 
 // True if shadow rays must ask the material what passes straight through it.

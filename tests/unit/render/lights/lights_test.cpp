@@ -1,10 +1,10 @@
 // Lights: irradiance by their own sampling against closed forms, and densities that agree with the sampling.
 #include "worker/render/lights/lights.h"
+#include "common/base/clock.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <ctime>
 
 #include "tests/unit/render/light_bench.h"
 
@@ -201,12 +201,6 @@ TEST(Lights, EachOfManyIsChosenAsOftenAsItsProbabilitySays) {
 
 // CPU time of this thread alone, and as a multiple of another linear step's: neither the machine nor its load
 // matters.
-double cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
 TEST(Lights, TakeTimeInProportionToShapesNotToShapesTimesTriangles) {
   SceneBuilder builder = area(RectangleShape{}, {});
   constexpr int kShapes = 20000;
@@ -216,15 +210,15 @@ TEST(Lights, TakeTimeInProportionToShapesNotToShapesTimesTriangles) {
     s.to_world = translate({1. * i, 0, 0});
     builder.scene.shapes.push_back(s);
   }
-  const double t0 = cpu_seconds();
+  const double t0 = thread_cpu_seconds();
   auto geometry = Geometry::build(builder.scene, AssetLoader{builder.scene, builder.files});
-  const double t1 = cpu_seconds();
+  const double t1 = thread_cpu_seconds();
   ASSERT_TRUE(geometry);
   const auto textures = TextureTable::build(builder.scene, {});
   ASSERT_TRUE(textures);
-  const double t2 = cpu_seconds();
+  const double t2 = thread_cpu_seconds();
   const auto lights = Lights::build(builder.scene, *geometry, *textures);
-  const double t3 = cpu_seconds();
+  const double t3 = thread_cpu_seconds();
   ASSERT_TRUE(lights);
   EXPECT_EQ(lights->count(), static_cast<std::size_t>(kShapes));
   EXPECT_LT(t3 - t2, 5 * (t1 - t0));

@@ -47,7 +47,7 @@ TEST(SmallLamp, IsNotHiddenByItself) {
         const float distance = std::sqrt(dot(f, f));
         hidden += b.world->accel.occluded(x, f / distance, distance) ? 1 : 0;
       }
-      // Of a flat lamp half of the points see the back
+      // Half of the points see only the back of a flat lamp
       EXPECT_GT(sampled, 5000) << kind.index() << ' ' << size;
       EXPECT_EQ(hidden, 0) << kind.index() << ' ' << size << " of " << sampled;
     }

@@ -132,8 +132,8 @@ TEST(TwoSidedLight, OnlyItsOwnBackShines) {
     }
 }
 
-// Of two lights of the same area and radiance, one of both sides, the latter is chosen with the probability
-// 1/2 * 2/3 + 1/2 * 1/2 = 7/12.
+// Two lights have the same area and radiance, and one of them shines on both sides. That one is chosen with
+// the probability 1/2 * 2/3 + 1/2 * 1/2 = 7/12.
 TEST(TwoSidedLight, HasThePowerOfTwo) {
   SceneBuilder builder = two_sided(RectangleShape{}, {});
   builder.lamp(RectangleShape{}, translate({5, 0, 0}));
