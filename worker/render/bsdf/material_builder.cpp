@@ -61,17 +61,27 @@ BsdfIndex MaterialBuilder::side(BsdfIndex b) {
   return b;
 }
 
+bool MaterialBuilder::room_for_table() {
+  const bool room = coats_.size() + energies_.size() + coated_conductors_.size() <= kMostTables;
+  if (!room)
+    refuse(
+        fmt::format("the scene has more than {} rough materials whose roughness or index of refraction "
+                    "differs: round them, so that materials share their tables",
+                    kMostTables));
+  return room;
+}
+
 const RoughPlasticTable& MaterialBuilder::coat(Microfacet type, double alpha, double eta) {
   const auto [it, fresh] = coats_.try_emplace({type, alpha, eta});
-  if (fresh) it->second = make_rough_plastic_table(type, alpha, eta);
+  if (fresh && room_for_table()) it->second = make_rough_plastic_table(type, alpha, eta);
   return it->second;
 }
 
 const CoatedConductorTables& MaterialBuilder::coated_conductor(
     const std::array<float, 4>& parameters, const std::function<CoatedConductorTables()>& make) {
-  const auto it = coated_conductors_.find(parameters);
-  return it != coated_conductors_.end() ? it->second
-                                        : coated_conductors_.emplace(parameters, make()).first->second;
+  const auto [it, fresh] = coated_conductors_.try_emplace(parameters);
+  if (fresh && room_for_table()) it->second = make();
+  return it->second;
 }
 
 const MicrofacetEnergy* MaterialBuilder::energy(EnergyOf of, const Roughness& r, double eta) {
@@ -86,10 +96,12 @@ const MicrofacetEnergy* MaterialBuilder::energy(EnergyOf of, const Roughness& r,
 const MicrofacetEnergy* MaterialBuilder::energy(EnergyOf of, Microfacet type, double alpha, double eta) {
   const auto [it, fresh] = known_energies_.try_emplace({of, type, alpha, eta});
   if (!fresh) return it->second;
-  energies_.push_back(
-      std::make_unique<MicrofacetEnergy>(of == EnergyOf::conductor    ? conductor_energy(type, alpha)
-                                         : of == EnergyOf::dielectric ? dielectric_energy(type, alpha, eta)
-                                                                      : coat_energy(type, alpha, eta)));
+  energies_.push_back(nullptr);
+  if (!room_for_table()) return nullptr;
+  energies_.back() =
+      (std::make_unique<MicrofacetEnergy>(of == EnergyOf::conductor    ? conductor_energy(type, alpha)
+                                          : of == EnergyOf::dielectric ? dielectric_energy(type, alpha, eta)
+                                                                       : coat_energy(type, alpha, eta)));
   return it->second = energies_.back().get();
 }
 

@@ -44,18 +44,21 @@ class MaterialBuilder {
   BsdfIndex side(BsdfIndex b);
   bool passes(BsdfIndex b) const { return traits_[b.value].passes; }
 
-  // Returns the transmittance table of a rough plastic's coat (rough_plastic_table.h). Computing one takes
-  // about 30 ms, and many objects of a scene often have the same coat, so materials with equal parameters
-  // share one table.
+  // The tables of rough materials take about 30 to 50 ms each to compute, and many objects of a scene often
+  // have the same roughness, so materials with equal parameters share one table. A scene that needs more than
+  // kMostTables of them is refused: a small hostile file could keep a worker busy for hours.
+  static constexpr std::size_t kMostTables = 2048;
+
+  // Returns the transmittance table of a rough plastic's coat (rough_plastic_table.h).
   const RoughPlasticTable& coat(Microfacet type, double alpha, double eta);
   // energy() returns the tables that compensate for light lost between the microfacets of a surface of the
-  // kind `of` (microfacet_energy.h). Materials with equal parameters share them.
+  // kind `of` (microfacet_energy.h).
+  // Null: the scene is refused.
   enum class EnergyOf { conductor, dielectric, coat };
   const MicrofacetEnergy* energy(EnergyOf of, const Roughness& roughness, double eta);
   const MicrofacetEnergy* energy(EnergyOf of, Microfacet type, double alpha, double eta);
 
-  // Returns the tables of a coated metal with these parameters, which `make` makes. Materials with equal
-  // parameters share the work.
+  // Returns the tables of a coated metal with these parameters, which `make` makes.
   const CoatedConductorTables& coated_conductor(const std::array<float, 4>& parameters,
                                                 const std::function<CoatedConductorTables()>& make);
 
@@ -63,6 +66,9 @@ class MaterialBuilder {
   std::vector<std::unique_ptr<const MicrofacetEnergy>> take_energies() { return std::move(energies_); }
 
  private:
+  // Counts a new table; false, and the scene is refused, if there are too many.
+  bool room_for_table();
+
   const Scene& scene_;
   const TextureTable& textures_;
   const std::vector<scene::BsdfTraits>& traits_;

@@ -143,6 +143,7 @@ inline RoughPlastic make_material(const RoughPlasticBsdf& b, MaterialBuilder& bu
     return m;
   }
   m.energy = builder.energy(MaterialBuilder::EnergyOf::coat, b.distribution, b.alpha, eta);
+  if (!m.energy) return m;
   // The share of diffuse light from inside that the coat reflects back. By reciprocity, the coat's
   // transmittance for light from inside is 1 / eta^2 of that for light from outside.
   m.internal_reflectance = static_cast<float>(1 - m.energy->through.mean() / (eta * eta));
