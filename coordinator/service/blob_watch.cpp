@@ -42,14 +42,15 @@ bool is_open(JobState state) { return state == JobState::queued || state == JobS
 }  // namespace
 
 Result<std::vector<BlobRef>> missing_blobs_of(const StoredJob& job, const BlobStore& blobs) {
-  std::vector<BlobRef> files = job.assets, missing;
+  std::vector<BlobRef> files = job.assets;
   files.push_back({job.scene, 0, job.name});
-  for (const BlobRef& file : files) {
-    const auto there = blobs.find(file.digest);
-    if (!there) return tl::unexpected(there.error());
-    if (!*there) missing.push_back(file);
-  }
-  return missing;
+  std::vector<Digest> digests;
+  for (const BlobRef& file : files) digests.push_back(file.digest);
+  const auto lacking = blobs.missing(digests);
+  if (!lacking) return tl::unexpected(lacking.error());
+  const std::set<Digest> missing(lacking->begin(), lacking->end());
+  std::erase_if(files, [&](const BlobRef& file) { return !missing.contains(file.digest); });
+  return files;
 }
 
 void await_blob(Core& core, JobEntry& entry, const BlobRef& file, bool damaged) {
@@ -96,13 +97,10 @@ void BlobWatch::look_loop(const std::stop_token& token) {
 }
 
 void BlobWatch::look_for(const std::set<Digest>& digests) {
-  std::set<Digest> here;
-  for (const Digest& digest : digests) {
-    const auto found = blobs_.find(digest);
-    // the store is unavailable: the lookup is repeated when it is due again
-    if (!found) break;
-    if (*found) here.insert(digest);
-  }
+  const auto lacking = blobs_.missing(std::vector(digests.begin(), digests.end()));
+  if (!lacking) return;  // the store is unavailable: the lookup is repeated when it is due again
+  std::set<Digest> here = digests;
+  for (const Digest& digest : *lacking) here.erase(digest);
   if (here.empty()) return;
   const auto core = core_.lock();
   std::vector<EntryPtr> complete;

@@ -1,6 +1,7 @@
 """Blobs in an S3-compatible store that checks every signature: the same pixels, also when it is slow, breaks off or lies."""
 
 import hashlib
+import json
 import os
 import re
 import concurrent.futures
@@ -35,8 +36,14 @@ def put(farm, data):
     return digest
 
 
+def all_missing(farm, digests):
+    """Those of the digests that the coordinator says it lacks."""
+    reply = farm.request("POST", "/api/v1/blobs/missing", json.dumps({"digests": digests}).encode())
+    return json.loads(reply)["missing"]
+
+
 def missing(farm, digest):
-    return farm.request("POST", "/api/v1/blobs/missing", b'{"digests":["%s"]}' % digest.encode()) != b'{"missing":[]}'
+    return bool(all_missing(farm, [digest]))
 
 
 def test_a_job_has_the_pixels_of_a_store_on_disk_also_after_the_local_copies_are_lost(s3, s3_farm, expected):
@@ -81,6 +88,32 @@ def test_lists_of_many_pages_are_read_at_the_start(s3, s3_farm):
 
     assert not any(missing(s3_farm, digest) for digest in digests)
     assert len(s3.requests) == before, "what was listed is not asked for again"
+
+
+def test_many_unknown_blobs_are_looked_for_in_lists_of_the_store(s3, s3_farm):
+    there = [put(s3_farm, b"%d" % i) for i in range(3)]
+    strangers = [hashlib.sha256(b"stranger %d" % i).hexdigest() for i in range(200)]
+    late = hashlib.sha256(b"late").hexdigest()
+    s3.objects[f"scenes/{late[:2]}/{late}"] = b"late"  # put there by somebody else
+    before = len(s3.requests)
+
+    assert all_missing(s3_farm, [*there, late, *strangers]) == strangers
+
+    lists = len(s3.requests) - before
+    assert lists == -(-len(s3.objects) // s3.PAGE), "one request for each page of the list"
+    assert not missing(s3_farm, late)
+
+
+def test_a_damaged_object_is_missing_in_a_list_too(s3, s3_farm):
+    digest = put(s3_farm, b"right")
+    s3.objects[f"scenes/{digest[:2]}/{digest}"] = b"wrong"
+    shutil.rmtree(s3_farm.data / "blobs" / digest[:2], ignore_errors=True)
+    s3_farm.restart_coordinator()
+    token = (s3_farm.data / "join-token").read_text().strip()
+    farm_rpc.fetch_blob(farm_rpc.channel_of(s3_farm.grpc), token, digest)  # finds the damage
+    strangers = [hashlib.sha256(b"stranger %d" % i).hexdigest() for i in range(200)]
+
+    assert all_missing(s3_farm, [*strangers, digest]) == [*strangers, digest]
 
 
 def test_a_store_that_is_busy_is_asked_again(s3, s3_farm):

@@ -252,14 +252,16 @@ Response post_blobs_missing(Api& api, const Request& request, const Params&) {
     return problem(400, "the body must be {\"digests\": [SHA256, ...]}");
   if (list->size() > kMaxDigests)
     return problem(400, fmt::format("more than {} digests in one request", kMaxDigests));
-  auto missing = nlohmann::ordered_json::array();
+  std::vector<Digest> digests;
   for (const auto& item : *list) {
     const auto digest = read_digest(item, fmt::format("digests[{}]", &item - &list->front()));
     if (!digest) return problem(digest.error());
-    const auto there = api.coordinator().blobs().find(*digest);
-    if (!there) return problem(there.error());  // it is unknown at the moment whether the store has the blob
-    if (!*there) missing.push_back(digest->hex());
+    digests.push_back(*digest);
   }
+  const auto lacking = api.coordinator().blobs().missing(digests);
+  if (!lacking) return problem(lacking.error());  // it is unknown at the moment which blobs the store has
+  auto missing = nlohmann::ordered_json::array();
+  for (const Digest& digest : *lacking) missing.push_back(digest.hex());
   return json_response(200, write_json({{"missing", std::move(missing)}}));
 }
 

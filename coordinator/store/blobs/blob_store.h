@@ -21,6 +21,9 @@ class BlobStore {
   virtual bool has(const Digest& digest) const = 0;
   // Like has(), but returns an error if it is unknown at the moment whether the store has the blob.
   virtual Result<bool> find(const Digest& digest) const { return has(digest); }
+  // Returns those of the digests whose blobs the store lacks, in the given order. A remote store needs fewer
+  // requests for this than for a find() of each. Errors as of find().
+  virtual Result<std::vector<Digest>> missing(std::span<const Digest> digests) const;
   // Returns an error if the storage (a disk or another machine) is unavailable. Sends it one request, which
   // may take seconds.
   virtual Result<void> answers() const { return {}; }

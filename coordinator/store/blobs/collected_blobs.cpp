@@ -21,6 +21,10 @@ Result<bool> CollectedBlobs::find(const Digest& digest) const {
   asked_for(digest);
   return inner_->find(digest);
 }
+Result<std::vector<Digest>> CollectedBlobs::missing(std::span<const Digest> digests) const {
+  for (const Digest& digest : digests) asked_for(digest);
+  return inner_->missing(digests);
+}
 Result<void> CollectedBlobs::prove(const Digest& digest, bool again) const {
   asked_for(digest);
   return inner_->prove(digest, again);

@@ -42,6 +42,7 @@ class CollectedBlobs final : public BlobStore {
 
   bool has(const Digest& digest) const override;
   Result<bool> find(const Digest& digest) const override;
+  Result<std::vector<Digest>> missing(std::span<const Digest> digests) const override;
   Result<void> answers() const override { return inner_->answers(); }
   Result<void> prove(const Digest& digest, bool again = false) const override;
   Result<std::uint64_t> size(const Digest& digest) const override;

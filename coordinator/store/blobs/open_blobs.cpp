@@ -15,6 +15,16 @@ constexpr std::size_t kNodeIdLength = 16;
 bool is_s3(const std::string& where) { return where.starts_with("s3:"); }
 }  // namespace
 
+Result<std::vector<Digest>> BlobStore::missing(std::span<const Digest> digests) const {
+  std::vector<Digest> lacking;
+  for (const Digest& digest : digests) {
+    const auto there = find(digest);
+    if (!there) return tl::unexpected(there.error());
+    if (!*there) lacking.push_back(digest);
+  }
+  return lacking;
+}
+
 Result<void> check_blobs(const std::string& where) {
   if (!is_s3(where)) return {};
   if (auto address = parse_s3_url(where); !address) return tl::unexpected(address.error());

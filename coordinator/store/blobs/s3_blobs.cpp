@@ -29,6 +29,9 @@ void LocalCopies::gone(const Digest& digest) {
 namespace {
 
 constexpr int kReadTries = 3;
+// missing() looks up at most this many digests, and one more for each list that all known blobs need;
+// above this it lists the store. S3 returns up to 1000 keys per list.
+constexpr std::size_t kLeastLookups = 16, kKeysPerList = 1000;
 
 std::string key_of(const Digest& digest) {
   const std::string hex = digest.hex();
@@ -77,11 +80,13 @@ void S3Blobs::note(const Digest& digest) const {
   damaged_.erase(digest);
 }
 
+bool S3Blobs::known(const Digest& digest) const {
+  const std::lock_guard lock(mutex_);
+  return there_.contains(digest);
+}
+
 Result<bool> S3Blobs::find(const Digest& digest) const {
-  {
-    const std::lock_guard lock(mutex_);
-    if (there_.contains(digest)) return true;
-  }
+  if (known(digest)) return true;
   const auto object = link_.look_at(key_of(digest));
   if (object) {
     {
@@ -95,6 +100,31 @@ Result<bool> S3Blobs::find(const Digest& digest) const {
   if (object.error().code == Errc::not_found) return false;
   log_error("store=s3", object.error().message);
   return fail(Errc::unavailable, object.error().message);
+}
+
+Result<std::vector<Digest>> S3Blobs::missing(std::span<const Digest> digests) const {
+  std::set<Digest> unknown;
+  bool list_is_shorter = false;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const Digest& digest : digests)
+      if (!there_.contains(digest) && !damaged_.contains(digest)) unknown.insert(digest);
+    list_is_shorter = unknown.size() > kLeastLookups + there_.size() / kKeysPerList;
+  }
+  if (list_is_shorter) {
+    const auto keys = list(false);
+    if (!keys) return tl::unexpected(keys.error());
+    const std::lock_guard lock(mutex_);
+    for (const Digest& digest : *keys)
+      if (!damaged_.contains(digest)) there_.insert(digest);
+  }
+  std::vector<Digest> lacking;
+  for (const Digest& digest : digests) {
+    const auto there = list_is_shorter && unknown.contains(digest) ? known(digest) : find(digest);
+    if (!there) return tl::unexpected(there.error());
+    if (!*there) lacking.push_back(digest);
+  }
+  return lacking;
 }
 
 Result<void> S3Blobs::prove(const Digest& digest, bool again) const {
@@ -127,11 +157,7 @@ Result<std::vector<std::byte>> S3Blobs::read(const Digest& digest, std::uint64_t
 }
 
 void S3Blobs::note_copy(const Digest& digest) const {
-  {
-    const std::lock_guard lock(mutex_);
-    // The S3 store may lack this blob, so the local file must not be removed
-    if (!there_.contains(digest)) return;
-  }
+  if (!known(digest)) return;  // the S3 store may lack this blob, so the local file must not be removed
   const auto bytes = local_->size(digest);
   if (!bytes) return;
   for (const Digest& old : copies_.lock()->used(digest, *bytes))

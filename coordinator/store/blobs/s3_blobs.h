@@ -55,6 +55,7 @@ class S3Blobs final : public BlobStore {
 
   bool has(const Digest& digest) const override { return find(digest).value_or(false); }
   Result<bool> find(const Digest& digest) const override;
+  Result<std::vector<Digest>> missing(std::span<const Digest> digests) const override;
   Result<void> answers() const override { return link_.answers(); }
   // Verifies the local copy; a damaged copy is moved aside. Without an intact copy it only checks that the S3
   // store has the blob, since the bytes are verified when they are fetched.
@@ -79,6 +80,7 @@ class S3Blobs final : public BlobStore {
   // fetch.
   Result<void> fetch(const Digest& digest) const;
   Result<void> fetch_now(const Digest& digest) const;
+  bool known(const Digest& digest) const;  // true if the S3 store is known to have the blob
   void note(const Digest& digest) const;
   void note_lost(const Digest& digest) const;
   Error note_damaged(const Digest& digest, const Error& why) const;
