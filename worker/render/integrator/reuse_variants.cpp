@@ -80,7 +80,9 @@ class Pilot {
     Noise noise;
     for (std::size_t k = 0; k < group.size(); ++k)
       for (int c = 0; c < 3; ++c) {
-        const double mean = (shared[k][0][c] + shared[k][1][c]) / kPilotSamples;
+        // The mean of both kinds of samples: a rare bright sample of one kind makes errors of both count less
+        const double mean =
+            (shared[k][0][c] + shared[k][1][c] + alone[k][0][c] + alone[k][1][c]) / (2 * kPilotSamples);
         const double weight = 1 / (mean * mean + kRelMseDenominator);
         const auto squared = [](double x) { return x * x; };
         noise.shared += squared(shared[k][0][c] - shared[k][1][c]) * weight;
