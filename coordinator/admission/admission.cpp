@@ -25,8 +25,7 @@
 namespace ls::coordinator {
 namespace {
 
-// At most this many items of the scene that are left out of the rendering are listed, so that a job's record
-// stays small
+// A job's record lists at most this many items that are left out of the rendering, so that it stays small
 constexpr std::size_t kMostListed = 64;
 
 // Returns the total bytes of the files that only this part of the renderer reads.
@@ -45,9 +44,9 @@ std::uint64_t bytes_of_files(const scene::Needs& needs, const std::string& part)
   return sum;
 }
 
-// Sets needs, features and analysis of `job`: the renderer's features that the scene needs, and the parts of
-// the scene that are left out of the rendering, for workers and as text for users. `pruned` is the part of
-// the scene that the job's integrator uses.
+// Describes for workers and users which features of the renderer the scene needs, and which parts of the
+// scene are not rendered: sets `needs`, the features and `analysis` of `job`. `pruned` is the part of the
+// scene that the job's integrator uses, with a list of the rest.
 void note_analysis(const scene::Pruned& pruned, const RenderSettings& settings, StoredJob& job) {
   using nlohmann::json;
   const scene::Needs needs = scene::needs_of(pruned.scene, scene::sees_media(settings.integrator));
@@ -157,7 +156,7 @@ tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, 
   scene::Pruned pruned = scene::pruned(read.scene, whom);
   const auto missing = [&](const Asset& a) { return read.not_uploaded.contains(a.digest); };
   if (std::none_of(pruned.scene.assets.begin(), pruned.scene.assets.end(), missing)) return pruned;
-  // Reading a second time, strictly, gives errors with the places in the scene that name the missing file
+  // Now read strictly, the scene gives an error at each place that names a missing file
   const auto again = read_uploaded(request, blobs, frame, true);
   if (!again) return tl::unexpected(again.error());
   return scene::pruned(again->scene, whom);  // the file has arrived since the first reading
@@ -196,7 +195,8 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
     if (!right) return refuse(right.error());
     origin = std::move(right->origin);
   }
-  if (!wants_labels(job.settings)) {  // unless there are cryptomattes, names are not part of the scene
+  // Names of objects are kept for cryptomattes only
+  if (!wants_labels(job.settings)) {
     read->scene.shape_labels.clear();
     read->scene.instance_labels.clear();
   }
@@ -236,8 +236,8 @@ Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const Blob
         Errc::failed_precondition,
         fmt::format("the reference's blob {0} is not here: PUT /api/v1/blobs/{0} first", digest.hex()));
   ExrLimits limits;
-  // The picture may have as many pixels as a reference of the right size. The limit is at least 2^22, so that
-  // a slightly wrong size is reported as a wrong size and not as too large.
+  // A reference must have the size of the image. This limit protects the memory. It is at least 2^22 pixels,
+  // so that for a picture of another size the error names the wrong size and not the limit.
   limits.max_pixels = std::max<std::uint64_t>(
       static_cast<std::uint64_t>(size.width) * static_cast<std::uint64_t>(size.height),
       std::uint64_t{1} << 22);
@@ -256,8 +256,8 @@ std::string replay_of(const StoredJob& job) {
   return replay_command(job.name, job.spec, frame ? std::optional(frame->frame) : std::nullopt);
 }
 
-// A world (the scene as loaded by a worker) takes at least as much memory as its files; the user may request
-// workers with more memory.
+// The least is the size of the files, since a world (the scene as loaded by a worker) takes at least as much
+// memory. The user may request more.
 std::uint64_t memory_need(const StoredJob& job) {
   std::uint64_t files = 0;
   for (const BlobRef& file : job.assets) files += file.bytes;

@@ -18,7 +18,8 @@ class Budget {
  public:
   explicit Budget(std::uint32_t frames) : frames_(frames) {}
 
-  // Call scene() once, before the frames are read, and frame() for every frame.
+  // Call scene() once with the size of the scene's main file, before the frames are read, and frame() for
+  // every frame.
   Result<void> scene(std::size_t bytes) const {
     if (bytes <= limits::kMaxSequenceText / frames_) return {};
     return too_much("bytes of scene text", limits::kMaxSequenceText);
@@ -50,7 +51,7 @@ tl::unexpected<Rejected> refused(Error error, std::vector<Diagnostic> found = {}
   return tl::unexpected(Rejected{std::move(error), std::move(found)});
 }
 
-// Drops warnings that an earlier frame has, too.
+// Drops each warning of a frame that an earlier frame has already.
 void merge_warnings(std::vector<Admission>& frames) {
   std::set<std::string> reported;
   for (Admission& f : frames)

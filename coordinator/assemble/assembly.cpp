@@ -30,9 +30,8 @@ Health HealthTable::total() const {
   return all;
 }
 
-// Returns the health (counts of invalid values) as text: one line for the full rounds of each tile with
-// problems there, then one for the truncated last round of each tile with problems there. A line is "f"
-// (full) or "t" (truncated), the tile and its health.
+// Returns the health (counts of invalid values) as text. A line is "f TILE HEALTH" for the full rounds of a
+// tile, or "t TILE HEALTH" for its truncated last round. Tiles without invalid values have no line.
 std::string HealthTable::save() const {
   std::string text;
   for (const auto& [tile, health] : full_)

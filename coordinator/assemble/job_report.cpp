@@ -39,8 +39,8 @@ json reference_of(const ReportFacts& facts, const std::optional<ReferenceError>&
           {"relmse", reference_error ? number(reference_error->relmse) : json()},
           {"flip", reference_error && reference_error->flip ? number(*reference_error->flip) : json()},
           {"same_seed", facts.job.reference_same_seed},
-          // True if the difference to the reference is within the reference's own noise, so that it does not
-          // show the image's error.
+          // True if the measured difference is no larger than the reference's own noise: it then says nothing
+          // about the image's error.
           {"below_noise", reference_error && reference_error->relmse_below_noise()},
           {"rmse_below_noise", reference_error && reference_error->rmse_below_noise()},
           {"mse_stderr", reference_error ? number(reference_error->mse_stderr) : json()},
@@ -49,12 +49,12 @@ json reference_of(const ReportFacts& facts, const std::optional<ReferenceError>&
           {"noise_relmse", noise ? number(noise->relmse) : json()}};
 }
 
-// Adds to some checkpoints of the curve a forecast of the cost of reaching the target, made from the points
-// up to this checkpoint. Users can then judge afterwards how reliable forecasts were.
+// Adds forecasts of the cost of reaching the target to some points of the curve. Each is made from the points
+// up to this one, so users can see how reliable such forecasts were.
 void put_forecasts(json& curve, const std::vector<ConvergencePoint>& points, double target) {
   const std::vector<ErrorPoint> all = error_points(points);
-  // A forecast is added each time the samples have doubled. Forecasts in between would add little, and each
-  // evaluates all points so far
+  // One forecast each time the samples have doubled: forecasts in between would add little, and each
+  // evaluates all points before it
   double next = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (all[i].spp < next) continue;

@@ -16,8 +16,8 @@
 
 namespace ls::coordinator {
 
-// Drops those of a tile's rounds (ascending) that no checkpoint with `next` or more rounds needs: all rounds
-// before `next` except the latest of them.
+// Drops the entries of one tile that no later checkpoint needs. `rounds` is ascending. A checkpoint with at
+// least `next` rounds of the tile needs the latest entry before `next`, and later ones.
 template <class T>
 void drop_rounds_before(RoundIndex next, std::vector<std::pair<RoundIndex, T>>& rounds) {
   const auto later =
@@ -27,8 +27,8 @@ void drop_rounds_before(RoundIndex next, std::vector<std::pair<RoundIndex, T>>& 
 
 class RoundErrors {
  public:
-  // If `keep_relative`, the relative error sums after all rounds are kept even when no checkpoint needs them:
-  // the farm's rule that stops tiles at a target error needs them after a restart.
+  // `keep_relative`: the relative error sums after all rounds are kept, even those that no checkpoint needs.
+  // A job with a target error needs them after a restart, when its stop rule is fed again.
   RoundErrors(TileIndex tiles, bool keep_relative) : tiles_(tiles), keep_relative_(keep_relative) {}
 
   // Adds the tile's error after this round. The rounds of a tile come in order. If a truncated round comes

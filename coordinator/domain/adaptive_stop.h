@@ -102,7 +102,7 @@ class AdaptiveStop {
   // foresee() predicts the level (threshold for stopping) at which the image will meet `target`. It does
   // nothing until every group of tiles has kFirstForecast rounds.
   void foresee(double target);
-  // Returns how many rounds of the tile will probably be needed; never fewer than are certain to be needed.
+  // Returns how many rounds of the tile will probably be needed, at least those that are certain to be.
   RoundIndex predicted_last(TileIndex tile) const;
   // Returns the variance per sample of the tile's group, estimated from its last known round; NaN if unknown.
   // The queue of units (unit_queue.h) orders speculative rounds by it.

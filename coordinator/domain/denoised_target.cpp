@@ -38,7 +38,9 @@ void DenoisedTarget::add(const DenoisedCheck& check) {
 
 double DenoisedTarget::error_left(double target) const {
   const DenoisedCheck* now = find(due_);
-  const double next = 1 / kDenoisedCheckGrowth;  // at least one further check
+  // The job ends after one further check at the earliest, whose level has kDenoisedCheckGrowth times the
+  // samples
+  const double next = 1 / kDenoisedCheckGrowth;
   return now != nullptr && now->at_most && *now->at_most > 0 ? std::min(next, target / *now->at_most) : next;
 }
 

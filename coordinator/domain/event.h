@@ -124,9 +124,9 @@ struct JobRetargeted {
   JobId job;
   double target_error = 0;  // relMSE
 };
-// Raises the job's total of samples per pixel; the job may be running, paused or done. If the last rounds of
-// all tiles are decided already, the job loses its target error, and all tiles get the new total. A time
-// limit that has passed is dropped, too.
+// Raises the job's total of samples per pixel; the job may be running, paused or done. If the last round of
+// every tile is fixed already, because the job has stopped or is about to, the job loses its target error,
+// and all tiles get the new total. A time limit that has passed is dropped, too.
 struct JobExtended {
   JobId job;
   std::uint64_t spp = 0;
@@ -199,7 +199,8 @@ struct UnitAccepted {
   Digest digest;
   WorkerId worker;
   double cpu_seconds = 0;
-  // Seconds that the rendering thread waited for a core or for memory while it rendered the unit: CoreShare
+  // Seconds that the rendering thread waited for a core or for memory during the unit; for CoreShare
+  // (worker_table.h)
   double wait_seconds = 0;
 };
 // The result of a unit (one tile, one range of its samples) has been added to the image, as the effect Fold

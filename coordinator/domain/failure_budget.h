@@ -39,7 +39,7 @@ class UnitFailures {
   }
 
  private:
-  // A list has few entries, since the job fails as soon as a unit is exhausted()
+  // The latest attempts of each unit; add() limits their number
   std::map<UnitCode, std::vector<FailedAttempt>> units_;
 };
 

@@ -97,9 +97,9 @@ struct Holders {
   }
 };
 
-// The number of leased units of one job, or of all jobs of a user or group
+// The leased units of one job, or of all jobs of a user or group
 struct Load {
-  // copies of units are counted, audits are not
+  // Leased units. A unit that is leased twice counts twice; units of audits do not count
   std::uint32_t units = 0;
   std::unordered_map<WorkerIndex, std::uint32_t> leases_at;  // number of leases of each worker that has any
 };
@@ -139,10 +139,11 @@ struct Job {
   JobPlan plan;
   std::uint64_t spp;  // samples per pixel: the plan's, or kMaxSppWithoutLimit; always even
   JobState state = JobState::queued;
-  // Why the job ends. It is set once the last rounds of all tiles are decided, even while some of their units
+  // Why the job ends. It is set once the last round of every tile is fixed, even while some of their units
   // are leased or not in the image yet. It is final once the job is done
   std::optional<StopReason> stopping;
-  bool frozen = false;  // stopped by time or user: only units leased before and first rounds still count
+  // Stopped by time or user: only units leased before, and the first round of each tile, still count
+  bool frozen = false;
   std::optional<Digest> numeric_class;
   // Time of the first ray, moved later by the periods in which the job's clock was stopped
   std::optional<TimePoint> first_ray;

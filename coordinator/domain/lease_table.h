@@ -24,8 +24,8 @@ struct LeaseRecord {
   // Core seconds per unit charged to the owner's share: seconds_per_unit, or kAssumedUnitSeconds if nothing
   // is measured
   double charge_per_unit = 0;
-  bool audit = false;  // true for an audit: a lease of one unit that has an accepted result, rendered again
-                       // for comparison
+  // An audit: a lease of one unit that has an accepted result and is rendered again for comparison
+  bool audit = false;
   TimePoint issued{};
   // Predicted time from `issued` until its last unit is done, including the wait for the worker's earlier
   // leases

@@ -27,8 +27,8 @@
 
 namespace ls::coordinator {
 
-// How the time of a job was spent, in core seconds of the workers (`merge`: of the coordinator). If the
-// coordinator is killed, all but `render` lose the time since the job was last stored.
+// How the time of a job was spent, in core seconds of the workers (`merge`: of the coordinator). These totals
+// are stored now and then: if the coordinator is killed, all but `render` lose what was added since.
 struct TimeSplit {
   double load = 0;      // fetching files
   double build = 0;     // parsing files, building worlds
@@ -53,7 +53,8 @@ inline void TimeSplit::add(const TimeSplit& o) {
   for (const TimePart& part : kTimeParts) this->*part.seconds += o.*part.seconds;
 }
 
-inline constexpr int kMoreWorkers = 8;  // number of workers that JobView::eta_with_more assumes in addition
+// JobView::eta_with_more is the prediction for this many workers more
+inline constexpr int kMoreWorkers = 8;
 
 // Estimated errors of an image: at a checkpoint, or at the end of the job
 struct ErrorFigures {
@@ -108,7 +109,8 @@ struct FrameView {
 struct FramesView {
   FrameRange range;
   std::uint32_t total = 0, done = 0, running = 0, failed = 0, cancelled = 0;
-  // The frame to show: the first one that is being rendered; if there is none, the last one with samples
+  // The frame to show: the first one that is being rendered, else the last one with finished units, else the
+  // first
   std::uint32_t current = 0;
   std::vector<FrameView> all;  // all frames, ascending; filled in by Coordinator::job() only
 };
@@ -116,10 +118,10 @@ struct FramesView {
 struct JobView {
   JobId id;
   std::string name;  // name of the scene file, for display
-  // The user whose token submitted it. Empty: the administrator, or a record from before users existed
+  // The user who submitted it, by token. Empty: the administrator, or the job was stored before users existed
   std::string owner;
   JobState state = JobState::queued;
-  std::string stopped;    // once done: "spp", "error", "time" or "user"
+  std::string stopped;    // once done or cancelled: "spp", "error", "time" or "user"
   double progress = 0;    // 0..1
   std::uint64_t spp = 0;  // samples per pixel: requested, or the limit
   bool spp_asked = true;  // false: no number of samples was requested; a target error or a time ends the job
@@ -165,10 +167,10 @@ struct JobView {
   // Numeric health of the units in its image (rounds of tiles); for a sequence only the totals
   Health health;
   std::vector<HealthNote> notes;  // the numeric health as sentences for users; empty: no problems
-  // The numeric class that it is pinned to, with its platform, and how much of the farm is of that class
+  // The numeric class (machines that compute the same bits) that it is pinned to, and the class's platform
   std::optional<Digest> numeric_class;
   std::string platform;
-  // nullopt: the job is pinned to no class, has ended, or is a sequence
+  // How much of the farm is of that class; nullopt: the job is pinned to none, has ended, or is a sequence
   std::optional<ClassShare> class_share;
   bool fake = false;  // true if fake workers invented its pixels; for a sequence: the pixels of any frame
   // Set only for a sequence. The other values of its view combine all frames: they are sums or means over

@@ -51,7 +51,7 @@ json to_value(const DenoisedCheck& c) {
           {"at_most", c.at_most ? number(*c.at_most) : json()}};
 }
 
-// `share` is null if no workers are connected.
+// The value "share" is null if no workers are connected.
 json to_value(const ClassShare& s) {
   return {{"workers", s.workers},
           {"of_workers", s.of_workers},

@@ -117,8 +117,9 @@ class Farm {
   Result<void> may_extend(const JobId& id, std::uint64_t spp) const;
   std::optional<WorkerFigures> worker(const WorkerId& id) const;
   std::optional<TileFigures> tile(const JobId& id, TileIndex tile) const;
-  // Returns, for the user, why a job that could run has no worker: workers of another class, workers without
-  // its tags, and blocked or unhealthy ones. Empty if some worker may take it.
+  // Explains to the user why no worker may take units of a job that could run: each connected worker is of
+  // another class, lacks memory or a tag, is blocked or unhealthy, or the like. Empty if some worker may take
+  // them.
   std::string why_waiting(const JobId& id) const;
   // Returns the core seconds of all users whose jobs have units to lease or leased units, as FairShare counts
   // them; for tests and metrics.

@@ -30,7 +30,7 @@ void Farm::State::set_state(Job& job, JobState to) {
 
 void Farm::State::refresh(Job& job) {
   const bool units = job.leasable() && !job.queue.empty(job.units);
-  // FairShare may list the job already, because of an audit that only some workers can render
+  // Set even if FairShare lists the job already: it may do so for an audit that only some workers can render
   work_appeared |= units && !job.has_units;
   job.has_units = units;
   if (units || (job.leasable() && job.audit_waits()))
@@ -116,7 +116,7 @@ void Farm::State::on(const JobResumed& event) {
   Job* job = find(event.job);
   if (job == nullptr || job->state != JobState::paused) return;
   set_state(*job, job->numeric_class ? JobState::running : JobState::queued);
-  // if a failed check of the denoised error paused the job, the check is made again
+  // A failed check of the denoised layers' error may have paused the job: this repeats the check
   job->checking_spp = 0;
   if (job->adaptive) judge(*job);
   refresh(*job);
@@ -162,12 +162,12 @@ void Farm::State::on(const JobForgotten& event) {
 
 void Farm::State::freeze(Job& job, StopReason reason) {
   job.frozen = true;
-  work_appeared = true;  // units that came back after the time limit may be leased again
+  work_appeared = true;  // the time limit no longer forbids leasing units that came back
   std::vector<RoundIndex> begun(job.units.tiles());
   for (TileIndex t = 0; t < begun.size(); ++t)
     begun[t] = std::max({job.queue.next(t), job.units.end_of_accepted(t), RoundIndex{1}});
   job.cut_off(begun, reason);
-  // This also adds accepted results that the stop rule of a target error has kept out of the image
+  // The stop rule of a target error no longer holds back accepted results: they are added to the image, too
   for (TileIndex t = 0; t < begun.size(); ++t) issue_folds(job, t);
   finish_if_complete(job);
   refresh(job);
@@ -187,7 +187,7 @@ void Farm::State::finish_if_complete(Job& job) {
 void Farm::State::fail(Job& job, std::string error) {
   set_state(job, JobState::failed);
   effects.emplace_back(JobFailed{job.plan.brief.job, std::move(error)});
-  // The failure of a job is not attributed to its workers: their failures in it are erased.
+  // The failed job is to blame, not its workers: their failures in it are erased.
   for (const auto& [index, worker] : workers.all()) worker->failures.erase(job.seq);
   end(job);
 }

@@ -116,12 +116,12 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
   f.units_folded = job->units.folded_count();
   f.rounds_complete = job->units.rounds_complete();
   const double per_sample = job->cost.per_sample();  // 0: nothing has been measured yet
-  // samples_of_last(n) estimates the number of pixel samples in n units that are not done. It takes them to
-  // be the last n units in the order of rounds, and all tiles to have the same size.
+  // samples_of_last(n) estimates the number of pixel samples in n units that are not done, as if all tiles
+  // had the same size and only the last units in the order of rounds were missing.
   const RoundIndex rounds = job->queue.longest();
   const double pixels = static_cast<double>(job->plan.grid.frame.width) * job->plan.grid.frame.height;
   const double left = static_cast<double>(job->units.tiles());
-  const auto samples_of_last = [&](std::uint64_t undone) {  // the missing units belong to the last rounds
+  const auto samples_of_last = [&](std::uint64_t undone) {
     double samples = 0;
     for (RoundIndex r = rounds; undone > 0 && r-- > 0;) {
       const std::uint64_t units = std::min<std::uint64_t>(undone, job->units.tiles());

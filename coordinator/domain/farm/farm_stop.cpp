@@ -59,8 +59,7 @@ AdaptiveStop::Verdict Farm::State::denoised_verdict(Job& job) {
     }
     return Verdict::no;
   }
-  // The film can be denoised for the check only while it is exactly the image of the stop rule's present
-  // level.
+  // The check denoises the film, so the film must be exactly the image of the stop rule's present level.
   const std::vector<RoundIndex> ends = rule.ends();
   bool missing = false;
   for (TileIndex t = 0; t < job.units.tiles(); ++t) {

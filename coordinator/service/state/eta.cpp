@@ -33,17 +33,16 @@ std::optional<CoreSeconds> core_seconds_left(const EtaInputs& facts, std::span<c
                      {{from_now(forecast->core_seconds_lo), from_now(forecast->core_seconds_hi)}}};
 }
 
-// How long threads wait at the end of a job with a target error, as multiples of a unit's duration u. (They
-// do not idle, but render units that will be dropped.) Until the last needed unit is done they wait between 0
-// and 1 u (Graham 1969: list scheduling of work W on P threads takes at most W / P + (1 - 1 / P) u). Besides,
-// this last unit itself may wait for up to 1 u until a thread is free for it. If the samples end the job, the
-// number of units is known, and all threads end at about the same time.
+// How long a job with a target error lasts after its work has run out for some threads, as multiples of a
+// unit's duration u. Until the last needed unit is done the other threads wait between 0 and 1 u (Graham
+// 1969: list scheduling of work W on P threads takes at most W / P + (1 - 1 / P) u). They do not idle, but
+// render units that will be dropped; so the last needed unit itself may wait up to 1 u for a free thread. If
+// the samples end the job, the number of units is known, and all threads end at about the same time.
 constexpr double kEven = 0, kLeastWait = 0, kMeanWait = .5, kMostWait = 2;
 
 // Returns the wall-clock seconds that `core` core seconds of work take on `cores` cores. A unit runs on one
-// thread, so at most facts.units_at_once cores are busy. The result is at least facts.unit_seconds, the
-// duration of one unit, or `core` if less than that is left. `wait` is the time that threads wait for the
-// last units, as a multiple of a unit's duration.
+// thread. So at most facts.units_at_once cores are busy, and the result is at least the duration of one unit
+// (facts.unit_seconds), or `core` if less work than that is left. `wait` is one of the multiples above.
 double seconds_on(double cores, double core, double wait, const EtaInputs& facts) {
   const double busy = facts.units_at_once > 0 ? std::min(cores, facts.units_at_once) : cores;
   const double waits = wait * facts.unit_seconds * std::max(0.0, 1 - 1 / busy);

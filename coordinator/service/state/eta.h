@@ -17,12 +17,12 @@ struct EtaInputs {
   // scheduler's own prediction; 0: unknown
   double core_left = 0;
   double core_to_limit = 0;  // the same until the sample limit; 0: unknown
-  // Target error (relMSE) and time budget (seconds since the first ray), if requested
+  // The target error (relMSE) and the time budget (seconds since the first ray); nullopt: the job has none
   std::optional<double> target, time;
   double elapsed = 0;  // seconds since the first ray
   // CPU seconds per wall-clock second that the job's workers give it, or would give it if it were running
   double cores = 0;
-  // `cores` with kMoreWorkers more workers; not above `cores` if more workers would not help
+  // `cores` if kMoreWorkers more workers joined; no more than `cores` if they would not help
   double cores_with_more = 0;
   double unit_seconds = 0;   // mean core seconds of a remaining unit; 0: unknown
   double units_at_once = 0;  // units that can be rendered at the same time; 0: no limit
@@ -36,12 +36,11 @@ struct Eta {
   std::optional<std::pair<double, double>> with_more_ci95;
 };
 
-// The job ends by samples, target or time, whichever comes first. The core seconds until the target are
-// forecast from `points` (convergence.h), minus the core seconds spent since the last of them. Until the
-// first checkpoint, adaptive jobs use the scheduler's own prediction, without an interval. The prediction
-// takes into account that a unit runs on one thread, so that few units keep few threads busy, and that
-// threads wait for the last units at the end of a job with a target. A forecast's interval is cut at the
-// sample limit.
+// Predicts the end by samples, target error or time, whichever comes first. The core seconds until the target
+// are forecast from `points` (convergence.h), minus those spent since the last point. Before the first
+// checkpoint of an adaptive job, the scheduler's own prediction is used, without an interval. A unit runs on
+// one thread: few units keep few threads busy, and at the end of a job with a target threads wait for the
+// last units. An interval is cut at the sample limit.
 Eta eta_of(const EtaInputs& facts, std::span<const ErrorPoint> points);
 
 }  // namespace ls::coordinator

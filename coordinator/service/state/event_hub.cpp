@@ -25,7 +25,7 @@ struct EventHub::State {
   std::thread::id thread;
 
   // Makes sure that next_id is reserved. If the store cannot reserve ids now, the next block of ids is used
-  // all the same, and may be used again after a crash.
+  // unreserved; a coordinator that starts after a crash may use these ids again.
   void reserve_ids() {
     while (next_id >= reserved_end) {
       const auto first = reserve(limits::kEventIdBlock);
@@ -80,8 +80,8 @@ std::shared_ptr<void> EventHub::subscribe(std::uint64_t after_id,
   const std::lock_guard lock(state_->mutex);
   const std::uint64_t id = ++state_->last_listener;
   auto listener = std::make_shared<State::Listener>();
-  // `after_id` may be greater than any id given so far, if it comes from a store that was lost. The listener
-  // must not wait until ids exceed it.
+  // If the store was lost and ids began again, `after_id` may be greater than any id given so far. The
+  // listener must get new events all the same.
   listener->next = std::min(after_id + 1, state_->next_id);
   listener->on_event = std::move(on_event);
   state_->listeners.emplace(id, std::move(listener));

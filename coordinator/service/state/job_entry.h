@@ -44,8 +44,8 @@ struct JobEntry {
   // computed yet
   std::shared_ptr<const Denoised> denoised;
   std::vector<ConvergencePoint> points;
-  // Number of the current convergence curve. It rises when the curve is dropped because pixels were wrong or
-  // lost. Comparisons of an older curve that finish later are dropped
+  // Number of the current convergence curve; it rises when the curve is dropped because pixels were wrong or
+  // lost. A comparison with the reference that began for an older curve and ends later is ignored
   std::uint64_t curve = 0;
   // True if it has ended and only its files and its record remain: the farm has forgotten it
   bool unloaded = false;
@@ -59,12 +59,13 @@ struct JobEntry {
   std::uint64_t snapshots = 0;  // number of snapshots committed; used by the writer thread only
   TimePoint last_snapshot{}, last_progress{};
   bool progress_due = false;
-  JobState last_state = JobState::queued;  // its state when it was last published
-  std::optional<TimePoint> clock_zero;     // zero of the job's clock, while it runs
+  JobState last_state = JobState::queued;  // the state that clients were last sent
+  // When the job's clock stood at 0: the time of the first ray, moved later by pauses; nullopt while the
+  // clock does not run
+  std::optional<TimePoint> clock_zero;
   // When its clock stopped because the job was paused; nullopt: the clock is not stopped
   std::optional<TimePoint> still_since;
-  // Wall clock of the end of its rendering, in seconds since 1970. The record gets it when the job's end is
-  // stored
+  // When its rendering ended, in seconds since 1970. The job's record gets this value when the end is stored
   double ended_unix = 0;
   double fold_seconds = 0;    // seconds on the job's clock when a result was last added to the image
   std::string trouble;        // why the job waits, for the user

@@ -59,8 +59,8 @@ Result<std::vector<EntryPtr>> JobTable::job_or_frames(const JobId& id) const {
 
 Result<std::string> JobTable::owner(const JobId& id) const {
   if (const auto entry = find(id)) return entry->stored.owner;
-  // The id may name a missing frame of an existing sequence. The owner is then that of the sequence, who gets
-  // an error that lists the frames.
+  // The id may name a frame that an existing sequence lacks. Its owner is the sequence's, so that this user
+  // gets an error that lists the frames.
   const auto frame = frame_of(id);
   const auto sequence = sequences_.find(frame ? frame->sequence : id);
   if (sequence != sequences_.end()) return sequence->second.frames.front()->stored.owner;

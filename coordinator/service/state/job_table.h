@@ -17,8 +17,8 @@ class JobTable {
 
   EntryPtr find(const JobId& id) const;  // null if there is no such job
   Sequence* sequence(const JobId& id);   // null if there is no such sequence
-  // Return the job. job() fails for a sequence, which has no job of its own. usable() also fails for a job
-  // that could not be restored at the start: such a job can only be removed.
+  // Return the job, or an error: job() fails for a sequence, which is no job of its own; usable() also fails
+  // for a job that could not be restored at the start. Such a job can only be removed.
   Result<EntryPtr> job(const JobId& id) const;
   Result<EntryPtr> usable(const JobId& id) const;
   Result<std::vector<EntryPtr>> job_or_frames(const JobId& id) const;
@@ -33,7 +33,8 @@ class JobTable {
   Result<void> room_for(const std::string& owner, std::size_t jobs) const;
   // Adds a job. If it is a frame, it joins its sequence, which is listed at the place of its first frame.
   void add(const EntryPtr& entry);
-  void unlist(const JobId& id);  // removes a job or a sequence from order(); its entries stay until remove()
+  // Removes a job or a sequence from order(). Its jobs stay in the table until remove()
+  void unlist(const JobId& id);
   // Removes the job. Returns the id that is no longer in order(): the job's, or the sequence's if the job was
   // its last frame.
   std::optional<JobId> remove(const EntryPtr& entry);

@@ -25,8 +25,8 @@ void Publisher::progress(JobEntry& entry) {
 void Publisher::sequence(const JobId& id, bool at_once) {
   Sequence* sequence = jobs_.sequence(id);
   if (!sequence || quiet_) return;
-  // A sequence with more than kFramesPerEvent frames is published at most once per `period`, even with
-  // `at_once`
+  // Even with `at_once`, a sequence of more than kFramesPerEvent frames is published at most once per
+  // `period`
   at_once &= sequence->frames.size() <= limits::kFramesPerEvent;
   const double period = limits::kProgressSeconds * (1 + static_cast<double>(sequence->frames.size()) /
                                                             static_cast<double>(limits::kFramesPerEvent));

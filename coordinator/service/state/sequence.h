@@ -9,9 +9,9 @@
 
 namespace ls::coordinator {
 
-// Returns the state of the sequence. An open frame is one that has not ended. With open frames, the sequence
-// is queued if no frame has begun, paused if all open frames are paused, and running otherwise. Without open
-// frames, it is failed or cancelled if any frame is, else done.
+// Returns the state of the sequence. While frames are open (have not ended), it is paused if all of them are
+// paused, else queued if no frame has begun, else running. Then it is failed if any frame failed, else
+// cancelled if any was cancelled, else done.
 JobState sequence_state(std::span<const JobView> frames);
 
 struct SequenceFacts {
@@ -22,10 +22,10 @@ struct SequenceFacts {
   double cores = 0;  // cores of the connected workers
   int workers = 0;   // number of connected workers
 };
-// `frames` has at least one frame; frames are in ascending order. The error is the mean over the pixels of
-// the frames that have one; its interval treats the estimates as independent. The cost of the remaining
-// frames is extrapolated from the work done so far. Their remaining time assumes as many cores as the
-// sequence's limits allow and its units (rounds of tiles) can keep busy.
+// Requires at least one frame; frames are ascending. The error is the mean over the pixels of the frames that
+// have one, and its interval treats these estimates as independent. The cost of the remaining frames is
+// extrapolated from the work so far. The remaining time assumes as many cores as the sequence's limits allow
+// and its units (rounds of tiles) can keep busy.
 JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frames);
 
 FrameView frame_view(const JobView& frame);

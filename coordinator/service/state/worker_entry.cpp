@@ -5,8 +5,8 @@
 namespace ls::coordinator {
 namespace {
 
-// Returns n of a lease id "PREFIX-n"; nullopt if the id has another prefix: the lease is from an earlier
-// start of the coordinator.
+// Returns n of a lease id "PREFIX-n"; nullopt if it has another prefix, that of an earlier start of the
+// coordinator.
 std::optional<std::uint64_t> lease_number(const LeaseId& id, const std::string& prefix) {
   const std::size_t dash = prefix.size();
   if (!id.value.starts_with(prefix) || id.value.size() <= dash || id.value[dash] != '-') return std::nullopt;

@@ -1,4 +1,4 @@
-// The tiles that a user looks at get the next samples first, and nothing else changes.
+// The tiles in the focus get the next samples first, and nothing else changes.
 #include "tests/unit/domain/rig.h"
 
 namespace ls::coordinator {
@@ -6,10 +6,10 @@ namespace {
 
 using testing::IsEmpty;
 
-// Tiles are 8 pixels wide, in one row.
+// Returns a rectangle over these tiles; tiles are 8 pixels wide, in one row.
 PixelRect over_tiles(int first, int last) { return {first * 8 + 3, 0, last * 8 + 4, 8}; }
 
-// Renders all that the workers hold and returns the tiles of the leases that follow, in their order.
+// Renders all units that the workers hold, and returns the tiles of the leases that follow, in order.
 std::vector<TileIndex> next_tiles(Rig& rig, std::size_t count) {
   std::vector<TileIndex> tiles;
   while (tiles.size() < count) {
@@ -42,7 +42,7 @@ TEST(Focus, WithoutItTheOrderIsAsBefore) {
   EXPECT_EQ(next_tiles(other, 20), plain);
 }
 
-// The focus changes the order of leases alone: the same units are folded, and every tile ends at the same
+// The focus changes only the order of leases: the same units are folded, and every tile ends at the same
 // round.
 TEST(Focus, TheUnitsOfAnAdaptiveJobAreTheSameWithAndWithoutIt) {
   const auto units = [](const std::optional<PixelRect>& focus) {

@@ -1,4 +1,4 @@
-// The life of a job: folding in order, results that come twice or late, pause, cancel, extension, restart.
+// The life of a job: folding in order, duplicate and late results, pause, cancel, extension, restart.
 #include "tests/unit/domain/rig.h"
 
 namespace ls::coordinator {
@@ -58,7 +58,8 @@ TEST(Job, ASecondEqualResultIsDropped) {
 TEST(Job, ASecondDifferentResultIsEvidenceAndFailsTheJob) {
   Rig rig(plan_of("j", 5, 2), {{"a", 1}, {"b", 1}}, {.lease_prefix = "t", .audit_rate = 1});
   const Rig::Held unit = rig.take("a");
-  rig.result("a", unit);  // which b is asked to render again
+  // The unit is audited by b
+  rig.result("a", unit);
 
   const auto effects = rig.send(UnitAccepted{unit.key(), unit.unit.samples, digest_number(666), {"b"}, 0.1});
 
@@ -149,7 +150,7 @@ TEST(Job, TheUserMayStopItWithWhatIsLeased) {
 TEST(Extend, AFinishedJobGoesOnWithItsCutRoundRenderedAgainInFull) {
   Rig rig;
   rig.join("w", 2);
-  rig.submit(plan_of("j", 3, 6));  // rounds [0,2) [2,4) [4,6): the last is cut from [4,8)
+  rig.submit(plan_of("j", 3, 6));  // rounds [0,2) [2,4) [4,6): the last one is truncated from [4,8)
   rig.render_all();
   ASSERT_EQ(rig.job().state, JobState::done);
 
@@ -172,7 +173,7 @@ TEST(Extend, AFinishedJobGoesOnWithItsCutRoundRenderedAgainInFull) {
 TEST(Extend, ARunningJobsCutRoundIsTakenBackFromWorkers) {
   Rig rig(plan_of("j", 3, 6), {{"w", 2}});
   while (rig.job().rounds_complete < 2) rig.render("w");
-  rig.render("w");  // one cut unit folded, others leased
+  rig.render("w");  // one unit of a truncated round is folded, others are leased
   const Rig::Held cut = rig.held[{"w"}].front();
 
   const auto effects = rig.send(JobExtended{{"j"}, 8});
@@ -193,7 +194,7 @@ TEST(Extend, ToNoMoreThanThereIsChangesNothing) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-// Everything the service would have stored of a job.
+// Returns all data that the service would have stored for a job.
 JobRestored stored(const Rig& rig, const JobPlan& plan, const std::vector<Effect>& history) {
   JobRestored restored{plan, rig.job().state, rig.job().stopped, rig.job().numeric_class, {}, {}, {}, 1.0};
   for (const RecordUnit& r : of<RecordUnit>(history)) {

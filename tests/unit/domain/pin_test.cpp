@@ -1,4 +1,4 @@
-// Which numeric class a job is pinned to, where its pixels are to be checked.
+// Which numeric class a job may be pinned to when its results are audited.
 #include "tests/unit/domain/rig.h"
 
 namespace ls::coordinator {
@@ -74,7 +74,7 @@ TEST(Pin, WorkersThatMayNotBeginAJobGetItsUnitsAsSoonAsItHasTheirClass) {
     ASSERT_TRUE(rig.held[{"old"}].empty());
 
     if (chosen)
-      rig.send(ClassChosen{{"j"}, digest_number(1)});  // by a result from before a restart
+      rig.send(ClassChosen{{"j"}, digest_number(1)});  // chosen by a result from before a restart
     else
       rig.join("of the same class", 1, 1);
 

@@ -1,4 +1,4 @@
-// Whose turn it is, how much at once, and where.
+// Which job is next, how many units it gets at once, and on which worker.
 #include <random>
 
 #include "tests/unit/domain/clockwork.h"
@@ -13,8 +13,8 @@ JobPlan plan_for(const std::string& owner, const std::string& id, int tiles = 40
   return plan;
 }
 
-// Of a farm of four workers with two threads: what one lease and the unit that ends it can be too much, for
-// each of them, and what the farm may prefer worlds that are loaded for.
+// By how many core seconds shares may differ on a farm of four workers with two threads each: on each worker
+// by one lease and the unit that ends it, and by the preference for loaded worlds.
 constexpr double kThreads = 8;
 constexpr double kBound = kThreads * (kQueuedLeases * kLeaseSeconds + 1) + kThreads * kLocalitySeconds;
 
@@ -91,8 +91,8 @@ TEST(Shares, CountWithinAPriorityOnly) {
   EXPECT_GT(work.seconds["urgent"], 20 * kThreads - 2 * kThreads * kQueuedLeases * kLeaseSeconds);
 }
 
-// Users with any number of jobs of any cost, workers that come and go: who has work all the time has had as
-// much as any other such user, but for a lease each and the preference for loaded worlds.
+// Users have any number of jobs of any cost, and workers come and go. All users who have work all the time
+// get equal core seconds, up to one lease per worker and the preference for loaded worlds.
 TEST(Shares, DifferByABoundedAmountInRandomHistories) {
   for (std::uint64_t seed = 1; seed <= 15; ++seed) {
     std::mt19937_64 random(seed);
@@ -276,12 +276,13 @@ TEST(Locality, AWorkerThatHasTheFilesGoesFirst) {
   EXPECT_FALSE(rig.held[{"b"}].empty());
 }
 
-// Two jobs and eight workers: without preferring loaded worlds every worker would soon hold both.
+// With two jobs and eight workers, every worker would soon hold both worlds if loaded worlds were not
+// preferred.
 TEST(Locality, WorkersStayWithTheWorldTheyHoldAndNobodyStarves) {
   Clockwork work;
   for (int i = 0; i < 8; ++i) {
     work.join("w" + std::to_string(i), 1);
-    work.slow["w" + std::to_string(i)] = 1 + .02 * i;  // they do not beat in time
+    work.slow["w" + std::to_string(i)] = 1 + .02 * i;  // so that workers do not stay in step
   }
   work.rig.submit(plan_for("ann", "one"));
   work.run(30);
@@ -308,7 +309,8 @@ TEST(Tail, CopiesOfTheSlowestUnitsEndAJobSooner) {
 
   work.run();
 
-  // Sixty units of half a second on three good workers take 10 s, and the slow one's first alone 20 s.
+  // Sixty units of half a second take 10 s on the three fast workers; the slow worker needs 20 s for its
+  // first unit alone.
   ASSERT_TRUE(work.finished.contains("j"));
   EXPECT_LT(work.finished["j"], 13);
   EXPECT_EQ(work.accepted.size(), 60u);
