@@ -20,9 +20,9 @@ struct UploadedScene {
   std::set<Digest> not_uploaded;  // files that the scene names but that are not in the store
 };
 
-// Reads the request's scene. If `strict`, a file that is not in the store is an error, with its place in the
-// scene. Otherwise it is listed in not_uploaded, and the caller decides whether it is needed; only a missing
-// scene file that the scene includes is still an error.
+// Reads the request's scene. `strict`: a file that is not in the store is an error, with its place in the
+// scene. Otherwise it is listed in not_uploaded, and the caller decides whether it is needed. A scene file
+// that the scene includes must be in the store in any case.
 tl::expected<UploadedScene, Rejected> read_uploaded(const SubmitRequest& request, const BlobStore& blobs,
                                                     std::optional<std::uint32_t> frame, bool strict);
 

@@ -294,7 +294,7 @@ std::string report_json(const ReportFacts& facts) {
          {"stopped", job.stopped ? json(to_string(*job.stopped)) : json()},
          {"warnings", job.warnings},
          {"convergence", std::move(curve)}};
-  // Both texts were written by this program. Jobs stored by older versions have none.
+  // `needs` and `analysis` are JSON texts that this program wrote. Jobs stored by older versions have none.
   j["needs"] = job.needs.empty() ? json() : json::parse(job.needs, nullptr, false);
   j["analysis"] = job.analysis.empty() ? json() : json::parse(job.analysis, nullptr, false);
   j["techniques"] = json::parse(techniques_json(job.techniques, job.settings.integrator));

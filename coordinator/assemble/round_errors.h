@@ -35,8 +35,8 @@ class RoundErrors {
   // again in full, its new error replaces the old one.
   void folded(TileIndex tile, RoundIndex round, const TileError& error);
   // Returns the sum of all tiles' errors, in tile order, each after `rounds[tile]` rounds. A tile that has
-  // fewer rounds counts with the error after its latest round. If only later rounds of a tile are kept,
-  // because it was ahead at an earlier checkpoint, the first of these counts.
+  // fewer rounds counts with the error after its latest round. If the error that is needed has been dropped,
+  // the next later one counts.
   TileError at(std::span<const RoundIndex> rounds) const;
   // True if at(rounds) is exact: all errors that it needs are still there.
   bool knows(std::span<const RoundIndex> rounds) const;

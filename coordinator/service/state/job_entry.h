@@ -28,7 +28,7 @@ struct JobEntry {
   void begin_image();
   void begin_comparison();  // only for a job that has a reference
   void free_image();        // afterwards only the job's record and its files are left
-  // Seconds on the job's clock
+  // Seconds on the job's clock, which starts with the first ray and stands still during pauses
   double elapsed(TimePoint now) const;
 
   StoredJob stored;  // its state stays `running` until the final image is written
