@@ -16,7 +16,6 @@
 #include "common/image/frame/frame.h"
 #include "common/image/frame/rounds.h"
 #include "common/protocol/messages.h"
-#include "coordinator/domain/denoised_target.h"
 #include "coordinator/domain/job_state.h"
 
 namespace ls::coordinator {

@@ -17,7 +17,6 @@
 
 #include "common/image/frame/frame.h"
 #include "coordinator/domain/adaptive_stop.h"
-#include "coordinator/domain/denoised_target.h"
 #include "coordinator/domain/event.h"
 #include "coordinator/domain/failure_budget.h"
 #include "coordinator/domain/limits.h"

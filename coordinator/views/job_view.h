@@ -21,7 +21,6 @@
 #include "common/job/health_notes.h"
 #include "common/job/settings.h"
 #include "common/scene/diagnostic.h"
-#include "coordinator/domain/denoised_target.h"
 #include "coordinator/domain/farm_figures.h"
 #include "coordinator/domain/job_state.h"
 

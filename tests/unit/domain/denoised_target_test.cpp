@@ -1,5 +1,5 @@
 // When a job ends if its target error is that of its denoised layers.
-#include "coordinator/domain/denoised_target.h"
+#include "coordinator/domain/adaptive_stop.h"
 
 #include <gtest/gtest.h>
 
