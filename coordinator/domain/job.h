@@ -11,6 +11,7 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <string>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -18,7 +19,6 @@
 #include "common/image/frame/frame.h"
 #include "coordinator/domain/adaptive_stop.h"
 #include "coordinator/domain/event.h"
-#include "coordinator/domain/failure_budget.h"
 #include "coordinator/domain/limits.h"
 #include "coordinator/domain/unit_queue.h"
 #include "coordinator/domain/unit_table.h"
@@ -59,6 +59,56 @@ class CostModel {
   double seconds_ = 0, samples_ = 0;
   std::vector<float> tile_cost_;
 };
+
+// A failed attempt to render a unit. Failures of the infrastructure do not count: a lost worker, a missed
+// deadline, or a lease that the worker gave back.
+struct FailedAttempt {
+  WorkerIndex worker = kNoWorker;
+  std::string worker_name;
+  UnitFailure failure;
+};
+
+// The units of one job that have failed and have no accepted result yet
+class UnitFailures {
+ public:
+  void add(UnitCode code, FailedAttempt attempt);
+  void accepted(UnitCode code) { units_.erase(code); }
+  // True if this worker has failed on this unit.
+  bool failed_on(UnitCode code, WorkerIndex worker) const;
+  // True if the unit has failed on min(kUnitFailureWorkers, workers_known) distinct workers and in at least
+  // kUnitFailureAttempts attempts. `workers_known`: number of connected workers that could render the job.
+  bool exhausted(UnitCode code, std::size_t workers_known) const;
+  const std::vector<FailedAttempt>& attempts(UnitCode code) const;
+  void mark_workers(std::vector<bool>& used) const {
+    for (const auto& [code, attempts] : units_)
+      for (const FailedAttempt& attempt : attempts) used[attempt.worker] = true;
+  }
+
+ private:
+  // The latest attempts of each unit; add() limits their number
+  std::map<UnitCode, std::vector<FailedAttempt>> units_;
+};
+
+// Failures of one worker in one job
+struct WorkerFailures {
+  std::uint32_t count = 0;
+  TimePoint last{};
+  bool blocked = false;
+
+  void add(TimePoint now) {
+    if (count > 0 && forgiven_at(now)) *this = {};
+    ++count;
+    last = now;
+    blocked = count >= kWorkerFailuresPerJob;
+  }
+  bool forgiven_at(TimePoint now) const { return now - last >= kForgiveAfter; }
+  bool blocked_at(TimePoint now) const { return blocked && !forgiven_at(now); }
+};
+
+// Returns the error message of a failed job for its owner: unit, pixel, signal, what each worker reported,
+// how to replay it.
+std::string describe_failure(const PixelRect& rect, const SampleRange& samples,
+                             const std::vector<FailedAttempt>& attempts, const std::string& replay);
 
 // The workers that held a lease on a unit (one round of one tile) but did not deliver its accepted result. If
 // results of a unit differ, only these workers may vote on it (farm_trust.cpp). The table is bounded: beyond

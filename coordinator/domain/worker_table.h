@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "coordinator/domain/event.h"
-#include "coordinator/domain/failure_budget.h"
 #include "coordinator/domain/job.h"
 #include "coordinator/domain/limits.h"
 
