@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -167,6 +168,10 @@ struct WorkerLost {
 struct WorkerDrains {
   WorkerId worker;
 };
+// The farm names leases "PREFIX-1", "PREFIX-2"... Returns the number in such an id; nullopt if the id has
+// another prefix, that of an earlier start of the coordinator.
+std::optional<std::uint64_t> lease_number(const LeaseId& id, std::string_view prefix);
+
 struct LeaseProgress {
   WorkerId worker;
   std::vector<WorkerProgress::Entry> leases;

@@ -69,7 +69,7 @@ ROWS = [
     (29, "coordinator/domain/farm/farm_leases.cpp", "if (lease->remaining == 0) close(*lease, «lease->worker != by»);", "false",
      "who renders a unit that another has handed in is not told to stop", DOMAIN),
     (30, "coordinator/domain/farm/farm_leases.cpp", "leases.renew(lease, «std::max(lease.deadline, deadline)»);", "deadline", "a renewal may shorten a lease", DOMAIN),
-    (31, "coordinator/domain/lease_table.cpp", "«deadlines_.erase({lease.deadline, lease.seq});»", ";", "a renewed lease ends at its first deadline", DOMAIN),
+    (31, "coordinator/domain/worker_table.cpp", "«deadlines_.erase({lease.deadline, lease.seq});»", ";", "a renewed lease ends at its first deadline", DOMAIN),
     (32, "common/base/parse_number.h", "error == std::errc{} && «end == text.data() + text.size()» ?", "true",
      "a lease is known by an id with something behind it", DOMAIN),
     (33, "coordinator/domain/farm/farm_workers.cpp", "LeaseRecord* lease = leases.find(entry.lease);\n    if (lease == nullptr || «lease->worker != worker») continue;", "false",

@@ -13,7 +13,7 @@
 
 #include "coordinator/domain/fair_share.h"
 #include "coordinator/domain/farm/farm.h"
-#include "coordinator/domain/lease_table.h"
+#include "coordinator/domain/worker_table.h"
 
 namespace ls::coordinator {
 
