@@ -109,6 +109,13 @@ void Job::move_window(TileIndex tile, int farm_threads) {
   queue.set_wanted(tile, adaptive->wanted(tile) + 1, adaptive->variance(tile));
 }
 
+std::vector<RoundIndex> Job::begun() const {
+  std::vector<RoundIndex> rounds(units.tiles());
+  for (TileIndex t = 0; t < rounds.size(); ++t)
+    rounds[t] = std::max({queue.next(t), units.end_of_accepted(t), RoundIndex{1}});
+  return rounds;
+}
+
 void Job::cut_off(const std::vector<RoundIndex>& ends, StopReason reason) {
   for (TileIndex t = 0; t < units.tiles(); ++t) {
     if (ends[t] >= queue.end(t)) continue;

@@ -258,6 +258,9 @@ struct Job {
   // all connected workers.
   void move_windows(int farm_threads);
   void move_window(TileIndex tile, int farm_threads);
+  // Returns for each tile how many rounds must still be rendered when the job stops: those that were leased
+  // or have accepted results, and the first round in any case.
+  std::vector<RoundIndex> begun() const;
   // Sets the end of each tile to ends[tile] rounds, unless it ends earlier already, and forgets accepted
   // results of later rounds. If this makes any tile end earlier, `stopping` becomes `reason`.
   void cut_off(const std::vector<RoundIndex>& ends, StopReason reason);

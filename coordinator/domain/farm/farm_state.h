@@ -1,5 +1,5 @@
 // The state of the farm, and its reaction to each event. The functions are grouped by subject into the files
-// farm_jobs, farm_changes, farm_workers, farm_units, farm_leases, schedule, farm_stop and farm_trust. A unit
+// farm_jobs, farm_workers, farm_units, farm_leases, schedule, farm_stop and farm_trust. A unit
 // is one round (range of samples) of one tile; a lease is a list of units that is assigned to one worker.
 #pragma once
 
@@ -50,7 +50,7 @@ struct Farm::State {
   bool pinned_for_others = false;
   std::set<WorkerIndex> dirty;  // workers whose state has changed, so that they may want more work
 
-  // farm_jobs.cpp, farm_changes.cpp
+  // farm_jobs.cpp
   void on(const JobSubmitted& event);
   void on(const JobRestored& event);
   void on(const JobCancelled& event);
@@ -102,6 +102,9 @@ struct Farm::State {
   void on(const UnitFailed& event);
   void charge(Job& job, double cpu_seconds);  // adds these seconds to the share of the job's owner
   void issue_folds(Job& job, TileIndex tile);
+  void issue_folds(Job& job) {
+    for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
+  }
   void checkpoint(Job& job, RoundIndex round);
 
   // farm_trust.cpp: audits and faulty workers
