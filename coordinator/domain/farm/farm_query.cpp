@@ -91,12 +91,6 @@ Result<void> Farm::may_extend(const JobId& id, std::uint64_t spp) const {
   return State::may_extend(*job, spp);
 }
 
-std::vector<JobId> Farm::jobs() const {
-  std::vector<JobId> ids;
-  for (const auto& [seq, job] : state_->jobs) ids.push_back(job->plan.brief.job);
-  return ids;
-}
-
 std::optional<JobPlan> Farm::plan(const JobId& id) const {
   const Job* job = state_->find(id);
   return job == nullptr ? std::nullopt : std::optional(job->plan);
@@ -162,13 +156,6 @@ std::optional<WorkerFigures> Farm::worker(const WorkerId& id) const {
   return f;
 }
 
-std::optional<TileFigures> Farm::tile(const JobId& id, TileIndex tile) const {
-  const Job* job = state_->find(id);
-  if (job == nullptr || tile >= job->units.tiles()) return std::nullopt;
-  const RoundIndex rounds = job->units.folded(tile);
-  return TileFigures{rounds, rounds == 0 ? 0 : cut_range(rounds - 1, job->spp).s1};
-}
-
 std::string Farm::why_waiting(const JobId& id) const {
   const Job* job = state_->find(id);
   if (job == nullptr || !job->leasable()) return "";
@@ -209,13 +196,6 @@ std::string Farm::why_waiting(const JobId& id) const {
   if (connected == 0) return "no worker is connected";
   if (named > kMaxNamedWorkers) reasons += fmt::format("; and {} more", named - kMaxNamedWorkers);
   return reasons;
-}
-
-std::vector<Farm::Shares> Farm::shares() const {
-  std::vector<Shares> all;
-  for (const auto& f : state_->shares.figures())
-    all.push_back({f.owner, static_cast<int>(f.priority), f.seconds});
-  return all;
 }
 
 AuditFigures Farm::audits() const { return state_->audited; }

@@ -55,7 +55,7 @@ TEST(Adaptive, MoreSamplesForAFinishedJobMakeItOneBySamples) {
 
   EXPECT_EQ(rig.job().stopped, StopReason::spp);
   EXPECT_FALSE(rig.farm.plan({"j"})->target_error);
-  for (TileIndex t = 0; t < 18; ++t) EXPECT_EQ(rig.farm.tile({"j"}, t)->spp, most + 10);
+  for (TileIndex t = 0; t < 18; ++t) EXPECT_EQ(tile_figures(rig.farm, {"j"}, t)->spp, most + 10);
 }
 
 TEST(Adaptive, CheckpointsAreLevelsAndTheSameWhateverTheOrder) {

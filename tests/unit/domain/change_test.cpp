@@ -97,7 +97,7 @@ std::uint64_t spp_with(double target, std::optional<double> then) {
   if (then) rig.send(JobRetargeted{{"j"}, *then});
   rig.render_all();
   EXPECT_EQ(rig.job().stopped, StopReason::error);
-  return rig.farm.tile({"j"}, 0)->spp;
+  return tile_figures(rig.farm, {"j"}, 0)->spp;
 }
 
 TEST(Target, ASmallerOneGivesWhatAJobThatHadItFromTheFirstGives) {
@@ -140,13 +140,14 @@ TEST(Target, ALargerOneIsSafeAcrossARestart) {
   JobPlan plan = plan_of("j", 3, std::nullopt);
   plan.target_error = 1 / 5000.0;
   std::vector<Effect> history = before.submit(plan);
-  while (before.job().rounds_complete < 8 || before.farm.tile({"j"}, 0)->rounds_folded < 9)
+  while (before.job().rounds_complete < 8 || tile_figures(before.farm, {"j"}, 0)->rounds_folded < 9)
     for (Effect& e : before.render("w")) history.push_back(e);
   plan.target_error = 1 / 64.0;  // met long ago; one tile has more rounds in the image than it needs
   JobRestored restored{plan, JobState::running, {}, digest_number(1), {}, {}, {}, 1.0};
   for (const RecordUnit& r : of<RecordUnit>(history))
     restored.accepted.push_back({r.unit.tile, r.unit.round, r.samples, r.digest, r.worker});
-  for (TileIndex t = 0; t < 3; ++t) restored.folded.push_back(before.farm.tile({"j"}, t)->rounds_folded);
+  for (TileIndex t = 0; t < 3; ++t)
+    restored.folded.push_back(tile_figures(before.farm, {"j"}, t)->rounds_folded);
   restored.rel_error.resize(12);
   for (RoundIndex k = 0; k < 12; ++k) restored.rel_error[k].assign(3, one_over_n({{"j"}, 0, k}));
 
@@ -177,7 +178,7 @@ TEST(Restart, ADoneJobWhoseFilmIsLostIsFoldedAgainAndExtended) {
   after.send(JobExtended{{"j"}, 8});
   after.render_all();
 
-  EXPECT_EQ(after.farm.tile({"j"}, 1)->spp, 8u);
+  EXPECT_EQ(tile_figures(after.farm, {"j"}, 1)->spp, 8u);
 }
 
 TEST(Figures, TellWhatTheQueueWillCost) {

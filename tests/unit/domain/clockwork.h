@@ -68,7 +68,7 @@ class Clockwork {
     }
   }
   bool idle() const {
-    for (const JobId& job : rig.farm.jobs())
+    for (const JobId& job : jobs_of(rig.farm))
       if (const auto f = rig.farm.job(job);
           f->state == JobState::running && rig.farm.why_waiting(job).empty())
         return false;

@@ -15,7 +15,7 @@ JobPlan denoised_plan(double target) {
 
 double folded_spp(const Rig& rig) {
   double sum = 0;
-  for (TileIndex t = 0; t < 18; ++t) sum += static_cast<double>(rig.farm.tile({"j"}, t)->spp);
+  for (TileIndex t = 0; t < 18; ++t) sum += static_cast<double>(tile_figures(rig.farm, {"j"}, t)->spp);
   return sum / 18;
 }
 

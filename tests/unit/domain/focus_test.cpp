@@ -30,7 +30,7 @@ TEST(Focus, ItsTilesAreLeasedBeforeAllOthersUntilTheyHaveAllSamples) {
       std::count(tiles.begin(), tiles.begin() + 10, 70) + std::count(tiles.begin(), tiles.begin() + 10, 71),
       10);
   EXPECT_LT(tiles.at(10), 70u);
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 TEST(Focus, WithoutItTheOrderIsAsBefore) {
@@ -59,7 +59,7 @@ TEST(Focus, TheUnitsOfAnAdaptiveJobAreTheSameWithAndWithoutIt) {
     std::set<std::pair<TileIndex, RoundIndex>> folded;
     for (const Fold& fold : of<Fold>(rig.render_all())) folded.emplace(fold.unit.tile, fold.unit.round);
     EXPECT_EQ(rig.job().state, JobState::done);
-    EXPECT_EQ(rig.farm.audit(), "");
+    EXPECT_EQ(audit(rig.farm), "");
     return folded;
   };
   const auto plain = units(std::nullopt);

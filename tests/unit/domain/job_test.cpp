@@ -27,7 +27,7 @@ TEST(Job, RunsFromQueuedToDone) {
   ASSERT_EQ(of<JobFinished>(effects).size(), 1u);
   EXPECT_EQ(of<JobFinished>(effects)[0].stopped, StopReason::spp);
   EXPECT_EQ(rig.job().stopped, StopReason::spp);
-  EXPECT_EQ(rig.farm.tile({"j"}, 1)->spp, 4u);
+  EXPECT_EQ(tile_figures(rig.farm, {"j"}, 1)->spp, 4u);
 }
 
 TEST(Job, EarlyArrivalsWaitToBeFoldedInOrder) {
@@ -115,7 +115,7 @@ TEST(Job, PauseTakesBackWhatIsNotBegunAndLeavesWhatIsInHand) {
   EXPECT_EQ(rig.worker("w").leases, 1u);
   EXPECT_GE(rig.worker("w").units_out, 2u);
   EXPECT_EQ(rig.held[{"w"}].size(), rig.worker("w").units_out);
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
   rig.send(JobResumed{{"j"}});
   rig.render_all();
   EXPECT_EQ(rig.job().state, JobState::done);
@@ -131,7 +131,7 @@ TEST(Job, CancelTakesLeasesBackAtOnce) {
   EXPECT_EQ(rig.worker("a").units_out, 0u);
   EXPECT_EQ(rig.farm.wanted({{"j"}, 0, 0}, {}).verdict, Wanted::Verdict::no);
   rig.send(JobForgotten{{"j"}});
-  EXPECT_TRUE(rig.farm.jobs().empty());
+  EXPECT_TRUE(jobs_of(rig.farm).empty());
 }
 
 TEST(Job, TheUserMayStopItWithWhatIsLeased) {
@@ -167,7 +167,7 @@ TEST(Extend, AFinishedJobGoesOnWithItsCutRoundRenderedAgainInFull) {
 
   EXPECT_EQ(rig.job().state, JobState::done);
   EXPECT_EQ(of<Fold>(effects).size(), 6u) << "rounds [4,8) and [8,16) of three tiles";
-  EXPECT_EQ(rig.farm.tile({"j"}, 0)->spp, 16u);
+  EXPECT_EQ(tile_figures(rig.farm, {"j"}, 0)->spp, 16u);
 }
 
 TEST(Extend, ARunningJobsCutRoundIsTakenBackFromWorkers) {
@@ -183,7 +183,7 @@ TEST(Extend, ARunningJobsCutRoundIsTakenBackFromWorkers) {
   EXPECT_EQ(of<DropUnwanted>(rig.result("w", cut)).size(), 1u);
   rig.render_all();
   EXPECT_EQ(rig.job().state, JobState::done);
-  EXPECT_EQ(rig.farm.tile({"j"}, 2)->spp, 8u);
+  EXPECT_EQ(tile_figures(rig.farm, {"j"}, 2)->spp, 8u);
 }
 
 TEST(Extend, ToNoMoreThanThereIsChangesNothing) {
@@ -201,7 +201,7 @@ JobRestored stored(const Rig& rig, const JobPlan& plan, const std::vector<Effect
     restored.accepted.push_back({r.unit.tile, r.unit.round, r.samples, r.digest, r.worker});
   }
   for (TileIndex t = 0; t < plan.grid.count(); ++t)
-    restored.folded.push_back(rig.farm.tile({"j"}, t)->rounds_folded);
+    restored.folded.push_back(tile_figures(rig.farm, {"j"}, t)->rounds_folded);
   return restored;
 }
 
@@ -258,7 +258,7 @@ TEST(Restart, ADoneJobStaysDoneAndCanBeExtended) {
   after.render_all();
 
   EXPECT_EQ(after.job().state, JobState::done);
-  EXPECT_EQ(after.farm.tile({"j"}, 1)->spp, 8u);
+  EXPECT_EQ(tile_figures(after.farm, {"j"}, 1)->spp, 8u);
 }
 
 TEST(Plan, RefusesWhatIsTooLargeOrMeaningless) {

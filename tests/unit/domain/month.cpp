@@ -94,7 +94,7 @@ void Month::send(int home, const Event& event) {
   const auto handle = [&](const Event& one) {
     ++counts_.events;
     for (const Effect& effect : farm.handle(one, now_)) see(home, effect);
-    if (std::string wrong = farm.audit(); !wrong.empty()) blame("audit: " + wrong);
+    if (std::string wrong = audit(farm); !wrong.empty()) blame("audit: " + wrong);
   };
   handle(event);
   while (!to_fold_.empty() && wrong_.empty()) {
@@ -239,7 +239,8 @@ void Month::user_acts() {
     case 3:
       return send(home, JobPriority{JobId(id), static_cast<int>(pick(5))});
     default:  // resumes a paused job
-      for (const JobId& other : farms_[static_cast<std::size_t>(home)].jobs()) send(home, JobResumed{other});
+      for (const JobId& other : jobs_of(farms_[static_cast<std::size_t>(home)]))
+        send(home, JobResumed{other});
   }
 }
 

@@ -2,8 +2,8 @@
 // crash on a unit, some that render wrong pixels; users who pause, resume, cancel, stop and change
 // priorities. The second coordinator dies again and again; it is started again with the data that it had
 // stored, or the first one takes over its jobs. The first coordinator lives all the time, so that anything
-// that it keeps too long shows as growth. After every event the farm checks its invariants (Farm::audit), and
-// the month compares its own records with those of the farm.
+// that it keeps too long shows as growth. After every event the farm checks its invariants
+// (farm_inspector.h), and the month compares its own records with those of the farm.
 #pragma once
 
 #include <array>
@@ -31,8 +31,8 @@ class Month {
                   restarts = 0, takeovers = 0, audits = 0, quarantined = 0, user_acts = 0;
   };
   const Counts& counts() const { return counts_; }
-  // Farm::sizes() of the coordinator that lives all the time.
-  std::vector<std::pair<std::string, std::size_t>> sizes() const { return farms_[0].sizes(); }
+  // The sizes of the containers of the coordinator that lives all the time.
+  std::vector<std::pair<std::string, std::size_t>> sizes() const { return ls::coordinator::sizes(farms_[0]); }
 
  private:
   struct Worker {

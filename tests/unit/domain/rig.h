@@ -13,6 +13,7 @@
 
 #include "coordinator/domain/farm/farm.h"
 #include "coordinator/domain/limits.h"
+#include "tests/unit/domain/farm_inspector.h"
 
 namespace ls::coordinator {
 

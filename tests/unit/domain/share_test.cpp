@@ -119,7 +119,7 @@ TEST(Shares, DifferByABoundedAmountInRandomHistories) {
       chance_of(random, 50) ? work.lose(name(i)) : work.join(name(i), 1 + static_cast<int>(i % 3));
       work.run(10 + static_cast<double>(pick(20)));
     }
-    ASSERT_EQ(work.rig.farm.audit(), "") << "seed " << seed;
+    ASSERT_EQ(audit(work.rig.farm), "") << "seed " << seed;
     std::map<std::string, double> had;
     for (const auto& [id, owner] : owners) had[owner] += work.seconds[id];
     const auto [least, most] = std::minmax_element(
@@ -151,7 +151,7 @@ TEST(Shares, FigureNamesWhoHasHadHowMuch) {
 
   work.run(50);
 
-  const auto shares = work.rig.farm.shares();
+  const auto shares = ls::coordinator::shares(work.rig.farm);
   ASSERT_EQ(shares.size(), 1u);
   EXPECT_EQ(shares[0].owner, "ann");
   EXPECT_GE(shares[0].seconds, work.seconds["j"]);
@@ -180,7 +180,7 @@ TEST(Limits, OfAJobHoldItsWorkersAndUnits) {
     rig.render(i % 2 ? "a" : "d");
     EXPECT_LE(workers_on(rig, {"few"}), 2u);
     EXPECT_LE(rig.job("small").units_leased, 3u);
-    ASSERT_EQ(rig.farm.audit(), "");
+    ASSERT_EQ(audit(rig.farm), "");
   }
   EXPECT_GT(rig.job("few").units_done, 0u);
   EXPECT_GT(rig.job("small").units_done, 0u);
@@ -199,7 +199,7 @@ TEST(Limits, OfASequenceHoldForAllItsFrames) {
 
   EXPECT_EQ(workers_on(rig, {"s-frame1", "s-frame2"}), 2u);
   EXPECT_EQ(rig.job("s-frame1").units_leased + rig.job("s-frame2").units_leased, 3u);
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 TEST(Limits, OfAUserHoldForAllItsJobsAndNotForTheAdministrator) {
@@ -213,7 +213,7 @@ TEST(Limits, OfAUserHoldForAllItsJobsAndNotForTheAdministrator) {
 
   EXPECT_EQ(workers_on(rig, {"admin"}), 4u);
   EXPECT_EQ(rig.job("one").units_leased + rig.job("two").units_leased, 3u);
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 TEST(Limits, WhatALeaseGivesBackGoesToAnotherWorker) {
@@ -229,7 +229,7 @@ TEST(Limits, WhatALeaseGivesBackGoesToAnotherWorker) {
   rig.lose(holder);
 
   EXPECT_FALSE(rig.held[{holder == "a" ? "b" : "a"}].empty());
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 TEST(Memory, AJobIsGivenOnlyToWorkersThatHaveEnough) {
@@ -331,7 +331,7 @@ TEST(Limits, AnAuditDoesNotWaitForTheUsersOtherWork) {
   ASSERT_EQ(work.finished.size(), 2u);
   EXPECT_LT(work.finished["one"], work.finished["two"] / 2);
   EXPECT_EQ(work.rig.farm.audits().equal, 204u);
-  EXPECT_EQ(work.rig.farm.audit(), "");
+  EXPECT_EQ(audit(work.rig.farm), "");
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ TEST(StopByError, EndsAtTheSameRoundWhateverTheOrder) {
 
     ASSERT_EQ(of<JobFinished>(effects).size(), 1u);
     EXPECT_EQ(of<JobFinished>(effects)[0].stopped, StopReason::error);
-    for (TileIndex t = 0; t < 6; ++t) EXPECT_EQ(rig.farm.tile({"j"}, t)->spp, 320u);
+    for (TileIndex t = 0; t < 6; ++t) EXPECT_EQ(tile_figures(rig.farm, {"j"}, t)->spp, 320u);
     for (const Fold& fold : of<Fold>(effects)) EXPECT_LT(fold.samples.s0, 320u);
   }
 }
@@ -62,7 +62,7 @@ TEST(StopByError, AnUnreachableTargetEndsAtTheSampleLimit) {
   rig.render_all();
 
   EXPECT_EQ(rig.job().stopped, StopReason::spp);
-  EXPECT_EQ(rig.farm.tile({"j"}, 1)->spp, 200u);
+  EXPECT_EQ(tile_figures(rig.farm, {"j"}, 1)->spp, 200u);
 }
 
 TEST(StopByError, ExtendingGoesBeyondTheTarget) {
@@ -76,7 +76,7 @@ TEST(StopByError, ExtendingGoesBeyondTheTarget) {
   rig.render_all();
 
   EXPECT_EQ(rig.job().stopped, StopReason::spp);
-  EXPECT_EQ(rig.farm.tile({"j"}, 0)->spp, 640u);
+  EXPECT_EQ(tile_figures(rig.farm, {"j"}, 0)->spp, 640u);
 }
 
 TEST(StopByError, ARestartAnywhereEndsAtTheSameRound) {
@@ -94,7 +94,7 @@ TEST(StopByError, ARestartAnywhereEndsAtTheSameRound) {
       restored.accepted.push_back({r.unit.tile, r.unit.round, r.samples, r.digest, r.worker});
     }
     for (TileIndex t = 0; t < 3; ++t) {
-      restored.folded.push_back(before.farm.tile({"j"}, t)->rounds_folded);
+      restored.folded.push_back(tile_figures(before.farm, {"j"}, t)->rounds_folded);
       for (RoundIndex k = 0; k < restored.folded[t]; ++k) {
         if (restored.rel_error.size() <= k) restored.rel_error.resize(k + 1, std::vector<double>(3));
         restored.rel_error[k][t] = error_at({{"j"}, t, k});
@@ -108,7 +108,7 @@ TEST(StopByError, ARestartAnywhereEndsAtTheSameRound) {
     after.render_all();
 
     EXPECT_EQ(after.job().stopped, StopReason::error) << cut;
-    for (TileIndex t = 0; t < 3; ++t) EXPECT_EQ(after.farm.tile({"j"}, t)->spp, 320u) << cut;
+    for (TileIndex t = 0; t < 3; ++t) EXPECT_EQ(tile_figures(after.farm, {"j"}, t)->spp, 320u) << cut;
   }
 }
 
@@ -122,7 +122,7 @@ TEST(StopByError, ARestartAfterTheLastFoldAddsNoRound) {
   // The crash came before the state `done` was stored, so the job is restored as running.
   JobRestored restored{target_plan(3), JobState::running, std::nullopt, before.job().numeric_class};
   for (TileIndex t = 0; t < 3; ++t) {
-    restored.folded.push_back(before.farm.tile({"j"}, t)->rounds_folded);
+    restored.folded.push_back(tile_figures(before.farm, {"j"}, t)->rounds_folded);
     restored.rel_error.resize(restored.folded[0], std::vector<double>(3));
     for (RoundIndex k = 0; k < restored.folded[t]; ++k) restored.rel_error[k][t] = error_at({{"j"}, t, k});
   }
@@ -134,7 +134,7 @@ TEST(StopByError, ARestartAfterTheLastFoldAddsNoRound) {
 
   EXPECT_EQ(after.job().state, JobState::done);
   EXPECT_EQ(after.job().stopped, StopReason::error);
-  EXPECT_EQ(after.farm.tile({"j"}, 0)->spp, before.farm.tile({"j"}, 0)->spp);
+  EXPECT_EQ(tile_figures(after.farm, {"j"}, 0)->spp, tile_figures(before.farm, {"j"}, 0)->spp);
 }
 
 // Renders the units of worker "w" one after the other, each in `unit_seconds` of wall-clock time, with a tick

@@ -250,7 +250,7 @@ TEST(Audit, OfWhatIsNotAcceptedIsNotTakenUpAfterARestart) {
   rig.send(event);
 
   EXPECT_TRUE(rig.farm.open_audits({"j"}).empty());
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 TEST(FaultyWorker, IsFoundByAThirdWorkerQuarantinedAndItsTilesAreRenderedAgain) {
@@ -310,7 +310,7 @@ TEST(FaultyWorker, WhoFoundItFirstDoesNotMatter) {
     EXPECT_EQ(of<TileDiscarded>(verdict).size(), lies_first ? 1u : 0u);
     rig.render_all();
     EXPECT_EQ(rig.job().state, JobState::done);
-    EXPECT_EQ(rig.farm.audit(), "");
+    EXPECT_EQ(audit(rig.farm), "");
   }
 }
 
@@ -334,7 +334,7 @@ TEST(FaultyWorker, TwoThatNobodyAskedBarNoOneAndWhoAccusedIsFound) {
   EXPECT_FALSE(rig.farm.quarantined({"h"}));
   rig.render_all();
   EXPECT_EQ(rig.job().state, JobState::done);
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 TEST(FaultyWorker, AnUnaskedWordAgainstTheOnlyOtherWorkerFailsNoJob) {
@@ -385,7 +385,7 @@ TEST(FaultyWorker, OneThatIsFoundElsewhereLosesWhatItHoldsAndWhatItHasRendered) 
   EXPECT_TRUE(rig.held[{"a"}].empty());
   ASSERT_EQ(of<TileDiscarded>(effects).size(), 1u);
   EXPECT_EQ(of<TileDiscarded>(effects)[0].tile, unit.unit.tile);
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
   rig.render_all();
   EXPECT_EQ(rig.job().state, JobState::done);
 }
@@ -427,7 +427,7 @@ TEST(FaultyWorker, ThatIsHereAlreadyGetsNothingFromWhenItIsKnown) {
   EXPECT_EQ(rig.worker("a").units_out, 0u);
   EXPECT_EQ(rig.worker("a").state, WorkerState::unhealthy);
   EXPECT_FALSE(of<WorkerStateChanged>(effects).empty());
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
   rig.held.erase({"a"});
   rig.render_all();
   EXPECT_EQ(rig.job().state, JobState::done);
@@ -445,7 +445,7 @@ TEST(FaultyWorker, NothingItSendsIsTakenAndItGetsNothingAfterARestart) {
 
   EXPECT_EQ(of<DropUnwanted>(effects).size(), 1u);
   EXPECT_TRUE(of<RecordUnit>(effects).empty());
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 // Where each tile ends depends on the errors of all tiles, including those with wrong pixels: all begin
@@ -468,7 +468,7 @@ TEST(FaultyWorker, AJobWithATargetEndsWhereItWouldHaveEndedWithoutIt) {
     EXPECT_EQ(work.rig.job().state, JobState::done);
     EXPECT_EQ(work.seen<WorkerFoundFaulty>().size(), with_faulty_worker ? 1u : 0u);
     std::vector<RoundIndex> rounds;
-    for (TileIndex t = 0; t < 4; ++t) rounds.push_back(work.rig.farm.tile({"j"}, t)->rounds_folded);
+    for (TileIndex t = 0; t < 4; ++t) rounds.push_back(tile_figures(work.rig.farm, {"j"}, t)->rounds_folded);
     return rounds;
   };
   EXPECT_EQ(ends(true), ends(false));

@@ -27,7 +27,7 @@ inline JobPlan uneven_plan(double target) {
 
 inline std::vector<RoundIndex> ends_in(const Rig& rig) {
   std::vector<RoundIndex> ends;
-  for (TileIndex t = 0; t < 18; ++t) ends.push_back(rig.farm.tile({"j"}, t)->rounds_folded);
+  for (TileIndex t = 0; t < 18; ++t) ends.push_back(tile_figures(rig.farm, {"j"}, t)->rounds_folded);
   return ends;
 }
 

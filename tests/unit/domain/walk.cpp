@@ -34,7 +34,7 @@ std::string Walk::run(int events) {
 
 void Walk::send(const Event& event) {
   for (const Effect& effect : farm_.handle(event, now_)) see(effect);
-  if (std::string wrong = farm_.audit(); !wrong.empty()) blame("audit: " + wrong);
+  if (std::string wrong = audit(farm_); !wrong.empty()) blame("audit: " + wrong);
   check_figures();
 }
 

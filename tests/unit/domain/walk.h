@@ -1,8 +1,8 @@
 // A simulated farm for random walks: workers that crash, stall, fail, duplicate, reorder, drain, reconnect
 // and bring results late, in some histories one that renders wrong pixels; an assembler that folds later;
 // users with limits who pause, extend, stop, cancel and change priorities; a coordinator that restarts. After
-// every event the farm checks its invariants (Farm::audit), and the walk compares its own records with those
-// of the farm. At its end a job's film must be the one that honest workers alone would have made.
+// every event the farm checks its invariants (farm_inspector.h), and the walk compares its own records with
+// those of the farm. At its end a job's film must be the one that honest workers alone would have made.
 #pragma once
 
 #include <deque>
