@@ -132,6 +132,9 @@ class Assembly {
   std::uint64_t folds_since_snapshot = 0;
 
  private:
+  template <class Unwanted>
+  void forget_if(Unwanted&& unwanted);  // drops waiting partials by tile and round
+
   Film film_;
   RoundErrors errors_;
   HealthTable health_;

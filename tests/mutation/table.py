@@ -51,7 +51,7 @@ ROWS = [
     (19, "coordinator/assemble/assembly.cpp", "if (found == waiting_.end() || «found->second.samples != samples») return", "false",
      "a waiting partial of another sample range is folded", FOLD),
     (20, "coordinator/assemble/assembly.cpp", "film_.discard(tile);\n  «errors_.discard(tile);»", ";", "the errors of a discarded tile stay", FOLD),
-    (21, "coordinator/assemble/round_errors.cpp", "while (!t.rounds.empty() && «t.rounds.back().first >= round»)", "t.rounds.back().first > round",
+    (21, "coordinator/assemble/round_errors.cpp", "while (!rounds.empty() && «rounds.back().first >= round»)", "rounds.back().first > round",
      "a round that is folded again counts twice among the errors", FOLD),
     (22, "common/image/film/merge.cpp", "return «std::tie(a.samples.s0, b.samples.s1) < std::tie(b.samples.s0, a.samples.s1)»;",
      "std::tie(a.samples.s0, a.samples.s1) < std::tie(b.samples.s0, b.samples.s1)", "of a cut round and the whole one, merge takes the cut one", FOLD),

@@ -12,7 +12,6 @@
 
 #include "coordinator/assemble/assembly.h"
 #include "coordinator/assemble/job_report.h"
-#include "coordinator/assemble/reference_tiles.h"
 #include "coordinator/service/state/job_trace.h"
 #include "coordinator/store/jobs/job_store.h"
 #include "coordinator/store/log/partial_log.h"
