@@ -266,8 +266,8 @@ struct Rejected {
   Error error;
   std::vector<Diagnostic> diagnostics;
 };
-inline tl::unexpected<Rejected> rejected(Error error) {
-  return tl::unexpected(Rejected{std::move(error), {}});
+inline tl::unexpected<Rejected> rejected(Error error, std::vector<Diagnostic> diagnostics = {}) {
+  return tl::unexpected(Rejected{std::move(error), std::move(diagnostics)});
 }
 
 }  // namespace ls::coordinator
