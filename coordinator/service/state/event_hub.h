@@ -12,7 +12,7 @@
 #include <mutex>
 #include <thread>
 
-#include "coordinator/views/job_view.h"
+#include "coordinator/views/views.h"
 
 namespace ls::coordinator {
 

@@ -1,4 +1,4 @@
-// Makes the views of jobs, sequences and workers that clients see (views/job_view.h).
+// Makes the views of jobs, sequences and workers that clients see (views/views.h).
 #pragma once
 
 #include "coordinator/domain/farm/farm.h"
@@ -6,7 +6,7 @@
 #include "coordinator/service/state/job_entry.h"
 #include "coordinator/service/state/job_table.h"
 #include "coordinator/service/state/worker_entry.h"
-#include "coordinator/views/job_list.h"
+#include "coordinator/views/views.h"
 
 namespace ls::coordinator {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "coordinator/views/job_view.h"
+#include "coordinator/views/views.h"
 
 namespace ls::coordinator {
 

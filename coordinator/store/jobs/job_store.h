@@ -21,7 +21,7 @@
 #include "common/job/techniques.h"
 #include "common/protocol/messages.h"
 #include "coordinator/domain/job_state.h"
-#include "coordinator/views/job_view.h"
+#include "coordinator/views/views.h"
 
 namespace ls::coordinator {
 
