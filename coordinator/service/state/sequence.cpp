@@ -1,4 +1,4 @@
-#include "coordinator/service/state/sequence.h"
+#include "coordinator/service/state/job_views.h"
 
 #include <fmt/format.h>
 

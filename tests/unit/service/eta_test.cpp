@@ -1,5 +1,5 @@
 // Predictions of when a job will be done: which end comes first, and what is unknown.
-#include "coordinator/service/state/eta.h"
+#include "coordinator/service/state/job_views.h"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "coordinator/service/state/sequence.h"
+#include "coordinator/service/state/job_views.h"
 
 namespace ls::coordinator {
 namespace {
