@@ -7,6 +7,8 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <ranges>
+#include <set>
 
 #include "common/job/limits.h"
 #include "common/job/replay_command.h"
@@ -15,18 +17,17 @@
 #include "common/scene/analysis/prune.h"
 #include "common/scene/json/serialize.h"
 #include "common/scene/limits.h"
+#include "common/scene/read.h"
 #include "common/scene/schema/integrators.h"
 #include "common/scene/schema/nori_words.h"
 #include "coordinator/admission/cryptomatte_manifests.h"
-#include "coordinator/admission/scene_admission.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/store/jobs/job_store.h"
 
 namespace ls::coordinator {
 namespace {
 
-// At most this many items of the scene that are left out of the rendering are listed, so that a job's record
-// stays small
+// A job's record lists at most this many items that are left out of the rendering, so that it stays small
 constexpr std::size_t kMostListed = 64;
 
 // Returns the total bytes of the files that only this part of the renderer reads.
@@ -45,9 +46,9 @@ std::uint64_t bytes_of_files(const scene::Needs& needs, const std::string& part)
   return sum;
 }
 
-// Sets needs, features and analysis of `job`: the renderer's features that the scene needs, and the parts of
-// the scene that are left out of the rendering, for workers and as text for users. `pruned` is the part of
-// the scene that the job's integrator uses.
+// Describes for workers and users which features of the renderer the scene needs, and which parts of the
+// scene are not rendered: sets `needs`, the features and `analysis` of `job`. `pruned` is the part of the
+// scene that the job's integrator uses, with a list of the rest.
 void note_analysis(const scene::Pruned& pruned, const RenderSettings& settings, StoredJob& job) {
   using nlohmann::json;
   const scene::Needs needs = scene::needs_of(pruned.scene, scene::sees_media(settings.integrator));
@@ -68,7 +69,7 @@ void note_analysis(const scene::Pruned& pruned, const RenderSettings& settings, 
       -1, ' ', false, json::error_handler_t::replace);
 }
 
-Error invalid(std::string text) { return {Errc::invalid_argument, std::move(text)}; }
+tl::unexpected<Error> invalid(std::string text) { return fail(Errc::invalid_argument, std::move(text)); }
 
 // Sets the integrator. The job's choice takes precedence over the scene's.
 Result<void> choose_integrator(const Scene& scene, const JobSpec& spec, RenderSettings& settings,
@@ -76,12 +77,9 @@ Result<void> choose_integrator(const Scene& scene, const JobSpec& spec, RenderSe
   const std::string asked = spec.integrator.value_or(scene.integrator.name);
   const scene::IntegratorRow* known = scene::integrator_row(asked);
   const scene::nori::IntegratorRow* nori = known ? nullptr : scene::nori::integrator_row(asked);
-  if (!known && !nori) {
-    std::vector<std::string_view> names;
-    for (const auto& row : scene::integrators()) names.push_back(row.name);
-    return tl::unexpected(
-        invalid(fmt::format("there is no integrator \"{}\"; there are {}", asked, fmt::join(names, ", "))));
-  }
+  const auto names = std::views::transform(scene::integrators(), &scene::IntegratorRow::name);
+  if (!known && !nori)
+    return invalid(fmt::format("there is no integrator \"{}\"; there are {}", asked, fmt::join(names, ", ")));
   const std::string_view ours = known ? known->ours : nori->ours;
   if (!scene::sees_media(ours) && !scene.media.empty())
     warnings.push_back(
@@ -95,28 +93,26 @@ Result<void> choose_integrator(const Scene& scene, const JobSpec& spec, RenderSe
 
 Result<void> check_size(FrameSize size) {
   if (size.width <= 0 || size.height <= 0)
-    return tl::unexpected(invalid(fmt::format("an image of {} x {} has no pixels", size.width, size.height)));
+    return invalid(fmt::format("an image of {} x {} has no pixels", size.width, size.height));
   if (size.width > limits::kMaxFrameSide || size.height > limits::kMaxFrameSide ||
       std::int64_t{size.width} * size.height > limits::kMaxFramePixels)
-    return fail(Errc::invalid_argument,
-                fmt::format("an image of {} x {} is larger than {} a side or {} pixels", size.width,
-                            size.height, limits::kMaxFrameSide, limits::kMaxFramePixels));
+    return invalid(fmt::format("an image of {} x {} is larger than {} a side or {} pixels", size.width,
+                               size.height, limits::kMaxFrameSide, limits::kMaxFramePixels));
   return {};
 }
 
 Result<void> check_spec(const JobSpec& spec) {
   if (spec.target_error && !(std::isfinite(*spec.target_error) && *spec.target_error > 0))
-    return tl::unexpected(invalid("target_error must be positive"));
+    return invalid("target_error must be positive");
   if (spec.target_layer == TargetLayer::denoised && !spec.target_error)
-    return tl::unexpected(
-        invalid("target_layer says which error target_error means, and there is no target_error: give one"));
+    return invalid(
+        "target_layer says which error target_error means, and there is no target_error: give one");
   if (spec.time && !(std::isfinite(*spec.time) && *spec.time > 0 && *spec.time <= kMaxSeconds))
-    return tl::unexpected(invalid(fmt::format("time must be between 0 and {} seconds", kMaxSeconds)));
+    return invalid(fmt::format("time must be between 0 and {} seconds", kMaxSeconds));
   if (spec.spp && (*spec.spp == 0 || *spec.spp > limits::kMaxSpp))
-    return fail(Errc::invalid_argument,
-                fmt::format("{} samples per pixel: it must be 1 to {}", *spec.spp, limits::kMaxSpp));
+    return invalid(fmt::format("{} samples per pixel: it must be 1 to {}", *spec.spp, limits::kMaxSpp));
   if (std::abs(spec.priority) > kMaxPriority)
-    return tl::unexpected(invalid(fmt::format("priority must be within +-{}", kMaxPriority)));
+    return invalid(fmt::format("priority must be within +-{}", kMaxPriority));
   if (const auto aovs = parse_aovs(spec.aov); !aovs) return tl::unexpected(aovs.error());
   return {};
 }
@@ -124,8 +120,7 @@ Result<void> check_spec(const JobSpec& spec) {
 // Sets the AOVs: those that the job requests and those that the scene requests.
 Result<void> choose_aovs(const Scene& scene, const JobSpec& spec, RenderSettings& settings) {
   std::vector<std::string> names = spec.aov;
-  if (spec.denoise)
-    for (std::string& name : names_of(aovs_of(AovKind::guide))) names.push_back(std::move(name));
+  if (spec.denoise) std::ranges::move(names_of(aovs_of(AovKind::guide)), std::back_inserter(names));
   for (std::string_view rest = scene.aovs; !rest.empty();) {
     const auto end = std::min(rest.find(','), rest.size());
     names.emplace_back(rest.substr(0, end));
@@ -148,6 +143,90 @@ Result<RenderSettings> settings_of(const Scene& scene, const JobSpec& spec, std:
   return settings;
 }
 
+// Returns the name without leading "./": "./a/b.obj" and "a/b.obj" are the same file.
+std::string plain_name(std::string_view name) {
+  while (name.starts_with("./")) name.remove_prefix(2);
+  return std::string(name);
+}
+
+class UploadedAssets final : public AssetSource {
+ public:
+  UploadedAssets(const std::map<std::string, Digest>& assets, const BlobStore& blobs, bool strict)
+      : blobs_(blobs), strict_(strict) {
+    for (const auto& [name, digest] : assets) assets_.emplace(plain_name(name), digest);
+  }
+
+  Result<Asset> find(std::string_view name) override { return find(name, false); }
+
+  Result<std::string> text(std::string_view name) override {
+    const auto asset = find(name, true);
+    if (!asset) return tl::unexpected(asset.error());
+    if (asset->bytes > scene::kMaxTextBytes)
+      return invalid(fmt::format("\"{}\" has {} bytes; an included scene may have {}", name, asset->bytes,
+                                 scene::kMaxTextBytes));
+    const auto bytes = blobs_.read(asset->digest, 0, asset->bytes);
+    if (!bytes) return tl::unexpected(bytes.error());
+    text_bytes += bytes->size();
+    return std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  }
+
+  std::size_t text_bytes = 0;     // of the scene files that the main file includes
+  std::set<Digest> not_uploaded;  // files that the scene names but that are not in the store
+
+ private:
+  Result<Asset> find(std::string_view name, bool of_text) {
+    const auto found = assets_.find(plain_name(name));
+    if (found == assets_.end())
+      return fail(Errc::not_found,
+                  fmt::format("\"{}\" was not sent along: name it among the assets, with its SHA-256{}", name,
+                              offered()));
+    const auto bytes = blobs_.size(found->second);
+    if (!bytes && (strict_ || of_text))
+      return fail(Errc::not_found,
+                  fmt::format("the bytes of \"{}\" have not been uploaded: PUT them to /api/v1/blobs/{}",
+                              name, found->second.hex()));
+    if (!bytes) not_uploaded.insert(found->second);
+    return Asset{std::string(name), found->second, bytes.value_or(0)};
+  }
+
+  std::string offered() const {
+    if (assets_.empty()) return "; no assets were named";
+    std::string names = "; named were";
+    std::size_t shown = 0;
+    for (const auto& [name, digest] : assets_) {
+      if (++shown > 5) return names + fmt::format(" and {} more", assets_.size() - 5);
+      names += fmt::format(" \"{}\"", name);
+    }
+    return names;
+  }
+
+  std::map<std::string, Digest> assets_;
+  const BlobStore& blobs_;
+  const bool strict_;
+};
+
+struct UploadedScene {
+  Scene scene;
+  std::vector<Diagnostic> warnings;
+  std::size_t text_bytes = 0;     // as in UploadedAssets
+  std::set<Digest> not_uploaded;  // as in UploadedAssets
+};
+
+// Reads the request's scene. `strict`: a file that is not in the store is an error, with its place in the
+// scene. Otherwise it is listed in not_uploaded, and the caller decides whether it is needed. A scene file
+// that the scene includes must be in the store in any case.
+tl::expected<UploadedScene, Rejected> read_uploaded(const SubmitRequest& request, const BlobStore& blobs,
+                                                    std::optional<std::uint32_t> frame, bool strict) {
+  UploadedAssets assets(request.assets, blobs, strict);
+  ReadResult read =
+      read_scene(request.scene_name, request.scene_text, assets, {request.spec.defines, false, frame, true});
+  if (!read.scene)
+    return rejected({Errc::invalid_argument, fmt::format("the scene {} cannot be read", request.scene_name)},
+                    std::move(read.diagnostics));
+  return UploadedScene{std::move(*read.scene), std::move(read.diagnostics), assets.text_bytes,
+                       std::move(assets.not_uploaded)};
+}
+
 // Returns the part of the scene that the job's integrator uses, or an error if a file of this part is not in
 // the store.
 tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, const BlobStore& blobs,
@@ -156,28 +235,30 @@ tl::expected<scene::Pruned, Rejected> needed_part(const SubmitRequest& request, 
   const scene::PrunedFor whom = scene::pruned_for(settings.integrator, settings.max_depth);
   scene::Pruned pruned = scene::pruned(read.scene, whom);
   const auto missing = [&](const Asset& a) { return read.not_uploaded.contains(a.digest); };
-  if (std::none_of(pruned.scene.assets.begin(), pruned.scene.assets.end(), missing)) return pruned;
-  // Reading a second time, strictly, gives errors with the places in the scene that name the missing file
+  if (std::ranges::none_of(pruned.scene.assets, missing)) return pruned;
+  // Now read strictly, the scene gives an error at each place that names a missing file
   const auto again = read_uploaded(request, blobs, frame, true);
   if (!again) return tl::unexpected(again.error());
   return scene::pruned(again->scene, whom);  // the file has arrived since the first reading
+}
+
+Result<void> check_job(const StoredJob& job) {
+  JobPlan plan = plan_of(job);
+  plan.brief.job.value = "new";
+  return check_plan(plan);
 }
 
 }  // namespace
 
 tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const BlobStore& blobs,
                                         std::optional<std::uint32_t> frame) {
-  const auto refuse = [](Error error, std::vector<Diagnostic> found = {}) {
-    return tl::unexpected(Rejected{std::move(error), std::move(found)});
-  };
   if (request.scene_text.size() > scene::kMaxTextBytes)
-    return refuse({Errc::invalid_argument, fmt::format("the scene text has {} bytes; {} are allowed",
-                                                       request.scene_text.size(), scene::kMaxTextBytes)});
+    return rejected({Errc::invalid_argument, fmt::format("the scene text has {} bytes; {} are allowed",
+                                                         request.scene_text.size(), scene::kMaxTextBytes)});
   if (request.assets.size() > limits::kMaxAssets)
-    return refuse({Errc::invalid_argument, fmt::format("{} assets were named; {} are allowed",
-                                                       request.assets.size(), limits::kMaxAssets)});
-  if (auto ok = check_spec(request.spec); !ok) return refuse(ok.error());
-
+    return rejected({Errc::invalid_argument, fmt::format("{} assets were named; {} are allowed",
+                                                         request.assets.size(), limits::kMaxAssets)});
+  if (auto ok = check_spec(request.spec); !ok) return rejected(ok.error());
   auto read = read_uploaded(request, blobs, frame, false);
   if (!read) return tl::unexpected(std::move(read.error()));
 
@@ -188,15 +269,15 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
   for (const auto& d : read->warnings)
     if (job.warnings.size() < limits::kMaxWarnings) job.warnings.push_back(format_diagnostic(d));
   auto settings = settings_of(read->scene, request.spec, frame.value_or(0), job.warnings);
-  if (!settings) return refuse(settings.error());
+  if (!settings) return rejected(settings.error());
   job.settings = std::move(*settings);
   ReferenceOrigin origin;
   if (request.spec.reference) {
     auto right = load_reference(request.spec, job.settings.size, blobs);
-    if (!right) return refuse(right.error());
+    if (!right) return rejected(right.error());
     origin = std::move(right->origin);
   }
-  if (!wants_labels(job.settings)) {  // unless there are cryptomattes, names are not part of the scene
+  if (!wants_labels(job.settings)) {  // only cryptomattes use the names of objects
     read->scene.shape_labels.clear();
     read->scene.instance_labels.clear();
   }
@@ -204,29 +285,63 @@ tl::expected<Admission, Rejected> admit(const SubmitRequest& request, const Blob
   job.spp = request.spec.spp;
   if (!job.spp && !request.spec.target_error && !request.spec.time) job.spp = read->scene.sample_count;
   if (job.spp && *job.spp > limits::kMaxSpp)
-    return refuse({Errc::invalid_argument,
-                   fmt::format("{} samples per pixel: at most {} are allowed", *job.spp, limits::kMaxSpp)});
+    return rejected({Errc::invalid_argument,
+                     fmt::format("{} samples per pixel: at most {} are allowed", *job.spp, limits::kMaxSpp)});
   const auto pruned = needed_part(request, blobs, frame, *read, job.settings);
   if (!pruned) return tl::unexpected(pruned.error());
   const Scene& scene = pruned->scene;
-  for (const Asset& a : scene.assets) {
-    const auto known = [&](const BlobRef& b) { return b.digest == a.digest; };
-    if (std::none_of(job.assets.begin(), job.assets.end(), known))
+  for (const Asset& a : scene.assets)
+    if (std::ranges::find(job.assets, a.digest, &BlobRef::digest) == job.assets.end())
       job.assets.push_back({a.digest, a.bytes, a.name});
-  }
   if (job.assets.size() > ls::limits::kAssetsPerJob)
-    return refuse({Errc::invalid_argument,
-                   fmt::format("the scene uses {} files; workers can be told of {}: merge some of its meshes",
-                               job.assets.size(), ls::limits::kAssetsPerJob)});
+    return rejected(
+        {Errc::invalid_argument,
+         fmt::format("the scene uses {} files; workers can be told of {}: merge some of its meshes",
+                     job.assets.size(), ls::limits::kAssetsPerJob)});
   note_analysis(*pruned, job.settings, job);
   admission.text_bytes = request.scene_text.size() + read->text_bytes;
   admission.scene_json = serialize(scene);
   job.scene = sha256(admission.scene_json);
   job.reference_same_seed = same_noise(origin, job.scene, job.settings.seed);
-  JobPlan plan = plan_of(job);
-  plan.brief.job.value = "new";
-  if (auto ok = check_plan(plan); !ok) return refuse(ok.error());
+  if (auto ok = check_job(job); !ok) return rejected(ok.error());
   return admission;
+}
+
+Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, const BlobStore& blobs) {
+  StoredJob job{.name = before.name,
+                .scene = before.scene,
+                .settings = before.settings,
+                .spec = before.spec,
+                .spp = before.spp,
+                .assets = before.assets,
+                .warnings = before.warnings,
+                .features_used = before.features_used,
+                .features_left_out = before.features_left_out,
+                .needs = before.needs,
+                .analysis = before.analysis};
+  job.spec.frames = {};  // a single frame is not a sequence
+  if (changes.spp || changes.target_error || changes.time) {
+    job.spp = job.spec.spp = changes.spp;
+    job.spec.target_error = changes.target_error;
+    if (!changes.target_error) job.spec.target_layer = TargetLayer::raw;
+    job.spec.time = changes.time;
+  }
+  job.spec.priority = changes.priority;
+  if (changes.seed) job.settings.seed = *(job.spec.seed = changes.seed);
+  for (const BlobRef& asset : job.assets)
+    if (!blobs.has(asset.digest))
+      return fail(Errc::failed_precondition,
+                  fmt::format("the file {} of the scene is not here any more: PUT /api/v1/blobs/{} first",
+                              asset.name, asset.digest.hex()));
+  if (!blobs.has(job.scene))
+    return fail(Errc::failed_precondition, "the scene of this job is not here any more: submit it again");
+  if (job.spec.reference) {
+    const auto reference = load_reference(job.spec, job.settings.size, blobs);
+    if (!reference) return tl::unexpected(reference.error());
+    job.reference_same_seed = same_noise(reference->origin, job.scene, job.settings.seed);
+  }
+  if (auto ok = check_job(job); !ok) return tl::unexpected(ok.error());
+  return job;
 }
 
 Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const BlobStore& blobs) {
@@ -236,16 +351,14 @@ Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const Blob
         Errc::failed_precondition,
         fmt::format("the reference's blob {0} is not here: PUT /api/v1/blobs/{0} first", digest.hex()));
   ExrLimits limits;
-  // The picture may have as many pixels as a reference of the right size. The limit is at least 2^22, so that
-  // a slightly wrong size is reported as a wrong size and not as too large.
-  limits.max_pixels = std::max<std::uint64_t>(
-      static_cast<std::uint64_t>(size.width) * static_cast<std::uint64_t>(size.height),
-      std::uint64_t{1} << 22);
+  // A reference must have the size of the image. This limit protects the memory. It is at least 2^22 pixels,
+  // so that for a picture of another size the error names the wrong size and not the limit.
+  limits.max_pixels =
+      std::max(std::uint64_t{1} << 22, static_cast<std::uint64_t>(std::int64_t{size.width} * size.height));
   const auto bytes = blobs.size(digest);
   if (!bytes) return tl::unexpected(bytes.error());
   if (*bytes > limits.max_bytes)
-    return fail(Errc::invalid_argument,
-                fmt::format("the reference has {} bytes; at most {} are read", *bytes, limits.max_bytes));
+    return invalid(fmt::format("the reference has {} bytes; at most {} are read", *bytes, limits.max_bytes));
   const auto exr = blobs.read(digest, 0, *bytes);
   if (!exr) return tl::unexpected(exr.error());
   return read_reference(*exr, "the reference", size, limits);
@@ -256,8 +369,7 @@ std::string replay_of(const StoredJob& job) {
   return replay_command(job.name, job.spec, frame ? std::optional(frame->frame) : std::nullopt);
 }
 
-// A world (the scene as loaded by a worker) takes at least as much memory as its files; the user may request
-// workers with more memory.
+// The size of the files is a lower bound of a loaded scene's memory. The user may request more.
 std::uint64_t memory_need(const StoredJob& job) {
   std::uint64_t files = 0;
   for (const BlobRef& file : job.assets) files += file.bytes;
@@ -265,24 +377,23 @@ std::uint64_t memory_need(const StoredJob& job) {
 }
 
 JobPlan plan_of(const StoredJob& job) {
-  JobPlan plan;
-  plan.brief = {job.id, job.scene, job.settings, digest_of(job.settings), job.assets, job.needs};
-  plan.grid = {job.settings.size, job.settings.tile};
-  plan.spp = job.spp;
-  plan.target_error = job.spec.target_error;
-  plan.target_denoised = job.spec.target_layer == TargetLayer::denoised;
-  plan.time = job.spec.time;
-  plan.priority = job.spec.priority;
-  plan.tags = job.spec.tags;
-  plan.owner = job.owner;
-  plan.replay = replay_of(job);
-  if (const auto frame = frame_of(job.id)) plan.group = frame->sequence.value;
-  plan.max_workers = job.spec.max_workers.value_or(0);
-  plan.max_units = job.spec.max_units.value_or(0);
-  plan.memory_bytes = memory_need(job);
-  plan.class_asked = job.spec.numeric_class.value_or("");
-  plan.focus = job.focus;
-  return plan;
+  const auto frame = frame_of(job.id);
+  return {.brief = {job.id, job.scene, job.settings, digest_of(job.settings), job.assets, job.needs},
+          .grid = {job.settings.size, job.settings.tile},
+          .spp = job.spp,
+          .target_error = job.spec.target_error,
+          .target_denoised = job.spec.target_layer == TargetLayer::denoised,
+          .time = job.spec.time,
+          .priority = job.spec.priority,
+          .tags = job.spec.tags,
+          .replay = replay_of(job),
+          .owner = job.owner,
+          .group = frame ? frame->sequence.value : "",
+          .max_workers = job.spec.max_workers.value_or(0),
+          .max_units = job.spec.max_units.value_or(0),
+          .memory_bytes = memory_need(job),
+          .class_asked = job.spec.numeric_class.value_or(""),
+          .focus = job.focus};
 }
 
 }  // namespace ls::coordinator

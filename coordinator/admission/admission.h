@@ -9,7 +9,7 @@
 #include "coordinator/domain/farm/farm.h"
 #include "coordinator/store/blobs/blob_store.h"
 #include "coordinator/store/jobs/job_store.h"
-#include "coordinator/views/job_view.h"
+#include "coordinator/views/views.h"
 
 namespace ls::coordinator {
 

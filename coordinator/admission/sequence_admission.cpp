@@ -18,7 +18,8 @@ class Budget {
  public:
   explicit Budget(std::uint32_t frames) : frames_(frames) {}
 
-  // Call scene() once, before the frames are read, and frame() for every frame.
+  // Call scene() once with the size of the scene's main file, before the frames are read, and frame() for
+  // every frame.
   Result<void> scene(std::size_t bytes) const {
     if (bytes <= limits::kMaxSequenceText / frames_) return {};
     return too_much("bytes of scene text", limits::kMaxSequenceText);
@@ -46,11 +47,7 @@ class Budget {
   std::uint64_t text_ = 0, kept_ = 0, files_ = 0, tiles_ = 0;
 };
 
-tl::unexpected<Rejected> refused(Error error, std::vector<Diagnostic> found = {}) {
-  return tl::unexpected(Rejected{std::move(error), std::move(found)});
-}
-
-// Drops warnings that an earlier frame has, too.
+// Drops each warning of a frame that an earlier frame has already.
 void merge_warnings(std::vector<Admission>& frames) {
   std::set<std::string> reported;
   for (Admission& f : frames)
@@ -73,7 +70,7 @@ tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitReques
                                                               const BlobStore& blobs) {
   const auto numbers = request.spec.frames.value().frames();
   Budget budget(static_cast<std::uint32_t>(numbers.size()));
-  if (auto fits = budget.scene(request.scene_text.size()); !fits) return refused(fits.error());
+  if (auto fits = budget.scene(request.scene_text.size()); !fits) return rejected(fits.error());
   std::vector<Admission> frames;
   FrameDiagnostics found;
   std::uint32_t bad = 0;
@@ -82,7 +79,7 @@ tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitReques
     if (!taken && taken.error().diagnostics.empty()) {
       if (frame != numbers.front())
         taken.error().error.message = fmt::format("frame {}: {}", frame, taken.error().error.message);
-      return refused(std::move(taken.error().error));
+      return rejected(std::move(taken.error().error));
     }
     if (!taken) {
       found.add(frame, taken.error().diagnostics);
@@ -92,11 +89,11 @@ tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitReques
     }
     found.add(frame, {});
     if (bad > 0) continue;
-    if (auto fits = budget.frame(*taken); !fits) return refused(fits.error());
+    if (auto fits = budget.frame(*taken); !fits) return rejected(fits.error());
     frames.push_back(std::move(*taken));
   }
   if (bad > 0)
-    return refused(
+    return rejected(
         {Errc::invalid_argument,
          fmt::format("the scene {} cannot be read for {} of its {} frames{}", request.scene_name, bad,
                      numbers.size(), bad == kMostBadFrames || found.full() ? " at least" : "")},

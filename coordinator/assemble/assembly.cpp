@@ -30,26 +30,24 @@ Health HealthTable::total() const {
   return all;
 }
 
-// Returns the health (counts of invalid values) as text: one line for the full rounds of each tile with
-// problems there, then one for the truncated last round of each tile with problems there. A line is "f"
-// (full) or "t" (truncated), the tile and its health.
+namespace {
+std::string line(char kind, const std::pair<const TileIndex, Health>& tile) {
+  return std::string{kind, ' '} + std::to_string(tile.first) + " " + canonical_json(tile.second) + "\n";
+}
+}  // namespace
+
+// Returns the health (counts of invalid values) as text. A line is "f TILE HEALTH" for the full rounds of a
+// tile, or "t TILE HEALTH" for its truncated last round. Tiles without invalid values have no line.
 std::string HealthTable::save() const {
   std::string text;
-  for (const auto& [tile, health] : full_)
-    text += "f " + std::to_string(tile) + " " + canonical_json(health) + "\n";
-  for (const auto& [tile, health] : tails_)
-    text += "t " + std::to_string(tile) + " " + canonical_json(health) + "\n";
+  for (const auto& tile : full_) text += line('f', tile);
+  for (const auto& tile : tails_) text += line('t', tile);
   return text;
 }
 
 std::string HealthTable::save_tile(TileIndex tile) const {
-  const auto line = [&](char kind, const std::map<TileIndex, Health>& of) {
-    const auto found = of.find(tile);
-    return found == of.end()
-               ? std::string()
-               : std::string{kind, ' '} + std::to_string(tile) + " " + canonical_json(found->second) + "\n";
-  };
-  return line('f', full_) + line('t', tails_);
+  const auto full = full_.find(tile), tail = tails_.find(tile);
+  return (full == full_.end() ? "" : line('f', *full)) + (tail == tails_.end() ? "" : line('t', *tail));
 }
 
 std::optional<HealthTable> HealthTable::load(std::string_view text) {
@@ -118,20 +116,21 @@ std::optional<WaitingPartial> Assembly::take(TileIndex tile, RoundIndex round, S
   return taken;
 }
 
-void Assembly::forget_round(RoundIndex round) {
+template <class Unwanted>
+void Assembly::forget_if(Unwanted&& unwanted) {
   std::erase_if(waiting_, [&](const auto& entry) {
-    if (entry.first.second != round) return false;
-    waiting_bytes_.remove(bytes_of(entry.second));
-    return true;
+    const bool gone = unwanted(entry.first.first, entry.first.second);
+    if (gone) waiting_bytes_.remove(bytes_of(entry.second));
+    return gone;
   });
 }
 
+void Assembly::forget_round(RoundIndex round) {
+  forget_if([&](TileIndex, RoundIndex of) { return of == round; });
+}
+
 void Assembly::discard(TileIndex tile) {
-  std::erase_if(waiting_, [&](const auto& entry) {
-    if (entry.first.first != tile) return false;
-    waiting_bytes_.remove(bytes_of(entry.second));
-    return true;
-  });
+  forget_if([&](TileIndex of, RoundIndex) { return of == tile; });
   film_.discard(tile);
   errors_.discard(tile);
   health_.discard(tile);

@@ -40,7 +40,8 @@ class HealthTable {
   bool operator==(const HealthTable&) const = default;
 
  private:
-  // Health of full rounds and of truncated last rounds; tiles without problems are left out
+  // The health of a tile's full rounds, and that of its truncated last round; only of tiles with invalid
+  // values
   std::map<TileIndex, Health> full_, tails_;
 };
 
@@ -112,7 +113,7 @@ class Assembly {
   // kMaxPendingPartials, its pixels are dropped and read from the log later.
   void hold(TileIndex tile, RoundIndex round, WaitingPartial waiting);
   std::optional<WaitingPartial> take(TileIndex tile, RoundIndex round, SampleRange samples);
-  // drops waiting partials of a truncated round that is to be rendered again in full
+  // drops the waiting partials of this round, which was truncated and is rendered again in full
   void forget_round(RoundIndex round);
   void forget_waiting();
   void discard(TileIndex tile);  // drops all data of the tile, which begins again without samples
@@ -126,11 +127,14 @@ class Assembly {
   UnitCosts& costs() { return costs_; }  // costs of accepted units, whether or not they are in the film
   void checkpoint_taken(std::span<const RoundIndex> rounds) { errors_.checkpoint_taken(rounds); }
   // Returns for each tile how many of its rounds in the film a job of `spp` samples per pixel can use. A last
-  // round that was truncated for another number of samples does not count.
+  // round that was truncated counts only if `spp` truncates it at the same sample.
   std::vector<RoundIndex> rounds_for(std::uint64_t spp) const;
   std::uint64_t folds_since_snapshot = 0;
 
  private:
+  template <class Unwanted>
+  void forget_if(Unwanted&& unwanted);  // drops waiting partials by tile and round
+
   Film film_;
   RoundErrors errors_;
   HealthTable health_;

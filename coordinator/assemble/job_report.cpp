@@ -14,6 +14,7 @@ using nlohmann::json;
 
 json number(double value) { return std::isfinite(value) ? json(value) : json(); }
 json number(const std::optional<double>& value) { return value ? number(*value) : json(); }
+json interval(double from, double to) { return {number(from), number(to)}; }
 json text_or_null(const std::string& text) { return text.empty() ? json() : json(text); }
 
 // Writes samples per pixel as an integer if all pixels have the same number: 64 rather than 64.0.
@@ -34,27 +35,30 @@ void put_reference_error(json& object, const ReferenceError& reference_error) {
 json reference_of(const ReportFacts& facts, const std::optional<ReferenceError>& reference_error) {
   if (!facts.job.spec.reference) return {};
   const auto& noise = facts.reference_noise;
+  const auto figure = [&](auto value) {
+    return reference_error ? number((*reference_error).*value) : json();
+  };
   return {{"digest", facts.job.spec.reference->hex()},
-          {"rmse", reference_error ? number(reference_error->rmse) : json()},
-          {"relmse", reference_error ? number(reference_error->relmse) : json()},
-          {"flip", reference_error && reference_error->flip ? number(*reference_error->flip) : json()},
+          {"rmse", figure(&ReferenceError::rmse)},
+          {"relmse", figure(&ReferenceError::relmse)},
+          {"flip", figure(&ReferenceError::flip)},
           {"same_seed", facts.job.reference_same_seed},
-          // True if the difference to the reference is within the reference's own noise, so that it does not
-          // show the image's error.
+          // True if the measured difference is no larger than the reference's own noise: it then says nothing
+          // about the image's error.
           {"below_noise", reference_error && reference_error->relmse_below_noise()},
           {"rmse_below_noise", reference_error && reference_error->rmse_below_noise()},
-          {"mse_stderr", reference_error ? number(reference_error->mse_stderr) : json()},
-          {"relmse_stderr", reference_error ? number(reference_error->relmse_stderr) : json()},
+          {"mse_stderr", figure(&ReferenceError::mse_stderr)},
+          {"relmse_stderr", figure(&ReferenceError::relmse_stderr)},
           {"noise_rmse", noise ? number(std::sqrt(noise->mse)) : json()},
           {"noise_relmse", noise ? number(noise->relmse) : json()}};
 }
 
-// Adds to some checkpoints of the curve a forecast of the cost of reaching the target, made from the points
-// up to this checkpoint. Users can then judge afterwards how reliable forecasts were.
+// Adds forecasts of the cost of reaching the target to some points of the curve. Each is made from the points
+// up to this one, so users can see how reliable such forecasts were.
 void put_forecasts(json& curve, const std::vector<ConvergencePoint>& points, double target) {
   const std::vector<ErrorPoint> all = error_points(points);
-  // A forecast is added each time the samples have doubled. Forecasts in between would add little, and each
-  // evaluates all points so far
+  // One forecast each time the samples have doubled: forecasts in between would add little, and each
+  // evaluates all points before it
   double next = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (all[i].spp < next) continue;
@@ -63,7 +67,7 @@ void put_forecasts(json& curve, const std::vector<ConvergencePoint>& points, dou
     next = 2 * all[i].spp;
     curve[i]["forecast"] = {
         {"core_seconds", number(forecast->core_seconds)},
-        {"core_seconds_ci95", {number(forecast->core_seconds_lo), number(forecast->core_seconds_hi)}},
+        {"core_seconds_ci95", interval(forecast->core_seconds_lo, forecast->core_seconds_hi)},
         {"spp", number(forecast->spp)}};
   }
 }
@@ -75,13 +79,10 @@ json split_json(const TimeSplit& t) {
 }
 
 json point(const ConvergencePoint& p) {
-  json j{{"seconds", number(p.seconds)},
-         {"core_seconds", number(p.core_seconds)},
-         {"spp", spp_value(p.spp)},
-         {"rmse", number(p.error.rmse)},
-         {"relmse", number(p.error.relmse)},
-         {"relmse_ci95", {number(p.error.relmse_lo), number(p.error.relmse_hi)}}};
-  if (p.error.rmse_hi > 0) j["rmse_ci95"] = {number(p.error.rmse_lo), number(p.error.rmse_hi)};
+  json j{{"seconds", number(p.seconds)},     {"core_seconds", number(p.core_seconds)},
+         {"spp", spp_value(p.spp)},          {"rmse", number(p.error.rmse)},
+         {"relmse", number(p.error.relmse)}, {"relmse_ci95", interval(p.error.relmse_lo, p.error.relmse_hi)}};
+  if (p.error.rmse_hi > 0) j["rmse_ci95"] = interval(p.error.rmse_lo, p.error.rmse_hi);
   if (p.reference_error) put_reference_error(j, *p.reference_error);
   return j;
 }
@@ -90,14 +91,13 @@ json denoised_of(const ReportFacts& facts) {
   if (!facts.denoised) return {};
   const DenoisedFigures& d = *facts.denoised;
   if (d.by.empty()) return {{"error", d.trouble}};
-  json j{
-      {"by", d.by},
-      {"seconds", number(d.seconds)},
-      {"rmse", number(d.error.rmse)},
-      {"rmse_ci95", d.error.rmse_interval ? json{number(d.error.rmse_lo), number(d.error.rmse_hi)} : json()},
-      {"relmse", number(std::max(0.0, d.error.relmse))},
-      {"relmse_ci95",
-       d.error.relmse_interval ? json{number(d.error.relmse_lo), number(d.error.relmse_hi)} : json()}};
+  const DenoisedError& e = d.error;
+  json j{{"by", d.by},
+         {"seconds", number(d.seconds)},
+         {"rmse", number(e.rmse)},
+         {"rmse_ci95", e.rmse_interval ? interval(e.rmse_lo, e.rmse_hi) : json()},
+         {"relmse", number(std::max(0.0, e.relmse))},
+         {"relmse_ci95", e.relmse_interval ? interval(e.relmse_lo, e.relmse_hi) : json()}};
   if (!d.true_error) return j;
   j["true_rmse"] = number(d.true_error->rmse);
   j["true_relmse"] = number(d.true_error->relmse);
@@ -134,7 +134,7 @@ json forecast(const ReportFacts& facts) {
           {"asked", goes_on},
           {"spp", spp_value(f->spp)},
           {"core_seconds", number(f->core_seconds)},
-          {"core_seconds_ci95", {number(f->core_seconds_lo), number(f->core_seconds_hi)}}};
+          {"core_seconds_ci95", interval(f->core_seconds_lo, f->core_seconds_hi)}};
 }
 
 }  // namespace
@@ -261,7 +261,7 @@ std::string report_json(const ReportFacts& facts) {
   json j{{"job", job.id.value},
          {"name", job.name},
          {"submitted_unix", number(job.submitted_unix)},
-         {"target_error", job.spec.target_error ? number(*job.spec.target_error) : json()},
+         {"target_error", number(job.spec.target_error)},
          {"target_layer", job.spec.target_error ? json(to_string(job.spec.target_layer)) : json()},
          {"scene", job.scene.hex()},
          {"state", to_string(job.state)},
@@ -271,7 +271,7 @@ std::string report_json(const ReportFacts& facts) {
          {"max_depth", job.settings.max_depth},
          {"rr_depth", job.settings.rr_depth},
          {"spp_asked", job.spp ? json(even_spp(*job.spp)) : json()},
-         {"time_asked", job.spec.time ? number(*job.spec.time) : json()},
+         {"time_asked", number(job.spec.time)},
          {"spp", spp_value(totals.spp_done)},
          {"samples", facts.samples},
          {"load_seconds", number(totals.load_seconds)},
@@ -294,23 +294,22 @@ std::string report_json(const ReportFacts& facts) {
          {"stopped", job.stopped ? json(to_string(*job.stopped)) : json()},
          {"warnings", job.warnings},
          {"convergence", std::move(curve)}};
-  // Both texts were written by this program. Jobs stored by older versions have none.
+  // `needs` and `analysis` are JSON texts that this program wrote. Jobs stored by older versions have none.
   j["needs"] = job.needs.empty() ? json() : json::parse(job.needs, nullptr, false);
   j["analysis"] = job.analysis.empty() ? json() : json::parse(job.analysis, nullptr, false);
   j["techniques"] = json::parse(techniques_json(job.techniques, job.settings.integrator));
-  const bool known = facts.error.has_value();
-  const ImageError e = facts.error.value_or(ImageError{});
-  j["rmse"] = known ? number(e.rmse) : json();
-  j["rmse_ci95"] = known ? json{number(e.rmse_lo), number(e.rmse_hi)} : json();
-  j["relmse"] = known ? number(e.relmse) : json();
-  j["relmse_ci95"] = known ? json{number(e.relmse_lo), number(e.relmse_hi)} : json();
+  const auto& e = facts.error;
+  j["rmse"] = e ? number(e->rmse) : json();
+  j["rmse_ci95"] = e ? interval(e->rmse_lo, e->rmse_hi) : json();
+  j["relmse"] = e ? number(e->relmse) : json();
+  j["relmse_ci95"] = e ? interval(e->relmse_lo, e->relmse_hi) : json();
   const auto reference_error = last_reference_error(facts.convergence);
   if (reference_error) put_reference_error(j, *reference_error);
   j["reference"] = reference_of(facts, reference_error);
-  j["few_hits_pixels"] = facts.error ? json(facts.error->few_hits) : json();
+  j["few_hits_pixels"] = e ? json(e->few_hits) : json();
   const auto trend = trend_of(error_points(facts.convergence));
   j["slope"] = trend ? number(-trend->slope) : json();
-  j["slope_ci95"] = trend ? json{number(-trend->slope_hi), number(-trend->slope_lo)} : json();
+  j["slope_ci95"] = trend ? interval(-trend->slope_hi, -trend->slope_lo) : json();
   j["trend"] = trend ? trend->verdict : "too early to tell how it converges";
   j["forecast"] = forecast(facts);
   const ConvergenceStatus convergence_status = convergence_status_of(facts);

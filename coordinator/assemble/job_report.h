@@ -33,7 +33,7 @@ struct ReportFacts {
   std::optional<ImageError> error;
   std::uint64_t pixels_without_samples = 0;
   Digest pixels;
-  std::uint64_t clamped_values = 0;  // number of values that are out of range for the final EXR
+  std::uint64_t clamped_values = 0;  // number of values that a half float of the final EXR cannot hold
   std::vector<ConvergencePoint> convergence;
   std::string replay;                             // the job's replay_command()
   std::optional<ReferenceNoise> reference_noise;  // nullopt: unknown, or there is no reference
@@ -43,7 +43,7 @@ std::string report_json(const ReportFacts& facts);
 // Sets the facts that come from the film: samples, pixels without samples, and error.
 void put_film(ReportFacts& facts, const Film& film);
 
-// Returns how far the image's error estimates can be trusted.
+// Returns how far the image's error estimates can be trusted, from its curve and its current error.
 ConvergenceStatus convergence_status_of(const ReportFacts& facts);
 struct Efficiency {
   // wall: 1 / (relMSE x wall-clock seconds); per_core: 1 / (relMSE x core seconds)

@@ -5,11 +5,28 @@
 #include <type_traits>
 
 namespace ls::coordinator {
+namespace {
+
+// Sets the entry of this round, and drops those of later rounds. `rounds` is ascending.
+template <class T>
+void put_round(RoundIndex round, T value, std::vector<std::pair<RoundIndex, T>>& rounds) {
+  while (!rounds.empty() && rounds.back().first >= round) rounds.pop_back();
+  rounds.emplace_back(round, std::move(value));
+}
+
+// Drops the entries of one tile that no later checkpoint needs. `rounds` is ascending. A checkpoint with at
+// least `next` rounds of the tile needs the latest entry before `next`, and later ones.
+template <class T>
+void drop_rounds_before(RoundIndex next, std::vector<std::pair<RoundIndex, T>>& rounds) {
+  const auto later = std::ranges::find_if(rounds, [&](const auto& r) { return r.first >= next; });
+  if (later - rounds.begin() > 1) rounds.erase(rounds.begin(), later - 1);
+}
+
+}  // namespace
 
 void RoundErrors::folded(TileIndex tile, RoundIndex round, const TileError& error) {
   Tile& t = tiles_[tile];
-  while (!t.rounds.empty() && t.rounds.back().first >= round) t.rounds.pop_back();
-  t.rounds.emplace_back(round, error);
+  put_round(round, error, t.rounds);
   if (!keep_relative_) return;
   t.relative.resize(round + 1);
   t.relative[round] = error.relative.squares;
@@ -50,13 +67,6 @@ std::vector<std::vector<double>> RoundErrors::relative() const {
 namespace {
 static_assert(std::is_trivially_copyable_v<TileError>);
 
-template <class T>
-void put(std::vector<std::byte>& out, const T& value) {
-  const std::size_t at = out.size();
-  out.resize(at + sizeof value);
-  std::memcpy(&out[at], &value, sizeof value);
-}
-
 // Reads values from `bytes`. It never allocates more memory than the size of `bytes`, whatever counts they
 // contain.
 class Reader {
@@ -83,13 +93,13 @@ class Reader {
 std::vector<std::byte> RoundErrors::save_tile(TileIndex tile) const {
   const Tile& t = tiles_[tile];
   std::vector<std::byte> out;
-  put(out, static_cast<std::uint32_t>(t.rounds.size()));
+  append_value(out, static_cast<std::uint32_t>(t.rounds.size()));
   for (const auto& [round, error] : t.rounds) {
-    put(out, round);
-    put(out, error);
+    append_value(out, round);
+    append_value(out, error);
   }
-  put(out, static_cast<std::uint32_t>(t.relative.size()));
-  for (const double r : t.relative) put(out, r);
+  append_value(out, static_cast<std::uint32_t>(t.relative.size()));
+  for (const double r : t.relative) append_value(out, r);
   return out;
 }
 
@@ -106,15 +116,59 @@ bool read_tile(Reader& in, Rounds& rounds, std::vector<double>& relative) {
   relative.resize(count);
   return std::all_of(relative.begin(), relative.end(), [&](double& r) { return in.get(r); });
 }
-
-tl::unexpected<Error> damaged() { return fail(Errc::invalid_argument, "saved error figures are damaged"); }
 }  // namespace
 
 Result<void> RoundErrors::load_tile(TileIndex tile, std::span<const std::byte> bytes) {
   Reader in(bytes);
   if (tile >= tiles_.size() || !read_tile(in, tiles_[tile].rounds, tiles_[tile].relative) || !in.empty())
-    return damaged();
+    return fail(Errc::invalid_argument, "saved error figures are damaged");
   return {};
+}
+
+ReferenceTiles::ReferenceTiles(const Film& film) : tiles_(film.grid().count()) {
+  for (TileIndex t = 0; t < tiles_.size(); ++t) {
+    tiles_[t].rect = film.grid().rect(t);
+    if (const RoundIndex rounds = film.rounds_folded(t); rounds > 0) folded(t, rounds - 1, film);
+  }
+}
+
+void ReferenceTiles::folded(TileIndex tile, RoundIndex round, const Film& film) {
+  const TilePixels pixels = film.pixels(tile);
+  Picture rgb = std::make_shared<const std::vector<float>>(pixels.mean.begin(), pixels.mean.end());
+  put_round(round, std::move(rgb), tiles_[tile].rounds);
+}
+
+std::optional<std::vector<TilePicture>> ReferenceTiles::at(std::span<const RoundIndex> rounds) const {
+  std::vector<TilePicture> out;
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    TilePicture found{tiles_[t].rect, nullptr};
+    for (const auto& [round, rgb] : tiles_[t].rounds)
+      if (round < rounds[t]) found.rgb = rgb;
+    if (!found.rgb) return std::nullopt;
+    out.push_back(std::move(found));
+  }
+  return out;
+}
+
+std::optional<std::vector<TilePicture>> ReferenceTiles::latest() const {
+  return at(std::vector<RoundIndex>(tiles_.size(), std::numeric_limits<RoundIndex>::max()));
+}
+
+void ReferenceTiles::checkpoint_taken(std::span<const RoundIndex> rounds) {
+  for (std::size_t t = 0; t < tiles_.size(); ++t) drop_rounds_before(rounds[t], tiles_[t].rounds);
+}
+
+std::vector<float> joined(const std::vector<TilePicture>& tiles, FrameSize frame) {
+  const auto width = static_cast<std::size_t>(frame.width);
+  std::vector<float> out(3 * width * static_cast<std::size_t>(frame.height));
+  for (const TilePicture& tile : tiles) {
+    const auto row = 3 * static_cast<std::size_t>(tile.rect.width());
+    auto from = tile.rgb->begin();
+    for (int y = tile.rect.y0; y < tile.rect.y1; ++y, from += static_cast<std::ptrdiff_t>(row))
+      std::copy_n(from, row,
+                  &out[3 * (static_cast<std::size_t>(y) * width + static_cast<std::size_t>(tile.rect.x0))]);
+  }
+  return out;
 }
 
 }  // namespace ls::coordinator

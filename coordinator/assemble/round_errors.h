@@ -1,11 +1,11 @@
-// Keeps the error sums of every tile after every fold, as long as checkpoints need them. A round is a range
-// of samples; folding adds a tile's next round to the image. A checkpoint gives a number of rounds for each
-// tile, and sums the errors of the tiles after these rounds, even if some tiles already have later ones. So
-// the errors of a checkpoint do not depend on the order in which results arrive.
+// Keeps what checkpoints need of tiles: their error sums (RoundErrors) and, to compare them with a reference
+// image, their pictures (ReferenceTiles). A round is a range of samples; folding adds a tile's next round to
+// the image. A checkpoint gives a number of rounds for each tile. It shows every tile as it was after these
+// rounds, even if some tiles already have later ones.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
@@ -13,30 +13,31 @@
 
 #include "common/base/error.h"
 #include "common/image/error/error_estimate.h"
+#include "common/image/film/film.h"
 
 namespace ls::coordinator {
 
-// Drops those of a tile's rounds (ascending) that no checkpoint with `next` or more rounds needs: all rounds
-// before `next` except the latest of them.
+// Appends the bytes of `value`.
 template <class T>
-void drop_rounds_before(RoundIndex next, std::vector<std::pair<RoundIndex, T>>& rounds) {
-  const auto later =
-      std::find_if(rounds.begin(), rounds.end(), [&](const auto& r) { return r.first >= next; });
-  if (later - rounds.begin() > 1) rounds.erase(rounds.begin(), later - 1);
+void append_value(std::vector<std::byte>& out, const T& value) {
+  const auto bytes = std::as_bytes(std::span(&value, 1));
+  out.insert(out.end(), bytes.begin(), bytes.end());
 }
 
+// Error sums, as long as checkpoints need them. So the errors of a checkpoint do not depend on the order in
+// which results arrive.
 class RoundErrors {
  public:
-  // If `keep_relative`, the relative error sums after all rounds are kept even when no checkpoint needs them:
-  // the farm's rule that stops tiles at a target error needs them after a restart.
+  // `keep_relative`: the relative error sums after all rounds are kept, even those that no checkpoint needs.
+  // A job with a target error needs them after a restart, when its stop rule is fed again.
   RoundErrors(TileIndex tiles, bool keep_relative) : tiles_(tiles), keep_relative_(keep_relative) {}
 
   // Adds the tile's error after this round. The rounds of a tile come in order. If a truncated round comes
   // again in full, its new error replaces the old one.
   void folded(TileIndex tile, RoundIndex round, const TileError& error);
   // Returns the sum of all tiles' errors, in tile order, each after `rounds[tile]` rounds. A tile that has
-  // fewer rounds counts with the error after its latest round. If only later rounds of a tile are kept,
-  // because it was ahead at an earlier checkpoint, the first of these counts.
+  // fewer rounds counts with the error after its latest round. If the error that is needed has been dropped,
+  // the next later one counts.
   TileError at(std::span<const RoundIndex> rounds) const;
   // True if at(rounds) is exact: all errors that it needs are still there.
   bool knows(std::span<const RoundIndex> rounds) const;
@@ -63,5 +64,43 @@ class RoundErrors {
   std::vector<Tile> tiles_;
   bool keep_relative_ = false;
 };
+
+using Picture = std::shared_ptr<const std::vector<float>>;  // pixels row by row, three values each
+struct TilePicture {
+  PixelRect rect;
+  Picture rgb;
+};
+
+// Pictures of tiles, as long as a comparison with a reference image needs them. Sums of errors do not
+// suffice: the perceived error (FLIP) is not a sum over tiles. Not thread-safe; but pictures are shared and
+// immutable, so the result of at() may be used without a lock.
+class ReferenceTiles {
+ public:
+  // Starts with the picture of each tile in `film`. If `film` has rounds already (after a restart), the
+  // tiles' earlier pictures are unknown.
+  explicit ReferenceTiles(const Film& film);
+
+  // Keeps the tile's picture after this round. Call it after each round that is added to `film`.
+  void folded(TileIndex tile, RoundIndex round, const Film& film);
+  // Returns the picture of each tile after `rounds[tile]` rounds. A tile with fewer rounds gives its latest
+  // picture. nullopt: the picture of some tile is lost, because the coordinator was restarted meanwhile.
+  std::optional<std::vector<TilePicture>> at(std::span<const RoundIndex> rounds) const;
+  // Called when the tile begins again without samples
+  void discard(TileIndex tile) { tiles_[tile].rounds.clear(); }
+  std::optional<std::vector<TilePicture>> latest() const;
+  // Drops pictures that no later checkpoint needs. Later calls of at() must request at least `rounds[tile]`
+  // rounds of every tile.
+  void checkpoint_taken(std::span<const RoundIndex> rounds);
+
+ private:
+  struct Tile {
+    PixelRect rect;
+    std::vector<std::pair<RoundIndex, Picture>> rounds;  // ascending
+  };
+  std::vector<Tile> tiles_;
+};
+
+// Joins the pictures of all tiles to one of the whole frame: pixels row by row, three values each.
+std::vector<float> joined(const std::vector<TilePicture>& tiles, FrameSize frame);
 
 }  // namespace ls::coordinator

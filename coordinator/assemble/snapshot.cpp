@@ -15,17 +15,8 @@ constexpr std::uint32_t kEnd = ~std::uint32_t{0};
 // at most this many bytes in one of the three parts (film, errors, health) of a tile
 constexpr std::uint64_t kMostPart = std::uint64_t{1} << 32;
 
-struct TileHead {
-  std::uint32_t tile = 0;
-  std::uint64_t film = 0, errors = 0, health = 0;
-};
-
-template <class T>
-void append_value(std::vector<std::byte>& out, const T& value) {
-  const std::size_t at = out.size();
-  out.resize(at + sizeof value);
-  std::memcpy(&out[at], &value, sizeof value);
-}
+// Lengths of the three parts of a tile
+using Lengths = std::array<std::uint64_t, 3>;
 
 std::vector<std::byte> head_of(const TileGrid& grid, AovSet aovs, std::string_view format) {
   const auto magic = std::as_bytes(std::span(kMagic)), name = std::as_bytes(std::span(format));
@@ -77,13 +68,10 @@ class Source {
 // Reads one tile into `film` and `errors`, and appends the text of its health to `health`, which
 // HealthTable::load() reads at the end. False: the file is damaged.
 bool read_tile(Source& in, TileIndex tile, Film& film, RoundErrors& errors, std::string& health) {
-  TileHead head{.tile = tile};
-  for (std::uint64_t* length : {&head.film, &head.errors, &head.health}) {
-    const auto read = in.value<std::uint64_t>();
-    if (!read) return false;
-    *length = *read;
-  }
-  const auto film_bytes = in.take(head.film), error_bytes = in.take(head.errors), text = in.take(head.health);
+  const auto lengths = in.value<Lengths>();
+  if (!lengths) return false;
+  const auto film_bytes = in.take((*lengths)[0]), error_bytes = in.take((*lengths)[1]),
+             text = in.take((*lengths)[2]);
   if (!film_bytes || !error_bytes || !text || film_bytes->empty()) return false;
   health.append(reinterpret_cast<const char*>(text->data()), text->size());
   return film.load_tile(tile, *film_bytes).has_value() && errors.load_tile(tile, *error_bytes).has_value();
@@ -116,8 +104,7 @@ Result<void> SnapshotFile::add(const TileSnapshot& tile) {
   if (film.empty()) return {};
   std::vector<std::byte> head;
   append_value(head, tile.tile);
-  for (const std::uint64_t length : {film.size(), tile.errors.size(), tile.health.size()})
-    append_value(head, length);
+  append_value(head, Lengths{film.size(), tile.errors.size(), tile.health.size()});
   for (const std::span<const std::byte> part :
        {std::span<const std::byte>(head), std::span<const std::byte>(film),
         std::span<const std::byte>(tile.errors), std::as_bytes(std::span(tile.health))})
@@ -165,7 +152,7 @@ std::optional<SnapshotTiles> SnapshotTiles::open(const std::filesystem::path& pa
   const auto expected = head_of(grid, aovs, format);
   const auto head = read_at(out.file_, 0, expected.size(), path);
   if (!head || *head != expected) return std::nullopt;
-  constexpr std::size_t kHead = sizeof(std::uint32_t) + 3 * sizeof(std::uint64_t);
+  constexpr std::size_t kHead = sizeof(std::uint32_t) + sizeof(Lengths);
   for (std::uint64_t at = expected.size();;) {
     std::uint32_t tile = 0;
     const auto number = read_at(out.file_, at, sizeof tile, path);
@@ -174,7 +161,7 @@ std::optional<SnapshotTiles> SnapshotTiles::open(const std::filesystem::path& pa
     if (tile == kEnd) return out;
     const auto raw = read_at(out.file_, at, kHead, path);
     if (tile >= grid.count() || !raw) return std::nullopt;
-    std::array<std::uint64_t, 3> lengths{};  // lengths of film, errors and health
+    Lengths lengths{};
     std::memcpy(lengths.data(), raw->data() + sizeof tile, sizeof lengths);
     at += kHead;
     out.places_[tile] = {at, lengths[0]};

@@ -48,8 +48,8 @@ Result<std::vector<std::byte>> StoredLayers::pixels(const PixelLayer& layer, int
   const auto same = [&](const PixelLayer& other) { return other.name == layer.name; };
   const auto at =
       static_cast<std::size_t>(std::find_if(layers_.begin(), layers_.end(), same) - layers_.begin());
-  // Mip level kKeptLevel of each tile, kept in memory, serves this level and coarser ones, but only if none
-  // of its pixels covers two tiles: if a tile's side is a multiple of 2^kKeptLevel pixels.
+  // The small version of a tile (its mip level kKeptLevel) serves this level and coarser ones, provided that
+  // no pixel of it covers two tiles: a tile's side must be a multiple of 2^kKeptLevel pixels.
   const bool from_small = level >= kKeptLevel && grid_.tile % (1 << kKeptLevel) == 0;
   for (const TileIndex tile : tiles_over(grid_, rect_in_image(grid_.frame, level, rect))) {
     if (from_small) {

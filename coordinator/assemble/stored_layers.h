@@ -28,8 +28,8 @@ class StoredLayers {
   std::size_t bytes() const;  // bytes kept in memory
 
  private:
-  // Pixels of each layer at mip level kKeptLevel; empty if the tile has no samples. Its identifiers would be
-  // zeros then, which would hide those of its neighbours at a coarser level.
+  // Pixels of each layer at mip level kKeptLevel. Empty if the tile has no samples: it must not take part in
+  // coarser levels then, since an identifier of zero would hide those of its neighbours.
   using Small = std::vector<std::vector<std::byte>>;
   static constexpr int kKeptLevel = 2;
   Result<TileLayers> read(TileIndex tile) const;

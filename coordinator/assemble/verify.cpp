@@ -14,8 +14,7 @@ BadResult bad(const UnitResult& result, Errc code, std::string_view why) {
                              result.unit.round, why)}};
 }
 
-// True if the headers differ at most in the end of the sample range, that is, in where the round was
-// truncated, and this end is within the round.
+// True if `got` is the header of the same round, perhaps truncated at another sample than `expected`.
 bool same_round(const UnitHeader& got, const UnitHeader& expected, RoundIndex round) {
   UnitHeader other = got;
   other.samples = expected.samples;

@@ -17,7 +17,7 @@ inline constexpr std::uint64_t kMaxBlobBytes = std::uint64_t{1} << 36;
 inline constexpr std::uint64_t kMaxBlobRead = std::uint64_t{256} << 20;  // bytes that one read() returns
 // Interrupted uploads that are kept so that they can be resumed
 inline constexpr std::size_t kMaxUnfinishedUploads = 1024;
-// A job is paused while a blob that it needs is missing. Time between two checks for these blobs
+// Time between two checks for blobs that are missing: a job is paused while a blob that it needs is missing
 inline constexpr Duration kMissingBlobLook = std::chrono::seconds(1);
 
 // Submission

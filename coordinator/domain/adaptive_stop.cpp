@@ -21,8 +21,8 @@ struct Side {
   int block_of(int tile) const { return std::min(tile / block, blocks() - 1); }
 };
 
-// Divides a side of `frame` pixels into blocks. A block has as many tiles (of `tile` pixels) along this side
-// as it needs to contain kMinStopPixels pixels, given its extent `across` along the other side, in pixels.
+// Divides a side of `frame` pixels into blocks. A block has as many tiles of `tile` pixels along this side as
+// it needs for kMinStopPixels pixels; `across` is its extent along the other side, in pixels.
 Side side_of(int frame, int tile, int across) {
   const int whole = std::max(1, frame / tile);
   const auto wanted = divided_up(kMinStopPixels, std::int64_t{across} * std::min(tile, frame));
@@ -35,7 +35,8 @@ std::vector<std::vector<TileIndex>> stop_groups(const TileGrid& grid) {
   const int width = grid.frame.width, height = grid.frame.height;
   int square = grid.tile;
   while (std::int64_t{square} * square < kMinStopPixels) square += grid.tile;
-  // A square block may be higher than the frame; blocks are then wider instead. The same holds for the width.
+  // Blocks are about square, unless the frame is too low or too narrow for that: they are then longer along
+  // the other side.
   const Side x = side_of(width, grid.tile, std::min(square, height));
   const Side y = side_of(height, grid.tile, std::min(width, x.block * grid.tile));
   std::vector<std::vector<TileIndex>> groups(static_cast<std::size_t>(x.blocks()) *
@@ -53,7 +54,8 @@ namespace {
 
 // The earliest round after which a tile may stop: with it every pixel has kMinSppBeforeStop samples.
 constexpr RoundIndex kFirstStop = round_count(kMinSppBeforeStop) - 1;
-// Number of rounds that every group of tiles needs before a forecast; together they have 8 samples per pixel
+// Number of rounds that every group of tiles needs before a forecast; the first 3 rounds have 8 samples per
+// pixel together
 constexpr RoundIndex kFirstForecast = 3;
 
 constexpr double samples_after(RoundIndex round) { return static_cast<double>(round_range(round).s1); }
@@ -73,7 +75,7 @@ double level_below(double gain) {
   const double mantissa = std::frexp(gain, &exponent);  // in [1/2, 1)
   for (const double step : kSteps)
     if (step < mantissa) return std::ldexp(step, exponent);
-  return std::ldexp(kSteps[0], exponent - 1);  // gain is a power of two
+  return std::ldexp(kSteps[0], exponent - 1);  // mantissa is 1/2
 }
 
 AdaptiveStop::AdaptiveStop(const TileGrid& grid, std::uint64_t spp)
@@ -265,6 +267,44 @@ double AdaptiveStop::samples_to_limit() const {
   double samples = 0;
   for (const Group& g : groups_) samples += samples_missing(g, last_);
   return samples;
+}
+
+namespace {
+
+bool meets(const DenoisedCheck* check, double target) {
+  return check != nullptr && check->at_most && *check->at_most <= target;
+}
+
+}  // namespace
+
+const DenoisedCheck* DenoisedTarget::find(double spp) const {
+  const auto found = std::ranges::find(made_, spp, &DenoisedCheck::spp);
+  return found == made_.end() ? nullptr : &*found;
+}
+
+DenoisedTarget::Answer DenoisedTarget::judge(double spp, double target) {
+  if (spp != due_) {
+    if (spp < kDenoisedCheckGrowth * due_) return Answer::go_on;
+    before_ = due_;
+    due_ = spp;
+  }
+  const DenoisedCheck* now = find(due_);
+  if (now == nullptr) return Answer::check;
+  return meets(now, target) && meets(find(before_), target) ? Answer::end : Answer::go_on;
+}
+
+bool DenoisedTarget::met(double target) const { return meets(find(due_), target); }
+
+void DenoisedTarget::add(const DenoisedCheck& check) {
+  if (find(check.spp) == nullptr) made_.push_back(check);
+}
+
+double DenoisedTarget::error_left(double target) const {
+  const DenoisedCheck* now = find(due_);
+  // The job ends after one further check at the earliest, whose level has kDenoisedCheckGrowth times the
+  // samples
+  const double next = 1 / kDenoisedCheckGrowth;
+  return now != nullptr && now->at_most && *now->at_most > 0 ? std::min(next, target / *now->at_most) : next;
 }
 
 }  // namespace ls::coordinator

@@ -46,7 +46,8 @@ struct RecordUnit {
 };
 
 // Add this unit's accepted partial (pixel sums) to the film (the image), then raise the event UnitFolded. The
-// farm requests the rounds of a tile in order, each once, and never one after the tile's last round.
+// farm requests the rounds of a tile in order, none after the tile's last one, and each once unless
+// TileDiscarded or ReopenRound has removed it from the film.
 struct Fold {
   UnitKey unit;
   SampleRange samples;
@@ -57,16 +58,17 @@ struct DropDuplicate {
   UnitKey unit;
   WorkerId worker;
 };
-// The worker delivered a result that is not needed, for the reason in `why`: its job has ended, its round is
-// after the tile's last one, or it has another sample range or numeric class than the job needs.
+// The worker delivered a result that is not needed, for the reason in `why`: the worker is quarantined, the
+// job has ended, the round is after the tile's last one, or the result has another sample range or numeric
+// class than the job needs.
 struct DropUnwanted {
   UnitKey unit;
   WorkerId worker;
   std::string why;
 };
-// Two results of one unit differ although they are of one numeric class (machines that compute the same
-// bits): a worker has bad memory or lies. A third worker decides (farm_trust.cpp); if there is none, and the
-// second result comes from a worker that held a lease on the unit, the job fails unless it has ended.
+// Two results of one unit differ although both workers are of one numeric class (machines that compute the
+// same bits): one of them has bad memory or lies. A third worker decides (farm_trust.cpp). If no third worker
+// exists, the job fails, unless it has ended or the second worker held no lease on the unit.
 struct DigestMismatch {
   UnitKey unit;
   Digest first, second;
@@ -84,9 +86,10 @@ struct JobStateChanged {
   JobState to = JobState::queued;
 };
 // The image has at least `rounds[tile]` rounds of each tile. The service adds a point to the convergence
-// curve and may take a snapshot. With a target error, tiles have different numbers of rounds: those of one
-// level of the stop rule (coordinator/domain/adaptive_stop.h). The checkpoints and their order do not depend
-// on the order in which results arrive.
+// curve and may take a snapshot. In a job with a target error the tiles have different numbers of rounds from
+// some point on; they are then those at which the tiles stop at one level of the stop rule
+// (coordinator/domain/adaptive_stop.h). The checkpoints and their order do not depend on the order in which
+// results arrive.
 struct Checkpoint {
   JobId job;
   std::vector<RoundIndex> rounds;  // for each tile, how many of its rounds the checkpoint includes

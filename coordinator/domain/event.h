@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -16,7 +17,6 @@
 #include "common/image/frame/frame.h"
 #include "common/image/frame/rounds.h"
 #include "common/protocol/messages.h"
-#include "coordinator/domain/denoised_target.h"
 #include "coordinator/domain/job_state.h"
 
 namespace ls::coordinator {
@@ -124,9 +124,9 @@ struct JobRetargeted {
   JobId job;
   double target_error = 0;  // relMSE
 };
-// Raises the job's total of samples per pixel; the job may be running, paused or done. If the last rounds of
-// all tiles are decided already, the job loses its target error, and all tiles get the new total. A time
-// limit that has passed is dropped, too.
+// Raises the job's total of samples per pixel; the job may be running, paused or done. If the last round of
+// every tile is fixed already, because the job has stopped or is about to, the job loses its target error,
+// and all tiles get the new total. A time limit that has passed is dropped, too.
 struct JobExtended {
   JobId job;
   std::uint64_t spp = 0;
@@ -168,6 +168,10 @@ struct WorkerLost {
 struct WorkerDrains {
   WorkerId worker;
 };
+// The farm names leases "PREFIX-1", "PREFIX-2"... Returns the number in such an id; nullopt if the id has
+// another prefix, that of an earlier start of the coordinator.
+std::optional<std::uint64_t> lease_number(const LeaseId& id, std::string_view prefix);
+
 struct LeaseProgress {
   WorkerId worker;
   std::vector<WorkerProgress::Entry> leases;
@@ -199,7 +203,8 @@ struct UnitAccepted {
   Digest digest;
   WorkerId worker;
   double cpu_seconds = 0;
-  // Seconds that the rendering thread waited for a core or for memory while it rendered the unit: CoreShare
+  // Seconds that the rendering thread waited for a core or for memory during the unit; for CoreShare
+  // (worker_table.h)
   double wait_seconds = 0;
 };
 // The result of a unit (one tile, one range of its samples) has been added to the image, as the effect Fold

@@ -69,14 +69,16 @@ class FairShare {
  private:
   struct Share {
     double spent = 0, out = 0;  // core seconds that results reported, and those predicted for leased units
-    std::uint32_t at_work = 0;  // number of its jobs that have units to lease or units that are leased
+    std::uint32_t at_work = 0;  // number of its jobs that have units to lease or leased units
     double had() const { return spent + out; }
   };
   template <class T>
   struct Turn {
     double had;
-    JobSeq first;  // its earliest submitted job with units to lease: equal shares are served in order of
-                   // submission
+    // The earliest submitted of its jobs with units to lease; of equal shares, the one with the earlier job
+    // goes first
+    JobSeq first;
+    // submission
     T* who;
     bool operator<(const Turn& o) const { return std::tie(had, first) < std::tie(o.had, o.first); }
   };
@@ -86,7 +88,7 @@ class FairShare {
   };
   struct User {
     Share share;
-    double clock = 0;  // the share of the group served last
+    double clock = 0;  // the share of the group that was served most recently
     std::map<std::string, Group> groups;
     std::set<Turn<Group>> turns;  // groups that have jobs with units to lease
     std::set<JobSeq> ready;

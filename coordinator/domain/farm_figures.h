@@ -26,8 +26,9 @@ enum class FreedCause {
   paused,          // the job was paused
   round_reopened,  // the job was extended, and the round is rendered again with more samples
   worker_quarantined,
-  not_wanted,  // the tile has ended with an earlier round, so the unit is not rendered again
-  job_ended    // the job failed or was cancelled, so the unit is not rendered again
+  // The tile ended with an earlier round, or the unit's audit was closed: the unit is not rendered again
+  not_wanted,
+  job_ended  // the job failed or was cancelled, so the unit is not rendered again
 };
 inline constexpr std::pair<FreedCause, std::string_view> kFreedCauses[] = {
     {FreedCause::worker_lost, "worker lost"},
@@ -60,7 +61,7 @@ struct FarmFigures {
   std::uint64_t accepted = 0;
   std::uint64_t equal = 0;      // second results of a unit with the same bits as the first
   std::uint64_t differing = 0;  // second results with other bits: a worker has bad memory or lies
-  // Results of ended jobs, of rounds after a tile's last, or of other sample ranges
+  // Results that no job needs (effect DropUnwanted)
   std::uint64_t unwanted = 0;
   std::uint64_t refused = 0;  // results that failed verification
   // Results that could not be stored: the disk was full or the storage failed otherwise

@@ -11,15 +11,14 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <string>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "common/image/frame/frame.h"
 #include "coordinator/domain/adaptive_stop.h"
-#include "coordinator/domain/denoised_target.h"
 #include "coordinator/domain/event.h"
-#include "coordinator/domain/failure_budget.h"
 #include "coordinator/domain/limits.h"
 #include "coordinator/domain/unit_queue.h"
 #include "coordinator/domain/unit_table.h"
@@ -61,6 +60,56 @@ class CostModel {
   std::vector<float> tile_cost_;
 };
 
+// A failed attempt to render a unit. Failures of the infrastructure do not count: a lost worker, a missed
+// deadline, or a lease that the worker gave back.
+struct FailedAttempt {
+  WorkerIndex worker = kNoWorker;
+  std::string worker_name;
+  UnitFailure failure;
+};
+
+// The units of one job that have failed and have no accepted result yet
+class UnitFailures {
+ public:
+  void add(UnitCode code, FailedAttempt attempt);
+  void accepted(UnitCode code) { units_.erase(code); }
+  // True if this worker has failed on this unit.
+  bool failed_on(UnitCode code, WorkerIndex worker) const;
+  // True if the unit has failed on min(kUnitFailureWorkers, workers_known) distinct workers and in at least
+  // kUnitFailureAttempts attempts. `workers_known`: number of connected workers that could render the job.
+  bool exhausted(UnitCode code, std::size_t workers_known) const;
+  const std::vector<FailedAttempt>& attempts(UnitCode code) const;
+  void mark_workers(std::vector<bool>& used) const {
+    for (const auto& [code, attempts] : units_)
+      for (const FailedAttempt& attempt : attempts) used[attempt.worker] = true;
+  }
+
+ private:
+  // The latest attempts of each unit; add() limits their number
+  std::map<UnitCode, std::vector<FailedAttempt>> units_;
+};
+
+// Failures of one worker in one job
+struct WorkerFailures {
+  std::uint32_t count = 0;
+  TimePoint last{};
+  bool blocked = false;
+
+  void add(TimePoint now) {
+    if (count > 0 && forgiven_at(now)) *this = {};
+    ++count;
+    last = now;
+    blocked = count >= kWorkerFailuresPerJob;
+  }
+  bool forgiven_at(TimePoint now) const { return now - last >= kForgiveAfter; }
+  bool blocked_at(TimePoint now) const { return blocked && !forgiven_at(now); }
+};
+
+// Returns the error message of a failed job for its owner: unit, pixel, signal, what each worker reported,
+// how to replay it.
+std::string describe_failure(const PixelRect& rect, const SampleRange& samples,
+                             const std::vector<FailedAttempt>& attempts, const std::string& replay);
+
 // The workers that held a lease on a unit (one round of one tile) but did not deliver its accepted result. If
 // results of a unit differ, only these workers may vote on it (farm_trust.cpp). The table is bounded: beyond
 // kMaxVoters the entries of the earliest rounds are dropped, and later results of those units are mere
@@ -97,9 +146,9 @@ struct Holders {
   }
 };
 
-// The number of leased units of one job, or of all jobs of a user or group
+// The leased units of one job, or of all jobs of a user or group
 struct Load {
-  // copies of units are counted, audits are not
+  // Leased units. A unit that is leased twice counts twice; units of audits do not count
   std::uint32_t units = 0;
   std::unordered_map<WorkerIndex, std::uint32_t> leases_at;  // number of leases of each worker that has any
 };
@@ -139,10 +188,11 @@ struct Job {
   JobPlan plan;
   std::uint64_t spp;  // samples per pixel: the plan's, or kMaxSppWithoutLimit; always even
   JobState state = JobState::queued;
-  // Why the job ends. It is set once the last rounds of all tiles are decided, even while some of their units
+  // Why the job ends. It is set once the last round of every tile is fixed, even while some of their units
   // are leased or not in the image yet. It is final once the job is done
   std::optional<StopReason> stopping;
-  bool frozen = false;  // stopped by time or user: only units leased before and first rounds still count
+  // Stopped by time or user: only units leased before, and the first round of each tile, still count
+  bool frozen = false;
   std::optional<Digest> numeric_class;
   // Time of the first ray, moved later by the periods in which the job's clock was stopped
   std::optional<TimePoint> first_ray;
@@ -208,6 +258,9 @@ struct Job {
   // all connected workers.
   void move_windows(int farm_threads);
   void move_window(TileIndex tile, int farm_threads);
+  // Returns for each tile how many rounds must still be rendered when the job stops: those that were leased
+  // or have accepted results, and the first round in any case.
+  std::vector<RoundIndex> begun() const;
   // Sets the end of each tile to ends[tile] rounds, unless it ends earlier already, and forgets accepted
   // results of later rounds. If this makes any tile end earlier, `stopping` becomes `reason`.
   void cut_off(const std::vector<RoundIndex>& ends, StopReason reason);

@@ -1,8 +1,9 @@
 // The states of jobs and workers, as the farm decides them, and the reasons why jobs stop, each with its name
-// for users.
+// for users. Also the checks that end jobs with a denoised target.
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string_view>
 
 namespace ls::coordinator {
@@ -34,5 +35,14 @@ constexpr std::string_view to_string(WorkerState state) {
   constexpr std::string_view kWords[] = {"connected", "draining", "lost", "sick"};
   return kWords[static_cast<std::size_t>(state)];
 }
+
+// The error of the denoised layers at one level of the stop rule (adaptive_stop.h).
+struct DenoisedCheck {
+  double spp = 0;     // samples per pixel at this level, mean over all pixels; identifies the level
+  double relmse = 0;  // estimated; noise can bring it below 0
+  // The largest relMSE that the 95 % interval allows; nullopt: the interval is not known
+  std::optional<double> at_most;
+  bool operator==(const DenoisedCheck&) const = default;
+};
 
 }  // namespace ls::coordinator

@@ -32,8 +32,8 @@ inline constexpr std::uint32_t kQueuedLeases = 3;
 // Units per thread that a worker holds, even if units take long: one that it renders, and one that waits
 inline constexpr std::uint32_t kUnitsAThread = 2;
 // A speculative unit (the job may end without it) goes only to a worker that holds fewer than kUnitsAThread
-// units per thread, or whose leased work takes less than this many seconds. With 0 a worker would idle
-// between two small units until the next message.
+// units per thread, or whose leased work takes less than this many seconds. Without the second condition a
+// worker with small units would idle until the next message.
 inline constexpr double kSpeculativeSeconds = .05;
 // A worker holds at most this many leases. This matters near the end of a job, when a lease may be a single
 // unit
@@ -78,11 +78,12 @@ inline constexpr std::size_t kBlobsRemembered = 1024;
 inline constexpr std::size_t kMaxAuditsOpen = 64;
 // Time for workers to reconnect before a restored audit is dropped
 inline constexpr Duration kAuditAfterRestart = 60s;
-// At most this many pairs of unit and worker are remembered per job: VoterTable
+// At most this many pairs of unit and worker are kept in a job's VoterTable
 inline constexpr std::size_t kMaxVoters = 65'536;
 
-// Number of rounds that may be leased ahead of those in the image
-inline constexpr RoundIndex kRoundsAhead = 64;  // bounds how many results wait to be folded
+// At most this many rounds are leased ahead of those in the image. This limits how many results wait to be
+// folded (added to the image)
+inline constexpr RoundIndex kRoundsAhead = 64;
 
 // Failures
 

@@ -149,12 +149,12 @@ class UnitQueue {
     else
       forget(code);
   }
-  // Queues a leased unit that came back without a result again.
+  // Queues a unit again that was leased and came back without a result.
   void put_back(UnitCode code) {
     if (plans(code) && round_of(code) < next_[tile_of(code)])
       (wanted(code) ? line_of(tile_of(code)).returned : returned_perhaps_).insert(code);
   }
-  // Removes a unit whose late result arrived from the queue, if it is there.
+  // Removes the unit from those that came back, if it is among them: its result has arrived late.
   void forget(UnitCode code) {
     line_of(tile_of(code)).returned.erase(code);
     returned_perhaps_.erase(code);
@@ -174,7 +174,8 @@ class UnitQueue {
     RoundIndex before = kNoWindow;
     float weight = 0;
   };
-  // Units that are certain to be needed; those in `returned` go before those in `heads`
+  // Units that are certain to be needed: `returned` were leased and came back, and go first; `heads` are the
+  // next ones of their tiles
   struct Line {
     std::priority_queue<UnitCode, std::vector<UnitCode>, std::greater<>> heads;
     std::set<UnitCode> returned;
@@ -248,8 +249,8 @@ class UnitQueue {
     if (returned_count() == 0) return;
     for (RoundIndex k = round; k < next_[tile]; ++k) forget(unit_code(k, tile));
   }
-  // Moves units of the tile that came back between the set of certain units and that of speculative ones,
-  // when the end of the tile's certain rounds changes from `from` to `to`.
+  // Called when the end of the tile's certain rounds changes from `from` to `to`. Moves those of its units
+  // that came back and are concerned between the certain and the speculative ones.
   void sort_returned(TileIndex tile, RoundIndex from, RoundIndex to) {
     if (returned_count() == 0) return;
     auto& surely = line_of(tile).returned;

@@ -46,7 +46,7 @@ void UnitTable::truncate(TileIndex tile, RoundIndex end) {
 }
 
 void UnitTable::reopen(RoundIndex index) {
-  // Drops later rounds that have neither accepted results nor units in the image: they were cut off
+  // Later rounds are empty: the tiles' ends were cut before them
   while (rounds_.size() > index + 1 && rounds_.back().accepted == 0 && rounds_.back().folded == 0)
     rounds_.pop_back();
   if (index >= rounds_.size()) return;

@@ -43,8 +43,8 @@ class UnitTable {
   RoundIndex end_of_accepted(TileIndex tile) const;
   // Forgets the tile's accepted results of rounds from `end` on; none of these may be in the image
   void truncate(TileIndex tile, RoundIndex end);
-  // Forgets round `round` of all tiles, whether accepted or in the image. Requires that no later round has
-  // results
+  // Forgets round `round` of all tiles, whether accepted or in the image, so that it can be rendered again.
+  // Requires that no later round has results
   void reopen(RoundIndex round);
   // Forgets all results of the tile, also those in the image. Returns the units that had an accepted result,
   // ascending.
@@ -52,7 +52,8 @@ class UnitTable {
   // Returns the tiles with an accepted result of this worker, ascending
   std::vector<TileIndex> tiles_of(WorkerIndex worker) const;
   void mark_workers(std::vector<bool>& used) const;  // sets used[worker] for the workers of accepted results
-  void forget_results();  // for a failed job: frees the memory, keeps the numbers of folded rounds
+  // For a job that failed or was cancelled: frees the memory, keeps the numbers of folded rounds
+  void forget_results();
 
   // Folding
 

@@ -4,6 +4,8 @@
 #include <cstring>
 #include <utility>
 
+#include "common/base/parse_number.h"
+
 namespace ls::coordinator {
 
 WorkerIndex WorkerTable::index_of(const WorkerId& id) {
@@ -131,6 +133,45 @@ bool fits(const Job& job, const Worker& worker) {
 
 bool may_serve(const Job& job, const Worker& worker, TimePoint now) {
   return worker.available() && fits(job, worker) && !worker.blocked(job.seq, now);
+}
+
+void LeaseTable::add(LeaseRecord record) {
+  deadlines_.emplace(record.deadline, record.seq);
+  leases_.emplace(record.seq, std::move(record));
+}
+
+std::optional<std::uint64_t> lease_number(const LeaseId& id, std::string_view prefix) {
+  const std::string_view text = id.value;
+  if (!text.starts_with(prefix) || !text.substr(prefix.size()).starts_with('-')) return std::nullopt;
+  return parse_number<std::uint64_t>(text.substr(prefix.size() + 1));
+}
+
+LeaseRecord* LeaseTable::find(LeaseSeq seq) {
+  const auto it = leases_.find(seq);
+  return it == leases_.end() ? nullptr : &it->second;
+}
+
+LeaseRecord* LeaseTable::find(const LeaseId& id) {
+  const auto seq = lease_number(id, prefix_);
+  return seq ? find(*seq) : nullptr;
+}
+
+void LeaseTable::erase(LeaseSeq seq) {
+  const auto it = leases_.find(seq);
+  if (it == leases_.end()) return;
+  deadlines_.erase({it->second.deadline, seq});
+  leases_.erase(it);
+}
+
+void LeaseTable::renew(LeaseRecord& lease, TimePoint deadline) {
+  deadlines_.erase({lease.deadline, lease.seq});
+  lease.deadline = deadline;
+  deadlines_.emplace(deadline, lease.seq);
+}
+
+LeaseRecord* LeaseTable::expired(TimePoint now) {
+  if (deadlines_.empty() || deadlines_.begin()->first > now) return nullptr;
+  return find(deadlines_.begin()->second);
 }
 
 }  // namespace ls::coordinator

@@ -1,17 +1,18 @@
-// All known workers: their connection, leases and failures. A unit is one round (range of samples) of one
-// tile; a lease is a list of units that is assigned to one worker. A numeric class is a set of machines that
-// compute the same bits.
+// All known workers, with their connections and failures, and all leases. A unit is one round (range of
+// samples) of one tile; a lease is a list of units that is assigned to one worker. A numeric class is a set
+// of machines that compute the same bits.
 #pragma once
 
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "coordinator/domain/event.h"
-#include "coordinator/domain/failure_budget.h"
 #include "coordinator/domain/job.h"
 #include "coordinator/domain/limits.h"
 
@@ -177,5 +178,52 @@ bool of_class_asked(const Job& job, const Worker& worker);
 bool fits(const Job& job, const Worker& worker);
 // True if the worker fits the job and may also take units of it now.
 bool may_serve(const Job& job, const Worker& worker, TimePoint now);
+
+struct LeaseRecord {
+  LeaseSeq seq = 0;
+  Job* job = nullptr;
+  Worker* worker = nullptr;
+  // All units of the lease, finished ones included. A unit is still leased if its Holders (job.h) name this
+  // lease
+  std::vector<UnitCode> units;
+  std::uint32_t remaining = 0;  // number of units still leased
+  std::uint32_t reported = 0;   // number of units done, from the worker's progress reports
+  double seconds_per_unit = 0;  // predicted CPU seconds of a unit, mean over all units of the lease
+  // Core seconds per unit charged to the owner's share: seconds_per_unit, or kAssumedUnitSeconds if nothing
+  // is measured
+  double charge_per_unit = 0;
+  // An audit: a lease of one unit that has an accepted result and is rendered again for comparison
+  bool audit = false;
+  TimePoint issued{};
+  // Predicted time from `issued` until its last unit is done, including the wait for the worker's earlier
+  // leases
+  Duration predicted{};
+  TimePoint deadline{};
+};
+
+// All leases, oldest first, with their deadlines.
+class LeaseTable {
+ public:
+  explicit LeaseTable(std::string prefix) : prefix_(std::move(prefix)) {}
+
+  LeaseSeq next_seq() { return ++last_; }
+  void add(LeaseRecord record);
+  LeaseRecord* find(LeaseSeq seq);
+  LeaseRecord* find(const LeaseId& id);
+  void erase(LeaseSeq seq);
+  void renew(LeaseRecord& lease, TimePoint deadline);
+  // Returns the lease with the earliest deadline if this deadline has passed at `now`, else null.
+  LeaseRecord* expired(TimePoint now);
+
+  std::map<LeaseSeq, LeaseRecord>& all() { return leases_; }
+  const std::map<LeaseSeq, LeaseRecord>& all() const { return leases_; }
+  LeaseId id_of(LeaseSeq seq) const { return {prefix_ + "-" + std::to_string(seq)}; }
+
+ private:
+  std::string prefix_;
+  LeaseSeq last_ = 0;
+  std::map<LeaseSeq, LeaseRecord> leases_;
+  std::set<std::pair<TimePoint, LeaseSeq>> deadlines_;
+};
 
 }  // namespace ls::coordinator

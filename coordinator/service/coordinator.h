@@ -17,8 +17,7 @@
 #include "coordinator/domain/farm_figures.h"
 #include "coordinator/store/blobs/blob_store.h"
 #include "coordinator/store/jobs/job_store.h"
-#include "coordinator/views/job_list.h"
-#include "coordinator/views/job_view.h"
+#include "coordinator/views/views.h"
 #include "coordinator/views/worker_session.h"
 
 namespace ls::coordinator {

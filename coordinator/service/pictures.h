@@ -11,8 +11,8 @@
 #include "common/base/guarded.h"
 #include "coordinator/assemble/stored_layers.h"
 #include "coordinator/service/denoising.h"
-#include "coordinator/service/state/job_entry.h"
 #include "coordinator/service/state/job_files.h"
+#include "coordinator/service/state/job_table.h"
 
 namespace ls::coordinator {
 

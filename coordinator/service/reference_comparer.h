@@ -12,7 +12,7 @@
 
 #include "common/base/guarded.h"
 #include "coordinator/base/work_queue.h"
-#include "coordinator/service/state/job_entry.h"
+#include "coordinator/service/state/job_table.h"
 #include "coordinator/store/blobs/blob_store.h"
 
 namespace ls::coordinator {

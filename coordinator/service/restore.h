@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "coordinator/domain/event.h"
-#include "coordinator/service/state/job_entry.h"
 #include "coordinator/service/state/job_files.h"
+#include "coordinator/service/state/job_table.h"
 #include "coordinator/store/blobs/blob_store.h"
 
 namespace ls::coordinator {

@@ -5,7 +5,7 @@
 #include "coordinator/service/denoising.h"
 #include "coordinator/service/state/job_files.h"
 #include "coordinator/store/blobs/collected_blobs.h"
-#include "coordinator/views/job_view.h"
+#include "coordinator/views/views.h"
 
 namespace ls::coordinator {
 

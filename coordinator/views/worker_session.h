@@ -26,8 +26,8 @@ class WorkerSession {
  public:
   virtual ~WorkerSession() = default;
   virtual void receive(FromWorker message) = 0;
-  // Takes a message without blocking. `next` is called when there is room for another message: during this
-  // call, or later on another thread. It is never called if the coordinator closes first.
+  // Takes a message without blocking. When there is room for another message, calls `next`: before receive()
+  // returns, or later on another thread. It is never called if the coordinator closes first.
   virtual void receive(FromWorker message, std::function<void()> next) = 0;
   virtual void disconnected() = 0;
 };

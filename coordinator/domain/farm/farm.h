@@ -81,11 +81,6 @@ struct WorkerFigures {
   JobId job;  // the job of its oldest lease; may be empty
 };
 
-struct TileFigures {
-  RoundIndex rounds_folded = 0;
-  std::uint64_t spp = 0;
-};
-
 class Farm {
  public:
   struct Options {
@@ -107,7 +102,6 @@ class Farm {
   // Queries. For an unknown id they return nullopt, an empty container or Verdict::no. `numeric_class` is the
   // class of the worker that rendered the result.
   Wanted wanted(const UnitKey& unit, const Digest& numeric_class) const;
-  std::vector<JobId> jobs() const;  // in order of submission
   std::optional<JobFigures> job(const JobId& id) const;
   // Returns the job's current plan, for storage: with changed priority and samples, and without a target
   // error or time limit that no longer applies.
@@ -116,18 +110,10 @@ class Farm {
   Result<void> may_retarget(const JobId& id, double target_error) const;
   Result<void> may_extend(const JobId& id, std::uint64_t spp) const;
   std::optional<WorkerFigures> worker(const WorkerId& id) const;
-  std::optional<TileFigures> tile(const JobId& id, TileIndex tile) const;
-  // Returns, for the user, why a job that could run has no worker: workers of another class, workers without
-  // its tags, and blocked or unhealthy ones. Empty if some worker may take it.
+  // Explains to the user why no worker may take units of a job that could run: each connected worker is of
+  // another class, lacks memory or a tag, is blocked or unhealthy, or the like. Empty if some worker may take
+  // them.
   std::string why_waiting(const JobId& id) const;
-  // Returns the core seconds of all users whose jobs have units to lease or leased units, as FairShare counts
-  // them; for tests and metrics.
-  struct Shares {
-    std::string owner;
-    int priority = 0;
-    double seconds = 0;
-  };
-  std::vector<Shares> shares() const;
   AuditFigures audits() const;
   // Returns the job's open audits (units that are rendered again for comparison). The service must store
   // them: otherwise a faulty worker would no longer be suspected after a restart.
@@ -140,16 +126,8 @@ class Farm {
   double cores_connected() const;  // sum over connected workers: threads times core share (CoreShare)
   int workers_connected() const;
 
-  // Returns the sizes of all containers, by name. Tests use them to detect unbounded growth.
-  std::vector<std::pair<std::string, std::size_t>> sizes() const;
-
-  // Checks all invariants and describes the first violation; empty if all hold. Invariants: planned = done +
-  // leased + queued; leases, workers and jobs agree with one another; no worker is idle while a queued unit
-  // exists that it may take. The check is slow; it is meant for tests and for occasional use in service, and
-  // may be called only right after handle().
-  std::string audit() const;
-
  private:
+  friend struct FarmInspector;  // tests/unit/domain/farm_inspector.cpp
   struct State;
   std::unique_ptr<State> state_;
 };

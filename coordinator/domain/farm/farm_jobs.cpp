@@ -1,5 +1,8 @@
-// The life of jobs in the farm, from submission to end.
+// The life of jobs in the farm, from submission to end, and changes that a user makes to them.
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "common/image/frame/tiles_over.h"
@@ -30,7 +33,7 @@ void Farm::State::set_state(Job& job, JobState to) {
 
 void Farm::State::refresh(Job& job) {
   const bool units = job.leasable() && !job.queue.empty(job.units);
-  // FairShare may list the job already, because of an audit that only some workers can render
+  // Set even if FairShare lists the job already: it may do so for an audit that only some workers can render
   work_appeared |= units && !job.has_units;
   job.has_units = units;
   if (units || (job.leasable() && job.audit_waits()))
@@ -76,7 +79,7 @@ void Farm::State::on(const JobRestored& event) {
   }
   restore_audits(job, event);
   if (job.adaptive) judge(job);
-  for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
+  issue_folds(job);
   finish_if_complete(job);
   refresh(job);
 }
@@ -116,7 +119,7 @@ void Farm::State::on(const JobResumed& event) {
   Job* job = find(event.job);
   if (job == nullptr || job->state != JobState::paused) return;
   set_state(*job, job->numeric_class ? JobState::running : JobState::queued);
-  // if a failed check of the denoised error paused the job, the check is made again
+  // A failed check of the denoised layers' error may have paused the job: this repeats the check
   job->checking_spp = 0;
   if (job->adaptive) judge(*job);
   refresh(*job);
@@ -162,13 +165,10 @@ void Farm::State::on(const JobForgotten& event) {
 
 void Farm::State::freeze(Job& job, StopReason reason) {
   job.frozen = true;
-  work_appeared = true;  // units that came back after the time limit may be leased again
-  std::vector<RoundIndex> begun(job.units.tiles());
-  for (TileIndex t = 0; t < begun.size(); ++t)
-    begun[t] = std::max({job.queue.next(t), job.units.end_of_accepted(t), RoundIndex{1}});
-  job.cut_off(begun, reason);
-  // This also adds accepted results that the stop rule of a target error has kept out of the image
-  for (TileIndex t = 0; t < begun.size(); ++t) issue_folds(job, t);
+  work_appeared = true;  // the time limit no longer forbids leasing units that came back
+  job.cut_off(job.begun(), reason);
+  // The stop rule of a target error no longer holds back accepted results: they are added to the image, too
+  issue_folds(job);
   finish_if_complete(job);
   refresh(job);
 }
@@ -187,7 +187,7 @@ void Farm::State::finish_if_complete(Job& job) {
 void Farm::State::fail(Job& job, std::string error) {
   set_state(job, JobState::failed);
   effects.emplace_back(JobFailed{job.plan.brief.job, std::move(error)});
-  // The failure of a job is not attributed to its workers: their failures in it are erased.
+  // The failed job is to blame, not its workers: their failures in it are erased.
   for (const auto& [index, worker] : workers.all()) worker->failures.erase(job.seq);
   end(job);
 }
@@ -207,6 +207,123 @@ void Farm::State::end(Job& job) {
   job.audits.clear();
   job.voters.clear();
   job.units.forget_results();
+  refresh(job);
+}
+
+Result<void> Farm::State::may_retarget(const Job& job, double target_error) {
+  const auto refuse = [](std::string why) { return ls::fail(Errc::failed_precondition, std::move(why)); };
+  const std::string& id = job.plan.brief.job.value;
+  if (!(target_error > 0 && std::isfinite(target_error)))
+    return ls::fail(Errc::invalid_argument, "target_error must be positive");
+  if (is_closed(job.state))
+    return refuse(fmt::format("job {} is {}: its target error can no longer be changed; submit it again", id,
+                              to_string(job.state)));
+  if (!job.plan.target_error)
+    return refuse(
+        fmt::format("job {} has no target error, so its tiles' errors are not kept: it can't be "
+                    "given one; extend its samples (spp), or submit it again",
+                    id));
+  constexpr std::string_view kCauses[] = {"has reached its number of samples", "has reached its target error",
+                                          "has reached its time limit", "was stopped by a user"};
+  if (job.stopping && job.stopping != StopReason::error)
+    return refuse(
+        fmt::format("job {} {}: its target error can no longer be changed; extend its samples (spp), or "
+                    "submit it again",
+                    id, kCauses[static_cast<std::size_t>(*job.stopping)]));
+  if (job.stopping && target_error >= *job.plan.target_error)
+    return refuse(
+        fmt::format("job {} has come down to its target error of {:g}: only a smaller one makes a "
+                    "difference",
+                    id, *job.plan.target_error));
+  return {};
+}
+
+Result<void> Farm::State::may_extend(const Job& job, std::uint64_t spp) {
+  const std::string& id = job.plan.brief.job.value;
+  if (is_closed(job.state))
+    return ls::fail(Errc::failed_precondition,
+                    fmt::format("job {} is {}: it cannot be extended", id, to_string(job.state)));
+  // now_spp is the job's current total of samples per pixel. It is the requested number, unless a target
+  // error, a time limit or the user ends the job early; then it is the number of the tile with the most
+  // rounds.
+  const RoundIndex rounds = job.queue.longest();
+  const bool cut_short = job.stopping && *job.stopping != StopReason::spp;
+  const std::uint64_t now_spp = !cut_short ? job.spp : rounds == 0 ? 0 : cut_range(rounds - 1, job.spp).s1;
+  const bool uneven = cut_short && job.adaptive;
+  if (even_spp(spp) < now_spp || (even_spp(spp) == now_spp && !uneven))
+    return ls::fail(Errc::invalid_argument,
+                    fmt::format("job {} has {} samples per pixel already{}; ask for a larger total", id,
+                                now_spp, uneven ? " in parts of the image" : ""));
+  if (job.adaptive_running() && job.adaptive->bound())
+    return ls::fail(Errc::failed_precondition,
+                    fmt::format("parts of job {} have all of its {} samples, and its target error was judged "
+                                "with them: extend it when it is done",
+                                id, job.spp));
+  JobPlan plan = job.plan;
+  plan.spp = even_spp(spp);
+  return check_plan(plan);
+}
+
+void Farm::State::on(const JobRetargeted& event) {
+  Job* job = find(event.job);
+  if (job == nullptr || !may_retarget(*job, event.target_error)) return;
+  job->plan.target_error = event.target_error;
+  job->level_seen = 0;
+  job->predicted_at = 0;
+  job->predicted_error = 0;
+  if (job->stopping) {
+    job->stopping.reset();
+    job->plan_all();
+    if (job->state == JobState::done) set_state(*job, JobState::running);
+  }
+  take_up_again(*job);
+}
+
+void Farm::State::on(const JobExtended& event) {
+  Job* job = find(event.job);
+  if (job == nullptr || !may_extend(*job, event.spp)) return;
+  const RoundIndex last = round_count(job->spp) - 1;
+  const std::uint64_t new_spp = even_spp(event.spp);
+  if (cut_range(last, job->spp) != cut_range(last, new_spp)) reopen(*job, last);
+  const auto limit = job->time_limit(now);
+  const bool by_time = job->stopping == StopReason::time && (job->frozen || job->ended());
+  if (by_time || (limit && now >= *limit)) job->plan.time.reset();
+  if (job->stopping) job->plan.target_error.reset();
+  job->plan.spp = new_spp;
+  job->spp = new_spp;
+  job->stopping.reset();
+  job->frozen = false;
+  if (job->plan.target_error) job->adaptive->extend(new_spp);
+  job->steer();
+  job->plan_all();
+  if (job->state == JobState::done) set_state(*job, JobState::running);
+  take_up_again(*job);
+}
+
+void Farm::State::reopen(Job& job, RoundIndex last) {
+  for (const LeaseSeq seq : leases_of(job)) {
+    const LeaseRecord& lease = *leases.find(seq);
+    const bool concerned = std::any_of(lease.units.begin(), lease.units.end(),
+                                       [&](UnitCode unit) { return round_of(unit) >= last; });
+    if (concerned) free_lease(seq, FreedCause::round_reopened, true);
+  }
+  close_audits(job, [&](UnitCode code, const Audit&) { return round_of(code) >= last; });
+  for (TileIndex t = 0; t < job.units.tiles(); ++t) job.queue.rewind(t, last);
+  job.units.reopen(last);
+  effects.emplace_back(ReopenRound{job.plan.brief.job, last});
+}
+
+void Farm::State::take_up_again(Job& job) {
+  work_appeared = true;
+  // While the job had ended, its image was final, so results of quarantined workers were kept. Now they are
+  // void.
+  for (const auto& [worker, why] : quarantined)
+    if (const WorkerIndex faulty = workers.index_of(worker); !job.units.tiles_of(faulty).empty())
+      void_results(job, faulty);
+  if (job.adaptive) judge(job);
+  job.move_windows(workers.threads());
+  issue_folds(job);
+  finish_if_complete(job);
   refresh(job);
 }
 

@@ -91,12 +91,6 @@ Result<void> Farm::may_extend(const JobId& id, std::uint64_t spp) const {
   return State::may_extend(*job, spp);
 }
 
-std::vector<JobId> Farm::jobs() const {
-  std::vector<JobId> ids;
-  for (const auto& [seq, job] : state_->jobs) ids.push_back(job->plan.brief.job);
-  return ids;
-}
-
 std::optional<JobPlan> Farm::plan(const JobId& id) const {
   const Job* job = state_->find(id);
   return job == nullptr ? std::nullopt : std::optional(job->plan);
@@ -116,12 +110,12 @@ std::optional<JobFigures> Farm::job(const JobId& id) const {
   f.units_folded = job->units.folded_count();
   f.rounds_complete = job->units.rounds_complete();
   const double per_sample = job->cost.per_sample();  // 0: nothing has been measured yet
-  // samples_of_last(n) estimates the number of pixel samples in n units that are not done. It takes them to
-  // be the last n units in the order of rounds, and all tiles to have the same size.
+  // samples_of_last(n) estimates the number of pixel samples in n units that are not done, as if all tiles
+  // had the same size and only the last units in the order of rounds were missing.
   const RoundIndex rounds = job->queue.longest();
   const double pixels = static_cast<double>(job->plan.grid.frame.width) * job->plan.grid.frame.height;
   const double left = static_cast<double>(job->units.tiles());
-  const auto samples_of_last = [&](std::uint64_t undone) {  // the missing units belong to the last rounds
+  const auto samples_of_last = [&](std::uint64_t undone) {
     double samples = 0;
     for (RoundIndex r = rounds; undone > 0 && r-- > 0;) {
       const std::uint64_t units = std::min<std::uint64_t>(undone, job->units.tiles());
@@ -160,13 +154,6 @@ std::optional<WorkerFigures> Farm::worker(const WorkerId& id) const {
                   worker->units_out, worker->units_done, {}};
   if (!worker->leases.empty()) f.job = state_->leases.find(*worker->leases.begin())->job->plan.brief.job;
   return f;
-}
-
-std::optional<TileFigures> Farm::tile(const JobId& id, TileIndex tile) const {
-  const Job* job = state_->find(id);
-  if (job == nullptr || tile >= job->units.tiles()) return std::nullopt;
-  const RoundIndex rounds = job->units.folded(tile);
-  return TileFigures{rounds, rounds == 0 ? 0 : cut_range(rounds - 1, job->spp).s1};
 }
 
 std::string Farm::why_waiting(const JobId& id) const {
@@ -209,13 +196,6 @@ std::string Farm::why_waiting(const JobId& id) const {
   if (connected == 0) return "no worker is connected";
   if (named > kMaxNamedWorkers) reasons += fmt::format("; and {} more", named - kMaxNamedWorkers);
   return reasons;
-}
-
-std::vector<Farm::Shares> Farm::shares() const {
-  std::vector<Shares> all;
-  for (const auto& f : state_->shares.figures())
-    all.push_back({f.owner, static_cast<int>(f.priority), f.seconds});
-  return all;
 }
 
 AuditFigures Farm::audits() const { return state_->audited; }

@@ -1,5 +1,5 @@
 // The state of the farm, and its reaction to each event. The functions are grouped by subject into the files
-// farm_jobs, farm_changes, farm_workers, farm_units, farm_leases, schedule, farm_stop and farm_trust. A unit
+// farm_jobs, farm_workers, farm_units, farm_leases, schedule, farm_stop and farm_trust. A unit
 // is one round (range of samples) of one tile; a lease is a list of units that is assigned to one worker.
 #pragma once
 
@@ -13,7 +13,7 @@
 
 #include "coordinator/domain/fair_share.h"
 #include "coordinator/domain/farm/farm.h"
-#include "coordinator/domain/lease_table.h"
+#include "coordinator/domain/worker_table.h"
 
 namespace ls::coordinator {
 
@@ -45,11 +45,12 @@ struct Farm::State {
   // True if units may have appeared that some worker can take: dispatch() then considers all workers that
   // want work, not only those in `dirty`
   bool work_appeared = false;
-  // a job was pinned to a class, and workers of this class that may not begin jobs can now take its units
+  // True if a job was just pinned to a numeric class and some workers of this class may not begin jobs: they
+  // can take its units from now on, so dispatch() considers all workers again
   bool pinned_for_others = false;
   std::set<WorkerIndex> dirty;  // workers whose state has changed, so that they may want more work
 
-  // farm_jobs.cpp, farm_changes.cpp
+  // farm_jobs.cpp
   void on(const JobSubmitted& event);
   void on(const JobRestored& event);
   void on(const JobCancelled& event);
@@ -101,6 +102,9 @@ struct Farm::State {
   void on(const UnitFailed& event);
   void charge(Job& job, double cpu_seconds);  // adds these seconds to the share of the job's owner
   void issue_folds(Job& job, TileIndex tile);
+  void issue_folds(Job& job) {
+    for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
+  }
   void checkpoint(Job& job, RoundIndex round);
 
   // farm_trust.cpp: audits and faulty workers
@@ -118,16 +122,16 @@ struct Farm::State {
   void disagreed(Job& job, UnitCode code, const UnitAccepted& with, bool asked);
   void claimed(Job& job, UnitCode code, const UnitAccepted& by);
   void undecided(Job& job, UnitCode code);
-  // Which workers could render the unit of an audit. `none`: no worker; `away`: only connected workers that
-  // get no work now; `there`: at least one that may begin.
+  // Whether any worker can render the unit for the audit. `none`: no connected worker; `away`: only workers
+  // that get no work at the moment; `there`: at least one that can render it now.
   enum class Deciders { none, away, there };
   Deciders deciders(const Job& job, const Audit& audit) const;
   void settle_audits(Job& job);  // decides or drops the open audits that no worker can render
   void audit_failed(Job& job, UnitCode code, Worker& worker, LeaseRecord& lease);
   void close_audits(Job& job, const std::function<bool(UnitCode, const Audit&)>& which);
   void found_faulty(const UnitKey& unit, WorkerIndex faulty, std::string evidence);
-  void bar(const WorkerId& id, const std::string& why);  // requires that the worker is in `quarantined`
-                                                         // already
+  // Takes the worker's leases back and voids its results; the caller has added it to `quarantined`
+  void bar(const WorkerId& id, const std::string& why);
   void void_results(Job& job, WorkerIndex faulty);
   void void_tile(Job& job, TileIndex tile);
   static void steer_anew(Job& job);
@@ -138,8 +142,10 @@ struct Farm::State {
   // Passes the tile's error after this round, which was just added to the image, to the stop rule, and
   // applies the rule's decision on how many rounds the tiles get.
   void steer(Job& job, TileIndex tile, RoundIndex round);
-  void judge(Job& job);  // judges the image at every level that all groups have reached
-  // judges the image at the level that all groups have reached
+  // Judges the image at the present level of the stop rule once all groups have reached it. While it misses
+  // the target, goes to the next level and judges again; if it meets the target, ends the job.
+  void judge(Job& job);
+  // Judges the image once, at the present level; requires that all groups have reached it
   AdaptiveStop::Verdict verdict_on(Job& job);
   AdaptiveStop::Verdict denoised_verdict(Job& job);
   void mark_level(Job& job, bool last);
@@ -156,8 +162,8 @@ struct Farm::State {
   void grant(Job& job, Worker& worker, std::vector<UnitCode> units, bool audit = false);
   void load(Job& job, const Worker& worker, std::uint32_t units);
   void unload(Job& job, std::uint32_t units);
-  void leave_load(Job& job, const Worker& worker);  // subtracts one of the job's leases from the worker's
-                                                    // count
+  // Counts one lease less that the worker holds of this job, its owner and its group
+  void leave_load(Job& job, const Worker& worker);
   // Returns how many more of the job's units may be leased to the worker under the limits on workers and
   // units. Audits (second renderings, for comparison) are exempt: the farm orders them, not the user, and an
   // audit that waited for the user's other work would delay the end of a finished job.

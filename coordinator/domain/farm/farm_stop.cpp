@@ -37,7 +37,7 @@ void Farm::State::judge(Job& job) {
   }
   if (!lower) return;
   job.move_windows(workers.threads());
-  for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
+  issue_folds(job);
 }
 
 AdaptiveStop::Verdict Farm::State::verdict_on(Job& job) {
@@ -59,8 +59,7 @@ AdaptiveStop::Verdict Farm::State::denoised_verdict(Job& job) {
     }
     return Verdict::no;
   }
-  // The film can be denoised for the check only while it is exactly the image of the stop rule's present
-  // level.
+  // The check denoises the film, so the film must be exactly the image of the stop rule's present level.
   const std::vector<RoundIndex> ends = rule.ends();
   bool missing = false;
   for (TileIndex t = 0; t < job.units.tiles(); ++t) {
@@ -108,7 +107,7 @@ void Farm::State::stop_at_level(Job& job) {
   for (TileIndex t = 0; t < job.units.tiles(); ++t) ends[t] = std::max(ends[t], job.units.issued(t));
   job.cut_off(ends, StopReason::error);
   give_back_beyond(job);
-  for (TileIndex t = 0; t < job.units.tiles(); ++t) issue_folds(job, t);
+  issue_folds(job);
 }
 
 // Decides which units are still rendered before the time limit. Queued units are considered in the order of
@@ -128,13 +127,9 @@ void Farm::State::plan_end(Job& job, TimePoint limit) {
     cores += worker->available() && fits(job, *worker) ? worker->cores() : 0;
   double room = seconds(limit - now) * cores;
   for (const auto& [code, holders] : job.out) room -= job.predict(code);
-  std::vector<RoundIndex> ends(job.units.tiles());
-  RoundIndex round = job.queue.longest();
-  for (TileIndex t = 0; t < ends.size(); ++t) {
-    ends[t] = std::max({job.queue.next(t), job.units.end_of_accepted(t), RoundIndex{1}});
-    round = std::min(round, ends[t]);
-  }
-  for (const RoundIndex last = job.queue.longest(); round < last && room > 0; ++round) {
+  std::vector<RoundIndex> ends = job.begun();
+  const RoundIndex last = job.queue.longest();
+  for (RoundIndex round = std::ranges::min(ends); round < last && room > 0; ++round) {
     for (TileIndex t = 0; t < ends.size() && room > 0; ++t) {
       if (ends[t] != round || round >= job.queue.end(t)) continue;
       const double cost = job.predict(unit_code(round, t));

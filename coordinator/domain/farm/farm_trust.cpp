@@ -273,7 +273,7 @@ void Farm::State::bar(const WorkerId& id, const std::string& why) {
 
 void Farm::State::void_results(Job& job, WorkerIndex faulty) {
   std::vector<TileIndex> tiles = job.units.tiles_of(faulty);
-  // In an adaptive job the error of one tile affects how many rounds all other tiles get.
+  // The errors of these tiles have influenced how many rounds all other tiles get.
   const bool by_error = job.adaptive && (!job.stopping || *job.stopping == StopReason::error);
   if (!tiles.empty() && by_error) {
     tiles.resize(job.units.tiles());

@@ -67,7 +67,7 @@ void Farm::State::lose(Worker& worker, FreedCause why) {
   while (!worker.leases.empty()) free_lease(*worker.leases.begin(), why, false);
   workers.settle(worker);
   effects.emplace_back(WorkerStateChanged{worker.id, worker.state(), std::string(to_string(why))});
-  work_appeared = true;  // units that were reserved for this worker are free again
+  work_appeared = true;  // others may now take units that were left to this worker
 }
 
 void Farm::State::on(const WorkerDrains& event) {
@@ -118,7 +118,7 @@ void Farm::State::on(const LeaseCameBack& event) {
   std::set<UnitCode> back;
   for (const UnitKey& unit : event.returned.unrendered) back.insert(unit_code(unit.round, unit.tile));
   workers.settle(*worker);
-  work_appeared = true;  // units that were reserved for this worker may go to others
+  work_appeared = true;  // others may now take units that were left to this worker
   free_units(*lease, FreedCause::returned, false, [&](UnitCode code) { return back.contains(code); });
 }
 

@@ -24,10 +24,10 @@ double seconds_left(const Job& job, const Worker& worker, TimePoint now) {
   return std::max(0.0, seconds(*limit - now) - worker.seconds_until_free());
 }
 
-// Guided self-scheduling: a worker gets half of its threads' share in an even split of the waiting units over
-// all threads of the farm (`farm_threads`). So all threads end at about the same time. A lease also ends with
-// the unit at which its predicted cost reaches `seconds`, a limit that shrinks shortly before the job's time
-// limit.
+// Guided self-scheduling: if the waiting units were divided among all threads of the farm (`farm_threads`), a
+// lease would hold half of what the worker's threads get. So leases shrink, and all threads end at about the
+// same time. A lease also ends with the unit at which its predicted cost reaches `seconds`, a limit that
+// shrinks shortly before the job's time limit.
 LeaseSize lease_size(const Job& job, const Worker& worker, int farm_threads, TimePoint now) {
   const std::uint64_t threads = static_cast<std::uint64_t>(worker.threads);
   const std::uint64_t halves = 2 * static_cast<std::uint64_t>(std::max(farm_threads, 1));
@@ -168,9 +168,9 @@ bool Farm::State::may_pin(const Job& job, const Worker& worker) const {
 }
 
 // Returns the job whose units this worker gets next; null: none. This is the first job in turn, or a later
-// one whose world (loaded scene) the worker has, since loading costs time. But a later job must not be far
-// ahead of its fair share, and the first job is not passed over while no worker renders it. Null also if the
-// worker will get units of the first job only later: leases of another job would delay these.
+// one whose world (loaded scene) or scene file the worker has, since loading costs time. But the later job
+// must not be far ahead of its fair share, and some worker must be rendering the first job. Null also if the
+// worker will get units of the first job soon: leases of another job would delay these.
 Job* Farm::State::choose(const Worker& worker) {
   Job* fair = nullptr;
   Job* chosen = nullptr;

@@ -22,7 +22,7 @@
 #include "coordinator/http/auth/token_registry.h"
 #include "coordinator/http/message/limits.h"
 #include "coordinator/http/message/message.h"
-#include "coordinator/views/job_view.h"
+#include "coordinator/views/views.h"
 
 namespace ls::http {
 

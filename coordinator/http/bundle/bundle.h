@@ -13,7 +13,7 @@
 #include "common/base/error.h"
 #include "coordinator/http/bundle/archive.h"
 #include "coordinator/store/blobs/blob_store.h"
-#include "coordinator/views/job_view.h"
+#include "coordinator/views/views.h"
 
 namespace ls::http {
 

@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-#include "coordinator/views/job_view.h"
+#include "coordinator/views/views.h"
 
 namespace ls::http {
 

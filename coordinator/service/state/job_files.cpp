@@ -88,7 +88,8 @@ std::string JobFiles::thumbnail_name(const StoredJob& job) const {
 }
 
 bool JobFiles::image_is_lost(const StoredJob& job) const {
-  std::error_code unknown;  // an error means that the folder cannot be read: the image does not count as lost
+  // With an error the folder cannot be read: the image does not count as lost
+  std::error_code unknown;
   return on_disk() && !job.damaged && job.state == JobState::done &&
          !fs::exists(folder(job.id) / "image.exr", unknown) && !unknown;
 }

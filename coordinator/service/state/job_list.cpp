@@ -6,7 +6,8 @@
 namespace ls::coordinator {
 namespace {
 
-// The facts of a job that need no view.
+// One job of the list, with the values that the list is filtered and sorted by. A view (JobView) takes time
+// to make, so it is made only where needed.
 struct Row {
   JobId id;
   const JobEntry* entry = nullptr;
@@ -42,7 +43,7 @@ bool asked_for(const Row& row, const JobsAsked& asked, const std::string& search
           lower(row.id.value).find(search) != std::string::npos);
 }
 
-// The error to sort by. Jobs without an error go last.
+// Returns the error to sort by. A job without an error counts as infinite.
 double error_of(const Row& row) {
   return row.view->error_now ? row.view->error_now->relmse : std::numeric_limits<double>::infinity();
 }

@@ -5,9 +5,59 @@
 #include <algorithm>
 #include <random>
 
+#include "coordinator/admission/admission.h"
 #include "coordinator/base/limits.h"
 
 namespace ls::coordinator {
+
+JobEntry::JobEntry(StoredJob job, TimePoint now)
+    : stored(std::move(job)),
+      settings_digest(digest_of(stored.settings)),
+      grid{stored.settings.size, stored.settings.tile},
+      last_snapshot(now),
+      fold_seconds(stored.totals.render_seconds) {}
+
+void JobEntry::begin_image() {
+  assembly.emplace(grid, stored.spec.target_error.has_value(), aovs_of(stored.settings));
+}
+
+void JobEntry::begin_comparison() {
+  if (stored.spec.reference) reference_tiles.emplace(assembly->film());
+}
+
+void JobEntry::free_image() {
+  unloaded = true;
+  assembly.reset();
+  reference_tiles.reset();
+  log.reset();
+}
+
+double JobEntry::elapsed(TimePoint now) const {
+  return clock_zero ? std::max(0.0, seconds(still_since.value_or(now) - *clock_zero)) : fold_seconds;
+}
+
+FrameRange Sequence::range() const {
+  const StoredJob &first = frames.front()->stored, &last = frames.back()->stored;
+  if (first.spec.frames) return *first.spec.frames;
+  if (last.spec.frames) return *last.spec.frames;
+  return {frame_of(first.id)->frame, frame_of(last.id)->frame, 1};  // used if both records are damaged
+}
+
+ReportFacts facts_of(const JobEntry& entry, TimePoint now) {
+  ReportFacts facts;
+  facts.job = entry.stored;
+  if (facts.job.state == JobState::cancelled) facts.job.stopped = StopReason::user;
+  facts.convergence = entry.points;
+  facts.replay = replay_of(entry.stored);
+  facts.reference_noise = entry.reference_noise;
+  if (!entry.assembly) return facts;
+  const Film& film = entry.assembly->film();
+  facts.job.totals.health = entry.assembly->health().total();
+  if (entry.clock_zero) facts.job.totals.render_seconds = entry.elapsed(now);
+  put_film(facts, film);
+  return facts;
+}
+
 namespace {
 
 // Returns a random job id of 32 bits; if `wide`, of 64 bits. 64 bits avoid collisions in a store where other
@@ -59,8 +109,8 @@ Result<std::vector<EntryPtr>> JobTable::job_or_frames(const JobId& id) const {
 
 Result<std::string> JobTable::owner(const JobId& id) const {
   if (const auto entry = find(id)) return entry->stored.owner;
-  // The id may name a missing frame of an existing sequence. The owner is then that of the sequence, who gets
-  // an error that lists the frames.
+  // The id may name a frame that an existing sequence lacks. Its owner is the sequence's, so that this user
+  // gets an error that lists the frames.
   const auto frame = frame_of(id);
   const auto sequence = sequences_.find(frame ? frame->sequence : id);
   if (sequence != sequences_.end()) return sequence->second.frames.front()->stored.owner;

@@ -76,8 +76,8 @@ JobTrace::JobTrace(const Tracing& tracing, const StoredJob& job, trace::SpanCont
       start_ns_(to_ns(std::max(job.submitted_unix, job.totals.ended_unix))),
       ended_(is_terminal(job.state)) {}
 
-// Converts a time for this job's spans to nanoseconds since 1970. The job's own start may come from another
-// clock; a time before this start is replaced by the start.
+// Converts a time to nanoseconds since 1970. The job's start may come from another clock, so a time before it
+// is replaced by the start.
 std::int64_t JobTrace::ns(TimePoint at) const { return std::max(tracing_.tracer->unix_ns(at), start_ns_); }
 
 void JobTrace::event(std::string name, TimePoint at) {
@@ -139,7 +139,7 @@ void JobTrace::result(const UnitResult& r, const WorkerId& worker, TimePoint che
     OpenLease former{.worker = worker.value, .start_ns = held_ns > 0 ? held_ns : ns(checked)};
     open = leases_.emplace(r.lease, std::move(former)).first;
   }
-  // A lying worker can name another worker's lease. The result is then not counted for that lease.
+  // If a lying worker names another worker's lease, the result is not counted for that lease.
   const bool foreign = open != leases_.end() && open->second.worker != worker.value;
   if (open != leases_.end() && !foreign) {
     // A worker may have begun the unit under an earlier lease, which ended when its connection broke.
@@ -158,7 +158,7 @@ void JobTrace::result(const UnitResult& r, const WorkerId& worker, TimePoint che
   child("check partial", parent, ns(checked), stored_ns, attributes(), failed);
   child("store partial", parent, stored_ns, now_ns, attributes(), failed);
   if (failed) return;
-  // Other leases lose the unit, too: it needs no second result.
+  // The unit is done: it is taken out of all leases that hold it.
   const auto [first, last] = holders_.equal_range(unit);
   std::vector<LeaseId> held;
   for (auto it = first; it != last; ++it) held.push_back(it->second);

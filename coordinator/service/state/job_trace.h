@@ -45,8 +45,8 @@ class JobTrace {
   trace::SpanContext lease_begins(const Lease& lease, const WorkerId& worker, const std::string& worker_name,
                                   TimePoint now);
   // Records how a result was handled: its check began at `checked` and took `check_seconds`; then it was
-  // stored, until `now`. If it `failed`, it was not stored, and its unit stays part of every lease that holds
-  // it until units_freed().
+  // stored, until `now`. `failed`: it was not stored, and its unit stays in every lease that holds it until
+  // units_freed().
   void result(const UnitResult& result, const WorkerId& worker, TimePoint checked, double check_seconds,
               TimePoint now, bool failed);
   void units_freed(const UnitsFreed& freed, TimePoint now);
@@ -66,7 +66,7 @@ class JobTrace {
     std::size_t left = 0;     // units without a result
     std::int64_t units = 0, results = 0, samples = 0;
     double core_seconds = 0;
-    std::string lost;  // why units left the lease without a result; empty: none did
+    std::string lost;  // why units left the lease without a result; empty if none did
   };
   JobTrace(const Tracing& tracing, const StoredJob& job, trace::SpanContext context,
            std::optional<trace::SpanId> parent);

@@ -1,14 +1,76 @@
-// Makes the views of jobs, sequences and workers that clients see (views/job_view.h).
+// Makes the views of jobs, sequences (jobs with frames) and workers that clients see (views/views.h), with
+// predictions of when jobs will be done. A unit is one round (range of samples) of one tile; a worker renders
+// it on one thread.
 #pragma once
 
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/image/error/convergence.h"
 #include "coordinator/domain/farm/farm.h"
-#include "coordinator/service/state/eta.h"
-#include "coordinator/service/state/job_entry.h"
 #include "coordinator/service/state/job_table.h"
 #include "coordinator/service/state/worker_entry.h"
-#include "coordinator/views/job_list.h"
+#include "coordinator/views/views.h"
 
 namespace ls::coordinator {
+
+// What is known of a job when its end is predicted
+struct EtaInputs {
+  double done = 0;          // fraction of the requested samples, 0 to 1
+  double core_seconds = 0;  // core seconds spent so far, counted as in the convergence points
+  // Predicted core seconds until the job ends. For an adaptive job (one with a target error) this is the
+  // scheduler's own prediction; 0: unknown
+  double core_left = 0;
+  double core_to_limit = 0;  // the same until the sample limit; 0: unknown
+  // The target error (relMSE) and the time budget (seconds since the first ray); nullopt: the job has none
+  std::optional<double> target, time;
+  double elapsed = 0;  // seconds since the first ray
+  // CPU seconds per wall-clock second that the job's workers give it, or would give it if it were running
+  double cores = 0;
+  // `cores` if kMoreWorkers more workers joined; no more than `cores` if they would not help
+  double cores_with_more = 0;
+  double unit_seconds = 0;   // mean core seconds of a remaining unit; 0: unknown
+  double units_at_once = 0;  // units that can be rendered at the same time; 0: no limit
+};
+
+struct Eta {
+  double progress = 0;
+  std::optional<double> seconds;                  // seconds from now until the job is done; nullopt: unknown
+  std::optional<std::pair<double, double>> ci95;  // 95 % interval of `seconds`, if the target ends the job
+  std::optional<double> with_more;                // `seconds` with more workers, if that is less
+  std::optional<std::pair<double, double>> with_more_ci95;
+};
+
+// Predicts the end by samples, target error or time, whichever comes first. The core seconds until the target
+// are forecast from `points` (convergence.h), minus those spent since the last point. Before the first
+// checkpoint of an adaptive job, the scheduler's own prediction is used, without an interval. A unit runs on
+// one thread: few units keep few threads busy, and at the end of a job with a target threads wait for the
+// last units. An interval is cut at the sample limit.
+Eta eta_of(const EtaInputs& facts, std::span<const ErrorPoint> points);
+
+// Returns the state of the sequence. While frames are open (have not ended), it is paused if all of them are
+// paused, else queued if no frame has begun, else running. Then it is failed if any frame failed, else
+// cancelled if any was cancelled, else done.
+JobState sequence_state(std::span<const JobView> frames);
+
+struct SequenceFacts {
+  JobId id;
+  FrameRange range;
+  std::vector<std::string> warnings;  // of all frames, without duplicates
+  double elapsed_seconds = 0;
+  double cores = 0;  // cores of the connected workers
+  int workers = 0;   // number of connected workers
+};
+// Requires at least one frame; frames are ascending. The error is the mean over the pixels of the frames that
+// have one, and its interval treats these estimates as independent. The cost of the remaining frames is
+// extrapolated from the work so far. The remaining time assumes as many cores as the sequence's limits allow
+// and its units (rounds of tiles) can keep busy.
+JobView sequence_view(const SequenceFacts& facts, std::span<const JobView> frames);
+
+FrameView frame_view(const JobView& frame);
 
 class JobViews {
  public:

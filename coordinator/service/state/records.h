@@ -39,8 +39,8 @@ class Records {
 
   void log(const JobId& id, std::string text);
   void add_point(const EntryPtr& entry, const ConvergencePoint& point);
-  // Drops the points of the job's convergence curve, because its image was lost or had wrong pixels.
-  // Checkpoints are taken again as the tiles' results are added to the image again.
+  // Drops the points of the job's convergence curve, because its image was lost or had wrong pixels. New
+  // points come as the tiles' results are added to the image again.
   void forget_curve(JobEntry& entry);
   // Drops the points of the curve and the checks of the denoised layers' error, because the image had wrong
   // pixels.

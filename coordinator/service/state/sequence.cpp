@@ -1,4 +1,4 @@
-#include "coordinator/service/state/sequence.h"
+#include "coordinator/service/state/job_views.h"
 
 #include <fmt/format.h>
 
@@ -10,8 +10,8 @@ namespace {
 
 double pixels_of(const JobView& frame) { return static_cast<double>(frame.size.width) * frame.size.height; }
 
-// Returns the mean error over the pixels of all frames that have an estimate. Frames have different seeds, so
-// their estimates are independent: the half-widths of the intervals add in quadrature.
+// Returns the mean error over the pixels of all frames that have an estimate. The estimates are independent,
+// since frames have different seeds: the half-widths of their intervals add in quadrature.
 std::optional<ErrorFigures> error_of(std::span<const JobView> frames) {
   double pixels = 0;
   for (const JobView& f : frames)

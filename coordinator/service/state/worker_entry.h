@@ -9,19 +9,35 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "common/base/clock.h"
+#include "coordinator/domain/event.h"
 #include "coordinator/views/worker_session.h"
 
 namespace ls::coordinator {
 
 struct Connection {
   Connection(WorkerId id, std::uint64_t number, const WorkerHello& hello, std::shared_ptr<WorkerSink> to,
-             std::string prefix);
-  void close();
-  void note_lease(const LeaseId& lease);  // notes that a lease was assigned over this stream
-  // True if the lease was assigned over this stream, not over an earlier one of the worker
-  bool assigned(const LeaseId& lease) const;
+             std::string prefix)
+      : worker(std::move(id)),
+        epoch(number),
+        numeric_class(hello.numeric_class),
+        fake(hello.fake),
+        sink(std::move(to)),
+        lease_prefix_(std::move(prefix)) {}
+  void close() {
+    if (std::exchange(open, false)) sink->close();
+  }
+  // Notes that a lease was assigned over this stream.
+  void note_lease(const LeaseId& lease) {
+    if (!first_lease_) first_lease_ = lease_number(lease, lease_prefix_);
+  }
+  // True if the lease was assigned over this stream, not over an earlier one of the worker.
+  bool assigned(const LeaseId& lease) const {
+    const auto n = lease_number(lease, lease_prefix_);
+    return n && first_lease_ && *n >= *first_lease_;
+  }
 
   const WorkerId worker;
   const std::uint64_t epoch;

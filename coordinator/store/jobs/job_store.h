@@ -20,9 +20,8 @@
 #include "common/job/settings.h"
 #include "common/job/techniques.h"
 #include "common/protocol/messages.h"
-#include "coordinator/domain/denoised_target.h"
 #include "coordinator/domain/job_state.h"
-#include "coordinator/views/job_view.h"
+#include "coordinator/views/views.h"
 
 namespace ls::coordinator {
 
@@ -96,7 +95,7 @@ struct StoredJob {
   // Rendering techniques that workers reported to use for this job
   TechniqueSet techniques;
   // The checks of the denoised layers' error made so far, if the job's target error applies to these layers
-  // (domain/denoised_target.h). They decide when the job ends
+  // (DenoisedTarget in domain/adaptive_stop.h). They decide when the job ends
   std::vector<DenoisedCheck> denoised_checks;
   // Missing or damaged blobs: the job is paused until they are available
   std::set<Digest> missing_blobs;

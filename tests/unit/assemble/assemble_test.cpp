@@ -92,7 +92,7 @@ TEST(RoundErrors, RefusesBytesCutAnywhere) {
     EXPECT_FALSE(RoundErrors(2, true).load_tile(0, std::span(bytes).first(n))) << n;
 }
 
-// What is folded, written as the service does.
+// Writes a snapshot of the assembly, as the service does.
 void write_to(const std::filesystem::path& path, const Assembly& a, std::string_view format = "f") {
   auto file = SnapshotFile::create(path, ".new", a.film().grid(), a.film().aovs(), format).value();
   for (TileIndex t = 0; t < a.film().grid().count(); ++t)
@@ -105,7 +105,7 @@ TEST(Assembly, ASnapshotGivesTheSameFilmAndAnyDamageIsNoticed) {
   TempFolder dir;
   const auto path = dir.path() / "film.snap";
   Assembly assembly(kGrid, false);
-  for (TileIndex t = 0; t + 1 < kGrid.count(); ++t)  // and one tile that nothing is folded of
+  for (TileIndex t = 0; t + 1 < kGrid.count(); ++t)  // the last tile stays without samples
     for (RoundIndex r = 0; r < 3; ++r) ASSERT_TRUE(assembly.fold(t, r, waiting(t, cut_range(r, 6))));
 
   write_to(path, assembly);
@@ -186,7 +186,7 @@ TEST(Assembly, PixelsThatWaitHaveABoundForAllJobsTogether) {
     for (RoundIndex r = 0; r < 4000; ++r)
       kept += (r % 2 == 0 ? one : other).take(0, r, {0, 2})->partial.has_value();
     EXPECT_EQ(kept, (limits::kMaxPendingPartials - before) / kEach);
-    WaitingPartial nowhere = waiting(0, {0, 2});  // what is on no disk is kept in any case
+    WaitingPartial nowhere = waiting(0, {0, 2});  // a partial that is on no disk is always kept
     one.hold(0, 0, std::move(nowhere));
     EXPECT_EQ(WaitingBytes::all(), before + kEach);
     Assembly moved = std::move(one);
@@ -332,7 +332,7 @@ TEST(Report, SaysWhatWasAskedFor) {
   EXPECT_EQ(j["time_asked"], 1.5);
 }
 
-// Error falling as 1/N exactly.
+// Facts of a job whose error is exactly proportional to 1/N.
 ReportFacts falling() {
   ReportFacts facts;
   facts.job.name = "bath.xml";

@@ -1,4 +1,4 @@
-// What a report says of a reference, and what it leaves open.
+// What a report states about the error against a reference, and what it leaves open.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,7 +11,8 @@ namespace {
 
 using nlohmann::json;
 
-// Errors that fall like 1/N, with a squared bias of `floor`, by a reference of this standard error.
+// Facts of a job whose errors fall as 1/N. The squared bias against the reference is `floor`, and the
+// comparison has this standard error.
 ReportFacts compared(double floor, std::optional<double> standard_error) {
   ReportFacts facts;
   facts.job.spec.reference = sha256("reference");
@@ -30,8 +31,8 @@ json told(const ReportFacts& facts) { return json::parse(report_json(facts)); }
 
 TEST(ReferenceReport, TellsAFloorOnlyAboveTheReferencesNoise) {
   EXPECT_EQ(told(compared(.01, {}))["verdict_kind"], "bias_floor");
-  EXPECT_EQ(told(compared(.01, .002))["verdict_kind"], "bias_floor");  // five standard errors
-  EXPECT_EQ(told(compared(.01, .003))["verdict_kind"], "converging");  // three
+  EXPECT_EQ(told(compared(.01, .002))["verdict_kind"], "bias_floor");  // the bias is five standard errors
+  EXPECT_EQ(told(compared(.01, .003))["verdict_kind"], "converging");  // the bias is three standard errors
 }
 
 TEST(ReferenceReport, OfTheJobsOwnSeedDrawsNoVerdict) {
@@ -47,7 +48,7 @@ TEST(ReferenceReport, OfTheJobsOwnSeedDrawsNoVerdict) {
 }
 
 TEST(ReferenceReport, SaysWhatIsBelowItsNoise) {
-  const ReportFacts facts = compared(0, .001);  // of the last checkpoint, 1 / 1024
+  const ReportFacts facts = compared(0, .001);  // its error at the last checkpoint is 1 / 1024
   const json below = told(facts), without = told(compared(0, {}));
 
   EXPECT_EQ(below["reference"]["below_noise"], true);

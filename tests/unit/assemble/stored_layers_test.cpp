@@ -14,7 +14,7 @@ constexpr TileGrid kStoredGrid{{75, 50}, 32};
 constexpr AovSet kStoredAovs = AovSet().with(Aov::position).with(Aov::material_id);
 constexpr PixelRect kStoredWhole{0, 0, 75, 50};
 
-// All tiles but one have samples.
+// A film in which all tiles except this one have samples.
 Film film_without(TileIndex empty) {
   Film film(kStoredGrid, kStoredAovs);
   for (TileIndex t = 0; t < kStoredGrid.count(); ++t)
@@ -77,7 +77,8 @@ TEST_F(StoredLayersTest, OfHighLevelsDifferByNoMoreThanARoundingToHalf) {
 
   for (std::size_t i = 0; i < found.size(); ++i) {
     ASSERT_EQ(std::isnan(found[i]), std::isnan(wanted[i]));
-    // A half has 11 bits: what is averaged is off by up to 2^-11 of it, and so is each of the two results.
+    // Half floats have 11 significant bits: each averaged value is off by up to 2^-11 of itself, and so is
+    // each of the two results.
     if (!std::isnan(found[i])) EXPECT_NEAR(found[i], wanted[i], 3 * std::ldexp(wanted[i], -11));
   }
 }
@@ -95,7 +96,7 @@ TEST_F(StoredLayersTest, OfATileWithoutSamplesHideNoIdentifierOfItsNeighbours) {
     const auto found = stored->pixels(ids, level, rect).value();
 
     EXPECT_EQ(found, from_memory(ids, level, rect)) << level;
-    // A pixel of level 5 is one tile, and the first of them has nothing to show.
+    // A pixel of level 5 is one tile, and the first tile has no samples.
     EXPECT_EQ(layer_floats(ids, found)[0] != 0, level > 5) << level;
   }
 }
@@ -108,7 +109,7 @@ TEST_F(StoredLayersTest, AreReadOnceForAllLayersOfASmallVersion) {
   ASSERT_TRUE(stored->pixels(layers[0], 2, rect));
   const std::size_t kept = stored->bytes();
 
-  std::filesystem::resize_file(path, 100);  // reading once more would fail
+  std::filesystem::resize_file(path, 100);  // another read of the file would fail
 
   EXPECT_GT(kept, 0u);
   for (const PixelLayer& layer : layers) EXPECT_TRUE(stored->pixels(layer, 2, rect)) << layer.name;

@@ -11,7 +11,7 @@ TEST(UnitCosts, OfACheckpointAreThoseOfItsUnitsAlone) {
   UnitCosts costs(2);
   costs.add(0, 0, 1);
   costs.add(0, 1, 2);
-  costs.add(0, 2, 4);  // ahead
+  costs.add(0, 2, 4);  // a later round than the next one
   costs.add(1, 1, 16);
   costs.add(1, 0, 8);
 
@@ -32,12 +32,13 @@ TEST(UnitCosts, OfAUnitRenderedAgainCountTwice) {
   EXPECT_EQ(costs.until(Rounds{1}), 7);
 }
 
-// A tile that stopped early, and a cut last round: rounds are asked for that nothing has been said of.
+// A checkpoint may include rounds without recorded cost: of a tile that stopped early, or a truncated last
+// round.
 TEST(UnitCosts, OfWhatIsNotThereAreNothing) {
   UnitCosts costs(2);
   costs.add(0, 0, 1);
   EXPECT_EQ(costs.until(Rounds{4, 0}), 1);
-  EXPECT_EQ(costs.until(Rounds{2, 0}), 1);  // fewer than before
+  EXPECT_EQ(costs.until(Rounds{2, 0}), 1);  // fewer rounds than at the earlier checkpoint
   costs.add(0, 5, 8);
   costs.add(0, 3, 2);
   EXPECT_EQ(costs.until(Rounds{4, 0}), 3);

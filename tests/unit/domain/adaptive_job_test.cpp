@@ -1,4 +1,4 @@
-// When the tiles of a job with a target end, each by its errors.
+// When the tiles of a job with a target error end, each by its own errors.
 #include "tests/unit/domain/stop_oracle.h"
 #include "tests/unit/domain/uneven_job.h"
 
@@ -55,7 +55,7 @@ TEST(Adaptive, MoreSamplesForAFinishedJobMakeItOneBySamples) {
 
   EXPECT_EQ(rig.job().stopped, StopReason::spp);
   EXPECT_FALSE(rig.farm.plan({"j"})->target_error);
-  for (TileIndex t = 0; t < 18; ++t) EXPECT_EQ(rig.farm.tile({"j"}, t)->spp, most + 10);
+  for (TileIndex t = 0; t < 18; ++t) EXPECT_EQ(tile_figures(rig.farm, {"j"}, t)->spp, most + 10);
 }
 
 TEST(Adaptive, CheckpointsAreLevelsAndTheSameWhateverTheOrder) {
@@ -81,10 +81,10 @@ TEST(Adaptive, CheckpointsAreLevelsAndTheSameWhateverTheOrder) {
   }
 }
 
-// What is only probably wanted is lent when a thread would have nothing to do, two units a thread at most,
-// and what the rule would want next goes first: so with these errors only that is in vain which is out when
-// the last level is reached, or came just before. Errors that fall faster than as 1/n, as those of
-// low-discrepancy samples do, make the rule foresee too much.
+// Speculative units are leased only to threads that would idle, at most two a thread, and in the order in
+// which the stop rule would request them. So only units that are out when the last level is reached, or were
+// leased just before, are rendered in vain. This holds for errors that fall as 1/n; with errors that fall
+// faster, as those of low-discrepancy samples do, the rule predicts too many rounds.
 TEST(Adaptive, FewUnitsAreRenderedInVain) {
   for (const auto [workers, threads] : {std::pair(1, 1), {1, 4}, {4, 1}, {3, 4}}) {
     Rig rig;
@@ -100,8 +100,8 @@ TEST(Adaptive, FewUnitsAreRenderedInVain) {
   }
 }
 
-// Waiting for the worker to have next to nothing is no reason to pass a job over: leases of others in between
-// would keep it from that.
+// A job whose speculative units have to wait until the worker has little else to do keeps its turn: leases of
+// other jobs in between would keep the worker busy.
 TEST(Adaptive, WhatIsOnlyForeseenKeepsItsJobsTurn) {
   Rig rig;
   rig.rel_error = uneven_error;
@@ -111,7 +111,7 @@ TEST(Adaptive, WhatIsOnlyForeseenKeepsItsJobsTurn) {
   plan.grid = {{32, 32}, 32};
   plan.priority = 1;
   rig.submit(plan);
-  while (rig.job().units_folded < 7) rig.render("w");  // more than are wanted whatever comes
+  while (rig.job().units_folded < 7) rig.render("w");  // more than the stop rule needs in any case
   ASSERT_EQ(rig.worker("w").units_out, 2u);
 
   rig.submit(plan_of("other", 100, 2));
@@ -124,7 +124,7 @@ TEST(Adaptive, WhatIsOnlyForeseenKeepsItsJobsTurn) {
   EXPECT_GE(kept, 5) << "until nothing more was foreseen";
 }
 
-// Single units must not bring a worker of many threads to the most leases it may have, and to idle threads.
+// Leases of single units must not use up kMaxLeasesPerWorker while threads still idle.
 TEST(Adaptive, AWorkerOfManyThreadsIsKeptBusyByWhatIsForeseen) {
   Rig rig;
   rig.rel_error = uneven_error;

@@ -1,4 +1,5 @@
-// The stop rule by itself: which tiles decide together, where samples go, and that order never matters.
+// The stop rule alone: which tiles stop together, which tiles get samples, and that the order of results has
+// no influence.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +18,7 @@ constexpr double kTileValues = 32 * 32 * 3;
 
 TileGrid tiles_in_a_row(int n) { return {{32 * n, 32}, 32}; }
 
-// The errors of tiles with these variances per sample, without noise.
+// Errors, without noise, of tiles with these variances per sample.
 ErrorOf exact(std::vector<double> variance) {
   return [variance = std::move(variance)](TileIndex t, RoundIndex k) {
     return variance[t] * kTileValues / static_cast<double>(round_range(k).s1);
@@ -44,7 +45,7 @@ TEST(StopGroups, HaveEnoughPixelsAndEveryTileOnce) {
 }
 
 TEST(StopGroups, AreSingleTilesButForCutOnesAtTheEdge) {
-  const auto groups = stop_groups({{1920, 1080}, 32});  // 60 x 33 whole tiles and a row of 24 pixels' height
+  const auto groups = stop_groups({{1920, 1080}, 32});  // 60 x 33 whole tiles, and a row 24 pixels high
   EXPECT_EQ(groups.size(), 60u * 33u);
   EXPECT_EQ(groups[0], std::vector<TileIndex>{0});
   EXPECT_EQ(groups[32 * 60], (std::vector<TileIndex>{32 * 60, 33 * 60}));
@@ -60,7 +61,7 @@ TEST(Level, IsTheNextOneOnTheGridBelow) {
     const double level = level_below(gain);
     EXPECT_LT(level, gain);
     EXPECT_GE(level, gain * step * (1 - 1e-15));
-    const double steps = 4 * std::log2(level);  // of the grid: a whole number, but for log2's last bits
+    const double steps = 4 * std::log2(level);  // a whole number of the grid's steps, up to rounding
     EXPECT_NEAR(steps, std::round(steps), 1e-10);
     EXPECT_LT(level_below(level), level);
   }
@@ -76,7 +77,8 @@ TEST(AdaptiveStop, NoTileStopsBeforeSixtyFourSamples) {
 }
 
 TEST(AdaptiveStop, SamplesGrowWithTheRootOfTheVariance) {
-  // n ~ sqrt(a): 1, 2, 4 and 8 times as many, within a round and a level (2^1/8 of n).
+  // n is proportional to sqrt(a): 1, 2, 4 and 8 times as many samples, up to one round and one level (2^1/8
+  // of n).
   const auto out = stop_at_once(tiles_in_a_row(4), kMany, 2e-3, exact({1, 4, 16, 64}));
   ASSERT_TRUE(out.by_error);
   const double least = static_cast<double>(spp_of(out, 0));
@@ -87,8 +89,8 @@ TEST(AdaptiveStop, SamplesGrowWithTheRootOfTheVariance) {
   }
 }
 
-// The least mean of n with mean(a/n) = T is mean(sqrt a)^2 / T. A level and a round more are what the grids
-// cost.
+// The least mean of n, under the condition mean(a/n) = T, is mean(sqrt a)^2 / T. The grids of rounds and
+// levels cost up to one round and one level more.
 TEST(AdaptiveStop, ReachesTheTargetAtHardlyMoreThanTheLeastCost) {
   std::mt19937_64 random(11);
   for (int i = 0; i < 50; ++i) {
@@ -98,7 +100,7 @@ TEST(AdaptiveStop, ReachesTheTargetAtHardlyMoreThanTheLeastCost) {
       v = std::exp(std::normal_distribution(0., 2.)(random));
       roots += std::sqrt(v) / 40, mean += v / 40;
     }
-    const double target = roots * roots / 3000;  // 3000 samples a pixel at best
+    const double target = roots * roots / 3000;  // the least mean is 3000 samples per pixel
     const auto out = stop_at_once(tiles_in_a_row(40), kMany, target, exact(a));
     EXPECT_LE(out.predicted, target);
     EXPECT_LE(out.mean_spp, 3000 * 1.0905 + 96) << "a level of n, a round and the 64 that all get";
@@ -106,7 +108,8 @@ TEST(AdaptiveStop, ReachesTheTargetAtHardlyMoreThanTheLeastCost) {
   }
 }
 
-// Its own last round would bias the decision low: however good it is, the tile does not end before it.
+// The error after a tile's own last round would bias the decision towards stopping: however low it is, the
+// tile does not end earlier.
 TEST(AdaptiveStop, ATilesLastRoundHasNoSayInItsStop) {
   const auto honest = exact({2, 3});
   const auto out = stop_at_once(tiles_in_a_row(2), kMany, 5e-3, honest);
@@ -119,7 +122,7 @@ TEST(AdaptiveStop, ATilesLastRoundHasNoSayInItsStop) {
 TEST(AdaptiveStop, AnImageThatTurnsOutWorseThanPredictedGoesOn) {
   const auto honest = exact({2, 3});
   const auto out = stop_at_once(tiles_in_a_row(2), kMany, 5e-3, honest);
-  const ErrorOf late = [&](TileIndex t, RoundIndex k) {  // a firefly comes with the last round
+  const ErrorOf late = [&](TileIndex t, RoundIndex k) {  // one very bright sample comes in the last round
     return honest(t, k) * (t == 1 && k >= out.ends[t] - 1 ? 2 : 1);
   };
   const auto further = stop_at_once(tiles_in_a_row(2), kMany, 5e-3, late);
@@ -127,7 +130,7 @@ TEST(AdaptiveStop, AnImageThatTurnsOutWorseThanPredictedGoesOn) {
   EXPECT_GT(further.ends[1], out.ends[1]);
 }
 
-// Errors with a scatter of their own for each round.
+// Errors whose rounds scatter independently.
 ErrorOf noisy(std::vector<double> variance, std::uint64_t seed) {
   return [variance = std::move(variance), seed](TileIndex t, RoundIndex k) {
     std::mt19937_64 random(seed + 1000003 * t + k);
@@ -166,7 +169,7 @@ TEST(AdaptiveStop, ASmallerTargetGoesOnToWhereItWouldHaveEndedAtOnce) {
     std::vector<RoundIndex> seen(grid.count());
     double target = .1;
     stop_at(rule, seen, target, error);
-    feed_wanted(rule, seen, error);  // all is folded; the job is done
+    feed_wanted(rule, seen, error);  // everything is folded, and the job is done
     target /= std::uniform_real_distribution(1.5, 8.)(random);
     EXPECT_EQ(stop_at(rule, seen, target, error).ends, stop_at_once(grid, 20000, target, error).ends);
   }

@@ -1,4 +1,4 @@
-// What users change of a job under way, what time it may take, and what workers may say of it.
+// Changes of a running job by its user, time limits, and what workers may report.
 #include "tests/unit/domain/rig.h"
 
 namespace ls::coordinator {
@@ -83,7 +83,7 @@ TEST(Time, DoesNotRunWhileAJobIsDone) {
   EXPECT_EQ(rig.job().stopped, StopReason::spp);
 }
 
-// Error falls as 1/n: relMSE after n samples is 1/n.
+// Returns the error sum of a tile of 8 x 8 pixels with 3 channels whose relMSE after n samples is 1/n.
 double one_over_n(const UnitKey& unit) { return 8 * 8 * 3 / static_cast<double>(round_range(unit.round).s1); }
 
 std::uint64_t spp_with(double target, std::optional<double> then) {
@@ -97,7 +97,7 @@ std::uint64_t spp_with(double target, std::optional<double> then) {
   if (then) rig.send(JobRetargeted{{"j"}, *then});
   rig.render_all();
   EXPECT_EQ(rig.job().stopped, StopReason::error);
-  return rig.farm.tile({"j"}, 0)->spp;
+  return tile_figures(rig.farm, {"j"}, 0)->spp;
 }
 
 TEST(Target, ASmallerOneGivesWhatAJobThatHadItFromTheFirstGives) {
@@ -140,13 +140,14 @@ TEST(Target, ALargerOneIsSafeAcrossARestart) {
   JobPlan plan = plan_of("j", 3, std::nullopt);
   plan.target_error = 1 / 5000.0;
   std::vector<Effect> history = before.submit(plan);
-  while (before.job().rounds_complete < 8 || before.farm.tile({"j"}, 0)->rounds_folded < 9)
+  while (before.job().rounds_complete < 8 || tile_figures(before.farm, {"j"}, 0)->rounds_folded < 9)
     for (Effect& e : before.render("w")) history.push_back(e);
-  plan.target_error = 1 / 64.0;  // met long ago, while a tile is folded beyond it
+  plan.target_error = 1 / 64.0;  // met long ago; one tile has more rounds in the image than it needs
   JobRestored restored{plan, JobState::running, {}, digest_number(1), {}, {}, {}, 1.0};
   for (const RecordUnit& r : of<RecordUnit>(history))
     restored.accepted.push_back({r.unit.tile, r.unit.round, r.samples, r.digest, r.worker});
-  for (TileIndex t = 0; t < 3; ++t) restored.folded.push_back(before.farm.tile({"j"}, t)->rounds_folded);
+  for (TileIndex t = 0; t < 3; ++t)
+    restored.folded.push_back(tile_figures(before.farm, {"j"}, t)->rounds_folded);
   restored.rel_error.resize(12);
   for (RoundIndex k = 0; k < 12; ++k) restored.rel_error[k].assign(3, one_over_n({{"j"}, 0, k}));
 
@@ -177,12 +178,12 @@ TEST(Restart, ADoneJobWhoseFilmIsLostIsFoldedAgainAndExtended) {
   after.send(JobExtended{{"j"}, 8});
   after.render_all();
 
-  EXPECT_EQ(after.farm.tile({"j"}, 1)->spp, 8u);
+  EXPECT_EQ(tile_figures(after.farm, {"j"}, 1)->spp, 8u);
 }
 
 TEST(Figures, TellWhatTheQueueWillCost) {
   Rig rig;
-  rig.cpu_seconds = 1;  // 2 samples of 64 pixels
+  rig.cpu_seconds = 1;  // the cost of a unit of 2 samples in 64 pixels
   rig.join("w", 1);
   rig.submit(plan_of("j", 10, 2));
   EXPECT_EQ(rig.job().core_seconds_queued, 0) << "nothing is measured";
@@ -195,7 +196,7 @@ TEST(Figures, TellWhatTheQueueWillCost) {
   EXPECT_EQ(f.core_seconds_to_limit, f.core_seconds_left) << "no target ends it sooner";
 }
 
-// A job's time left is told from these.
+// The prediction of a job's remaining time uses these figures.
 TEST(Figures, CountAThreadByTheCoreThatItGets) {
   Rig rig;
   rig.cpu_seconds = 1;
@@ -212,7 +213,8 @@ TEST(Figures, CountAThreadByTheCoreThatItGets) {
   EXPECT_DOUBLE_EQ(rig.job().cores, 5);
 }
 
-// Copies of units that are only late because their worker shares its cores would be rendered in vain.
+// A unit is not overdue if it is slow only because its worker shares the cores: a copy would be rendered in
+// vain.
 TEST(Figures, AWorkerThatSharesItsCoresIsExpectedLater) {
   for (const double wait : {0., 9.}) {
     Rig rig;

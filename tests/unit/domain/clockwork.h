@@ -1,4 +1,4 @@
-// A rig whose workers take the time that units cost: every render thread is busy until its unit is done.
+// A rig in simulated time: each render thread is busy for as long as its unit costs.
 #pragma once
 
 #include <algorithm>
@@ -23,24 +23,29 @@ class Clockwork {
 
   Rig rig;
   std::function<double(const UnitKey&)> cost = [](const UnitKey&) { return 0.5; };  // core seconds
-  std::map<std::string, double> slow;     // factors of workers that are slower than others
-  std::map<std::string, double> seconds;  // that each job has had
-  std::map<std::string, std::map<std::string, std::uint64_t>> units;  // by job and worker
-  std::map<UnitKey, Digest> accepted, arrived;                        // the first result that came
-  std::map<std::string, double> finished;                             // when
+  // Factors on the cost, for workers that are slower than others
+  std::map<std::string, double> slow;
+  // Core seconds that each job has used
+  std::map<std::string, double> seconds;
+  // Number of units rendered, by job and worker
+  std::map<std::string, std::map<std::string, std::uint64_t>> units;
+  // The accepted result of each unit, and the first one that arrived
+  std::map<UnitKey, Digest> accepted, arrived;
+  // When each job was finished, in seconds
+  std::map<std::string, double> finished;
   std::function<Digest(const std::string& worker, const UnitKey&, const SampleRange&)> pixels =
       [](const std::string&, const UnitKey& unit, const SampleRange& range) { return honest(unit, range); };
-  std::vector<Effect> effects;  // all but folds and assignments
+  std::vector<Effect> effects;  // all effects except folds and assignments
 
   void join(const std::string& name, int threads, std::uint64_t memory = 0, std::vector<Digest> blobs = {}) {
     threads_[name] = threads;
     note(rig.join(name, threads, 1, {}, memory, std::move(blobs)));
   }
-  // What it has in hand still comes.
+  // The stream breaks; results of the units that the worker holds still arrive.
   void lose(const std::string& name) { note(rig.lose(name)); }
   double now() const { return ls::seconds(rig.now.time_since_epoch()) - begin_; }
 
-  // Until nothing is rendered any more, or so many seconds from now.
+  // Runs until no unit is being rendered, or for this many seconds.
   void run(double for_seconds = 1e9) {
     const double end = now() + for_seconds;
     while (now() < end) {
@@ -63,7 +68,7 @@ class Clockwork {
     }
   }
   bool idle() const {
-    for (const JobId& job : rig.farm.jobs())
+    for (const JobId& job : jobs_of(rig.farm))
       if (const auto f = rig.farm.job(job);
           f->state == JobState::running && rig.farm.why_waiting(job).empty())
         return false;

@@ -1,4 +1,5 @@
-// Jobs whose target error is that of their denoised layers: what the farm asks for, and when such a job ends.
+// Jobs whose target error is that of their denoised layers: which checks the farm requests, and when such a
+// job ends.
 #include "tests/unit/domain/uneven_job.h"
 
 namespace ls::coordinator {
@@ -14,14 +15,14 @@ JobPlan denoised_plan(double target) {
 
 double folded_spp(const Rig& rig) {
   double sum = 0;
-  for (TileIndex t = 0; t < 18; ++t) sum += static_cast<double>(rig.farm.tile({"j"}, t)->spp);
+  for (TileIndex t = 0; t < 18; ++t) sum += static_cast<double>(tile_figures(rig.farm, {"j"}, t)->spp);
   return sum / 18;
 }
 
 double upper_end_at(const CheckDenoised& check) { return 1 / check.spp; }
 
-// Renders the job with a farm that answers each check at once, and sees to it that the film is that of the
-// level.
+// Renders the job with a farm in which each check is answered immediately. Checks that the film is then
+// exactly that of the level.
 std::vector<RoundIndex> ends_at(double target, int workers) {
   Rig rig;
   rig.rel_error = uneven_error;
@@ -111,8 +112,7 @@ TEST(DenoisedJob, APausedJobAsksAgainWhenItIsResumed) {
   EXPECT_EQ(ends_in(rig), ends_at(kTarget, 1));
 }
 
-// At any moment the coordinator may be killed: what it knows then are the folded rounds and the stored
-// checks.
+// The coordinator may be killed at any moment. It then restores the folded rounds and the stored checks.
 TEST(DenoisedJob, ARestoredJobEndsWhereItWouldHaveEnded) {
   const auto expected = ends_at(kTarget, 1);
   for (const int units : {10, 80, 100, 120, 140, 160, 200}) {

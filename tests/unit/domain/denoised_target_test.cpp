@@ -1,5 +1,5 @@
-// When a job ends whose target error is that of its denoised layers.
-#include "coordinator/domain/denoised_target.h"
+// When a job ends if its target error is that of its denoised layers.
+#include "coordinator/domain/adaptive_stop.h"
 
 #include <gtest/gtest.h>
 
@@ -14,8 +14,8 @@ using Answer = DenoisedTarget::Answer;
 
 constexpr double kRuleTarget = 1e-3;
 
-// Goes through levels of the stop rule until the job ends or the levels are used up; every check finds what
-// `at_most` says. Returns the samples of the levels that were checked.
+// Goes through the levels of the stop rule until the job ends or no level is left; `at_most` gives the result
+// of each check. Returns the samples per pixel of the levels that were checked.
 std::vector<double> checked(DenoisedTarget& rule, const std::vector<double>& levels, double target,
                             const std::function<std::optional<double>(double spp)>& at_most,
                             bool* ended = nullptr) {

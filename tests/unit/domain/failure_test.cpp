@@ -1,4 +1,4 @@
-// The three budgets: lost infrastructure, a unit that fails, a worker that fails.
+// Three kinds of failures are counted separately: lost workers or leases, units that fail, workers that fail.
 #include "tests/unit/domain/rig.h"
 
 namespace ls::coordinator {
@@ -89,7 +89,7 @@ TEST(Failure, LosingWorkersCostsAUnitNothing) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-// Worker "bad" fails what it gets until it is blocked; "good" renders.
+// Worker "bad" fails every unit that it gets until it is blocked; "good" renders.
 std::vector<Effect> bad_worker_against(Rig& rig, const std::string& job) {
   std::vector<Effect> all = rig.submit(plan_of(job, 40, 2));
   for (int guard = 0; rig.job(job).state != JobState::done && guard < 1000; ++guard) {

@@ -1,4 +1,4 @@
-// The tiles that a user looks at get the next samples first, and nothing else changes.
+// The tiles in the focus get the next samples first, and nothing else changes.
 #include "tests/unit/domain/rig.h"
 
 namespace ls::coordinator {
@@ -6,10 +6,10 @@ namespace {
 
 using testing::IsEmpty;
 
-// Tiles are 8 pixels wide, in one row.
+// Returns a rectangle over these tiles; tiles are 8 pixels wide, in one row.
 PixelRect over_tiles(int first, int last) { return {first * 8 + 3, 0, last * 8 + 4, 8}; }
 
-// Renders all that the workers hold and returns the tiles of the leases that follow, in their order.
+// Renders all units that the workers hold, and returns the tiles of the leases that follow, in order.
 std::vector<TileIndex> next_tiles(Rig& rig, std::size_t count) {
   std::vector<TileIndex> tiles;
   while (tiles.size() < count) {
@@ -30,7 +30,7 @@ TEST(Focus, ItsTilesAreLeasedBeforeAllOthersUntilTheyHaveAllSamples) {
       std::count(tiles.begin(), tiles.begin() + 10, 70) + std::count(tiles.begin(), tiles.begin() + 10, 71),
       10);
   EXPECT_LT(tiles.at(10), 70u);
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 TEST(Focus, WithoutItTheOrderIsAsBefore) {
@@ -42,7 +42,7 @@ TEST(Focus, WithoutItTheOrderIsAsBefore) {
   EXPECT_EQ(next_tiles(other, 20), plain);
 }
 
-// The focus changes the order of leases alone: the same units are folded, and every tile ends at the same
+// The focus changes only the order of leases: the same units are folded, and every tile ends at the same
 // round.
 TEST(Focus, TheUnitsOfAnAdaptiveJobAreTheSameWithAndWithoutIt) {
   const auto units = [](const std::optional<PixelRect>& focus) {
@@ -59,7 +59,7 @@ TEST(Focus, TheUnitsOfAnAdaptiveJobAreTheSameWithAndWithoutIt) {
     std::set<std::pair<TileIndex, RoundIndex>> folded;
     for (const Fold& fold : of<Fold>(rig.render_all())) folded.emplace(fold.unit.tile, fold.unit.round);
     EXPECT_EQ(rig.job().state, JobState::done);
-    EXPECT_EQ(rig.farm.audit(), "");
+    EXPECT_EQ(audit(rig.farm), "");
     return folded;
   };
   const auto plain = units(std::nullopt);

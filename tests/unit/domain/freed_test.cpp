@@ -1,4 +1,4 @@
-// Each cause for which units are freed (metric lightshaft_units_freed_total) is one that really comes about.
+// Each cause for which units are freed (metric lightshaft_units_freed_total) does occur.
 #include <cmath>
 
 #include "tests/unit/domain/rig.h"
@@ -8,10 +8,10 @@ namespace {
 
 struct Story {
   FreedCause cause;
-  std::function<std::vector<Effect>(Rig&)> tell;  // the effects in which it comes about
+  std::function<std::vector<Effect>(Rig&)> tell;  // provokes the cause and returns the effects
 };
 
-// A worker that has units of a job in hand.
+// Adds a worker that holds units of a job.
 void lend(Rig& rig, int threads = 2) {
   rig.join("w", threads);
   rig.submit(plan_of("j", 8, 6));

@@ -1,4 +1,4 @@
-// The life of a job: folding in order, results that come twice or late, pause, cancel, extension, restart.
+// The life of a job: folding in order, duplicate and late results, pause, cancel, extension, restart.
 #include "tests/unit/domain/rig.h"
 
 namespace ls::coordinator {
@@ -27,7 +27,7 @@ TEST(Job, RunsFromQueuedToDone) {
   ASSERT_EQ(of<JobFinished>(effects).size(), 1u);
   EXPECT_EQ(of<JobFinished>(effects)[0].stopped, StopReason::spp);
   EXPECT_EQ(rig.job().stopped, StopReason::spp);
-  EXPECT_EQ(rig.farm.tile({"j"}, 1)->spp, 4u);
+  EXPECT_EQ(tile_figures(rig.farm, {"j"}, 1)->spp, 4u);
 }
 
 TEST(Job, EarlyArrivalsWaitToBeFoldedInOrder) {
@@ -58,7 +58,8 @@ TEST(Job, ASecondEqualResultIsDropped) {
 TEST(Job, ASecondDifferentResultIsEvidenceAndFailsTheJob) {
   Rig rig(plan_of("j", 5, 2), {{"a", 1}, {"b", 1}}, {.lease_prefix = "t", .audit_rate = 1});
   const Rig::Held unit = rig.take("a");
-  rig.result("a", unit);  // which b is asked to render again
+  // The unit is audited by b
+  rig.result("a", unit);
 
   const auto effects = rig.send(UnitAccepted{unit.key(), unit.unit.samples, digest_number(666), {"b"}, 0.1});
 
@@ -114,7 +115,7 @@ TEST(Job, PauseTakesBackWhatIsNotBegunAndLeavesWhatIsInHand) {
   EXPECT_EQ(rig.worker("w").leases, 1u);
   EXPECT_GE(rig.worker("w").units_out, 2u);
   EXPECT_EQ(rig.held[{"w"}].size(), rig.worker("w").units_out);
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
   rig.send(JobResumed{{"j"}});
   rig.render_all();
   EXPECT_EQ(rig.job().state, JobState::done);
@@ -130,7 +131,7 @@ TEST(Job, CancelTakesLeasesBackAtOnce) {
   EXPECT_EQ(rig.worker("a").units_out, 0u);
   EXPECT_EQ(rig.farm.wanted({{"j"}, 0, 0}, {}).verdict, Wanted::Verdict::no);
   rig.send(JobForgotten{{"j"}});
-  EXPECT_TRUE(rig.farm.jobs().empty());
+  EXPECT_TRUE(jobs_of(rig.farm).empty());
 }
 
 TEST(Job, TheUserMayStopItWithWhatIsLeased) {
@@ -149,7 +150,7 @@ TEST(Job, TheUserMayStopItWithWhatIsLeased) {
 TEST(Extend, AFinishedJobGoesOnWithItsCutRoundRenderedAgainInFull) {
   Rig rig;
   rig.join("w", 2);
-  rig.submit(plan_of("j", 3, 6));  // rounds [0,2) [2,4) [4,6): the last is cut from [4,8)
+  rig.submit(plan_of("j", 3, 6));  // rounds [0,2) [2,4) [4,6): the last one is truncated from [4,8)
   rig.render_all();
   ASSERT_EQ(rig.job().state, JobState::done);
 
@@ -166,13 +167,13 @@ TEST(Extend, AFinishedJobGoesOnWithItsCutRoundRenderedAgainInFull) {
 
   EXPECT_EQ(rig.job().state, JobState::done);
   EXPECT_EQ(of<Fold>(effects).size(), 6u) << "rounds [4,8) and [8,16) of three tiles";
-  EXPECT_EQ(rig.farm.tile({"j"}, 0)->spp, 16u);
+  EXPECT_EQ(tile_figures(rig.farm, {"j"}, 0)->spp, 16u);
 }
 
 TEST(Extend, ARunningJobsCutRoundIsTakenBackFromWorkers) {
   Rig rig(plan_of("j", 3, 6), {{"w", 2}});
   while (rig.job().rounds_complete < 2) rig.render("w");
-  rig.render("w");  // one cut unit folded, others leased
+  rig.render("w");  // one unit of a truncated round is folded, others are leased
   const Rig::Held cut = rig.held[{"w"}].front();
 
   const auto effects = rig.send(JobExtended{{"j"}, 8});
@@ -182,7 +183,7 @@ TEST(Extend, ARunningJobsCutRoundIsTakenBackFromWorkers) {
   EXPECT_EQ(of<DropUnwanted>(rig.result("w", cut)).size(), 1u);
   rig.render_all();
   EXPECT_EQ(rig.job().state, JobState::done);
-  EXPECT_EQ(rig.farm.tile({"j"}, 2)->spp, 8u);
+  EXPECT_EQ(tile_figures(rig.farm, {"j"}, 2)->spp, 8u);
 }
 
 TEST(Extend, ToNoMoreThanThereIsChangesNothing) {
@@ -193,14 +194,14 @@ TEST(Extend, ToNoMoreThanThereIsChangesNothing) {
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
-// Everything the service would have stored of a job.
+// Returns all data that the service would have stored for a job.
 JobRestored stored(const Rig& rig, const JobPlan& plan, const std::vector<Effect>& history) {
   JobRestored restored{plan, rig.job().state, rig.job().stopped, rig.job().numeric_class, {}, {}, {}, 1.0};
   for (const RecordUnit& r : of<RecordUnit>(history)) {
     restored.accepted.push_back({r.unit.tile, r.unit.round, r.samples, r.digest, r.worker});
   }
   for (TileIndex t = 0; t < plan.grid.count(); ++t)
-    restored.folded.push_back(rig.farm.tile({"j"}, t)->rounds_folded);
+    restored.folded.push_back(tile_figures(rig.farm, {"j"}, t)->rounds_folded);
   return restored;
 }
 
@@ -257,7 +258,7 @@ TEST(Restart, ADoneJobStaysDoneAndCanBeExtended) {
   after.render_all();
 
   EXPECT_EQ(after.job().state, JobState::done);
-  EXPECT_EQ(after.farm.tile({"j"}, 1)->spp, 8u);
+  EXPECT_EQ(tile_figures(after.farm, {"j"}, 1)->spp, 8u);
 }
 
 TEST(Plan, RefusesWhatIsTooLargeOrMeaningless) {

@@ -1,4 +1,4 @@
-// Who gets what, when, and how much of it.
+// Which worker gets which units, when, and how many.
 #include <set>
 
 #include "tests/unit/domain/rig.h"
@@ -55,13 +55,13 @@ TEST(Lease, FirstLeasesAreSmallUntilTheCostIsKnown) {
 
 TEST(Lease, LaterLeasesLastAboutTheTargetTime) {
   Rig rig;
-  rig.cpu_seconds = 0.1;  // 2 samples of 64 pixels
+  rig.cpu_seconds = 0.1;  // the cost of a unit of 2 samples in 64 pixels
   rig.join("w", 4);
   rig.submit(plan_of("j", 10000, 2));
 
   const auto leases = sent<AssignLease>(rig.render_all());
 
-  // 2 s on 4 threads at 0.1 s a unit: 80 units, while the rest of the job is much more than that.
+  // A lease of 2 s on 4 threads, at 0.1 s a unit, has 80 units. The rest of the job is far more than that.
   std::size_t largest = 0;
   for (const auto& [id, message] : leases) largest = std::max(largest, message.lease.units.size());
   EXPECT_GE(largest, 80u);
@@ -283,7 +283,7 @@ TEST(Deadline, IsRenewedByItsHolderAndByItsFullNameAlone) {
 TEST(Deadline, IsNeverMovedForwardByProgress) {
   Rig rig(plan_of("j", 3, 2), {{"w", 1}});
   rig.render("w");
-  const LeaseId lease = rig.held[{"w"}].front().lease;  // made out before the job's world was loaded
+  const LeaseId lease = rig.held[{"w"}].front().lease;  // granted before the world was loaded
 
   rig.send(LeaseProgress{{"w"}, {{lease, 0}}});
   for (const UnitsFreed& freed : of<UnitsFreed>(rig.pass(kLoadSlack)))
@@ -300,14 +300,16 @@ TEST(Deadline, FollowsTheMeasuredCost) {
   rig.join("v", 1);
   rig.submit(plan_of("k", 2, 2));
 
-  // Leases of unknown cost have the slack; those made now know that a unit lasts 20 s.
+  // Leases that were granted before the cost was known have more slack. Those granted now are based on the
+  // measured 20 s per unit.
   rig.send(LeaseProgress{{"w"}, {{rig.held[{"w"}].front().lease, 0}}});
   rig.pass(kDeadlineSlack + from_seconds(kDeadlineFactor * 20) - 1s);
 
   EXPECT_GT(rig.worker("w").units_out, 0u);
 }
 
-// Two workers that know the job's cost; then "fast" has rendered all that it held, and nothing waits.
+// Runs a job with two workers until its cost is measured, "fast" has rendered all its units, and no unit
+// waits.
 void run_dry(Rig& rig, double cpu_seconds) {
   rig.cpu_seconds = cpu_seconds;
   rig.join("slow", 1);
@@ -348,14 +350,14 @@ TEST(TakingBack, TheWorkerThatWaitedIsToldAndAResultThatComesAllTheSameCounts) {
   ASSERT_EQ(rig.held[{"fast"}].size(), 1u);
   EXPECT_EQ(rig.held[{"fast"}][0].key(), waiting[1].key());
 
-  rig.result("slow", waiting[1]);  // it had begun it before it was told
+  rig.result("slow", waiting[1]);  // it had begun the unit before the lease was taken back
   EXPECT_EQ(rig.worker("fast").units_out, 0u);
   rig.render("slow");
   EXPECT_EQ(rig.job().state, JobState::done);
 }
 
 TEST(TakingBack, WorkThatWillBeBegunAtOnceStaysWhereItIs) {
-  // "slow" holds three: the last waits for two others.
+  // "slow" holds three units; the last one waits for the two others.
   for (const auto& [share, stays] : {std::pair{.45, 3u}, {.55, 2u}}) {
     Rig rig;
     run_dry(rig, share * seconds(kTakeBackAfter));

@@ -88,13 +88,13 @@ void Month::happen(const Due& due) {
   }
 }
 
-// The event, and all folds that it leads to.
+// Sends the event to the farm, and carries out all folds that result from it.
 void Month::send(int home, const Event& event) {
   Farm& farm = farms_[static_cast<std::size_t>(home)];
   const auto handle = [&](const Event& one) {
     ++counts_.events;
     for (const Effect& effect : farm.handle(one, now_)) see(home, effect);
-    if (std::string wrong = farm.audit(); !wrong.empty()) blame("audit: " + wrong);
+    if (std::string wrong = audit(farm); !wrong.empty()) blame("audit: " + wrong);
   };
   handle(event);
   while (!to_fold_.empty() && wrong_.empty()) {
@@ -172,7 +172,8 @@ void Month::see_fold(int home, const Fold& fold) {
   to_fold_.emplace_back(home, UnitFolded{fold.unit, fold.samples, 1});
 }
 
-// Its film must be what honest workers would have made, but for liars that nobody has found out so far.
+// Checks that the job's film is the one that honest workers would have made, except for results of faulty
+// workers that are not found out yet.
 void Month::see_end(const JobId& id) {
   StoredJob& job = jobs_.at(id);
   const JobState state = farms_[static_cast<std::size_t>(job.home)].job(id)->state;
@@ -197,13 +198,14 @@ void Month::see_end(const JobId& id) {
 
 void Month::submit() {
   const JobId id{"j" + std::to_string(jobs_made_++)};
-  const int tiles = 1 + static_cast<int>(pick(6));  // one after the other: arguments have no order
+  // Drawn separately, since the order in which arguments are evaluated is unspecified
+  const int tiles = 1 + static_cast<int>(pick(6));
   const std::uint64_t most = chance(.1) ? 60 : 12;
   StoredJob job{plan_of(id.value, tiles, 2 + 2 * pick(most))};
   job.plan.owner = std::array{"", "ann", "bob", "cat"}[pick(4)];
   job.plan.priority = static_cast<int>(pick(3));
   if (chance(.2)) job.plan.max_workers = 1 + static_cast<std::uint32_t>(pick(4));
-  if (chance(.2)) {  // frames of a sequence have one owner and one limit
+  if (chance(.2)) {  // frames of a sequence have one owner and the same limits
     job.plan.group = "film" + std::to_string(jobs_made_ / 8);
     job.plan.owner = "ann";
     job.plan.max_workers = 3;
@@ -236,8 +238,9 @@ void Month::user_acts() {
       return send(home, JobPaused{JobId(id)});
     case 3:
       return send(home, JobPriority{JobId(id), static_cast<int>(pick(5))});
-    default:  // whoever was paused goes on
-      for (const JobId& other : farms_[static_cast<std::size_t>(home)].jobs()) send(home, JobResumed{other});
+    default:  // resumes a paused job
+      for (const JobId& other : jobs_of(farms_[static_cast<std::size_t>(home)]))
+        send(home, JobResumed{other});
   }
 }
 
@@ -258,7 +261,7 @@ void Month::join(const std::string& name, int home) {
   send(home, WorkerJoined{{name}, ++worker.epoch, name, digest_number(1), worker.threads, {}, 0, {}});
 }
 
-// A preempted one takes what it held along; another one comes in its place, under another name.
+// A preempted worker takes its units along. A worker with another name replaces it.
 void Month::leave(const std::string& name) {
   const Worker worker = workers_.at(name);
   workers_.erase(name);
@@ -278,7 +281,7 @@ void Month::begin_units(const std::string& name) {
 
 void Month::rendered(const std::string& name, const Rig::Held& unit) {
   const auto found = workers_.find(name);
-  if (found == workers_.end()) return;  // preempted meanwhile
+  if (found == workers_.end()) return;  // the worker was preempted meanwhile
   Worker& worker = found->second;
   --worker.busy;
   if (!worker.connected || !jobs_.contains(unit.job)) return;
@@ -288,12 +291,12 @@ void Month::rendered(const std::string& name, const Rig::Held& unit) {
   }
   const bool lies = worker.faulty && chance(.5);
   const Digest digest = lies ? digest_number(1 + pick(1000)) : honest(unit.key(), unit.unit.samples);
-  // Its connection may have been to the coordinator that had the job before.
+  // The worker may still be connected to the coordinator that had the job before.
   send(worker.home, UnitAccepted{unit.key(), unit.unit.samples, digest, {name}, 40});
 }
 
-// Half of the times it is back at once with what it had stored; else its jobs go to the other one, without
-// results.
+// In half of the cases the coordinator starts again immediately with the data that it had stored. Otherwise
+// the other coordinator takes over its jobs, without results.
 void Month::coordinator_dies() {
   later(kCoordinatorLives, What::coordinator_dies);
   if (!up_[kDies]) return;
@@ -315,7 +318,7 @@ void Month::coordinator_dies() {
       if (job.home == kDies && !job.ended) orphans.push_back(id);
     std::erase_if(jobs_, [&](const auto& j) { return j.second.home == kDies && j.second.ended; });
     counts_.takeovers += orphans.size();
-    if (!orphans.empty())  // their records say who has lied
+    if (!orphans.empty())  // the jobs' records name the quarantined workers
       for (const std::string& faulty : quarantined_[kDies])
         if (quarantined_[kLives].insert(faulty).second) send(kLives, WorkerQuarantined{{faulty}, "lied"});
     for (const JobId& id : orphans) give(kLives, id, false);

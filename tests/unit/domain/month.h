@@ -1,8 +1,9 @@
-// A month of a farm in simulated time: two coordinators, workers that are preempted and replaced by others,
-// some that crash on a unit, some that lie; users who pause, resume, cancel, stop and change priorities; the
-// second coordinator dies again and again, and is started again with what it had stored, or the first one
-// takes its jobs over. The first one lives for all of the time, so that what it keeps too long is seen to
-// grow. After every event the farm adds up its books, and the month compares them with its own.
+// A month of a farm in simulated time: two coordinators; workers that are preempted and replaced, some that
+// crash on a unit, some that render wrong pixels; users who pause, resume, cancel, stop and change
+// priorities. The second coordinator dies again and again; it is started again with the data that it had
+// stored, or the first one takes over its jobs. The first coordinator lives all the time, so that anything
+// that it keeps too long shows as growth. After every event the farm checks its invariants
+// (farm_inspector.h), and the month compares its own records with those of the farm.
 #pragma once
 
 #include <array>
@@ -22,7 +23,7 @@ class Month {
  public:
   explicit Month(std::uint64_t seed);
 
-  // The next simulated hour. What went wrong first; empty: nothing.
+  // Simulates the next hour. Returns the first problem; empty: there was none.
   std::string hour();
 
   struct Counts {
@@ -30,8 +31,8 @@ class Month {
                   restarts = 0, takeovers = 0, audits = 0, quarantined = 0, user_acts = 0;
   };
   const Counts& counts() const { return counts_; }
-  // Of the coordinator that lives all the time.
-  std::vector<std::pair<std::string, std::size_t>> sizes() const { return farms_[0].sizes(); }
+  // The sizes of the containers of the coordinator that lives all the time.
+  std::vector<std::pair<std::string, std::size_t>> sizes() const { return ls::coordinator::sizes(farms_[0]); }
 
  private:
   struct Worker {
@@ -41,7 +42,7 @@ class Month {
     int threads = 1, busy = 0;
     std::deque<Rig::Held> held;
   };
-  struct StoredJob {  // what a coordinator would have stored
+  struct StoredJob {  // the data that a coordinator would have stored
     JobPlan plan;
     int home = 0;
     bool stopped = false;
@@ -49,7 +50,7 @@ class Month {
     std::map<std::pair<TileIndex, RoundIndex>, RecordUnit> accepted;
     std::vector<RoundIndex> asked, folded;
     std::vector<std::vector<Digest>> film;
-    std::vector<JobRestored::Audit> audits;  // that are open
+    std::vector<JobRestored::Audit> audits;  // the open audits
   };
   enum class What { submit, user, tick, arrive, leave, rendered, coordinator_dies, coordinator_back, forget };
   struct Due {
@@ -86,7 +87,7 @@ class Month {
   void give(int home, const JobId& id, bool with_results);
 
   std::mt19937_64 random_;
-  int starts_ = 0;  // before the farms, whose making counts it
+  int starts_ = 0;  // declared before farms_, whose construction counts it up
   std::array<Farm, 2> farms_;
   std::array<bool, 2> up_{true, true};
   TimePoint now_{};
@@ -95,7 +96,7 @@ class Month {
   std::map<std::string, Worker> workers_;
   std::map<JobId, StoredJob> jobs_;
   std::set<std::string> liars_;
-  std::array<std::set<std::string>, 2> quarantined_;  // by the coordinator that knows
+  std::array<std::set<std::string>, 2> quarantined_;  // one set for each coordinator
   std::deque<std::pair<int, UnitFolded>> to_fold_;
   Counts counts_;
   std::string wrong_;

@@ -9,11 +9,12 @@ constexpr int kHours = 12;
 constexpr int kHours = 96;
 #endif
 
-// docs/measurements/soak.md has thirty days: tests/bench/month.cpp. The sizes are looked at every hour; what
-// is in flight scatters, by less than half of the largest value of many hours.
+// Thirty days: docs/measurements/soak.md, by tests/bench/month.cpp. The sizes are read every hour. Sizes of
+// what is in flight scatter, by less than half of the largest value of many hours.
 TEST(Month, FourDaysKeepEveryInvariantAndNothingGrows) {
   Month month(1);
-  std::map<std::string, std::pair<std::size_t, std::size_t>> most;  // of the first and of the second half
+  // Largest sizes in the first and in the second half of the time
+  std::map<std::string, std::pair<std::size_t, std::size_t>> most;
   for (int hour = 0; hour < kHours; ++hour) {
     ASSERT_EQ(month.hour(), "");
     for (const auto& [what, size] : month.sizes()) {
@@ -21,7 +22,7 @@ TEST(Month, FourDaysKeepEveryInvariantAndNothingGrows) {
       half = std::max(half, size);
     }
   }
-  most.erase("quarantined");  // one entry for each worker that lied: it must never be believed again
+  most.erase("quarantined");  // one entry for each faulty worker: it stays quarantined forever
   for (const auto& [what, halves] : most) EXPECT_LE(halves.second, halves.first * 3 / 2 + 32) << what;
   const Month::Counts& c = month.counts();
   for (const std::uint64_t happened :

@@ -1,4 +1,4 @@
-// Which numeric class a job is pinned to, where its pixels are to be checked.
+// Which numeric class a job may be pinned to when its results are audited.
 #include "tests/unit/domain/rig.h"
 
 namespace ls::coordinator {
@@ -18,7 +18,7 @@ TEST(Pin, AWorkerThatIsAloneOfItsClassPinsNoJobThatOthersCanCheck) {
   EXPECT_EQ(rig.job().numeric_class, digest_number(1));
   EXPECT_TRUE(rig.held[{"x"}].empty());
   EXPECT_FALSE(rig.farm.may_pin({"j2"}, {"x"}));
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 TEST(Pin, AWorkerThatIsAloneRendersWhereNoOtherClassHasTwoAndTheEndSaysSo) {
@@ -58,12 +58,12 @@ TEST(Pin, AWorkerOfAnotherVersionFinishesJobsOfItsClassAndBeginsNone) {
   EXPECT_EQ(rig.held[{"old"}].front().job.value, "begun");
   EXPECT_EQ(rig.farm.why_waiting({"new"}),
             "old is of another version than the coordinator and begins no job");
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 
   rig.join("new", 1, 2);
   EXPECT_EQ(rig.farm.job({"new"})->numeric_class, digest_number(2));
   EXPECT_EQ(rig.farm.why_waiting({"new"}), "");
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 TEST(Pin, WorkersThatMayNotBeginAJobGetItsUnitsAsSoonAsItHasTheirClass) {
@@ -74,12 +74,12 @@ TEST(Pin, WorkersThatMayNotBeginAJobGetItsUnitsAsSoonAsItHasTheirClass) {
     ASSERT_TRUE(rig.held[{"old"}].empty());
 
     if (chosen)
-      rig.send(ClassChosen{{"j"}, digest_number(1)});  // by a result from before a restart
+      rig.send(ClassChosen{{"j"}, digest_number(1)});  // chosen by a result from before a restart
     else
       rig.join("of the same class", 1, 1);
 
     EXPECT_FALSE(rig.held[{"old"}].empty());
-    EXPECT_EQ(rig.farm.audit(), "");
+    EXPECT_EQ(audit(rig.farm), "");
   }
 }
 
@@ -95,7 +95,7 @@ TEST(Pin, TheClassOfTheFirstResultToBeStoredIsThatOfTheJob) {
   EXPECT_EQ(pinned[0].numeric_class, digest_number(1));
   EXPECT_TRUE(of<JobPinned>(again).empty());
   EXPECT_EQ(rig.farm.wanted({{"j"}, 0, 0}, digest_number(2)).verdict, Wanted::Verdict::other_class);
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 TEST(Pin, AJobThatAsksForAClassWaitsForItAndSaysWhatThereIs) {
@@ -115,7 +115,7 @@ TEST(Pin, AJobThatAsksForAClassWaitsForItAndSaysWhatThereIs) {
     rig.join_of_platform("arm", 1, 9, "armv8-a:gcc-14.2.0");
     EXPECT_EQ(rig.job().numeric_class, digest_number(9)) << "although it is alone in its class";
     EXPECT_FALSE(rig.held[{"arm"}].empty());
-    EXPECT_EQ(rig.farm.audit(), "");
+    EXPECT_EQ(audit(rig.farm), "");
   }
 }
 

@@ -1,10 +1,10 @@
-// More results than the coordinator has room for.
+// More results arrive than the coordinator has room for.
 #include "tests/unit/domain/rig.h"
 
 namespace ls::coordinator {
 namespace {
 
-// Behind the result that waits the worker's own words wait, too.
+// While a result waits, the worker's later messages, with its progress, wait behind it.
 TEST(Deadline, IsNotPassedWhileTheCoordinatorHasNoRoomForTheWorkersResult) {
   Rig rig(plan_of("j", 1, 2), {{"w", 1}});
 

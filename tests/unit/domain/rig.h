@@ -1,4 +1,4 @@
-// A farm with a hand on the clock, and short words for events and for what came of them.
+// A farm whose time the test sets, with short names for events and effects.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -13,6 +13,7 @@
 
 #include "coordinator/domain/farm/farm.h"
 #include "coordinator/domain/limits.h"
+#include "tests/unit/domain/farm_inspector.h"
 
 namespace ls::coordinator {
 
@@ -40,13 +41,13 @@ inline Digest digest_number(std::uint64_t n) {
   d.bytes[31] = 1;
   return d;
 }
-// What an honest worker renders: a function of the unit and its range.
+// The digest of an honest worker's result: a function of the unit and its range.
 inline Digest honest(const UnitKey& unit, const SampleRange& range) {
   return digest_number(std::hash<JobId>{}(unit.job) ^ (std::uint64_t{unit.tile} * 0x9e3779b97f4a7c15u) ^
                        (std::uint64_t{unit.round} * 0xc2b2ae3d27d4eb4fu) ^ (range.s1 * 0x165667b19e3779f9u));
 }
 
-// A plan of `tiles` tiles in one row.
+// Returns a plan with `tiles` tiles in one row.
 inline JobPlan plan_of(const std::string& id, int tiles, std::optional<std::uint64_t> spp) {
   JobPlan plan;
   plan.brief.job = {id};
@@ -57,7 +58,8 @@ inline JobPlan plan_of(const std::string& id, int tiles, std::optional<std::uint
 
 using Workers = std::vector<std::pair<std::string, int>>;  // names and numbers of threads
 
-// Drives a farm by hand: plays the assembler (folds at once) and keeps what each worker holds.
+// Drives a farm: carries out Fold effects immediately, as an assembler, and keeps which units each worker
+// holds.
 class Rig {
  public:
   struct Held {
@@ -68,7 +70,7 @@ class Rig {
   };
 
   explicit Rig(Farm::Options options = {.lease_prefix = "t"}) : farm(std::move(options)) {}
-  // A farm whose workers, each with its threads, have joined before the job was submitted.
+  // A farm whose workers, with these numbers of threads, join before the job is submitted.
   Rig(JobPlan plan, const Workers& workers, Farm::Options options = {.lease_prefix = "t"})
       : Rig(std::move(options)) {
     for (const auto& [name, threads] : workers) join(name, threads);
@@ -79,12 +81,14 @@ class Rig {
   TimePoint now{};
   std::map<WorkerId, std::deque<Held>> held;
   std::function<double(const UnitKey&)> rel_error = [](const UnitKey&) { return 1.0; };
-  // The upper end that a check of the denoised layers finds, at once; empty: the test answers
+  // The upper end of the interval that each check of the denoised layers' error finds, immediately. Empty:
+  // the test sends the results of checks itself
   std::function<double(const CheckDenoised&)> denoised;
-  double cpu_seconds = 0.01;  // that each unit reports
-  double wait_seconds = 0;    // and that its thread waited
+  double cpu_seconds = 0.01;  // reported for each unit
+  // Seconds that the thread waited, reported for each unit
+  double wait_seconds = 0;
 
-  // The effects of the event and of all folds that it led to.
+  // Returns the effects of the event and of all folds that result from it.
   std::vector<Effect> send(const Event& event) {
     std::vector<Effect> all;
     std::deque<Event> events{event};
@@ -133,7 +137,7 @@ class Rig {
     held.erase({name});
     return send(WorkerLost{{name}, epochs_[{name}]});
   }
-  // The worker renders the first unit that it holds.
+  // The worker renders the first unit that it holds, and delivers the result.
   std::vector<Effect> render(const std::string& name) {
     const Held unit = take(name);
     return result(name, unit);
@@ -158,7 +162,7 @@ class Rig {
     units.pop_front();
     return unit;
   }
-  // Workers take turns until nothing is held.
+  // Workers render in turn until none holds a unit.
   std::vector<Effect> render_all() {
     std::vector<Effect> all;
     for (bool any = true; any;) {

@@ -1,4 +1,4 @@
-// A million units and a thousand workers: handle() must not look at all of anything.
+// A million units and a thousand workers: handle() must not iterate over all of them.
 #include "tests/unit/domain/rig.h"
 
 namespace ls::coordinator {

@@ -1,4 +1,4 @@
-// Whose turn it is, how much at once, and where.
+// Which job is next, how many units it gets at once, and on which worker.
 #include <random>
 
 #include "tests/unit/domain/clockwork.h"
@@ -13,8 +13,8 @@ JobPlan plan_for(const std::string& owner, const std::string& id, int tiles = 40
   return plan;
 }
 
-// Of a farm of four workers with two threads: what one lease and the unit that ends it can be too much, for
-// each of them, and what the farm may prefer worlds that are loaded for.
+// By how many core seconds shares may differ on a farm of four workers with two threads each: on each worker
+// by one lease and the unit that ends it, and by the preference for loaded worlds.
 constexpr double kThreads = 8;
 constexpr double kBound = kThreads * (kQueuedLeases * kLeaseSeconds + 1) + kThreads * kLocalitySeconds;
 
@@ -91,8 +91,8 @@ TEST(Shares, CountWithinAPriorityOnly) {
   EXPECT_GT(work.seconds["urgent"], 20 * kThreads - 2 * kThreads * kQueuedLeases * kLeaseSeconds);
 }
 
-// Users with any number of jobs of any cost, workers that come and go: who has work all the time has had as
-// much as any other such user, but for a lease each and the preference for loaded worlds.
+// Users have any number of jobs of any cost, and workers come and go. All users who have work all the time
+// get equal core seconds, up to one lease per worker and the preference for loaded worlds.
 TEST(Shares, DifferByABoundedAmountInRandomHistories) {
   for (std::uint64_t seed = 1; seed <= 15; ++seed) {
     std::mt19937_64 random(seed);
@@ -119,7 +119,7 @@ TEST(Shares, DifferByABoundedAmountInRandomHistories) {
       chance_of(random, 50) ? work.lose(name(i)) : work.join(name(i), 1 + static_cast<int>(i % 3));
       work.run(10 + static_cast<double>(pick(20)));
     }
-    ASSERT_EQ(work.rig.farm.audit(), "") << "seed " << seed;
+    ASSERT_EQ(audit(work.rig.farm), "") << "seed " << seed;
     std::map<std::string, double> had;
     for (const auto& [id, owner] : owners) had[owner] += work.seconds[id];
     const auto [least, most] = std::minmax_element(
@@ -151,7 +151,7 @@ TEST(Shares, FigureNamesWhoHasHadHowMuch) {
 
   work.run(50);
 
-  const auto shares = work.rig.farm.shares();
+  const auto shares = ls::coordinator::shares(work.rig.farm);
   ASSERT_EQ(shares.size(), 1u);
   EXPECT_EQ(shares[0].owner, "ann");
   EXPECT_GE(shares[0].seconds, work.seconds["j"]);
@@ -180,7 +180,7 @@ TEST(Limits, OfAJobHoldItsWorkersAndUnits) {
     rig.render(i % 2 ? "a" : "d");
     EXPECT_LE(workers_on(rig, {"few"}), 2u);
     EXPECT_LE(rig.job("small").units_leased, 3u);
-    ASSERT_EQ(rig.farm.audit(), "");
+    ASSERT_EQ(audit(rig.farm), "");
   }
   EXPECT_GT(rig.job("few").units_done, 0u);
   EXPECT_GT(rig.job("small").units_done, 0u);
@@ -199,7 +199,7 @@ TEST(Limits, OfASequenceHoldForAllItsFrames) {
 
   EXPECT_EQ(workers_on(rig, {"s-frame1", "s-frame2"}), 2u);
   EXPECT_EQ(rig.job("s-frame1").units_leased + rig.job("s-frame2").units_leased, 3u);
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 TEST(Limits, OfAUserHoldForAllItsJobsAndNotForTheAdministrator) {
@@ -213,7 +213,7 @@ TEST(Limits, OfAUserHoldForAllItsJobsAndNotForTheAdministrator) {
 
   EXPECT_EQ(workers_on(rig, {"admin"}), 4u);
   EXPECT_EQ(rig.job("one").units_leased + rig.job("two").units_leased, 3u);
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 TEST(Limits, WhatALeaseGivesBackGoesToAnotherWorker) {
@@ -229,7 +229,7 @@ TEST(Limits, WhatALeaseGivesBackGoesToAnotherWorker) {
   rig.lose(holder);
 
   EXPECT_FALSE(rig.held[{holder == "a" ? "b" : "a"}].empty());
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 TEST(Memory, AJobIsGivenOnlyToWorkersThatHaveEnough) {
@@ -276,12 +276,13 @@ TEST(Locality, AWorkerThatHasTheFilesGoesFirst) {
   EXPECT_FALSE(rig.held[{"b"}].empty());
 }
 
-// Two jobs and eight workers: without preferring loaded worlds every worker would soon hold both.
+// With two jobs and eight workers, every worker would soon hold both worlds if loaded worlds were not
+// preferred.
 TEST(Locality, WorkersStayWithTheWorldTheyHoldAndNobodyStarves) {
   Clockwork work;
   for (int i = 0; i < 8; ++i) {
     work.join("w" + std::to_string(i), 1);
-    work.slow["w" + std::to_string(i)] = 1 + .02 * i;  // they do not beat in time
+    work.slow["w" + std::to_string(i)] = 1 + .02 * i;  // so that workers do not stay in step
   }
   work.rig.submit(plan_for("ann", "one"));
   work.run(30);
@@ -308,7 +309,8 @@ TEST(Tail, CopiesOfTheSlowestUnitsEndAJobSooner) {
 
   work.run();
 
-  // Sixty units of half a second on three good workers take 10 s, and the slow one's first alone 20 s.
+  // Sixty units of half a second take 10 s on the three fast workers; the slow worker needs 20 s for its
+  // first unit alone.
   ASSERT_TRUE(work.finished.contains("j"));
   EXPECT_LT(work.finished["j"], 13);
   EXPECT_EQ(work.accepted.size(), 60u);
@@ -329,7 +331,7 @@ TEST(Limits, AnAuditDoesNotWaitForTheUsersOtherWork) {
   ASSERT_EQ(work.finished.size(), 2u);
   EXPECT_LT(work.finished["one"], work.finished["two"] / 2);
   EXPECT_EQ(work.rig.farm.audits().equal, 204u);
-  EXPECT_EQ(work.rig.farm.audit(), "");
+  EXPECT_EQ(audit(work.rig.farm), "");
 }
 
 }  // namespace

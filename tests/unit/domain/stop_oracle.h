@@ -1,5 +1,5 @@
-// Where the tiles of a job with a target error must end, from their errors alone: every tile's rounds in
-// order, one tile after the other, by the stop rule and nothing else.
+// Computes where the tiles of a job with a target error must end, from their errors alone: feeds the stop
+// rule with every tile's rounds in order, one tile after the other.
 #pragma once
 
 #include <functional>
@@ -9,7 +9,8 @@
 
 namespace ls::coordinator {
 
-using ErrorOf = std::function<double(TileIndex, RoundIndex)>;  // what TileError::relative.squares would be
+// Returns TileError::relative.squares of a tile after a round
+using ErrorOf = std::function<double(TileIndex, RoundIndex)>;
 
 struct StopOutcome {
   std::vector<RoundIndex> ends;
@@ -17,7 +18,8 @@ struct StopOutcome {
   double predicted = 0, mean_spp = 0;
 };
 
-// Folds of each tile what is wanted for certain; `seen` is how many rounds are.
+// Feeds the rule with the rounds of each tile that are certain to be needed. `seen` is the number of rounds
+// of each tile so far.
 inline void feed_wanted(AdaptiveStop& rule, std::vector<RoundIndex>& seen, const ErrorOf& error) {
   for (TileIndex t = 0; t < seen.size(); ++t)
     for (; seen[t] <= rule.wanted(t); ++seen[t]) rule.folded(t, seen[t], error(t, seen[t]));

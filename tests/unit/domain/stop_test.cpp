@@ -1,4 +1,4 @@
-// When jobs stop: by error, by time, by samples.
+// When jobs stop: at a target error, a time or a number of samples.
 #include "tests/unit/domain/rig.h"
 #include "tests/unit/domain/stop_oracle.h"
 #include "tests/unit/domain/uneven_job.h"
@@ -6,7 +6,7 @@
 namespace ls::coordinator {
 namespace {
 
-// relMSE of exactly 0.64 / n: the target 0.002 needs n = 320 samples, round 9.
+// The relMSE is exactly 0.64 / n: the target 0.002 needs n = 320 samples, reached with round 9.
 double error_at(const UnitKey& unit) {
   return 0.64 / static_cast<double>(round_range(unit.round).s1) * 3 * 64;
 }
@@ -28,7 +28,7 @@ TEST(StopByError, EndsAtTheSameRoundWhateverTheOrder) {
 
     ASSERT_EQ(of<JobFinished>(effects).size(), 1u);
     EXPECT_EQ(of<JobFinished>(effects)[0].stopped, StopReason::error);
-    for (TileIndex t = 0; t < 6; ++t) EXPECT_EQ(rig.farm.tile({"j"}, t)->spp, 320u);
+    for (TileIndex t = 0; t < 6; ++t) EXPECT_EQ(tile_figures(rig.farm, {"j"}, t)->spp, 320u);
     for (const Fold& fold : of<Fold>(effects)) EXPECT_LT(fold.samples.s0, 320u);
   }
 }
@@ -36,7 +36,7 @@ TEST(StopByError, EndsAtTheSameRoundWhateverTheOrder) {
 TEST(StopByError, LateSpeculativeRoundsAreDropped) {
   Rig rig;
   rig.rel_error = error_at;
-  rig.join("w", 32);  // leases rounds well beyond the stop
+  rig.join("w", 32);  // its leases reach well beyond the last round that is needed
   rig.submit(target_plan(1));
   std::vector<Rig::Held> seen;
   for (int i = 0; i < 200 && rig.job().state == JobState::running; ++i) {
@@ -62,7 +62,7 @@ TEST(StopByError, AnUnreachableTargetEndsAtTheSampleLimit) {
   rig.render_all();
 
   EXPECT_EQ(rig.job().stopped, StopReason::spp);
-  EXPECT_EQ(rig.farm.tile({"j"}, 1)->spp, 200u);
+  EXPECT_EQ(tile_figures(rig.farm, {"j"}, 1)->spp, 200u);
 }
 
 TEST(StopByError, ExtendingGoesBeyondTheTarget) {
@@ -76,7 +76,7 @@ TEST(StopByError, ExtendingGoesBeyondTheTarget) {
   rig.render_all();
 
   EXPECT_EQ(rig.job().stopped, StopReason::spp);
-  EXPECT_EQ(rig.farm.tile({"j"}, 0)->spp, 640u);
+  EXPECT_EQ(tile_figures(rig.farm, {"j"}, 0)->spp, 640u);
 }
 
 TEST(StopByError, ARestartAnywhereEndsAtTheSameRound) {
@@ -94,7 +94,7 @@ TEST(StopByError, ARestartAnywhereEndsAtTheSameRound) {
       restored.accepted.push_back({r.unit.tile, r.unit.round, r.samples, r.digest, r.worker});
     }
     for (TileIndex t = 0; t < 3; ++t) {
-      restored.folded.push_back(before.farm.tile({"j"}, t)->rounds_folded);
+      restored.folded.push_back(tile_figures(before.farm, {"j"}, t)->rounds_folded);
       for (RoundIndex k = 0; k < restored.folded[t]; ++k) {
         if (restored.rel_error.size() <= k) restored.rel_error.resize(k + 1, std::vector<double>(3));
         restored.rel_error[k][t] = error_at({{"j"}, t, k});
@@ -108,7 +108,7 @@ TEST(StopByError, ARestartAnywhereEndsAtTheSameRound) {
     after.render_all();
 
     EXPECT_EQ(after.job().stopped, StopReason::error) << cut;
-    for (TileIndex t = 0; t < 3; ++t) EXPECT_EQ(after.farm.tile({"j"}, t)->spp, 320u) << cut;
+    for (TileIndex t = 0; t < 3; ++t) EXPECT_EQ(tile_figures(after.farm, {"j"}, t)->spp, 320u) << cut;
   }
 }
 
@@ -119,10 +119,10 @@ TEST(StopByError, ARestartAfterTheLastFoldAddsNoRound) {
   before.submit(target_plan(3));
   before.render_all();
   ASSERT_EQ(before.job().stopped, StopReason::error);
-  // The crash came before `done` was stored: it runs, as far as anyone knows.
+  // The crash came before the state `done` was stored, so the job is restored as running.
   JobRestored restored{target_plan(3), JobState::running, std::nullopt, before.job().numeric_class};
   for (TileIndex t = 0; t < 3; ++t) {
-    restored.folded.push_back(before.farm.tile({"j"}, t)->rounds_folded);
+    restored.folded.push_back(tile_figures(before.farm, {"j"}, t)->rounds_folded);
     restored.rel_error.resize(restored.folded[0], std::vector<double>(3));
     for (RoundIndex k = 0; k < restored.folded[t]; ++k) restored.rel_error[k][t] = error_at({{"j"}, t, k});
   }
@@ -134,10 +134,11 @@ TEST(StopByError, ARestartAfterTheLastFoldAddsNoRound) {
 
   EXPECT_EQ(after.job().state, JobState::done);
   EXPECT_EQ(after.job().stopped, StopReason::error);
-  EXPECT_EQ(after.farm.tile({"j"}, 0)->spp, before.farm.tile({"j"}, 0)->spp);
+  EXPECT_EQ(tile_figures(after.farm, {"j"}, 0)->spp, tile_figures(before.farm, {"j"}, 0)->spp);
 }
 
-// One unit after the other, each in so many seconds of the clock, with a tick behind each.
+// Renders the units of worker "w" one after the other, each in `unit_seconds` of wall-clock time, with a tick
+// after each.
 void render_all_of_w(Rig& rig, double unit_seconds) {
   for (int i = 0; i < 1000 && !rig.held[{"w"}].empty(); ++i) {
     rig.now += from_seconds(unit_seconds);
@@ -157,7 +158,7 @@ TEST(StopByTime, ALeaseEndsWithTheUnitThatReachesTheTime) {
   render_all_of_w(rig, kUnit);
 
   EXPECT_EQ(rig.job().stopped, StopReason::time);
-  // A lease of the usual length would end two seconds later.
+  // With a lease of the usual length the job would end two seconds later.
   EXPECT_GE(seconds(rig.now.time_since_epoch()), 3 - kUnit);
   EXPECT_LE(seconds(rig.now.time_since_epoch()), 3 + 3 * kUnit);
 }
@@ -186,13 +187,13 @@ TEST(StopByTime, NothingLeasedIsThrownAwayAndNothingIsLeasedAfterwards) {
   EXPECT_EQ(rig.job().stopped, StopReason::time);
   EXPECT_EQ(results, leased);
   EXPECT_EQ(rig.job().units_folded, leased);
-  // At most one lease longer than asked.
+  // At most one lease longer than requested.
   EXPECT_LE(seconds(rig.now.time_since_epoch()), 10 + 2 * kLeaseSeconds);
   EXPECT_GE(seconds(rig.now.time_since_epoch()), 10 - kLeaseSeconds);
 }
 
-// One unit of each tile is rendered although the time is over after the first of them: an image without a
-// sample in some tile is none. The worker does not wait for a tick in between.
+// Each tile gets its first unit although the time is over after the first of them: an image needs a sample in
+// every tile. The worker does not wait for a tick in between.
 TEST(StopByTime, EveryTileHasItsFirstRoundHoweverLateItIs) {
   constexpr int kTiles = 20;
   Rig rig;
@@ -212,8 +213,8 @@ TEST(StopByTime, EveryTileHasItsFirstRoundHoweverLateItIs) {
   EXPECT_EQ(rig.job().units_folded, std::uint64_t{kTiles});
 }
 
-// One thread, units of a second: of those that would end after the time none is begun that ends mostly after
-// it.
+// With one thread and units of a second, a unit that would end after the limit is begun only if at least half
+// of it fits.
 TEST(StopByTime, TheLastRoundsAreChosenFromWhatUnitsHaveCost) {
   for (const double time : {20.3, 20.7}) {
     Rig rig;
@@ -230,8 +231,8 @@ TEST(StopByTime, TheLastRoundsAreChosenFromWhatUnitsHaveCost) {
   }
 }
 
-// Whichever comes first. With a target that is far away the worker is kept busy until the time is up, and no
-// longer than a job by time alone would keep it.
+// The job ends by error or by time, whichever comes first. If the target is far away, the worker has work
+// until the time is up, and no longer than in a job with a time limit alone.
 TEST(StopByTime, ATargetThatIsNotMetDoesNotMoveTheEnd) {
   constexpr double kUnit = 0.05;
   Rig rig;
@@ -273,7 +274,7 @@ TEST(StopByTime, ATargetThatIsMetBeforeEndsTheJobWhereItWouldHaveEnded) {
             stop_at_once(uneven_plan(.01).grid, kMaxSppWithoutLimit, .01, uneven_error_of).ends);
 }
 
-// Its thread gets a twelfth of a core: costs are CPU seconds, the limit is one of the clock.
+// The worker's thread gets a twelfth of a core. Costs are in CPU seconds, the limit in wall-clock seconds.
 TEST(StopByTime, AWorkerThatSharesItsCoresEndsInTimeToo) {
   constexpr double kCpu = .05, kWall = .6;
   Rig rig;

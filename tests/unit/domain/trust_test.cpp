@@ -1,4 +1,4 @@
-// Audits, and what becomes of a worker that renders wrong pixels and of what it has rendered.
+// Audits, and how a worker that rendered wrong pixels, and its results, are treated.
 #include "tests/unit/domain/clockwork.h"
 
 namespace ls::coordinator {
@@ -16,7 +16,7 @@ bool all_honest(const Clockwork& work, const JobPlan& plan) {
   return right == rounds * plan.grid.count();
 }
 
-// Renders each unit that `who` says wrong.
+// Returns a function that gives wrong pixels for every unit of the workers in `who`.
 auto liars(std::set<std::string> who) {
   return [who = std::move(who)](const std::string& worker, const UnitKey& unit, const SampleRange& range) {
     return who.contains(worker)
@@ -49,12 +49,12 @@ TEST(Audit, TakesTheShareAskedFor) {
 
   work.run();
 
-  // 10,000 draws at 1 %: six standard deviations are 60.
+  // With 10,000 draws at 1 %, six standard deviations are 60.
   EXPECT_NEAR(static_cast<double>(work.rig.farm.audits().asked), 100, 60);
   EXPECT_EQ(work.rig.farm.audits().equal, work.rig.farm.audits().asked);
 }
 
-// What is audited of the first results of "a", while "b" does nothing.
+// Returns the audits that the first `results` results of "a" begin, while "b" does nothing.
 std::vector<JobRestored::Audit> opened(Farm::Options options, int results) {
   Rig rig(plan_of("j", 200, 2), {{"a", 1}, {"b", 1}}, std::move(options));
   for (int i = 0; i < results; ++i) rig.render("a");
@@ -65,7 +65,7 @@ TEST(Audit, HasABoundForEachJob) {
   EXPECT_EQ(opened(audited_farm(1), kMaxAuditsOpen + 20).size(), kMaxAuditsOpen);
 }
 
-// Who knew which units are audited could lie about all others.
+// A worker that could predict which units are audited could deliver wrong pixels for all others.
 TEST(Audit, ChoosesUnitsByASeedThatNoWorkerKnows) {
   Farm::Options one = audited_farm(.5), other = one;
   other.audit_seed = one.audit_seed + 1;
@@ -93,8 +93,8 @@ TEST(Audit, IsGivenUpWhenNobodyElseIsLeftAndTheJobEnds) {
   EXPECT_GT(work.rig.farm.audits().dropped, 0u);
 }
 
-// One result of `a` is accepted, and being rendered again, when the coordinator dies; what it comes back
-// with.
+// The job of a coordinator that dies while the audit of one accepted result of "a" is open, as it is
+// restored.
 JobRestored restored(Digest accepted, JobRestored::Audit audit, int tiles = 6) {
   JobRestored event;
   event.plan = plan_of("j", tiles, 2);
@@ -124,7 +124,7 @@ TEST(Audit, UnderWayIsKnownUntilItIsDecided) {
 TEST(Audit, IsGoneOnWithAfterARestart) {
   Rig rig(audited_farm(0));
   rig.send(restored(kRight, {0, 0, std::nullopt}));
-  rig.pass(1s);  // no worker is back yet
+  rig.pass(1s);  // no worker has connected again yet
   rig.join("a", 1);
   rig.join("b", 1);
 
@@ -250,7 +250,7 @@ TEST(Audit, OfWhatIsNotAcceptedIsNotTakenUpAfterARestart) {
   rig.send(event);
 
   EXPECT_TRUE(rig.farm.open_audits({"j"}).empty());
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 TEST(FaultyWorker, IsFoundByAThirdWorkerQuarantinedAndItsTilesAreRenderedAgain) {
@@ -275,7 +275,7 @@ TEST(FaultyWorker, IsFoundByAThirdWorkerQuarantinedAndItsTilesAreRenderedAgain) 
   EXPECT_EQ(work.rig.farm.audits().workers_quarantined, 1u);
 }
 
-// Takes the unit from the worker that was asked to render it again.
+// Takes the unit from the worker that audits it, and returns the worker's name.
 std::string asked(Rig& rig, const UnitKey& unit) {
   for (auto& [id, units] : rig.held)
     for (auto it = units.begin(); it != units.end(); ++it)
@@ -310,7 +310,7 @@ TEST(FaultyWorker, WhoFoundItFirstDoesNotMatter) {
     EXPECT_EQ(of<TileDiscarded>(verdict).size(), lies_first ? 1u : 0u);
     rig.render_all();
     EXPECT_EQ(rig.job().state, JobState::done);
-    EXPECT_EQ(rig.farm.audit(), "");
+    EXPECT_EQ(audit(rig.farm), "");
   }
 }
 
@@ -334,7 +334,7 @@ TEST(FaultyWorker, TwoThatNobodyAskedBarNoOneAndWhoAccusedIsFound) {
   EXPECT_FALSE(rig.farm.quarantined({"h"}));
   rig.render_all();
   EXPECT_EQ(rig.job().state, JobState::done);
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
 TEST(FaultyWorker, AnUnaskedWordAgainstTheOnlyOtherWorkerFailsNoJob) {
@@ -356,7 +356,7 @@ TEST(FaultyWorker, ALateResultCountsSinceItsWorkerWasAsked) {
   for (const char* name : {"h", "x", "c"}) rig.join(name, 1);
   rig.submit(plan_of("j", 3, 2));
   const Rig::Held unit = rig.take("x");
-  rig.lose("x");  // its stream breaks, and the unit goes to another
+  rig.lose("x");  // its stream breaks, and another worker gets the unit
   rig.join("x", 1);
   const std::string other = asked(rig, unit.key());
   ASSERT_THAT(other, testing::AnyOf("h", "c"));
@@ -385,7 +385,7 @@ TEST(FaultyWorker, OneThatIsFoundElsewhereLosesWhatItHoldsAndWhatItHasRendered) 
   EXPECT_TRUE(rig.held[{"a"}].empty());
   ASSERT_EQ(of<TileDiscarded>(effects).size(), 1u);
   EXPECT_EQ(of<TileDiscarded>(effects)[0].tile, unit.unit.tile);
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
   rig.render_all();
   EXPECT_EQ(rig.job().state, JobState::done);
 }
@@ -417,7 +417,7 @@ TEST(FaultyWorker, ThreeDifferentAnswersFailTheJob) {
   EXPECT_TRUE(of<WorkerFoundFaulty>(effects).empty());
 }
 
-// With a job that another coordinator had, and knew the liar by.
+// A job comes from another coordinator that had found this worker faulty.
 TEST(FaultyWorker, ThatIsHereAlreadyGetsNothingFromWhenItIsKnown) {
   Rig rig(plan_of("j", 6, 2), {{"a", 1}, {"b", 1}}, audited_farm(0));
   ASSERT_GT(rig.worker("a").units_out, 0u);
@@ -427,7 +427,7 @@ TEST(FaultyWorker, ThatIsHereAlreadyGetsNothingFromWhenItIsKnown) {
   EXPECT_EQ(rig.worker("a").units_out, 0u);
   EXPECT_EQ(rig.worker("a").state, WorkerState::unhealthy);
   EXPECT_FALSE(of<WorkerStateChanged>(effects).empty());
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
   rig.held.erase({"a"});
   rig.render_all();
   EXPECT_EQ(rig.job().state, JobState::done);
@@ -445,10 +445,10 @@ TEST(FaultyWorker, NothingItSendsIsTakenAndItGetsNothingAfterARestart) {
 
   EXPECT_EQ(of<DropUnwanted>(effects).size(), 1u);
   EXPECT_TRUE(of<RecordUnit>(effects).empty());
-  EXPECT_EQ(rig.farm.audit(), "");
+  EXPECT_EQ(audit(rig.farm), "");
 }
 
-// Where tiles end depends on the errors of all of them, those of the wrong pixels among them: all begin
+// Where each tile ends depends on the errors of all tiles, including those with wrong pixels: all begin
 // again.
 TEST(FaultyWorker, AJobWithATargetEndsWhereItWouldHaveEndedWithoutIt) {
   const auto ends = [](bool with_faulty_worker) {
@@ -468,7 +468,7 @@ TEST(FaultyWorker, AJobWithATargetEndsWhereItWouldHaveEndedWithoutIt) {
     EXPECT_EQ(work.rig.job().state, JobState::done);
     EXPECT_EQ(work.seen<WorkerFoundFaulty>().size(), with_faulty_worker ? 1u : 0u);
     std::vector<RoundIndex> rounds;
-    for (TileIndex t = 0; t < 4; ++t) rounds.push_back(work.rig.farm.tile({"j"}, t)->rounds_folded);
+    for (TileIndex t = 0; t < 4; ++t) rounds.push_back(tile_figures(work.rig.farm, {"j"}, t)->rounds_folded);
     return rounds;
   };
   EXPECT_EQ(ends(true), ends(false));

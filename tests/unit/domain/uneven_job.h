@@ -7,7 +7,8 @@
 
 namespace ls::coordinator {
 
-// Tiles of 32 x 32 pixels with variances of 1/8 to 16, each round with a scatter of its own.
+// Returns the error sum of a tile. Tiles have 32 x 32 pixels and variances of 1/8 to 16; every round scatters
+// independently.
 inline double uneven_error(const UnitKey& unit) {
   std::mt19937_64 random(99 + 1000003 * unit.tile + unit.round);
   const double scatter = std::uniform_real_distribution(.7, 1.4)(random);
@@ -26,7 +27,7 @@ inline JobPlan uneven_plan(double target) {
 
 inline std::vector<RoundIndex> ends_in(const Rig& rig) {
   std::vector<RoundIndex> ends;
-  for (TileIndex t = 0; t < 18; ++t) ends.push_back(rig.farm.tile({"j"}, t)->rounds_folded);
+  for (TileIndex t = 0; t < 18; ++t) ends.push_back(tile_figures(rig.farm, {"j"}, t)->rounds_folded);
   return ends;
 }
 

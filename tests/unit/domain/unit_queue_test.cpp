@@ -1,4 +1,5 @@
-// The order in which a job's units are handed out: what is surely wanted, then what probably is.
+// The order in which a job's units are leased: first those that are certain to be needed, then speculative
+// ones.
 #include "coordinator/domain/unit_queue.h"
 
 #include <gtest/gtest.h>
@@ -34,7 +35,8 @@ TEST(UnitQueue, RoundsOfAllTilesOneAfterTheOther) {
 TEST(UnitQueue, WhatIsSurelyWantedGoesFirstThenWhatGainsMost) {
   const UnitTable units(3);
   UnitQueue queue(3, 10);
-  // 64 samples after round 5, then 64 a round: gains of tile 0 are 90 / (64 * 128), 90 / (128 * 192)...
+  // There are 64 samples after round 5, and each later round adds 64: the gains of tile 0 are 90 / (64 *
+  // 128), 90 / (128 * 192)...
   queue.set_wanted(0, 6, 90);
   queue.set_wanted(1, 8, 0);
   queue.set_wanted(2, 6, 40);
@@ -57,9 +59,9 @@ TEST(UnitQueue, WhatCameBackGoesFirstAmongItsLike) {
   UnitQueue queue(2, 8);
   for (const TileIndex t : {0u, 1u}) queue.set_wanted(t, 6, 1);
   while (queue.front(units, nobody) != unit_code(7, 0)) queue.pop(*queue.front(units, nobody));
-  queue.put_back(unit_code(6, 1));  // of those that are probably wanted
+  queue.put_back(unit_code(6, 1));  // a speculative unit
   EXPECT_EQ(queue.front(units, nobody), unit_code(6, 1));
-  queue.rewind(1, 5);  // one that surely is waits again
+  queue.rewind(1, 5);  // a certain unit waits again
   EXPECT_EQ(queue.front(units, nobody), unit_code(5, 1));
   queue.pop(unit_code(5, 1));
   queue.put_back(unit_code(5, 1));
@@ -109,7 +111,7 @@ TEST(UnitQueue, AnErrorThatIsNotKnownStandsForAGreatOne) {
   EXPECT_EQ(all_of(queue, units).at(12), unit_code(6, 1));
 }
 
-// The same by looking through all units each time.
+// The same queue, but it looks through all units each time.
 struct Oracle {
   std::vector<RoundIndex> next, end, window, before;
   std::vector<double> variance;
@@ -208,7 +210,7 @@ TEST(UnitQueue, IsWhatLookingThroughAllUnitsSays) {
   }
 }
 
-// However many came back that are only probably wanted, they are not looked through for one that surely is.
+// However many speculative units came back, the search for a certain one does not look through them.
 TEST(UnitQueue, FindsWhatIsWantedWithoutLookingAtTheRest) {
   const UnitTable units(2);
   UnitQueue queue(2, 10'000);
@@ -227,12 +229,12 @@ TEST(UnitQueue, FindsWhatIsWantedWithoutLookingAtTheRest) {
   };
   EXPECT_EQ(queue.front(units, none_of_tile_1), unit_code(0, 1));
   EXPECT_EQ(looked_at, 1);
-  queue.set_wanted(0, 1, 1);  // one more is wanted
+  queue.set_wanted(0, 1, 1);  // one more round is certain to be needed
   EXPECT_EQ(queue.front(units, none_of_tile_1), unit_code(0, 0));
   EXPECT_EQ(looked_at, 2);
 }
 
-// A rule that changes its mind a million times leaves no million entries.
+// Entries that a million changes of the predicted order made outdated do not accumulate.
 TEST(UnitQueue, WhatIsOutdatedIsNotKept) {
   const UnitTable units(4);
   UnitQueue queue(4, 100);

@@ -4,7 +4,7 @@
 
 namespace ls::coordinator {
 
-// Half of the histories have limits, a third audits, and half of those a liar.
+// Half of the histories have limits, a third have audits, and half of the latter have a faulty worker.
 Walk::Walk(std::uint64_t seed) : random_(seed), farm_(Farm::Options{"r0"}) {
   const auto some = [&](int most) {
     return chance(50) ? 0 : 1 + static_cast<std::uint32_t>(pick(static_cast<std::uint64_t>(most)));
@@ -34,7 +34,7 @@ std::string Walk::run(int events) {
 
 void Walk::send(const Event& event) {
   for (const Effect& effect : farm_.handle(event, now_)) see(effect);
-  if (std::string wrong = farm_.audit(); !wrong.empty()) blame("audit: " + wrong);
+  if (std::string wrong = audit(farm_); !wrong.empty()) blame("audit: " + wrong);
   check_figures();
 }
 
@@ -127,7 +127,7 @@ void Walk::submit() {
   job.plan.owner = std::array{"", "ann", "bob"}[pick(3)];
   if (chance(20)) job.plan.max_workers = 1 + static_cast<std::uint32_t>(pick(3));
   if (chance(20)) job.plan.max_units = 1 + static_cast<std::uint32_t>(pick(6));
-  if (chance(30)) {  // frames have their sequence's owner and limits
+  if (chance(30)) {  // frames have the owner and the limits of their sequence
     job.plan.group = "film";
     job.plan.owner = "ann";
     job.plan.max_workers = 2;
@@ -148,7 +148,7 @@ void Walk::join(const std::string& name) {
   worker.numeric_class = name == "w4" ? 2 : 1;
   std::vector<std::string> tags;
   if ((name.back() - '0') % 2 == 0) tags = {"even"};
-  // w0 and w4 do not say what memory they have; w1 has too little for some jobs.
+  // w0 and w4 do not report their memory; w1 has too little for some jobs.
   const std::uint64_t memory =
       std::array<std::uint64_t, 5>{0, 4, 16, 16, 0}[static_cast<std::size_t>(name.back() - '0')];
   send(WorkerJoined{
@@ -160,7 +160,8 @@ void Walk::worker_acts() {
   FakeWorker& worker = workers_[name];
   const std::uint64_t what = pick(100);
   if (!worker.connected || what < 2) return join(name);
-  if (what < 5) {  // the agent dies, or only the stream breaks and it finishes what it holds
+  // The agent dies and loses its units, or only the stream breaks, and the worker finishes its units
+  if (what < 5) {
     if (chance(50)) worker.held.clear();
     worker.connected = false;
     return send(WorkerLost{{name}, worker.epoch});
@@ -201,7 +202,7 @@ void Walk::render(const std::string& name) {
                          0.001 * static_cast<double>(pick(5000))});
 }
 
-// kill -9: what was stored is all that is left. Streams break; workers keep what they hold.
+// Kills the coordinator: only stored data is left, and the streams break. Workers keep their units.
 void Walk::restart() {
   ++restarts_;
   Farm fresh{options()};
@@ -211,8 +212,8 @@ void Walk::restart() {
     const JobFigures f = farm_.job(id).value();
     job.plan = farm_.plan(id).value();
     if (f.state == JobState::done) ended_before_.insert(id);
-    // When its time is up, a job with a target folds results beyond the level of its target. After a restart
-    // the target may end it, with more rounds than the target needs.
+    // At the end of its time, a job with a target error folds results beyond the level of its target. After a
+    // restart the target may end the job with more rounds than the target needs.
     if (job.plan.time && job.plan.target_error && f.state != JobState::done) job.disturbed = true;
     JobRestored event{job.plan, f.state,    f.stopped, f.numeric_class,
                       {},       job.folded, {},        f.first_ray ? 0.5 : 0.0};

@@ -1,8 +1,8 @@
 // A simulated farm for random walks: workers that crash, stall, fail, duplicate, reorder, drain, reconnect
-// and bring results late; in some histories one that renders wrong pixels; an assembler that folds later;
+// and bring results late, in some histories one that renders wrong pixels; an assembler that folds later;
 // users with limits who pause, extend, stop, cancel and change priorities; a coordinator that restarts. After
-// every event the farm audits itself and the walk compares it with its own books; at its end a job's film
-// must be what honest workers alone would have made.
+// every event the farm checks its invariants (farm_inspector.h), and the walk compares its own records with
+// those of the farm. At its end a job's film must be the one that honest workers alone would have made.
 #pragma once
 
 #include <deque>
@@ -19,8 +19,8 @@ class Walk {
  public:
   explicit Walk(std::uint64_t seed);
 
-  // A number of random events, then fair weather until every job has ended. What went wrong first; empty:
-  // nothing.
+  // Makes this many random events, then only helpful ones until every job has ended. Returns the first
+  // problem; empty: there was none.
   std::string run(int events);
 
  private:
@@ -31,13 +31,13 @@ class Walk {
     std::uint64_t numeric_class = 1;
     std::deque<Rig::Held> held;
   };
-  struct StoredJob {  // what the service would have stored
+  struct StoredJob {  // the data that the service would have stored
     JobPlan plan;
-    std::uint64_t errors = 0;               // seed of its tiles' errors
-    bool disturbed = false;                 // extended or stopped: where it ends is not foreseen here
-    bool reopened = false;                  // ended, and then given a smaller target
-    bool discarded = false;                 // some of it was void
-    std::vector<std::vector<Digest>> film;  // of each tile, round by round
+    std::uint64_t errors = 0;               // seed of the errors of its tiles
+    bool disturbed = false;                 // extended or stopped: the test does not predict where it ends
+    bool reopened = false;                  // it had ended and then got a smaller target
+    bool discarded = false;                 // some of its pixels were void
+    std::vector<std::vector<Digest>> film;  // digests of each tile's rounds, in order
     std::map<std::pair<TileIndex, RoundIndex>, RecordUnit> accepted;
     std::vector<RoundIndex> fold_asked, folded;
     std::uint64_t done_seen = 0;
@@ -78,9 +78,10 @@ class Walk {
   static double error_sum(const StoredJob& job, TileIndex tile, RoundIndex round);
 
   std::mt19937_64 random_;
-  std::string faulty_;  // empty: all are honest
+  std::string faulty_;  // the worker that renders wrong pixels; empty: none
   bool found_ = false;
-  std::set<JobId> ended_before_;  // the liar was found, or a restart: what it had rendered of them stands
+  // Jobs that had ended when the faulty worker was found, or before a restart: its results in them stay
+  std::set<JobId> ended_before_;
   ShareLimits limits_;
   double audit_rate_ = 0;
   int restarts_ = 0, submitted_ = 0;
@@ -88,8 +89,8 @@ class Walk {
   TimePoint now_{};
   std::map<std::string, FakeWorker> workers_;
   std::map<JobId, StoredJob> jobs_;
-  std::deque<UnitFolded> unfolded_;      // asked for, not done
-  std::deque<UnitAccepted> on_the_way_;  // results in the network; any may come first, some come twice
+  std::deque<UnitFolded> unfolded_;      // requested folds that are not done
+  std::deque<UnitAccepted> on_the_way_;  // results in the network: any may arrive first, some arrive twice
   std::string wrong_;
 };
 

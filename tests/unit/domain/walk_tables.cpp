@@ -1,4 +1,4 @@
-// What a walk sees of the farm's effects, and what it holds against its own books.
+// How a walk records the farm's effects, and compares its records with the farm's.
 #include "common/base/overloaded.h"
 #include "tests/unit/domain/stop_oracle.h"
 #include "tests/unit/domain/walk.h"
@@ -11,8 +11,8 @@ void Walk::see(const Effect& effect) {
                           auto& accepted = jobs_[e.unit.job].accepted;
                           const bool once = accepted.try_emplace({e.unit.tile, e.unit.round}, e).second;
                           if (!once && accepted[{e.unit.tile, e.unit.round}].samples == e.samples) {
-                            // Beyond a stop acceptances are forgotten and may be made again after an
-                            // extension.
+                            // After a job has stopped, accepted results beyond its end are forgotten; an
+                            // extension may accept these units again.
                             if (!jobs_[e.unit.job].disturbed && !jobs_[e.unit.job].reopened)
                               blame("a unit was accepted twice");
                           }
@@ -58,7 +58,7 @@ void Walk::see_discard(const TileDiscarded& discarded) {
   });
 }
 
-// Once a liar is found nothing of it is left; and where nobody lies every unit is what it must be.
+// Once the faulty worker is found, none of its pixels are left. Without a faulty worker every unit is right.
 void Walk::see_film(const JobId& id) {
   const StoredJob& job = jobs_[id];
   const std::uint64_t spp = farm_.job(id)->spp;
@@ -104,7 +104,8 @@ void Walk::see_fold(const Fold& fold) {
   unfolded_.push_back({fold.unit, fold.samples, error_sum(job, fold.unit.tile, fold.unit.round)});
 }
 
-// The variance per sample is 2^-3 to 2^3, a tile's own, and every round scatters.
+// Returns the error sum of a tile. Each tile has a variance per sample of 2^-3 to 2^3, and every round
+// scatters.
 double Walk::error_sum(const StoredJob& job, TileIndex tile, RoundIndex round) {
   std::mt19937_64 of_tile(job.errors + tile), of_round(job.errors + 1000003 * round + tile);
   const double variance = std::exp2(static_cast<double>(of_tile() % 7) - 3);
@@ -118,7 +119,7 @@ void Walk::see_end(const JobId& id, StopReason reason) {
   if (job.folded != job.fold_asked) blame("a job finished before all was folded");
   see_film(id);
   if (job.disturbed || reason == StopReason::time || reason == StopReason::user) return;
-  // Where it must end, from its numbers alone.
+  // Where each tile must end, computed from its errors alone.
   const std::uint64_t spp = farm_.job(id)->spp;
   const auto target = farm_.plan(id)->target_error;
   std::vector<RoundIndex> ends(job.folded.size(), round_count(spp));

@@ -5,8 +5,8 @@
 namespace ls::coordinator {
 namespace {
 
-// Sanitizers make a step ten to fifty times dearer and look for other faults than wrong decisions: fewer
-// histories do.
+// A step takes ten to fifty times as long under sanitizers. They look for other faults than wrong decisions,
+// so fewer histories are enough.
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
 constexpr std::uint64_t kShort = 60, kLong = 2;
 #else

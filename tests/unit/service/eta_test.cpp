@@ -1,5 +1,5 @@
-// When a job will be done: which end comes first, and what is known of it.
-#include "coordinator/service/state/eta.h"
+// Predictions of when a job will be done: which end comes first, and what is unknown.
+#include "coordinator/service/state/job_views.h"
 
 #include <gtest/gtest.h>
 
@@ -8,19 +8,20 @@
 namespace ls::coordinator {
 namespace {
 
-// relMSE 1 / spp, .01 core seconds a sample: 1e-3 is down to after 10 core seconds.
+// A curve with relMSE 1 / spp, at .01 core seconds per sample: the relMSE is 1e-3 after 10 core seconds.
 std::vector<ErrorPoint> points(double last) {
   std::vector<ErrorPoint> all;
   for (double n = 2; n <= last; n *= 2) all.push_back({n, n / 100, 1 / n, .95 / n, 1.05 / n});
   return all;
 }
 
-// At 256 samples: 2.56 core seconds spent, 7.44 to the target, about 30 to the end of the samples.
+// The job has 256 samples and has used 2.56 core seconds. It needs 7.44 more to the target, and about 30 to
+// the sample limit.
 EtaInputs facts() {
   EtaInputs f;
   f.done = 256. / 3300;
   f.core_seconds = 2.56;
-  f.core_left = 1;  // a steered job's own foresight
+  f.core_left = 1;  // the scheduler's own prediction for an adaptive job
   f.core_to_limit = 30;
   f.target = 1e-3;
   f.elapsed = 2;
@@ -99,7 +100,8 @@ TEST(Eta, WithMoreWorkersIsShorterInProportion) {
   EXPECT_DOUBLE_EQ(out.with_more_ci95->second, out.ci95->second / 5);
 }
 
-// 1.5 core seconds in four units: a fifth thread has nothing to do, and no unit takes less than its own time.
+// With 1.5 core seconds left in four units, a fifth thread has nothing to do, and the time is never less than
+// that of one unit.
 TEST(Eta, NoMoreThreadsHelpThanThereAreUnitsLeft) {
   EtaInputs f;
   f.core_left = 1.5;
@@ -114,8 +116,9 @@ TEST(Eta, NoMoreThreadsHelpThanThereAreUnitsLeft) {
   EXPECT_FALSE(eta_of(f, {}).with_more) << "all four are under way";
 }
 
-// By how many units a target is met is not known: threads wait at the end for the last one, and may have been
-// busy with what is dropped when it came: twice a unit's time at most. One thread waits for nobody.
+// The number of units that a target needs is not known. At the end, threads wait for the last needed unit;
+// this unit itself may have waited for a thread that rendered a unit that was not needed. Together the wait
+// is at most twice a unit's time. With one thread there is no wait.
 TEST(Eta, OfATargetThreadsWaitForTheLastUnit) {
   EtaInputs f = facts();
   f.cores = 4;
@@ -129,7 +132,7 @@ TEST(Eta, OfATargetThreadsWaitForTheLastUnit) {
   EXPECT_DOUBLE_EQ(*eta_of(f, points(256)).seconds, 4 * *even.seconds);
 }
 
-// No wait makes it longer than one thread alone would take.
+// With any wait the time is at most that of one thread alone.
 TEST(Eta, WithoutWorkLeftNobodyWaits) {
   EtaInputs f = facts();
   f.cores = 4;
@@ -159,11 +162,11 @@ TEST(Eta, OfThePartOfAUnitThatIsLeftIsThatPart) {
   f.unit_seconds = 1;
   f.cores = 8;
   EXPECT_DOUBLE_EQ(*eta_of(f, {}).seconds, .25);
-  f.cores = .5;  // of a worker that it shares with other jobs
+  f.cores = .5;  // the job gets half a core of a worker that it shares with other jobs
   EXPECT_DOUBLE_EQ(*eta_of(f, {}).seconds, .5);
 }
 
-// Each end is on as many cores as help it.
+// Each end of the interval assumes as many cores as help it.
 TEST(Eta, AnIntervalHoldsItsMiddleWhereUnitsAreFew) {
   EtaInputs f = facts();
   f.unit_seconds = 3;

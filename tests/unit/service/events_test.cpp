@@ -5,7 +5,7 @@
 #include <set>
 
 #include "coordinator/base/limits.h"
-#include "coordinator/service/state/event_hub.h"
+#include "coordinator/service/state/publisher.h"
 #include "coordinator/views/views.h"
 #include "tests/unit/service/fake_farm.h"
 #include "tests/unit/store/temp_folder.h"

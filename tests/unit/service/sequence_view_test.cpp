@@ -1,9 +1,9 @@
-// A sequence's figures from those of its frames.
+// How the view of a sequence is computed from those of its frames.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "coordinator/service/state/sequence.h"
+#include "coordinator/service/state/job_views.h"
 
 namespace ls::coordinator {
 namespace {
@@ -73,8 +73,8 @@ TEST(SequenceView, AddsUpAndWeighsByPixels) {
   EXPECT_EQ(v.elapsed_seconds, 12);
 }
 
-// Two frames of one size with relMSE 2 and 4, known to 3/-1 and 4/-0: the mean is 3, and independent errors
-// of a mean of two have half the root of the sum of squares: 5/2 above, 1/2 below.
+// Two frames of equal size have relMSE 2 (interval +3/-1) and 4 (+4/-0). The mean is 3. The half-width of a
+// mean of two independent estimates is half the root of the sum of squares: 5/2 above, 1/2 below.
 TEST(SequenceView, ItsErrorIsTheMeanAndItsIntervalThatOfIndependentEstimates) {
   auto frames = with({JobState::done, JobState::done, JobState::queued});
   frames[0].error_now = ErrorFigures{3, 2, 1, 5};
@@ -114,7 +114,7 @@ TEST(SequenceView, ExpectsFramesThatWaitToCostWhatTheOthersDo) {
 
   const JobView v = whole(frames, 4);
 
-  // 60 core seconds for 1.5 frames: 40 each. Half a frame and a whole one are left, on 4 threads.
+  // 1.5 frames took 60 core seconds: 40 per frame. One and a half frames are left, on 4 threads.
   EXPECT_DOUBLE_EQ(v.eta_seconds.value(), 15);
   EXPECT_DOUBLE_EQ(v.queued_core_seconds, 47);
   EXPECT_FALSE(whole(frames, 0).eta_seconds);
@@ -130,7 +130,7 @@ TEST(SequenceView, ItsTimeLeftIsThatOnCoresThatItsLimitsAndUnitsKeepBusy) {
 
   EXPECT_DOUBLE_EQ(eta(8, 4), 5);
   EXPECT_DOUBLE_EQ(eta(1000, 4), 4) << "ten units are left";
-  frames[0].max_workers = 1;  // a sequence's limits stand at its first frame
+  frames[0].max_workers = 1;  // the limits of a sequence are those of its first frame
   EXPECT_DOUBLE_EQ(eta(8, 4), 20);
   frames[0].max_units = 1;
   EXPECT_DOUBLE_EQ(eta(8, 4), 40);

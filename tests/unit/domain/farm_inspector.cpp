@@ -1,4 +1,5 @@
-// Farm::audit(), which checks the farm's invariants, and Farm::sizes().
+#include "tests/unit/domain/farm_inspector.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,7 +9,15 @@
 #include "coordinator/domain/farm/farm_state.h"
 
 namespace ls::coordinator {
+
+struct FarmInspector {
+  using State = Farm::State;
+  static State& state(const Farm& farm) { return *farm.state_; }
+};
+
 namespace {
+
+using State = FarmInspector::State;
 
 std::string audit_job(Job& job, const LeaseTable& leases) {
   const std::string name = "job " + job.plan.brief.job.value + ": ";
@@ -120,8 +129,8 @@ std::string audit_loads(const std::string& what, const std::map<std::string, Loa
 
 }  // namespace
 
-std::vector<std::pair<std::string, std::size_t>> Farm::sizes() const {
-  const State& s = *state_;
+std::vector<std::pair<std::string, std::size_t>> sizes(const Farm& farm) {
+  const State& s = FarmInspector::state(farm);
   std::size_t of_workers = 0, of_jobs = 0, units = 0;
   for (const auto& [index, w] : s.workers.all())
     of_workers += w->tags.size() + w->blobs.size() + w->leases.size() + w->briefed.size() +
@@ -145,8 +154,25 @@ std::vector<std::pair<std::string, std::size_t>> Farm::sizes() const {
           {"quarantined", s.quarantined.size()}};
 }
 
-std::string Farm::audit() const {
-  State& state = *state_;
+std::vector<JobId> jobs_of(const Farm& farm) {
+  std::vector<JobId> ids;
+  for (const auto& [seq, job] : FarmInspector::state(farm).jobs) ids.push_back(job->plan.brief.job);
+  return ids;
+}
+
+std::optional<TileFigures> tile_figures(const Farm& farm, const JobId& id, TileIndex tile) {
+  const Job* job = FarmInspector::state(farm).find(id);
+  if (job == nullptr || tile >= job->units.tiles()) return std::nullopt;
+  const RoundIndex rounds = job->units.folded(tile);
+  return TileFigures{rounds, rounds == 0 ? 0 : cut_range(rounds - 1, job->spp).s1};
+}
+
+std::vector<FairShare::Figure> shares(const Farm& farm) {
+  return FarmInspector::state(farm).shares.figures();
+}
+
+std::string audit(const Farm& farm) {
+  State& state = FarmInspector::state(farm);
   std::map<WorkerIndex, std::uint32_t> units_out;
   int threads = 0;
   double cores = 0;
