@@ -19,7 +19,7 @@ BlobStream::BlobStream(Coordinator& coordinator, const lightshaft::farm::v1::Fet
       run_(std::move(run)),
       on_gone_(std::move(on_gone)) {}
 
-// No member may be used after a write or Finish has been started: OnDone, which deletes this object, may run
+// After a write or Finish has been started, no member may be used: OnDone, which deletes this object, may run
 // immediately.
 void BlobStream::begin(const JoinGuard& guard, const std::string& address) {
   if (const int wait = guard.wait(address, request_.join_token()); wait > 0)

@@ -74,7 +74,8 @@ void WorkStream::OnReadDone(bool ok) {
     end(grpc::Status::OK);
     return;
   }
-  // A message of a kind that only newer versions have is ignored: newer workers must not rely on it
+  // A message of an unknown kind comes from a newer worker and is ignored; workers must not rely on messages
+  // that older coordinators do not know
   if (greeted_ && !wire::known(incoming_)) {
     StartRead(&incoming_);
     return;

@@ -50,8 +50,8 @@ Result<std::unique_ptr<JobStore>> open_store(const Coordinator::Options& options
   return open_redis_job_store(std::move(*local), std::move(redis));
 }
 
-// Returns a random number: the seed that decides which results are audited (rendered again). Workers must not
-// be able to predict it.
+// Returns a random seed, which decides which results are audited (rendered again by another worker). Workers
+// must not be able to predict it.
 std::uint64_t random_number() {
   std::random_device device;
   return std::uint64_t{device()} << 32 | device();

@@ -1,8 +1,7 @@
 // The state of the coordinator's jobs and workers. One mutex guards all of it: it can be reached only through
 // Guarded<Core>::lock(). So a function with a Core& parameter runs under the lock, and a function without one
-// does not need the lock. Facts of a JobEntry that never change (id, scene, settings, grid) may also be read
-// without the lock. Slow work has its own threads, which take the lock briefly:
-//
+// does not need the lock. Members of a JobEntry that never change (id, scene, settings, grid) may also be
+// read without the lock. Slow work has its own threads, which take the lock briefly:
 //   receive() -> [verify threads: decode, digest] -> [commit thread: append, one fdatasync for all]
 //     -> farm -> acknowledge
 //   [writer thread: convergence points, logs, snapshots, final images; strictly in order]

@@ -62,7 +62,7 @@ class FarmDriver {
   ImageWriter& images_;
   ReferenceComparer& comparer_;
   std::deque<Event> todo_;        // events raised by effects, to be handled next
-  std::vector<EntryPtr> folded_;  // jobs to whose images the events being handled have added units
+  std::vector<EntryPtr> folded_;  // jobs whose images got units from the events that are being handled
 };
 
 }  // namespace ls::coordinator

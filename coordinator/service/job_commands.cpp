@@ -74,8 +74,8 @@ Result<void> may_wake(double pixels) {
                           pixels, limits::kMaxWokenPixels));
 }
 
-// Returns the frames to which a new target error applies: those whose end is not decided yet, and those that
-// ended because they reached a larger target.
+// Returns the frames to which a new target error applies: those that have not ended, and those that ended
+// because they reached a larger target.
 Result<std::vector<EntryPtr>> may_retarget(const Farm& farm, const JobId& id,
                                            const std::vector<EntryPtr>& sound, double target_error) {
   std::vector<EntryPtr> chosen;
@@ -101,8 +101,8 @@ Result<std::vector<EntryPtr>> may_retarget(const Farm& farm, const JobId& id,
   return chosen;
 }
 
-// Returns the frames that do not have `spp` samples yet; others may have them already, after an interrupted
-// change.
+// Returns the frames that do not have `spp` samples yet. Some may have them already, if an earlier change was
+// interrupted.
 Result<std::vector<EntryPtr>> may_extend(const Farm& farm, const Sequence& sequence, std::uint64_t spp) {
   std::vector<EntryPtr> chosen;
   double woken = 0;
@@ -375,8 +375,8 @@ Result<void> JobCommands::set_priority_of_all(Core& core, const Entries& frames,
   return {};
 }
 
-// Changes the state of the frames and stores them together. A frame whose image is being written is left
-// unchanged, unless the writing has failed and is to be repeated.
+// Changes the state of the frames and stores them together. A frame whose final image is being written is
+// left unchanged; if writing has failed, it is repeated.
 Result<void> JobCommands::become_all(Core& core, const Entries& frames, JobState asked) const {
   Result<void> done;
   const auto saved = core.records.put_together([&] {

@@ -91,7 +91,7 @@ Result<void> Restore::take_up(Core& core, JobEntry& entry,
   entry.points = std::move(*points);
   if (entry.unloaded) return {};
   if (!missing) return tl::unexpected(missing.error());
-  // A job paused by its user stays paused.
+  // A job that is paused by its user stays paused and does not wait for blobs.
   if (entry.stored.state != JobState::paused || !entry.stored.missing_blobs.empty()) {
     for (const BlobRef& file : *missing) await_blob(core, entry, file, false);
     if (!missing->empty()) entry.stored.state = JobState::paused;
@@ -99,9 +99,9 @@ Result<void> Restore::take_up(Core& core, JobEntry& entry,
   if (auto loaded = load(core, entry); !loaded) return loaded;
   const bool begins_again =
       entry.assembly->film().samples() == 0 && (!entry.log || entry.log->found().empty());
-  // If some pixels were wrong, the points of the curve and the checks of the denoised layers describe them
-  // and are dropped. If the image is only lost, rendering again gives the same pixels, so the checks stay
-  // valid.
+  // If a quarantined worker's results are in the log, some pixels were wrong: the points of the curve and the
+  // checks of the denoised layers describe wrong pixels and are dropped. If the image is only lost, the
+  // checks stay, since rendering again gives the same pixels.
   if (has_quarantined(core.driver.farm(), entry))
     core.records.forget_wrong_pixels(entry);
   else if (begins_again)

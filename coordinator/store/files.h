@@ -35,7 +35,7 @@ class File {
 // Makes an error from errno: a full disk is resource_exhausted, a missing file not_found.
 Error errno_error(std::string_view what, const std::filesystem::path& path);
 
-Result<void> make_folder(const std::filesystem::path& folder);  // also creates its parents; mode 0750
+Result<void> make_folder(const std::filesystem::path& folder);  // also creates its parents
 Result<void> write_all(const File& file, std::span<const std::byte> bytes, const std::filesystem::path& path);
 // Reads exactly `length` bytes from `offset` on; a shorter file is an error.
 Result<std::vector<std::byte>> read_at(const File& file, std::uint64_t offset, std::size_t length,

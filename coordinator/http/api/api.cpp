@@ -52,8 +52,8 @@ std::string target_of(const Request& request) {
   return target;
 }
 
-// Returns a redirect to the coordinator that has the job, or a 503 if that coordinator is unknown at the
-// moment or does not answer; nullopt: no coordinator has the job.
+// Returns a redirect to the coordinator that has the job, or a 503 if that coordinator does not answer or the
+// job's owner cannot be looked up now. nullopt: no coordinator has the job.
 std::optional<Response> at_its_owner(coordinator::Coordinator& coordinator, const Request& request,
                                      const Params& params) {
   if (params.empty() || !plausible_id(params[0])) return std::nullopt;
@@ -87,8 +87,8 @@ Api::Api(coordinator::Coordinator& coordinator, TokenRegistry& tokens, Limits li
 
 std::variant<Response, Match> Api::admit(Request& request) {
   auto found = admit_route(request);
-  // Requests of known callers were counted when the caller was identified. The others are counted here, by
-  // address.
+  // The limit on requests per caller has been applied to identified callers already. All other requests are
+  // limited here, by address.
   if (request.caller.token_id.empty())
     if (auto refused = auth_.too_often(request, nullptr)) return *refused;
   return found;
@@ -106,7 +106,8 @@ std::variant<Response, Match> Api::admit_route(Request& request) {
       response.headers.emplace_back("Allow", "GET, HEAD, OPTIONS");
       return response;
     }
-    // Under /api only callers with a token get the 404 of an unknown address.
+    // Under /api a caller without a token gets a 401 even for an unknown address, so the 404 does not reveal
+    // to strangers which routes exist.
     if (!request.segments.empty() && request.segments.front() == "api")
       if (auto refused = refuse_caller(Access::token, request)) return *refused;
     return not_found(request);
@@ -184,8 +185,8 @@ Response Api::handle(const Match& match, const Request& request) {
   });
 }
 
-// Only jobs unknown here are looked up at other coordinators; the job's own coordinator checks access. A
-// local job that the caller may not see stays a 404.
+// Only jobs that this coordinator does not have are looked up at others; the job's own coordinator then
+// checks access. For a job that is here but invisible to the caller, the 404 stays.
 bool Api::may_be_another_coordinators(const Match& match, const Response& response) const {
   return response.status == 404 && match.route->pattern.starts_with(kOneJob) && !match.params.empty() &&
          !coordinator_.owner(JobId{match.params[0]});

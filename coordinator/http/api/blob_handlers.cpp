@@ -84,8 +84,8 @@ class StoreSink final : public BodySink {
   std::uint64_t limit_, received_ = 0;
 };
 
-// Receives the body of a blob that exists already, undamaged. Writes nothing, but rejects a body that differs
-// from the blob.
+// Receives the body of a blob that is stored already and undamaged. It stores nothing, but rejects a body
+// that differs from the blob.
 class CompareSink final : public BodySink {
  public:
   CompareSink(const Digest& digest, std::uint64_t limit) : digest_(digest), limit_(limit) {}
@@ -122,8 +122,8 @@ Response refused_part(int status, std::string_view detail, std::uint64_t offset)
   return response;
 }
 
-// Receives and ignores a part of a blob that the store already has completely. An answer before the end of
-// the part would break the connection.
+// Receives and ignores a part of a blob that is stored completely already. The part is read to its end, since
+// an earlier answer would break the connection.
 class IgnoreSink final : public BodySink {
  public:
   IgnoreSink(const Digest& digest, std::uint64_t bytes) : digest_(digest), left_(bytes) {}
@@ -214,7 +214,7 @@ std::variant<Response, std::unique_ptr<BodySink>> open_blob(Api& api, const Requ
   if (!request.header("content-range").empty()) return open_part(api, request, *digest);
   auto& blobs = api.coordinator().blobs();
   if (blobs.prove(*digest)) {
-    // A client that waits for '100 Continue' has not sent the body yet and does not have to.
+    // A client that waits for '100 Continue' has not sent the body yet and need not send it.
     if (!request.header("expect").empty()) return stored(*digest, 204);
     return std::make_unique<CompareSink>(*digest, api.limits().blob_bytes);
   }
@@ -257,7 +257,7 @@ Response post_blobs_missing(Api& api, const Request& request, const Params&) {
     const auto digest = read_digest(item, fmt::format("digests[{}]", &item - &list->front()));
     if (!digest) return problem(digest.error());
     const auto there = api.coordinator().blobs().find(*digest);
-    if (!there) return problem(there.error());  // it is unknown at the moment whether the store has the blob
+    if (!there) return problem(there.error());  // the store cannot be asked now
     if (!*there) missing.push_back(digest->hex());
   }
   return json_response(200, write_json({{"missing", std::move(missing)}}));

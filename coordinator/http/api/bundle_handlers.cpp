@@ -134,7 +134,7 @@ class BundleSink final : public BodySink {
 std::variant<Response, std::unique_ptr<BodySink>> open_bundle(Api& api, const Request& request) {
   if (!request.header("content-encoding").empty())
     return problem(415, "send the bundle as it is: Content-Encoding is not decoded");
-  // Errors in the query are reported here, before gigabytes have arrived.
+  // The query is checked before the body, which may have gigabytes, is received.
   const auto spec = spec_from_query(request.query, "");
   if (!spec) return problem(spec.error());
   if (auto refused = refuse_priority(api, request.caller, spec->priority)) return std::move(*refused);

@@ -62,7 +62,7 @@ std::variant<Response, std::unique_ptr<BodySink>> open_blob(Api&, const Request&
 // bundle_handlers.cpp: POST /jobs with an archive
 std::variant<Response, std::unique_ptr<BodySink>> open_bundle(Api&, const Request&);
 
-// The steps that all submissions share, whether the body was a scene, JSON or an archive (job_handlers.cpp)
+// The steps that all submissions share, whether the body was a scene, JSON or an archive (job_handlers.cpp).
 
 // Returns the text of a scene file from the blob store; a file of more than scene::kMaxTextBytes bytes is an
 // error.

@@ -76,7 +76,7 @@ Result<SubmitRequest> from_xml(const Request& request) {
   return submit;
 }
 
-// Reads all changes of a PATCH, so that an error in one of them is found before any is applied.
+// Reads all changes in the body of a PATCH, so that an error in one is found before any is applied.
 Result<coordinator::JobChange> read_change(std::string_view text) {
   using coordinator::JobState;
   const auto body = read_object(text, {"state", "priority", "spp", "target_error", "focus"});

@@ -27,7 +27,7 @@ std::uint64_t files_in(const char* folder) {
   for (std::filesystem::directory_iterator at(folder, failed), end; !failed && at != end;
        at.increment(failed))
     ++count;
-  // Does not count the descriptor that this iteration itself opens
+  // The iterator itself has one descriptor open, which is not counted
   return failed || count == 0 ? 0 : count - 1;
 }
 
@@ -122,8 +122,8 @@ void write_leases(std::string& out, const coordinator::FarmFigures& f) {
          f.units_leased);
   head(out, "lightshaft_units_freed_total", "counter",
        "Units that a worker had and did not hand in, by cause; those that are still wanted go to another.");
-  // All causes are listed, even with count 0: Prometheus can compute the rate of an event only if its counter
-  // existed before.
+  // Causes with count 0 are listed, too: Prometheus computes the rate of a counter only from values that it
+  // has seen, so a counter that first appeared with 1 would lose that event.
   for (const auto& [cause, word] : coordinator::kFreedCauses) {
     const auto count = f.units_freed.find(cause);
     fmt::format_to(std::back_inserter(out), "lightshaft_units_freed_total{{cause=\"{}\"}} {}\n", word,

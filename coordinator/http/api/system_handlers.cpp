@@ -20,8 +20,8 @@ Response event_stream(const Request& request, std::string job) {
   EventStream stream;
   stream.job = std::move(job);
   stream.reader = request.caller;
-  // Browsers send the header Last-Event-ID when they reconnect. Its id is later than that of last_event_id in
-  // the address.
+  // A browser that reconnects sends the header Last-Event-ID with the last id it got, which is later than the
+  // parameter last_event_id in the address.
   std::string_view text = request.header("last-event-id");
   if (text.empty()) text = request.parameter("last_event_id").value_or("");
   if (!text.empty()) {
@@ -86,8 +86,8 @@ Response get_workers(Api& api, const Request& request, const Params&) {
   auto workers = api.coordinator().workers();
   for (auto& worker : workers) {
     if (request.caller.role != Role::submit) continue;
-    // The status of a worker without a job is hidden, too: it may reveal the worker's earlier jobs for other
-    // users (why it failed or is quarantined).
+    // The activity of a worker without a job is hidden, too: it may tell why the worker failed or is
+    // quarantined, and so reveal earlier jobs of other users.
     const auto owner = api.coordinator().owner(JobId{worker.job});
     if (!owner || !request.caller.sees(*owner)) hide_work(worker);
   }

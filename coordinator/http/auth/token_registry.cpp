@@ -135,7 +135,7 @@ void TokenRegistry::Tokens::put(Role role, std::string user, const Digest& diges
 
 Guarded<TokenRegistry::Tokens>::Lock TokenRegistry::latest() const {
   auto tokens = tokens_.lock();
-  (void)tokens->look_again();  // until the file is right again, the tokens are those of before
+  (void)tokens->look_again();  // if the file is invalid, the tokens stay as they were
   return tokens;
 }
 
@@ -171,7 +171,7 @@ Result<TokenRegistry::Made> TokenRegistry::add(Role role, std::string user) {
   if (!token) return tl::unexpected(token.error());
   const auto tokens = tokens_.lock();
   const FolderLock others(tokens->file.parent_path());
-  // save() replaces the file, so nothing in it may be unread.
+  // save() overwrites the file, so changes by other coordinators must be read first.
   if (auto read = tokens->look_again(); !read) return tl::unexpected(read.error());
   if (tokens->entries.size() >= kMaxTokens)
     return fail(Errc::resource_exhausted, fmt::format("there are {} tokens already", tokens->entries.size()));
@@ -186,7 +186,7 @@ Result<TokenRegistry::Made> TokenRegistry::add(Role role, std::string user) {
 Result<void> TokenRegistry::revoke(std::string_view id) {
   const auto tokens = tokens_.lock();
   const FolderLock others(tokens->file.parent_path());
-  // save() replaces the file, so nothing in it may be unread.
+  // save() overwrites the file, so changes by other coordinators must be read first.
   if (auto read = tokens->look_again(); !read) return tl::unexpected(read.error());
   auto& entries = tokens->entries;
   const auto found =

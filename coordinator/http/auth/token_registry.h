@@ -39,8 +39,8 @@ class TokenRegistry {
   // Makes a registry without files. If `join_token` is empty, no token lets a worker join.
   explicit TokenRegistry(std::string admin_token, std::string join_token = {});
   // Reads the folder's files; creates `token` and `join-token` if they are missing. failed_precondition:
-  // others may write `tokens`, or read or write one of the other two; or a line of `tokens` is invalid, and
-  // the message has its number.
+  // other users may write `tokens`, or may read or write one of the other two; or a line of `tokens` is
+  // invalid, and the message has its number.
   static Result<std::unique_ptr<TokenRegistry>> open(const std::filesystem::path& folder);
 
   // Returns the caller with this token; nullopt: the token is wrong. The search takes equally long in both
@@ -73,8 +73,8 @@ class TokenRegistry {
   // The tokens of the files, as last read.
   struct Tokens {
     void put(Role role, std::string user, const Digest& digest, bool of_file);
-    // Rereads the file if it has changed, or could not be read the last time. Error: it cannot be read, or
-    // has a wrong line. Then `entries` stays as it is, and the error is logged once.
+    // Rereads the file if it has changed or could not be read the last time. On an error (the file cannot be
+    // read, or has an invalid line) `entries` stays as it is, and the error is logged once.
     Result<void> look_again();
     Result<void> read_all();
     Result<void> read_line(std::string_view line);

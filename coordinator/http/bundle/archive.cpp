@@ -110,7 +110,7 @@ struct ArchiveReader::State {
   Source source;
   ArchiveKind kind = ArchiveKind::zip;
   std::unique_ptr<archive, FreeArchive> reader;
-  // offset, in the unpacked tar, of the end of the current entry's data
+  // end of the current entry's data, in bytes of the unpacked tar
   std::int64_t data_end = 0;
 
   Error error(std::string_view doing) const;

@@ -118,9 +118,9 @@ class Survey {
     return {};
   }
 
-  // True if this file may be the bundle's job.json. That is a job.json at the top or, since a folder that
-  // contains all files but litter counts as the top, one directly in a folder. When two such files were
-  // found, no more are kept from folders: no folder contains all files then.
+  // True if this file may be the bundle's job.json: a job.json at the top of the archive, or directly in a
+  // folder, since a folder with all files (except litter) counts as the top. If two folders have a job.json,
+  // no folder contains all files, so the files of further folders are not kept.
   bool may_be_job_file(const std::string& name) const {
     if (name == kBundleJobFile) return true;
     if (is_litter(name)) return false;

@@ -135,8 +135,8 @@ std::string head_text(const Response& response, const HeadOptions& options, std:
   field("Date", fmt::format("{:%a, %d %b %Y %H:%M:%S} GMT", fmt::gmtime(std::time_t{unix_seconds})));
   if (!response.content_type.empty()) field("Content-Type", response.content_type);
   const bool bodyless = response.status == 204 || response.status == 304;
-  // The answer to HEAD gives the length of the answer to GET. If a handler answers HEAD without a body and
-  // content type, the length is unknown.
+  // The answer to HEAD gives the length of the answer to GET. A handler that answers HEAD itself sets no
+  // content type, and the length is unknown.
   const bool unknown = options.streamed || (options.method == Method::head && response.content_type.empty());
   if (!bodyless && !unknown) field("Content-Length", fmt::format("{}", response.length()));
   for (const auto& [name, value] : response.headers) field(name, value);

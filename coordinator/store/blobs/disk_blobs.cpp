@@ -117,8 +117,8 @@ Result<std::uint64_t> DiskBlobs::size(const Digest& digest) const {
   return stamp->bytes;
 }
 
-// A blob that one call reads as a whole is hashed every time. A larger file, which is read in pieces, is
-// hashed completely before the first piece.
+// A blob that is read as a whole by one call is hashed each time. A larger one, which is read in pieces, is
+// hashed completely before its first piece is read.
 Result<std::vector<std::byte>> DiskBlobs::read(const Digest& digest, std::uint64_t offset,
                                                std::uint64_t length) const {
   const auto seen = look_at(digest);

@@ -20,8 +20,8 @@
 
 namespace ls::coordinator {
 
-// Identifies a version of a file by its size, inode and time of last change (ctime, here `seconds` and
-// `nanoseconds`). Every write changes the ctime, and programs cannot set it.
+// Identifies a version of a file by its device, inode, size and time of last change (ctime, here `seconds`
+// and `nanoseconds`). Every write changes the ctime, and programs cannot set it.
 struct FileStamp {
   std::uint64_t device = 0, inode = 0, bytes = 0;
   std::int64_t seconds = 0, nanoseconds = 0;
@@ -100,8 +100,8 @@ class DiskBlobs final : public BlobStore {
   std::filesystem::path folder_, work_;
   mutable VerifiedDigests proofs_;
   mutable std::mutex proving_;  // only one file is verified at a time: a second request waits for the result
-  // Held while a file is put in its place or moved aside, so that a file that was just repaired is not moved
-  // aside.
+  // Held while a file is put in its place or moved aside. Otherwise a file could be repaired after its damage
+  // was noticed, and the good file be moved aside.
   mutable std::mutex placing_;
   std::unique_ptr<UploadParts> parts_;
 };

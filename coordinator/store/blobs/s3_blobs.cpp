@@ -129,7 +129,7 @@ Result<std::vector<std::byte>> S3Blobs::read(const Digest& digest, std::uint64_t
 void S3Blobs::note_copy(const Digest& digest) const {
   {
     const std::lock_guard lock(mutex_);
-    // The S3 store may lack this blob, so the local file must not be removed
+    // Without an object in the S3 store the local file is the only one, and must not be removed
     if (!there_.contains(digest)) return;
   }
   const auto bytes = local_->size(digest);

@@ -41,7 +41,7 @@ Result<S3Keys> s3_keys_from_environment();
 struct S3Options {
   S3Address address;
   S3Keys keys;
-  // greatest number of attempts of a request that fails for a transient reason: no answer, 429, 5xx
+  // Greatest number of attempts of a request that fails for a transient reason: no answer, 429, 5xx
   int attempts = 6;
   Duration first_pause = std::chrono::milliseconds(100), longest_pause = std::chrono::seconds(5);
 };

@@ -35,7 +35,7 @@ class UploadParts::Part final : public BlobStore::Upload {
         path_(std::move(path)),
         publish_(std::move(publish)) {}
   ~Part() override {
-    // With the sync, a power failure rarely loses bytes that were reported as received
+    // Bytes that were reported as received are rarely lost by a power failure
     if (!ended_) ::fdatasync(file_.fd());
   }
 
@@ -94,7 +94,7 @@ class UploadParts::Part final : public BlobStore::Upload {
   bool from_start_, ended_ = false;
   std::filesystem::path path_;
   Publish publish_;
-  Sha256 hash_;  // hash of the whole blob; valid only if all bytes came through this upload
+  Sha256 hash_;  // of the whole blob; used only if all bytes came through this Part
 };
 
 UploadParts::UploadParts(std::filesystem::path folder, Publish publish)

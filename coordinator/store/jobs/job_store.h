@@ -56,9 +56,9 @@ struct JobTotals {
   Health health;
   TimeSplit time;                         // `render` is not set; its value is core_seconds
   double began_unix = 0, ended_unix = 0;  // wall clock of the first ray and of the end; 0: not yet
-  // At the last checkpoint: why the image's error figures were not trusted (ImageError::verdict; empty: they
-  // were, or there was no checkpoint), and the number of pixels with few hits (ImageError::few_hits; nullopt:
-  // there was no checkpoint)
+  // From the last checkpoint: why the image's error figures were not trusted (ImageError::verdict; empty if
+  // they were, or before the first checkpoint), and the number of pixels with few hits (ImageError::few_hits;
+  // nullopt before the first checkpoint)
   std::string doubt;
   std::optional<std::uint64_t> few_hits;
   bool operator==(const JobTotals&) const = default;
@@ -88,8 +88,8 @@ struct StoredJob {
   std::optional<StopReason> stopped;
   std::string error;
   std::optional<Digest> numeric_class;
-  // The job is pinned to a numeric class (machines that compute the same bits). These are the build of the
-  // worker that determined the class, and the platform of the class (WorkerHello)
+  // The numeric class (machines that compute the same bits) to which the job is pinned has this platform; the
+  // worker that determined the class had this build (WorkerHello)
   std::string build, platform;
   bool fake = false;  // true if pinned to a fake worker; then only fake workers may render its units
   JobTotals totals;

@@ -10,7 +10,7 @@
 namespace ls::coordinator {
 
 inline double finite(double value) { return std::isfinite(value) ? value : 0; }
-// null: written by a version that did not use finite().
+// Older records have null for such a number.
 inline double number_of(const nlohmann::json& j) { return j.is_null() ? 0 : j.get<double>(); }
 // Throws for any value but an integer from 0 to 2^64 - 1. The library alone would convert 1e20, which does
 // not fit.

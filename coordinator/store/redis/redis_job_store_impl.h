@@ -146,8 +146,8 @@ class RedisJobStore final : public JobStore {
     auto owner = members_->owner_of(id);
     if (!owner) return tl::unexpected(owner.error());
     if (!*owner) return std::nullopt;
-    // This node owns the job in Redis but does not have it yet or any more: it is still taking the job over,
-    // or removing it.
+    // This node owns the job in Redis but does not have it: it is still taking the job over, or has removed
+    // it.
     if ((*owner)->node == options_.node) {
       const auto state = state_.lock();
       const auto due = state->due.find(id);

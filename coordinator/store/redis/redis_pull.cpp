@@ -133,8 +133,9 @@ Result<void> keep_from_redis(JobStore& local, const RedisJob& job) {
   if (log->empty())
     for (const LogLine& line : job.log)
       if (auto added = local.add_log(job.job.id, line); !added) return added;
-  // The record is last: from then on the job counts as copied. If the process were killed before it had the
-  // points and the log, the next start would not copy them, and a later change would replace those in Redis.
+  // The record is stored last, since a job with a record counts as copied. If it were stored first and the
+  // process were killed, the next start would not copy the points and the log, and a later change would
+  // overwrite them in Redis.
   return local.put_job(job.job);
 }
 

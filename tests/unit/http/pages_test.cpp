@@ -1,4 +1,4 @@
-// Jobs as pages for people.
+// Reports of jobs as HTML pages.
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {

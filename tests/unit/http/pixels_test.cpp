@@ -1,4 +1,4 @@
-// Layers of an image as numbers.
+// The routes that return the layers of an image as numbers.
 #include <cmath>
 #include <cstring>
 

@@ -1,4 +1,4 @@
-// When a job will be done: which end comes first, and what is known of it.
+// Predicts when a job ends: which of its possible ends comes first, and the interval of the prediction.
 #include "coordinator/service/state/eta.h"
 
 #include <gtest/gtest.h>
@@ -8,19 +8,21 @@
 namespace ls::coordinator {
 namespace {
 
-// relMSE 1 / spp, .01 core seconds a sample: 1e-3 is down to after 10 core seconds.
+// Makes a curve with relMSE 1 / spp and 0.01 core seconds per sample: relMSE 1e-3 is reached after 10 core
+// seconds.
 std::vector<ErrorPoint> points(double last) {
   std::vector<ErrorPoint> all;
   for (double n = 2; n <= last; n *= 2) all.push_back({n, n / 100, 1 / n, .95 / n, 1.05 / n});
   return all;
 }
 
-// At 256 samples: 2.56 core seconds spent, 7.44 to the target, about 30 to the end of the samples.
+// A job at 256 samples: 2.56 core seconds are spent, 7.44 are left to the target, and about 30 to the limit
+// on samples.
 EtaInputs facts() {
   EtaInputs f;
   f.done = 256. / 3300;
   f.core_seconds = 2.56;
-  f.core_left = 1;  // a steered job's own foresight
+  f.core_left = 1;  // what an adaptive job predicts by itself
   f.core_to_limit = 30;
   f.target = 1e-3;
   f.elapsed = 2;
@@ -99,7 +101,8 @@ TEST(Eta, WithMoreWorkersIsShorterInProportion) {
   EXPECT_DOUBLE_EQ(out.with_more_ci95->second, out.ci95->second / 5);
 }
 
-// 1.5 core seconds in four units: a fifth thread has nothing to do, and no unit takes less than its own time.
+// 1.5 core seconds are left in four units: a fifth thread would have no unit, and no unit takes less than its
+// own time.
 TEST(Eta, NoMoreThreadsHelpThanThereAreUnitsLeft) {
   EtaInputs f;
   f.core_left = 1.5;
@@ -114,8 +117,9 @@ TEST(Eta, NoMoreThreadsHelpThanThereAreUnitsLeft) {
   EXPECT_FALSE(eta_of(f, {}).with_more) << "all four are under way";
 }
 
-// By how many units a target is met is not known: threads wait at the end for the last one, and may have been
-// busy with what is dropped when it came: twice a unit's time at most. One thread waits for nobody.
+// The last unit before a target is reached is not known in advance. So all threads but one wait at the end
+// for the last unit; some may also finish units that are then dropped. Together this takes at most twice a
+// unit's time. A single thread does not wait.
 TEST(Eta, OfATargetThreadsWaitForTheLastUnit) {
   EtaInputs f = facts();
   f.cores = 4;
@@ -129,7 +133,7 @@ TEST(Eta, OfATargetThreadsWaitForTheLastUnit) {
   EXPECT_DOUBLE_EQ(*eta_of(f, points(256)).seconds, 4 * *even.seconds);
 }
 
-// No wait makes it longer than one thread alone would take.
+// Without work left the prediction is 0, although threads would wait for each other.
 TEST(Eta, WithoutWorkLeftNobodyWaits) {
   EtaInputs f = facts();
   f.cores = 4;
@@ -159,11 +163,11 @@ TEST(Eta, OfThePartOfAUnitThatIsLeftIsThatPart) {
   f.unit_seconds = 1;
   f.cores = 8;
   EXPECT_DOUBLE_EQ(*eta_of(f, {}).seconds, .25);
-  f.cores = .5;  // of a worker that it shares with other jobs
+  f.cores = .5;  // half of a worker's core; the rest is used by other jobs
   EXPECT_DOUBLE_EQ(*eta_of(f, {}).seconds, .5);
 }
 
-// Each end is on as many cores as help it.
+// Each end of the interval is computed with the number of cores that can be used until then.
 TEST(Eta, AnIntervalHoldsItsMiddleWhereUnitsAreFew) {
   EtaInputs f = facts();
   f.unit_seconds = 3;

@@ -1,5 +1,5 @@
-// A store of jobs that tells the service what other coordinators have done, as a test says, and fails when it
-// is told to.
+// A job store that reports changes by other coordinators, as the test sets them, and fails when the test asks
+// for it.
 #pragma once
 
 #include <atomic>
@@ -54,7 +54,7 @@ class MovingStore : public JobStore {
   Moved moved() override {
     const std::lock_guard lock(mutex_);
     for (const QuarantinedWorker& worker : next_.quarantined)
-      (void)inner_->quarantine(worker);  // as a real one does before it tells
+      (void)inner_->quarantine(worker);  // a real store also stores the worker before it reports it
     return std::exchange(next_, {});
   }
 

@@ -1,5 +1,5 @@
-// Addresses of --blobs. That requests are signed rightly is seen by a server that checks it:
-// tests/system/test_s3.py.
+// Addresses given to --blobs. Signatures of requests are tested in tests/system/test_s3.py, where a server
+// verifies them.
 #include <gtest/gtest.h>
 
 #include "coordinator/store/blobs/s3_link.h"
