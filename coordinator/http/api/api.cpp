@@ -11,7 +11,6 @@
 #include "common/protocol/limits.h"
 #include "common/scene/limits.h"
 #include "coordinator/http/api/handlers.h"
-#include "coordinator/http/message/problem.h"
 
 namespace ls::http {
 namespace {

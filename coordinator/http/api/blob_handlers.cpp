@@ -8,7 +8,6 @@
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/message/json_read.h"
-#include "coordinator/http/message/problem.h"
 
 namespace ls::http {
 namespace {

@@ -11,7 +11,6 @@
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/message/json_read.h"
-#include "coordinator/http/message/problem.h"
 #include "coordinator/views/views.h"
 
 namespace ls::http {

@@ -5,7 +5,6 @@
 #include "common/scene/limits.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/message/limits.h"
-#include "coordinator/http/message/problem.h"
 
 namespace ls::http {
 namespace {

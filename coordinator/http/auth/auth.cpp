@@ -13,7 +13,6 @@
 #include "common/base/digest.h"
 #include "common/base/secret.h"
 #include "coordinator/http/message/limits.h"
-#include "coordinator/http/message/problem.h"
 
 namespace ls::http {
 namespace {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "common/base/error.h"
+#include "common/scene/diagnostic.h"
 
 namespace ls::http {
 
@@ -101,6 +102,18 @@ Response text_response(int status, std::string content_type, std::string body);
 Response json_response(int status, std::string json);
 
 std::string_view reason_phrase(int status);
+
+// Errors as RFC 9457 problem details. This is the only mapping from Errc to HTTP status.
+int status_of(Errc code);
+
+// Makes a response {type, title, status, detail}; `detail` contains the cause, the place and the remedy.
+Response problem(int status, std::string_view detail);
+Response problem(const Error& error);
+// Returns a 429 with the header Retry-After: `wait_seconds`.
+Response too_many(int wait_seconds, std::string_view detail);
+// Returns the problem of a rejected scene. It has an additional member diagnostics: [{severity, file, line,
+// column, text, source_line, length}].
+Response problem(const Error& error, std::span<const Diagnostic> diagnostics);
 
 // Returns the media type in lower case without parameters: "application/json" for "Application/JSON;
 // charset=utf-8".

@@ -13,7 +13,6 @@
 
 #include "common/base/log.h"
 #include "coordinator/http/message/message.h"
-#include "coordinator/http/message/problem.h"
 
 namespace ls::http {
 

@@ -7,7 +7,6 @@
 
 #include "coordinator/http/auth/auth.h"
 #include "coordinator/http/message/message.h"
-#include "coordinator/http/message/problem.h"
 #include "coordinator/http/net/connection.h"
 
 namespace ls::http {

@@ -11,7 +11,6 @@
 
 #include "common/base/log.h"
 #include "common/base/parse_number.h"
-#include "coordinator/http/message/problem.h"
 #include "coordinator/http/net/connection.h"
 
 namespace ls::http {

@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "coordinator/http/message/message.h"
-#include "coordinator/http/message/problem.h"
 
 namespace ls::http {
 namespace {

@@ -2,7 +2,6 @@
 #include <set>
 
 #include "coordinator/http/api/handlers.h"
-#include "coordinator/http/message/problem.h"
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {
