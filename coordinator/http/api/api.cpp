@@ -16,11 +16,8 @@ namespace ls::http {
 namespace {
 
 bool lists(std::string_view words, std::string_view word) {
-  while (!words.empty()) {
-    const std::size_t end = words.find(' ');
-    if (words.substr(0, end) == word) return true;
-    words = end == std::string_view::npos ? std::string_view{} : words.substr(end + 1);
-  }
+  while (!words.empty())
+    if (take_part(words, ' ') == word) return true;
   return false;
 }
 
@@ -136,8 +133,7 @@ std::optional<Response> Api::refuse_caller(Access access, Request& request) {
 }
 
 std::optional<Response> Api::refuse_job(const Match& match, const Request& request) const {
-  if (request.caller.role != Role::submit || !match.route->pattern.starts_with("/api/v1/jobs/{id}"))
-    return std::nullopt;
+  if (request.caller.role != Role::submit || !match.route->pattern.starts_with(kOneJob)) return std::nullopt;
   const auto id = job_of(request, match.params);
   if (!id && id.error().code != Errc::not_found) return problem(id.error());
   const auto owner = id ? coordinator_.owner(*id) : tl::unexpected(id.error());
@@ -210,13 +206,9 @@ Response guarded(std::string_view what, const std::function<Response()>& work) {
 }
 
 bool plausible_id(std::string_view id) {
-  if (id.empty() || id.size() > limits::kIdBytes) return false;
-  for (const char c : id) {
-    const bool ok =
-        (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' || c == '_';
-    if (!ok) return false;
-  }
-  return true;
+  return !id.empty() && id.size() <= limits::kIdBytes && std::all_of(id.begin(), id.end(), [](char c) {
+    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' || c == '_';
+  });
 }
 
 Result<JobId> job_of(const Request& request, const Params& params) {

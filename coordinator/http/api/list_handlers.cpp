@@ -35,8 +35,7 @@ Result<void> read_number(const Request& request, std::string_view name, T& out) 
 
 Result<void> read_states(std::string_view text, JobsAsked& asked) {
   while (!text.empty()) {
-    const std::string_view word = text.substr(0, text.find(','));
-    text.remove_prefix(std::min(text.size(), word.size() + 1));
+    const std::string_view word = take_part(text, ',');
     const auto found = std::find_if(kStates.begin(), kStates.end(),
                                     [&](coordinator::JobState state) { return to_string(state) == word; });
     if (found == kStates.end())

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "coordinator/http/message/limits.h"
+#include "coordinator/http/message/message.h"
 
 namespace ls::http {
 namespace {
@@ -39,10 +40,7 @@ Result<json> read_object(std::string_view body, std::initializer_list<std::strin
 }
 
 Result<Digest> read_digest(std::string_view text, std::string_view what) {
-  std::string lower(text.substr(0, 65));
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](char c) { return c >= 'A' && c <= 'F' ? static_cast<char>(c + 32) : c; });
-  if (const auto digest = Digest::parse(lower)) return *digest;
+  if (const auto digest = Digest::parse(lower_case(text.substr(0, 65)))) return *digest;
   return bad_argument(fmt::format("{} must be a SHA-256 of 64 hexadecimal digits", what));
 }
 

@@ -46,6 +46,20 @@ std::optional<Method> parse_method(std::string_view name) {
   return std::nullopt;
 }
 
+std::string lower_case(std::string_view text) {
+  std::string out(text);
+  std::transform(out.begin(), out.end(), out.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  return out;
+}
+
+std::string_view take_part(std::string_view& rest, char separator) {
+  const std::size_t end = rest.find(separator);
+  const std::string_view part = rest.substr(0, end);
+  rest = end == std::string_view::npos ? std::string_view{} : rest.substr(end + 1);
+  return part;
+}
+
 std::string_view Request::header(std::string_view lower_case_name) const {
   for (const auto& [name, value] : headers)
     if (name == lower_case_name) return value;
@@ -153,31 +167,25 @@ Response problem(const Error& error, std::span<const Diagnostic> diagnostics) {
 }
 
 std::string media_type(std::string_view content_type) {
-  std::string type(content_type.substr(0, content_type.find(';')));
+  std::string type = lower_case(content_type.substr(0, content_type.find(';')));
   while (!type.empty() && (type.back() == ' ' || type.back() == '\t')) type.pop_back();
-  std::transform(type.begin(), type.end(), type.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
   return type;
 }
 
 Result<FileBody> open_file_body(const std::filesystem::path& path) {
-  const int opened = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (opened < 0)
+  auto file = std::make_shared<const Descriptor>(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file->fd < 0)
     return fail(errno == ENOENT ? Errc::not_found : Errc::unavailable,
                 fmt::format("cannot open {}: {}", path.string(), std::strerror(errno)));
-  const std::shared_ptr<const int> fd(new int(opened), [](const int* owned) {
-    ::close(*owned);
-    delete owned;
-  });
   struct stat info {};
-  if (::fstat(*fd, &info) != 0)
+  if (::fstat(file->fd, &info) != 0)
     return fail(Errc::unavailable, fmt::format("cannot look at {}: {}", path.string(), std::strerror(errno)));
-  return FileBody{fd, static_cast<std::uint64_t>(info.st_size)};
+  return FileBody{std::move(file), static_cast<std::uint64_t>(info.st_size)};
 }
 
 std::size_t read_slice(const FileBody& file, std::uint64_t offset, std::span<std::byte> into) {
   ssize_t n = -1;
-  do n = ::pread(*file.fd, into.data(), into.size(), static_cast<off_t>(offset));
+  do n = ::pread(file.opened->fd, into.data(), into.size(), static_cast<off_t>(offset));
   while (n < 0 && errno == EINTR);
   return n < 0 ? 0 : static_cast<std::size_t>(n);
 }
@@ -185,9 +193,8 @@ std::size_t read_slice(const FileBody& file, std::uint64_t offset, std::span<std
 namespace {
 
 bool has(const Response& response, std::string_view name) {
-  for (const auto& field : response.headers)
-    if (field.first == name) return true;
-  return false;
+  return std::any_of(response.headers.begin(), response.headers.end(),
+                     [&](const auto& field) { return field.first == name; });
 }
 
 }  // namespace
@@ -224,14 +231,6 @@ Result<std::string> decode(std::string_view text, bool plus_is_space) {
   auto plain = percent_decode(coded);
   if (!plain) return fail(Errc::invalid_argument, "the request target has a broken percent code");
   return std::move(*plain);
-}
-
-// Removes and returns the part of `rest` up to `separator`.
-std::string_view take_part(std::string_view& rest, char separator) {
-  const std::size_t end = rest.find(separator);
-  const std::string_view part = rest.substr(0, end);
-  rest = end == std::string_view::npos ? std::string_view{} : rest.substr(end + 1);
-  return part;
 }
 
 Result<std::vector<std::string>> parse_path(std::string_view path) {

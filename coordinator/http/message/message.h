@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "common/base/error.h"
+#include "common/base/helper_program.h"
 #include "common/scene/diagnostic.h"
 
 namespace ls::http {
@@ -43,8 +44,8 @@ struct Caller {
 // A response body that is read from a file. It is sent slice by slice, so that it does not fill memory while
 // a slow client reads it.
 struct FileBody {
-  // The descriptor is closed with the last copy of the FileBody; the file is readable even after its removal.
-  std::shared_ptr<const int> fd;
+  // Closed with the last copy of the FileBody; the file is readable even after its removal
+  std::shared_ptr<const Descriptor> opened;
   std::uint64_t size = 0;  // bytes
 };
 
@@ -59,6 +60,11 @@ std::string_view to_string(Method method);                  // returns "GET", ..
 std::optional<Method> parse_method(std::string_view name);  // case-sensitive, as in RFC 9110
 
 using Fields = std::vector<std::pair<std::string, std::string>>;
+
+// Returns the text with the letters A to Z in lower case.
+std::string lower_case(std::string_view text);
+// Removes the text up to `separator`, and the separator, from `rest`, and returns that text.
+std::string_view take_part(std::string_view& rest, char separator);
 
 struct Request {
   Method method = Method::get;
