@@ -24,7 +24,7 @@
 #include "common/trace/tracer.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/auth/throttle.h"
-#include "coordinator/http/auth/token_file.h"
+#include "coordinator/http/auth/token_registry.h"
 #include "coordinator/http/net/http_server.h"
 #include "coordinator/options.h"
 #include "coordinator/rpc/rpc_server.h"

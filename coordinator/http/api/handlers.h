@@ -11,7 +11,6 @@ namespace ls::http {
 class BodySink;
 
 // system_handlers.cpp
-Response get_report_page(Api&, const Request&, const JobId&);
 Response get_healthz(Api&, const Request&, const Params&);
 Response get_readyz(Api&, const Request&, const Params&);
 Response get_metrics(Api&, const Request&, const Params&);
@@ -26,33 +25,30 @@ Response get_workers(Api&, const Request&, const Params&);
 Response get_events(Api&, const Request&, const Params&);
 Response get_job_events(Api&, const Request&, const JobId&);
 
-// list_handlers.cpp
+// job_handlers.cpp
 Response get_jobs(Api&, const Request&, const Params&);
 Response post_again(Api&, const Request&, const JobId&);
-Response get_thumbnail(Api&, const Request&, const JobId&);
-
-// job_handlers.cpp
 Response post_job(Api&, const Request&, const Params&);
 Response get_job(Api&, const Request&, const JobId&);
 Response patch_job(Api&, const Request&, const JobId&);
 Response delete_job(Api&, const Request&, const JobId&);
+
+// output_handlers.cpp
 Response get_image_exr(Api&, const Request&, const JobId&);
 Response get_image_png(Api&, const Request&, const JobId&);
+Response get_thumbnail(Api&, const Request&, const JobId&);
 Response get_error_png(Api&, const Request&, const JobId&);
 Response get_samples_png(Api&, const Request&, const JobId&);
-Response get_report(Api&, const Request&, const JobId&);
-Response get_convergence(Api&, const Request&, const JobId&);
-Response get_tiles(Api&, const Request&, const JobId&);
-Response get_log(Api&, const Request&, const JobId&);
-
-// pixel_handlers.cpp
 Response get_layers(Api&, const Request&, const JobId&);
 Response get_pixels(Api&, const Request&, const JobId&);
-
-// video_handlers.cpp
 Response post_video(Api&, const Request&, const JobId&);
 Response get_video(Api&, const Request&, const JobId&);
 Response get_video_mp4(Api&, const Request&, const JobId&);
+Response get_report(Api&, const Request&, const JobId&);
+Response get_report_page(Api&, const Request&, const JobId&);
+Response get_convergence(Api&, const Request&, const JobId&);
+Response get_tiles(Api&, const Request&, const JobId&);
+Response get_log(Api&, const Request&, const JobId&);
 
 // blob_handlers.cpp; PUT is streamed
 Response post_blobs_missing(Api&, const Request&, const Params&);

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include "common/base/parse_number.h"
-#include "common/report/job_page.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/auth/auth.h"
@@ -28,6 +27,11 @@ Response event_stream(const Request& request, std::string job) {
     if (!stream.after_id) return problem(400, "Last-Event-ID must be the id of an event: a whole number");
   }
   return {.content_type = "text/event-stream", .events = std::move(stream)};
+}
+
+nlohmann::ordered_json to_value(const TokenInfo& token) {
+  return {
+      {"id", token.id}, {"role", to_string(token.role)}, {"user", token.user}, {"of_file", token.of_file}};
 }
 
 }  // namespace
@@ -99,31 +103,6 @@ Response get_job_events(Api& api, const Request& request, const JobId& id) {
   if (const auto job = api.coordinator().job(id); !job) return problem(job.error());
   return event_stream(request, id.value);
 }
-
-Response get_report_page(Api& api, const Request&, const JobId& id) {
-  auto image = api.coordinator().image_png(id, 0);
-  if (!image) return problem(image.error());
-  auto report = api.coordinator().report_json(id);
-  if (!report) return problem(report.error());
-  auto page = report::job_page({std::move(*report), std::move(*image),
-                                api.coordinator().error_png(id).value_or(std::vector<std::byte>{}),
-                                api.coordinator().samples_png(id).value_or(std::vector<std::byte>{})});
-  if (!page) return problem(page.error());
-  Response response = text_response(200, "text/html; charset=utf-8", std::move(*page));
-  response.headers.emplace_back("Content-Security-Policy",
-                                report::job_page_policy() + "; frame-ancestors 'none'");
-  response.headers.emplace_back("Content-Disposition", fmt::format("inline; filename=\"{}.html\"", id.value));
-  return response;
-}
-
-namespace {
-
-nlohmann::ordered_json to_value(const TokenInfo& token) {
-  return {
-      {"id", token.id}, {"role", to_string(token.role)}, {"user", token.user}, {"of_file", token.of_file}};
-}
-
-}  // namespace
 
 Response get_tokens(Api& api, const Request&, const Params&) {
   auto list = nlohmann::ordered_json::array();

@@ -5,6 +5,7 @@
 // rereads DATA/tokens if that file has changed.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -14,16 +15,32 @@
 #include "common/base/digest.h"
 #include "common/base/error.h"
 #include "common/base/guarded.h"
-#include "coordinator/http/auth/token_file.h"
+#include "common/base/helper_program.h"
 #include "coordinator/http/message/message.h"
 
 namespace ls::http {
 
+// Returns the secret (a token, or the key that signs webhooks) in `file`; creates the file (mode 0600) with a
+// new secret if it does not exist. Rejects a file that others may read, or with fewer than 16 characters. The
+// caller must hold the data folder's lock, so that two starts do not race.
+Result<std::string> read_or_make_token(const std::filesystem::path& file);
+
+// Returns 256 random bits in hexadecimal.
+Result<std::string> random_token();
+
+// Holds a lock on a folder while the object lives, so that other processes do not change the folder's secrets
+// meanwhile. The constructor blocks until it has the lock. If the folder is read-only, so that no lock file
+// can be created, no lock is needed or held. An empty path locks nothing.
+class FolderLock {
+ public:
+  explicit FolderLock(const std::filesystem::path& folder);
+
+ private:
+  Descriptor file_;
+};
+
 inline constexpr std::size_t kMaxTokens = 1000;
 inline constexpr std::size_t kMaxUserName = 64;
-
-// True for 1 to kMaxUserName characters a-z A-Z 0-9 . _ - @, beginning with a letter or digit.
-bool plausible_user(std::string_view name);
 
 struct TokenInfo {
   std::string id;  // the first 16 hex digits of its SHA-256
@@ -70,6 +87,14 @@ class TokenRegistry {
     TokenInfo info;
     Digest digest;
   };
+  // Identifies a version of a file: if two states differ, the file was replaced or written in between. All
+  // zero: there is no file.
+  struct FileState {
+    std::uint64_t inode = 0, size = 0;
+    std::int64_t changed_ns = 0;
+    bool operator==(const FileState&) const = default;
+  };
+  static FileState file_state(const std::filesystem::path& file);
   // The tokens of the files, as last read.
   struct Tokens {
     void put(Role role, std::string user, const Digest& digest, bool of_file);

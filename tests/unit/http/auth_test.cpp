@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <fstream>
 
-#include "coordinator/http/auth/token_file.h"
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {
