@@ -13,7 +13,7 @@ class BodySink;
 // system_handlers.cpp
 Response get_healthz(Api&, const Request&, const Params&);
 Response get_readyz(Api&, const Request&, const Params&);
-Response get_metrics(Api&, const Request&, const Params&);
+Response get_metrics(Api&, const Request&, const Params&);  // metrics.cpp
 Response get_openapi(Api&, const Request&, const Params&);
 Response get_session(Api&, const Request&, const Params&);
 Response post_session(Api&, const Request&, const Params&);
@@ -50,12 +50,10 @@ Response get_convergence(Api&, const Request&, const JobId&);
 Response get_tiles(Api&, const Request&, const JobId&);
 Response get_log(Api&, const Request&, const JobId&);
 
-// blob_handlers.cpp; PUT is streamed
+// upload_handlers.cpp; open_blob() is for PUT, open_bundle() for POST /jobs with an archive
 Response post_blobs_missing(Api&, const Request&, const Params&);
 Response head_blob(Api&, const Request&, const Params&);
 std::variant<Response, std::unique_ptr<BodySink>> open_blob(Api&, const Request&, const Params&);
-
-// bundle_handlers.cpp: POST /jobs with an archive
 std::variant<Response, std::unique_ptr<BodySink>> open_bundle(Api&, const Request&);
 
 // The steps that all submissions share, whether the body was a scene, JSON or an archive (job_handlers.cpp).

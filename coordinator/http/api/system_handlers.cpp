@@ -47,14 +47,6 @@ Response get_readyz(Api& api, const Request&, const Params&) {
   return text_response(200, "text/plain", trouble.empty() ? "ready\n" : "ready, but: " + trouble + "\n");
 }
 
-Response get_metrics(Api& api, const Request&, const Params&) {
-  auto& coordinator = api.coordinator();
-  return text_response(200, "text/plain; version=0.0.4; charset=utf-8",
-                       metrics_text(coordinator.jobs(), coordinator.workers(), coordinator.last_event_id(),
-                                    api.counters(), coordinator.store_status(), coordinator.figures(),
-                                    coordinator.audits(), api.webhooks(), api.traces()));
-}
-
 Response get_openapi(Api&, const Request&, const Params&) {
   return json_response(200, std::string(embedded_openapi()));
 }
