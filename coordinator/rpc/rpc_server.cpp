@@ -10,8 +10,7 @@
 #include "common/base/log.h"
 #include "common/protocol/limits.h"
 #include "coordinator/base/work_queue.h"
-#include "coordinator/rpc/blob_stream.h"
-#include "coordinator/rpc/work_stream.h"
+#include "coordinator/rpc/streams.h"
 
 namespace ls::coordinator {
 
