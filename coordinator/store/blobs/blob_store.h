@@ -66,7 +66,4 @@ class BlobStore {
   virtual void remove_unfinished(const Digest&) {}
 };
 
-// Checks the value of --blobs: a folder, or an s3:// address with keys in the environment.
-Result<void> check_blobs(const std::string& where);
-
 }  // namespace ls::coordinator

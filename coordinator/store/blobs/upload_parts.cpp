@@ -1,4 +1,3 @@
-#include "coordinator/store/blobs/upload_parts.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -11,6 +10,7 @@
 
 #include "common/base/log.h"
 #include "coordinator/base/limits.h"
+#include "coordinator/store/blobs/disk_blobs.h"
 #include "coordinator/store/files.h"
 
 namespace ls::coordinator {

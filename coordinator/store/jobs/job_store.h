@@ -40,9 +40,6 @@ struct JobLocation {
   bool alive = false;  // false: the coordinator is gone; another will take the job over, unless it has ended
 };
 
-// Checks the value of --store: sqlite, or a redis:// address.
-Result<void> check_store(const std::string& store);
-
 // Totals of a job over all its units (a unit is one tile with one range of samples). They are written when
 // the job ends, so that a restart does not have to read its partials (the encoded pixel sums of its units).
 struct JobTotals {
