@@ -113,6 +113,11 @@ struct LogLine {
   std::string text;
 };
 
+std::string points_json(const std::vector<ConvergencePoint>& points);
+Result<std::vector<ConvergencePoint>> parse_points(std::string_view json);
+std::string log_json(const std::vector<LogLine>& lines);
+Result<std::vector<LogLine>> parse_log(std::string_view json);
+
 // A worker that rendered wrong pixels, with the evidence
 struct QuarantinedWorker {
   WorkerId worker;

@@ -1,7 +1,7 @@
-// The class behind redis_job_store.h. redis_job_store.cpp opens the store, redis_job_store_send.cpp contains
-// the thread that updates Redis, and this header the functions that the coordinator's other threads call. A
-// node is one of several coordinators that share the Redis; the members' thread is the one that RedisMembers
-// starts (redis_members.h).
+// The class behind redis_job_store.h. This header contains the functions that the coordinator's threads call,
+// redis_job_store.cpp opens the store and contains the thread that updates Redis. A node is one of several
+// coordinators that share the Redis; the members' thread is the one that RedisMembers starts
+// (redis_members.h).
 #pragma once
 
 #include <fmt/format.h>
