@@ -13,7 +13,6 @@
 #include "coordinator/service/pictures.h"
 #include "coordinator/service/state/job_views.h"
 #include "coordinator/service/submission.h"
-#include "coordinator/service/takeover.h"
 #include "coordinator/service/videos.h"
 #include "coordinator/service/worker_sessions.h"
 #include "coordinator/store/blobs/memory_blobs.h"

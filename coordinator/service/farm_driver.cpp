@@ -1,5 +1,3 @@
-#include "coordinator/service/farm_driver.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
