@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <utility>
@@ -86,10 +87,7 @@ Result<std::string> read_list(const std::filesystem::path& file) {
 constexpr std::size_t kIdDigits = 16;
 constexpr std::size_t kMaxLine = 256;
 
-constexpr struct {
-  Role role;
-  std::string_view name;
-} kRoles[] = {{Role::admin, "admin"}, {Role::submit, "submit"}, {Role::read, "read"}, {Role::join, "join"}};
+constexpr std::array<std::string_view, 4> kRoles = {"admin", "submit", "read", "join"};  // by Role
 
 std::string_view next_word(std::string_view& text) {
   const std::size_t begin = text.find_first_not_of(" \t\r");
@@ -140,16 +138,11 @@ FolderLock::FolderLock(const std::filesystem::path& folder)
   while (file_.fd >= 0 && ::flock(file_.fd, LOCK_EX) != 0 && errno == EINTR) continue;
 }
 
-std::string_view to_string(Role role) {
-  for (const auto& row : kRoles)
-    if (row.role == role) return row.name;
-  return "?";
-}
+std::string_view to_string(Role role) { return kRoles[static_cast<std::size_t>(role)]; }
 
 std::optional<Role> parse_role(std::string_view name) {
-  for (const auto& row : kRoles)
-    if (row.name == name) return row.role;
-  return std::nullopt;
+  const auto found = std::find(kRoles.begin(), kRoles.end(), name);
+  return found == kRoles.end() ? std::nullopt : std::optional(static_cast<Role>(found - kRoles.begin()));
 }
 
 TokenRegistry::TokenRegistry(std::string admin_token, std::string join_token)

@@ -21,29 +21,18 @@
 namespace ls::http {
 namespace {
 
-struct MethodName {
-  Method method;
-  std::string_view name;
-};
-constexpr std::array kMethods = {
-    MethodName{Method::get, "GET"},         MethodName{Method::head, "HEAD"},
-    MethodName{Method::post, "POST"},       MethodName{Method::put, "PUT"},
-    MethodName{Method::patch, "PATCH"},     MethodName{Method::del, "DELETE"},
-    MethodName{Method::options, "OPTIONS"},
-};
+// By Method
+constexpr std::array<std::string_view, 7> kMethods = {"GET",   "HEAD",   "POST",   "PUT",
+                                                      "PATCH", "DELETE", "OPTIONS"};
 
 }  // namespace
 
-std::string_view to_string(Method method) {
-  for (const auto& m : kMethods)
-    if (m.method == method) return m.name;
-  return "GET";
-}
+std::string_view to_string(Method method) { return kMethods[static_cast<std::size_t>(method)]; }
 
 std::optional<Method> parse_method(std::string_view name) {
-  for (const auto& m : kMethods)
-    if (m.name == name) return m.method;
-  return std::nullopt;
+  const auto found = std::find(kMethods.begin(), kMethods.end(), name);
+  return found == kMethods.end() ? std::nullopt
+                                 : std::optional(static_cast<Method>(found - kMethods.begin()));
 }
 
 std::string lower_case(std::string_view text) {

@@ -72,11 +72,9 @@ class DiskUpload final : public BlobStore::Upload {
 
 Result<std::unique_ptr<DiskBlobs>> DiskBlobs::open(std::filesystem::path folder, std::filesystem::path work) {
   if (auto made = make_folder(work / "tmp"); !made) return tl::unexpected(made.error());
-  std::error_code error;
-  for (std::filesystem::directory_iterator left(work / "tmp", error), end; !error && left != end;
-       left.increment(error)) {
+  for (const auto& left : list_folder(work / "tmp").value_or(std::vector<std::filesystem::path>())) {
     std::error_code ignored;
-    std::filesystem::remove(left->path(), ignored);
+    std::filesystem::remove(left, ignored);
   }
   std::unique_ptr<DiskBlobs> blobs(new DiskBlobs(std::move(folder), std::move(work)));
   auto parts =
@@ -216,19 +214,13 @@ Result<std::unique_ptr<BlobStore::Upload>> DiskBlobs::resume_upload(const Digest
 
 Result<std::vector<Digest>> DiskBlobs::list(bool unfinished) const {
   if (unfinished) return parts_->list();
+  const auto groups = list_folder(folder_);
+  if (!groups) return tl::unexpected(groups.error());
   std::vector<Digest> all;
-  std::error_code error;
-  const std::filesystem::directory_iterator end;
-  for (std::filesystem::directory_iterator group(folder_, error); !error && group != end;
-       group.increment(error)) {
-    if (group->path().filename().string().size() != 2) continue;
-    std::error_code gone;
-    for (std::filesystem::directory_iterator file(group->path(), gone); !gone && file != end;
-         file.increment(gone))
-      if (const auto digest = Digest::parse(file->path().filename().string())) all.push_back(*digest);
+  for (const auto& group : *groups) {
+    const auto files = group.filename().string().size() == 2 ? digests_in(group) : std::vector<Digest>();
+    if (files) all.insert(all.end(), files->begin(), files->end());
   }
-  if (error)
-    return fail(Errc::unavailable, fmt::format("cannot list '{}': {}", folder_.string(), error.message()));
   return all;
 }
 

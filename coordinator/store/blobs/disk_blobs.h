@@ -62,6 +62,9 @@ class VerifiedDigests {
   std::map<Digest, FileStamp> stamps_;
 };
 
+// Returns the digests that are names of files in the folder.
+Result<std::vector<Digest>> digests_in(const std::filesystem::path& folder);
+
 // Receives blobs in parts. An incomplete blob is a file, FOLDER/<its SHA-256 in hex>, to which each part is
 // appended. It outlives broken connections and restarts of the coordinator. Thread-safe.
 class UploadParts {
@@ -78,7 +81,7 @@ class UploadParts {
   // Removes an incomplete blob. If its upload is in progress, the next bytes of that upload are rejected. A
   // blob whose finish() is running stays.
   void remove(const Digest& digest);
-  Result<std::vector<Digest>> list() const;
+  Result<std::vector<Digest>> list() const { return digests_in(folder_); }
 
  private:
   struct Slot;

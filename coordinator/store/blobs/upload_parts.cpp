@@ -137,6 +137,15 @@ Result<std::unique_ptr<BlobStore::Upload>> UploadParts::resume(const Digest& dig
                                 publish_);
 }
 
+Result<std::vector<Digest>> digests_in(const std::filesystem::path& folder) {
+  const auto files = list_folder(folder);
+  if (!files) return tl::unexpected(files.error());
+  std::vector<Digest> all;
+  for (const auto& file : *files)
+    if (const auto digest = Digest::parse(file.filename().string())) all.push_back(*digest);
+  return all;
+}
+
 void UploadParts::make_room() {
   const auto kept = list();
   if (!kept || kept->size() < limits::kMaxUnfinishedUploads) return;
@@ -160,17 +169,6 @@ void UploadParts::remove(const Digest& digest) {
   if (slot->finishing) return;
   ++slot->turn;
   ::unlink(path(digest).c_str());
-}
-
-Result<std::vector<Digest>> UploadParts::list() const {
-  std::vector<Digest> all;
-  std::error_code error;
-  for (std::filesystem::directory_iterator file(folder_, error), end; !error && file != end;
-       file.increment(error))
-    if (const auto digest = Digest::parse(file->path().filename().string())) all.push_back(*digest);
-  if (error)
-    return fail(Errc::unavailable, fmt::format("cannot list '{}': {}", folder_.string(), error.message()));
-  return all;
 }
 
 }  // namespace ls::coordinator
