@@ -168,8 +168,10 @@ Result<void> JobCommands::change_job(Core& core, const EntryPtr& entry, const Jo
     if (auto done = extend(core, *entry, *change.spp); !done) return done;
   if (change.target_error)
     if (auto done = set_target(core, *entry, *change.target_error); !done) return done;
-  if (change.priority)
-    if (auto done = set_priority(core, *entry, *change.priority); !done) return done;
+  if (change.priority) {
+    if (auto done = set_priority(core, {entry}, *change.priority); !done) return done;
+    core.publisher.job(*entry);
+  }
   if (change.focus)
     if (auto done = set_focus(core, {entry}, *change.focus); !done) return done;
   return change.state ? become(core, entry, *change.state) : Result<void>{};
@@ -199,28 +201,28 @@ Result<void> JobCommands::become(Core& core, const EntryPtr& entry, JobState ask
   return {};
 }
 
-Result<void> JobCommands::set_priority(Core& core, JobEntry& entry, int priority) const {
-  const int before = std::exchange(entry.stored.spec.priority, priority);
-  if (auto put = store_.put_job(entry.stored); !put) {
-    entry.stored.spec.priority = before;
-    return put;
-  }
-  if (!entry.unloaded) core.driver.run(JobPriority{entry.stored.id, priority});
-  core.publisher.job(entry);
+// Applies edit() to the records of the jobs. All are stored in one transaction: either all are stored or
+// nothing is changed.
+template <class Edit>
+Result<void> JobCommands::edit_all(const Entries& jobs, Edit edit) const {
+  std::vector<StoredJob> edited;
+  for (const EntryPtr& job : jobs) edit(edited.emplace_back(job->stored));
+  if (auto put = store_.put_jobs(edited); !put) return put;
+  for (const EntryPtr& job : jobs) edit(job->stored);
   return {};
 }
 
-// The focus of all jobs is stored in one transaction: either all are stored or nothing is changed.
+Result<void> JobCommands::set_priority(Core& core, const Entries& jobs, int priority) const {
+  if (auto put = edit_all(jobs, [&](StoredJob& job) { job.spec.priority = priority; }); !put) return put;
+  for (const EntryPtr& job : jobs)
+    if (!job->unloaded) core.driver.run(JobPriority{job->stored.id, priority});
+  return {};
+}
+
 Result<void> JobCommands::set_focus(Core& core, const Entries& jobs,
                                     const std::optional<PixelRect>& focus) const {
-  std::vector<StoredJob> edited;
+  if (auto put = edit_all(jobs, [&](StoredJob& job) { job.focus = focus; }); !put) return put;
   for (const EntryPtr& job : jobs) {
-    edited.push_back(job->stored);
-    edited.back().focus = focus;
-  }
-  if (auto put = store_.put_jobs(edited); !put) return put;
-  for (const EntryPtr& job : jobs) {
-    job->stored.focus = focus;
     if (!job->unloaded) core.driver.run(JobFocused{job->stored.id, focus});
     core.publisher.job(*job);
   }
@@ -350,7 +352,7 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
     if (auto done = set_target(core, *frame, *change.target_error); !done)
       return tl::unexpected(in_frame(frame->stored.id, done.error()));
   if (change.priority)
-    if (auto done = set_priority_of_all(core, sound, *change.priority); !done) return done;
+    if (auto done = set_priority(core, sound, *change.priority); !done) return done;
   if (change.focus)
     if (auto done = set_focus(core, sound, *change.focus); !done) return done;
   if (change.state) {
@@ -358,20 +360,6 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
     if (auto done = become_all(core, open, *change.state); !done) return done;
   }
   core.publisher.sequence(id, true);
-  return {};
-}
-
-// The priority of all frames is stored in one transaction: either all are stored or nothing is changed.
-Result<void> JobCommands::set_priority_of_all(Core& core, const Entries& frames, int priority) const {
-  std::vector<StoredJob> edited;
-  for (const EntryPtr& frame : frames) {
-    edited.push_back(frame->stored);
-    edited.back().spec.priority = priority;
-  }
-  if (auto put = store_.put_jobs(edited); !put) return put;
-  for (const EntryPtr& frame : frames) frame->stored.spec.priority = priority;
-  for (const EntryPtr& frame : frames)
-    if (!frame->unloaded) core.driver.run(JobPriority{frame->stored.id, priority});
   return {};
 }
 

@@ -62,9 +62,8 @@ std::optional<Response> at_its_owner(coordinator::Coordinator& coordinator, cons
         503,
         "the coordinator that has this job does not answer; unless the job has ended, another one takes "
         "it over within seconds: ask again");
-  Response response = problem(307, "another coordinator has this job; its address is in Location");
-  response.headers.emplace_back("Location", (*owner)->http + target_of(request));
-  return response;
+  return problem(307, "another coordinator has this job; its address is in Location",
+                 {{"Location", (*owner)->http + target_of(request)}});
 }
 
 Response options_response(const std::string& allow) { return {.status = 204, .headers = {{"Allow", allow}}}; }
@@ -97,11 +96,7 @@ std::variant<Response, Match> Api::admit_route(Request& request) {
     const auto file = files_.find(request);
     if (file && request.method == Method::options) return options_response("GET, HEAD, OPTIONS");
     if (file && reads) return *file;
-    if (file) {
-      Response response = problem(405, "this is a page: GET or HEAD it");
-      response.headers.emplace_back("Allow", "GET, HEAD, OPTIONS");
-      return response;
-    }
+    if (file) return problem(405, "this is a page: GET or HEAD it", {{"Allow", "GET, HEAD, OPTIONS"}});
     // Under /api a caller without a token gets a 401 even for an unknown address, so the 404 does not reveal
     // to strangers which routes exist.
     if (!request.segments.empty() && request.segments.front() == "api")
@@ -110,10 +105,9 @@ std::variant<Response, Match> Api::admit_route(Request& request) {
   }
   if (auto* wrong = std::get_if<WrongMethod>(&*found)) {
     if (request.method == Method::options) return options_response(wrong->allow);
-    Response response = problem(
-        405, fmt::format("{} is not possible here; possible: {}", to_string(request.method), wrong->allow));
-    response.headers.emplace_back("Allow", wrong->allow);
-    return response;
+    return problem(
+        405, fmt::format("{} is not possible here; possible: {}", to_string(request.method), wrong->allow),
+        {{"Allow", wrong->allow}});
   }
   Match& match = std::get<Match>(*found);
   if (auto refused = refuse_caller(match.route->access, request)) return *refused;

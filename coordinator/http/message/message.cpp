@@ -93,23 +93,17 @@ std::string_view reason_phrase(int status) {
 
 namespace {
 
-struct Row {
-  Errc code;
-  int status;
-};
-constexpr std::array kStatus = {
-    Row{Errc::invalid_argument, 400},   Row{Errc::not_found, 404},
-    Row{Errc::already_exists, 409},     Row{Errc::failed_precondition, 409},
-    Row{Errc::resource_exhausted, 507}, Row{Errc::permission_denied, 403},
-    Row{Errc::unauthenticated, 401},    Row{Errc::unavailable, 503},
-    Row{Errc::internal, 500},
-};
+constexpr std::pair<Errc, int> kStatus[] = {
+    {Errc::invalid_argument, 400},    {Errc::not_found, 404},          {Errc::already_exists, 409},
+    {Errc::failed_precondition, 409}, {Errc::resource_exhausted, 507}, {Errc::permission_denied, 403},
+    {Errc::unauthenticated, 401},     {Errc::unavailable, 503},        {Errc::internal, 500}};
 
-Response problem_of(int status, const nlohmann::ordered_json& json) {
+Response problem_of(int status, const nlohmann::ordered_json& json, Fields headers = {}) {
   // Texts may quote bytes of a scene. Invalid UTF-8 is replaced, so that dump() never throws.
   Response response =
       text_response(status, "application/problem+json",
                     json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  response.headers = std::move(headers);
   if (status == 401) response.headers.emplace_back("WWW-Authenticate", "Bearer realm=\"lightshaft\"");
   if (status == 503) response.headers.emplace_back("Retry-After", "2");
   return response;
@@ -122,19 +116,17 @@ nlohmann::ordered_json base(int status, std::string_view type, std::string_view 
 }  // namespace
 
 int status_of(Errc code) {
-  for (const auto& row : kStatus)
-    if (row.code == code) return row.status;
+  for (const auto& [known, status] : kStatus)
+    if (known == code) return status;
   return 500;
 }
 
-Response problem(int status, std::string_view detail) {
-  return problem_of(status, base(status, "about:blank", detail));
+Response problem(int status, std::string_view detail, Fields headers) {
+  return problem_of(status, base(status, "about:blank", detail), std::move(headers));
 }
 
 Response too_many(int wait_seconds, std::string_view detail) {
-  Response response = problem(429, detail);
-  response.headers.emplace_back("Retry-After", std::to_string(wait_seconds));
-  return response;
+  return problem(429, detail, {{"Retry-After", std::to_string(wait_seconds)}});
 }
 
 Response problem(const Error& error) { return problem(status_of(error.code), error.message); }

@@ -112,8 +112,9 @@ std::string_view reason_phrase(int status);
 // Errors as RFC 9457 problem details. This is the only mapping from Errc to HTTP status.
 int status_of(Errc code);
 
-// Makes a response {type, title, status, detail}; `detail` contains the cause, the place and the remedy.
-Response problem(int status, std::string_view detail);
+// Makes a response {type, title, status, detail} with these headers; `detail` contains the cause, the place
+// and the remedy.
+Response problem(int status, std::string_view detail, Fields headers = {});
 Response problem(const Error& error);
 // Returns a 429 with the header Retry-After: `wait_seconds`.
 Response too_many(int wait_seconds, std::string_view detail);
