@@ -128,14 +128,14 @@ struct QuarantinedWorker {
 class JobStore {
  public:
   virtual ~JobStore() = default;
-  virtual Result<void> put_job(const StoredJob& job) = 0;  // inserts or replaces
   // Inserts or replaces all of these jobs or, on an error, none.
+  Result<void> put_job(const StoredJob& job) { return put_jobs({&job, 1}); }
   virtual Result<void> put_jobs(std::span<const StoredJob> jobs) = 0;
   // Returns all jobs, in the order in which they were first put. A job whose record is damaged is returned
   // with `damaged` set; the other jobs are not affected.
   virtual Result<std::vector<StoredJob>> jobs() const = 0;
   // Removes the job with its points and log; succeeds if the job is unknown.
-  virtual Result<void> remove_job(const JobId& job) { return remove_jobs({&job, 1}); }
+  Result<void> remove_job(const JobId& job) { return remove_jobs({&job, 1}); }
   virtual Result<void> remove_jobs(std::span<const JobId> jobs) = 0;  // removes all jobs or none
 
   virtual Result<void> add_point(const JobId& job, const ConvergencePoint& point) = 0;

@@ -137,11 +137,9 @@ class SqliteJobStore final : public JobStore {
  public:
   explicit SqliteJobStore(Db db) : db_(std::move(db)) {}
 
-  Result<void> put_job(const StoredJob& job) override { return put(*db_.lock(), job); }
-
   Result<void> put_jobs(std::span<const StoredJob> jobs) override {
     const auto db = db_.lock();
-    return all_or_nothing(*db, "store jobs", [&]() -> Result<void> {
+    return all_or_nothing(*db, jobs.size() == 1 ? "store a job" : "store jobs", [&]() -> Result<void> {
       for (const StoredJob& job : jobs)
         if (auto done = put(*db, job); !done) return done;
       return {};

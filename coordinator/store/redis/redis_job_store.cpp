@@ -133,13 +133,9 @@ void RedisJobStore::set_trouble(State& state, const Result<void>& sent) {
 }
 
 Result<void> RedisJobStore::send_once() {
-  if (!link_ || link_->broken()) {
-    link_.reset();
-    auto link = RedisLink::connect(options_.address, options_.timeouts);
-    if (!link) return tl::unexpected(link.error());
-    link_ = std::move(*link);
-    memory_.clear();
-  }
+  const auto renewed = RedisLink::renew(link_, options_.address, options_.timeouts);
+  if (!renewed) return tl::unexpected(renewed.error());
+  if (*renewed) memory_.clear();
   if (auto same = check_memory(); !same) return same;
   if (auto all = note_all_behind(); !all) return all;
   // Quarantined workers are sent before the jobs, so that a coordinator that takes over the jobs gets them,

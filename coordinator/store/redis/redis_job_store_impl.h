@@ -39,8 +39,6 @@ class RedisJobStore final : public JobStore {
     sender_ = std::jthread([this](const std::stop_token& token) { send_loop(token); });
   }
 
-  Result<void> put_job(const StoredJob& job) override { return put_jobs({&job, 1}); }
-
   Result<void> put_jobs(std::span<const StoredJob> jobs) override {
     const auto state = state_.lock();
     std::vector<StoredJob> revised;

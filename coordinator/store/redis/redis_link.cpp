@@ -152,6 +152,16 @@ Result<std::unique_ptr<RedisLink>> RedisLink::connect(const RedisAddress& addres
   return link;
 }
 
+Result<bool> RedisLink::renew(std::unique_ptr<RedisLink>& link, const RedisAddress& address,
+                              Timeouts timeouts) {
+  if (link && !link->broken_) return false;
+  link.reset();
+  auto fresh = connect(address, timeouts);
+  if (!fresh) return tl::unexpected(fresh.error());
+  link = std::move(*fresh);
+  return true;
+}
+
 Result<Result<RedisReply>> RedisLink::next_reply() {
   void* raw = nullptr;
   if (redisGetReply(context_.get(), &raw) != REDIS_OK || raw == nullptr)

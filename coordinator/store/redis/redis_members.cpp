@@ -91,15 +91,13 @@ RedisMembers::RedisMembers(MemberOptions options, Callbacks callbacks)
     : options_(std::move(options)), callbacks_(std::move(callbacks)), absence_(options_.looks) {}
 
 Result<RedisLink*> RedisMembers::link() {
-  if (!link_ || link_->broken()) {
-    link_.reset();
+  const auto renewed = RedisLink::renew(link_, options_.address, options_.timeouts);
+  if (!renewed) return tl::unexpected(renewed.error());
+  if (*renewed) {
     absence_.begin_again();
     // It is unknown whether Redis has carried out the last commands sent over the old connection
     own_unclear_ = true;
     quarantined_seen_ = 0;  // the new connection may lead to another Redis
-    auto fresh = RedisLink::connect(options_.address, options_.timeouts);
-    if (!fresh) return tl::unexpected(fresh.error());
-    link_ = std::move(*fresh);
   }
   return link_.get();
 }
@@ -312,12 +310,8 @@ Result<void> RedisMembers::take_some(std::span<const JobId> ids, const std::stri
 
 Result<std::optional<Member>> RedisMembers::owner_of(const JobId& id) {
   const std::lock_guard lock(asking_);
-  if (!asking_link_ || asking_link_->broken()) {
-    asking_link_.reset();
-    auto fresh = RedisLink::connect(options_.address, options_.timeouts);
-    if (!fresh) return tl::unexpected(fresh.error());
-    asking_link_ = std::move(*fresh);
-  }
+  if (auto renewed = RedisLink::renew(asking_link_, options_.address, options_.timeouts); !renewed)
+    return tl::unexpected(renewed.error());
   auto owner = asking_link_->run({"HGET", redis_job_key(id), "owner"});
   if (owner && owner->nil) owner = asking_link_->run({"HGET", "lightshaft:sequences", id.value});
   if (!owner) return tl::unexpected(owner.error());

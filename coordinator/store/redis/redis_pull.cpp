@@ -108,6 +108,16 @@ Result<void> take_jobs(RedisLink& link, JobStore& local, const std::map<JobId, s
   return {};
 }
 
+// Copies the jobs in the Redis set `set_key` that `here` lacks or has in a lower revision.
+Result<void> pull_jobs(RedisLink& link, JobStore& local, const std::map<JobId, std::uint64_t>& here,
+                       const std::string& set_key, const std::string& node) {
+  const auto ids = job_ids(link, set_key);
+  if (!ids) return tl::unexpected(ids.error());
+  auto wanted = wanted_of(link, local, here, *ids, node);
+  if (!wanted) return tl::unexpected(wanted.error());
+  return take_jobs(link, local, here, *wanted);
+}
+
 }  // namespace
 
 Result<std::vector<JobId>> job_ids(RedisLink& link, const std::string& set_key) {
@@ -158,13 +168,9 @@ Result<void> pull_quarantined(RedisLink& link, JobStore& local) {
 Result<void> pull_from_redis(RedisLink& link, JobStore& local, std::span<const StoredJob> known) {
   if (auto quarantined = pull_quarantined(link, local); !quarantined) return quarantined;
   if (auto counters = pull_counters(link, local); !counters) return counters;
-  const auto ids = job_ids(link, kRedisJobs);
-  if (!ids) return tl::unexpected(ids.error());
   std::map<JobId, std::uint64_t> here;
   for (const StoredJob& job : known) here[job.id] = job.revision;
-  auto wanted = wanted_of(link, local, here, *ids, "");
-  if (!wanted) return tl::unexpected(wanted.error());
-  return take_jobs(link, local, here, *wanted);
+  return pull_jobs(link, local, here, kRedisJobs, "");
 }
 
 Result<void> pull_owned(RedisLink& link, JobStore& local, const std::string& node) {
@@ -188,12 +194,7 @@ Result<void> pull_owned(RedisLink& link, JobStore& local, const std::string& nod
     log_warn(fmt::format("job={} store=redis", id.value),
              "another coordinator has taken it over while this one was away: dropped");
   if (auto removed = local.remove_jobs(gone); !removed) return removed;
-
-  const auto ids = job_ids(link, "lightshaft:owned:" + node);
-  if (!ids) return tl::unexpected(ids.error());
-  auto wanted = wanted_of(link, local, here, *ids, node);
-  if (!wanted) return tl::unexpected(wanted.error());
-  return take_jobs(link, local, here, *wanted);
+  return pull_jobs(link, local, here, "lightshaft:owned:" + node, node);
 }
 
 Result<std::set<JobId>> jobs_behind(RedisLink& link, std::span<const std::pair<JobId, std::uint64_t>> known) {

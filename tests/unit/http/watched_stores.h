@@ -111,7 +111,6 @@ class WatchedRecords final : public MovingStore {
     const std::lock_guard lock(last_mutex_);
     return last_job_;
   }
-  Result<void> put_job(const StoredJob& job) override { return put_jobs({&job, 1}); }
   Result<void> put_jobs(std::span<const StoredJob> jobs) override {
     if (refuses) return fail(Errc::resource_exhausted, "the disk is full");
     const std::lock_guard lock(last_mutex_);

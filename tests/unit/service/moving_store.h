@@ -23,7 +23,6 @@ class MovingStore : public JobStore {
   std::atomic<bool> refuses_to_bar{false};
   std::function<void()> on_refusal = [] {};  // called under the coordinator's lock
 
-  Result<void> put_job(const StoredJob& job) override { return inner_->put_job(job); }
   Result<void> put_jobs(std::span<const StoredJob> jobs) override { return inner_->put_jobs(jobs); }
   Result<std::vector<StoredJob>> jobs() const override { return inner_->jobs(); }
   Result<void> remove_jobs(std::span<const JobId> jobs) override { return inner_->remove_jobs(jobs); }

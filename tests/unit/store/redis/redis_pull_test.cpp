@@ -17,9 +17,6 @@ class Dying final : public JobStore {
  public:
   Dying(JobStore& inner, int writes) : inner_(inner), left_(writes) {}
 
-  Result<void> put_job(const StoredJob& job) override {
-    return write([&] { return inner_.put_job(job); });
-  }
   Result<void> put_jobs(std::span<const StoredJob> jobs) override {
     return write([&] { return inner_.put_jobs(jobs); });
   }
