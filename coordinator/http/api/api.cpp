@@ -1,6 +1,7 @@
 #include "coordinator/http/api/api.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <exception>
@@ -31,10 +32,8 @@ Response unsupported_type(const Route& route, std::string_view type) {
 }
 
 Response not_found(const Request& request) {
-  std::string path;
-  for (const auto& segment : request.segments) path += "/" + segment;
   return problem(404, fmt::format("there is nothing at '{}'; the routes are in /api/v1/openapi.json",
-                                  path.empty() ? "/" : path.substr(0, 200)));
+                                  fmt::format("/{}", fmt::join(request.segments, "/")).substr(0, 200)));
 }
 
 constexpr std::string_view kOneJob = "/api/v1/jobs/{id}";

@@ -52,22 +52,23 @@ namespace {
 
 using coordinator::JobState;
 
-void head(std::string& out, std::string_view name, std::string_view type, std::string_view help) {
-  fmt::format_to(std::back_inserter(out), "# HELP {} {}\n# TYPE {} {}\n", name, help, name, type);
+// A metric whose name ends with _total is a counter, any other a gauge.
+void head(std::string& out, std::string_view name, std::string_view help) {
+  fmt::format_to(std::back_inserter(out), "# HELP {} {}\n# TYPE {} {}\n", name, help, name,
+                 name.ends_with("_total") ? "counter" : "gauge");
 }
 
 template <class Value>
-void single(std::string& out, std::string_view name, std::string_view type, std::string_view help,
-            Value value) {
-  head(out, name, type, help);
+void single(std::string& out, std::string_view name, std::string_view help, Value value) {
+  head(out, name, help);
   fmt::format_to(std::back_inserter(out), "{} {}\n", name, value);
 }
 
 // A metric with one value for each value of its label.
 using LabelledValues = std::vector<std::pair<std::string_view, std::uint64_t>>;
-void labelled(std::string& out, std::string_view name, std::string_view type, std::string_view help,
-              std::string_view label, const LabelledValues& values) {
-  head(out, name, type, help);
+void labelled(std::string& out, std::string_view name, std::string_view help, std::string_view label,
+              const LabelledValues& values) {
+  head(out, name, help);
   for (const auto& [word, value] : values)
     fmt::format_to(std::back_inserter(out), "{}{{{}=\"{}\"}} {}\n", name, label, word, value);
 }
@@ -92,18 +93,18 @@ void write_jobs(std::string& out, std::span<const coordinator::JobView> jobs) {
   }
   LabelledValues states;
   for (const JobState state : kStates) states.emplace_back(to_string(state), by_state[state]);
-  labelled(out, "lightshaft_jobs", "gauge", "Jobs by state.", "state", states);
-  single(out, "lightshaft_units_planned", "gauge", "Units of unfinished jobs.", planned);
-  single(out, "lightshaft_units_done", "gauge", "Units of unfinished jobs that are folded.", done);
-  single(out, "lightshaft_queued_core_seconds", "gauge",
+  labelled(out, "lightshaft_jobs", "Jobs by state.", "state", states);
+  single(out, "lightshaft_units_planned", "Units of unfinished jobs.", planned);
+  single(out, "lightshaft_units_done", "Units of unfinished jobs that are folded.", done);
+  single(out, "lightshaft_queued_core_seconds",
          "Predicted CPU seconds of units that wait for a worker, of jobs that are not paused.", queued);
-  single(out, "lightshaft_eta_seconds", "gauge",
-         "Predicted wall seconds to finish all jobs whose rate is known.", eta);
-  single(out, "lightshaft_core_seconds", "gauge", "CPU seconds that workers spent on the jobs kept here.",
+  single(out, "lightshaft_eta_seconds", "Predicted wall seconds to finish all jobs whose rate is known.",
+         eta);
+  single(out, "lightshaft_core_seconds", "CPU seconds that workers spent on the jobs kept here.",
          core_seconds);
-  single(out, "lightshaft_nonfinite_samples", "gauge", "Samples counted as non-finite; zero on healthy jobs.",
+  single(out, "lightshaft_nonfinite_samples", "Samples counted as non-finite; zero on healthy jobs.",
          health.nonfinite);
-  single(out, "lightshaft_majorant_violations", "gauge", "Densities above their bound; zero on healthy jobs.",
+  single(out, "lightshaft_majorant_violations", "Densities above their bound; zero on healthy jobs.",
          health.majorant_violations);
 }
 
@@ -116,20 +117,18 @@ void write_workers(std::string& out, std::span<const coordinator::WorkerView> wo
     threads += static_cast<std::uint64_t>(worker.threads);
     fake += worker.fake;
   }
-  labelled(out, "lightshaft_workers", "gauge", "Workers by state.", "state",
-           {by_state.begin(), by_state.end()});
-  single(out, "lightshaft_worker_threads", "gauge", "Render threads of connected workers.", threads);
-  single(out, "lightshaft_workers_fake", "gauge", "Connected workers that make their pixels up.", fake);
+  labelled(out, "lightshaft_workers", "Workers by state.", "state", {by_state.begin(), by_state.end()});
+  single(out, "lightshaft_worker_threads", "Render threads of connected workers.", threads);
+  single(out, "lightshaft_workers_fake", "Connected workers that make their pixels up.", fake);
 }
 
 void write_leases(std::string& out, const coordinator::FarmFigures& f) {
-  single(out, "lightshaft_leases", "gauge", "Leases that workers hold.", f.leases_now);
-  single(out, "lightshaft_units_leased", "gauge", "Units of these leases.", f.units_leased_now);
-  single(out, "lightshaft_units_lent", "gauge", "Older name of lightshaft_units_leased.", f.units_leased_now);
-  single(out, "lightshaft_leases_granted_total", "counter", "Leases given to workers.", f.leases_granted);
-  single(out, "lightshaft_units_leased_total", "counter", "Units of these leases.", f.units_leased);
-  single(out, "lightshaft_units_lent_total", "counter", "Older name of lightshaft_units_leased_total.",
-         f.units_leased);
+  single(out, "lightshaft_leases", "Leases that workers hold.", f.leases_now);
+  single(out, "lightshaft_units_leased", "Units of these leases.", f.units_leased_now);
+  single(out, "lightshaft_units_lent", "Older name of lightshaft_units_leased.", f.units_leased_now);
+  single(out, "lightshaft_leases_granted_total", "Leases given to workers.", f.leases_granted);
+  single(out, "lightshaft_units_leased_total", "Units of these leases.", f.units_leased);
+  single(out, "lightshaft_units_lent_total", "Older name of lightshaft_units_leased_total.", f.units_leased);
   // Causes with count 0 are listed, too: Prometheus computes the rate of a counter only from values that it
   // has seen, so a counter that first appeared with 1 would lose that event.
   LabelledValues freed;
@@ -138,13 +137,13 @@ void write_leases(std::string& out, const coordinator::FarmFigures& f) {
     freed.emplace_back(word, count == f.units_freed.end() ? 0 : count->second);
   }
   labelled(
-      out, "lightshaft_units_freed_total", "counter",
+      out, "lightshaft_units_freed_total",
       "Units that a worker had and did not hand in, by cause; those that are still wanted go to another.",
       "cause", freed);
 }
 
 void write_results(std::string& out, const coordinator::FarmFigures& f) {
-  labelled(out, "lightshaft_results_total", "counter",
+  labelled(out, "lightshaft_results_total",
            "Results that workers handed in. equal, differing: a second one of a unit, against the first.",
            "verdict",
            {{"accepted", f.accepted},
@@ -153,47 +152,43 @@ void write_results(std::string& out, const coordinator::FarmFigures& f) {
             {"unwanted", f.unwanted},
             {"refused", f.refused},
             {"not_stored", f.not_stored}});
-  single(out, "lightshaft_units_folded_total", "counter", "Units folded into images.", f.folded);
-  single(out, "lightshaft_fold_lag_seconds_total", "counter",
+  single(out, "lightshaft_units_folded_total", "Units folded into images.", f.folded);
+  single(out, "lightshaft_fold_lag_seconds_total",
          "Seconds from a result's arrival to its fold, summed over lightshaft_units_folded_total.",
          f.fold_lag_seconds);
-  single(out, "lightshaft_results_arrived", "gauge", "Results that are being checked and stored.",
-         f.arrived_now);
-  single(out, "lightshaft_results_arrived_bytes", "gauge", "Memory that these take.", f.arrived_bytes);
-  single(out, "lightshaft_results_waiting", "gauge",
-         "Accepted results that wait for an earlier round of their tile.", f.waiting_now);
-  single(out, "lightshaft_background_writes", "gauge", "Writes that wait for the disk.",
-         f.background_writes_now);
-  single(out, "lightshaft_chores", "gauge", "Older name of lightshaft_background_writes.",
-         f.background_writes_now);
-  single(out, "lightshaft_result_bytes_total", "counter", "Bytes of results from workers.", f.result_bytes);
-  single(out, "lightshaft_blob_bytes_total", "counter", "Bytes of blobs sent to workers.", f.blob_bytes);
+  single(out, "lightshaft_results_arrived", "Results that are being checked and stored.", f.arrived_now);
+  single(out, "lightshaft_results_arrived_bytes", "Memory that these take.", f.arrived_bytes);
+  single(out, "lightshaft_results_waiting", "Accepted results that wait for an earlier round of their tile.",
+         f.waiting_now);
+  single(out, "lightshaft_background_writes", "Writes that wait for the disk.", f.background_writes_now);
+  single(out, "lightshaft_chores", "Older name of lightshaft_background_writes.", f.background_writes_now);
+  single(out, "lightshaft_result_bytes_total", "Bytes of results from workers.", f.result_bytes);
+  single(out, "lightshaft_blob_bytes_total", "Bytes of blobs sent to workers.", f.blob_bytes);
 }
 
 void write_audits(std::string& out, const coordinator::AuditFigures& a) {
-  labelled(out, "lightshaft_audits_total", "counter",
+  labelled(out, "lightshaft_audits_total",
            "Results chosen to be rendered again by another worker, and what came of it.", "verdict",
            {{"asked", a.asked}, {"equal", a.equal}, {"differ", a.differ}, {"dropped", a.dropped}});
-  single(out, "lightshaft_workers_quarantined_total", "counter", "Workers found to render wrong pixels.",
+  single(out, "lightshaft_workers_quarantined_total", "Workers found to render wrong pixels.",
          a.workers_quarantined);
-  single(out, "lightshaft_workers_barred_total", "counter",
-         "Older name of lightshaft_workers_quarantined_total.", a.workers_quarantined);
-  single(out, "lightshaft_tiles_discarded_total", "counter",
+  single(out, "lightshaft_workers_barred_total", "Older name of lightshaft_workers_quarantined_total.",
+         a.workers_quarantined);
+  single(out, "lightshaft_tiles_discarded_total",
          "Tiles rendered again since such a worker had a hand in them.", a.tiles_discarded);
 }
 
 void write_webhooks(std::string& out, const coordinator::WebhookFigures& w) {
-  labelled(out, "lightshaft_webhook_sendings_total", "counter",
+  labelled(out, "lightshaft_webhook_sendings_total",
            "Attempts to tell a receiver of a job's event; a failed one is tried again later.", "result",
            {{"taken", w.delivered}, {"failed", w.failed_attempts}});
-  single(out, "lightshaft_webhooks_given_up_total", "counter", "Events that a receiver never took.",
-         w.given_up);
-  single(out, "lightshaft_webhooks_waiting", "gauge", "Events that receivers have still to take.", w.waiting);
+  single(out, "lightshaft_webhooks_given_up_total", "Events that a receiver never took.", w.given_up);
+  single(out, "lightshaft_webhooks_waiting", "Events that receivers have still to take.", w.waiting);
 }
 
 void write_traces(std::string& out, const trace::Figures& f) {
   labelled(
-      out, "lightshaft_trace_spans_total", "counter",
+      out, "lightshaft_trace_spans_total",
       "Spans that the collector of traces took, those that it refused or did not answer for, and those left "
       "out since too many waited.",
       "result", {{"taken", f.sent}, {"refused", f.refused}, {"left out", f.left_out}});
@@ -201,10 +196,10 @@ void write_traces(std::string& out, const trace::Figures& f) {
 
 void write_process(std::string& out) {
   const ProcessFigures p = process_figures();
-  single(out, "process_resident_memory_bytes", "gauge", "Memory of the coordinator.", p.resident_bytes);
-  single(out, "process_open_fds", "gauge", "Files and sockets that it has open.", p.open_files);
-  single(out, "process_threads", "gauge", "Its threads.", p.threads);
-  single(out, "process_cpu_seconds_total", "counter", "CPU time of it.", p.cpu_seconds);
+  single(out, "process_resident_memory_bytes", "Memory of the coordinator.", p.resident_bytes);
+  single(out, "process_open_fds", "Files and sockets that it has open.", p.open_files);
+  single(out, "process_threads", "Its threads.", p.threads);
+  single(out, "process_cpu_seconds_total", "CPU time of it.", p.cpu_seconds);
 }
 
 }  // namespace
@@ -230,24 +225,22 @@ Response get_metrics(Api& api, const Request&, const Params&) {
   write_results(out, farm);
   write_audits(out, coordinator.audits());
   write_process(out);
-  single(out, "lightshaft_events_total", "counter", "Id of the last event.", coordinator.last_event_id());
-  head(out, "lightshaft_http_requests_total", "counter", "Requests answered.");
+  single(out, "lightshaft_events_total", "Id of the last event.", coordinator.last_event_id());
+  head(out, "lightshaft_http_requests_total", "Requests answered.");
   for (const auto& [key, count] : counters.requests())
     fmt::format_to(std::back_inserter(out),
                    "lightshaft_http_requests_total{{method=\"{}\",code=\"{}\"}} {}\n", to_string(key.first),
                    key.second, count);
-  single(out, "lightshaft_http_connections", "gauge", "Open HTTP connections.", counters.connections.load());
-  single(out, "lightshaft_http_event_streams", "gauge", "Open event streams.", counters.event_streams.load());
-  single(out, "lightshaft_http_slow_readers_total", "counter",
-         "Event streams closed because the reader was too slow.", counters.events_dropped.load());
-  single(out, "lightshaft_http_body_bytes_total", "counter", "Bytes of request bodies.",
-         counters.body_bytes.load());
+  single(out, "lightshaft_http_connections", "Open HTTP connections.", counters.connections.load());
+  single(out, "lightshaft_http_event_streams", "Open event streams.", counters.event_streams.load());
+  single(out, "lightshaft_http_slow_readers_total", "Event streams closed because the reader was too slow.",
+         counters.events_dropped.load());
+  single(out, "lightshaft_http_body_bytes_total", "Bytes of request bodies.", counters.body_bytes.load());
   if (const auto webhooks = api.webhooks()) write_webhooks(out, *webhooks);
   if (const auto traces = api.traces()) write_traces(out, *traces);
   if (const auto store = coordinator.store_status(); !store.mirror.empty()) {
-    single(out, "lightshaft_redis_up", "gauge", "1 while Redis answers.", store.trouble.empty() ? 1 : 0);
-    single(out, "lightshaft_redis_jobs_behind", "gauge", "Jobs of which Redis has not been told all.",
-           store.behind);
+    single(out, "lightshaft_redis_up", "1 while Redis answers.", store.trouble.empty() ? 1 : 0);
+    single(out, "lightshaft_redis_jobs_behind", "Jobs of which Redis has not been told all.", store.behind);
   }
   return text_response(200, "text/plain; version=0.0.4; charset=utf-8", std::move(out));
 }

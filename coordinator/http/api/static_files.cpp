@@ -1,5 +1,7 @@
 #include "coordinator/http/api/static_files.h"
 
+#include <fmt/ranges.h>
+
 #include <utility>
 
 #include "common/base/digest.h"
@@ -25,15 +27,6 @@ constexpr std::string_view kPagePolicy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; font-src 'self'; "
     "connect-src 'self'; manifest-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'";
 
-std::string joined(std::span<const std::string> segments) {
-  std::string path;
-  for (const auto& segment : segments) {
-    if (!path.empty()) path += '/';
-    path += segment;
-  }
-  return path.empty() ? "index.html" : path;
-}
-
 }  // namespace
 
 std::string_view content_type_of(std::string_view file_name) {
@@ -49,7 +42,8 @@ StaticFiles::StaticFiles(std::span<const StaticFile> files) {
 }
 
 std::optional<Response> StaticFiles::find(const Request& request) const {
-  const auto found = entries_.find(joined(request.segments));
+  const auto found = entries_.find(
+      request.segments.empty() ? "index.html" : fmt::format("{}", fmt::join(request.segments, "/")));
   if (found == entries_.end()) return std::nullopt;
   const Entry& entry = found->second;
   // With "no-cache" the browser checks for changes each time, and gets a 304 if the file has not changed.

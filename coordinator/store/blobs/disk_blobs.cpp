@@ -133,24 +133,30 @@ Result<std::vector<std::byte>> DiskBlobs::read(const Digest& digest, std::uint64
   auto bytes = read_at(*file, offset, static_cast<std::size_t>(n), path(digest));
   if (!bytes || !whole) return bytes;
   if (const Digest got = sha256(*bytes); got != digest) return set_aside(digest, *seen, got);
-  proofs_.note(digest, *seen);
+  proofs_.lock()->insert_or_assign(digest, *seen);
   return bytes;
+}
+
+bool DiskBlobs::proven(const Digest& digest, const FileStamp& stamp) const {
+  const auto proofs = proofs_.lock();
+  const auto found = proofs->find(digest);
+  return found != proofs->end() && found->second == stamp;
 }
 
 Result<void> DiskBlobs::prove(const Digest& digest, bool again) const {
   const auto known = look_at(digest);
   if (!known) return tl::unexpected(known.error());
-  if (!again && proofs_.proven(digest, *known)) return {};
+  if (!again && proven(digest, *known)) return {};
   const std::lock_guard lock(proving_);
   // The stamp is taken before the file is read. If the file changes meanwhile, the stamp no longer matches,
   // and the next request reads the file again.
   const auto seen = look_at(digest);
   if (!seen) return tl::unexpected(seen.error());
-  if (!again && proofs_.proven(digest, *seen)) return {};
+  if (!again && proven(digest, *seen)) return {};
   const auto got = sha256_file(path(digest));
   if (!got) return tl::unexpected(got.error());
   if (*got != digest) return set_aside(digest, *seen, *got);
-  proofs_.note(digest, *seen);
+  proofs_.lock()->insert_or_assign(digest, *seen);
   return {};
 }
 
@@ -160,7 +166,7 @@ tl::unexpected<Error> DiskBlobs::set_aside(const Digest& digest, const FileStamp
   const std::lock_guard lock(placing_);
   if (stamp_of(from) != seen)
     return fail(Errc::unavailable, fmt::format("{} changed while it was read; try again", from.string()));
-  proofs_.forget(digest);
+  proofs_.lock()->erase(digest);
   const std::string what = fmt::format("blob {} is damaged: the bytes in {} have the SHA-256 {}",
                                        digest.hex(), from.string(), got.hex());
   if (::rename(from.c_str(), to.c_str()) != 0)
@@ -181,7 +187,7 @@ Result<void> DiskBlobs::place(const Digest& digest, const std::filesystem::path&
   {
     const std::lock_guard lock(placing_);
     if (::rename(from.c_str(), to.c_str()) != 0) return tl::unexpected(errno_error("rename to", to));
-    if (const auto stamp = stamp_of(to)) proofs_.note(digest, *stamp);
+    if (const auto stamp = stamp_of(to)) proofs_.lock()->insert_or_assign(digest, *stamp);
     ::unlink(damaged(to).c_str());
   }
   if (auto synced = sync_folder(to.parent_path()); !synced) return synced;
@@ -225,7 +231,7 @@ Result<std::vector<Digest>> DiskBlobs::list(bool unfinished) const {
 }
 
 Result<void> DiskBlobs::remove(const Digest& digest) {
-  proofs_.forget(digest);
+  proofs_.lock()->erase(digest);
   if (::unlink(path(digest).c_str()) == 0 || errno == ENOENT) return {};
   return tl::unexpected(errno_error("remove", path(digest)));
 }

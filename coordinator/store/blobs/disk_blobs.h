@@ -38,30 +38,6 @@ inline std::optional<FileStamp> stamp_of(const std::filesystem::path& path) {
                    info.st_ctim.tv_nsec};
 }
 
-// The files that this process has read as a whole and found to match their digests, with each file's stamp at
-// that time. A file whose stamp has changed since must be read again. Thread-safe.
-class VerifiedDigests {
- public:
-  // True if this blob's file matched its digest when it had this stamp.
-  bool proven(const Digest& digest, const FileStamp& stamp) const {
-    const std::lock_guard lock(mutex_);
-    const auto found = stamps_.find(digest);
-    return found != stamps_.end() && found->second == stamp;
-  }
-  void note(const Digest& digest, const FileStamp& stamp) {
-    const std::lock_guard lock(mutex_);
-    stamps_.insert_or_assign(digest, stamp);
-  }
-  void forget(const Digest& digest) {
-    const std::lock_guard lock(mutex_);
-    stamps_.erase(digest);
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::map<Digest, FileStamp> stamps_;
-};
-
 // Returns the digests that are names of files in the folder.
 Result<std::vector<Digest>> digests_in(const std::filesystem::path& folder);
 
@@ -127,6 +103,7 @@ class DiskBlobs final : public BlobStore {
   DiskBlobs(std::filesystem::path folder, std::filesystem::path work)
       : folder_(std::move(folder)), work_(std::move(work)) {}
   Result<FileStamp> look_at(const Digest& digest) const;
+  bool proven(const Digest& digest, const FileStamp& stamp) const;
   // Moves the blob's file aside, if it still has the stamp `seen` that it had when it was read; `got` is the
   // digest of the bytes read. Always returns an error, with the cause and the remedy.
   tl::unexpected<Error> set_aside(const Digest& digest, const FileStamp& seen, const Digest& got) const;
@@ -134,7 +111,9 @@ class DiskBlobs final : public BlobStore {
   Result<void> place(const Digest& digest, const std::filesystem::path& from);
 
   std::filesystem::path folder_, work_;
-  mutable VerifiedDigests proofs_;
+  // The blobs that this process has read as a whole and found to match their digests, with the stamp of each
+  // file at that time. A file whose stamp has changed since must be read again.
+  mutable Guarded<std::map<Digest, FileStamp>> proofs_;
   mutable std::mutex proving_;  // only one file is verified at a time: a second request waits for the result
   // Held while a file is put in its place or moved aside. Otherwise a file could be repaired after its damage
   // was noticed, and the good file be moved aside.

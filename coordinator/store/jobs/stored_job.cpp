@@ -36,22 +36,23 @@ auto decoded(std::string_view text, std::string_view what, Read read) -> Result<
   }
 }
 
+constexpr std::pair<const char*, double JobTotals::*> kReals[] = {
+    {"render_seconds", &JobTotals::render_seconds}, {"core_seconds", &JobTotals::core_seconds},
+    {"load_seconds", &JobTotals::load_seconds},     {"spp_done", &JobTotals::spp_done},
+    {"began_unix", &JobTotals::began_unix},         {"ended_unix", &JobTotals::ended_unix}};
+constexpr std::pair<const char*, std::uint64_t JobTotals::*> kCounts[] = {
+    {"peak_rss_bytes", &JobTotals::peak_rss_bytes},
+    {"units", &JobTotals::units},
+    {"units_planned", &JobTotals::units_planned}};
+
 json to_value(const JobTotals& t) {
-  json time;
-  for (const TimePart& part : kTimeParts) time[part.name] = finite(t.time.*part.seconds);
-  return {{"render_seconds", finite(t.render_seconds)},
-          {"core_seconds", finite(t.core_seconds)},
-          {"load_seconds", finite(t.load_seconds)},
-          {"peak_rss_bytes", t.peak_rss_bytes},
-          {"spp_done", t.spp_done},
-          {"units", t.units},
-          {"units_planned", t.units_planned},
-          {"health", json::parse(canonical_json(t.health))},
-          {"time", std::move(time)},
-          {"began_unix", t.began_unix},
-          {"ended_unix", t.ended_unix},
-          {"doubt", t.doubt},
-          {"few_hits", t.few_hits ? json(*t.few_hits) : json()}};
+  json j{{"health", json::parse(canonical_json(t.health))},
+         {"doubt", t.doubt},
+         {"few_hits", t.few_hits ? json(*t.few_hits) : json()}};
+  for (const auto& [name, member] : kReals) j[name] = finite(t.*member);
+  for (const auto& [name, member] : kCounts) j[name] = t.*member;
+  for (const TimePart& part : kTimeParts) j["time"][part.name] = finite(t.time.*part.seconds);
+  return j;
 }
 
 // Returns 0 if the key is missing: a counter that is 0 is not stored.
@@ -68,17 +69,10 @@ T required(Result<T> parsed) {
 
 JobTotals totals_of(const json& j) {
   JobTotals t;
-  t.render_seconds = number_of(j.at("render_seconds"));
-  t.core_seconds = number_of(j.at("core_seconds"));
-  t.load_seconds = number_of(j.at("load_seconds"));
-  t.peak_rss_bytes = count_of(j.at("peak_rss_bytes"));
-  t.spp_done = j.at("spp_done");
-  t.units = count_of(j.at("units"));
-  t.units_planned = count_of(j.at("units_planned"));
-  t.health = required(parse_health(j.at("health").dump()));
+  for (const auto& [name, member] : kReals) t.*member = number_of(j.at(name));
+  for (const auto& [name, member] : kCounts) t.*member = count_of(j.at(name));
   for (const TimePart& part : kTimeParts) t.time.*part.seconds = number_of(j.at("time").at(part.name));
-  t.began_unix = j.at("began_unix");
-  t.ended_unix = j.at("ended_unix");
+  t.health = required(parse_health(j.at("health").dump()));
   t.doubt = j.at("doubt");
   if (const json& few = j.at("few_hits"); !few.is_null()) t.few_hits = count_of(few);
   return t;
