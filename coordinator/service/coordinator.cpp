@@ -10,6 +10,7 @@
 #include "coordinator/base/work_queue.h"
 #include "coordinator/service/blob_watch.h"
 #include "coordinator/service/core.h"
+#include "coordinator/service/open_stores.h"
 #include "coordinator/service/pictures.h"
 #include "coordinator/service/state/job_views.h"
 #include "coordinator/service/submission.h"
@@ -17,7 +18,6 @@
 #include "coordinator/service/worker_sessions.h"
 #include "coordinator/store/blobs/memory_blobs.h"
 #include "coordinator/store/files.h"
-#include "coordinator/store/open_stores.h"
 
 namespace ls::coordinator {
 

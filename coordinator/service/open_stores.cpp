@@ -1,4 +1,4 @@
-#include "coordinator/store/open_stores.h"
+#include "coordinator/service/open_stores.h"
 
 #include <fmt/format.h>
 
