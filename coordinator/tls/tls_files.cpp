@@ -196,14 +196,6 @@ tl::unexpected<Error> wrong(const fs::path& file, const std::string& why) {
   return fail(Errc::invalid_argument, fmt::format("'{}' {}", file.string(), why));
 }
 
-}  // namespace
-
-bool kept_secret(unsigned owner, unsigned mode, unsigned reader) {
-  return (mode & 077) == 0 || (owner == 0 && reader != 0 && (mode & 037) == 0);
-}
-
-namespace {
-
 Result<std::string> read_pem(const fs::path& file, bool secret) {
   const Descriptor in{::open(file.c_str(), O_RDONLY | O_CLOEXEC)};
   struct stat info {};
@@ -253,6 +245,10 @@ std::string host_name() {
 }
 
 }  // namespace
+
+bool kept_secret(unsigned owner, unsigned mode, unsigned reader) {
+  return (mode & 077) == 0 || (owner == 0 && reader != 0 && (mode & 037) == 0);
+}
 
 Result<Texts> read_files(const fs::path& ca, const fs::path& cert, const fs::path& key) {
   auto own_ca = read_pem(ca, false);

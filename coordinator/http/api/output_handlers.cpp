@@ -18,10 +18,15 @@ namespace {
 using coordinator::VideoAsked;
 
 template <class Body>
-Response file_response(std::string content_type, Body bytes, const std::string& name) {
+Response file_response(std::string content_type, Result<Body> bytes, const std::string& name) {
+  if (!bytes) return problem(bytes.error());
   return {.content_type = std::move(content_type),
           .headers = {{"Content-Disposition", fmt::format("inline; filename=\"{}\"", name)}},
-          .body = std::move(bytes)};
+          .body = std::move(*bytes)};
+}
+
+Response answer_json(Result<std::string> json) {
+  return json ? json_response(200, std::move(*json)) : problem(json.error());
 }
 
 // Parses N non-negative whole numbers, separated by commas; false: the text is anything else.
@@ -61,9 +66,8 @@ Result<VideoAsked> read_asked_video(std::string_view text) {
 Response get_image_exr(Api& api, const Request&, const JobId& id) {
   if (const auto path = api.coordinator().final_file(id, "image.exr"); !path.empty())
     if (auto file = open_file_body(path))
-      return file_response("image/x-exr", std::move(*file), id.value + ".exr");
-  auto image = api.coordinator().image_exr(id);
-  return image ? file_response("image/x-exr", std::move(*image), id.value + ".exr") : problem(image.error());
+      return file_response("image/x-exr", std::move(file), id.value + ".exr");
+  return file_response("image/x-exr", api.coordinator().image_exr(id), id.value + ".exr");
 }
 
 Response get_image_png(Api& api, const Request& request, const JobId& id) {
@@ -74,8 +78,8 @@ Response get_image_png(Api& api, const Request& request, const JobId& id) {
   const auto layer = request.parameter("layer");
   if (layer && *layer != "denoised")
     return problem(400, "'layer' must be \"denoised\", or be left out for the image itself");
-  auto image = api.coordinator().image_png(id, *exposure, layer.has_value());
-  return image ? file_response("image/png", std::move(*image), id.value + ".png") : problem(image.error());
+  return file_response("image/png", api.coordinator().image_png(id, *exposure, layer.has_value()),
+                       id.value + ".png");
 }
 
 Response get_thumbnail(Api& api, const Request&, const JobId& id) {
@@ -85,18 +89,15 @@ Response get_thumbnail(Api& api, const Request&, const JobId& id) {
 }
 
 Response get_error_png(Api& api, const Request&, const JobId& id) {
-  auto map = api.coordinator().error_png(id);
-  return map ? file_response("image/png", std::move(*map), id.value + "-error.png") : problem(map.error());
+  return file_response("image/png", api.coordinator().error_png(id), id.value + "-error.png");
 }
 
 Response get_samples_png(Api& api, const Request&, const JobId& id) {
-  auto map = api.coordinator().samples_png(id);
-  return map ? file_response("image/png", std::move(*map), id.value + "-samples.png") : problem(map.error());
+  return file_response("image/png", api.coordinator().samples_png(id), id.value + "-samples.png");
 }
 
 Response get_layers(Api& api, const Request&, const JobId& id) {
-  auto layers = api.coordinator().layers_json(id);
-  return layers ? json_response(200, std::move(*layers)) : problem(layers.error());
+  return answer_json(api.coordinator().layers_json(id));
 }
 
 Response get_pixels(Api& api, const Request& request, const JobId& id) {
@@ -123,8 +124,7 @@ Response post_video(Api& api, const Request& request, const JobId& id) {
 }
 
 Response get_video(Api& api, const Request&, const JobId& id) {
-  const auto video = api.coordinator().video(id);
-  return video ? json_response(200, coordinator::video_json(*video)) : problem(video.error());
+  return answer_json(api.coordinator().video(id).map(coordinator::video_json));
 }
 
 Response get_video_mp4(Api& api, const Request&, const JobId& id) {
@@ -132,7 +132,7 @@ Response get_video_mp4(Api& api, const Request&, const JobId& id) {
   if (!path) return problem(path.error());
   auto file = open_file_body(*path);
   if (!file) return problem(404, fmt::format("the video of job {} is gone: ask for it again", id.value));
-  return file_response("video/mp4", std::move(*file), id.value + ".mp4");
+  return file_response("video/mp4", std::move(file), id.value + ".mp4");
 }
 
 Response get_report(Api& api, const Request&, const JobId& id) {
@@ -142,8 +142,7 @@ Response get_report(Api& api, const Request&, const JobId& id) {
       response.body = std::move(*file);
       return response;
     }
-  auto report = api.coordinator().report_json(id);
-  return report ? json_response(200, std::move(*report)) : problem(report.error());
+  return answer_json(api.coordinator().report_json(id));
 }
 
 Response get_report_page(Api& api, const Request&, const JobId& id) {
@@ -169,8 +168,7 @@ Response get_convergence(Api& api, const Request&, const JobId& id) {
 }
 
 Response get_tiles(Api& api, const Request&, const JobId& id) {
-  const auto tiles = api.coordinator().tiles(id);
-  return tiles ? json_response(200, coordinator::tiles_json(*tiles)) : problem(tiles.error());
+  return answer_json(api.coordinator().tiles(id).map(coordinator::tiles_json));
 }
 
 Response get_log(Api& api, const Request&, const JobId& id) {
