@@ -24,7 +24,7 @@
 #include "common/trace/tracer.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/auth/throttle.h"
-#include "coordinator/http/auth/token_file.h"
+#include "coordinator/http/auth/token_registry.h"
 #include "coordinator/http/net/http_server.h"
 #include "coordinator/options.h"
 #include "coordinator/rpc/rpc_server.h"
@@ -175,7 +175,7 @@ Result<void> serve(const Flags& flags, const sigset_t& signals) {
   fs::remove(data / "ports.json", ignored);
   const fs::path secrets = secrets_of(flags);
   fs::create_directories(secrets, ignored);
-  // Other coordinators that start with the same folder of secrets at the same time wait for this lock
+  // Other coordinators that start with the same folder of secrets wait for this lock
   std::optional<ls::http::FolderLock> others(secrets);
   auto tokens = ls::http::TokenRegistry::open(secrets);
   if (!tokens) return tl::unexpected(tokens.error());

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 
 #include "common/command_line/command.h"
+#include "coordinator/service/open_stores.h"
 
 namespace ls::coordinator {
 namespace {

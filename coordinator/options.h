@@ -24,8 +24,8 @@ struct Flags {
   bool shared = false;
   std::string public_http, public_grpc;
   std::string secrets;  // folder of tokens and TLS files; empty: the folder of --data
-  // For so many hours the coordinator keeps a blob (file of a scene) that no job needs. nullopt: 24 hours,
-  // or forever if --blobs is given, because other coordinators may use that store
+  // Hours for which a blob (file of a scene) is kept after the last job that needs it. nullopt: 24 hours, or
+  // forever if --blobs is given, because other coordinators may use that store
   std::optional<double> keep_unused_hours;
   std::vector<std::string> webhooks;
   LogFormat log_format = LogFormat::text;

@@ -10,8 +10,7 @@
 #include "common/base/log.h"
 #include "common/protocol/limits.h"
 #include "coordinator/base/work_queue.h"
-#include "coordinator/rpc/blob_stream.h"
-#include "coordinator/rpc/work_stream.h"
+#include "coordinator/rpc/streams.h"
 
 namespace ls::coordinator {
 
@@ -25,8 +24,8 @@ namespace {
 constexpr int kWorkStreams = 16'384;
 // At most this many blob transfers are in progress; further ones are rejected, and workers retry them
 constexpr int kFetches = 512;
-// Number of threads that read blobs for these transfers. There are many, because most of them may wait for
-// blobs that the coordinator must first fetch from another machine
+// Number of threads that read blobs for these transfers; many, because most of them may be waiting for blobs
+// that the coordinator must first fetch from another machine
 constexpr int kReadThreads = 64;
 // A worker may send at most this many bytes before the coordinator reads them.
 constexpr int kUnreadBytes = 64 << 10;

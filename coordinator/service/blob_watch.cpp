@@ -13,7 +13,7 @@ namespace ls::coordinator {
 namespace {
 
 constexpr Duration kLongestPause = std::chrono::hours(1);
-// Number of searches for unused blobs within the time keep_unused; so an unused blob stays for at most 1.25
+// Number of searches for unused blobs within the time keep_unused; an unused blob thus stays for at most 1.25
 // times keep_unused
 constexpr int kSweepsPerTime = 4;
 // Number of jobs whose needed blobs are collected before the lock is released and taken again
@@ -26,8 +26,8 @@ std::optional<BlobRef> file_of(const StoredJob& job, const Digest& digest) {
   return asset == job.assets.end() ? std::nullopt : std::optional(*asset);
 }
 
-// Returns a text for the user about the file or scene to send again. A file can be uploaded, but the scene is
-// stored in our own format, which only a submission makes.
+// Returns a text that tells the user how to provide the missing file or scene. A file can be uploaded; a
+// scene must be submitted again, since it is stored in our own format, which only a submission makes.
 std::string what_to_do(const StoredJob& job, const BlobRef& file, bool damaged) {
   const bool scene = file.digest == job.scene;
   return fmt::format(
@@ -70,7 +70,7 @@ void BlobWatch::missing(const Digest& digest, const Error& why) {
       waiting.push_back(entry);
   }
   if (waiting.empty()) return;
-  (void)core->records.put_together([&] {  // if storing fails, the next start finds the loss again
+  (void)core->records.put_together([&] {  // if storing fails, the next start finds the missing blob again
     for (const EntryPtr& entry : waiting) {
       core->records.log(entry->stored.id, why.message);
       await_blob(*core, *entry, *file_of(entry->stored, digest), why.code == Errc::failed_precondition);
@@ -129,8 +129,8 @@ void BlobWatch::check_store() {
   trouble_ = trouble;
 }
 
-// Returns the digests of all blobs that jobs need. nullopt: the files of some job are unknown, because its
-// record is damaged.
+// Returns the digests of all blobs that jobs need; nullopt: a job's record is damaged, so its files are
+// unknown.
 std::optional<std::set<Digest>> BlobWatch::needed_blobs() {
   std::vector<EntryPtr> entries;
   {

@@ -10,26 +10,16 @@
 #include "coordinator/base/work_queue.h"
 #include "coordinator/service/blob_watch.h"
 #include "coordinator/service/core.h"
+#include "coordinator/service/open_stores.h"
 #include "coordinator/service/pictures.h"
 #include "coordinator/service/state/job_views.h"
 #include "coordinator/service/submission.h"
-#include "coordinator/service/takeover.h"
 #include "coordinator/service/videos.h"
 #include "coordinator/service/worker_sessions.h"
 #include "coordinator/store/blobs/memory_blobs.h"
-#include "coordinator/store/blobs/open_blobs.h"
-#include "coordinator/store/redis/redis_job_store.h"
+#include "coordinator/store/files.h"
 
 namespace ls::coordinator {
-
-Result<void> check_store(const std::string& store) {
-  if (store == "sqlite") return {};
-  if (!store.starts_with("redis"))
-    return fail(Errc::invalid_argument,
-                fmt::format("--store '{}' is unknown; use sqlite, or redis://HOST:PORT/DB", store));
-  const auto address = parse_redis_url(store);
-  return address ? Result<void>() : tl::unexpected(address.error());
-}
 
 JoinCheck join_check(std::string token) {
   return [token = std::move(token)](std::string_view shown) {
@@ -41,17 +31,8 @@ namespace {
 // Time between two checks whether the blob store is available
 constexpr Duration kBlobsLookedAt = std::chrono::seconds(5);
 
-Result<std::unique_ptr<JobStore>> open_store(const Coordinator::Options& options, const std::string& node) {
-  if (auto known = check_store(options.store); !known) return tl::unexpected(known.error());
-  auto local = open_sqlite_job_store(options.data / "jobs.sqlite");
-  if (!local || options.store == "sqlite") return local;
-  RedisStoreOptions redis{.address = *parse_redis_url(options.store)};
-  if (options.shared) redis.node = node;
-  return open_redis_job_store(std::move(*local), std::move(redis));
-}
-
-// Returns a random number: the seed that decides which results are audited (rendered again). Workers must not
-// be able to predict it.
+// Returns a random seed, which decides which results are audited (rendered again by another worker). Workers
+// must not be able to predict it.
 std::uint64_t random_number() {
   std::random_device device;
   return std::uint64_t{device()} << 32 | device();
@@ -168,7 +149,7 @@ Result<std::unique_ptr<Coordinator>> Coordinator::open(Options options) {
     const auto node = node_id(options.data);
     if (!node) return tl::unexpected(node.error());
     if (!store) {
-      auto opened = open_store(options, *node);
+      auto opened = open_jobs(options.store, options.data, options.shared, *node);
       if (!opened) return tl::unexpected(opened.error());
       store = std::move(*opened);
     }

@@ -1,21 +1,79 @@
 // The state of the coordinator's jobs and workers. One mutex guards all of it: it can be reached only through
 // Guarded<Core>::lock(). So a function with a Core& parameter runs under the lock, and a function without one
-// does not need the lock. Facts of a JobEntry that never change (id, scene, settings, grid) may also be read
-// without the lock. Slow work has its own threads, which take the lock briefly:
-//
+// does not need the lock. Members of a JobEntry that never change (id, scene, settings, grid) may also be
+// read without the lock. Slow work has its own threads, which take the lock briefly:
 //   receive() -> [verify threads: decode, digest] -> [commit thread: append, one fdatasync for all]
 //     -> farm -> acknowledge
 //   [writer thread: convergence points, logs, snapshots, final images; strictly in order]
 #pragma once
 
 #include <condition_variable>
+#include <deque>
+#include <vector>
 
 #include "common/base/guarded.h"
+#include "coordinator/domain/farm/farm.h"
 #include "coordinator/domain/farm_figures.h"
-#include "coordinator/service/farm_driver.h"
+#include "coordinator/service/state/job_files.h"
 #include "coordinator/service/state/publisher.h"
+#include "coordinator/service/state/records.h"
 
 namespace ls::coordinator {
+
+struct Core;
+class ImageWriter;
+class ReferenceComparer;
+
+// Drives the farm: passes events to it, and carries out its effects (domain/effect.h), in order. Part of
+// Core, so all of it runs under the lock.
+class FarmDriver {
+ public:
+  FarmDriver(Core& core, Farm::Options options, const Clock& clock, const JobFiles& files,
+             ImageWriter& images, ReferenceComparer& comparer);
+
+  const Farm& farm() const { return farm_; }
+  void run(Event first);
+  // Gives a stored job to the farm. Results that are added to the image again publish no events.
+  void replay(JobEntry& entry, JobRestored event);
+  void quarantine(const std::vector<QuarantinedWorker>& workers);  // `workers` are stored already
+  // Unloads an ended job whose files are complete on disk: frees its image in memory and its state in the
+  // farm; only its files and its record remain. Results that still arrive for it are dropped.
+  void unload(JobEntry& entry);
+
+ private:
+  void on(const Send& e);
+  void on(const UnitsFreed& e);
+  void on(const RecordUnit& e);
+  void on(const Fold& e);
+  void on(const DropDuplicate& e);
+  void on(const DropUnwanted& e);
+  void on(const DigestMismatch& e);
+  void on(const JobPinned& e);
+  void on(const JobStateChanged& e);
+  void on(const Checkpoint& e);
+  void on(const CheckDenoised& e);
+  void on(const ReopenRound& e);
+  void on(const JobFinished& e);
+  void on(const JobFailed& e);
+  void on(const WorkerStateChanged& e);
+  void on(const WorkerBlocked& e);
+  void on(const WorkerFoundFaulty& e);
+  void on(const TileDiscarded& e);
+  void on(const WorkerForgotten& e);
+  Result<WaitingPartial> partial_for(JobEntry& entry, const Fold& e) const;
+  void note_leased(const Lease& lease, const WorkerId& worker);
+  void end_image(const EntryPtr& entry);
+  void end_curve(const EntryPtr& entry);
+
+  Core& core_;
+  Farm farm_;
+  const Clock& clock_;
+  const JobFiles& files_;
+  ImageWriter& images_;
+  ReferenceComparer& comparer_;
+  std::deque<Event> todo_;        // events raised by effects, to be handled next
+  std::vector<EntryPtr> folded_;  // jobs whose images got units from the events that are being handled
+};
 
 struct Core {
   Core(Farm::Options farm, bool shared, const Clock& clock, JobStore& store, const JobFiles& files,

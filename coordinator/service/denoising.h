@@ -31,7 +31,7 @@ class Denoising {
   Result<void> available() const;
 
   // Denoises the film, which must have the AOVs that the denoiser needs. The figures lack the true error,
-  // since this depends on the job's reference.
+  // which needs the job's reference image.
   std::shared_ptr<const Denoised> of(const Film& film);
   // Returns the denoised image of a job with JobSpec::denoise, and puts its figures into the facts. `made` is
   // the image if it exists already. Null if the job has no denoising or no samples.

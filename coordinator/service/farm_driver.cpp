@@ -1,5 +1,3 @@
-#include "coordinator/service/farm_driver.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -30,8 +28,8 @@ void FarmDriver::run(Event first) {
     for (const Effect& effect : farm_.handle(event, clock_.now()))
       std::visit([&](const auto& e) { on(e); }, effect);
   }
-  // Snapshots are taken only after all events are handled: a snapshot includes convergence points, and these
-  // must precede it in the writer's queue.
+  // Snapshots are taken after all events are handled: a snapshot includes points of the convergence curve,
+  // and these must be queued for writing before it.
   for (const EntryPtr& entry : std::exchange(folded_, {})) images_.snapshot_if_due(core_, entry);
   for (const JobId& id : farm_.take_changed_audits())
     if (const auto entry = core_.jobs.find(id)) images_.keep_audits(core_, entry, farm_.open_audits(id));
@@ -107,7 +105,7 @@ void FarmDriver::on(const UnitsFreed& e) {
 
 // Results
 
-// The result is in the job's log already, so this writes nothing and only starts the job's clock.
+// The result is in the job's log already, so nothing is stored here. The first result starts the job's clock.
 void FarmDriver::on(const RecordUnit& e) {
   const auto entry = core_.jobs.find(e.unit.job);
   if (!entry) return;
@@ -145,8 +143,8 @@ void FarmDriver::on(const Fold& e) {
   const auto error =
       waiting ? entry->assembly->fold(e.unit.tile, e.unit.round, *waiting) : tl::unexpected(waiting.error());
   if (!error) {
-    // If the partial cannot be read, the tile gets no more rounds and the job is paused: the image must never
-    // contain a wrong pixel.
+    // If the partial cannot be read, the tile gets no further rounds and the job is paused: the image must
+    // never have a wrong pixel.
     entry->trouble =
         fmt::format("tile {} round {} cannot be folded: {}; restart the coordinator to render it again",
                     e.unit.tile, e.unit.round, error.error().message);
@@ -165,7 +163,7 @@ void FarmDriver::on(const Fold& e) {
   todo_.push_back(UnitFolded{e.unit, e.samples, error->relative.squares});
   const TimePoint end = clock_.now();
   entry->stored.totals.time.merge += seconds(end - begin);
-  // a result that was in the image before a restart publishes no event when it is added again
+  // results that are only added again after a restart cause no events
   if (core_.publisher.quiet()) return;
   failpoint("result-folded");
   if (entry->trace)
@@ -239,7 +237,7 @@ void FarmDriver::on(const JobPinned& e) {
 // The state `done` is published and stored only after the final image is written: see ImageWriter.
 void FarmDriver::on(const JobStateChanged& e) {
   const auto entry = core_.jobs.find(e.job);
-  // A job that was removed here is continued by another coordinator or not at all.
+  // The record of a removed job must not be written: the job is gone, or another coordinator owns it.
   if (!entry || entry->removed || e.to == JobState::done) return;
   entry->stored.state = e.to;
   entry->stored.stopped.reset();
@@ -315,7 +313,8 @@ void FarmDriver::on(const Checkpoint& e) {
   entry->assembly->checkpoint_taken(e.rounds);
   entry->stored.totals.doubt = error.verdict;
   entry->stored.totals.few_hits = error.few_hits;
-  // The curve already contains this checkpoint, from before a restart
+  // The curve already contains this checkpoint, from before a restart. It may still lack the comparison with
+  // the reference
   if (!entry->points.empty() && entry->points.back().spp >= error.spp) {
     const bool compared = std::none_of(entry->points.begin(), entry->points.end(), [&](const auto& p) {
       return p.spp == error.spp && !p.reference_error;
@@ -323,8 +322,8 @@ void FarmDriver::on(const Checkpoint& e) {
     if (!compared) comparer_.compare(core_, entry, e.rounds, error.spp);
     return;
   }
-  // Without exact errors the convergence curve gets no point for this checkpoint: some tile is being rendered
-  // again, and earlier errors of the other tiles are lost.
+  // The errors of this checkpoint are unknown if a tile is being rendered again, since earlier errors of the
+  // other tiles are not kept. Then the curve gets no point.
   if (!exact) return;
   core_.records.add_point(
       entry, {entry->fold_seconds, entry->assembly->costs().until(e.rounds), error.spp, figures_of(error)});
@@ -366,9 +365,9 @@ void FarmDriver::on(const WorkerBlocked& e) {
   core_.records.log(e.job, fmt::format("worker {} gets no more of it: {}", e.worker.value, e.why));
 }
 
-// A faulty worker is stored separately from the jobs, and outlives them, so that none of its results is
-// accepted after a restart or in jobs that are extended later. Until it is stored every job waits, since a
-// restart would accept the worker's results from the log.
+// The quarantine of a faulty worker is stored separately from the jobs and outlives them, so that none of its
+// results is accepted after a restart or in a job that is extended later. Until it is stored all jobs are
+// paused, since a restart would accept the worker's results from the log.
 void FarmDriver::on(const WorkerFoundFaulty& e) {
   log_error(fmt::format("worker={} job={} tile={} round={}", e.worker.value, e.unit.job.value, e.unit.tile,
                         e.unit.round),

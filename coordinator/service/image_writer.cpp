@@ -82,9 +82,10 @@ void ImageWriter::snapshot_if_due(Core&, const EntryPtr& entry) {
   writes_.push([this, entry] { take_snapshot(entry); });
 }
 
-// Takes a snapshot while results are added to the image. Results that are added to a tile after it was copied
-// are added again after a restart. The convergence points that the snapshot includes must be stored before
-// it; they are in the writer's queue already, so the snapshot is queued behind them.
+// Takes a snapshot while results are still added to the image. Results that are added to a tile after the
+// tile was copied are added again after a restart. The points of the convergence curve that the snapshot
+// includes must be stored before it; they are queued for writing already, so the snapshot is queued behind
+// them.
 void ImageWriter::take_snapshot(const EntryPtr& entry) {
   const auto done = [this, entry](const Result<void>& written) {
     if (!written) log_warn(fmt::format("job={}", entry->stored.id.value), written.error().message);
@@ -152,7 +153,7 @@ void ImageWriter::note_check(const EntryPtr& entry, std::uint64_t curve, double 
   StoredJob& job = entry->stored;
   if (entry->removed || entry->unloaded || entry->curve != curve) return;
   if (made.image.rgb.empty()) {
-    // A job that has ended, or whose target was dropped meanwhile, needs no check
+    // A job that has ended or has no such target any more needs no check
     if (job.state != JobState::running || job.spec.target_layer != TargetLayer::denoised) return;
     entry->trouble = fmt::format(
         "its target is the error of the denoised layers, which cannot be made: {}; then resume the job",

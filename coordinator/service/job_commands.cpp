@@ -74,8 +74,8 @@ Result<void> may_wake(double pixels) {
                           pixels, limits::kMaxWokenPixels));
 }
 
-// Returns the frames to which a new target error applies: those whose end is not decided yet, and those that
-// ended because they reached a larger target.
+// Returns the frames to which a new target error applies: those that have not ended, and those that ended
+// because they reached a larger target.
 Result<std::vector<EntryPtr>> may_retarget(const Farm& farm, const JobId& id,
                                            const std::vector<EntryPtr>& sound, double target_error) {
   std::vector<EntryPtr> chosen;
@@ -101,8 +101,8 @@ Result<std::vector<EntryPtr>> may_retarget(const Farm& farm, const JobId& id,
   return chosen;
 }
 
-// Returns the frames that do not have `spp` samples yet; others may have them already, after an interrupted
-// change.
+// Returns the frames that do not have `spp` samples yet. Some may have them already, if an earlier change was
+// interrupted.
 Result<std::vector<EntryPtr>> may_extend(const Farm& farm, const Sequence& sequence, std::uint64_t spp) {
   std::vector<EntryPtr> chosen;
   double woken = 0;
@@ -168,8 +168,10 @@ Result<void> JobCommands::change_job(Core& core, const EntryPtr& entry, const Jo
     if (auto done = extend(core, *entry, *change.spp); !done) return done;
   if (change.target_error)
     if (auto done = set_target(core, *entry, *change.target_error); !done) return done;
-  if (change.priority)
-    if (auto done = set_priority(core, *entry, *change.priority); !done) return done;
+  if (change.priority) {
+    if (auto done = set_priority(core, {entry}, *change.priority); !done) return done;
+    core.publisher.job(*entry);
+  }
   if (change.focus)
     if (auto done = set_focus(core, {entry}, *change.focus); !done) return done;
   return change.state ? become(core, entry, *change.state) : Result<void>{};
@@ -199,28 +201,28 @@ Result<void> JobCommands::become(Core& core, const EntryPtr& entry, JobState ask
   return {};
 }
 
-Result<void> JobCommands::set_priority(Core& core, JobEntry& entry, int priority) const {
-  const int before = std::exchange(entry.stored.spec.priority, priority);
-  if (auto put = store_.put_job(entry.stored); !put) {
-    entry.stored.spec.priority = before;
-    return put;
-  }
-  if (!entry.unloaded) core.driver.run(JobPriority{entry.stored.id, priority});
-  core.publisher.job(entry);
+// Applies edit() to the records of the jobs. All are stored in one transaction: either all are stored or
+// nothing is changed.
+template <class Edit>
+Result<void> JobCommands::edit_all(const Entries& jobs, Edit edit) const {
+  std::vector<StoredJob> edited;
+  for (const EntryPtr& job : jobs) edit(edited.emplace_back(job->stored));
+  if (auto put = store_.put_jobs(edited); !put) return put;
+  for (const EntryPtr& job : jobs) edit(job->stored);
   return {};
 }
 
-// The focus of all jobs is stored in one transaction: either all are stored or nothing is changed.
+Result<void> JobCommands::set_priority(Core& core, const Entries& jobs, int priority) const {
+  if (auto put = edit_all(jobs, [&](StoredJob& job) { job.spec.priority = priority; }); !put) return put;
+  for (const EntryPtr& job : jobs)
+    if (!job->unloaded) core.driver.run(JobPriority{job->stored.id, priority});
+  return {};
+}
+
 Result<void> JobCommands::set_focus(Core& core, const Entries& jobs,
                                     const std::optional<PixelRect>& focus) const {
-  std::vector<StoredJob> edited;
+  if (auto put = edit_all(jobs, [&](StoredJob& job) { job.focus = focus; }); !put) return put;
   for (const EntryPtr& job : jobs) {
-    edited.push_back(job->stored);
-    edited.back().focus = focus;
-  }
-  if (auto put = store_.put_jobs(edited); !put) return put;
-  for (const EntryPtr& job : jobs) {
-    job->stored.focus = focus;
     if (!job->unloaded) core.driver.run(JobFocused{job->stored.id, focus});
     core.publisher.job(*job);
   }
@@ -350,7 +352,7 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
     if (auto done = set_target(core, *frame, *change.target_error); !done)
       return tl::unexpected(in_frame(frame->stored.id, done.error()));
   if (change.priority)
-    if (auto done = set_priority_of_all(core, sound, *change.priority); !done) return done;
+    if (auto done = set_priority(core, sound, *change.priority); !done) return done;
   if (change.focus)
     if (auto done = set_focus(core, sound, *change.focus); !done) return done;
   if (change.state) {
@@ -361,22 +363,8 @@ Result<void> JobCommands::change_sequence(Core& core, const JobId& id, const Seq
   return {};
 }
 
-// The priority of all frames is stored in one transaction: either all are stored or nothing is changed.
-Result<void> JobCommands::set_priority_of_all(Core& core, const Entries& frames, int priority) const {
-  std::vector<StoredJob> edited;
-  for (const EntryPtr& frame : frames) {
-    edited.push_back(frame->stored);
-    edited.back().spec.priority = priority;
-  }
-  if (auto put = store_.put_jobs(edited); !put) return put;
-  for (const EntryPtr& frame : frames) frame->stored.spec.priority = priority;
-  for (const EntryPtr& frame : frames)
-    if (!frame->unloaded) core.driver.run(JobPriority{frame->stored.id, priority});
-  return {};
-}
-
-// Changes the state of the frames and stores them together. A frame whose image is being written is left
-// unchanged, unless the writing has failed and is to be repeated.
+// Changes the state of the frames and stores them together. A frame whose final image is being written is
+// left unchanged; if writing has failed, it is repeated.
 Result<void> JobCommands::become_all(Core& core, const Entries& frames, JobState asked) const {
   Result<void> done;
   const auto saved = core.records.put_together([&] {

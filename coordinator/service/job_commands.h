@@ -36,7 +36,9 @@ class JobCommands {
  private:
   using Entries = std::vector<EntryPtr>;
   Result<void> change_job(Core& core, const EntryPtr& entry, const JobChange& change) const;
-  Result<void> set_priority(Core& core, JobEntry& entry, int priority) const;
+  template <class Edit>
+  Result<void> edit_all(const Entries& jobs, Edit edit) const;
+  Result<void> set_priority(Core& core, const Entries& jobs, int priority) const;
   Result<void> set_focus(Core& core, const Entries& jobs, const std::optional<PixelRect>& focus) const;
   Result<void> extend(Core& core, JobEntry& entry, std::uint64_t spp) const;
   Result<void> set_target(Core& core, JobEntry& entry, double target_error) const;
@@ -45,7 +47,6 @@ class JobCommands {
 
   Result<void> change_sequence(Core& core, const JobId& id, const Sequence& sequence,
                                const JobChange& change) const;
-  Result<void> set_priority_of_all(Core& core, const Entries& frames, int priority) const;
   Result<void> become_all(Core& core, const Entries& frames, JobState asked) const;
   Result<void> remove_sequence(Core& core, const JobId& id, const Sequence& sequence) const;
   void drop(Core& core, const EntryPtr& entry) const;

@@ -52,8 +52,8 @@ class Pictures {
     Film film;
     ReportFacts facts;
   };
-  // The denoised image of a job for viewers. A running job's image is reused until its age is large compared
-  // to the time that denoising took, so several requests get the same image.
+  // The denoised image of a job for viewers. The image of a running job is reused for a multiple of the time
+  // that denoising took (kDenoisedAge), so several requests get the same image.
   struct DenoisedView {
     std::string key;  // names the image
     TimePoint made{};

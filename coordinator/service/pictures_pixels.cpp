@@ -142,8 +142,8 @@ Result<std::vector<std::byte>> Pictures::pixels(const JobId& id, const PixelsAsk
     return mosaic.bytes();
   }
   if ((*entry)->assembly) {
-    // Only the rows of the requested tiles are shared with the film. While they are read, the memory of all
-    // other tiles can be freed.
+    // Only the requested rows of tiles are copied (a cheap copy, which shares their memory with the film). So
+    // the film's other tiles can be freed while these are read.
     std::vector<TileRow> rows;
     for (int row = wanted.y0 / grid.tile; row * grid.tile < wanted.y1; ++row)
       rows.push_back({row, (*entry)->assembly->film().row(row)});

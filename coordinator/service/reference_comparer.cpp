@@ -50,8 +50,8 @@ void ReferenceComparer::compare_last(Core&, const EntryPtr& entry) {
   });
 }
 
-// Returns the job's reference image. Only the one used most recently is kept in memory, so the references of
-// waiting jobs need no memory.
+// Returns the job's reference image. Only the one used last is kept in memory, so waiting comparisons hold no
+// references.
 std::shared_ptr<const Reference> ReferenceComparer::reference_of(const StoredJob& job) {
   const Digest& digest = *job.spec.reference;
   if (reference_ && reference_digest_ == digest && reference_->size == job.settings.size) return reference_;

@@ -18,6 +18,9 @@
 namespace ls::coordinator {
 namespace {
 
+// Time until the next attempt to take over a job if the blob store did not answer
+constexpr Duration kTakeOverPause = std::chrono::seconds(5);
+
 bool has_quarantined(const Farm& farm, const JobEntry& entry) {
   if (!entry.log) return false;
   const auto& found = entry.log->found();
@@ -91,7 +94,7 @@ Result<void> Restore::take_up(Core& core, JobEntry& entry,
   entry.points = std::move(*points);
   if (entry.unloaded) return {};
   if (!missing) return tl::unexpected(missing.error());
-  // A job paused by its user stays paused.
+  // A job that is paused by its user stays paused and does not wait for blobs.
   if (entry.stored.state != JobState::paused || !entry.stored.missing_blobs.empty()) {
     for (const BlobRef& file : *missing) await_blob(core, entry, file, false);
     if (!missing->empty()) entry.stored.state = JobState::paused;
@@ -99,9 +102,9 @@ Result<void> Restore::take_up(Core& core, JobEntry& entry,
   if (auto loaded = load(core, entry); !loaded) return loaded;
   const bool begins_again =
       entry.assembly->film().samples() == 0 && (!entry.log || entry.log->found().empty());
-  // If some pixels were wrong, the points of the curve and the checks of the denoised layers describe them
-  // and are dropped. If the image is only lost, rendering again gives the same pixels, so the checks stay
-  // valid.
+  // If a quarantined worker's results are in the log, some pixels were wrong: the points of the curve and the
+  // checks of the denoised layers describe wrong pixels and are dropped. If the image is only lost, the
+  // checks stay, since rendering again gives the same pixels.
   if (has_quarantined(core.driver.farm(), entry))
     core.records.forget_wrong_pixels(entry);
   else if (begins_again)
@@ -208,6 +211,70 @@ void Restore::take_up_records(Core& core, JobEntry& entry, JobRestored& event) c
     if (folded) entry.fold_seconds = std::max(entry.fold_seconds, record.at_seconds);
   }
   entry.log->forget_found();
+}
+
+void Takeover::look_for_moved_jobs() {
+  JobStore::Moved moved = store_.moved();
+  std::vector<Inheritance> inherited;
+  {
+    const auto core = core_.lock();
+    core->driver.quarantine(moved.quarantined);
+    std::erase_if(later_, [&](Inheritance& one) {
+      if (clock_.now() < one.again) return false;
+      inherited.push_back(std::move(one));
+      return true;
+    });
+  }
+  for (const JobId& id : moved.lost) writes_.push([this, id] { let_go(id); });
+  for (JobStore::Inherited& one : moved.inherited) inherited.push_back({std::move(one)});
+  for (Inheritance& one : inherited) writes_.push([this, one = std::move(one)] { take_over(one); });
+}
+
+// Drops a job that another coordinator owns now. The job's record in the store belongs to the new owner and
+// must not be touched.
+void Takeover::let_go(const JobId& id) {
+  {
+    const auto core = core_.lock();
+    std::erase_if(later_, [&](const Inheritance& one) { return one.job.job.id == id; });
+    const auto entry = core->jobs.find(id);
+    if (!entry) return;
+    log_warn(fmt::format("job={}", id.value),
+             "this coordinator's lease on it has passed and another one has taken it over: dropped here");
+    entry->removed = true;
+    entry->finishing = 0;
+    if (!entry->unloaded) core->driver.run(JobCancelled{id});
+    if (!entry->unloaded) core->driver.run(JobForgotten{id});
+    if (const auto shown = core->jobs.remove(entry)) core->publisher.job_moved(*shown, entry->stored.owner);
+    core->ended.notify_all();
+  }
+  files_.remove_folder(id);
+}
+
+void Takeover::take_over(Inheritance inheritance) {
+  StoredJob job = inheritance.job.job;
+  // The lock is not held here, since the blob store may need the network.
+  const auto missing = missing_blobs_of(job, blobs_);
+  const auto core = core_.lock();
+  const JobId id = job.id;
+  if (!missing) {
+    log_warn(fmt::format("job={}", id.value),
+             "cannot be taken over now, and is tried again: " + missing.error().message);
+    inheritance.again = clock_.now() + kTakeOverPause;
+    later_.push_back(std::move(inheritance));
+    return;
+  }
+  if (core->jobs.find(id)) return;
+  // A folder that exists here is outdated: it is from an earlier time at which this coordinator owned the job
+  files_.remove_folder(id);
+  restore_.reopen_if_image_is_lost(job);
+  const auto entry = restore_.add(*core, std::move(job), missing);
+  core->records.log(
+      id, fmt::format("taken over from coordinator {}, which is gone; what it had rendered since and not "
+                      "written to a shared place is rendered again, to the same bits",
+                      inheritance.job.from));
+  if (!entry->broken.empty()) core->records.log(id, entry->broken);
+  core->publisher.job(*entry);
+  core->driver.run(Tick{});
 }
 
 }  // namespace ls::coordinator

@@ -181,7 +181,7 @@ void ResultPipeline::accept(Core& core, Checked& item, std::optional<PartialLog:
   core.records.set_trouble("");
   const Wanted wanted = core.driver.farm().wanted(r.unit, a.from->numeric_class);
   const bool accepted = wanted.verdict == Verdict::yes;
-  // this copy is not in the log, because the farm did not need it when storing began
+  // this copy is not in the log: the farm did not need it when storing began
   const bool lost = entry.log && !place;
   if (accepted && wanted.samples == a.expected.samples && !lost) {
     ++core.figures.accepted;
@@ -196,10 +196,10 @@ void ResultPipeline::accept(Core& core, Checked& item, std::optional<PartialLog:
           {std::move(std::get<Partial>(item.verified)), place, a.expected.samples, r.digest, r.health, a.at});
     }
   }
-  // The farm gets all other results, duplicates included, which it compares. Two kinds of results are only
-  // removed from their lease. One is a copy that the farm needs now, but that was not stored, since the farm
-  // did not need it when storing began. The other is a result of another numeric class: the farm has only the
-  // worker's present class, which may be the job's if the worker has joined again meanwhile.
+  // Reports the result to the farm, which compares duplicates. Two kinds of results are only removed from
+  // their lease. One is a copy that the farm needs now but that is not in the log (`lost`). The other is a
+  // result of another numeric class than the job's: the farm would take it for one of the worker's present
+  // class, which may be the job's if the worker has joined again meanwhile.
   if ((accepted && lost) || wanted.verdict == Verdict::other_class)
     core.driver.run(LeaseCameBack{a.from->worker, {r.lease, {r.unit}}});
   else

@@ -46,8 +46,8 @@ bool well_formed(const WorkerId& id) {
          });
 }
 
-// Makes the id of a new worker. A worker that sends its id continues after a broken connection. So anyone
-// with the id could take over that worker's stream, and ids must not be guessable.
+// Makes the id of a new worker. A worker that reconnects is recognised by its id, so anyone with the id could
+// take over its stream: ids must not be guessable.
 std::string new_worker_id(std::uint64_t start, std::uint64_t number) {
   std::random_device device;
   const std::uint64_t secret = (std::uint64_t{device()} << 32 | device()) & 0xffff'ffff'ffff;
@@ -105,7 +105,7 @@ Result<std::unique_ptr<WorkerSession>> WorkerSessions::connect(const WorkerHello
   if (worker.connection) worker.connection->close();
   worker.hello = hello;
   worker.hello.join_token.clear();
-  worker.hello.blobs_held.clear();  // freed here; the farm keeps the ones it needs
+  worker.hello.blobs_held.clear();  // freed here; the farm gets those of `hello`
   worker.connection = connection;
   worker.last_seen = clock_.now();
   connection->sink->send(Welcome{id, connection->epoch});
@@ -175,8 +175,8 @@ void WorkerSessions::note_progress(Core& core, Connection& from, WorkerEntry& wo
     totals.peak_rss_bytes = std::max(totals.peak_rss_bytes, m.rss_bytes);
     if (m.load_seconds < 1e9) totals.load_seconds = std::max(totals.load_seconds, m.load_seconds);
   }
-  // The worker may still report leases of an earlier stream. Their units went to others when that stream
-  // broke, so these leases are ignored.
+  // The worker may still report leases from an earlier stream. Their units went to others when that stream
+  // broke, so the worker is asked to cancel them.
   for (const auto& lease : m.leases)
     if (!from.assigned(lease.lease)) from.sink->send(CancelLease{lease.lease});
   core.driver.run(LeaseProgress{from.worker, m.leases});

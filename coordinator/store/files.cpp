@@ -108,6 +108,16 @@ Result<void> sync_folder(const std::filesystem::path& folder) {
   return {};
 }
 
+Result<std::vector<std::filesystem::path>> list_folder(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> paths;
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
+    paths.push_back(at->path());
+  if (error)
+    return fail(Errc::unavailable, fmt::format("cannot list '{}': {}", folder.string(), error.message()));
+  return paths;
+}
+
 Result<AtomicFile> AtomicFile::create(std::filesystem::path path, std::string_view suffix) {
   std::filesystem::path temporary = path.string() + std::string(suffix);
   auto file = File::open(temporary, O_WRONLY | O_CREAT | O_TRUNC);

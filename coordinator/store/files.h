@@ -35,7 +35,7 @@ class File {
 // Makes an error from errno: a full disk is resource_exhausted, a missing file not_found.
 Error errno_error(std::string_view what, const std::filesystem::path& path);
 
-Result<void> make_folder(const std::filesystem::path& folder);  // also creates its parents; mode 0750
+Result<void> make_folder(const std::filesystem::path& folder);  // also creates its parents
 Result<void> write_all(const File& file, std::span<const std::byte> bytes, const std::filesystem::path& path);
 // Reads exactly `length` bytes from `offset` on; a shorter file is an error.
 Result<std::vector<std::byte>> read_at(const File& file, std::uint64_t offset, std::size_t length,
@@ -43,6 +43,8 @@ Result<std::vector<std::byte>> read_at(const File& file, std::uint64_t offset, s
 Result<std::vector<std::byte>> read_file(const std::filesystem::path& path, std::uint64_t max_bytes);
 Result<void> sync_data(const File& file, const std::filesystem::path& path);
 Result<void> sync_folder(const std::filesystem::path& folder);
+// Returns the paths of all that the folder contains.
+Result<std::vector<std::filesystem::path>> list_folder(const std::filesystem::path& folder);
 // Writes a temporary file, syncs it, renames it to `path` and syncs the folder, so that after a crash the
 // file at `path` has either its old or its new content.
 Result<void> write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);

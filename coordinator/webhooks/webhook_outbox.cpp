@@ -71,11 +71,8 @@ std::optional<Delivery> read_delivery(const fs::path& file) {
                   j["body"].get<std::string>()};
 }
 
-template <class Visit>
-void each_file(const fs::path& folder, Visit visit) {
-  std::error_code failed;
-  for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed))
-    visit(at->path());
+std::vector<fs::path> files_of(const fs::path& folder) {
+  return list_folder(folder).value_or(std::vector<fs::path>());
 }
 
 }  // namespace
@@ -96,10 +93,9 @@ fs::path Outbox::file(std::size_t receiver, const Delivery& delivery) const {
 
 std::vector<Delivery> Outbox::waiting(std::size_t receiver) const {
   std::vector<Delivery> found;
-  each_file(receivers_[receiver], [&](const fs::path& path) {
+  for (const fs::path& path : files_of(receivers_[receiver]))
     if (auto delivery = path.extension() == ".json" ? read_delivery(path) : std::nullopt)
       found.push_back(std::move(*delivery));
-  });
   std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.number < b.number; });
   return found;
 }
@@ -118,7 +114,7 @@ void Outbox::forget(std::size_t receiver, const Delivery& delivery) {
 
 std::set<JobId> Outbox::open_jobs() const {
   std::set<JobId> jobs;
-  each_file(folder_ / "open", [&](const fs::path& path) { jobs.insert(JobId{path.filename().string()}); });
+  for (const fs::path& path : files_of(folder_ / "open")) jobs.insert(JobId{path.filename().string()});
   return jobs;
 }
 

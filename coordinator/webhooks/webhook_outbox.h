@@ -22,7 +22,7 @@
 
 namespace ls::coordinator::webhooks {
 
-// A delivery is dropped after this many failed attempts. The last is about an hour after the first
+// A delivery is dropped after this many failed attempts, the last about an hour after the first
 inline constexpr int kMaxAttempts = 20;
 inline constexpr std::size_t kMaxWaiting = 10000;  // when more deliveries wait, the oldest is dropped
 inline constexpr double kFirstRetrySeconds = 1, kMaxRetrySeconds = 300;
@@ -45,7 +45,7 @@ class Line {
   const Delivery* due(TimePoint now) const;
   // Returns the time from which due() will return a delivery; nullopt: there is none.
   std::optional<TimePoint> next_due() const;
-  // taken() notes that the receiver has accepted the delivery that due() returned, failed() that the attempt
+  // Call taken() when the receiver has accepted the delivery that due() returned, failed() when the attempt
   // failed. Both return the delivery if it leaves the queue: taken() always, failed() after kMaxAttempts
   // attempts.
   std::optional<Delivery> taken();

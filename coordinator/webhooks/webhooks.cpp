@@ -142,9 +142,9 @@ class Webhooks::Impl {
     for (const JobId& job : open) {
       const auto view = coordinator.job(job);
       const std::string word(view ? to_string(view->state) : "");
-      // If the previous run crashed after it had stored the notification of the job's end, but before it
-      // recorded that the job has ended, the notification is still pending. Then the end is recorded and not
-      // reported again. A job that no longer exists is handled in the same way.
+      // If the previous run was killed after it had stored the notification of the job's end, but before it
+      // recorded the end, the notification is still pending: the end is recorded now, and not reported again.
+      // A job that no longer exists is handled in the same way.
       if (!view || kept_.contains(job.value + "/" + word)) {
         const auto state = state_.lock();
         state->mark_ended(job);

@@ -109,7 +109,7 @@ ROWS = [
     (54, "coordinator/http/auth/auth.cpp", "«throttle_.failed(address, now);»", ";", "tokens may be guessed without end", HTTP),
     (55, "coordinator/http/auth/auth.cpp", "if («caller->role == Role::join») return problem(403,", "false", "a worker's join token opens the API", HTTP),
     (56, "coordinator/http/api/api.cpp", "if (owner && «request.caller.sees(*owner)») return std::nullopt;", "true", "users read and change each other's jobs", HTTP),
-    (57, "coordinator/http/api/list_handlers.cpp", "asked.visible = [&request](const std::string& owner) { return «request.caller.sees(owner)»; };", "true",
+    (57, "coordinator/http/api/job_handlers.cpp", "asked.visible = [&request](const std::string& owner) { return «request.caller.sees(owner)»; };", "true",
      "users see each other's jobs in the list", HTTP),
     (58, "coordinator/http/api/routes.cpp", "if (role == Role::read) return access == Access::token || «access == Access::see»;", "access != Access::admin",
      "a token that only reads submits jobs", HTTP),

@@ -15,7 +15,7 @@
 
 namespace ls::worker {
 
-// Converts a gRPC status to an Error: the inverse of status_code() in coordinator/rpc/grpc_status.h.
+// Converts a gRPC status to an Error: the inverse of to_status() in coordinator/rpc/streams.cpp.
 Error to_error(const grpc::Status& status);
 
 class WorkCall final

@@ -1,6 +1,7 @@
 #include "coordinator/http/api/api.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <exception>
@@ -11,17 +12,13 @@
 #include "common/protocol/limits.h"
 #include "common/scene/limits.h"
 #include "coordinator/http/api/handlers.h"
-#include "coordinator/http/message/problem.h"
 
 namespace ls::http {
 namespace {
 
 bool lists(std::string_view words, std::string_view word) {
-  while (!words.empty()) {
-    const std::size_t end = words.find(' ');
-    if (words.substr(0, end) == word) return true;
-    words = end == std::string_view::npos ? std::string_view{} : words.substr(end + 1);
-  }
+  while (!words.empty())
+    if (take_part(words, ' ') == word) return true;
   return false;
 }
 
@@ -35,10 +32,8 @@ Response unsupported_type(const Route& route, std::string_view type) {
 }
 
 Response not_found(const Request& request) {
-  std::string path;
-  for (const auto& segment : request.segments) path += "/" + segment;
   return problem(404, fmt::format("there is nothing at '{}'; the routes are in /api/v1/openapi.json",
-                                  path.empty() ? "/" : path.substr(0, 200)));
+                                  fmt::format("/{}", fmt::join(request.segments, "/")).substr(0, 200)));
 }
 
 constexpr std::string_view kOneJob = "/api/v1/jobs/{id}";
@@ -52,8 +47,8 @@ std::string target_of(const Request& request) {
   return target;
 }
 
-// Returns a redirect to the coordinator that has the job, or a 503 if that coordinator is unknown at the
-// moment or does not answer; nullopt: no coordinator has the job.
+// Returns a redirect to the coordinator that has the job, or a 503 if that coordinator does not answer or the
+// job's owner cannot be looked up now. nullopt: no coordinator has the job.
 std::optional<Response> at_its_owner(coordinator::Coordinator& coordinator, const Request& request,
                                      const Params& params) {
   if (params.empty() || !plausible_id(params[0])) return std::nullopt;
@@ -66,9 +61,8 @@ std::optional<Response> at_its_owner(coordinator::Coordinator& coordinator, cons
         503,
         "the coordinator that has this job does not answer; unless the job has ended, another one takes "
         "it over within seconds: ask again");
-  Response response = problem(307, "another coordinator has this job; its address is in Location");
-  response.headers.emplace_back("Location", (*owner)->http + target_of(request));
-  return response;
+  return problem(307, "another coordinator has this job; its address is in Location",
+                 {{"Location", (*owner)->http + target_of(request)}});
 }
 
 Response options_response(const std::string& allow) { return {.status = 204, .headers = {{"Allow", allow}}}; }
@@ -87,8 +81,8 @@ Api::Api(coordinator::Coordinator& coordinator, TokenRegistry& tokens, Limits li
 
 std::variant<Response, Match> Api::admit(Request& request) {
   auto found = admit_route(request);
-  // Requests of known callers were counted when the caller was identified. The others are counted here, by
-  // address.
+  // The limit on requests per caller has been applied to identified callers already. All other requests are
+  // limited here, by address.
   if (request.caller.token_id.empty())
     if (auto refused = auth_.too_often(request, nullptr)) return *refused;
   return found;
@@ -101,22 +95,18 @@ std::variant<Response, Match> Api::admit_route(Request& request) {
     const auto file = files_.find(request);
     if (file && request.method == Method::options) return options_response("GET, HEAD, OPTIONS");
     if (file && reads) return *file;
-    if (file) {
-      Response response = problem(405, "this is a page: GET or HEAD it");
-      response.headers.emplace_back("Allow", "GET, HEAD, OPTIONS");
-      return response;
-    }
-    // Under /api only callers with a token get the 404 of an unknown address.
+    if (file) return problem(405, "this is a page: GET or HEAD it", {{"Allow", "GET, HEAD, OPTIONS"}});
+    // Under /api a caller without a token gets a 401 even for an unknown address, so the 404 does not reveal
+    // to strangers which routes exist.
     if (!request.segments.empty() && request.segments.front() == "api")
       if (auto refused = refuse_caller(Access::token, request)) return *refused;
     return not_found(request);
   }
   if (auto* wrong = std::get_if<WrongMethod>(&*found)) {
     if (request.method == Method::options) return options_response(wrong->allow);
-    Response response = problem(
-        405, fmt::format("{} is not possible here; possible: {}", to_string(request.method), wrong->allow));
-    response.headers.emplace_back("Allow", wrong->allow);
-    return response;
+    return problem(
+        405, fmt::format("{} is not possible here; possible: {}", to_string(request.method), wrong->allow),
+        {{"Allow", wrong->allow}});
   }
   Match& match = std::get<Match>(*found);
   if (auto refused = refuse_caller(match.route->access, request)) return *refused;
@@ -136,8 +126,7 @@ std::optional<Response> Api::refuse_caller(Access access, Request& request) {
 }
 
 std::optional<Response> Api::refuse_job(const Match& match, const Request& request) const {
-  if (request.caller.role != Role::submit || !match.route->pattern.starts_with("/api/v1/jobs/{id}"))
-    return std::nullopt;
+  if (request.caller.role != Role::submit || !match.route->pattern.starts_with(kOneJob)) return std::nullopt;
   const auto id = job_of(request, match.params);
   if (!id && id.error().code != Errc::not_found) return problem(id.error());
   const auto owner = id ? coordinator_.owner(*id) : tl::unexpected(id.error());
@@ -184,8 +173,8 @@ Response Api::handle(const Match& match, const Request& request) {
   });
 }
 
-// Only jobs unknown here are looked up at other coordinators; the job's own coordinator checks access. A
-// local job that the caller may not see stays a 404.
+// Only jobs that this coordinator does not have are looked up at others; the job's own coordinator then
+// checks access. For a job that is here but invisible to the caller, the 404 stays.
 bool Api::may_be_another_coordinators(const Match& match, const Response& response) const {
   return response.status == 404 && match.route->pattern.starts_with(kOneJob) && !match.params.empty() &&
          !coordinator_.owner(JobId{match.params[0]});
@@ -210,13 +199,9 @@ Response guarded(std::string_view what, const std::function<Response()>& work) {
 }
 
 bool plausible_id(std::string_view id) {
-  if (id.empty() || id.size() > limits::kIdBytes) return false;
-  for (const char c : id) {
-    const bool ok =
-        (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' || c == '_';
-    if (!ok) return false;
-  }
-  return true;
+  return !id.empty() && id.size() <= limits::kIdBytes && std::all_of(id.begin(), id.end(), [](char c) {
+    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' || c == '_';
+  });
 }
 
 Result<JobId> job_of(const Request& request, const Params& params) {

@@ -11,10 +11,9 @@ namespace ls::http {
 class BodySink;
 
 // system_handlers.cpp
-Response get_report_page(Api&, const Request&, const JobId&);
 Response get_healthz(Api&, const Request&, const Params&);
 Response get_readyz(Api&, const Request&, const Params&);
-Response get_metrics(Api&, const Request&, const Params&);
+Response get_metrics(Api&, const Request&, const Params&);  // metrics.cpp
 Response get_openapi(Api&, const Request&, const Params&);
 Response get_session(Api&, const Request&, const Params&);
 Response post_session(Api&, const Request&, const Params&);
@@ -26,43 +25,38 @@ Response get_workers(Api&, const Request&, const Params&);
 Response get_events(Api&, const Request&, const Params&);
 Response get_job_events(Api&, const Request&, const JobId&);
 
-// list_handlers.cpp
+// job_handlers.cpp
 Response get_jobs(Api&, const Request&, const Params&);
 Response post_again(Api&, const Request&, const JobId&);
-Response get_thumbnail(Api&, const Request&, const JobId&);
-
-// job_handlers.cpp
 Response post_job(Api&, const Request&, const Params&);
 Response get_job(Api&, const Request&, const JobId&);
 Response patch_job(Api&, const Request&, const JobId&);
 Response delete_job(Api&, const Request&, const JobId&);
+
+// output_handlers.cpp
 Response get_image_exr(Api&, const Request&, const JobId&);
 Response get_image_png(Api&, const Request&, const JobId&);
+Response get_thumbnail(Api&, const Request&, const JobId&);
 Response get_error_png(Api&, const Request&, const JobId&);
 Response get_samples_png(Api&, const Request&, const JobId&);
+Response get_layers(Api&, const Request&, const JobId&);
+Response get_pixels(Api&, const Request&, const JobId&);
+Response post_video(Api&, const Request&, const JobId&);
+Response get_video(Api&, const Request&, const JobId&);
+Response get_video_mp4(Api&, const Request&, const JobId&);
 Response get_report(Api&, const Request&, const JobId&);
+Response get_report_page(Api&, const Request&, const JobId&);
 Response get_convergence(Api&, const Request&, const JobId&);
 Response get_tiles(Api&, const Request&, const JobId&);
 Response get_log(Api&, const Request&, const JobId&);
 
-// pixel_handlers.cpp
-Response get_layers(Api&, const Request&, const JobId&);
-Response get_pixels(Api&, const Request&, const JobId&);
-
-// video_handlers.cpp
-Response post_video(Api&, const Request&, const JobId&);
-Response get_video(Api&, const Request&, const JobId&);
-Response get_video_mp4(Api&, const Request&, const JobId&);
-
-// blob_handlers.cpp; PUT is streamed
+// upload_handlers.cpp; open_blob() is for PUT, open_bundle() for POST /jobs with an archive
 Response post_blobs_missing(Api&, const Request&, const Params&);
 Response head_blob(Api&, const Request&, const Params&);
 std::variant<Response, std::unique_ptr<BodySink>> open_blob(Api&, const Request&, const Params&);
-
-// bundle_handlers.cpp: POST /jobs with an archive
 std::variant<Response, std::unique_ptr<BodySink>> open_bundle(Api&, const Request&);
 
-// The steps that all submissions share, whether the body was a scene, JSON or an archive (job_handlers.cpp)
+// The steps that all submissions share, whether the body was a scene, JSON or an archive (job_handlers.cpp).
 
 // Returns the text of a scene file from the blob store; a file of more than scene::kMaxTextBytes bytes is an
 // error.

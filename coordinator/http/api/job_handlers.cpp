@@ -1,6 +1,9 @@
+// Handlers that list, submit, show and change jobs.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -11,12 +14,12 @@
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/message/json_read.h"
-#include "coordinator/http/message/problem.h"
 #include "coordinator/views/views.h"
 
 namespace ls::http {
 namespace {
 
+using coordinator::JobsAsked;
 using coordinator::SubmitRequest;
 using nlohmann::json;
 
@@ -76,7 +79,7 @@ Result<SubmitRequest> from_xml(const Request& request) {
   return submit;
 }
 
-// Reads all changes of a PATCH, so that an error in one of them is found before any is applied.
+// Reads all changes in the body of a PATCH, so that an error in one is found before any is applied.
 Result<coordinator::JobChange> read_change(std::string_view text) {
   using coordinator::JobState;
   const auto body = read_object(text, {"state", "priority", "spp", "target_error", "focus"});
@@ -118,14 +121,85 @@ Result<coordinator::JobChange> read_change(std::string_view text) {
   return change;
 }
 
-template <class Body>
-Response file_response(std::string content_type, Body bytes, const std::string& name) {
-  return {.content_type = std::move(content_type),
-          .headers = {{"Content-Disposition", fmt::format("inline; filename=\"{}\"", name)}},
-          .body = std::move(bytes)};
+constexpr std::size_t kMaxPage = 1000;
+constexpr std::size_t kMaxSearch = 200;  // characters
+constexpr std::array kStates = {coordinator::JobState::queued, coordinator::JobState::running,
+                                coordinator::JobState::paused, coordinator::JobState::done,
+                                coordinator::JobState::failed, coordinator::JobState::cancelled};
+
+template <class T>
+Result<void> read_number(const Request& request, std::string_view name, T& out) {
+  const auto text = request.parameter(name);
+  if (!text) return {};
+  const auto value = parse_number<T>(*text);
+  if (!value || !(*value >= 0)) return bad_argument(fmt::format("'{}' must be a number from 0 on", name));
+  out = *value;
+  return {};
+}
+
+Result<void> read_states(std::string_view text, JobsAsked& asked) {
+  while (!text.empty()) {
+    const std::string_view word = take_part(text, ',');
+    const auto found = std::find_if(kStates.begin(), kStates.end(),
+                                    [&](coordinator::JobState state) { return to_string(state) == word; });
+    if (found == kStates.end())
+      return bad_argument(
+          "'state' has an unknown word; possible: queued, running, paused, done, failed, cancelled");
+    asked.states.insert(*found);
+  }
+  return {};
+}
+
+Result<void> read_order(std::string_view text, JobsAsked& asked) {
+  asked.descending = text.starts_with('-');
+  if (asked.descending) text.remove_prefix(1);
+  const auto& known = coordinator::kJobOrders;
+  const auto found = std::find(known.begin(), known.end(), text);
+  if (found == known.end())
+    return bad_argument(fmt::format("'sort' must be one of {}, with '-' before it for the other way round",
+                                    fmt::join(known, ", ")));
+  asked.by = static_cast<coordinator::JobOrder>(found - known.begin());
+  return {};
+}
+
+Result<JobsAsked> read_asked(const Request& request) {
+  JobsAsked asked;
+  asked.visible = [&request](const std::string& owner) { return request.caller.sees(owner); };
+  if (auto ok = read_states(request.parameter("state").value_or(""), asked); !ok)
+    return tl::unexpected(ok.error());
+  if (auto ok = read_order(request.parameter("sort").value_or("order"), asked); !ok)
+    return tl::unexpected(ok.error());
+  if (auto ok = read_number(request, "since", asked.since_unix); !ok) return tl::unexpected(ok.error());
+  if (auto ok = read_number(request, "offset", asked.offset); !ok) return tl::unexpected(ok.error());
+  if (auto ok = read_number(request, "limit", asked.limit); !ok) return tl::unexpected(ok.error());
+  if (request.parameter("limit") && asked.limit > kMaxPage)
+    return bad_argument(fmt::format("'limit' must be at most {}; without it all jobs come", kMaxPage));
+  if (const auto owner = request.parameter("owner")) asked.owner = std::string(*owner);
+  asked.search = request.parameter("search").value_or("");
+  if (asked.search.size() > kMaxSearch)
+    return bad_argument(fmt::format("'search' may have at most {} characters", kMaxSearch));
+  return asked;
 }
 
 }  // namespace
+
+Response get_jobs(Api& api, const Request& request, const Params&) {
+  const auto asked = read_asked(request);
+  if (!asked) return problem(asked.error());
+  return json_response(200, coordinator::jobs_json(api.coordinator().list(*asked)));
+}
+
+Response post_again(Api& api, const Request& request, const JobId& id) {
+  if (const auto owner = api.coordinator().owner(id); !owner) return problem(owner.error());
+  const auto body = read_object(request.body, {"spp", "target_error", "time", "seed", "priority"});
+  if (!body) return problem(body.error());
+  const auto changes = job_spec_of(*body);
+  if (!changes) return problem(changes.error());
+  if (auto refused = refuse_priority(api, request.caller, changes->priority)) return std::move(*refused);
+  const auto made = api.coordinator().submit_again(id, *changes, request.caller.user,
+                                                   std::string(request.header("traceparent")));
+  return made ? submitted(api, *made) : problem(made.error());
+}
 
 Response post_job(Api& api, const Request& request, const Params&) {
   const bool is_json = media_type(request.header("content-type")) == "application/json";
@@ -154,63 +228,6 @@ Response patch_job(Api& api, const Request& request, const JobId& id) {
 Response delete_job(Api& api, const Request&, const JobId& id) {
   if (const auto done = api.coordinator().remove(id); !done) return problem(done.error());
   return {.status = 204};
-}
-
-Response get_image_exr(Api& api, const Request&, const JobId& id) {
-  if (const auto path = api.coordinator().final_file(id, "image.exr"); !path.empty())
-    if (auto file = open_file_body(path))
-      return file_response("image/x-exr", std::move(*file), id.value + ".exr");
-  auto image = api.coordinator().image_exr(id);
-  return image ? file_response("image/x-exr", std::move(*image), id.value + ".exr") : problem(image.error());
-}
-
-Response get_image_png(Api& api, const Request& request, const JobId& id) {
-  const auto exposure = parse_number<double>(request.parameter("exposure").value_or("0"));
-  if (!exposure || !(std::abs(*exposure) <= coordinator::limits::kMaxExposure))
-    return problem(400, fmt::format("'exposure' must be a number of stops from -{0} to {0}",
-                                    coordinator::limits::kMaxExposure));
-  const auto layer = request.parameter("layer");
-  if (layer && *layer != "denoised")
-    return problem(400, "'layer' must be \"denoised\", or be left out for the image itself");
-  auto image = api.coordinator().image_png(id, *exposure, layer.has_value());
-  return image ? file_response("image/png", std::move(*image), id.value + ".png") : problem(image.error());
-}
-
-Response get_error_png(Api& api, const Request&, const JobId& id) {
-  auto map = api.coordinator().error_png(id);
-  return map ? file_response("image/png", std::move(*map), id.value + "-error.png") : problem(map.error());
-}
-
-Response get_samples_png(Api& api, const Request&, const JobId& id) {
-  auto map = api.coordinator().samples_png(id);
-  return map ? file_response("image/png", std::move(*map), id.value + "-samples.png") : problem(map.error());
-}
-
-Response get_report(Api& api, const Request&, const JobId& id) {
-  if (const auto path = api.coordinator().final_file(id, "report.json"); !path.empty())
-    if (auto file = open_file_body(path)) {
-      Response response = json_response(200, {});
-      response.body = std::move(*file);
-      return response;
-    }
-  auto report = api.coordinator().report_json(id);
-  return report ? json_response(200, std::move(*report)) : problem(report.error());
-}
-
-Response get_convergence(Api& api, const Request&, const JobId& id) {
-  const auto points = api.coordinator().convergence(id);
-  return points ? text_response(200, "text/csv; charset=utf-8", coordinator::convergence_csv(*points))
-                : problem(points.error());
-}
-
-Response get_tiles(Api& api, const Request&, const JobId& id) {
-  const auto tiles = api.coordinator().tiles(id);
-  return tiles ? json_response(200, coordinator::tiles_json(*tiles)) : problem(tiles.error());
-}
-
-Response get_log(Api& api, const Request&, const JobId& id) {
-  auto log = api.coordinator().job_log(id);
-  return log ? text_response(200, "text/plain; charset=utf-8", std::move(*log)) : problem(log.error());
 }
 
 Result<std::string> read_scene_blob(Api& api, const Digest& digest) {

@@ -1,3 +1,4 @@
+// /metrics in Prometheus' text format
 #include "coordinator/http/api/metrics.h"
 
 #include <fmt/format.h>
@@ -8,6 +9,8 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+
+#include "coordinator/http/api/handlers.h"
 
 namespace ls::http {
 namespace {
@@ -27,7 +30,7 @@ std::uint64_t files_in(const char* folder) {
   for (std::filesystem::directory_iterator at(folder, failed), end; !failed && at != end;
        at.increment(failed))
     ++count;
-  // Does not count the descriptor that this iteration itself opens
+  // The iterator itself has one descriptor open, which is not counted
   return failed || count == 0 ? 0 : count - 1;
 }
 
@@ -49,15 +52,25 @@ namespace {
 
 using coordinator::JobState;
 
-void head(std::string& out, std::string_view name, std::string_view type, std::string_view help) {
-  fmt::format_to(std::back_inserter(out), "# HELP {} {}\n# TYPE {} {}\n", name, help, name, type);
+// A metric whose name ends with _total is a counter, any other a gauge.
+void head(std::string& out, std::string_view name, std::string_view help) {
+  fmt::format_to(std::back_inserter(out), "# HELP {} {}\n# TYPE {} {}\n", name, help, name,
+                 name.ends_with("_total") ? "counter" : "gauge");
 }
 
 template <class Value>
-void single(std::string& out, std::string_view name, std::string_view type, std::string_view help,
-            Value value) {
-  head(out, name, type, help);
+void single(std::string& out, std::string_view name, std::string_view help, Value value) {
+  head(out, name, help);
   fmt::format_to(std::back_inserter(out), "{} {}\n", name, value);
+}
+
+// A metric with one value for each value of its label.
+using LabelledValues = std::vector<std::pair<std::string_view, std::uint64_t>>;
+void labelled(std::string& out, std::string_view name, std::string_view help, std::string_view label,
+              const LabelledValues& values) {
+  head(out, name, help);
+  for (const auto& [word, value] : values)
+    fmt::format_to(std::back_inserter(out), "{}{{{}=\"{}\"}} {}\n", name, label, word, value);
 }
 
 void write_jobs(std::string& out, std::span<const coordinator::JobView> jobs) {
@@ -78,21 +91,20 @@ void write_jobs(std::string& out, std::span<const coordinator::JobView> jobs) {
     eta += job.eta_seconds.value_or(0);
     if (job.state != JobState::paused) queued += job.queued_core_seconds;
   }
-  head(out, "lightshaft_jobs", "gauge", "Jobs by state.");
-  for (const JobState state : kStates)
-    fmt::format_to(std::back_inserter(out), "lightshaft_jobs{{state=\"{}\"}} {}\n", to_string(state),
-                   by_state[state]);
-  single(out, "lightshaft_units_planned", "gauge", "Units of unfinished jobs.", planned);
-  single(out, "lightshaft_units_done", "gauge", "Units of unfinished jobs that are folded.", done);
-  single(out, "lightshaft_queued_core_seconds", "gauge",
+  LabelledValues states;
+  for (const JobState state : kStates) states.emplace_back(to_string(state), by_state[state]);
+  labelled(out, "lightshaft_jobs", "Jobs by state.", "state", states);
+  single(out, "lightshaft_units_planned", "Units of unfinished jobs.", planned);
+  single(out, "lightshaft_units_done", "Units of unfinished jobs that are folded.", done);
+  single(out, "lightshaft_queued_core_seconds",
          "Predicted CPU seconds of units that wait for a worker, of jobs that are not paused.", queued);
-  single(out, "lightshaft_eta_seconds", "gauge",
-         "Predicted wall seconds to finish all jobs whose rate is known.", eta);
-  single(out, "lightshaft_core_seconds", "gauge", "CPU seconds that workers spent on the jobs kept here.",
+  single(out, "lightshaft_eta_seconds", "Predicted wall seconds to finish all jobs whose rate is known.",
+         eta);
+  single(out, "lightshaft_core_seconds", "CPU seconds that workers spent on the jobs kept here.",
          core_seconds);
-  single(out, "lightshaft_nonfinite_samples", "gauge", "Samples counted as non-finite; zero on healthy jobs.",
+  single(out, "lightshaft_nonfinite_samples", "Samples counted as non-finite; zero on healthy jobs.",
          health.nonfinite);
-  single(out, "lightshaft_majorant_violations", "gauge", "Densities above their bound; zero on healthy jobs.",
+  single(out, "lightshaft_majorant_violations", "Densities above their bound; zero on healthy jobs.",
          health.majorant_violations);
 }
 
@@ -105,103 +117,89 @@ void write_workers(std::string& out, std::span<const coordinator::WorkerView> wo
     threads += static_cast<std::uint64_t>(worker.threads);
     fake += worker.fake;
   }
-  head(out, "lightshaft_workers", "gauge", "Workers by state.");
-  for (const auto& [state, count] : by_state)
-    fmt::format_to(std::back_inserter(out), "lightshaft_workers{{state=\"{}\"}} {}\n", state, count);
-  single(out, "lightshaft_worker_threads", "gauge", "Render threads of connected workers.", threads);
-  single(out, "lightshaft_workers_fake", "gauge", "Connected workers that make their pixels up.", fake);
+  labelled(out, "lightshaft_workers", "Workers by state.", "state", {by_state.begin(), by_state.end()});
+  single(out, "lightshaft_worker_threads", "Render threads of connected workers.", threads);
+  single(out, "lightshaft_workers_fake", "Connected workers that make their pixels up.", fake);
 }
 
 void write_leases(std::string& out, const coordinator::FarmFigures& f) {
-  single(out, "lightshaft_leases", "gauge", "Leases that workers hold.", f.leases_now);
-  single(out, "lightshaft_units_leased", "gauge", "Units of these leases.", f.units_leased_now);
-  single(out, "lightshaft_units_lent", "gauge", "Older name of lightshaft_units_leased.", f.units_leased_now);
-  single(out, "lightshaft_leases_granted_total", "counter", "Leases given to workers.", f.leases_granted);
-  single(out, "lightshaft_units_leased_total", "counter", "Units of these leases.", f.units_leased);
-  single(out, "lightshaft_units_lent_total", "counter", "Older name of lightshaft_units_leased_total.",
-         f.units_leased);
-  head(out, "lightshaft_units_freed_total", "counter",
-       "Units that a worker had and did not hand in, by cause; those that are still wanted go to another.");
-  // All causes are listed, even with count 0: Prometheus can compute the rate of an event only if its counter
-  // existed before.
+  single(out, "lightshaft_leases", "Leases that workers hold.", f.leases_now);
+  single(out, "lightshaft_units_leased", "Units of these leases.", f.units_leased_now);
+  single(out, "lightshaft_units_lent", "Older name of lightshaft_units_leased.", f.units_leased_now);
+  single(out, "lightshaft_leases_granted_total", "Leases given to workers.", f.leases_granted);
+  single(out, "lightshaft_units_leased_total", "Units of these leases.", f.units_leased);
+  single(out, "lightshaft_units_lent_total", "Older name of lightshaft_units_leased_total.", f.units_leased);
+  // Causes with count 0 are listed, too: Prometheus computes the rate of a counter only from values that it
+  // has seen, so a counter that first appeared with 1 would lose that event.
+  LabelledValues freed;
   for (const auto& [cause, word] : coordinator::kFreedCauses) {
     const auto count = f.units_freed.find(cause);
-    fmt::format_to(std::back_inserter(out), "lightshaft_units_freed_total{{cause=\"{}\"}} {}\n", word,
-                   count == f.units_freed.end() ? 0 : count->second);
+    freed.emplace_back(word, count == f.units_freed.end() ? 0 : count->second);
   }
+  labelled(
+      out, "lightshaft_units_freed_total",
+      "Units that a worker had and did not hand in, by cause; those that are still wanted go to another.",
+      "cause", freed);
 }
 
 void write_results(std::string& out, const coordinator::FarmFigures& f) {
-  head(out, "lightshaft_results_total", "counter",
-       "Results that workers handed in. equal, differing: a second one of a unit, against the first.");
-  const auto results = [&](std::string_view what, std::uint64_t count) {
-    fmt::format_to(std::back_inserter(out), "lightshaft_results_total{{verdict=\"{}\"}} {}\n", what, count);
-  };
-  results("accepted", f.accepted);
-  results("equal", f.equal);
-  results("differing", f.differing);
-  results("unwanted", f.unwanted);
-  results("refused", f.refused);
-  results("not_stored", f.not_stored);
-  single(out, "lightshaft_units_folded_total", "counter", "Units folded into images.", f.folded);
-  single(out, "lightshaft_fold_lag_seconds_total", "counter",
+  labelled(out, "lightshaft_results_total",
+           "Results that workers handed in. equal, differing: a second one of a unit, against the first.",
+           "verdict",
+           {{"accepted", f.accepted},
+            {"equal", f.equal},
+            {"differing", f.differing},
+            {"unwanted", f.unwanted},
+            {"refused", f.refused},
+            {"not_stored", f.not_stored}});
+  single(out, "lightshaft_units_folded_total", "Units folded into images.", f.folded);
+  single(out, "lightshaft_fold_lag_seconds_total",
          "Seconds from a result's arrival to its fold, summed over lightshaft_units_folded_total.",
          f.fold_lag_seconds);
-  single(out, "lightshaft_results_arrived", "gauge", "Results that are being checked and stored.",
-         f.arrived_now);
-  single(out, "lightshaft_results_arrived_bytes", "gauge", "Memory that these take.", f.arrived_bytes);
-  single(out, "lightshaft_results_waiting", "gauge",
-         "Accepted results that wait for an earlier round of their tile.", f.waiting_now);
-  single(out, "lightshaft_background_writes", "gauge", "Writes that wait for the disk.",
-         f.background_writes_now);
-  single(out, "lightshaft_chores", "gauge", "Older name of lightshaft_background_writes.",
-         f.background_writes_now);
-  single(out, "lightshaft_result_bytes_total", "counter", "Bytes of results from workers.", f.result_bytes);
-  single(out, "lightshaft_blob_bytes_total", "counter", "Bytes of blobs sent to workers.", f.blob_bytes);
+  single(out, "lightshaft_results_arrived", "Results that are being checked and stored.", f.arrived_now);
+  single(out, "lightshaft_results_arrived_bytes", "Memory that these take.", f.arrived_bytes);
+  single(out, "lightshaft_results_waiting", "Accepted results that wait for an earlier round of their tile.",
+         f.waiting_now);
+  single(out, "lightshaft_background_writes", "Writes that wait for the disk.", f.background_writes_now);
+  single(out, "lightshaft_chores", "Older name of lightshaft_background_writes.", f.background_writes_now);
+  single(out, "lightshaft_result_bytes_total", "Bytes of results from workers.", f.result_bytes);
+  single(out, "lightshaft_blob_bytes_total", "Bytes of blobs sent to workers.", f.blob_bytes);
 }
 
 void write_audits(std::string& out, const coordinator::AuditFigures& a) {
-  head(out, "lightshaft_audits_total", "counter",
-       "Results chosen to be rendered again by another worker, and what came of it.");
-  for (const auto& [what, count] : {std::pair("asked", a.asked), std::pair("equal", a.equal),
-                                    std::pair("differ", a.differ), std::pair("dropped", a.dropped)})
-    fmt::format_to(std::back_inserter(out), "lightshaft_audits_total{{verdict=\"{}\"}} {}\n", what, count);
-  single(out, "lightshaft_workers_quarantined_total", "counter", "Workers found to render wrong pixels.",
+  labelled(out, "lightshaft_audits_total",
+           "Results chosen to be rendered again by another worker, and what came of it.", "verdict",
+           {{"asked", a.asked}, {"equal", a.equal}, {"differ", a.differ}, {"dropped", a.dropped}});
+  single(out, "lightshaft_workers_quarantined_total", "Workers found to render wrong pixels.",
          a.workers_quarantined);
-  single(out, "lightshaft_workers_barred_total", "counter",
-         "Older name of lightshaft_workers_quarantined_total.", a.workers_quarantined);
-  single(out, "lightshaft_tiles_discarded_total", "counter",
+  single(out, "lightshaft_workers_barred_total", "Older name of lightshaft_workers_quarantined_total.",
+         a.workers_quarantined);
+  single(out, "lightshaft_tiles_discarded_total",
          "Tiles rendered again since such a worker had a hand in them.", a.tiles_discarded);
 }
 
 void write_webhooks(std::string& out, const coordinator::WebhookFigures& w) {
-  head(out, "lightshaft_webhook_sendings_total", "counter",
-       "Attempts to tell a receiver of a job's event; a failed one is tried again later.");
-  fmt::format_to(std::back_inserter(out),
-                 "lightshaft_webhook_sendings_total{{result=\"taken\"}} {}\n"
-                 "lightshaft_webhook_sendings_total{{result=\"failed\"}} {}\n",
-                 w.delivered, w.failed_attempts);
-  single(out, "lightshaft_webhooks_given_up_total", "counter", "Events that a receiver never took.",
-         w.given_up);
-  single(out, "lightshaft_webhooks_waiting", "gauge", "Events that receivers have still to take.", w.waiting);
+  labelled(out, "lightshaft_webhook_sendings_total",
+           "Attempts to tell a receiver of a job's event; a failed one is tried again later.", "result",
+           {{"taken", w.delivered}, {"failed", w.failed_attempts}});
+  single(out, "lightshaft_webhooks_given_up_total", "Events that a receiver never took.", w.given_up);
+  single(out, "lightshaft_webhooks_waiting", "Events that receivers have still to take.", w.waiting);
 }
 
 void write_traces(std::string& out, const trace::Figures& f) {
-  head(out, "lightshaft_trace_spans_total", "counter",
-       "Spans that the collector of traces took, those that it refused or did not answer for, and those left "
-       "out since too many waited.");
-  for (const auto& [result, count] :
-       {std::pair("taken", f.sent), std::pair("refused", f.refused), std::pair("left out", f.left_out)})
-    fmt::format_to(std::back_inserter(out), "lightshaft_trace_spans_total{{result=\"{}\"}} {}\n", result,
-                   count);
+  labelled(
+      out, "lightshaft_trace_spans_total",
+      "Spans that the collector of traces took, those that it refused or did not answer for, and those left "
+      "out since too many waited.",
+      "result", {{"taken", f.sent}, {"refused", f.refused}, {"left out", f.left_out}});
 }
 
 void write_process(std::string& out) {
   const ProcessFigures p = process_figures();
-  single(out, "process_resident_memory_bytes", "gauge", "Memory of the coordinator.", p.resident_bytes);
-  single(out, "process_open_fds", "gauge", "Files and sockets that it has open.", p.open_files);
-  single(out, "process_threads", "gauge", "Its threads.", p.threads);
-  single(out, "process_cpu_seconds_total", "counter", "CPU time of it.", p.cpu_seconds);
+  single(out, "process_resident_memory_bytes", "Memory of the coordinator.", p.resident_bytes);
+  single(out, "process_open_fds", "Files and sockets that it has open.", p.open_files);
+  single(out, "process_threads", "Its threads.", p.threads);
+  single(out, "process_cpu_seconds_total", "CPU time of it.", p.cpu_seconds);
 }
 
 }  // namespace
@@ -216,39 +214,35 @@ std::map<std::pair<Method, int>, std::uint64_t> Counters::requests() const {
   return requests_;
 }
 
-std::string metrics_text(std::span<const coordinator::JobView> jobs,
-                         std::span<const coordinator::WorkerView> workers, std::uint64_t last_event,
-                         const Counters& counters, const coordinator::StoreStatus& store,
-                         const coordinator::FarmFigures& farm, const coordinator::AuditFigures& audits,
-                         const std::optional<coordinator::WebhookFigures>& webhooks,
-                         const std::optional<trace::Figures>& traces) {
+Response get_metrics(Api& api, const Request&, const Params&) {
+  auto& coordinator = api.coordinator();
+  const Counters& counters = api.counters();
+  const coordinator::FarmFigures farm = coordinator.figures();
   std::string out;
-  write_jobs(out, jobs);
-  write_workers(out, workers);
+  write_jobs(out, coordinator.jobs());
+  write_workers(out, coordinator.workers());
   write_leases(out, farm);
   write_results(out, farm);
-  write_audits(out, audits);
+  write_audits(out, coordinator.audits());
   write_process(out);
-  single(out, "lightshaft_events_total", "counter", "Id of the last event.", last_event);
-  head(out, "lightshaft_http_requests_total", "counter", "Requests answered.");
+  single(out, "lightshaft_events_total", "Id of the last event.", coordinator.last_event_id());
+  head(out, "lightshaft_http_requests_total", "Requests answered.");
   for (const auto& [key, count] : counters.requests())
     fmt::format_to(std::back_inserter(out),
                    "lightshaft_http_requests_total{{method=\"{}\",code=\"{}\"}} {}\n", to_string(key.first),
                    key.second, count);
-  single(out, "lightshaft_http_connections", "gauge", "Open HTTP connections.", counters.connections.load());
-  single(out, "lightshaft_http_event_streams", "gauge", "Open event streams.", counters.event_streams.load());
-  single(out, "lightshaft_http_slow_readers_total", "counter",
-         "Event streams closed because the reader was too slow.", counters.events_dropped.load());
-  single(out, "lightshaft_http_body_bytes_total", "counter", "Bytes of request bodies.",
-         counters.body_bytes.load());
-  if (webhooks) write_webhooks(out, *webhooks);
-  if (traces) write_traces(out, *traces);
-  if (!store.mirror.empty()) {
-    single(out, "lightshaft_redis_up", "gauge", "1 while Redis answers.", store.trouble.empty() ? 1 : 0);
-    single(out, "lightshaft_redis_jobs_behind", "gauge", "Jobs of which Redis has not been told all.",
-           store.behind);
+  single(out, "lightshaft_http_connections", "Open HTTP connections.", counters.connections.load());
+  single(out, "lightshaft_http_event_streams", "Open event streams.", counters.event_streams.load());
+  single(out, "lightshaft_http_slow_readers_total", "Event streams closed because the reader was too slow.",
+         counters.events_dropped.load());
+  single(out, "lightshaft_http_body_bytes_total", "Bytes of request bodies.", counters.body_bytes.load());
+  if (const auto webhooks = api.webhooks()) write_webhooks(out, *webhooks);
+  if (const auto traces = api.traces()) write_traces(out, *traces);
+  if (const auto store = coordinator.store_status(); !store.mirror.empty()) {
+    single(out, "lightshaft_redis_up", "1 while Redis answers.", store.trouble.empty() ? 1 : 0);
+    single(out, "lightshaft_redis_jobs_behind", "Jobs of which Redis has not been told all.", store.behind);
   }
-  return out;
+  return text_response(200, "text/plain; version=0.0.4; charset=utf-8", std::move(out));
 }
 
 }  // namespace ls::http

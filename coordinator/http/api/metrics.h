@@ -1,18 +1,13 @@
-// /metrics in Prometheus' text format
+// What /metrics shows about this process and the HTTP server.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
 #include <map>
 #include <mutex>
-#include <optional>
-#include <span>
-#include <string>
 #include <utility>
 
-#include "common/trace/span_queue.h"
 #include "coordinator/http/message/message.h"
-#include "coordinator/service/coordinator.h"
 
 namespace ls::http {
 
@@ -41,15 +36,5 @@ class Counters {
   mutable std::mutex mutex_;
   std::map<std::pair<Method, int>, std::uint64_t> requests_;
 };
-
-// Returns the text of /metrics. Without `webhooks` it has no counters of webhooks, without `traces` no
-// counters of trace spans.
-std::string metrics_text(std::span<const coordinator::JobView> jobs,
-                         std::span<const coordinator::WorkerView> workers, std::uint64_t last_event,
-                         const Counters& counters, const coordinator::StoreStatus& store = {},
-                         const coordinator::FarmFigures& farm = {},
-                         const coordinator::AuditFigures& audits = {},
-                         const std::optional<coordinator::WebhookFigures>& webhooks = std::nullopt,
-                         const std::optional<trace::Figures>& traces = std::nullopt);
 
 }  // namespace ls::http

@@ -5,16 +5,9 @@
 #include "common/scene/limits.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/message/limits.h"
-#include "coordinator/http/message/problem.h"
 
 namespace ls::http {
 namespace {
-
-constexpr Access kOpen = Access::open;
-constexpr Access kToken = Access::token;
-constexpr Access kSubmit = Access::submit;
-constexpr BodyKind kNone = BodyKind::none;
-constexpr BodyKind kWhole = BodyKind::buffered;
 
 constexpr std::string_view kJson = "application/json";
 constexpr std::string_view kPatchJson = "application/json application/merge-patch+json";
@@ -31,60 +24,61 @@ Response of_job(Api& api, const Request& request, const Params& params) {
   return id ? handler(api, request, *id) : problem(id.error());
 }
 
-constexpr std::array kRoutes = {
-    Route{Method::get, "/healthz", kOpen, Executor::here, kNone, 0, get_healthz},
-    Route{Method::get, "/readyz", kOpen, Executor::quick, kNone, 0, get_readyz},
-    Route{Method::get, "/metrics", Access::see, Executor::quick, kNone, 0, get_metrics},
-    Route{Method::get, "/api/v1/openapi.json", kToken, Executor::here, kNone, 0, get_openapi},
-    Route{Method::post, "/api/v1/session", kOpen, Executor::here, kWhole, kMaxSessionJson, post_session,
-          kJson},
-    Route{Method::get, "/api/v1/session", kToken, Executor::here, kNone, 0, get_session},
-    Route{Method::del, "/api/v1/session", kOpen, Executor::here, kNone, 0, delete_session},
-    Route{Method::get, "/api/v1/jobs", kToken, Executor::quick, kNone, 0, get_jobs},
-    Route{Method::post, "/api/v1/jobs", kSubmit, Executor::slow, kWhole, scene::kMaxTextBytes, post_job,
-          kJobTypes, kBundleTypes},
-    Route{Method::get, "/api/v1/jobs/{id}", kToken, Executor::quick, kNone, 0, of_job<get_job>},
-    Route{Method::patch, "/api/v1/jobs/{id}", kSubmit, Executor::quick, kWhole, kMaxControlJson,
-          of_job<patch_job>, kPatchJson},
-    Route{Method::del, "/api/v1/jobs/{id}", kSubmit, Executor::quick, kNone, 0, of_job<delete_job>},
-    Route{Method::get, "/api/v1/jobs/{id}/image.exr", kToken, Executor::slow, kNone, 0,
-          of_job<get_image_exr>},
-    Route{Method::get, "/api/v1/jobs/{id}/image.png", kToken, Executor::slow, kNone, 0,
-          of_job<get_image_png>},
-    Route{Method::get, "/api/v1/jobs/{id}/thumbnail.png", kToken, Executor::slow, kNone, 0,
-          of_job<get_thumbnail>},
-    Route{Method::post, "/api/v1/jobs/{id}/again", kSubmit, Executor::slow, kWhole, kMaxControlJson,
-          of_job<post_again>, kJson},
-    Route{Method::post, "/api/v1/jobs/{id}/video", kSubmit, Executor::slow, kWhole, kMaxControlJson,
-          of_job<post_video>, kJson},
-    Route{Method::get, "/api/v1/jobs/{id}/video", kToken, Executor::quick, kNone, 0, of_job<get_video>},
-    Route{Method::get, "/api/v1/jobs/{id}/video.mp4", kToken, Executor::slow, kNone, 0,
-          of_job<get_video_mp4>},
-    Route{Method::get, "/api/v1/jobs/{id}/error.png", kToken, Executor::slow, kNone, 0,
-          of_job<get_error_png>},
-    Route{Method::get, "/api/v1/jobs/{id}/samples.png", kToken, Executor::slow, kNone, 0,
-          of_job<get_samples_png>},
-    Route{Method::get, "/api/v1/jobs/{id}/layers", kToken, Executor::slow, kNone, 0, of_job<get_layers>},
-    Route{Method::get, "/api/v1/jobs/{id}/pixels", kToken, Executor::slow, kNone, 0, of_job<get_pixels>},
-    Route{Method::get, "/api/v1/jobs/{id}/report", kToken, Executor::slow, kNone, 0, of_job<get_report>},
-    Route{Method::get, "/api/v1/jobs/{id}/report.html", kToken, Executor::slow, kNone, 0,
-          of_job<get_report_page>},
-    Route{Method::get, "/api/v1/jobs/{id}/convergence.csv", kToken, Executor::quick, kNone, 0,
-          of_job<get_convergence>},
-    Route{Method::get, "/api/v1/jobs/{id}/tiles", kToken, Executor::slow, kNone, 0, of_job<get_tiles>},
-    Route{Method::get, "/api/v1/jobs/{id}/log", kToken, Executor::quick, kNone, 0, of_job<get_log>},
-    Route{Method::get, "/api/v1/jobs/{id}/events", kToken, Executor::quick, kNone, 0, of_job<get_job_events>},
-    Route{Method::get, "/api/v1/events", kToken, Executor::quick, kNone, 0, get_events},
-    Route{Method::get, "/api/v1/tokens", Access::admin, Executor::quick, kNone, 0, get_tokens},
-    Route{Method::post, "/api/v1/tokens", Access::admin, Executor::slow, kWhole, kMaxControlJson, post_token,
-          kJson},
-    Route{Method::del, "/api/v1/tokens/{token}", Access::admin, Executor::slow, kNone, 0, delete_token},
-    Route{Method::get, "/api/v1/workers", kToken, Executor::quick, kNone, 0, get_workers},
-    Route{Method::post, "/api/v1/blobs/missing", kToken, Executor::remote, kWhole, kMaxDigestList,
-          post_blobs_missing, kJson},
-    Route{Method::head, "/api/v1/blobs/{sha256}", kToken, Executor::remote, kNone, 0, head_blob},
-    Route{Method::put, "/api/v1/blobs/{sha256}", kSubmit, Executor::slow, BodyKind::blob, 0, nullptr},
-};
+// A route for requests without a body.
+constexpr Route plain(Method method, std::string_view pattern, Access access, Executor executor,
+                      Handler handler) {
+  return {method, pattern, access, executor, BodyKind::none, 0, handler};
+}
+
+constexpr auto kRoutes = [] {
+  using enum Method;
+  using enum Access;
+  using enum Executor;
+  using enum BodyKind;
+  return std::array{
+      plain(get, "/healthz", open, here, get_healthz),
+      plain(get, "/readyz", open, quick, get_readyz),
+      plain(get, "/metrics", see, quick, get_metrics),
+      plain(get, "/api/v1/openapi.json", token, here, get_openapi),
+      Route{post, "/api/v1/session", open, here, buffered, kMaxSessionJson, post_session, kJson},
+      plain(get, "/api/v1/session", token, here, get_session),
+      plain(del, "/api/v1/session", open, here, delete_session),
+      plain(get, "/api/v1/jobs", token, quick, get_jobs),
+      Route{post, "/api/v1/jobs", submit, slow, buffered, scene::kMaxTextBytes, post_job, kJobTypes,
+            kBundleTypes},
+      plain(get, "/api/v1/jobs/{id}", token, quick, of_job<get_job>),
+      Route{patch, "/api/v1/jobs/{id}", submit, quick, buffered, kMaxControlJson, of_job<patch_job>,
+            kPatchJson},
+      plain(del, "/api/v1/jobs/{id}", submit, quick, of_job<delete_job>),
+      plain(get, "/api/v1/jobs/{id}/image.exr", token, slow, of_job<get_image_exr>),
+      plain(get, "/api/v1/jobs/{id}/image.png", token, slow, of_job<get_image_png>),
+      plain(get, "/api/v1/jobs/{id}/thumbnail.png", token, slow, of_job<get_thumbnail>),
+      Route{post, "/api/v1/jobs/{id}/again", submit, slow, buffered, kMaxControlJson, of_job<post_again>,
+            kJson},
+      Route{post, "/api/v1/jobs/{id}/video", submit, slow, buffered, kMaxControlJson, of_job<post_video>,
+            kJson},
+      plain(get, "/api/v1/jobs/{id}/video", token, quick, of_job<get_video>),
+      plain(get, "/api/v1/jobs/{id}/video.mp4", token, slow, of_job<get_video_mp4>),
+      plain(get, "/api/v1/jobs/{id}/error.png", token, slow, of_job<get_error_png>),
+      plain(get, "/api/v1/jobs/{id}/samples.png", token, slow, of_job<get_samples_png>),
+      plain(get, "/api/v1/jobs/{id}/layers", token, slow, of_job<get_layers>),
+      plain(get, "/api/v1/jobs/{id}/pixels", token, slow, of_job<get_pixels>),
+      plain(get, "/api/v1/jobs/{id}/report", token, slow, of_job<get_report>),
+      plain(get, "/api/v1/jobs/{id}/report.html", token, slow, of_job<get_report_page>),
+      plain(get, "/api/v1/jobs/{id}/convergence.csv", token, quick, of_job<get_convergence>),
+      plain(get, "/api/v1/jobs/{id}/tiles", token, slow, of_job<get_tiles>),
+      plain(get, "/api/v1/jobs/{id}/log", token, quick, of_job<get_log>),
+      plain(get, "/api/v1/jobs/{id}/events", token, quick, of_job<get_job_events>),
+      plain(get, "/api/v1/events", token, quick, get_events),
+      plain(get, "/api/v1/tokens", admin, quick, get_tokens),
+      Route{post, "/api/v1/tokens", admin, slow, buffered, kMaxControlJson, post_token, kJson},
+      plain(del, "/api/v1/tokens/{token}", admin, slow, delete_token),
+      plain(get, "/api/v1/workers", token, quick, get_workers),
+      Route{post, "/api/v1/blobs/missing", token, remote, buffered, kMaxDigestList, post_blobs_missing,
+            kJson},
+      plain(head, "/api/v1/blobs/{sha256}", token, remote, head_blob),
+      Route{put, "/api/v1/blobs/{sha256}", submit, slow, blob, 0, nullptr}};
+}();
 
 std::string_view next_part(std::string_view& pattern) {
   pattern.remove_prefix(1);  // '/'
@@ -123,19 +117,9 @@ void add(std::string& list, std::string_view name) {
 std::span<const Route> routes() { return kRoutes; }
 
 std::string_view to_string(Access access) {
-  switch (access) {
-    case Access::open:
-      return "anybody";
-    case Access::token:
-      return "submit, read, admin";
-    case Access::submit:
-      return "submit, admin";
-    case Access::see:
-      return "read, admin";
-    case Access::admin:
-      return "admin";
-  }
-  return "";
+  constexpr std::string_view kCallers[] = {"anybody", "submit, read, admin", "submit, admin", "read, admin",
+                                           "admin"};
+  return kCallers[static_cast<std::size_t>(access)];
 }
 
 bool allows(Access access, Role role) {

@@ -28,8 +28,8 @@ enum class Access {
 };
 std::string_view to_string(Access access);
 bool allows(Access access, Role role);
-// The threads that run a route's handler: the network thread or one of three thread pools, so that slow work
-// never delays quick answers.
+// The threads that run a route's handler: the network thread or one of three thread pools. The pools are
+// separate, so that slow work never delays quick answers.
 enum class Executor {
   here,    // the network thread; the handler must not block
   quick,   // the pool for handlers that answer from memory

@@ -27,11 +27,8 @@ Result<Json> parse_size(std::string_view text) {
 
 Json parse_list(std::string_view text) {
   Json list = Json::array();
-  while (!text.empty()) {
-    const std::size_t comma = text.find(',');
-    if (comma != 0) list.push_back(std::string(text.substr(0, comma)));
-    text = comma == std::string_view::npos ? std::string_view{} : text.substr(comma + 1);
-  }
+  while (!text.empty())
+    if (const auto part = take_part(text, ','); !part.empty()) list.push_back(std::string(part));
   return list;
 }
 

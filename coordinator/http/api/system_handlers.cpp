@@ -1,12 +1,10 @@
 #include <fmt/format.h>
 
 #include "common/base/parse_number.h"
-#include "common/report/job_page.h"
 #include "coordinator/http/api/api.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/auth/auth.h"
 #include "coordinator/http/message/json_read.h"
-#include "coordinator/http/message/problem.h"
 #include "coordinator/views/views.h"
 
 namespace ls::http {
@@ -20,8 +18,8 @@ Response event_stream(const Request& request, std::string job) {
   EventStream stream;
   stream.job = std::move(job);
   stream.reader = request.caller;
-  // Browsers send the header Last-Event-ID when they reconnect. Its id is later than that of last_event_id in
-  // the address.
+  // A browser that reconnects sends the header Last-Event-ID with the last id it got, which is later than the
+  // parameter last_event_id in the address.
   std::string_view text = request.header("last-event-id");
   if (text.empty()) text = request.parameter("last_event_id").value_or("");
   if (!text.empty()) {
@@ -29,6 +27,11 @@ Response event_stream(const Request& request, std::string job) {
     if (!stream.after_id) return problem(400, "Last-Event-ID must be the id of an event: a whole number");
   }
   return {.content_type = "text/event-stream", .events = std::move(stream)};
+}
+
+nlohmann::ordered_json to_value(const TokenInfo& token) {
+  return {
+      {"id", token.id}, {"role", to_string(token.role)}, {"user", token.user}, {"of_file", token.of_file}};
 }
 
 }  // namespace
@@ -42,14 +45,6 @@ Response get_readyz(Api& api, const Request&, const Params&) {
   // clients.
   const std::string trouble = api.coordinator().store_status().trouble;
   return text_response(200, "text/plain", trouble.empty() ? "ready\n" : "ready, but: " + trouble + "\n");
-}
-
-Response get_metrics(Api& api, const Request&, const Params&) {
-  auto& coordinator = api.coordinator();
-  return text_response(200, "text/plain; version=0.0.4; charset=utf-8",
-                       metrics_text(coordinator.jobs(), coordinator.workers(), coordinator.last_event_id(),
-                                    api.counters(), coordinator.store_status(), coordinator.figures(),
-                                    coordinator.audits(), api.webhooks(), api.traces()));
 }
 
 Response get_openapi(Api&, const Request&, const Params&) {
@@ -86,8 +81,8 @@ Response get_workers(Api& api, const Request& request, const Params&) {
   auto workers = api.coordinator().workers();
   for (auto& worker : workers) {
     if (request.caller.role != Role::submit) continue;
-    // The status of a worker without a job is hidden, too: it may reveal the worker's earlier jobs for other
-    // users (why it failed or is quarantined).
+    // The activity of a worker without a job is hidden, too: it may tell why the worker failed or is
+    // quarantined, and so reveal earlier jobs of other users.
     const auto owner = api.coordinator().owner(JobId{worker.job});
     if (!owner || !request.caller.sees(*owner)) hide_work(worker);
   }
@@ -100,31 +95,6 @@ Response get_job_events(Api& api, const Request& request, const JobId& id) {
   if (const auto job = api.coordinator().job(id); !job) return problem(job.error());
   return event_stream(request, id.value);
 }
-
-Response get_report_page(Api& api, const Request&, const JobId& id) {
-  auto image = api.coordinator().image_png(id, 0);
-  if (!image) return problem(image.error());
-  auto report = api.coordinator().report_json(id);
-  if (!report) return problem(report.error());
-  auto page = report::job_page({std::move(*report), std::move(*image),
-                                api.coordinator().error_png(id).value_or(std::vector<std::byte>{}),
-                                api.coordinator().samples_png(id).value_or(std::vector<std::byte>{})});
-  if (!page) return problem(page.error());
-  Response response = text_response(200, "text/html; charset=utf-8", std::move(*page));
-  response.headers.emplace_back("Content-Security-Policy",
-                                report::job_page_policy() + "; frame-ancestors 'none'");
-  response.headers.emplace_back("Content-Disposition", fmt::format("inline; filename=\"{}.html\"", id.value));
-  return response;
-}
-
-namespace {
-
-nlohmann::ordered_json to_value(const TokenInfo& token) {
-  return {
-      {"id", token.id}, {"role", to_string(token.role)}, {"user", token.user}, {"of_file", token.of_file}};
-}
-
-}  // namespace
 
 Response get_tokens(Api& api, const Request&, const Params&) {
   auto list = nlohmann::ordered_json::array();

@@ -1,10 +1,8 @@
 #include "coordinator/http/auth/auth.h"
 
 #include <fmt/format.h>
-#include <openssl/rand.h>
 #include <strings.h>
 
-#include <array>
 #include <charconv>
 #include <nlohmann/json.hpp>
 
@@ -13,10 +11,11 @@
 #include "common/base/digest.h"
 #include "common/base/secret.h"
 #include "coordinator/http/message/limits.h"
-#include "coordinator/http/message/problem.h"
 
 namespace ls::http {
 namespace {
+
+constexpr std::size_t kNonceDigits = 32;  // hexadecimal
 
 bool unsafe(Method method) {
   return method != Method::get && method != Method::head && method != Method::options;
@@ -95,11 +94,10 @@ std::variant<std::string, Response> Auth::open_session(const Request& request, s
       request, token,
       "this is no token of this coordinator (the admin's is in its data folder, file 'token')");
   if (auto* refused = std::get_if<Response>(&caller)) return std::move(*refused);
-  std::array<unsigned char, 16> nonce{};
-  CHECK(RAND_bytes(nonce.data(), static_cast<int>(nonce.size())) == 1, "the system's random numbers failed");
-  std::string text = fmt::format("{}.", now_() + kSessionSeconds);
-  for (const unsigned char byte : nonce) text += fmt::format("{:02x}", byte);
-  text += "." + std::get<Caller>(caller).token_id;
+  const auto nonce = random_token();
+  CHECK(nonce, "the system's random numbers failed");
+  const std::string text = fmt::format("{}.{}.{}", now_() + kSessionSeconds, nonce->substr(0, kNonceDigits),
+                                       std::get<Caller>(caller).token_id);
   return cookie(text + "." + mac(text), kSessionSeconds);
 }
 
@@ -156,15 +154,10 @@ bool Auth::is_closed(const Session& session) const {
 }
 
 std::string_view Auth::session_of(const Request& request) const {
-  std::string_view rest = request.header("cookie");
-  while (!rest.empty()) {
-    const std::size_t end = rest.find(';');
-    std::string_view pair = rest.substr(0, end);
-    rest = end == std::string_view::npos ? std::string_view{} : rest.substr(end + 1);
-    while (pair.starts_with(' ')) pair.remove_prefix(1);
-    if (pair.size() > cookie_name_.size() && pair.starts_with(cookie_name_) &&
-        pair[cookie_name_.size()] == '=')
-      return pair.substr(cookie_name_.size() + 1);
+  for (std::string_view rest = request.header("cookie"); !rest.empty();) {
+    std::string_view value = take_part(rest, ';');
+    while (value.starts_with(' ')) value.remove_prefix(1);
+    if (value.starts_with(cookie_name_ + "=")) return value.substr(cookie_name_.size() + 1);
   }
   return {};
 }

@@ -2,9 +2,9 @@
 //
 // The cookie's text is `expiry.nonce.token-id.mac`; the key of the MAC is TokenRegistry::session_key(). The
 // coordinator stores no open session, so sessions survive its restart. A session becomes invalid when its
-// token is revoked. Sessions closed by DELETE /session are remembered until they expire or the process ends.
-// If a token has more than kMaxClosedSessions of them, its sessions that are as old as the one that is
-// forgotten are refused, whether they were closed or not: a closed session never becomes valid again.
+// token is revoked. Sessions closed by DELETE /session are remembered until they expire or the process ends,
+// for each token the kMaxClosedSessions that expire last. When another one is forgotten, all sessions of its
+// token that expire no later become invalid, so that no closed session becomes valid again.
 #pragma once
 
 #include <cstdint>
@@ -85,16 +85,16 @@ class Auth {
   mutable std::mutex mutex_;
   struct Closed {
     std::set<std::pair<std::int64_t, std::string>> sessions;  // expiry and text
-    std::int64_t refused_until = 0;  // sessions that expire at this time or earlier are refused
+    std::int64_t refused_until = 0;  // sessions with this expiry or an earlier one are invalid
   };
-  std::map<std::string, Closed, std::less<>> closed_;  // by the token's id; each session has not expired yet
+  std::map<std::string, Closed, std::less<>> closed_;  // by the token's id
 };
 
 // Clears the fields of `worker` that describe its work for other users' jobs.
 void hide_work(coordinator::WorkerView& worker);
 
-// Returns the event without the parts that this caller may not see; nullopt: the caller may not see the event
-// at all.
+// Returns the event without the parts that this caller may not see; nullopt: the caller may see nothing of
+// it.
 std::optional<coordinator::StreamEvent> visible(const coordinator::StreamEvent& event, const Caller& caller);
 
 }  // namespace ls::http

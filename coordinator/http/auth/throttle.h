@@ -1,6 +1,6 @@
-// Rate limits by token buckets: one bucket counts the requests of each token (or of each address, for
-// requests without a token), another the wrong tokens from each address. A bucket refills by Pace::per_second
-// for every second of the wall clock; if the clock jumps back, nothing is refilled.
+// Rate limits by token buckets. Each token has a bucket for its requests. Each address has one for its
+// requests without a token, and another for its wrong tokens. A bucket refills by Pace::per_second for every
+// second of the wall clock; if the clock jumps back, nothing is refilled.
 #pragma once
 
 #include <cstdint>
@@ -25,9 +25,9 @@ class Throttle {
   // allowed, else the number of seconds after which it would be.
   int request(std::string_view who, std::int64_t now);
 
-  // Checks whether a token from this address may be tried. After too many wrong tokens from an address, only
-  // tokens that were accepted from this address before may be tried. So guessing stops without locking out
-  // legitimate users. Returns the seconds to wait; 0: the token may be tried.
+  // Checks whether a token from this address may be tried. After too many wrong tokens, only tokens that were
+  // accepted from the address before may be tried: guessing stops, and known users are not locked out.
+  // Returns the seconds to wait; 0: the token may be tried.
   int may_try(const std::string& address, std::string_view token_id, std::int64_t now);
   void failed(const std::string& address, std::int64_t now);
   void succeeded(const std::string& address, std::string_view token_id, std::int64_t now);

@@ -1,26 +1,93 @@
 #include "coordinator/http/auth/token_registry.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <openssl/rand.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
-#include <fstream>
+#include <array>
+#include <cerrno>
+#include <cstring>
 #include <utility>
 
 #include "common/base/check.h"
 #include "common/base/log.h"
 #include "common/base/secret.h"
-#include "coordinator/http/auth/token_file.h"
 
 namespace ls::http {
 namespace {
 
+constexpr std::size_t kMinToken = 16, kMaxToken = 1024;
+constexpr std::size_t kMaxList = 1u << 20;
+
+std::string why() { return std::strerror(errno); }
+
+// Reads the file to its end, but at most `most` bytes.
+Result<std::string> read_up_to(std::size_t most, const Descriptor& in, const std::filesystem::path& file) {
+  std::string text(most, '\0');
+  std::size_t size = 0;
+  while (size < most) {
+    const ssize_t n = ::read(in.fd, text.data() + size, most - size);
+    if (n < 0) return fail(Errc::internal, fmt::format("cannot read '{}': {}", file.string(), why()));
+    if (n == 0) break;
+    size += static_cast<std::size_t>(n);
+  }
+  text.resize(size);
+  return text;
+}
+
+Result<std::string> read_token(const Descriptor& in, const std::filesystem::path& file) {
+  struct stat info {};
+  if (::fstat(in.fd, &info) != 0)
+    return fail(Errc::internal, fmt::format("cannot stat '{}': {}", file.string(), why()));
+  if ((info.st_mode & 077) != 0)
+    return fail(Errc::failed_precondition,
+                fmt::format("'{}' may be read by others: chmod 600 it, or delete it to get a new one",
+                            file.string()));
+  auto text = read_up_to(kMaxToken + 1, in, file);
+  if (!text) return text;
+  std::string& token = *text;
+  while (!token.empty() && static_cast<unsigned char>(token.back()) <= ' ') token.pop_back();
+  if (token.size() < kMinToken || token.size() > kMaxToken)
+    return fail(Errc::failed_precondition,
+                fmt::format("'{}' holds no token of {} to {} characters: delete it to get a "
+                            "new one",
+                            file.string(), kMinToken, kMaxToken));
+  return text;
+}
+
+Result<std::string> make_token(const std::filesystem::path& file) {
+  auto token = random_token();
+  if (!token) return token;
+  if (auto written = write_private(file, *token + "\n"); !written) return tl::unexpected(written.error());
+  return token;
+}
+
+// Reads a file of at most 1 MiB. Returns an empty text if there is no file. failed_precondition: users other
+// than the owner may write the file (they may read it), or it is too large or cannot be opened.
+Result<std::string> read_list(const std::filesystem::path& file) {
+  const Descriptor in{::open(file.c_str(), O_RDONLY | O_CLOEXEC)};
+  if (in.fd < 0 && errno == ENOENT) return std::string();
+  struct stat info {};
+  if (in.fd < 0 || ::fstat(in.fd, &info) != 0)
+    return fail(Errc::failed_precondition, fmt::format("cannot open '{}': {}", file.string(), why()));
+  if ((info.st_mode & 022) != 0)
+    return fail(Errc::failed_precondition,
+                fmt::format("'{}' may be written by others: chmod go-w it", file.string()));
+  auto text = read_up_to(kMaxList + 1, in, file);
+  if (text && text->size() > kMaxList)
+    return fail(Errc::failed_precondition,
+                fmt::format("'{}' has more than {} bytes", file.string(), kMaxList));
+  return text;
+}
+
 constexpr std::size_t kIdDigits = 16;
 constexpr std::size_t kMaxLine = 256;
 
-constexpr struct {
-  Role role;
-  std::string_view name;
-} kRoles[] = {{Role::admin, "admin"}, {Role::submit, "submit"}, {Role::read, "read"}, {Role::join, "join"}};
+constexpr std::array<std::string_view, 4> kRoles = {"admin", "submit", "read", "join"};  // by Role
 
 std::string_view next_word(std::string_view& text) {
   const std::size_t begin = text.find_first_not_of(" \t\r");
@@ -31,20 +98,7 @@ std::string_view next_word(std::string_view& text) {
   return word;
 }
 
-}  // namespace
-
-std::string_view to_string(Role role) {
-  for (const auto& row : kRoles)
-    if (row.role == role) return row.name;
-  return "?";
-}
-
-std::optional<Role> parse_role(std::string_view name) {
-  for (const auto& row : kRoles)
-    if (row.name == name) return row.role;
-  return std::nullopt;
-}
-
+// True for 1 to kMaxUserName characters a-z A-Z 0-9 . _ - @, beginning with a letter or digit.
 bool plausible_user(std::string_view name) {
   const auto letter = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
@@ -52,6 +106,43 @@ bool plausible_user(std::string_view name) {
   if (name.empty() || name.size() > kMaxUserName || !letter(name.front())) return false;
   return std::all_of(name.begin(), name.end(),
                      [&](char c) { return letter(c) || c == '.' || c == '_' || c == '-' || c == '@'; });
+}
+
+}  // namespace
+
+Result<std::string> read_or_make_token(const std::filesystem::path& file) {
+  const Descriptor in{::open(file.c_str(), O_RDONLY | O_CLOEXEC)};
+  if (in.fd >= 0) return read_token(in, file);
+  if (errno != ENOENT)
+    return fail(Errc::failed_precondition, fmt::format("cannot open '{}': {}", file.string(), why()));
+  return make_token(file);
+}
+
+Result<std::string> random_token() {
+  Digest random;
+  if (RAND_bytes(random.bytes.data(), static_cast<int>(random.bytes.size())) != 1)
+    return fail(Errc::internal, "the system's random numbers failed");
+  return random.hex();
+}
+
+TokenRegistry::FileState TokenRegistry::file_state(const std::filesystem::path& file) {
+  struct stat info {};
+  if (::stat(file.c_str(), &info) != 0) return {};
+  return {static_cast<std::uint64_t>(info.st_ino), static_cast<std::uint64_t>(info.st_size),
+          std::int64_t{info.st_mtim.tv_sec} * 1'000'000'000 + info.st_mtim.tv_nsec};
+}
+
+FolderLock::FolderLock(const std::filesystem::path& folder)
+    : file_(folder.empty() ? -1
+                           : ::open((folder / "secrets.lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600)) {
+  while (file_.fd >= 0 && ::flock(file_.fd, LOCK_EX) != 0 && errno == EINTR) continue;
+}
+
+std::string_view to_string(Role role) { return kRoles[static_cast<std::size_t>(role)]; }
+
+std::optional<Role> parse_role(std::string_view name) {
+  const auto found = std::find(kRoles.begin(), kRoles.end(), name);
+  return found == kRoles.end() ? std::nullopt : std::optional(static_cast<Role>(found - kRoles.begin()));
 }
 
 TokenRegistry::TokenRegistry(std::string admin_token, std::string join_token)
@@ -135,7 +226,7 @@ void TokenRegistry::Tokens::put(Role role, std::string user, const Digest& diges
 
 Guarded<TokenRegistry::Tokens>::Lock TokenRegistry::latest() const {
   auto tokens = tokens_.lock();
-  (void)tokens->look_again();  // until the file is right again, the tokens are those of before
+  (void)tokens->look_again();  // if the file is invalid, the tokens stay as they were
   return tokens;
 }
 
@@ -171,7 +262,7 @@ Result<TokenRegistry::Made> TokenRegistry::add(Role role, std::string user) {
   if (!token) return tl::unexpected(token.error());
   const auto tokens = tokens_.lock();
   const FolderLock others(tokens->file.parent_path());
-  // save() replaces the file, so nothing in it may be unread.
+  // save() overwrites the file, so changes by other coordinators must be read first.
   if (auto read = tokens->look_again(); !read) return tl::unexpected(read.error());
   if (tokens->entries.size() >= kMaxTokens)
     return fail(Errc::resource_exhausted, fmt::format("there are {} tokens already", tokens->entries.size()));
@@ -186,7 +277,7 @@ Result<TokenRegistry::Made> TokenRegistry::add(Role role, std::string user) {
 Result<void> TokenRegistry::revoke(std::string_view id) {
   const auto tokens = tokens_.lock();
   const FolderLock others(tokens->file.parent_path());
-  // save() replaces the file, so nothing in it may be unread.
+  // save() overwrites the file, so changes by other coordinators must be read first.
   if (auto read = tokens->look_again(); !read) return tl::unexpected(read.error());
   auto& entries = tokens->entries;
   const auto found =

@@ -5,6 +5,7 @@
 // rereads DATA/tokens if that file has changed.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -14,16 +15,32 @@
 #include "common/base/digest.h"
 #include "common/base/error.h"
 #include "common/base/guarded.h"
-#include "coordinator/http/auth/token_file.h"
+#include "common/base/helper_program.h"
 #include "coordinator/http/message/message.h"
 
 namespace ls::http {
 
+// Returns the secret (a token, or the key that signs webhooks) in `file`; creates the file (mode 0600) with a
+// new secret if it does not exist. Rejects a file that others may read, or with fewer than 16 characters. The
+// caller must hold the data folder's lock, so that two starts do not race.
+Result<std::string> read_or_make_token(const std::filesystem::path& file);
+
+// Returns 256 random bits in hexadecimal.
+Result<std::string> random_token();
+
+// Holds a lock on a folder while the object lives, so that other processes do not change the folder's secrets
+// meanwhile. The constructor blocks until it has the lock. If the folder is read-only, so that no lock file
+// can be created, no lock is needed or held. An empty path locks nothing.
+class FolderLock {
+ public:
+  explicit FolderLock(const std::filesystem::path& folder);
+
+ private:
+  Descriptor file_;
+};
+
 inline constexpr std::size_t kMaxTokens = 1000;
 inline constexpr std::size_t kMaxUserName = 64;
-
-// True for 1 to kMaxUserName characters a-z A-Z 0-9 . _ - @, beginning with a letter or digit.
-bool plausible_user(std::string_view name);
 
 struct TokenInfo {
   std::string id;  // the first 16 hex digits of its SHA-256
@@ -39,8 +56,8 @@ class TokenRegistry {
   // Makes a registry without files. If `join_token` is empty, no token lets a worker join.
   explicit TokenRegistry(std::string admin_token, std::string join_token = {});
   // Reads the folder's files; creates `token` and `join-token` if they are missing. failed_precondition:
-  // others may write `tokens`, or read or write one of the other two; or a line of `tokens` is invalid, and
-  // the message has its number.
+  // other users may write `tokens`, or may read or write one of the other two; or a line of `tokens` is
+  // invalid, and the message has its number.
   static Result<std::unique_ptr<TokenRegistry>> open(const std::filesystem::path& folder);
 
   // Returns the caller with this token; nullopt: the token is wrong. The search takes equally long in both
@@ -70,11 +87,19 @@ class TokenRegistry {
     TokenInfo info;
     Digest digest;
   };
+  // Identifies a version of a file: if two states differ, the file was replaced or written in between. All
+  // zero: there is no file.
+  struct FileState {
+    std::uint64_t inode = 0, size = 0;
+    std::int64_t changed_ns = 0;
+    bool operator==(const FileState&) const = default;
+  };
+  static FileState file_state(const std::filesystem::path& file);
   // The tokens of the files, as last read.
   struct Tokens {
     void put(Role role, std::string user, const Digest& digest, bool of_file);
-    // Rereads the file if it has changed, or could not be read the last time. Error: it cannot be read, or
-    // has a wrong line. Then `entries` stays as it is, and the error is logged once.
+    // Rereads the file if it has changed or could not be read the last time. On an error (the file cannot be
+    // read, or has an invalid line) `entries` stays as it is, and the error is logged once.
     Result<void> look_again();
     Result<void> read_all();
     Result<void> read_line(std::string_view line);

@@ -86,10 +86,6 @@ struct Source {
   }
 };
 
-struct FreeArchive {
-  void operator()(archive* a) const { archive_read_free(a); }
-};
-
 ArchiveEntry::Kind kind_of(archive_entry* e) {
   if (archive_entry_hardlink(e) || archive_entry_symlink(e)) return ArchiveEntry::Kind::link;
   switch (archive_entry_filetype(e)) {
@@ -109,8 +105,8 @@ ArchiveEntry::Kind kind_of(archive_entry* e) {
 struct ArchiveReader::State {
   Source source;
   ArchiveKind kind = ArchiveKind::zip;
-  std::unique_ptr<archive, FreeArchive> reader;
-  // offset, in the unpacked tar, of the end of the current entry's data
+  std::unique_ptr<archive, decltype([](archive* a) { archive_read_free(a); })> reader;
+  // end of the current entry's data, in bytes of the unpacked tar
   std::int64_t data_end = 0;
 
   Error error(std::string_view doing) const;

@@ -6,45 +6,46 @@
 #include <algorithm>
 
 #include "coordinator/http/message/limits.h"
+#include "coordinator/http/message/message.h"
 
 namespace ls::http {
+namespace {
+using nlohmann::json;
+}
 
-Result<nlohmann::json> read_object(std::string_view body, std::initializer_list<std::string_view> known) {
-  using nlohmann::json;
-  json object;
+Result<json> parse_json(std::string_view text, std::string_view what) {
+  json value;
   bool too_deep = false;
   const auto watch = [&](int depth, json::parse_event_t, const json&) {
-    too_deep |= depth > kMaxJsonDepth;
-    return !too_deep;
+    return !(too_deep |= depth > kMaxJsonDepth);
   };
   try {
-    object = json::parse(body, watch);
+    value = json::parse(text, watch);
   } catch (const json::exception& e) {
-    return fail(Errc::invalid_argument, fmt::format("the body is not JSON: {}", e.what()));
+    return bad_argument(fmt::format("{} is not JSON: {}", what, e.what()));
   }
-  if (too_deep)
-    return fail(Errc::invalid_argument,
-                fmt::format("the body is nested deeper than {} levels", kMaxJsonDepth));
-  if (!object.is_object()) return fail(Errc::invalid_argument, "the body must be a JSON object");
-  for (const auto& item : object.items())
+  if (too_deep) return bad_argument(fmt::format("{} is nested deeper than {} levels", what, kMaxJsonDepth));
+  return value;
+}
+
+Result<json> read_object(std::string_view body, std::initializer_list<std::string_view> known) {
+  auto object = parse_json(body, "the body");
+  if (!object) return object;
+  if (!object->is_object()) return bad_argument("the body must be a JSON object");
+  for (const auto& item : object->items())
     if (std::find(known.begin(), known.end(), item.key()) == known.end())
-      return fail(Errc::invalid_argument, fmt::format("unknown key '{}' in the body; known: {}",
-                                                      item.key().substr(0, 100), fmt::join(known, ", ")));
+      return bad_argument(fmt::format("unknown key '{}' in the body; known: {}", item.key().substr(0, 100),
+                                      fmt::join(known, ", ")));
   return object;
 }
 
 Result<Digest> read_digest(std::string_view text, std::string_view what) {
-  std::string lower(text.substr(0, 65));
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](char c) { return c >= 'A' && c <= 'F' ? static_cast<char>(c + 32) : c; });
-  if (const auto digest = Digest::parse(lower)) return *digest;
-  return fail(Errc::invalid_argument, fmt::format("{} must be a SHA-256 of 64 hexadecimal digits", what));
+  if (const auto digest = Digest::parse(lower_case(text.substr(0, 65)))) return *digest;
+  return bad_argument(fmt::format("{} must be a SHA-256 of 64 hexadecimal digits", what));
 }
 
-Result<Digest> read_digest(const nlohmann::json& value, std::string_view what) {
-  if (!value.is_string())
-    return fail(Errc::invalid_argument, fmt::format("{} must be a SHA-256 of 64 hexadecimal digits", what));
-  return read_digest(std::string_view(value.get_ref<const std::string&>()), what);
+Result<Digest> read_digest(const json& value, std::string_view what) {
+  return read_digest(std::string_view(value.is_string() ? value.get_ref<const std::string&>() : ""), what);
 }
 
 std::string write_json(const nlohmann::ordered_json& json) {

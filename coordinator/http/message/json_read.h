@@ -10,6 +10,9 @@
 
 namespace ls::http {
 
+// Parses JSON of at most kMaxJsonDepth levels; `what` names the text in the error.
+Result<nlohmann::json> parse_json(std::string_view text, std::string_view what);
+
 // Parses the body as a JSON object that may have only the keys in `known`. The error explains what is wrong.
 Result<nlohmann::json> read_object(std::string_view body, std::initializer_list<std::string_view> known);
 

@@ -9,7 +9,7 @@
 
 namespace ls::http {
 
-// Greatest body, per route
+// Greatest body of each route
 inline constexpr std::uint64_t kMaxJobJson = 4u << 20;  // POST /jobs with application/json: names and digests
 inline constexpr std::uint64_t kMaxDigestList = 8u << 20;    // POST /blobs/missing
 inline constexpr std::uint64_t kMaxControlJson = 64u << 10;  // PATCH /jobs/ID and other short JSON
@@ -33,7 +33,7 @@ inline constexpr std::uint64_t kBundleSlack = 64u << 20;
 
 // Buffers
 inline constexpr std::size_t kReadBuffer = 64u << 10;  // per connection
-// Bytes of a request's body written to the disk at once
+// Bytes of a request's body that are passed to the disk at once
 inline constexpr std::size_t kBodyChunk = 256u << 10;
 // Bytes written to a client between two checks of its deadline
 inline constexpr std::size_t kWriteSlice = 256u << 10;

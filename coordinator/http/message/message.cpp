@@ -12,6 +12,7 @@
 #include <cstring>
 #include <ctime>
 #include <iterator>
+#include <nlohmann/json.hpp>
 
 #include "common/base/overloaded.h"
 #include "common/base/percent_code.h"
@@ -20,29 +21,32 @@
 namespace ls::http {
 namespace {
 
-struct MethodName {
-  Method method;
-  std::string_view name;
-};
-constexpr std::array kMethods = {
-    MethodName{Method::get, "GET"},         MethodName{Method::head, "HEAD"},
-    MethodName{Method::post, "POST"},       MethodName{Method::put, "PUT"},
-    MethodName{Method::patch, "PATCH"},     MethodName{Method::del, "DELETE"},
-    MethodName{Method::options, "OPTIONS"},
-};
+// By Method
+constexpr std::array<std::string_view, 7> kMethods = {"GET",   "HEAD",   "POST",   "PUT",
+                                                      "PATCH", "DELETE", "OPTIONS"};
 
 }  // namespace
 
-std::string_view to_string(Method method) {
-  for (const auto& m : kMethods)
-    if (m.method == method) return m.name;
-  return "GET";
-}
+std::string_view to_string(Method method) { return kMethods[static_cast<std::size_t>(method)]; }
 
 std::optional<Method> parse_method(std::string_view name) {
-  for (const auto& m : kMethods)
-    if (m.name == name) return m.method;
-  return std::nullopt;
+  const auto found = std::find(kMethods.begin(), kMethods.end(), name);
+  return found == kMethods.end() ? std::nullopt
+                                 : std::optional(static_cast<Method>(found - kMethods.begin()));
+}
+
+std::string lower_case(std::string_view text) {
+  std::string out(text);
+  std::transform(out.begin(), out.end(), out.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  return out;
+}
+
+std::string_view take_part(std::string_view& rest, char separator) {
+  const std::size_t end = rest.find(separator);
+  const std::string_view part = rest.substr(0, end);
+  rest = end == std::string_view::npos ? std::string_view{} : rest.substr(end + 1);
+  return part;
 }
 
 std::string_view Request::header(std::string_view lower_case_name) const {
@@ -87,32 +91,82 @@ std::string_view reason_phrase(int status) {
       boost::beast::http::int_to_status(static_cast<unsigned>(status)));
 }
 
+namespace {
+
+constexpr std::pair<Errc, int> kStatus[] = {
+    {Errc::invalid_argument, 400},    {Errc::not_found, 404},          {Errc::already_exists, 409},
+    {Errc::failed_precondition, 409}, {Errc::resource_exhausted, 507}, {Errc::permission_denied, 403},
+    {Errc::unauthenticated, 401},     {Errc::unavailable, 503},        {Errc::internal, 500}};
+
+Response problem_of(int status, const nlohmann::ordered_json& json, Fields headers = {}) {
+  // Texts may quote bytes of a scene. Invalid UTF-8 is replaced, so that dump() never throws.
+  Response response =
+      text_response(status, "application/problem+json",
+                    json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  response.headers = std::move(headers);
+  if (status == 401) response.headers.emplace_back("WWW-Authenticate", "Bearer realm=\"lightshaft\"");
+  if (status == 503) response.headers.emplace_back("Retry-After", "2");
+  return response;
+}
+
+nlohmann::ordered_json base(int status, std::string_view type, std::string_view detail) {
+  return {{"type", type}, {"title", reason_phrase(status)}, {"status", status}, {"detail", detail}};
+}
+
+}  // namespace
+
+int status_of(Errc code) {
+  for (const auto& [known, status] : kStatus)
+    if (known == code) return status;
+  return 500;
+}
+
+Response problem(int status, std::string_view detail, Fields headers) {
+  return problem_of(status, base(status, "about:blank", detail), std::move(headers));
+}
+
+Response too_many(int wait_seconds, std::string_view detail) {
+  return problem(429, detail, {{"Retry-After", std::to_string(wait_seconds)}});
+}
+
+Response problem(const Error& error) { return problem(status_of(error.code), error.message); }
+
+Response problem(const Error& error, std::span<const Diagnostic> diagnostics) {
+  if (diagnostics.empty()) return problem(error);
+  const int status = status_of(error.code);
+  auto json = base(status, "urn:lightshaft:problem:scene-rejected", error.message);
+  auto& list = json["diagnostics"] = nlohmann::ordered_json::array();
+  for (const auto& d : diagnostics)
+    list.push_back({{"severity", d.severity == Diagnostic::Severity::error ? "error" : "warning"},
+                    {"file", d.place.file},
+                    {"line", d.place.line},
+                    {"column", d.place.column},
+                    {"text", d.text},
+                    {"source_line", d.source_line},
+                    {"length", d.length}});
+  return problem_of(status, json);
+}
+
 std::string media_type(std::string_view content_type) {
-  std::string type(content_type.substr(0, content_type.find(';')));
+  std::string type = lower_case(content_type.substr(0, content_type.find(';')));
   while (!type.empty() && (type.back() == ' ' || type.back() == '\t')) type.pop_back();
-  std::transform(type.begin(), type.end(), type.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
   return type;
 }
 
 Result<FileBody> open_file_body(const std::filesystem::path& path) {
-  const int opened = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (opened < 0)
+  auto file = std::make_shared<const Descriptor>(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file->fd < 0)
     return fail(errno == ENOENT ? Errc::not_found : Errc::unavailable,
                 fmt::format("cannot open {}: {}", path.string(), std::strerror(errno)));
-  const std::shared_ptr<const int> fd(new int(opened), [](const int* owned) {
-    ::close(*owned);
-    delete owned;
-  });
   struct stat info {};
-  if (::fstat(*fd, &info) != 0)
+  if (::fstat(file->fd, &info) != 0)
     return fail(Errc::unavailable, fmt::format("cannot look at {}: {}", path.string(), std::strerror(errno)));
-  return FileBody{fd, static_cast<std::uint64_t>(info.st_size)};
+  return FileBody{std::move(file), static_cast<std::uint64_t>(info.st_size)};
 }
 
 std::size_t read_slice(const FileBody& file, std::uint64_t offset, std::span<std::byte> into) {
   ssize_t n = -1;
-  do n = ::pread(*file.fd, into.data(), into.size(), static_cast<off_t>(offset));
+  do n = ::pread(file.opened->fd, into.data(), into.size(), static_cast<off_t>(offset));
   while (n < 0 && errno == EINTR);
   return n < 0 ? 0 : static_cast<std::size_t>(n);
 }
@@ -120,9 +174,8 @@ std::size_t read_slice(const FileBody& file, std::uint64_t offset, std::span<std
 namespace {
 
 bool has(const Response& response, std::string_view name) {
-  for (const auto& field : response.headers)
-    if (field.first == name) return true;
-  return false;
+  return std::any_of(response.headers.begin(), response.headers.end(),
+                     [&](const auto& field) { return field.first == name; });
 }
 
 }  // namespace
@@ -135,8 +188,8 @@ std::string head_text(const Response& response, const HeadOptions& options, std:
   field("Date", fmt::format("{:%a, %d %b %Y %H:%M:%S} GMT", fmt::gmtime(std::time_t{unix_seconds})));
   if (!response.content_type.empty()) field("Content-Type", response.content_type);
   const bool bodyless = response.status == 204 || response.status == 304;
-  // The answer to HEAD gives the length of the answer to GET. If a handler answers HEAD without a body and
-  // content type, the length is unknown.
+  // The answer to HEAD gives the length of the answer to GET. A handler that answers HEAD itself sets no
+  // content type, and the length is unknown.
   const bool unknown = options.streamed || (options.method == Method::head && response.content_type.empty());
   if (!bodyless && !unknown) field("Content-Length", fmt::format("{}", response.length()));
   for (const auto& [name, value] : response.headers) field(name, value);
@@ -159,14 +212,6 @@ Result<std::string> decode(std::string_view text, bool plus_is_space) {
   auto plain = percent_decode(coded);
   if (!plain) return fail(Errc::invalid_argument, "the request target has a broken percent code");
   return std::move(*plain);
-}
-
-// Removes and returns the part of `rest` up to `separator`.
-std::string_view take_part(std::string_view& rest, char separator) {
-  const std::size_t end = rest.find(separator);
-  const std::string_view part = rest.substr(0, end);
-  rest = end == std::string_view::npos ? std::string_view{} : rest.substr(end + 1);
-  return part;
 }
 
 Result<std::vector<std::string>> parse_path(std::string_view path) {

@@ -14,6 +14,8 @@
 #include <vector>
 
 #include "common/base/error.h"
+#include "common/base/helper_program.h"
+#include "common/scene/diagnostic.h"
 
 namespace ls::http {
 
@@ -42,8 +44,8 @@ struct Caller {
 // A response body that is read from a file. It is sent slice by slice, so that it does not fill memory while
 // a slow client reads it.
 struct FileBody {
-  // The descriptor is closed with the last copy of the FileBody; the file is readable even after its removal.
-  std::shared_ptr<const int> fd;
+  // Closed with the last copy of the FileBody; the file is readable even after its removal
+  std::shared_ptr<const Descriptor> opened;
   std::uint64_t size = 0;  // bytes
 };
 
@@ -58,6 +60,11 @@ std::string_view to_string(Method method);                  // returns "GET", ..
 std::optional<Method> parse_method(std::string_view name);  // case-sensitive, as in RFC 9110
 
 using Fields = std::vector<std::pair<std::string, std::string>>;
+
+// Returns the text with the letters A to Z in lower case.
+std::string lower_case(std::string_view text);
+// Removes the text up to `separator`, and the separator, from `rest`, and returns that text.
+std::string_view take_part(std::string_view& rest, char separator);
 
 struct Request {
   Method method = Method::get;
@@ -101,6 +108,19 @@ Response text_response(int status, std::string content_type, std::string body);
 Response json_response(int status, std::string json);
 
 std::string_view reason_phrase(int status);
+
+// Errors as RFC 9457 problem details. This is the only mapping from Errc to HTTP status.
+int status_of(Errc code);
+
+// Makes a response {type, title, status, detail} with these headers; `detail` contains the cause, the place
+// and the remedy.
+Response problem(int status, std::string_view detail, Fields headers = {});
+Response problem(const Error& error);
+// Returns a 429 with the header Retry-After: `wait_seconds`.
+Response too_many(int wait_seconds, std::string_view detail);
+// Returns the problem of a rejected scene. It has an additional member diagnostics: [{severity, file, line,
+// column, text, source_line, length}].
+Response problem(const Error& error, std::span<const Diagnostic> diagnostics);
 
 // Returns the media type in lower case without parameters: "application/json" for "Application/JSON;
 // charset=utf-8".

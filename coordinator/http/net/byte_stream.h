@@ -25,7 +25,7 @@ using boost::system::error_code;
 // For co_await: the operation reports failure in `ec` and does not throw.
 inline auto awaiting(error_code& ec) { return net::redirect_error(net::use_awaitable, ec); }
 
-// Used by the network thread only. One read and one write may be in progress at a time.
+// Used by the network thread only; at most one read and one write may be in progress.
 class Stream {
  public:
   Stream(Tcp::socket socket, std::shared_ptr<const TlsIdentity> identity);  // null: no TLS

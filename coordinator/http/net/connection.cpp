@@ -13,7 +13,6 @@
 
 #include "common/base/log.h"
 #include "coordinator/http/message/message.h"
-#include "coordinator/http/message/problem.h"
 
 namespace ls::http {
 
@@ -162,7 +161,8 @@ void Connection::watch(SteadyClock::time_point until) {
     if (ec || alive.expired() || SteadyClock::now() < deadline_) return;
     timed_out_ = true;
     stream_.cancel();
-    // Cancels again later: an operation of Beast that has just finished one read may start another.
+    // Cancels again later: Beast's operations consist of several reads, and may start another one after the
+    // cancellation.
     watch(SteadyClock::now() + std::chrono::milliseconds(100));
   });
 }
@@ -252,8 +252,8 @@ net::awaitable<Connection::Body> Connection::read_into(Parser& parser, BodySink&
     const Read read = co_await read_portion(parser, began, received);
     if (read == Read::ok && (chunk.size() == 0 || (chunk.size() < kBodyChunk && !parser.is_done()))) continue;
     disarm();
-    // If the read has failed, the rest of the body will not arrive. The sink still gets the bytes that have
-    // arrived, so that an upload in parts makes progress even if no connection lasts for a whole chunk.
+    // If the read has failed, the rest of the body will not arrive. The bytes that have arrived still go to
+    // the sink, so that an upload in parts makes progress even if every connection breaks within a chunk.
     const auto paused = SteadyClock::now();
     std::optional<Response> refused;
     if (chunk.size() > 0) refused = co_await run_on(shared_.slow, shared_.io, append);

@@ -80,9 +80,8 @@ class Connection {
   void cut();  // closes the connection immediately
 
  private:
-  // The result of reading a body. If `answer` is set, it is the response to the request: the body was
-  // rejected, and the client may still be sending the rest; or it was streamed into a sink, which has
-  // processed all of it.
+  // The result of reading a body. `answer` is the response to the request if it is known already: the body
+  // was rejected (the client may still be sending the rest), or the sink has processed all of it.
   struct Body {
     Read read = Read::ok;
     std::optional<Response> answer;

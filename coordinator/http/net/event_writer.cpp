@@ -7,14 +7,13 @@
 
 #include "coordinator/http/auth/auth.h"
 #include "coordinator/http/message/message.h"
-#include "coordinator/http/message/problem.h"
 #include "coordinator/http/net/connection.h"
 
 namespace ls::http {
 namespace {
 
-// Ends the bookkeeping of an event stream in its destructor, however the stream ends, even if the server is
-// destroyed while the stream waits.
+// Ends the bookkeeping of an event stream in its destructor, which also runs if the server is destroyed while
+// the stream waits.
 struct Undo {
   Shared& shared;
   net::steady_timer*& events_wait;
@@ -29,7 +28,7 @@ struct Undo {
 
 struct Start {
   std::uint64_t after = 0;
-  // true: this coordinator never published the event id in the request; the id comes from another data folder
+  // true: the id in the request is higher than any event's here, so it comes from another data folder
   bool reset = false;
 };
 

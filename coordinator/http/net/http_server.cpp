@@ -11,7 +11,6 @@
 
 #include "common/base/log.h"
 #include "common/base/parse_number.h"
-#include "coordinator/http/message/problem.h"
 #include "coordinator/http/net/connection.h"
 
 namespace ls::http {
@@ -185,10 +184,7 @@ void Server::stop() {
   s.shared->api.ask_to_stop();
   s.io.stop();
   s.thread.join();
-  s.quick->join();
-  s.slow->join();
-  s.bundles->join();
-  s.remote->join();
+  for (const auto* pool : {&s.quick, &s.slow, &s.bundles, &s.remote}) (*pool)->join();
   state_.reset();  // destroys the frames of closed connections, which use the api
 }
 

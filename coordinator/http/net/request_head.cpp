@@ -2,11 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <optional>
 
 #include "coordinator/http/message/message.h"
-#include "coordinator/http/message/problem.h"
 
 namespace ls::http {
 namespace {
@@ -14,13 +12,6 @@ namespace {
 namespace bhttp = beast::http;
 using boost::system::error_code;
 using Header = bhttp::request_header<bhttp::fields>;
-
-std::string lower_case(std::string_view text) {
-  std::string out(text);
-  std::transform(out.begin(), out.end(), out.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  return out;
-}
 
 // Headers that a request may have only once: if there were two, a proxy could use one and this server the
 // other.

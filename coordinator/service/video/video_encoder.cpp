@@ -56,47 +56,40 @@ Result<std::string> find_ffmpeg() {
 
 Result<std::unique_ptr<VideoEncoder>> VideoEncoder::start(const Asked& asked, const Clock& clock,
                                                           std::stop_token stop) {
-  std::array<int, 2> pixels{}, errors{};
-  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pixels.data()) != 0)
+  std::array<int, 2> ends{};
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0)
     return fail(Errc::internal, fmt::format("cannot make a socket for ffmpeg: {}", std::strerror(errno)));
-  if (::pipe2(errors.data(), O_CLOEXEC) != 0) {
-    const int error = errno;
-    for (const int fd : pixels) ::close(fd);
-    return fail(Errc::internal, fmt::format("cannot make a pipe for ffmpeg: {}", std::strerror(error)));
-  }
+  File pixels(ends[0]);
+  const File its_input(ends[1]);
+  if (::pipe2(ends.data(), O_CLOEXEC) != 0)
+    return fail(Errc::internal, fmt::format("cannot make a pipe for ffmpeg: {}", std::strerror(errno)));
+  File errors(ends[0]);
+  const File its_errors(ends[1]);
   const auto program =
-      spawn({asked.ffmpeg, command(asked), {pixels[1], kDevNull, errors[1]}, inherits, true});
-  ::close(pixels[1]);
-  ::close(errors[1]);
-  if (!program) {
-    ::close(pixels[0]);
-    ::close(errors[0]);
-    return tl::unexpected(program.error());
-  }
-  for (const int fd : {pixels[0], errors[0]}) ::fcntl(fd, F_SETFL, O_NONBLOCK);
+      spawn({asked.ffmpeg, command(asked), {its_input.fd(), kDevNull, its_errors.fd()}, inherits, true});
+  if (!program) return tl::unexpected(program.error());
+  for (const File* file : {&pixels, &errors}) ::fcntl(file->fd(), F_SETFL, O_NONBLOCK);
   return std::unique_ptr<VideoEncoder>(
-      new VideoEncoder(asked, clock, std::move(stop), pixels[0], errors[0], *program));
+      new VideoEncoder(asked, clock, std::move(stop), std::move(pixels), std::move(errors), *program));
 }
 
-VideoEncoder::VideoEncoder(Asked asked, const Clock& clock, std::stop_token stop, int pixels, int errors,
+VideoEncoder::VideoEncoder(Asked asked, const Clock& clock, std::stop_token stop, File pixels, File errors,
                            pid_t program)
     : asked_(std::move(asked)),
       clock_(clock),
       stop_(std::move(stop)),
-      pixels_(pixels),
-      errors_(errors),
+      pixels_(std::move(pixels)),
+      errors_(std::move(errors)),
       program_(program) {}
 
 VideoEncoder::~VideoEncoder() {
   if (program_) ::kill(*program_, SIGKILL);
   end();
-  ::close(errors_);
 }
 
 // Closes the socket and waits for the program's end.
 int VideoEncoder::end() {
-  if (pixels_ >= 0) ::close(pixels_);
-  pixels_ = -1;
+  pixels_ = File();
   const int status = program_ ? wait_for_end(*program_) : 0;
   program_.reset();
   return status;
@@ -105,7 +98,7 @@ int VideoEncoder::end() {
 void VideoEncoder::hear() {
   std::array<char, 1024> bytes;
   ssize_t got = 0;
-  while ((got = ::read(errors_, bytes.data(), bytes.size())) > 0)
+  while ((got = ::read(errors_.fd(), bytes.data(), bytes.size())) > 0)
     reported_.append(bytes.data(), std::min(static_cast<std::size_t>(got),
                                             kMostReported - std::min(kMostReported, reported_.size())));
 }
@@ -123,7 +116,7 @@ Result<void> VideoEncoder::wait_for(int fd, short events) {
                   until == asked_.until
                       ? "the time for one video is up: ask for fewer frames or a smaller size"
                       : "ffmpeg does not go on; it was killed");
-    std::array<pollfd, 2> watched = {pollfd{errors_, POLLIN, 0}, pollfd{fd, events, 0}};
+    std::array<pollfd, 2> watched = {pollfd{errors_.fd(), POLLIN, 0}, pollfd{fd, events, 0}};
     const int ready = ::poll(watched.data(), 2, static_cast<int>(std::min<std::int64_t>(left, 60'000)));
     if (ready < 0 && errno != EINTR)
       return fail(Errc::internal, fmt::format("waiting for ffmpeg: {}", std::strerror(errno)));
@@ -146,14 +139,14 @@ Error VideoEncoder::ended() {
 
 Result<void> VideoEncoder::add(std::span<const std::uint8_t> rgb) {
   while (!rgb.empty()) {
-    const ssize_t sent = ::send(pixels_, rgb.data(), rgb.size(), MSG_NOSIGNAL);
+    const ssize_t sent = ::send(pixels_.fd(), rgb.data(), rgb.size(), MSG_NOSIGNAL);
     if (sent > 0) {
       rgb = rgb.subspan(static_cast<std::size_t>(sent));
     } else if (errno == EPIPE || errno == ECONNRESET) {
       return tl::unexpected(ended());
     } else if (errno != EAGAIN && errno != EINTR) {
       return fail(Errc::internal, fmt::format("sending pixels to ffmpeg: {}", std::strerror(errno)));
-    } else if (auto ready = wait_for(pixels_, POLLOUT); !ready) {
+    } else if (auto ready = wait_for(pixels_.fd(), POLLOUT); !ready) {
       return ready;
     }
   }
@@ -161,9 +154,9 @@ Result<void> VideoEncoder::add(std::span<const std::uint8_t> rgb) {
 }
 
 Result<void> VideoEncoder::finish() {
-  ::shutdown(pixels_, SHUT_WR);
+  ::shutdown(pixels_.fd(), SHUT_WR);
   // At its end the program closes its standard error
-  if (auto closed = wait_for(errors_, POLLHUP); !closed) return closed;
+  if (auto closed = wait_for(errors_.fd(), POLLHUP); !closed) return closed;
   hear();
   const int status = end();
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};

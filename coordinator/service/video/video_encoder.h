@@ -16,6 +16,7 @@
 #include "common/base/clock.h"
 #include "common/base/error.h"
 #include "common/image/frame/frame.h"
+#include "coordinator/store/files.h"
 
 namespace ls::coordinator {
 
@@ -45,7 +46,8 @@ class VideoEncoder {
   Result<void> finish();
 
  private:
-  VideoEncoder(Asked asked, const Clock& clock, std::stop_token stop, int pixels, int errors, pid_t program);
+  VideoEncoder(Asked asked, const Clock& clock, std::stop_token stop, File pixels, File errors,
+               pid_t program);
   Result<void> wait_for(int fd, short events);
   void hear();  // reads the program's messages
   Error ended();
@@ -54,7 +56,8 @@ class VideoEncoder {
   const Asked asked_;
   const Clock& clock_;
   const std::stop_token stop_;
-  int pixels_, errors_;
+  File pixels_;  // our end of the socket; closed by end()
+  const File errors_;
   std::optional<pid_t> program_;
   std::string reported_;
 };

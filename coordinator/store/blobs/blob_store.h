@@ -19,16 +19,24 @@ class BlobStore {
  public:
   virtual ~BlobStore() = default;
   virtual bool has(const Digest& digest) const = 0;
-  // Like has(), but returns an error if it is unknown at the moment whether the store has the blob.
+  // Like has(), but returns an error if the store cannot be asked now.
   virtual Result<bool> find(const Digest& digest) const { return has(digest); }
   // Returns those of the digests whose blobs the store lacks, in the given order. A remote store needs fewer
   // requests for this than for a find() of each. Errors as of find().
-  virtual Result<std::vector<Digest>> missing(std::span<const Digest> digests) const;
+  virtual Result<std::vector<Digest>> missing(std::span<const Digest> digests) const {
+    std::vector<Digest> lacking;
+    for (const Digest& digest : digests) {
+      const auto there = find(digest);
+      if (!there) return tl::unexpected(there.error());
+      if (!*there) lacking.push_back(digest);
+    }
+    return lacking;
+  }
   // Returns an error if the storage (a disk or another machine) is unavailable. Sends it one request, which
   // may take seconds.
   virtual Result<void> answers() const { return {}; }
-  // Verifies that the blob exists and that its bytes have its digest. The blob is read for this only once per
-  // process, and again if its file has changed since or if `again` is set (for callers whose reader received
+  // Verifies that the blob exists and that its bytes match its digest. Each process reads the blob for this
+  // only once; it reads it again if the file has changed since, or if `again` is set (because a reader got
   // wrong bytes). not_found: there is no such blob. failed_precondition: the blob is damaged; it has been
   // moved aside and counts as missing.
   virtual Result<void> prove(const Digest& digest, [[maybe_unused]] bool again = false) const {
@@ -54,9 +62,9 @@ class BlobStore {
   // Returns the number of bytes that the store has of an incomplete blob.
   virtual std::uint64_t received(const Digest&) const { return 0; }
   // Continues an incomplete blob after its first `offset` bytes. failed_precondition: `offset` is not
-  // received(). Appended bytes are kept if the Upload is destroyed before finish(), even over restarts. From
-  // now on bytes from an earlier Upload of the same blob are rejected: the client has reconnected, so the
-  // earlier connection must have broken, even if that has not been noticed yet.
+  // received(). Appended bytes are kept if the Upload is destroyed before finish(), even over restarts. Bytes
+  // from an earlier Upload of the same blob are rejected from now on: the client has reconnected, so its
+  // earlier connection is dead, even if the server has not noticed it yet.
   virtual Result<std::unique_ptr<Upload>> resume_upload(const Digest&, std::uint64_t) {
     return fail(Errc::unavailable, "this store takes no uploads in parts");
   }
@@ -68,8 +76,5 @@ class BlobStore {
   virtual Result<void> remove(const Digest&) { return {}; }
   virtual void remove_unfinished(const Digest&) {}
 };
-
-// Checks the value of --blobs: a folder, or an s3:// address with keys in the environment.
-Result<void> check_blobs(const std::string& where);
 
 }  // namespace ls::coordinator

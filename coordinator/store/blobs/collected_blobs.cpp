@@ -7,49 +7,11 @@ namespace {
 constexpr Duration kKeepUnfinished = std::chrono::hours(24);
 }
 
-void CollectedBlobs::asked_for(const Digest& digest) const {
+BlobStore& CollectedBlobs::asked_for(const Digest& digest) const {
   std::unique_lock lock(mutex_);
   gone_.wait(lock, [&] { return !going_.contains(digest); });
   idle_.erase(digest);
-}
-
-bool CollectedBlobs::has(const Digest& digest) const {
-  asked_for(digest);
-  return inner_->has(digest);
-}
-Result<bool> CollectedBlobs::find(const Digest& digest) const {
-  asked_for(digest);
-  return inner_->find(digest);
-}
-Result<std::vector<Digest>> CollectedBlobs::missing(std::span<const Digest> digests) const {
-  for (const Digest& digest : digests) asked_for(digest);
-  return inner_->missing(digests);
-}
-Result<void> CollectedBlobs::prove(const Digest& digest, bool again) const {
-  asked_for(digest);
-  return inner_->prove(digest, again);
-}
-Result<std::uint64_t> CollectedBlobs::size(const Digest& digest) const {
-  asked_for(digest);
-  return inner_->size(digest);
-}
-Result<std::vector<std::byte>> CollectedBlobs::read(const Digest& digest, std::uint64_t offset,
-                                                    std::uint64_t length) const {
-  asked_for(digest);
-  return inner_->read(digest, offset, length);
-}
-Result<void> CollectedBlobs::put(const Digest& digest, std::span<const std::byte> bytes) {
-  asked_for(digest);
-  return inner_->put(digest, bytes);
-}
-Result<std::unique_ptr<BlobStore::Upload>> CollectedBlobs::begin_upload(const Digest& digest) {
-  asked_for(digest);
-  return inner_->begin_upload(digest);
-}
-Result<std::unique_ptr<BlobStore::Upload>> CollectedBlobs::resume_upload(const Digest& digest,
-                                                                         std::uint64_t offset) {
-  asked_for(digest);
-  return inner_->resume_upload(digest, offset);
+  return *inner_;
 }
 
 Result<CollectedBlobs::Swept> CollectedBlobs::sweep_unfinished() {

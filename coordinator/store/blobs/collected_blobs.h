@@ -40,18 +40,31 @@ class CollectedBlobs final : public BlobStore {
   // Hold this lock from a submission's first check for a blob until the new job counts as needing the blob.
   std::shared_lock<std::shared_mutex> in_use() const { return std::shared_lock(using_); }
 
-  bool has(const Digest& digest) const override;
-  Result<bool> find(const Digest& digest) const override;
-  Result<std::vector<Digest>> missing(std::span<const Digest> digests) const override;
+  bool has(const Digest& digest) const override { return asked_for(digest).has(digest); }
+  Result<bool> find(const Digest& digest) const override { return asked_for(digest).find(digest); }
+  Result<std::vector<Digest>> missing(std::span<const Digest> digests) const override {
+    for (const Digest& digest : digests) asked_for(digest);
+    return inner_->missing(digests);
+  }
   Result<void> answers() const override { return inner_->answers(); }
-  Result<void> prove(const Digest& digest, bool again = false) const override;
-  Result<std::uint64_t> size(const Digest& digest) const override;
+  Result<void> prove(const Digest& digest, bool again = false) const override {
+    return asked_for(digest).prove(digest, again);
+  }
+  Result<std::uint64_t> size(const Digest& digest) const override { return asked_for(digest).size(digest); }
   Result<std::vector<std::byte>> read(const Digest& digest, std::uint64_t offset,
-                                      std::uint64_t length) const override;
-  Result<void> put(const Digest& digest, std::span<const std::byte> bytes) override;
-  Result<std::unique_ptr<Upload>> begin_upload(const Digest& digest) override;
+                                      std::uint64_t length) const override {
+    return asked_for(digest).read(digest, offset, length);
+  }
+  Result<void> put(const Digest& digest, std::span<const std::byte> bytes) override {
+    return asked_for(digest).put(digest, bytes);
+  }
+  Result<std::unique_ptr<Upload>> begin_upload(const Digest& digest) override {
+    return asked_for(digest).begin_upload(digest);
+  }
   std::uint64_t received(const Digest& digest) const override { return inner_->received(digest); }
-  Result<std::unique_ptr<Upload>> resume_upload(const Digest& digest, std::uint64_t offset) override;
+  Result<std::unique_ptr<Upload>> resume_upload(const Digest& digest, std::uint64_t offset) override {
+    return asked_for(digest).resume_upload(digest, offset);
+  }
   Result<std::vector<Digest>> list(bool unfinished) const override { return inner_->list(unfinished); }
   Result<void> remove(const Digest& digest) override { return inner_->remove(digest); }
   void remove_unfinished(const Digest& digest) override { inner_->remove_unfinished(digest); }
@@ -61,7 +74,8 @@ class CollectedBlobs final : public BlobStore {
     std::uint64_t bytes = 0;
     TimePoint since{};
   };
-  void asked_for(const Digest& digest) const;
+  // Notes a request for the blob, waits while the blob is being removed, and returns the inner store.
+  BlobStore& asked_for(const Digest& digest) const;
   std::vector<Digest> idle_for_long(const std::vector<Digest>& there, const std::set<Digest>& needed);
   std::uint64_t sweep_unfinished(const std::vector<Digest>& there);
 

@@ -72,11 +72,9 @@ class DiskUpload final : public BlobStore::Upload {
 
 Result<std::unique_ptr<DiskBlobs>> DiskBlobs::open(std::filesystem::path folder, std::filesystem::path work) {
   if (auto made = make_folder(work / "tmp"); !made) return tl::unexpected(made.error());
-  std::error_code error;
-  for (std::filesystem::directory_iterator left(work / "tmp", error), end; !error && left != end;
-       left.increment(error)) {
+  for (const auto& left : list_folder(work / "tmp").value_or(std::vector<std::filesystem::path>())) {
     std::error_code ignored;
-    std::filesystem::remove(left->path(), ignored);
+    std::filesystem::remove(left, ignored);
   }
   std::unique_ptr<DiskBlobs> blobs(new DiskBlobs(std::move(folder), std::move(work)));
   auto parts =
@@ -117,8 +115,8 @@ Result<std::uint64_t> DiskBlobs::size(const Digest& digest) const {
   return stamp->bytes;
 }
 
-// A blob that one call reads as a whole is hashed every time. A larger file, which is read in pieces, is
-// hashed completely before the first piece.
+// A blob that is read as a whole by one call is hashed each time. A larger one, which is read in pieces, is
+// hashed completely before its first piece is read.
 Result<std::vector<std::byte>> DiskBlobs::read(const Digest& digest, std::uint64_t offset,
                                                std::uint64_t length) const {
   const auto seen = look_at(digest);
@@ -135,24 +133,30 @@ Result<std::vector<std::byte>> DiskBlobs::read(const Digest& digest, std::uint64
   auto bytes = read_at(*file, offset, static_cast<std::size_t>(n), path(digest));
   if (!bytes || !whole) return bytes;
   if (const Digest got = sha256(*bytes); got != digest) return set_aside(digest, *seen, got);
-  proofs_.note(digest, *seen);
+  proofs_.lock()->insert_or_assign(digest, *seen);
   return bytes;
+}
+
+bool DiskBlobs::proven(const Digest& digest, const FileStamp& stamp) const {
+  const auto proofs = proofs_.lock();
+  const auto found = proofs->find(digest);
+  return found != proofs->end() && found->second == stamp;
 }
 
 Result<void> DiskBlobs::prove(const Digest& digest, bool again) const {
   const auto known = look_at(digest);
   if (!known) return tl::unexpected(known.error());
-  if (!again && proofs_.proven(digest, *known)) return {};
+  if (!again && proven(digest, *known)) return {};
   const std::lock_guard lock(proving_);
   // The stamp is taken before the file is read. If the file changes meanwhile, the stamp no longer matches,
   // and the next request reads the file again.
   const auto seen = look_at(digest);
   if (!seen) return tl::unexpected(seen.error());
-  if (!again && proofs_.proven(digest, *seen)) return {};
+  if (!again && proven(digest, *seen)) return {};
   const auto got = sha256_file(path(digest));
   if (!got) return tl::unexpected(got.error());
   if (*got != digest) return set_aside(digest, *seen, *got);
-  proofs_.note(digest, *seen);
+  proofs_.lock()->insert_or_assign(digest, *seen);
   return {};
 }
 
@@ -162,7 +166,7 @@ tl::unexpected<Error> DiskBlobs::set_aside(const Digest& digest, const FileStamp
   const std::lock_guard lock(placing_);
   if (stamp_of(from) != seen)
     return fail(Errc::unavailable, fmt::format("{} changed while it was read; try again", from.string()));
-  proofs_.forget(digest);
+  proofs_.lock()->erase(digest);
   const std::string what = fmt::format("blob {} is damaged: the bytes in {} have the SHA-256 {}",
                                        digest.hex(), from.string(), got.hex());
   if (::rename(from.c_str(), to.c_str()) != 0)
@@ -183,7 +187,7 @@ Result<void> DiskBlobs::place(const Digest& digest, const std::filesystem::path&
   {
     const std::lock_guard lock(placing_);
     if (::rename(from.c_str(), to.c_str()) != 0) return tl::unexpected(errno_error("rename to", to));
-    if (const auto stamp = stamp_of(to)) proofs_.note(digest, *stamp);
+    if (const auto stamp = stamp_of(to)) proofs_.lock()->insert_or_assign(digest, *stamp);
     ::unlink(damaged(to).c_str());
   }
   if (auto synced = sync_folder(to.parent_path()); !synced) return synced;
@@ -216,24 +220,18 @@ Result<std::unique_ptr<BlobStore::Upload>> DiskBlobs::resume_upload(const Digest
 
 Result<std::vector<Digest>> DiskBlobs::list(bool unfinished) const {
   if (unfinished) return parts_->list();
+  const auto groups = list_folder(folder_);
+  if (!groups) return tl::unexpected(groups.error());
   std::vector<Digest> all;
-  std::error_code error;
-  const std::filesystem::directory_iterator end;
-  for (std::filesystem::directory_iterator group(folder_, error); !error && group != end;
-       group.increment(error)) {
-    if (group->path().filename().string().size() != 2) continue;
-    std::error_code gone;
-    for (std::filesystem::directory_iterator file(group->path(), gone); !gone && file != end;
-         file.increment(gone))
-      if (const auto digest = Digest::parse(file->path().filename().string())) all.push_back(*digest);
+  for (const auto& group : *groups) {
+    const auto files = group.filename().string().size() == 2 ? digests_in(group) : std::vector<Digest>();
+    if (files) all.insert(all.end(), files->begin(), files->end());
   }
-  if (error)
-    return fail(Errc::unavailable, fmt::format("cannot list '{}': {}", folder_.string(), error.message()));
   return all;
 }
 
 Result<void> DiskBlobs::remove(const Digest& digest) {
-  proofs_.forget(digest);
+  proofs_.lock()->erase(digest);
   if (::unlink(path(digest).c_str()) == 0 || errno == ENOENT) return {};
   return tl::unexpected(errno_error("remove", path(digest)));
 }

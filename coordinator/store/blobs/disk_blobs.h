@@ -9,19 +9,21 @@
 #include <cerrno>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <vector>
 
 #include "common/base/digest.h"
+#include "common/base/guarded.h"
 #include "coordinator/store/blobs/blob_store.h"
-#include "coordinator/store/blobs/upload_parts.h"
 
 namespace ls::coordinator {
 
-// Identifies a version of a file by its size, inode and time of last change (ctime, here `seconds` and
-// `nanoseconds`). Every write changes the ctime, and programs cannot set it.
+// Identifies a version of a file by its device, inode, size and time of last change (ctime, here `seconds`
+// and `nanoseconds`). Every write changes the ctime, and programs cannot set it.
 struct FileStamp {
   std::uint64_t device = 0, inode = 0, bytes = 0;
   std::int64_t seconds = 0, nanoseconds = 0;
@@ -36,28 +38,38 @@ inline std::optional<FileStamp> stamp_of(const std::filesystem::path& path) {
                    info.st_ctim.tv_nsec};
 }
 
-// The files that this process has read as a whole and found to match their digests, with each file's stamp at
-// that time. A file whose stamp has changed since must be read again. Thread-safe.
-class VerifiedDigests {
+// Returns the digests that are names of files in the folder.
+Result<std::vector<Digest>> digests_in(const std::filesystem::path& folder);
+
+// Receives blobs in parts. An incomplete blob is a file, FOLDER/<its SHA-256 in hex>, to which each part is
+// appended. It outlives broken connections and restarts of the coordinator. Thread-safe.
+class UploadParts {
  public:
-  // True if this blob's file matched its digest when it had this stamp.
-  bool proven(const Digest& digest, const FileStamp& stamp) const {
-    const std::lock_guard lock(mutex_);
-    const auto found = stamps_.find(digest);
-    return found != stamps_.end() && found->second == stamp;
-  }
-  void note(const Digest& digest, const FileStamp& stamp) {
-    const std::lock_guard lock(mutex_);
-    stamps_.insert_or_assign(digest, stamp);
-  }
-  void forget(const Digest& digest) {
-    const std::lock_guard lock(mutex_);
-    stamps_.erase(digest);
-  }
+  // Moves a complete, verified file away from its path (renames it, or copies and removes it).
+  using Publish = std::function<Result<void>(const Digest&, const std::filesystem::path&)>;
+  static Result<std::unique_ptr<UploadParts>> open(std::filesystem::path folder, Publish publish);
+  ~UploadParts();
+
+  std::uint64_t received(const Digest& digest) const;
+  // Implements BlobStore::resume_upload(). If there are limits::kMaxUnfinishedUploads incomplete blobs
+  // already, first removes the one that has not grown for the longest time.
+  Result<std::unique_ptr<BlobStore::Upload>> resume(const Digest& digest, std::uint64_t offset);
+  // Removes an incomplete blob. If its upload is in progress, the next bytes of that upload are rejected. A
+  // blob whose finish() is running stays.
+  void remove(const Digest& digest);
+  Result<std::vector<Digest>> list() const { return digests_in(folder_); }
 
  private:
-  mutable std::mutex mutex_;
-  std::map<Digest, FileStamp> stamps_;
+  struct Slot;
+  class Part;
+  UploadParts(std::filesystem::path folder, Publish publish);
+  std::filesystem::path path(const Digest& digest) const { return folder_ / digest.hex(); }
+  std::shared_ptr<Guarded<Slot>> slot(const Digest& digest);
+  void make_room();
+
+  std::filesystem::path folder_;
+  Publish publish_;
+  Guarded<std::map<Digest, std::weak_ptr<Guarded<Slot>>>> slots_;  // the uploads in progress
 };
 
 class DiskBlobs final : public BlobStore {
@@ -91,6 +103,7 @@ class DiskBlobs final : public BlobStore {
   DiskBlobs(std::filesystem::path folder, std::filesystem::path work)
       : folder_(std::move(folder)), work_(std::move(work)) {}
   Result<FileStamp> look_at(const Digest& digest) const;
+  bool proven(const Digest& digest, const FileStamp& stamp) const;
   // Moves the blob's file aside, if it still has the stamp `seen` that it had when it was read; `got` is the
   // digest of the bytes read. Always returns an error, with the cause and the remedy.
   tl::unexpected<Error> set_aside(const Digest& digest, const FileStamp& seen, const Digest& got) const;
@@ -98,10 +111,12 @@ class DiskBlobs final : public BlobStore {
   Result<void> place(const Digest& digest, const std::filesystem::path& from);
 
   std::filesystem::path folder_, work_;
-  mutable VerifiedDigests proofs_;
+  // The blobs that this process has read as a whole and found to match their digests, with the stamp of each
+  // file at that time. A file whose stamp has changed since must be read again.
+  mutable Guarded<std::map<Digest, FileStamp>> proofs_;
   mutable std::mutex proving_;  // only one file is verified at a time: a second request waits for the result
-  // Held while a file is put in its place or moved aside, so that a file that was just repaired is not moved
-  // aside.
+  // Held while a file is put in its place or moved aside. Otherwise a file could be repaired after its damage
+  // was noticed, and the good file be moved aside.
   mutable std::mutex placing_;
   std::unique_ptr<UploadParts> parts_;
 };

@@ -262,10 +262,7 @@ Result<std::vector<Digest>> S3Blobs::list(bool unfinished) const {
 }
 
 Result<void> S3Blobs::remove(const Digest& digest) {
-  {
-    const std::lock_guard lock(mutex_);
-    there_.erase(digest);
-  }
+  note_lost(digest);
   if (auto gone = link_.remove(key_of(digest)); !gone) return gone;
   copies_.lock()->gone(digest);
   return local_->remove(digest);

@@ -1,6 +1,7 @@
-#include "coordinator/store/blobs/s3_request.h"
+#include "coordinator/store/blobs/s3_link.h"
 
 #include <curl/curl.h>
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
 #include <strings.h>
@@ -12,6 +13,7 @@
 
 #include "common/base/log.h"
 #include "common/base/percent_code.h"
+#include "coordinator/store/files.h"
 
 namespace ls::coordinator {
 namespace {
@@ -21,18 +23,15 @@ constexpr long kStallSeconds = 30;          // a transfer without a byte for thi
 constexpr long kAnswerSeconds = 5;          // the store counts as unavailable if answers() takes longer
 constexpr std::size_t kMaxText = 8u << 20;  // greatest size of an answer that is a list or an error, in bytes
 constexpr std::size_t kShownText = 300;     // a message quotes at most this many bytes of such an answer
+constexpr std::uint64_t kMostParts = 10'000;  // the protocol's limit on the parts of an object
+constexpr std::uint64_t kChunk = 1u << 20;    // a part is hashed in chunks of this many bytes
+// SHA-256 of an empty payload
+constexpr const char* kNoBytes = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
 constexpr std::size_t kMaxListed = 10'000'000;  // keys in a list, at most
 
-struct CloseFile {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
-struct FreeList {
-  void operator()(curl_slist* list) const { curl_slist_free_all(list); }
-};
-struct Cleanup {
-  void operator()(CURL* curl) const { curl_easy_cleanup(curl); }
-};
-using Headers = std::unique_ptr<curl_slist, FreeList>;
+using InputFile = std::unique_ptr<std::FILE, decltype([](std::FILE* file) { std::fclose(file); })>;
+using Headers = std::unique_ptr<curl_slist, decltype([](curl_slist* list) { curl_slist_free_all(list); })>;
+using Transfer = std::unique_ptr<CURL, decltype([](CURL* curl) { curl_easy_cleanup(curl); })>;
 
 // The part of a file that a request still has to send; it begins at the file's current position.
 struct Source {
@@ -50,9 +49,10 @@ struct Source {
 
 bool may_pass(int status) { return status == 0 || status == 429 || status >= 500; }
 
-}  // namespace
-
-std::string xml_element(std::string_view xml, std::string_view name, std::size_t* at) {
+// Returns the text of the first XML element with this name at or after position *at, and sets *at to the end
+// of that element. If there is none, returns an empty text and sets *at to npos. Understands just enough XML
+// for the answers of S3.
+std::string xml_element(std::string_view xml, std::string_view name, std::size_t* at = nullptr) {
   const std::string open = fmt::format("<{}>", name), close = fmt::format("</{}>", name);
   const std::size_t begin = xml.find(open, at ? *at : 0);
   const std::size_t end = begin == std::string_view::npos ? begin : xml.find(close, begin);
@@ -62,7 +62,6 @@ std::string xml_element(std::string_view xml, std::string_view name, std::size_t
              : std::string(xml.substr(begin + open.size(), end - begin - open.size()));
 }
 
-namespace {
 struct Receiver {
   CURL* curl;
   const S3Link::Sink* sink;
@@ -96,7 +95,40 @@ std::size_t receive_header(char* data, std::size_t size, std::size_t count, void
   }
   return line.size();
 }
+
+Result<Digest> digest_of(const std::filesystem::path& path, std::uint64_t offset, std::uint64_t bytes) {
+  auto file = File::open(path, O_RDONLY);
+  if (!file) return tl::unexpected(file.error());
+  Sha256 hash;
+  for (const std::uint64_t end = offset + bytes; offset < end; offset += kChunk) {
+    const auto chunk = read_at(*file, offset, static_cast<std::size_t>(std::min(kChunk, end - offset)), path);
+    if (!chunk) return tl::unexpected(chunk.error());
+    hash.update(*chunk);
+  }
+  return hash.finish();
+}
+
 }  // namespace
+
+struct S3Link::Request {
+  const char* method = "GET";
+  std::string key;                  // of the object; empty: the request is about the bucket
+  std::string query;                // sorted and escaped, as signed; every name with '='
+  std::filesystem::path file = {};  // for PUT: the payload is `bytes` bytes of this file from `offset` on
+  std::uint64_t offset = 0, bytes = 0;
+  std::string body = {};           // for POST
+  std::string payload = kNoBytes;  // SHA-256 of the payload
+  long most_seconds = 0;           // limit for the whole request; 0: no limit while bytes arrive
+  const Sink* sink = nullptr;
+  const std::function<Result<void>()>* restart = nullptr;
+};
+struct S3Link::Answer {
+  int status = 0;  // 0: no answer
+  std::uint64_t length = 0;
+  std::string etag;
+  std::string text;  // the body, unless it was passed to a sink; if there is no answer, the reason
+  std::optional<Error> refused;  // the sink's error, which ended the request
+};
 
 S3Link::S3Link(S3Options options) : options_(std::move(options)) {
   static std::once_flag once;
@@ -111,7 +143,7 @@ std::string S3Link::url_of(const Request& request) const {
 }
 
 Result<S3Link::Answer> S3Link::ask_once(const Request& request) const {
-  const std::unique_ptr<CURL, Cleanup> curl(curl_easy_init());
+  const Transfer curl(curl_easy_init());
   if (!curl) return fail(Errc::internal, "libcurl cannot be started");
   Headers headers;
   const auto add = [&](const std::string& line) {
@@ -122,7 +154,7 @@ Result<S3Link::Answer> S3Link::ask_once(const Request& request) const {
   Answer answer;
   Receiver receiver{curl.get(), request.sink, &answer.text, &answer.refused};
   char problem[CURL_ERROR_SIZE] = "";
-  std::unique_ptr<std::FILE, CloseFile> file;
+  InputFile file;
   Source source{nullptr, request.bytes};
   const std::string verb = request.method;
   if (verb == "HEAD") curl_easy_setopt(curl.get(), CURLOPT_NOBODY, 1L);
@@ -188,6 +220,15 @@ Result<S3Link::Answer> S3Link::ask(const Request& request) const {
   }
 }
 
+Result<S3Link::Answer> S3Link::ask_for(const Request& request) const {
+  const std::string_view method = request.method;
+  const bool reads = method == "GET" || method == "HEAD";
+  auto answer = ask(request);
+  if (answer && (reads ? answer->status != 200 : answer->status / 100 != 2))
+    return tl::unexpected(error_of(request, *answer));
+  return answer;
+}
+
 Error S3Link::error_of(const Request& request, const Answer& answer) const {
   const std::string what = fmt::format("{} {}", request.method, url_of(request));
   if (answer.status == 0) return {Errc::unavailable, fmt::format("{}: no answer: {}", what, answer.text)};
@@ -216,34 +257,84 @@ Result<void> S3Link::answers() const {
 }
 
 Result<S3Link::Object> S3Link::look_at(const std::string& key) const {
-  const Request request{.method = "HEAD", .key = key};
-  const auto answer = ask(request);
+  const auto answer = ask_for({.method = "HEAD", .key = key});
   if (!answer) return tl::unexpected(answer.error());
-  if (answer->status != 200) return tl::unexpected(error_of(request, *answer));
   return Object{answer->length, answer->etag};
 }
 
 Result<void> S3Link::get(const std::string& key, const std::function<Result<void>()>& restart,
                          const Sink& sink) const {
-  const Request request{.key = key, .sink = &sink, .restart = &restart};
-  const auto answer = ask(request);
-  if (!answer) return tl::unexpected(answer.error());
-  if (answer->status != 200) return tl::unexpected(error_of(request, *answer));
-  return {};
+  return ask_for({.key = key, .sink = &sink, .restart = &restart}).map([](const Answer&) {});
 }
 
 Result<void> S3Link::put(const std::string& key, const std::filesystem::path& file, std::uint64_t bytes,
                          const Digest& digest) const {
   if (bytes > options_.address.part_bytes) return put_parts(key, file, bytes);
-  const Request request{.method = "PUT", .key = key, .file = file, .bytes = bytes, .payload = digest.hex()};
-  const auto answer = ask(request);
-  if (!answer) return tl::unexpected(answer.error());
-  if (answer->status / 100 != 2) return tl::unexpected(error_of(request, *answer));
-  return {};
+  return ask_for({.method = "PUT", .key = key, .file = file, .bytes = bytes, .payload = digest.hex()})
+      .map([](const Answer&) {});
 }
 
-Result<void> S3Link::remove(const std::string& key) const {
-  const Request request{.method = "DELETE", .key = key};
+Result<void> S3Link::put_parts(const std::string& key, const std::filesystem::path& file,
+                               std::uint64_t bytes) const {
+  auto upload = begin_parts(key);
+  if (!upload) return tl::unexpected(upload.error());
+  auto done = send_parts(key, *upload, file, bytes);
+  if (done) return done;
+  // Without this the store would keep the parts, invisible but charged for.
+  if (const auto gone = remove(key, "uploadId=" + percent_encode(*upload)); !gone)
+    log_warn("store=s3", fmt::format("the parts of {} that were sent stay in {}: {}", key, shown(),
+                                     gone.error().message));
+  return done;
+}
+
+Result<std::string> S3Link::begin_parts(const std::string& key) const {
+  const Request request{.method = "POST", .key = key, .query = "uploads="};
+  const auto answer = ask_for(request);
+  if (!answer) return tl::unexpected(answer.error());
+  const std::string id = xml_element(answer->text, "UploadId");
+  if (id.empty()) return tl::unexpected(error_of(request, *answer));
+  return id;
+}
+
+Result<void> S3Link::send_parts(const std::string& key, const std::string& upload,
+                                const std::filesystem::path& file, std::uint64_t bytes) const {
+  const std::uint64_t part_bytes =
+      std::max(options_.address.part_bytes, (bytes + kMostParts - 1) / kMostParts);
+  Request end{.method = "POST",
+              .key = key,
+              .query = "uploadId=" + percent_encode(upload),
+              .body = "<CompleteMultipartUpload>"};
+  int number = 1;
+  for (std::uint64_t offset = 0; offset < bytes; offset += part_bytes, ++number) {
+    Request part{.method = "PUT",
+                 .key = key,
+                 .query = fmt::format("partNumber={}&uploadId={}", number, percent_encode(upload)),
+                 .file = file,
+                 .offset = offset,
+                 .bytes = std::min(part_bytes, bytes - offset)};
+    const auto digest = digest_of(file, offset, part.bytes);
+    if (!digest) return tl::unexpected(digest.error());
+    part.payload = digest->hex();
+    const auto answer = ask_for(part);
+    if (!answer) return tl::unexpected(answer.error());
+    if (answer->etag.empty()) return tl::unexpected(error_of(part, *answer));
+    end.body += fmt::format("<Part><PartNumber>{}</PartNumber><ETag>{}</ETag></Part>", number, answer->etag);
+  }
+  end.body += "</CompleteMultipartUpload>";
+  end.payload = sha256(end.body).hex();
+  const auto answer = ask(end);
+  if (!answer) return tl::unexpected(answer.error());
+  // The store begins its answer before it has joined the parts, so an answer with status 200 may contain an
+  // error.
+  if (answer->status / 100 == 2 && xml_element(answer->text, "Code").empty()) return {};
+  // If the answer to an earlier attempt was lost, the upload may be complete, and the store no longer accepts
+  // its id: then the object exists.
+  if (const auto there = look_at(key); there && there->bytes == bytes) return {};
+  return tl::unexpected(error_of(end, *answer));
+}
+
+Result<void> S3Link::remove(const std::string& key, const std::string& query) const {
+  const Request request{.method = "DELETE", .key = key, .query = query};
   const auto answer = ask(request);
   if (!answer) return tl::unexpected(answer.error());
   if (answer->status / 100 != 2 && answer->status != 404) return tl::unexpected(error_of(request, *answer));
@@ -257,9 +348,8 @@ Result<std::vector<std::string>> S3Link::list() const {
     Request request;
     if (!token.empty()) request.query = "continuation-token=" + percent_encode(token) + "&";
     request.query += "list-type=2&prefix=" + percent_encode(prefix);
-    const auto answer = ask(request);
+    const auto answer = ask_for(request);
     if (!answer) return tl::unexpected(answer.error());
-    if (answer->status != 200) return tl::unexpected(error_of(request, *answer));
     for (std::size_t at = 0;;) {
       const std::string key = xml_element(answer->text, "Key", &at);
       if (at == std::string::npos) break;

@@ -41,7 +41,7 @@ Result<S3Keys> s3_keys_from_environment();
 struct S3Options {
   S3Address address;
   S3Keys keys;
-  // greatest number of attempts of a request that fails for a transient reason: no answer, 429, 5xx
+  // Greatest number of attempts of a request that fails for a transient reason: no answer, 429, 5xx
   int attempts = 6;
   Duration first_pause = std::chrono::milliseconds(100), longest_pause = std::chrono::seconds(5);
 };
@@ -64,11 +64,12 @@ class S3Link {
   Result<void> get(const std::string& key, const std::function<Result<void>()>& restart,
                    const Sink& sink) const;
   // Sends a file of `bytes` bytes, whose digest the store checks: in one request or, if the file is larger
-  // than S3Address::part_bytes, in parts (s3_parts.cpp).
+  // than S3Address::part_bytes, in parts. The store checks the digest of
+  // each part, and each is retried separately.
   Result<void> put(const std::string& key, const std::filesystem::path& file, std::uint64_t bytes,
                    const Digest& digest) const;
-  Result<void> remove(const std::string& key) const;  // succeeds for a missing object
-  Result<std::vector<std::string>> list() const;      // all keys under the prefix
+  Result<void> remove(const std::string& key) const { return remove(key, ""); }  // also if it is missing
+  Result<std::vector<std::string>> list() const;                                 // all keys under the prefix
 
   std::string shown() const { return options_.address.shown(); }
 
@@ -80,9 +81,12 @@ class S3Link {
   Result<std::string> begin_parts(const std::string& key) const;  // returns the upload's id
   Result<void> send_parts(const std::string& key, const std::string& upload,
                           const std::filesystem::path& file, std::uint64_t bytes) const;
-  void give_up_parts(const std::string& key, const std::string& upload) const;
-  Result<Answer> ask(const Request& request) const;
+  Result<void> remove(const std::string& key, const std::string& query) const;
   Result<Answer> ask_once(const Request& request) const;
+  Result<Answer> ask(const Request& request) const;  // with retries
+  // Like ask(), but an answer with a status other than 200 (2xx for requests that change something) is an
+  // error.
+  Result<Answer> ask_for(const Request& request) const;
   Error error_of(const Request& request, const Answer& answer) const;
   std::string url_of(const Request& request) const;
 

@@ -1,4 +1,3 @@
-#include "coordinator/store/blobs/upload_parts.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -11,6 +10,7 @@
 
 #include "common/base/log.h"
 #include "coordinator/base/limits.h"
+#include "coordinator/store/blobs/disk_blobs.h"
 #include "coordinator/store/files.h"
 
 namespace ls::coordinator {
@@ -35,7 +35,7 @@ class UploadParts::Part final : public BlobStore::Upload {
         path_(std::move(path)),
         publish_(std::move(publish)) {}
   ~Part() override {
-    // With the sync, a power failure rarely loses bytes that were reported as received
+    // Bytes that were reported as received are rarely lost by a power failure
     if (!ended_) ::fdatasync(file_.fd());
   }
 
@@ -94,7 +94,7 @@ class UploadParts::Part final : public BlobStore::Upload {
   bool from_start_, ended_ = false;
   std::filesystem::path path_;
   Publish publish_;
-  Sha256 hash_;  // hash of the whole blob; valid only if all bytes came through this upload
+  Sha256 hash_;  // of the whole blob; used only if all bytes came through this Part
 };
 
 UploadParts::UploadParts(std::filesystem::path folder, Publish publish)
@@ -137,6 +137,15 @@ Result<std::unique_ptr<BlobStore::Upload>> UploadParts::resume(const Digest& dig
                                 publish_);
 }
 
+Result<std::vector<Digest>> digests_in(const std::filesystem::path& folder) {
+  const auto files = list_folder(folder);
+  if (!files) return tl::unexpected(files.error());
+  std::vector<Digest> all;
+  for (const auto& file : *files)
+    if (const auto digest = Digest::parse(file.filename().string())) all.push_back(*digest);
+  return all;
+}
+
 void UploadParts::make_room() {
   const auto kept = list();
   if (!kept || kept->size() < limits::kMaxUnfinishedUploads) return;
@@ -160,17 +169,6 @@ void UploadParts::remove(const Digest& digest) {
   if (slot->finishing) return;
   ++slot->turn;
   ::unlink(path(digest).c_str());
-}
-
-Result<std::vector<Digest>> UploadParts::list() const {
-  std::vector<Digest> all;
-  std::error_code error;
-  for (std::filesystem::directory_iterator file(folder_, error), end; !error && file != end;
-       file.increment(error))
-    if (const auto digest = Digest::parse(file->path().filename().string())) all.push_back(*digest);
-  if (error)
-    return fail(Errc::unavailable, fmt::format("cannot list '{}': {}", folder_.string(), error.message()));
-  return all;
 }
 
 }  // namespace ls::coordinator

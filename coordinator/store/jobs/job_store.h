@@ -39,9 +39,6 @@ struct JobLocation {
   bool alive = false;  // false: the coordinator is gone; another will take the job over, unless it has ended
 };
 
-// Checks the value of --store: sqlite, or a redis:// address.
-Result<void> check_store(const std::string& store);
-
 // Totals of a job over all its units (a unit is one tile with one range of samples). They are written when
 // the job ends, so that a restart does not have to read its partials (the encoded pixel sums of its units).
 struct JobTotals {
@@ -55,9 +52,9 @@ struct JobTotals {
   Health health;
   TimeSplit time;                         // `render` is not set; its value is core_seconds
   double began_unix = 0, ended_unix = 0;  // wall clock of the first ray and of the end; 0: not yet
-  // At the last checkpoint: why the image's error figures were not trusted (ImageError::verdict; empty: they
-  // were, or there was no checkpoint), and the number of pixels with few hits (ImageError::few_hits; nullopt:
-  // there was no checkpoint)
+  // From the last checkpoint: why the image's error figures were not trusted (ImageError::verdict; empty if
+  // they were, or before the first checkpoint), and the number of pixels with few hits (ImageError::few_hits;
+  // nullopt before the first checkpoint)
   std::string doubt;
   std::optional<std::uint64_t> few_hits;
   bool operator==(const JobTotals&) const = default;
@@ -87,8 +84,8 @@ struct StoredJob {
   std::optional<StopReason> stopped;
   std::string error;
   std::optional<Digest> numeric_class;
-  // The job is pinned to a numeric class (machines that compute the same bits). These are the build of the
-  // worker that determined the class, and the platform of the class (WorkerHello)
+  // The numeric class (machines that compute the same bits) to which the job is pinned has this platform; the
+  // worker that determined the class had this build (WorkerHello)
   std::string build, platform;
   bool fake = false;  // true if pinned to a fake worker; then only fake workers may render its units
   JobTotals totals;
@@ -115,6 +112,11 @@ struct LogLine {
   std::string text;
 };
 
+std::string points_json(const std::vector<ConvergencePoint>& points);
+Result<std::vector<ConvergencePoint>> parse_points(std::string_view json);
+std::string log_json(const std::vector<LogLine>& lines);
+Result<std::vector<LogLine>> parse_log(std::string_view json);
+
 // A worker that rendered wrong pixels, with the evidence
 struct QuarantinedWorker {
   WorkerId worker;
@@ -125,14 +127,14 @@ struct QuarantinedWorker {
 class JobStore {
  public:
   virtual ~JobStore() = default;
-  virtual Result<void> put_job(const StoredJob& job) = 0;  // inserts or replaces
   // Inserts or replaces all of these jobs or, on an error, none.
+  Result<void> put_job(const StoredJob& job) { return put_jobs({&job, 1}); }
   virtual Result<void> put_jobs(std::span<const StoredJob> jobs) = 0;
   // Returns all jobs, in the order in which they were first put. A job whose record is damaged is returned
   // with `damaged` set; the other jobs are not affected.
   virtual Result<std::vector<StoredJob>> jobs() const = 0;
   // Removes the job with its points and log; succeeds if the job is unknown.
-  virtual Result<void> remove_job(const JobId& job) { return remove_jobs({&job, 1}); }
+  Result<void> remove_job(const JobId& job) { return remove_jobs({&job, 1}); }
   virtual Result<void> remove_jobs(std::span<const JobId> jobs) = 0;  // removes all jobs or none
 
   virtual Result<void> add_point(const JobId& job, const ConvergencePoint& point) = 0;

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <deque>
 #include <map>
 #include <mutex>
@@ -10,18 +11,16 @@ namespace {
 
 class MemoryJobStore final : public JobStore {
  public:
-  Result<void> put_job(const StoredJob& job) override {
-    const std::lock_guard lock(mutex_);
-    for (auto& known : jobs_)
-      if (known.id == job.id) {
-        known = job;
-        return {};
-      }
-    jobs_.push_back(job);
-    return {};
-  }
   Result<void> put_jobs(std::span<const StoredJob> jobs) override {
-    for (const StoredJob& job : jobs) (void)put_job(job);
+    const std::lock_guard lock(mutex_);
+    for (const StoredJob& job : jobs) {
+      const auto known =
+          std::find_if(jobs_.begin(), jobs_.end(), [&](const StoredJob& one) { return one.id == job.id; });
+      if (known != jobs_.end())
+        *known = job;
+      else
+        jobs_.push_back(job);
+    }
     return {};
   }
   Result<std::vector<StoredJob>> jobs() const override {

@@ -25,13 +25,7 @@ CREATE TABLE IF NOT EXISTS barred(worker TEXT PRIMARY KEY, evidence TEXT NOT NUL
 CREATE TABLE IF NOT EXISTS counters(name TEXT PRIMARY KEY, value INTEGER NOT NULL);
 )";
 
-struct CloseDb {
-  void operator()(sqlite3* db) const { sqlite3_close_v2(db); }
-};
-struct FinalizeStatement {
-  void operator()(sqlite3_stmt* s) const { sqlite3_finalize(s); }
-};
-using Db = std::unique_ptr<sqlite3, CloseDb>;
+using Db = std::unique_ptr<sqlite3, decltype([](sqlite3* db) { sqlite3_close_v2(db); })>;
 
 Error db_error(sqlite3* db, std::string_view what) {
   const int code = sqlite3_errcode(db);
@@ -94,15 +88,13 @@ class Statement {
   }
   void bind(double value) { sqlite3_bind_double(statement_.get(), ++bound_, value); }
   void bind(const std::optional<double>& value) {
-    if (value)
-      bind(*value);
-    else
-      ++bound_;  // a parameter that is not bound is null
+    if (!value) return void(++bound_);  // a parameter that is not bound is null
+    bind(*value);
   }
   void bind(std::int64_t value) { sqlite3_bind_int64(statement_.get(), ++bound_, value); }
 
   sqlite3* db_;
-  std::unique_ptr<sqlite3_stmt, FinalizeStatement> statement_;
+  std::unique_ptr<sqlite3_stmt, decltype([](sqlite3_stmt* s) { sqlite3_finalize(s); })> statement_;
   int bound_ = 0;
 };
 
@@ -145,11 +137,9 @@ class SqliteJobStore final : public JobStore {
  public:
   explicit SqliteJobStore(Db db) : db_(std::move(db)) {}
 
-  Result<void> put_job(const StoredJob& job) override { return put(*db_.lock(), job); }
-
   Result<void> put_jobs(std::span<const StoredJob> jobs) override {
     const auto db = db_.lock();
-    return all_or_nothing(*db, "store jobs", [&]() -> Result<void> {
+    return all_or_nothing(*db, jobs.size() == 1 ? "store a job" : "store jobs", [&]() -> Result<void> {
       for (const StoredJob& job : jobs)
         if (auto done = put(*db, job); !done) return done;
       return {};

@@ -1,31 +1,58 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "coordinator/store/jobs/job_store.h"
-#include "coordinator/store/jobs/json_number.h"
 
 namespace ls::coordinator {
 namespace {
 
 using nlohmann::json;
 
+// JSON has no infinity and no NaN: the library would write null, which could not be read back as a number. So
+// finite() replaces them by 0.
+double finite(double value) { return std::isfinite(value) ? value : 0; }
+// Older records have null for such a number.
+double number_of(const json& j) { return j.is_null() ? 0 : j.get<double>(); }
+// Throws for any value but an integer from 0 to 2^64 - 1. The library alone would convert 1e20, which does
+// not fit.
+std::uint64_t count_of(const json& j) {
+  if (!j.is_number_unsigned()) throw std::invalid_argument("a count is not an integer from 0 to 2^64 - 1");
+  return j.get<std::uint64_t>();
+}
+
+// Invalid UTF-8, which may come from a worker's name or message, is replaced, so that dump() never throws.
+std::string dumped(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
+
+// Returns read() of the JSON in the text; an exception becomes an error that begins with `what`.
+template <class Read>
+auto decoded(std::string_view text, std::string_view what, Read read) -> Result<decltype(read(json()))> {
+  try {
+    return read(json::parse(text));
+  } catch (const std::exception& e) {
+    return fail(Errc::internal, fmt::format("{}: {}", what, e.what()));
+  }
+}
+
+constexpr std::pair<const char*, double JobTotals::*> kReals[] = {
+    {"render_seconds", &JobTotals::render_seconds}, {"core_seconds", &JobTotals::core_seconds},
+    {"load_seconds", &JobTotals::load_seconds},     {"spp_done", &JobTotals::spp_done},
+    {"began_unix", &JobTotals::began_unix},         {"ended_unix", &JobTotals::ended_unix}};
+constexpr std::pair<const char*, std::uint64_t JobTotals::*> kCounts[] = {
+    {"peak_rss_bytes", &JobTotals::peak_rss_bytes},
+    {"units", &JobTotals::units},
+    {"units_planned", &JobTotals::units_planned}};
+
 json to_value(const JobTotals& t) {
-  json time;
-  for (const TimePart& part : kTimeParts) time[part.name] = finite(t.time.*part.seconds);
-  return {{"render_seconds", finite(t.render_seconds)},
-          {"core_seconds", finite(t.core_seconds)},
-          {"load_seconds", finite(t.load_seconds)},
-          {"peak_rss_bytes", t.peak_rss_bytes},
-          {"spp_done", t.spp_done},
-          {"units", t.units},
-          {"units_planned", t.units_planned},
-          {"health", json::parse(canonical_json(t.health))},
-          {"time", std::move(time)},
-          {"began_unix", t.began_unix},
-          {"ended_unix", t.ended_unix},
-          {"doubt", t.doubt},
-          {"few_hits", t.few_hits ? json(*t.few_hits) : json()}};
+  json j{{"health", json::parse(canonical_json(t.health))},
+         {"doubt", t.doubt},
+         {"few_hits", t.few_hits ? json(*t.few_hits) : json()}};
+  for (const auto& [name, member] : kReals) j[name] = finite(t.*member);
+  for (const auto& [name, member] : kCounts) j[name] = t.*member;
+  for (const TimePart& part : kTimeParts) j["time"][part.name] = finite(t.time.*part.seconds);
+  return j;
 }
 
 // Returns 0 if the key is missing: a counter that is 0 is not stored.
@@ -42,17 +69,10 @@ T required(Result<T> parsed) {
 
 JobTotals totals_of(const json& j) {
   JobTotals t;
-  t.render_seconds = number_of(j.at("render_seconds"));
-  t.core_seconds = number_of(j.at("core_seconds"));
-  t.load_seconds = number_of(j.at("load_seconds"));
-  t.peak_rss_bytes = count_of(j.at("peak_rss_bytes"));
-  t.spp_done = j.at("spp_done");
-  t.units = count_of(j.at("units"));
-  t.units_planned = count_of(j.at("units_planned"));
-  t.health = required(parse_health(j.at("health").dump()));
+  for (const auto& [name, member] : kReals) t.*member = number_of(j.at(name));
+  for (const auto& [name, member] : kCounts) t.*member = count_of(j.at(name));
   for (const TimePart& part : kTimeParts) t.time.*part.seconds = number_of(j.at("time").at(part.name));
-  t.began_unix = j.at("began_unix");
-  t.ended_unix = j.at("ended_unix");
+  t.health = required(parse_health(j.at("health").dump()));
   t.doubt = j.at("doubt");
   if (const json& few = j.at("few_hits"); !few.is_null()) t.few_hits = count_of(few);
   return t;
@@ -117,6 +137,32 @@ StoredJob stored_from(const json& j) {
   return job;
 }
 
+std::optional<ReferenceError> reference_error_of(const json& t) {
+  if (t.is_null()) return {};
+  const auto known = [&](std::size_t i) {
+    return t.at(i).is_null() ? std::nullopt : std::optional(t.at(i).get<double>());
+  };
+  return ReferenceError{t.at(0), t.at(1), known(2), known(3), known(4)};
+}
+
+json reference_error_value(const std::optional<ReferenceError>& reference_error) {
+  if (!reference_error) return nullptr;
+  const auto or_null = [](const std::optional<double>& v) { return v ? json(*v) : json(); };
+  return json::array({reference_error->rmse, reference_error->relmse, or_null(reference_error->flip),
+                      or_null(reference_error->mse_stderr), or_null(reference_error->relmse_stderr)});
+}
+
+std::vector<ConvergencePoint> points_from(const json& all) {
+  std::vector<ConvergencePoint> points;
+  for (const json& p : all) {
+    const ErrorFigures error{number_of(p.at(3)), number_of(p.at(4)), number_of(p.at(5)),
+                             number_of(p.at(6)), number_of(p.at(8)), number_of(p.at(9))};
+    points.push_back(
+        {number_of(p.at(0)), number_of(p.at(1)), number_of(p.at(2)), error, reference_error_of(p.at(7))});
+  }
+  return points;
+}
+
 }  // namespace
 
 std::string to_json(const StoredJob& job) {
@@ -156,18 +202,39 @@ std::string to_json(const StoredJob& job) {
   if (job.focus) j["focus"] = {job.focus->x0, job.focus->y0, job.focus->x1, job.focus->y1};
   if (job.revision != 0) j["revision"] = job.revision;
   if (job.fence != 0) j["fence"] = job.fence;
-  // Names and messages may come from a worker. Invalid UTF-8 in them is replaced, so that dump() never
-  // throws.
-  return j.dump(-1, ' ', false, json::error_handler_t::replace);
+  return dumped(j);
 }
 
 Result<StoredJob> parse_stored_job(std::string_view text) {
-  try {
-    return stored_from(json::parse(text));
-  } catch (const std::exception& e) {
-    return fail(Errc::internal,
-                fmt::format("the record of a job is damaged, or a newer version wrote it: {}", e.what()));
-  }
+  return decoded(text, "the record of a job is damaged, or a newer version wrote it", stored_from);
+}
+
+std::string points_json(const std::vector<ConvergencePoint>& points) {
+  json all = json::array();
+  for (const auto& p : points)
+    all.push_back({finite(p.seconds), finite(p.core_seconds), finite(p.spp), finite(p.error.rmse),
+                   finite(p.error.relmse), finite(p.error.relmse_lo), finite(p.error.relmse_hi),
+                   reference_error_value(p.reference_error), finite(p.error.rmse_lo),
+                   finite(p.error.rmse_hi)});
+  return dumped(all);
+}
+
+Result<std::vector<ConvergencePoint>> parse_points(std::string_view text) {
+  return decoded(text, "the points or log of a job are damaged", points_from);
+}
+
+std::string log_json(const std::vector<LogLine>& lines) {
+  json all = json::array();
+  for (const auto& line : lines) all.push_back({line.unix_time, line.text});
+  return dumped(all);
+}
+
+Result<std::vector<LogLine>> parse_log(std::string_view text) {
+  return decoded(text, "the points or log of a job are damaged", [](const json& all) {
+    std::vector<LogLine> lines;
+    for (const json& line : all) lines.push_back({line.at(0), line.at(1)});
+    return lines;
+  });
 }
 
 }  // namespace ls::coordinator

@@ -87,9 +87,9 @@ PartialRecord unpack(const RawHeader& raw, Health health) {
   return record;
 }
 
-// Makes the content of a full segment's index file: the headers of all its records, one after the other, and
-// their SHA-256. With the index a restart reads only this file; without it, it has to search the 64 MiB of
-// the segment for headers.
+// Makes the content of the index file of a full segment: the headers of all its records, one after the other,
+// and their SHA-256. A restart then reads only this file instead of searching the segment's 64 MiB for
+// headers.
 std::vector<std::byte> pack_index(std::span<const RawHeader> headers) {
   const auto raw = std::as_bytes(headers);
   std::vector<std::byte> out(raw.begin(), raw.end());
@@ -236,7 +236,7 @@ Result<bool> PartialLog::scan(std::uint32_t segment, bool last) {
     at += raw.record_bytes();
   }
   if (at == size) return true;
-  // In a segment other than the last, this is disk damage. The units of all records from here on are rendered
+  // In a segment other than the last, the disk is damaged. The units of all records from here on are rendered
   // again, and the bytes stay in the file for examination.
   log_warn(place(), last ? "cut a torn record" : "left out damaged records; their units are rendered again");
   if (last && ::ftruncate(file->fd(), static_cast<off_t>(at)) != 0)

@@ -1,7 +1,7 @@
-// The class behind redis_job_store.h. redis_job_store.cpp opens the store, redis_job_store_send.cpp contains
-// the thread that updates Redis, and this header the functions that the coordinator's other threads call. A
-// node is one of several coordinators that share the Redis; the members' thread is the one that RedisMembers
-// starts (redis_members.h).
+// The class behind redis_job_store.h. This header contains the functions that the coordinator's threads call,
+// redis_job_store.cpp opens the store and contains the thread that updates Redis. A node is one of several
+// coordinators that share the Redis; the members' thread is the one that RedisMembers starts
+// (redis_members.h).
 #pragma once
 
 #include <fmt/format.h>
@@ -38,8 +38,6 @@ class RedisJobStore final : public JobStore {
         state->quarantined[worker.worker] = worker.evidence;
     sender_ = std::jthread([this](const std::stop_token& token) { send_loop(token); });
   }
-
-  Result<void> put_job(const StoredJob& job) override { return put_jobs({&job, 1}); }
 
   Result<void> put_jobs(std::span<const StoredJob> jobs) override {
     const auto state = state_.lock();
@@ -146,8 +144,8 @@ class RedisJobStore final : public JobStore {
     auto owner = members_->owner_of(id);
     if (!owner) return tl::unexpected(owner.error());
     if (!*owner) return std::nullopt;
-    // This node owns the job in Redis but does not have it yet or any more: it is still taking the job over,
-    // or removing it.
+    // This node owns the job in Redis but does not have it: it is still taking the job over, or has removed
+    // it.
     if ((*owner)->node == options_.node) {
       const auto state = state_.lock();
       const auto due = state->due.find(id);

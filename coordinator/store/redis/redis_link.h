@@ -45,6 +45,8 @@ class RedisLink {
   };
   // Connects, authenticates, selects the database.
   static Result<std::unique_ptr<RedisLink>> connect(const RedisAddress& address, Timeouts timeouts);
+  // Replaces the link by a new connection if it is null or broken. True: it was replaced.
+  static Result<bool> renew(std::unique_ptr<RedisLink>& link, const RedisAddress& address, Timeouts timeouts);
   ~RedisLink();
 
   using Command = std::vector<std::string>;  // the command's name and its arguments, which may have any bytes
@@ -53,8 +55,6 @@ class RedisLink {
   // An error reply to one command becomes the error of that command's Result. An error of the connection
   // fails the whole call; it is then unknown which commands Redis has carried out.
   Result<std::vector<Result<RedisReply>>> run_all(std::span<const Command> commands);
-
-  bool broken() const { return broken_; }  // true after a connection error: a new RedisLink is needed
 
  private:
   struct Close {

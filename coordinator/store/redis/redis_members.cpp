@@ -12,11 +12,11 @@
 namespace ls::coordinator {
 namespace {
 
-// Lifetime of the key heir:NODE. Every job that is taken renews it, so it should be longer than the time
-// between two of them, in which kTakenAtOnce jobs are stored here.
+// Lifetime of the key heir:NODE. It is renewed at every job that is taken; between two such jobs up to
+// kTakenAtOnce jobs are stored here, which must take less time.
 constexpr const char* kHeirMilliseconds = "15000";
-// Number of jobs after which a takeover stores what it has taken and sends a heartbeat. A heartbeat is due
-// long before thousands of jobs are taken and stored, and without it this node would count as dead itself.
+// A takeover stores the jobs that it has taken, and sends a heartbeat, after this many jobs: if it took
+// thousands of jobs without a heartbeat, this node would count as dead itself.
 constexpr std::size_t kTakenAtOnce = 64;
 
 // Sends a node's heartbeat. ARGV: node, addresses, lifetime of the heartbeat in ms, the node's number from
@@ -37,8 +37,9 @@ return answer
 )";
 
 // Takes over a job and renews the key heir:NODE. ARGV: job, dead node, node that takes it, sequence or '',
-// lifetime of the key in ms. Returns nothing if the dead node is alive again or no longer owns the job, and
-// -1 if the node that takes the job is not the heir any more: two heirs would share the frames of a sequence.
+// lifetime of the key in ms. Returns nothing if the dead node is alive again or no longer owns the job.
+// Returns -1 if the node that takes the job is not the heir any more: otherwise two heirs could each get some
+// frames of a sequence.
 constexpr const char* kTake = R"(
 local key = 'lightshaft:job:' .. ARGV[1]
 local heir = 'lightshaft:heir:' .. ARGV[2]
@@ -57,9 +58,9 @@ if ARGV[4] ~= '' then redis.call('HSET', 'lightshaft:sequences', ARGV[4], ARGV[3
 return redis.call('HGETALL', key)
 )";
 
-// Ends the takeover from a dead node. ARGV: dead node, its heir. If the node has no jobs left, it is not
-// polled any more, and its list of lost jobs is kept for a week, in case the node comes back and reads it.
-// Returns 0, and does nothing, if another node is the heir by now.
+// Ends the takeover from a dead node. ARGV: dead node, its heir. A dead node without jobs is removed from the
+// list of nodes; its list of lost jobs is kept for a week, in case it comes back and reads it. Returns 0, and
+// does nothing, if another node is the heir by now.
 constexpr const char* kSettle = R"(
 if redis.call('GET', 'lightshaft:heir:' .. ARGV[1]) ~= ARGV[2] then return 0 end
 if redis.call('SCARD', 'lightshaft:owned:' .. ARGV[1]) == 0 and redis.call('EXISTS', 'lightshaft:alive:' .. ARGV[1]) == 0 then
@@ -90,15 +91,13 @@ RedisMembers::RedisMembers(MemberOptions options, Callbacks callbacks)
     : options_(std::move(options)), callbacks_(std::move(callbacks)), absence_(options_.looks) {}
 
 Result<RedisLink*> RedisMembers::link() {
-  if (!link_ || link_->broken()) {
-    link_.reset();
+  const auto renewed = RedisLink::renew(link_, options_.address, options_.timeouts);
+  if (!renewed) return tl::unexpected(renewed.error());
+  if (*renewed) {
     absence_.begin_again();
     // It is unknown whether Redis has carried out the last commands sent over the old connection
     own_unclear_ = true;
     quarantined_seen_ = 0;  // the new connection may lead to another Redis
-    auto fresh = RedisLink::connect(options_.address, options_.timeouts);
-    if (!fresh) return tl::unexpected(fresh.error());
-    link_ = std::move(*fresh);
   }
   return link_.get();
 }
@@ -311,12 +310,8 @@ Result<void> RedisMembers::take_some(std::span<const JobId> ids, const std::stri
 
 Result<std::optional<Member>> RedisMembers::owner_of(const JobId& id) {
   const std::lock_guard lock(asking_);
-  if (!asking_link_ || asking_link_->broken()) {
-    asking_link_.reset();
-    auto fresh = RedisLink::connect(options_.address, options_.timeouts);
-    if (!fresh) return tl::unexpected(fresh.error());
-    asking_link_ = std::move(*fresh);
-  }
+  if (auto renewed = RedisLink::renew(asking_link_, options_.address, options_.timeouts); !renewed)
+    return tl::unexpected(renewed.error());
   auto owner = asking_link_->run({"HGET", redis_job_key(id), "owner"});
   if (owner && owner->nil) owner = asking_link_->run({"HGET", "lightshaft:sequences", id.value});
   if (!owner) return tl::unexpected(owner.error());

@@ -108,6 +108,16 @@ Result<void> take_jobs(RedisLink& link, JobStore& local, const std::map<JobId, s
   return {};
 }
 
+// Copies the jobs in the Redis set `set_key` that `here` lacks or has in a lower revision.
+Result<void> pull_jobs(RedisLink& link, JobStore& local, const std::map<JobId, std::uint64_t>& here,
+                       const std::string& set_key, const std::string& node) {
+  const auto ids = job_ids(link, set_key);
+  if (!ids) return tl::unexpected(ids.error());
+  auto wanted = wanted_of(link, local, here, *ids, node);
+  if (!wanted) return tl::unexpected(wanted.error());
+  return take_jobs(link, local, here, *wanted);
+}
+
 }  // namespace
 
 Result<std::vector<JobId>> job_ids(RedisLink& link, const std::string& set_key) {
@@ -133,8 +143,9 @@ Result<void> keep_from_redis(JobStore& local, const RedisJob& job) {
   if (log->empty())
     for (const LogLine& line : job.log)
       if (auto added = local.add_log(job.job.id, line); !added) return added;
-  // The record is last: from then on the job counts as copied. If the process were killed before it had the
-  // points and the log, the next start would not copy them, and a later change would replace those in Redis.
+  // The record is stored last, since a job with a record counts as copied. If it were stored first and the
+  // process were killed, the next start would not copy the points and the log, and a later change would
+  // overwrite them in Redis.
   return local.put_job(job.job);
 }
 
@@ -157,13 +168,9 @@ Result<void> pull_quarantined(RedisLink& link, JobStore& local) {
 Result<void> pull_from_redis(RedisLink& link, JobStore& local, std::span<const StoredJob> known) {
   if (auto quarantined = pull_quarantined(link, local); !quarantined) return quarantined;
   if (auto counters = pull_counters(link, local); !counters) return counters;
-  const auto ids = job_ids(link, kRedisJobs);
-  if (!ids) return tl::unexpected(ids.error());
   std::map<JobId, std::uint64_t> here;
   for (const StoredJob& job : known) here[job.id] = job.revision;
-  auto wanted = wanted_of(link, local, here, *ids, "");
-  if (!wanted) return tl::unexpected(wanted.error());
-  return take_jobs(link, local, here, *wanted);
+  return pull_jobs(link, local, here, kRedisJobs, "");
 }
 
 Result<void> pull_owned(RedisLink& link, JobStore& local, const std::string& node) {
@@ -187,12 +194,7 @@ Result<void> pull_owned(RedisLink& link, JobStore& local, const std::string& nod
     log_warn(fmt::format("job={} store=redis", id.value),
              "another coordinator has taken it over while this one was away: dropped");
   if (auto removed = local.remove_jobs(gone); !removed) return removed;
-
-  const auto ids = job_ids(link, "lightshaft:owned:" + node);
-  if (!ids) return tl::unexpected(ids.error());
-  auto wanted = wanted_of(link, local, here, *ids, node);
-  if (!wanted) return tl::unexpected(wanted.error());
-  return take_jobs(link, local, here, *wanted);
+  return pull_jobs(link, local, here, "lightshaft:owned:" + node, node);
 }
 
 Result<std::set<JobId>> jobs_behind(RedisLink& link, std::span<const std::pair<JobId, std::uint64_t>> known) {

@@ -26,8 +26,8 @@ Result<void> pull_from_redis(RedisLink& link, JobStore& local, std::span<const S
 // `node` still owns, and removes from `local` those that another coordinator has taken over.
 Result<void> pull_owned(RedisLink& link, JobStore& local, const std::string& node);
 
-// Stores a job, its points and its log in `local`, the job last. Points that `local` has stay, and so does
-// its log unless it is empty.
+// Stores a job, its points and its log in `local`, the job last. Points in `local` are kept and only later
+// ones added; a log in `local` is kept unless it is empty.
 Result<void> keep_from_redis(JobStore& local, const RedisJob& job);
 // Stores a job that another coordinator owned until now. It replaces everything that `local` has of the job.
 Result<void> keep_inherited(JobStore& local, const RedisJob& job);

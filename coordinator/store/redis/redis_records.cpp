@@ -1,18 +1,11 @@
 #include "coordinator/store/redis/redis_records.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cctype>
 #include <charconv>
-#include <nlohmann/json.hpp>
-
-#include "coordinator/store/jobs/json_number.h"
 
 namespace ls::coordinator {
 namespace {
-
-using nlohmann::json;
 
 // Writes a job's changes if they are newer than the data in Redis, in one atomic step: no other write can
 // come between reading the revision and writing. ARGV: revision, id, fence, node, sequence or '', fields ...
@@ -47,43 +40,6 @@ redis.call('SREM', KEYS[2], ARGV[1])
 if ARGV[3] ~= '' then redis.call('HDEL', 'lightshaft:sequences', ARGV[3]) end
 return redis.call('DEL', KEYS[1])
 )";
-
-std::string dumped(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
-
-std::optional<ReferenceError> reference_error_of(const json& t) {
-  if (t.is_null()) return {};
-  ReferenceError reference_error{t.at(0), t.at(1), {}};
-  const auto known = [&](std::size_t i) {
-    return t.at(i).is_null() ? std::nullopt : std::optional(t.at(i).get<double>());
-  };
-  reference_error.flip = known(2), reference_error.mse_stderr = known(3),
-  reference_error.relmse_stderr = known(4);
-  return reference_error;
-}
-
-json reference_error_value(const std::optional<ReferenceError>& reference_error) {
-  if (!reference_error) return nullptr;
-  const auto or_null = [](const std::optional<double>& v) { return v ? json(*v) : json(); };
-  return json::array({reference_error->rmse, reference_error->relmse, or_null(reference_error->flip),
-                      or_null(reference_error->mse_stderr), or_null(reference_error->relmse_stderr)});
-}
-
-std::vector<ConvergencePoint> parse_points(const std::string& text) {
-  std::vector<ConvergencePoint> points;
-  for (const json& p : json::parse(text)) {
-    const ErrorFigures error{number_of(p.at(3)), number_of(p.at(4)), number_of(p.at(5)),
-                             number_of(p.at(6)), number_of(p.at(8)), number_of(p.at(9))};
-    points.push_back(
-        {number_of(p.at(0)), number_of(p.at(1)), number_of(p.at(2)), error, reference_error_of(p.at(7))});
-  }
-  return points;
-}
-
-std::vector<LogLine> parse_log(const std::string& text) {
-  std::vector<LogLine> lines;
-  for (const json& line : json::parse(text)) lines.push_back({line.at(0), line.at(1)});
-  return lines;
-}
 
 }  // namespace
 
@@ -143,22 +99,6 @@ std::vector<RedisLink::Command> remove_commands(const JobId& id, const std::stri
   return {{"SREM", kRedisJobs, id.value}, {"DEL", redis_job_key(id)}};
 }
 
-std::string points_json(const std::vector<ConvergencePoint>& points) {
-  json all = json::array();
-  for (const auto& p : points)
-    all.push_back({finite(p.seconds), finite(p.core_seconds), finite(p.spp), finite(p.error.rmse),
-                   finite(p.error.relmse), finite(p.error.relmse_lo), finite(p.error.relmse_hi),
-                   reference_error_value(p.reference_error), finite(p.error.rmse_lo),
-                   finite(p.error.rmse_hi)});
-  return dumped(all);
-}
-
-std::string log_json(const std::vector<LogLine>& lines) {
-  json all = json::array();
-  for (const auto& line : lines) all.push_back({line.unix_time, line.text});
-  return dumped(all);
-}
-
 Result<RedisJob> parse_redis_job(const RedisReply& fields) {
   std::map<std::string, std::string> values;
   for (std::size_t i = 0; i + 1 < fields.items.size(); i += 2)
@@ -170,11 +110,15 @@ Result<RedisJob> parse_redis_job(const RedisReply& fields) {
   // contains the fence of the current owner.
   std::from_chars(values["fence"].data(), values["fence"].data() + values["fence"].size(), read.fence);
   read.job.fence = std::max(read.job.fence, read.fence);
-  try {
-    if (!values["points"].empty()) read.points = parse_points(values["points"]);
-    if (!values["log"].empty()) read.log = parse_log(values["log"]);
-  } catch (const json::exception& e) {
-    return fail(Errc::internal, fmt::format("the points or log of a job are damaged: {}", e.what()));
+  if (!values["points"].empty()) {
+    auto points = parse_points(values["points"]);
+    if (!points) return tl::unexpected(points.error());
+    read.points = std::move(*points);
+  }
+  if (!values["log"].empty()) {
+    auto log = parse_log(values["log"]);
+    if (!log) return tl::unexpected(log.error());
+    read.log = std::move(*log);
   }
   return read;
 }

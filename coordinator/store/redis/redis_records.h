@@ -41,9 +41,6 @@ RedisLink::Command put_command(const RedisUpdate& update);
 // owns then stay.
 std::vector<RedisLink::Command> remove_commands(const JobId& id, const std::string& node = "");
 
-std::string points_json(const std::vector<ConvergencePoint>& points);
-std::string log_json(const std::vector<LogLine>& lines);
-
 struct RedisJob {
   StoredJob job;
   std::vector<ConvergencePoint> points;

@@ -1,4 +1,4 @@
-// Answers that take their time or much room: they keep no other waiting, and no memory.
+// Slow answers and large ones: neither delays the answers to other clients or takes much memory.
 #include <atomic>
 #include <filesystem>
 #include <fstream>
@@ -11,7 +11,7 @@
 namespace ls::http::testing {
 namespace {
 
-// What other machines take their time for: nothing that is answered here waits behind it.
+// Requests that wait for another machine do not delay requests that are answered from memory.
 TEST_F(ServerTest, QuestionsToOtherMachinesKeepNoQuickAnswerWaiting) {
   std::promise<void> answered;
   const auto answer = answered.get_future().share();
@@ -38,11 +38,11 @@ TEST_F(ServerTest, QuestionsToOtherMachinesKeepNoQuickAnswerWaiting) {
   EXPECT_TRUE(eventually([&] { return asking == 6; }));
   EXPECT_EQ(ask("GET /readyz HTTP/1.1\r\nHost: x\r\n\r\n"), 200);
   answered.set_value();
-  server->stop();  // its threads look at what is here
+  server->stop();  // stopped here, since its threads use the variables above
   server.reset();
 }
 
-// Clients that ask for something and do not read it.
+// Connects `count` clients that send the request and do not read the answer.
 std::vector<std::unique_ptr<RawClient>> slow_readers(int port, int count, const std::string& request) {
   std::vector<std::unique_ptr<RawClient>> all;
   for (int i = 0; i < count; ++i) {

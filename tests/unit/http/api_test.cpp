@@ -2,7 +2,6 @@
 #include <set>
 
 #include "coordinator/http/api/handlers.h"
-#include "coordinator/http/message/problem.h"
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {
@@ -166,7 +165,7 @@ TEST_F(Jobs, HaveImagesReportAndFigures) {
   EXPECT_EQ(json_of(ask(Method::get, url + "/report"))["size"], json({40, 24}));
   EXPECT_EQ(json_of(ask(Method::get, url + "/tiles"))["tiles"].size(), 2u);
   EXPECT_EQ(text(ask(Method::get, url + "/convergence.csv")).substr(0, 8), "seconds,");
-  EXPECT_TRUE(eventually([&] {  // it is stored in the background
+  EXPECT_TRUE(eventually([&] {  // the log is stored in the background
     return text(ask(Method::get, url + "/log")).find("submitted\n") != std::string::npos;
   }));
   EXPECT_EQ(json_of(ask(Method::get, "/api/v1/jobs"))["jobs"].size(), 1u);
@@ -215,7 +214,7 @@ TEST_F(Blobs, WithAnotherDigestOrTooLargeLeaveNothing) {
   EXPECT_EQ(header(ask(Method::head, url), "Upload-Offset"), "0");
   EXPECT_EQ(blobs->open_uploads, 0);
 
-  // The stored one is not replaced, but a body that isn't it is refused.
+  // A second PUT does not replace the blob, but a body that differs from the blob is rejected.
   ASSERT_EQ(ask(Method::put, url, "grid", "application/octet-stream").status, 201);
   EXPECT_EQ(ask(Method::put, url, "grit", "application/octet-stream").status, 400);
 }
@@ -368,7 +367,7 @@ TEST_F(Routes, AreThoseOfTheOpenApiDocument) {
   EXPECT_EQ(doc["openapi"], "3.1.0");
 }
 
-// Every "$ref" of the document leads somewhere.
+// Every "$ref" in the document names something that exists.
 TEST_F(Routes, DocumentHasNoDanglingReference) {
   const json doc = json::parse(embedded_openapi());
   std::vector<const json*> open{&doc};

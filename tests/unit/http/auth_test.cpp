@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <fstream>
 
-#include "coordinator/http/auth/token_file.h"
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {
@@ -67,7 +66,7 @@ TEST_F(AuthTest, TradesTheTokenForACookieThatScriptsAndOtherSitesCannotUse) {
 TEST_F(AuthTest, RefusesAChangedOrExpiredOrClosedSession) {
   const std::string good = cookie();
   std::string later = good;
-  later.replace(later.find('=') + 1, 1, "9");  // an expiry further off, with the old mac
+  later.replace(later.find('=') + 1, 1, "9");  // a later expiry with the old MAC
   EXPECT_EQ(status(Method::get, {{"cookie", later}}), 401);
   EXPECT_EQ(status(Method::get, {{"cookie", good.substr(0, good.size() - 1)}}), 401);
 
@@ -81,7 +80,8 @@ TEST_F(AuthTest, RefusesAChangedOrExpiredOrClosedSession) {
   EXPECT_EQ(status(Method::get, {{"cookie", cookie()}}), 200);
 }
 
-// One with read rights, say, that opens and closes sessions all day to bring back what was closed before.
+// Someone with a read token could open and close many sessions so that an earlier closed one is forgotten and
+// becomes valid again.
 TEST_F(AuthTest, AClosedSessionStaysClosedHoweverManyAreClosedAfterIt) {
   const auto close = [&](const std::string& session) {
     auth.close_session(request(Method::del, "/api/v1/session", {{"cookie", session}}));
@@ -139,7 +139,7 @@ TEST_F(AuthTest, ASessionHasTheRoleOfItsTokenAndEndsWithIt) {
   ASSERT_TRUE(std::holds_alternative<Caller>(found));
   EXPECT_EQ(std::get<Caller>(found).role, Role::submit);
   EXPECT_EQ(std::get<Caller>(found).user, "anna");
-  // The id inside is under the mac: it can't be made that of another token.
+  // The MAC covers the token's id in the cookie: replacing the id makes the cookie invalid.
   std::string other = session;
   const std::string admin_id = tokens.list().front().id;
   other.replace(other.find(made->info.id), admin_id.size(), admin_id);
@@ -178,7 +178,7 @@ TEST_F(AuthTest, GuessingEndsButNotForThoseWhoWereRightBefore) {
   for (int i = 0; i < 3; ++i) EXPECT_EQ(ask("wrong", "10.0.0.1"), 401) << i;
 
   EXPECT_EQ(ask("wrong", "10.0.0.1"), 429);
-  EXPECT_EQ(ask(read, "10.0.0.1"), 429);  // a right guess does not show
+  EXPECT_EQ(ask(read, "10.0.0.1"), 429);  // the answer does not reveal that the guess was right
   EXPECT_EQ(ask(kToken, "10.0.0.1"), 200);
   EXPECT_EQ(ask("wrong", "10.0.0.2"), 401);
   now += 2;

@@ -1,4 +1,4 @@
-// Bundles, good and hostile ones; all are written here with libarchive.
+// Bundles, valid and malicious ones; all are written here with libarchive.
 #include "coordinator/http/bundle/bundle.h"
 
 #include <archive.h>
@@ -82,7 +82,7 @@ class Bundles : public ::testing::Test {
   Result<Bundle> read(const Packing& packing, const Items& items, BundleLimits limits = {}) {
     return read(packed(packing, items), packing.kind, limits);
   }
-  // Why it is refused. Nothing of it may have come into the store.
+  // Returns why the bundle is rejected. Checks that none of its files was stored.
   std::string refusal(const Packing& packing, const Items& items, BundleLimits limits = {}) {
     return refusal(packed(packing, items), packing.kind, limits);
   }
@@ -99,7 +99,7 @@ class Bundles : public ::testing::Test {
   std::stop_source stop;
 };
 
-// With what stands before and behind the bad one.
+// Returns the items of an archive with `bad` among valid ones.
 Items around(Item bad) { return {{"a.xml", "<scene/>"}, {"good", "inside"}, std::move(bad), {"later", "x"}}; }
 
 TEST_F(Bundles, PutEveryFileIntoTheStoreByItsDigest) {
@@ -202,7 +202,8 @@ TEST_F(Bundles, WithNamesThatLeadOutAreRefused) {
     }
 }
 
-// Some programs write them into a zip instead of slashes: there libarchive reads them as such.
+// Some programs write backslashes into a zip instead of slashes; libarchive converts them in a zip, not in a
+// tar.
 TEST_F(Bundles, KnowBackslashesInZipOnly) {
   EXPECT_THAT(refusal(kTar, around({"a\\b.ply", "x"})), HasSubstr("backslash"));
   EXPECT_THAT(refusal(kZip, around({"a\\..\\b.ply", "x"})), HasSubstr("leads out"));
@@ -261,12 +262,12 @@ TEST_F(Bundles, ThatAreBombsAreRefusedByEntry) {
       << "grids may be empty";
 }
 
-// At every place where an archive can be cut it is refused, also between two entries.
+// An archive is rejected wherever it is cut off, even between two entries.
 TEST_F(Bundles, CutOffAnywhereAreRefused) {
   const Items items{{"a.xml", "<scene/>"}, {"good", "inside"}, {"b", std::string(700, 'b')}};
   const std::string zip = packed(kZip, items), tar = packed(kTar, items), gzip = packed(kTarGzip, items);
   for (std::size_t n = 0; n < zip.size(); n += 3) refusal(zip.substr(0, n), ArchiveKind::zip);
-  // The three entries take 2 + 2 + 3 blocks of 512 bytes; then come the zeros.
+  // The three entries take 2 + 2 + 3 blocks of 512 bytes; the blocks of zeros follow.
   for (std::size_t n = 0; n <= 7 * 512; n += 128) refusal(tar.substr(0, n), ArchiveKind::tar);
   for (std::size_t n = 0; n < gzip.size() - 20; n += 3) refusal(gzip.substr(0, n), ArchiveKind::tar);
   EXPECT_TRUE(read(tar.substr(0, 8 * 512), ArchiveKind::tar)) << "one block of zeros ends a tar";
@@ -284,7 +285,7 @@ TEST_F(Bundles, DamagedAnywhereAreRefusedOrReadRight) {
       EXPECT_FALSE(got.error().message.empty());
       continue;
     }
-    // Names have no checksum; bytes do.
+    // The archive has checksums of the bytes but not of the names.
     for (const auto& [name, digest] : got->assets)
       EXPECT_TRUE(digest == sha256("inside") || digest == sha256(std::string(700, 'b')) ||
                   digest == sha256("<scene/>"))

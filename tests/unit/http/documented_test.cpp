@@ -1,4 +1,4 @@
-// What the API's answers hold is what its description says that they hold.
+// The API's answers have the members that openapi.json describes.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>

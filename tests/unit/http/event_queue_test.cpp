@@ -56,7 +56,7 @@ TEST(EventQueue, SaysWhenEventsWereMissed) {
   none.push({5, "job", "x", ""});
   EXPECT_EQ(none.take().find("reset"), std::string::npos);
 
-  // Later jumps in the ids are no loss: one that comes while we listen can't be missed.
+  // Later gaps in the ids are no loss: no event is missed while the reader is subscribed.
   none.push({50, "job", "x", ""});
   EXPECT_EQ(none.take().find("reset"), std::string::npos);
 }
@@ -65,7 +65,7 @@ TEST(EventQueue, EndsForAReaderThatIsTooSlow) {
   EventQueue few({2, 10'000}, "", 0, [] {});
   for (std::uint64_t id = 1; id <= 3; ++id) few.push({id, "job", "x", ""});
   EXPECT_TRUE(few.overflowed());
-  const std::string text = few.take();  // whole events up to the break: the reader comes back with id 2
+  const std::string text = few.take();  // only whole events; the reader reconnects with id 2
   EXPECT_NE(text.find("id: 2\n"), std::string::npos);
   EXPECT_EQ(text.find("id: 3\n"), std::string::npos);
   few.push({4, "job", "x", ""});

@@ -1,4 +1,4 @@
-// An Api over a coordinator in memory, and requests to it as one line.
+// Fixtures with an Api and a coordinator in memory; ask() sends one request to the Api.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -45,7 +45,7 @@ inline Request request(Method method, std::string_view target, Fields headers = 
   return r;
 }
 
-// A coordinator in memory, and what it stores.
+// A coordinator in memory, with its store.
 class CoordinatorTest : public ::testing::Test {
  protected:
   static std::unique_ptr<Coordinator> open(Coordinator::Options options) {
@@ -60,7 +60,7 @@ class CoordinatorTest : public ::testing::Test {
 
 class ApiTest : public CoordinatorTest {
  protected:
-  // As the server loop does: admit, then the handler or the upload.
+  // Handles the request as the server loop does: admit(), then the handler or the upload.
   Response ask(Request r) {
     auto admitted = api.admit(r);
     if (auto* response = std::get_if<Response>(&admitted)) return *response;
@@ -78,7 +78,7 @@ class ApiTest : public CoordinatorTest {
     if (auto refused = sink->append(std::as_bytes(std::span(r.body)))) return *refused;
     return sink->finish();
   }
-  // With the token.
+  // Sends the request with the administrator's token.
   Response ask(Method method, std::string_view target, std::string body = {},
                std::string type = "application/json") {
     Fields headers{{"authorization", std::string("Bearer ") + kToken}};

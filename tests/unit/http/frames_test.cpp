@@ -1,4 +1,5 @@
-// Sequences at the HTTP door: the range goes in, ?frame= names one film, and streams tell of all frames.
+// Sequences over HTTP: submission with a range of frames, requests for one frame (?frame=), and event streams
+// with the events of all frames.
 #include "coordinator/http/net/event_queue.h"
 #include "tests/unit/http/fixture.h"
 

@@ -1,4 +1,4 @@
-// The list of jobs in pages, and the same scene once more.
+// The list of jobs in pages, and submitting a job's scene once more.
 #include "tests/unit/http/fixture.h"
 
 namespace ls::http::testing {

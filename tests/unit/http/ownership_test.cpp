@@ -1,4 +1,4 @@
-// What a submit token sees of jobs, workers and events: its own. (All routes:
+// A submit token shows only the jobs, workers and events of its own user. (All routes:
 // tests/system/test_authorisation.py.)
 #include "coordinator/http/auth/auth.h"
 #include "tests/unit/http/fixture.h"

@@ -1,4 +1,5 @@
-// A client that says exactly what it is told to, byte by byte: well-behaved libraries can't misbehave enough.
+// A client that sends exactly the given bytes, so that it can misbehave in ways that HTTP libraries do not
+// allow.
 #pragma once
 
 #include <arpa/inet.h>
@@ -30,7 +31,7 @@ class RawClient {
   void close() {
     if (fd_ >= 0) ::close(std::exchange(fd_, -1));
   }
-  // False once the other side has gone.
+  // Returns false once the server has closed the connection.
   bool send(std::string_view text) {
     while (!text.empty()) {
       const ssize_t n = ::send(fd_, text.data(), text.size(), MSG_NOSIGNAL);
@@ -39,13 +40,13 @@ class RawClient {
     }
     return true;
   }
-  // Reads until `mark` has come, or the end; everything read so far stays in `received`.
+  // Reads until `mark` has arrived or the stream ends; all bytes read so far stay in `received`.
   bool read_until(std::string_view mark) {
     while (received.find(mark) == std::string::npos)
       if (!read_some()) return false;
     return true;
   }
-  // Whether something to read comes; nothing is read.
+  // Waits until bytes arrive, without reading them; false after 3 minutes.
   bool readable() {
     pollfd p{fd_, POLLIN, 0};
     return ::poll(&p, 1, 180'000) == 1;
@@ -55,7 +56,7 @@ class RawClient {
     }
     return received;
   }
-  // The next response with a Content-Length (or none), taken out of `received`.
+  // Removes the next response from `received` and returns it. Its body has a Content-Length, or it has none.
   std::string response() {
     if (!read_until("\r\n\r\n")) return std::exchange(received, {});
     const std::size_t head = received.find("\r\n\r\n") + 4;

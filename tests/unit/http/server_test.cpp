@@ -1,4 +1,4 @@
-// The server loop on a real port, with strangers that behave badly.
+// The server loop on a real port, with clients that misbehave.
 #include "coordinator/http/net/http_server.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ TEST_F(ServerTest, AnswersRequestsOneAfterTheOtherOnAKeptConnection) {
     EXPECT_EQ(RawClient::status(response), 200);
     EXPECT_TRUE(response.ends_with("\r\n\r\nok\n")) << response;
   }
-  client.send(kGet + kGet);  // and when they come at once
+  client.send(kGet + kGet);  // two requests sent at once
   EXPECT_EQ(RawClient::status(client.response()), 200);
   EXPECT_EQ(RawClient::status(client.response()), 200);
   client.send("GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
@@ -147,7 +147,7 @@ TEST_F(ServerTest, StreamsABundleToTheDiskWithinItsBounds) {
   std::snprintf(size, sizeof size, "%zx\r\n", zeros.size());
   const std::string chunk = size + zeros + "\r\n";
 
-  // Well-formed, but there is nothing in it.
+  // The archives are well-formed but empty.
   EXPECT_EQ(ask(head + "Content-Length: " + std::to_string(zeros.size()) + "\r\n\r\n" + zeros), 400);
   EXPECT_EQ(ask(head + "Transfer-Encoding: chunked\r\n\r\n" + chunk + "0\r\n\r\n"), 400);
   EXPECT_EQ(ask(head + "Transfer-Encoding: chunked\r\n\r\n" + chunk + chunk), 413);
@@ -160,7 +160,7 @@ TEST_F(ServerTest, AnswersARefusedUploadThatIsStillBeingSent) {
   start();
   const std::string body(500'000, 'x');
 
-  // No token: refused at the header, with most of the body on its way.
+  // Without a token: rejected by the header alone, while most of the body is still being sent.
   EXPECT_EQ(ask("PUT /api/v1/blobs/" + sha256(body).hex() +
                 " HTTP/1.1\r\nHost: x\r\nContent-Length: 500000\r\n\r\n" + body),
             401);
@@ -178,7 +178,7 @@ TEST_F(ServerTest, AsksForTheBodyOnlyWhenItWantsIt) {
   client.send("grid");
   EXPECT_EQ(RawClient::status(client.response()), 201);
 
-  EXPECT_EQ(ask(head), 204);  // it is here: no body is asked for
+  EXPECT_EQ(ask(head), 204);  // the blob is stored already, so its body is not requested
 }
 
 TEST_F(ServerTest, ServesOthersWhileTheSlowWorkIsBusy) {
@@ -188,7 +188,7 @@ TEST_F(ServerTest, ServesOthersWhileTheSlowWorkIsBusy) {
   const std::string body = "{\"scene\":\"" + blobs->add(kSceneText).hex() + "\"}";
   blobs->before_look = [gate] { gate.wait(); };
   std::vector<std::unique_ptr<RawClient>> waiting;
-  for (int i = 0; i < 6; ++i) {  // more than there are slow threads
+  for (int i = 0; i < 6; ++i) {  // more requests than slow threads
     waiting.push_back(std::make_unique<RawClient>(server->port()));
     waiting.back()->send("POST /api/v1/jobs HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n" +
                          kAuth + "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
@@ -208,12 +208,12 @@ TEST_F(ServerTest, BoundsTheNumberOfConnections) {
     open.push_back(std::make_unique<RawClient>(server->port()));
     open.back()->send(put("whole", 5) + "who");
   }
-  ASSERT_TRUE(eventually([&] { return blobs->open_uploads == 16; }));  // all under way, none idle
+  ASSERT_TRUE(eventually([&] { return blobs->open_uploads == 16; }));  // all are in progress, none is idle
 
   RawClient more(server->port());
   EXPECT_EQ(RawClient::status(more.read_all()), 503);
 
-  for (auto& client : open) EXPECT_EQ(RawClient::status(client->read_all()), 408);  // in the end they are cut
+  for (auto& client : open) EXPECT_EQ(RawClient::status(client->read_all()), 408);  // their time is up
   open.clear();
   EXPECT_TRUE(eventually([&] { return api->counters().connections == 0; }));
   EXPECT_EQ(ask(kGet), 200);
@@ -277,7 +277,7 @@ TEST_F(ServerTest, SendsAwayAReaderThatDoesNotKeepUp) {
 
   const JobId job = coordinator::submit(*coordinator);
   int sent = 1;
-  EXPECT_TRUE(eventually([&] {  // the lazy one reads nothing: its socket fills, then its queue
+  EXPECT_TRUE(eventually([&] {  // `lazy` reads nothing: its socket fills, then its queue
     EXPECT_TRUE(set_priority(*coordinator, job, ++sent));
     EXPECT_TRUE(keen.read_until("id: " + std::to_string(sent) + "\n"));
     keen.received.clear();

@@ -112,7 +112,7 @@ TEST(TokenRegistry, ChangesNothingInAFileThatItCannotRead) {
   EXPECT_EQ(content(file), edited);
   EXPECT_TRUE(tokens->find(made.token)) << "the tokens of before count";
 
-  ::chmod(file.c_str(), 0620);  // another error, of which the file's time and size say nothing
+  ::chmod(file.c_str(), 0620);  // another error, which does not change the file's time or size
   EXPECT_FALSE(tokens->revoke(made.info.id));
   write(file, sound);
   EXPECT_TRUE(tokens->revoke(made.info.id));
@@ -127,7 +127,7 @@ TEST(TokenRegistry, ReadsAFileAgainThatItCouldNotRead) {
   ::chmod(file.c_str(), 0620);
   EXPECT_FALSE(tokens->find("x"));
 
-  ::chmod(file.c_str(), 0600);  // which changes neither size nor time
+  ::chmod(file.c_str(), 0600);  // this changes neither size nor time
 
   EXPECT_TRUE(tokens->find("x"));
 }

@@ -23,7 +23,7 @@ TEST_F(Uploads, InPartsAreKeptUntilTheyAreWhole) {
   EXPECT_EQ(header(probe, "Upload-Offset"), "2");
   EXPECT_EQ(header(probe, "Upload-Complete"), "?0");
 
-  // What does not go on where the bytes end is told where that is.
+  // A part that does not begin where the received bytes end is rejected with the right offset.
   for (const auto& [range, body, status] :
        std::initializer_list<std::tuple<const char*, const char*, int>>{{"bytes 3-3/4", "d", 409},
                                                                         {"bytes 0-3/4", "grid", 409},

@@ -1,4 +1,4 @@
-// Stores in memory for a coordinator under test, which a test can watch and hold up.
+// Stores in memory for a coordinator under test. A test can observe their calls and delay them.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using namespace ls::coordinator;
 
 class WatchedBlobs final : public BlobStore {
  public:
-  std::function<void()> before_look;  // at a blob
+  std::function<void()> before_look;  // called before a blob is looked up
   bool has(const Digest& digest) const override {
     if (before_look) before_look();
     const std::lock_guard lock(mutex_);
@@ -98,19 +98,19 @@ class WatchedBlobs final : public BlobStore {
   std::map<Digest, std::vector<std::byte>> blobs_, parts_;
 };
 
-// Stores records in memory, knows the last job that was put, and takes its time or fails when a test says so.
+// Stores records in memory and remembers the last job that was put. A test can delay its calls or make them
+// fail.
 class WatchedRecords final : public MovingStore {
  public:
-  std::map<std::string, JobLocation> others;  // jobs that other coordinators have
+  std::map<std::string, JobLocation> others;  // owners of jobs that other coordinators have
   std::function<void()> before_asking_others;
-  std::atomic<bool> refuses{false};  // to store a job
+  std::atomic<bool> refuses{false};  // true: storing a job fails
   std::size_t log_bytes = 0;         // if not 0, the log of each job is a line of that many bytes
 
   StoredJob last_job() const {
     const std::lock_guard lock(last_mutex_);
     return last_job_;
   }
-  Result<void> put_job(const StoredJob& job) override { return put_jobs({&job, 1}); }
   Result<void> put_jobs(std::span<const StoredJob> jobs) override {
     if (refuses) return fail(Errc::resource_exhausted, "the disk is full");
     const std::lock_guard lock(last_mutex_);

@@ -1,5 +1,5 @@
-// Whole jobs over gRPC in one process: a coordinator in memory and agents with the fake renderer, each with a
-// connection and a cache of its own. ThreadSanitizer sees both ends of every stream here
+// Whole jobs over gRPC in one process: a coordinator in memory, and agents with the fake renderer, each with
+// its own connection and cache. Both ends of every stream are in this process, so ThreadSanitizer checks both
 // (tests/support/grpc_handover.cpp).
 #include <gtest/gtest.h>
 
@@ -125,7 +125,7 @@ TEST_F(GrpcFarm, FourWorkersRenderThePixelsOfOne) {
   for (auto& each : workers) EXPECT_TRUE(each->drain());
 }
 
-// Leases, results, progress reports and cancellations cross on the streams.
+// Leases, results, progress reports and cancellations are sent on the streams at the same time.
 TEST_F(GrpcFarm, JobsAreCancelledWhileOthersRender) {
   std::vector<std::unique_ptr<GrpcWorker>> workers;
   for (int i = 0; i < 3; ++i) workers.push_back(worker(i));
@@ -144,7 +144,7 @@ TEST_F(GrpcFarm, JobsAreCancelledWhileOthersRender) {
 TEST_F(GrpcFarm, StreamsThatAreCutAnywhereLoseNothing) {
   const JobId job = submit_long();
   auto steady = worker(0);
-  for (int i = 1; i <= 6; ++i) {  // each leaves without a word
+  for (int i = 1; i <= 6; ++i) {  // each worker disconnects without draining first
     const std::uint64_t before = units_done(job);
     auto brief = worker(i);
     wait_for([&] { return units_done(job) > before + 10 || is_terminal(coordinator_->job(job)->state); });
@@ -183,7 +183,7 @@ TEST_F(GrpcFarm, AWorkerWithAWrongTokenIsToldAndEnds) {
   EXPECT_EQ(ended.error().code, Errc::unauthenticated);
 }
 
-// An observer that is slow to hear that its connection was lost: until close() has returned, or for a while.
+// An observer whose lost() returns only after `closed` is set, or after 100 ms.
 struct SlowToHear final : worker::LinkObserver {
   void received(ToWorker) override { answered.store(true); }
   void lost(Error) override {
@@ -194,7 +194,8 @@ struct SlowToHear final : worker::LinkObserver {
   std::atomic<bool> answered = false, closed = false, heard = false;
 };
 
-// Otherwise the call, which owns the channel too, could outlive the link on a thread of gRPC.
+// close() must wait for lost(). Otherwise the call, which also owns the channel, could outlive the link on a
+// thread of gRPC.
 TEST_F(GrpcFarm, ALinkIsClosedOnlyAfterItsObserverWasTold) {
   for (int i = 0; i < 5; ++i) {
     auto link = worker::make_grpc_link(address_, kToken);
@@ -213,8 +214,9 @@ TEST_F(GrpcFarm, ALinkIsClosedOnlyAfterItsObserverWasTold) {
   }
 }
 
-// When the last channel of a process ends, gRPC joins its threads. If one of them ended it, it would join
-// itself and use what it has just freed. There is no server here, whose channels would keep the threads.
+// When the last channel of a process is destroyed, gRPC joins its threads. If one of these threads destroyed
+// it, that thread would join itself and use freed memory. This test runs no server, since a server's channels
+// would keep the threads alive.
 TEST(GrpcLink, ToACoordinatorThatIsNotThereEndsCleanly) {
   for (int i = 0; i < 5; ++i) {
     auto link = worker::make_grpc_link("127.0.0.1:1", kToken);  // a port where no coordinator listens

@@ -1,5 +1,5 @@
-// Jobs with a target error through the whole coordinator: tiles stop after different numbers of rounds, and
-// the pixels are the same whoever rendered them, in whatever order, and however often somebody was killed.
+// Jobs with a target error through the whole coordinator. Tiles stop after different numbers of rounds. The
+// pixels are the same for any workers, any order of results and any number of restarts.
 #include <algorithm>
 #include <random>
 
@@ -11,8 +11,9 @@
 namespace ls::coordinator {
 namespace {
 
-// 5 x 4 tiles of the fake's pixels, whose noise is the same everywhere: where they are dark, at the upper
-// left, the relative error is largest. The lowest row, cut at 13 pixels, stops with its neighbours.
+// The image has 5 x 4 tiles of fake pixels, whose noise is the same everywhere; so the relative error is
+// largest where they are dark, at the upper left. The lowest row of tiles has a height of 13 pixels and stops
+// with its neighbours.
 JobSpec spec_with(std::optional<double> target, std::optional<std::uint64_t> spp = {}) {
   JobSpec spec;
   spec.size = FrameSize{160, 109};
@@ -47,10 +48,11 @@ std::vector<std::uint64_t> spp_of_tiles(const Coordinator& coordinator, const Jo
   return spp;
 }
 
-// Some tiles are rounds, and levels, ahead of others. A sample costs the same everywhere, and a restart
-// does not change what is known of it.
+// When a checkpoint is taken, some tiles are rounds, and levels of adaptive sampling, ahead of others. The
+// cost of the checkpoint must include only its own samples, even after a restart. Every sample costs the same
+// here.
 TEST(Adaptive, ACheckpointCostsWhatItsOwnSamplesTook) {
-  constexpr double kCost = 1. / 1024;  // of a pixel's sample
+  constexpr double kCost = 1. / 1024;  // CPU seconds per sample of a pixel
   for (const bool killed : {false, true}) {
     TempFolder dir;
     auto coordinator = open_at(dir.path());
@@ -78,7 +80,8 @@ TEST(Adaptive, ACheckpointCostsWhatItsOwnSamplesTook) {
     ASSERT_GT(points.size(), 7u);
     for (std::size_t i = 0; i < points.size(); ++i)
       EXPECT_NEAR(points[i]["core_seconds"].get<double>(), kCost * 160 * 109 * points[i]["spp"].get<double>(),
-                  1e-6 * points[i]["core_seconds"].get<double>())  // floats of single units
+                  // The cost of each unit is stored as a float
+                  1e-6 * points[i]["core_seconds"].get<double>())
           << i << " of " << points.size() << (killed ? ", killed" : "");
   }
 }
@@ -163,7 +166,7 @@ TEST(Adaptive, ShuffledDuplicatedAndLostResultsGiveTheSamePixels) {
     auto coordinator = open_at({});
     const JobId job = submit(*coordinator, spec_with(kTarget));
     FakeFarm farm(*coordinator, 1 + static_cast<int>(seed));
-    std::vector<UnitResult> kept;  // handed in late
+    std::vector<UnitResult> kept;  // results that are sent late
     farm.tamper = [&](UnitResult r) {
       std::vector<UnitResult> out{r};
       if (random() % 4 == 0) out.push_back(r);

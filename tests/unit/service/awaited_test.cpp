@@ -1,5 +1,5 @@
-// Jobs whose files are damaged or gone: they wait, cost nobody anything, and go on when the files are here
-// again.
+// Jobs whose files are damaged or missing: they wait without costing workers any attempts, and resume when
+// the files are available again.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -47,7 +47,7 @@ struct Awaited : ::testing::Test {
     return id.value_or(JobId{});
   }
   void damage() const { std::ofstream(blobs->path(wood)) << "other bytes"; }
-  // As a worker's FetchBlob does.
+  // Does what a worker's call FetchBlob does.
   void fetch() const {
     if (const auto right = blobs->prove(wood); !right) coordinator->blob_missing(wood, right.error());
   }
@@ -125,7 +125,7 @@ TEST_F(Awaited, AJobThatItsUserPausedMeanwhileStaysPaused) {
   damage();
   fetch();
   ASSERT_TRUE(pause(*coordinator, paused));
-  job = submit_wood();  // brings the file
+  job = submit_wood();  // uploads the file again
   coordinator->blob_missing(wood, {Errc::not_found, "there is no such blob"});
   ASSERT_EQ(state(), JobState::paused);
 

@@ -1,4 +1,4 @@
-// What users change, what is removed, and what a damaged folder or store does to one job and not to others.
+// Changes and removals of jobs, and damaged folders and records, which must affect one job only.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
@@ -63,7 +63,7 @@ TEST(Restore, AnUnreadableFolderFailsItsJobAloneUntilItIsRepaired) {
     auto coordinator = open_at(dir.path());
     bad = submit(*coordinator);
     good = submit(*coordinator);
-    FakeFarm farm(*coordinator, 1);  // a job has a folder from its first result on
+    FakeFarm farm(*coordinator, 1);  // a job gets its folder with its first result
     ASSERT_TRUE(farm.run([&] { return coordinator->job(bad)->units_done >= 2; }));
   }
   const fs::path folder = dir.path() / "jobs" / bad.value;
@@ -90,7 +90,7 @@ TEST(Pin, AClassThatCannotBeStoredHoldsTheJobUntilItIs) {
   sql(dir.path(),
       "CREATE TRIGGER broken BEFORE UPDATE ON jobs BEGIN SELECT RAISE(ABORT, 'the disk is broken'); END");
   FakeFarm farm(*coordinator, 1);
-  // All that it handed in: a refusal that came after the resume would pause the job again.
+  // Waits for the refusals of all sent results: one that came after the resume would pause the job again.
   ASSERT_TRUE(farm.run([&] {
     return !farm.refusals.empty() && farm.refusals.size() == static_cast<std::size_t>(farm.results_sent);
   }));
@@ -118,7 +118,8 @@ TEST(Done, AJobLeavesTheFarmsBooksAndCanStillBeExtended) {
   EXPECT_EQ(extend(*coordinator, job, 12).error().code, Errc::invalid_argument);
   ASSERT_TRUE(extend(*coordinator, job, 70));
 
-  FakeFarm farm(*coordinator, 1);  // with two, units that move to the idle one are rendered by both
+  // One worker, since with two an idle worker also renders units of the other
+  FakeFarm farm(*coordinator, 1);
   ASSERT_TRUE(farm.finish(job));
 
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels(70));
@@ -178,7 +179,7 @@ TEST(Remove, CancelsAJobThatRunsAndRemovesOneThatHasEnded) {
   EXPECT_EQ(coordinator->remove(running).error().code, Errc::not_found);
   EXPECT_TRUE(coordinator->jobs().empty());
 
-  // The keeper does its work in order: this job's end comes after the removals.
+  // The writer thread works in order, so the end of this job comes after the removals.
   const JobId last = finished(*coordinator);
   EXPECT_FALSE(fs::exists(dir.path() / "jobs" / done.value));
   EXPECT_FALSE(fs::exists(dir.path() / "jobs" / running.value));
@@ -193,8 +194,9 @@ TEST(Remove, CancelsAJobThatRunsAndRemovesOneThatHasEnded) {
 TEST(Change, IsDoneAsAWholeOrNotAtAll) {
   auto coordinator = open_at({});
   const JobId job = submit(*coordinator);
-  EXPECT_FALSE(coordinator->change(job, {JobState::paused, 5, 64, .001}));  // it has no target
-  EXPECT_FALSE(coordinator->change(job, {JobState::paused, 5, 4, {}}));     // it has 16 samples already
+  // Samples and target error cannot be changed together
+  EXPECT_FALSE(coordinator->change(job, {JobState::paused, 5, 64, .001}));
+  EXPECT_FALSE(coordinator->change(job, {JobState::paused, 5, 4, {}}));  // it has 16 samples already
   EXPECT_FALSE(coordinator->change(job, {JobState::paused, 2'000'000, 64, {}}));
 
   const JobView before = coordinator->job(job).value();
@@ -249,10 +251,10 @@ TEST(Budget, HoldsNoThreadBackAndGrantsInOrder) {
   ByteBudget budget(10);
   std::string granted;
   const auto ask = [&](std::size_t bytes, char name) { budget.ask(bytes, [&, name] { granted += name; }); };
-  ask(20, 'a');  // alone it may be larger than everything
+  ask(20, 'a');  // granted, since nothing else is in use, although it exceeds the budget
   ask(6, 'b');
   ask(6, 'c');
-  ask(1, 'd');  // there would be room, but others came first
+  ask(1, 'd');  // would fit, but must wait for the earlier requests
   EXPECT_EQ(granted, "a");
   budget.release(20);
   EXPECT_EQ(granted, "ab");

@@ -58,7 +58,7 @@ TEST_F(Collect, WhoIsToldThatABlobIsThereHasTimeToSubmit) {
   coordinator->collect();
   clock->advance(kKeep - std::chrono::seconds(1));
 
-  ASSERT_TRUE(coordinator->blobs().has(file));  // as POST /blobs/missing asks
+  ASSERT_TRUE(coordinator->blobs().has(file));  // the same request as in POST /blobs/missing
   clock->advance(std::chrono::seconds(1));
   coordinator->collect();
 

@@ -69,8 +69,8 @@ TEST(ServiceDenoise, AddsLayersToTheImageAndTheirErrorToTheReport) {
   }
 }
 
-// Two jobs of the same pixels against references of their own: a cached image brings no figures of the
-// other's.
+// Two jobs have the same pixels and different references. The denoised image may come from the cache, but
+// each job gets the error against its own reference.
 TEST(ServiceDenoise, TheTrueErrorIsOfTheJobsOwnReference) {
   TempFolder dir;
   for (const std::filesystem::path& data : {dir.path(), std::filesystem::path()}) {
@@ -97,12 +97,13 @@ TEST(ServiceDenoise, TheTrueErrorIsOfTheJobsOwnReference) {
         for (const float v : std::get<ExrFloat>(image.channels.at(layer)).values)
           sum += (double{v} - levels[i]) * (double{v} - levels[i]);
       const double rmse = report(*coordinator, jobs[i])["denoised"]["true_rmse"];
-      EXPECT_NEAR(rmse, std::sqrt(sum / (3 * 40 * 24)), 1e-12);  // 2,880 doubles are added in another order
+      EXPECT_NEAR(rmse, std::sqrt(sum / (3 * 40 * 24)), 1e-12);  // the 2,880 terms are added in another order
     }
   }
 }
 
-// The colours, their digest and what is sealed of each tile know nothing of it but the guides.
+// Denoising leaves the pixels and their digest as they are: those of a job that has only the denoiser's guide
+// layers.
 TEST(ServiceDenoise, LeavesTheImageItselfAlone) {
   auto coordinator = open_with({}, fake("blurs"));
   JobSpec plain = denoised_job();

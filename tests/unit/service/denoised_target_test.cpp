@@ -17,7 +17,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// A denoiser that changes nothing: its error falls as that of the image itself.
+// A denoiser that returns its input: the error of the denoised image falls like that of the image itself.
 std::filesystem::path copying() { return program_beside_us("../fake_oidn") / "copies.so"; }
 
 std::unique_ptr<Coordinator> open_denoised(const std::filesystem::path& data,
@@ -56,7 +56,8 @@ TargetOutcome target_at_once(const JobSpec& spec) {
   return target_outcome(*coordinator, job);
 }
 
-// Targets that the fake's images come down to, taken from the checks of a job that has a target out of reach.
+// Target errors that the fake's images reach, taken from the checks of a job whose target is too small to be
+// reached.
 struct Targets {
   double loose = 0, tight = 0;
 };

@@ -1,4 +1,4 @@
-// Who is let in: workers and submissions, and what is said to those that are not.
+// Which workers and submissions are accepted, and the errors for those that are not.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -49,7 +49,8 @@ TEST(Service, AFakeWorkerIsTakenOnlyWhereItIsAllowed) {
   EXPECT_TRUE(test->workers().at(0).fake);
 }
 
-// Whatever class it names: where a fake worker has rendered a unit, the job says so.
+// A job is marked as fake when a fake worker has rendered one of its units, whatever numeric class the worker
+// claims.
 TEST(Service, AJobSaysSoOnceAFakeWorkerHasRenderedAUnitOfIt) {
   Coordinator::Options options;
   options.allow_fake = true;
@@ -163,7 +164,7 @@ TEST(Service, TakesEveryIntegratorThatASceneMaySay) {
   }
 }
 
-// One limit for scenes and jobs: what is too much is told with its place in the scene.
+// Scenes and jobs have the same limits. A value above its limit is reported with its place in the scene.
 TEST(Service, TakesTheLargestFramesAndSampleCountsThatASceneMayHave) {
   auto coordinator = open_at({});
   const auto with = [&](std::string from, const std::string& to) {

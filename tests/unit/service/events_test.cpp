@@ -70,7 +70,7 @@ TEST(EventHub, KeepsABoundedHistoryAndStartsWithTheOldestKept) {
   EXPECT_EQ(reader.first(limits::kEventsKept).front().id, 11u);
 }
 
-// A store that counts reserved ids, and can fail.
+// A store that counts the reserved ids; it fails while `fails` is set.
 struct Ids {
   std::uint64_t reserved = 0;
   bool fails = false;

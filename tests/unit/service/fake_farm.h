@@ -1,5 +1,5 @@
-// Fake workers for whole jobs through the coordinator's public interface: they render fake_partial, in any
-// order, twice, late or wrong, as a test wishes.
+// Fake workers that render whole jobs through the coordinator's public interface. They send results of
+// fake_partial in any order, twice, late or with errors, as the test chooses.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ inline const std::string kSceneText = R"(<scene version="3.0.0">
   <emitter type="constant"/>
 </scene>)";
 
-// Scenes like kSceneText, with another shape in line 7.
+// Returns kSceneText with another shape in line 7.
 inline std::string with_shape(const std::string& shape) {
   std::string text = kSceneText;
   return text.replace(text.find("<shape type=\"sphere\"/>"), 22, shape);
@@ -37,7 +37,7 @@ inline std::string with_mesh(const std::string& name) {
   return with_shape("<shape type=\"ply\"><string name=\"filename\" value=\"" + name + "\"/></shape>");
 }
 
-// Messages to all fake workers, in order of arrival.
+// The messages from the coordinator to all fake workers, in order of arrival.
 class Mailbox {
  public:
   void put(int worker, ToWorker message) {
@@ -45,8 +45,8 @@ class Mailbox {
     mail_.emplace_back(worker, std::move(message));
     arrived_.notify_all();
   }
-  // The first message; nullopt if `enough`, which is asked every 2 ms, holds before one arrives, or after
-  // 60 s: a test hangs no longer than that.
+  // Waits for the first message and removes it. nullopt: `enough`, which is called every 2 ms, returned true
+  // before a message arrived, or 60 s have passed; so no test hangs longer.
   std::optional<std::pair<int, ToWorker>> take(const std::function<bool()>& enough = [] { return false; }) {
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     std::unique_lock lock(mutex_);
@@ -62,7 +62,7 @@ class Mailbox {
     mail_.pop_front();
     return first;
   }
-  // Takes those that answer results, and leaves the leases: they may be of another job.
+  // Removes and returns the messages that answer results. Leases stay, since they may be for another job.
   std::vector<ToWorker> acks() {
     const std::lock_guard lock(mutex_);
     std::vector<ToWorker> taken;
@@ -111,22 +111,23 @@ class FakeFarm {
     }
   }
 
-  // May change a result, hand in more of them, or hold some back.
+  // Returns the results to send for a rendered one: it may change the result, repeat it, or hold it back.
   std::function<std::vector<UnitResult>(UnitResult)> tamper = [](UnitResult r) {
     return std::vector{std::move(r)};
   };
-  // Whose pixels are wrong.
+  // True if the worker changes the pixels of this result.
   std::function<bool(int worker, const UnitResult&)> lies = [](int, const UnitResult&) { return false; };
   std::function<void(std::vector<LeaseUnit>&)> reorder = [](auto&) {};
-  // The coordinator's clock ticks while no message comes: a worker that gave units back gets more at a tick
+  // True: the coordinator's tick() is called while no message arrives, since a worker that returned units
+  // gets new ones at a tick.
   bool ticks = false;
   int results_sent = 0;
-  int stop_after = -1;  // results; then run() returns false
+  int stop_after = -1;  // after this many results run() returns false; -1: never
   std::vector<ResultAck> refusals;
   static inline std::string token;
 
-  // Works until `until` holds. What it waits for may come without a message: a check of the denoised layers,
-  // or the final image, may end a job.
+  // Renders until `until` returns true. That may happen without a message: the end of a job may depend on a
+  // check of the denoised layers, or on the final image.
   bool run(const std::function<bool()>& until) {
     while (!until()) {
       bool holds = false;
@@ -153,7 +154,7 @@ class FakeFarm {
       const auto state = coordinator_.job(job)->state;
       return state == JobState::failed || state == JobState::cancelled || state == JobState::done;
     });
-    // A job can end before the letters of its last units are read; a refusal may be among them.
+    // A job can end before the answers to its last results are read; these may include refusals.
     for (const ToWorker& letter : mail_->acks()) note_refusal(letter);
     return ended;
   }
@@ -224,7 +225,7 @@ inline JobId submit(Coordinator& coordinator, JobSpec spec = {}) {
   return id.value_or(JobId{});
 }
 
-// A job whose coordinator dies, without a shutdown, once its workers have handed in so many results.
+// Returns a job whose coordinator was destroyed after its workers had sent `results` results.
 inline JobId interrupted(const std::filesystem::path& data, int results, int workers, JobSpec spec = {}) {
   auto coordinator = open_at(data);
   const JobId job = submit(*coordinator, std::move(spec));
@@ -234,7 +235,7 @@ inline JobId interrupted(const std::filesystem::path& data, int results, int wor
   return job;
 }
 
-// Whether the job ends, rendered by so many honest workers.
+// Renders the job with this many honest workers; true if it ends.
 inline bool finish(Coordinator& coordinator, const JobId& job, int workers = 1) {
   return FakeFarm(coordinator, workers).finish(job);
 }
@@ -259,7 +260,7 @@ inline std::string pixels(const Coordinator& coordinator, const JobId& job) {
   return report(coordinator, job).value("pixels_sha256", "");
 }
 
-// What everything else is compared with: one worker, in memory, in order.
+// The pixels that other tests must reproduce: rendered by one worker, in memory, in order.
 inline std::string reference_pixels(std::optional<std::uint64_t> spp = {}) {
   auto coordinator = open_at({});
   JobSpec spec;

@@ -1,4 +1,5 @@
-// A worker that is found out after checkpoints were taken of its pixels: nothing is said of them any more.
+// A worker is quarantined after checkpoints were taken of its wrong pixels: the figures of these checkpoints
+// are dropped.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -28,7 +29,7 @@ bool eventually(Condition condition) {
   return true;
 }
 
-// The figures of the last checkpoint, as users see them, and the report's.
+// Compares the jobs' figures of the last checkpoint: those that users see, and those of the report.
 void expect_same_error(const Coordinator& a, const JobId& in_a, const Coordinator& b, const JobId& in_b) {
   const JobView x = a.job(in_a).value(), y = b.job(in_b).value();
   ASSERT_TRUE(x.error_now && y.error_now);
@@ -46,7 +47,8 @@ std::pair<std::unique_ptr<Coordinator>, JobId> honestly(const JobSpec& spec) {
   return {std::move(coordinator), job};
 }
 
-// The parameter: to a target error, which voids all tiles, or by samples, which voids only the liar's.
+// The parameter: true for a job with a target error, of which all tiles are discarded; false for a job with a
+// number of samples, of which only the faulty worker's tiles are discarded.
 struct FoundOutLate : ::testing::TestWithParam<bool> {
   JobSpec spec = [] {
     JobSpec to_a_target;
@@ -58,7 +60,7 @@ struct FoundOutLate : ::testing::TestWithParam<bool> {
   std::unique_ptr<Coordinator> coordinator = open_with(store);
 };
 
-// A worker that holds back all but the first rounds.
+// A worker that sends only the results that `renders` selects.
 struct Slow {
   FakeFarm farm;
   explicit Slow(Coordinator& coordinator, std::function<bool(const UnitKey&)> renders)

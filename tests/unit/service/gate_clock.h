@@ -1,4 +1,4 @@
-// A clock that holds the threads of a coordinator, and so its checks of results, while it is shut.
+// A clock that blocks a coordinator's threads while it is shut, and so delays the verification of results.
 #pragma once
 
 #include <condition_variable>
@@ -10,7 +10,7 @@
 
 namespace ls::coordinator {
 
-// Moves by hand. While it is shut nobody but its maker gets past now().
+// Advances only by advance(). While it is shut, now() returns only on the thread that made the clock.
 class GateClock final : public Clock {
  public:
   TimePoint now() const override {
@@ -28,7 +28,7 @@ class GateClock final : public Clock {
     const std::lock_guard lock(mutex_);
     at_ += by;
   }
-  // How often threads other than its maker and the calling one have read it
+  // Number of reads by threads other than the one that made the clock and the calling one
   int reads_of_others() const {
     const std::lock_guard lock(mutex_);
     int sum = 0;

@@ -1,4 +1,5 @@
-// The numeric health of a job: like its pixels a function of the job alone, whatever happens on the way.
+// The health of a job (the counts of its bad samples). Like its pixels it depends on the job only, not on the
+// order of results or on restarts.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -13,7 +14,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// What is wrong with a unit: a function of its pixels and samples.
+// The health that the tests' workers report for a unit; it depends on the unit's pixels and samples only.
 Health unhealthy(const PixelRect& rect, const SampleRange& samples) {
   Health h;
   for (std::uint64_t s = samples.s0; s < samples.s1; ++s)
@@ -27,11 +28,11 @@ UnitResult unhealthy(UnitResult r) {
   r.health = unhealthy(header.tile, header.samples);
   return r;
 }
-// Of tiles [from, 2) of the test's image.
+// Returns the health of the tiles from `from` up to 2, the number of tiles in the image.
 Health expected(std::uint64_t spp, TileIndex from = 0) {
   Health sum;
   for (TileIndex t = from; t < 2; ++t) sum.merge(unhealthy(TileGrid{{40, 24}, 32}.rect(t), {0, spp}));
-  if (spp > 4)  // both of its tiles' rounds of samples 4 to 8, whatever their end
+  if (spp > 4)  // the round that begins with sample 4, of each tile, even if it is cut short
     for (TileIndex t = from; t < 2; ++t) {
       const PixelRect rect = TileGrid{{40, 24}, 32}.rect(t);
       sum.add(HealthCause::majorant_violation, 5, {rect.x0, rect.y0, 4});
@@ -89,7 +90,7 @@ TEST(ServiceHealth, SurvivesARestartAtAnyPointAndAfterTheEnd) {
   }
 }
 
-// 6 samples end with a cut round; it is rendered again in full when the job goes on.
+// 6 samples end with a truncated round; when the job is extended, that round is rendered again in full.
 TEST(ServiceHealth, OfAnExtendedJobIsThatOfOneRenderedAtOnce) {
   TempFolder dir;
   for (const bool restart : {false, true}) {
@@ -113,7 +114,7 @@ TEST(ServiceHealth, OfAnExtendedJobIsThatOfOneRenderedAtOnce) {
   }
 }
 
-// What the image does not have is not told of: tile 0 waits for its first round.
+// The health includes only units that are in the image: those of tile 0 wait for its first round.
 TEST(ServiceHealth, IsOfWhatIsFoldedOnly) {
   auto coordinator = open_at({});
   const JobId job = submit_spp(*coordinator, 16);
@@ -161,7 +162,7 @@ TEST(ServiceHealth, OfAHealthyJobIsClean) {
   EXPECT_THAT(std::string(reinterpret_cast<const char*>(image.data()), image.size()), HasSubstr("clean"));
 }
 
-// A worker that tells of pixels that are not the unit's is not believed.
+// A result is rejected if its health names a pixel outside the unit.
 TEST(ServiceHealth, OfOtherPixelsIsRefused) {
   auto coordinator = open_at({});
   const JobId job = submit_spp(*coordinator, 2);

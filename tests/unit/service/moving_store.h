@@ -1,5 +1,5 @@
-// A store of jobs that tells the service what other coordinators have done, as a test says, and fails when it
-// is told to.
+// A job store that reports changes by other coordinators, as the test sets them, and fails when the test asks
+// for it.
 #pragma once
 
 #include <atomic>
@@ -23,7 +23,6 @@ class MovingStore : public JobStore {
   std::atomic<bool> refuses_to_bar{false};
   std::function<void()> on_refusal = [] {};  // called under the coordinator's lock
 
-  Result<void> put_job(const StoredJob& job) override { return inner_->put_job(job); }
   Result<void> put_jobs(std::span<const StoredJob> jobs) override { return inner_->put_jobs(jobs); }
   Result<std::vector<StoredJob>> jobs() const override { return inner_->jobs(); }
   Result<void> remove_jobs(std::span<const JobId> jobs) override { return inner_->remove_jobs(jobs); }
@@ -54,7 +53,7 @@ class MovingStore : public JobStore {
   Moved moved() override {
     const std::lock_guard lock(mutex_);
     for (const QuarantinedWorker& worker : next_.quarantined)
-      (void)inner_->quarantine(worker);  // as a real one does before it tells
+      (void)inner_->quarantine(worker);  // a real store also stores the worker before it reports it
     return std::exchange(next_, {});
   }
 

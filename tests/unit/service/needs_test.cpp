@@ -1,4 +1,5 @@
-// What a job keeps of its scene: the part that it needs, why, and no file beyond it.
+// A job stores only the part of the scene that it needs, with the reasons, and the digests of only those
+// files.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

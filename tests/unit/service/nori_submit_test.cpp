@@ -1,4 +1,4 @@
-// Scenes of Nori are taken as any other.
+// Scenes in Nori's format are accepted like any others.
 #include <gtest/gtest.h>
 
 #include "common/scene/schema/integrators.h"
@@ -45,7 +45,7 @@ TEST(Service, TakesASceneOfNoriAsTheSameSceneOfMitsuba) {
 TEST(Service, TakesTheNamesOfNorisIntegrators) {
   auto coordinator = open_at({});
   for (const auto& row : scene::nori::integrators()) {
-    if (scene::integrator_row(row.name)) continue;  // of both languages: Mitsuba's meaning
+    if (scene::integrator_row(row.name)) continue;  // a name of both formats has Mitsuba's meaning
     JobSpec spec;
     spec.integrator = std::string(row.name);
     const auto taken = admit({"t.xml", kMitsuba, {}, spec}, coordinator->blobs());

@@ -1,4 +1,5 @@
-// The user whose token handed a job in: kept, shown, and with every event of the job.
+// The owner of a job (the user of the token that submitted it) is stored, shown, and part of every event of
+// the job.
 #include <gtest/gtest.h>
 
 #include <mutex>
@@ -58,7 +59,7 @@ TEST(Owner, IsWithEveryEventOfTheJobToItsRemoval) {
   auto coordinator = open_at({});
   std::mutex mutex;
   std::condition_variable heard;
-  std::map<std::string, int> of_job;  // type -> how many
+  std::map<std::string, int> of_job;  // number of events by type
   bool removed = false;
   const auto handle = coordinator->subscribe(0, [&](const StreamEvent& e) {
     const std::lock_guard lock(mutex);
@@ -78,7 +79,8 @@ TEST(Owner, IsWithEveryEventOfTheJobToItsRemoval) {
   EXPECT_GT(of_job["tile"], 0);
 }
 
-// A worker may hold units of several users at once.
+// The owner in a worker's event is that of the job in the event. A worker may hold units of several users at
+// once.
 TEST(Owner, OfAWorkersEventIsThatOfTheJobThatItNames) {
   Coordinator::Options options;
   const auto clock = std::make_shared<FakeClock>();

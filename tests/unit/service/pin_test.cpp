@@ -1,4 +1,4 @@
-// A job is pinned to one numeric class: its log must never hold results of two.
+// A job is pinned to one numeric class: its log never has results of two classes.
 #include <gtest/gtest.h>
 
 #include "coordinator/base/limits.h"
@@ -10,7 +10,8 @@
 namespace ls::coordinator {
 namespace {
 
-// A lease of the units of round 0 of this job, which is paused, with the brief that its workers would get.
+// Returns a lease of the units of round 0 of `job`, with the brief (scene and settings) that workers get with
+// it. `job` is paused and gives no leases, so the brief comes from an equal job.
 AssignLease lease_of_round_0(const Coordinator& coordinator, const JobId& job) {
   struct Sink final : WorkerSink {
     void send(ToWorker message) override {
@@ -43,7 +44,7 @@ TEST(Pin, OfResultsOfTwoClassesInOneBatchOnlyThoseOfTheFirstAreStored) {
   options.audit_rate = 0;
   auto coordinator = Coordinator::open(options).value();
   const JobId job = submit(*coordinator);
-  ASSERT_TRUE(pause(*coordinator, job));  // so that no lease pins it
+  ASSERT_TRUE(pause(*coordinator, job));  // so that no lease pins the job
   const AssignLease assign = lease_of_round_0(*coordinator, job);
   FakeFarm farm(*coordinator, 0);
   farm.brief(assign);
@@ -56,12 +57,12 @@ TEST(Pin, OfResultsOfTwoClassesInOneBatchOnlyThoseOfTheFirstAreStored) {
   };
   const auto first = connect("first", "fake class"), second = connect("second", "other class"),
              bulky = connect("bulky", "fake class");
-  // A broken result that fills all the room. The two others wait until the thread that stores results is done
-  // with it. That thread then calls `checked`, which keeps it from storing either until both are checked.
+  // A broken result takes all the memory for results, so the two others wait until it is handled. The thread
+  // that handles it then calls `checked`, and so stores neither of the others until both are verified.
   UnitResult broken = farm.render_unit(assign.lease, assign.lease.units[0]);
   broken.exr.assign(limits::kMaxResultsWaiting / 2, std::byte{});
   const int before = clock->reads_of_others();
-  const auto checked = [&](int results) {  // the clock is read before and after each check
+  const auto checked = [&](int results) {  // the clock is read before and after each verification
     EXPECT_TRUE(test::eventually([&] {
       return clock->reads_of_others() >= before + 2 * (1 + results) &&
              coordinator->figures().arrived_now == static_cast<std::uint64_t>(results);

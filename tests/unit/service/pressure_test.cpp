@@ -1,4 +1,4 @@
-// More results than there is room for: they wait in the streams of their workers.
+// If there is no memory for more results, they wait in the streams of their workers.
 #include <gtest/gtest.h>
 
 #include <mutex>
@@ -46,7 +46,7 @@ TEST(Pressure, ResultsThatFindNoRoomWaitAndTheirLeasesDoNotPass) {
   int sent = 0;
   const AssignLease first = sink->leases.at(0);
   farm.brief(first);
-  // One unit again and again: what it is does not matter to the room it takes.
+  // Sends the same unit repeatedly; only the size of the results matters here.
   const UnitResult result = farm.render_unit(first.lease, first.lease.units.at(0));
   while (room == sent) {
     ++sent;

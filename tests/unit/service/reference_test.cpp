@@ -1,4 +1,4 @@
-// A job with a reference: its true error is known at every checkpoint, whatever happens on the way.
+// A job with a reference image: its true error is known at every checkpoint, also after restarts.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -66,8 +66,8 @@ TEST(ServiceReference, GivesTheTrueErrorAtEveryCheckpointWhateverTheOrder) {
   EXPECT_EQ(rendered({}, 3), first);  // in memory
 }
 
-// Cancelled in the middle of a round: list, curve and report tell of one image, the one that is handed out,
-// and its true error is its own.
+// The job is cancelled in the middle of a round. The list of jobs, the curve and the report then describe the
+// same image, which is the one that the user gets, and the true error is that of this image.
 TEST(ServiceReference, TheCurveEndsWithTheImageThatIsHandedOut) {
   TempFolder dir;
   auto coordinator = open_at(dir.path());
@@ -78,10 +78,10 @@ TEST(ServiceReference, TheCurveEndsWithTheImageThatIsHandedOut) {
       std::stable_sort(units.begin(), units.end(),
                        [](const LeaseUnit& a, const LeaseUnit& b) { return a.round < b.round; });
     };
-    farm.stop_after = 5;  // two tiles: up to 2 and to 4 samples, and one tile of the third round
+    farm.stop_after = 5;  // both tiles to 4 samples, and the third round of one of them
     farm.finish(job);
     while (coordinator->job(job)->spp_done < 7)
-      std::this_thread::yield();  // 7.2 as soon as all five are folded
+      std::this_thread::yield();  // it is 7.2 when all five are in the image
     ASSERT_EQ(coordinator->convergence(job)->size(), 2u);
     ASSERT_TRUE(coordinator->cancel(job));
   }
@@ -93,7 +93,7 @@ TEST(ServiceReference, TheCurveEndsWithTheImageThatIsHandedOut) {
     EXPECT_EQ(points.back().error.relmse, told["relmse"]);
     EXPECT_EQ(coordinator->job(job)->error_now->relmse, told["relmse"]);
     if (const auto reference_error =
-            points.back().reference_error) {  // what is not stored yet goes with a coordinator
+            points.back().reference_error) {  // lost with the coordinator if it was not stored yet
       EXPECT_EQ(reference_error->relmse, told["true_relmse"]);
       EXPECT_NE(reference_error->relmse, points[1].reference_error->relmse);
     }
@@ -132,7 +132,7 @@ TEST(ServiceReference, IsReadWhenTheJobIsSubmitted) {
   EXPECT_THAT(coordinator->submit(request).error().error.message, HasSubstr("PUT /api/v1/blobs/"));
 }
 
-// As a render of the job's own scene with `seed` would say.
+// Makes the spec of a job whose reference claims to be a render of the job's own scene with `seed`.
 JobSpec against_own_scene(Coordinator& coordinator, const std::string& seed) {
   JobSpec spec;
   spec.spp = 16;
@@ -162,7 +162,7 @@ TEST(ServiceReference, OfTheJobsOwnSeedIsToldAndGivesNoVerdict) {
 
   EXPECT_EQ(told["reference"]["same_seed"], true);
   EXPECT_EQ(apart["reference"]["same_seed"], false);
-  EXPECT_EQ(told["true_relmse"], apart["true_relmse"]);  // it is told as before
+  EXPECT_EQ(told["true_relmse"], apart["true_relmse"]);  // reported as for the other job
   EXPECT_NE(told["verdict_kind"], "bias_floor");
   EXPECT_EQ(coordinator->job(same)->convergence_status->words, told["verdict"]);
 }
@@ -172,7 +172,7 @@ TEST(ServiceReference, IsNotNeededForMaps) {
   JobSpec spec;
   spec.spp = 4;
   const JobId job = submit(*coordinator, spec);
-  EXPECT_TRUE(coordinator->error_png(job));  // nothing is rendered yet
+  EXPECT_TRUE(coordinator->error_png(job));  // works although nothing is rendered yet
   ASSERT_TRUE(finish(*coordinator, job));
   EXPECT_TRUE(coordinator->error_png(job));
   EXPECT_TRUE(coordinator->samples_png(job));

@@ -1,4 +1,4 @@
-// Sequences through the public interface: many films, one job.
+// Sequences (jobs with several frames) through the public interface.
 #include <gtest/gtest.h>
 
 #include <condition_variable>
@@ -20,7 +20,7 @@ JobSpec frames(std::uint32_t first, std::uint32_t last, std::uint64_t spp = 4) {
   return spec;
 }
 
-// The pixels of a job of its own with the seed that a frame has.
+// Returns the pixels of a single job with this seed, to compare with a frame that has the seed.
 std::string pixels_with_seed(std::uint64_t seed, std::uint64_t spp = 4) {
   auto coordinator = open_at({});
   JobSpec spec;
@@ -31,7 +31,8 @@ std::string pixels_with_seed(std::uint64_t seed, std::uint64_t spp = 4) {
   return pixels(*coordinator, job);
 }
 
-// The file of the mesh is one per frame.
+// Makes a request whose scene uses one mesh file per frame; only the files of the frames in `present` are
+// uploaded.
 SubmitRequest meshes(Coordinator& coordinator, const std::set<int>& present, JobSpec spec) {
   SubmitRequest request{"mesh.xml", with_mesh("mesh.###.ply"), {}, std::move(spec)};
   for (const int frame : present) {
@@ -83,7 +84,7 @@ TEST(Sequence, IsOneJobWhoseFramesHaveThePixelsOfJobsOfTheirOwn) {
   }
   EXPECT_EQ(distinct.size(), 3u) << "frames with one noise";
   EXPECT_EQ(whole["pixels_sha256"], chain.finish().hex());
-  EXPECT_EQ(whole["core_seconds"], 3 * 4 * .125);  // 2 tiles, 2 rounds; copies of a unit count once
+  EXPECT_EQ(whole["core_seconds"], 3 * 4 * .125);  // 2 tiles, 2 rounds; duplicate results count once
   EXPECT_NE(coordinator->job_log(id)->find("frame 3: submitted with 3 frames"), std::string::npos);
 }
 
@@ -111,7 +112,7 @@ TEST(Sequence, SurvivesAKillInTheMiddle) {
     auto coordinator = open_at(dir.path());
     id = submit(*coordinator, frames(1, 4));
     FakeFarm farm(*coordinator, 2);
-    farm.stop_after = 10;  // of 4 units a frame: two are done, one is begun, one waits
+    farm.stop_after = 10;  // each frame has 4 units: two frames are done, one has begun, one waits
     farm.run([] { return false; });
     before = coordinator->job(id)->units_done;
   }

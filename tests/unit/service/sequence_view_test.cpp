@@ -1,4 +1,4 @@
-// How the view of a sequence is computed from those of its frames.
+// The figures of a sequence, computed from those of its frames.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -73,8 +73,9 @@ TEST(SequenceView, AddsUpAndWeighsByPixels) {
   EXPECT_EQ(v.elapsed_seconds, 12);
 }
 
-// Two frames of equal size have relMSE 2 (interval +3/-1) and 4 (+4/-0). The mean is 3. The half-width of a
-// mean of two independent estimates is half the root of the sum of squares: 5/2 above, 1/2 below.
+// Two frames of one size have relMSE 2 with the interval [1, 5], and 4 with [4, 8]. Their mean is 3. The
+// errors are independent, so each end of the mean's interval is half the root of the sum of squares away:
+// sqrt(3^2 + 4^2) / 2 = 5/2 above, sqrt(1^2 + 0^2) / 2 = 1/2 below.
 TEST(SequenceView, ItsErrorIsTheMeanAndItsIntervalThatOfIndependentEstimates) {
   auto frames = with({JobState::done, JobState::done, JobState::queued});
   frames[0].error_now = ErrorFigures{3, 2, 1, 5};
@@ -114,7 +115,7 @@ TEST(SequenceView, ExpectsFramesThatWaitToCostWhatTheOthersDo) {
 
   const JobView v = whole(frames, 4);
 
-  // 1.5 frames took 60 core seconds: 40 per frame. One and a half frames are left, on 4 threads.
+  // 60 core seconds were spent on 1.5 frames: 40 per frame. 1.5 frames are left, on 4 threads.
   EXPECT_DOUBLE_EQ(v.eta_seconds.value(), 15);
   EXPECT_DOUBLE_EQ(v.queued_core_seconds, 47);
   EXPECT_FALSE(whole(frames, 0).eta_seconds);

@@ -1,4 +1,5 @@
-// Whole jobs through the public interface: the same pixels whatever happens on the way.
+// Whole jobs through the public interface: the pixels are the same for any order of results and any number of
+// restarts.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -29,7 +30,7 @@ TEST(Service, RendersAJobOnDiskToThePixelsOfOneInMemory) {
   EXPECT_EQ(r["samples"], 16 * 40 * 24);
   EXPECT_EQ(r["stopped"], "spp");
   EXPECT_EQ(r["convergence"].size(), 4u);  // rounds of 2, 2, 4, 8 samples
-  EXPECT_EQ(r["core_seconds"], 8 * .125);  // 2 tiles, 4 rounds; one that moved to an idle worker counts once
+  EXPECT_EQ(r["core_seconds"], 8 * .125);  // 2 tiles, 4 rounds; duplicate results count once
   EXPECT_TRUE(std::filesystem::exists(dir.path() / "jobs" / job.value / "image.exr"));
   const JobView view = coordinator->job(job).value();
   EXPECT_EQ(view.state, JobState::done);
@@ -38,7 +39,7 @@ TEST(Service, RendersAJobOnDiskToThePixelsOfOneInMemory) {
   EXPECT_TRUE(view.error_now.has_value());
 }
 
-// Rounds of 2, 2, 4 and 8 samples: half of a tile's units are a quarter of its work.
+// The rounds have 2, 2, 4 and 8 samples, so the first half of a tile's units is a quarter of its samples.
 TEST(Service, ProgressIsThatOfSamplesNotOfUnits) {
   auto coordinator = open_at({});
   const JobId job = submit(*coordinator);
@@ -80,7 +81,8 @@ TEST(Service, ARestartAtAnyPointLosesNothingThatCounts) {
     const JobId job = interrupted(dir.path(), k, 1);
     auto coordinator = open_at(dir.path());
     ASSERT_TRUE(coordinator->job(job)) << k;
-    FakeFarm farm(*coordinator, 1);  // with two, units that move to the idle one are rendered by both
+    // One worker, since with two an idle worker also renders units of the other
+    FakeFarm farm(*coordinator, 1);
     ASSERT_TRUE(farm.finish(job)) << k;
     EXPECT_EQ(pixels(*coordinator, job), expected) << k;
     EXPECT_LE(farm.results_sent, 8);
@@ -111,7 +113,7 @@ TEST(Service, AcknowledgedResultsAreNotRenderedAgainAfterARestart) {
     job = submit(*coordinator);
     FakeFarm farm(*coordinator, 1);
     farm.tamper = [&](UnitResult r) { return std::vector<UnitResult>(farm.results_sent < 5 ? 1 : 0, r); };
-    // The acknowledgement of the fifth says that all five are on the disk.
+    // When the fifth result is acknowledged, all five are on disk.
     ASSERT_TRUE(farm.run([&] { return coordinator->job(job)->units_done == 5; }));
     done = coordinator->job(job)->units_done;
   }
@@ -120,7 +122,7 @@ TEST(Service, AcknowledgedResultsAreNotRenderedAgainAfterARestart) {
   EXPECT_EQ(coordinator->job(job)->units_done, 5u);
   FakeFarm farm(*coordinator, 1);
   ASSERT_TRUE(farm.finish(job));
-  EXPECT_EQ(farm.results_sent, 3);  // of 2 tiles x 4 rounds
+  EXPECT_EQ(farm.results_sent, 3);  // the rest of 8 units
 }
 
 TEST(Service, WrongPartialsAreRefusedWithAReasonWhileTheJobGoesOn) {
@@ -138,7 +140,7 @@ TEST(Service, WrongPartialsAreRefusedWithAReasonWhileTheJobGoesOn) {
         Partial partial = decode_partial_file(r.exr)->partial;
         if (kind == 2) partial.header.numeric_class = sha256("another class");
         if (kind == 3) {
-          // Past encode_partial, which checks too: the last float of the file.
+          // Changes the last float of the file, since encode_partial would reject NaN.
           const float nan = std::numeric_limits<float>::quiet_NaN();
           std::memcpy(r.exr.data() + r.exr.size() - sizeof nan, &nan, sizeof nan);
           return std::vector{r};
@@ -163,7 +165,7 @@ TEST(Service, AnExtendedJobHasTheBitsOfOneRenderedAtOnce) {
     const auto data = dir.path() / (restart ? "restart" : "live");
     auto coordinator = open_at(data);
     JobSpec spec;
-    spec.spp = 11;  // 12: the last round is cut
+    spec.spp = 11;  // rounded up to 12, so the last round is truncated
     const JobId job = submit(*coordinator, spec);
     ASSERT_TRUE(finish(*coordinator, job));
     EXPECT_EQ(pixels(*coordinator, job), reference_pixels(12));
@@ -241,7 +243,7 @@ TEST(Service, AFullDiskPausesTheJobUntilAPersonResumesIt) {
   ::getrlimit(RLIMIT_FSIZE, &before);
   ::signal(SIGXFSZ, SIG_IGN);
   farm.tamper = [&](UnitResult r) {
-    // Half of the third record finds room.
+    // The disk has room for two and a half records.
     if (farm.results_sent == 2) {
       const rlimit tight{2 * (r.exr.size() + 184) + 1000, before.rlim_max};
       ::setrlimit(RLIMIT_FSIZE, &tight);
@@ -258,7 +260,7 @@ TEST(Service, AFullDiskPausesTheJobUntilAPersonResumesIt) {
   std::string why;
   EXPECT_FALSE(coordinator->ready(&why));
 
-  // The two held back are lost with their worker.
+  // The units of the two results that were held back are freed when their worker disconnects.
   farm.sessions()[0]->disconnected();
   ASSERT_TRUE(resume(*coordinator, job));
   FakeFarm other(*coordinator, 1);

@@ -1,4 +1,4 @@
-// Jobs that come from a coordinator that is gone, and jobs that went to another.
+// Jobs taken over from a coordinator that is gone, and jobs that another coordinator has taken over.
 #include <gmock/gmock.h>
 
 #include <condition_variable>
@@ -17,7 +17,7 @@ namespace ls::coordinator {
 using test::eventually;
 namespace {
 
-// Blobs a network away that answers when a test lets it.
+// A blob store on another machine, which is unavailable while `away` is set.
 class FarBlobs final : public MemoryBlobs {
  public:
   std::atomic<bool> away{false};
@@ -46,7 +46,7 @@ struct Shared : ::testing::Test {
     options.audit_rate = 0;
     return Coordinator::open(std::move(options)).value();
   }
-  // A job as another coordinator had it.
+  // Returns a job as another coordinator would have stored it.
   StoredJob foreign(std::uint64_t spp = 16) {
     JobSpec spec;
     spec.spp = spp;
@@ -73,7 +73,7 @@ TEST_F(Shared, ATakeoverWaitsForBlobsThatDoNotAnswerAndIsThenMade) {
   EXPECT_FALSE(coordinator->job(job.id)) << "not failed: it is on its way";
 
   blobs->away = false;
-  // It is put back after it was refused, and tried again after a pause.
+  // The takeover is postponed because the blob store is unavailable, and repeated later.
   ASSERT_TRUE(eventually([&] {
     clock->advance(std::chrono::seconds(1));
     coordinator->tick();
@@ -102,8 +102,7 @@ TEST_F(Shared, AFileThatIsNotThereIsToldAtOnceAndWaitedFor) {
   }));
 }
 
-// Its image begins with nothing: what was said of the one that is gone would be said of pixels that nobody
-// has.
+// The image of a job that is taken over is lost, so the figures of that image are dropped.
 TEST_F(Shared, AnInheritedJobIsNotToldToBeAsGoodAsItsLostImage) {
   StoredJob job = foreign(32);
   job.spec.target_error = 1e-3;
@@ -121,8 +120,8 @@ TEST_F(Shared, AnInheritedJobIsNotToldToBeAsGoodAsItsLostImage) {
   EXPECT_TRUE(eventually([&] { return store->points(job.id)->empty(); }));
 }
 
-// What lies here of a job is from when this coordinator had it before; it may be of another numeric class,
-// too.
+// Files of the job here are from an earlier ownership and must be ignored; they may even be of another
+// numeric class.
 TEST_F(Shared, AnInheritedJobBeginsWithNothingThatLayHere) {
   const StoredJob job = foreign(32);
   {
@@ -133,7 +132,8 @@ TEST_F(Shared, AnInheritedJobBeginsWithNothingThatLayHere) {
     lying.stop_after = 4;
     lying.finish(job.id);
   }
-  ASSERT_TRUE(store->remove_job(job.id));  // as the start after it has gone to another one does
+  // Removed as at the first start after the job has gone to another coordinator
+  ASSERT_TRUE(store->remove_job(job.id));
   coordinator.reset();
   ASSERT_TRUE(std::filesystem::exists(folder.path() / "jobs" / job.id.value));
   coordinator = open();

@@ -48,8 +48,9 @@ const CollectedSpan* find(const std::vector<CollectedSpan>& spans, const std::st
   return nullptr;
 }
 
-// All spans are below the one named `job`, and within the times of their parents. Below a lease that has lost
-// units later spans may stand: the fake workers hand in what was given to others meanwhile.
+// All spans are descendants of the span `job` and lie within the times of their parents. A lease that has
+// lost units is an exception: the fake workers still send results of units that others have now, and their
+// spans end after the lease's.
 void expect_a_tree(const std::vector<CollectedSpan>& spans) {
   std::set<std::string> ids;
   int roots = 0;
@@ -96,7 +97,7 @@ TEST_F(TraceTest, AJobsSpansFormATree) {
   auto count = counts(spans);
   EXPECT_EQ(count["admit scene"], 1);
   EXPECT_GE(count["lease"], 1);
-  // A copy that arrives when its unit is done is not checked.
+  // A duplicate that arrives after its unit is done is not verified.
   EXPECT_LE(count["check partial"], results);
   EXPECT_GE(count["check partial"], static_cast<int>(units.size()));
   EXPECT_EQ(count["store partial"], count["check partial"]);
@@ -143,7 +144,7 @@ TEST_F(TraceTest, ANewCoordinatorContinuesTheTrace) {
     ASSERT_GT(spans.size(), before);
     for (std::size_t i = before; i < spans.size(); ++i) EXPECT_EQ(spans[i].trace, trace);
     std::erase_if(spans, [&](const CollectedSpan& span) { return span.trace != trace; });
-    // The job's span, which only the second process recorded, is the parent of what the first one recorded.
+    // The parent of the first process's spans is the job's span, which only the second process recorded.
     const auto root = std::find_if(spans.begin(), spans.end(), [](const auto& s) { return s.name == "job"; });
     ASSERT_NE(root, spans.end());
     const auto admission =
@@ -154,8 +155,8 @@ TEST_F(TraceTest, ANewCoordinatorContinuesTheTrace) {
   }
 }
 
-// The worker hands in a result of a lease that the coordinator lent before its restart, and says since when
-// it had the unit.
+// The worker sends a result of a lease from before the coordinator's restart, and reports since when it has
+// had the unit.
 TEST_F(TraceTest, ALeaseFromBeforeTheRestartIsRecordedByWhatItsWorkerSays) {
   std::vector<UnitResult> kept;
   JobId job;
@@ -168,7 +169,7 @@ TEST_F(TraceTest, ALeaseFromBeforeTheRestartIsRecordedByWhatItsWorkerSays) {
       return std::vector<UnitResult>{};
     };
     farm.run([&] { return !kept.empty(); });
-    coordinator.reset();  // it ends before it sees that the worker's connection broke
+    coordinator.reset();  // it is destroyed before it notices that the worker has disconnected
   }
   const std::int64_t held = system_unix_ns();
   {
@@ -259,7 +260,7 @@ TEST_F(TraceTest, WorkersAreToldOfALeasesSpanOnlyIfTheJobIsTraced) {
   EXPECT_TRUE(told(*open()));
 }
 
-// One traced job, whose spans a test drives by hand.
+// A traced job whose spans the test begins and ends itself.
 struct TracedJob {
   explicit TracedJob(StoredJob job = {}) : stored(std::move(job)) {
     stored.id = {"j"};
@@ -276,7 +277,7 @@ struct TracedJob {
     r.lease = lease.id;
     spans->result(r, {worker}, clock->now(), 0, clock->now(), failed);
   }
-  // Ends the job, and returns the attribute of each lease's span, by the lease's id.
+  // Ends the job. Returns the value of the attribute in each lease's span, by the lease's id.
   std::map<std::string, std::string> end(const std::string& attribute) {
     spans->end(stored, clock->now());
     tracer.reset();
@@ -358,7 +359,7 @@ TEST_F(TraceTest, AJobSubmittedAgainIsPartOfTheTraceOfThatRequest) {
   EXPECT_EQ(parents, (std::set<std::string>{"", "b7ad6b7169203331"}));
 }
 
-// A job all of whose units are done, but whose final image finds a folder in its place.
+// A job whose units are all done, but whose final image cannot be written, since a folder has its name.
 class TraceOfAnUnwrittenImage : public TraceTest {
  protected:
   JobId render(Coordinator& coordinator) {

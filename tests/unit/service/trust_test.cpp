@@ -1,5 +1,5 @@
-// A worker that renders wrong pixels: found, quarantined, and nothing of it left in the image, also over a
-// restart.
+// A worker that renders wrong pixels is found and quarantined. None of its results stay in the image, even
+// after a restart.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -29,7 +29,7 @@ JobSpec samples(std::uint64_t spp) {
   return spec;
 }
 
-// Until the third of four workers was found lying; its id.
+// Renders with four workers until the third is found to be faulty, and returns its id.
 WorkerId bar_fake_2(Coordinator& coordinator) {
   FakeFarm farm(coordinator, 4);
   farm.lies = [](int worker, const UnitResult&) { return worker == 2; };
@@ -90,7 +90,8 @@ TEST(Trust, WhatALiarLeftInTheLogIsNotTakenUpAfterARestart) {
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels(512));
 }
 
-// This unit and two others at least: results are checked on threads of their own, in any order.
+// Waits until the file of audits lists this unit and at least two others; false after 2 minutes. It waits
+// because results are verified on several threads, in any order.
 bool come_to_be_audited(const std::filesystem::path& job, const UnitKey& unit) {
   const auto patience = std::chrono::steady_clock::now() + std::chrono::minutes(2);
   const auto listed = [&] {
@@ -119,7 +120,7 @@ TEST(Trust, AnAuditUnderWayIsGoneOnWithAfterARestart) {
       lie = r.unit;
       return true;
     };
-    // Nobody renders anything a second time, so that nobody finds out.
+    // Each unit is rendered only once, so no audit ends and the wrong result is not found.
     std::set<UnitKey> seen;
     farm.tamper = [&](UnitResult r) {
       return seen.insert(r.unit).second ? std::vector{r} : std::vector<UnitResult>{};
@@ -191,7 +192,7 @@ struct FoundElsewhere : ::testing::Test {
     options.audit_rate = 0;
     return Coordinator::open(std::move(options)).value();
   }
-  // In memory, with every result audited.
+  // Opens a coordinator in memory that audits every result.
   std::unique_ptr<Coordinator> open_audited_here() {
     store = std::make_shared<MovingStore>();
     Coordinator::Options options;
@@ -218,7 +219,7 @@ TEST_F(FoundElsewhere, AWorkerHereIsQuarantinedAtOnceAndItsTilesAreRenderedAgain
   EXPECT_EQ(pixels(*coordinator, job), reference_pixels(64));
 }
 
-// Its image of before stands; but nothing of it goes into a larger one.
+// The finished image keeps the wrong pixels, but an extension of it uses none of them.
 TEST_F(FoundElsewhere, AJobThatWasDoneBeforeIsExtendedWithoutTheLiarsPixels) {
   for (const bool on_disk : {true, false}) {
     auto coordinator = open(on_disk);
@@ -233,7 +234,7 @@ TEST_F(FoundElsewhere, AJobThatWasDoneBeforeIsExtendedWithoutTheLiarsPixels) {
     }
     ASSERT_TRUE(extend(*coordinator, job, 64));
     FakeFarm honest(*coordinator, 1);
-    if (on_disk) {  // and also after a restart in the middle of it
+    if (on_disk) {  // also with a restart in the middle
       honest.stop_after = 3;
       honest.finish(job);
       coordinator.reset();
@@ -267,9 +268,9 @@ TEST_F(FoundElsewhere, UntilItIsStoredThatAWorkerIsQuarantinedTheJobsWait) {
   EXPECT_EQ(store->quarantined().value().size(), 1u);
 }
 
-// A person who resumes the job while a result is being stored: that the result could not be stored was found
-// before the disk had room, and is told after. The try is made again, since whether the resumption falls
-// between the two is up to the scheduler.
+// The user resumes the job while a result is being stored. Storing it has failed already, but the error is
+// handled only after the resume. The test is repeated, since the scheduler decides whether the resume falls
+// between the two.
 TEST_F(FoundElsewhere, AnErrorFromBeforeAJobWasResumedDoesNotPauseItAgain) {
   for (int trial = 0; trial < 40; ++trial) {
     auto coordinator = open_audited_here();
@@ -281,7 +282,7 @@ TEST_F(FoundElsewhere, AnErrorFromBeforeAJobWasResumedDoesNotPauseItAgain) {
     store->refuses_to_bar = true;
     std::jthread user([&] {
       refusals.wait(0);
-      // The second refusal is of a result, if one is still under way
+      // Waits for the second refusal, which is of a result, if one is still being stored
       for (int i = 0; i < 100000 && refusals < 2; ++i) std::this_thread::yield();
       store->refuses_to_bar = false;
       EXPECT_TRUE(resume(*coordinator, job));

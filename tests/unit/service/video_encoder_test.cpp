@@ -1,4 +1,4 @@
-// The program that makes videos is a stranger: whatever it does, the coordinator goes on. Scripts play it.
+// The coordinator survives whatever the video program does. Shell scripts take the part of the program.
 #include "coordinator/service/video/video_encoder.h"
 
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@ class VideoEncoding : public testing::Test {
   VideoEncoding() { std::filesystem::create_directories(folder); }
   ~VideoEncoding() override { std::filesystem::remove_all(folder); }
 
-  // A program that runs this script. It also notes its process id.
+  // Makes a program that runs this script and writes its process id to a file.
   VideoEncoder::Asked program(const std::string& script) {
     const std::filesystem::path file = folder / "ffmpeg";
     std::ofstream(file) << "#!/bin/sh\necho $$ > " << (folder / "pid").string() << "\n" << script << "\n";
@@ -35,7 +35,7 @@ class VideoEncoding : public testing::Test {
   Result<void> make(const VideoEncoder::Asked& asked, std::stop_token stop = {}) {
     auto encoder = VideoEncoder::start(asked, clock, std::move(stop));
     if (!encoder) return tl::unexpected(encoder.error());
-    // Far more than a socket takes without a reader
+    // Sends far more than the socket takes without a reader
     const std::vector<std::uint8_t> picture(64 * 64 * 3, 7);
     for (int i = 0; i < 200; ++i)
       if (auto added = (*encoder)->add(picture); !added) return added;
@@ -77,7 +77,7 @@ TEST_F(VideoEncoding, AProgramThatStopsAtItsLimitSaysThatTheVideoIsTooLarge) {
   EXPECT_THAT(made.error().message, HasSubstr("more than 1000 bytes"));
 }
 
-// With so much text that it would fill a pipe that nobody reads
+// The program writes more messages than a pipe holds without a reader
 TEST_F(VideoEncoding, AProgramThatTalksWithoutEndIsHeard) {
   const auto made =
       make(program("i=0; while [ $i -lt 3000 ]; do echo 'a line of forty characters or so, again' >&2; "

@@ -1,4 +1,4 @@
-// A job's record with something in every field.
+// A job's record in which most fields are set.
 #pragma once
 
 #include <string>

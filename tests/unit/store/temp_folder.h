@@ -1,4 +1,4 @@
-// A folder of a test's own, removed with everything in it.
+// A temporary folder, removed with its contents by the destructor.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -15,7 +15,7 @@ TEST(KeyFiles, NobodyElseMayReadAKey) {
   EXPECT_FALSE(kept_secret(kOther, 0100640, kUs));
 }
 
-// A cluster mounts secrets as root's, readable by the group that the process is in.
+// A cluster mounts a secret as root's file that is readable by a group of the process.
 TEST(KeyFiles, WhatRootOwnsMayBeShownThroughItsGroup) {
   EXPECT_TRUE(kept_secret(kRoot, 0100440, kUs));
   EXPECT_TRUE(kept_secret(kRoot, 0100640, kUs));

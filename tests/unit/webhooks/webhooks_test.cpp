@@ -24,7 +24,7 @@ constexpr const char* kScene = R"(<scene version="3.0.0">
   <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film></sensor>
   <shape type="sphere"/><emitter type="constant"/></scene>)";
 
-// A receiver that answers as it is told, and remembers what came.
+// A receiver that gives the answers set by the test and records the requests.
 class Receiver {
  public:
   Result<HttpAnswer> take(const HttpPost& post) {
@@ -254,8 +254,8 @@ TEST_F(WebhooksTest, WhatWentByUnseenIsToldAfterAll) {
   ASSERT_TRUE(webhooks);
 
   ASSERT_TRUE(farm->cancel(ends));
-  held_up.get_future().wait();                                     // no event is delivered from now on
-  for (int i = 0; i < static_cast<int>(limits::kEventsKept); ++i)  // so the event of its end is lost
+  held_up.get_future().wait();                                     // from now on the callback is blocked
+  for (int i = 0; i < static_cast<int>(limits::kEventsKept); ++i)  // so the event of the job's end is lost
     ASSERT_TRUE(farm->change(stays, {.priority = i}));
   go_on.set_value();
 
@@ -289,7 +289,7 @@ TEST_F(WebhooksTest, AnEndThatWaitsToBeToldIsNotToldTwiceAfterACrash) {
     ASSERT_TRUE(coordinator_->cancel(job));
     receiver.wait_for(1);
   }
-  std::ofstream(open).close();  // the crash came before this was removed
+  std::ofstream(open).close();  // as if the crash had come before this file was removed
 
   receiver.answer = 200;
   const auto webhooks = start(receiver);

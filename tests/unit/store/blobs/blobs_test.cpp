@@ -142,14 +142,14 @@ TEST(DiskBlobs, OfTooManyUnfinishedUploadsTheOldestGivesWay) {
   EXPECT_EQ(blobs->list(true).value().size(), limits::kMaxUnfinishedUploads);
 }
 
-// Root may look everywhere: a file where the folder should be is what it meets as well.
+// The folder of the blob is a symbolic link to itself, since root may read any folder.
 TEST(DiskBlobs, ADiskThatCannotBeLookedAtIsNoAnswer) {
   const TempFolder dir;
   const auto blobs = DiskBlobs::open(dir.path()).value();
   const Digest digest = sha256("a blob");
   EXPECT_EQ(blobs->find(digest), Result<bool>(false));
   const auto group = dir.path() / digest.hex().substr(0, 2);
-  std::filesystem::create_symlink(group, group);  // ELOOP
+  std::filesystem::create_symlink(group, group);  // access() then fails with ELOOP
 
   const auto found = blobs->find(digest);
 

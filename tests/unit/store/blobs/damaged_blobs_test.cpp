@@ -1,4 +1,5 @@
-// Blobs whose files no longer have their digest: never read, out of the way, and repaired by the right bytes.
+// Blobs whose files no longer match their digests: they are never read, are moved aside, and are replaced
+// when the right bytes arrive.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +24,7 @@ struct DamagedBlobs : ::testing::Test {
   std::unique_ptr<DiskBlobs> blobs = DiskBlobs::open(dir.path()).value();
 
   void SetUp() override { ASSERT_TRUE(blobs->put(kName, damaged_bytes(kText))); }
-  // A byte that is another one; size and name are as before.
+  // Changes one byte of the file; its size and name stay.
   void damage() const {
     std::fstream file(blobs->path(kName), std::ios::in | std::ios::out | std::ios::binary);
     file.seekp(3);

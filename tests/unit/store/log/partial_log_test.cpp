@@ -11,9 +11,9 @@
 #include "tests/unit/store/temp_folder.h"
 
 namespace {
-off_t unreadable_from = -1;  // a disk error from this offset of every file on; -1: none
+off_t unreadable_from = -1;  // reads from this offset on fail in every file; -1: none fails
 }
-// Takes the place of the C library's function in this program.
+// Replaces the C library's function in this program.
 extern "C" ssize_t pread(int file, void* bytes, std::size_t count, off_t at) {
   if (unreadable_from >= 0 && at >= unreadable_from) {
     errno = EIO;
@@ -83,7 +83,7 @@ TEST(PartialLog, KeepsTheHealthOfARecord) {
   }
 }
 
-// A record ends with the text of its health: what of it is missing, or is another text, is no health.
+// A record ends with the text of its health. If this text is cut off or changed, the record is damaged.
 TEST(PartialLog, CutsARecordWhoseHealthIsTornOrDamaged) {
   for (const bool torn : {true, false}) {
     TempFolder dir;
@@ -199,7 +199,7 @@ TEST(PartialLog, NoticesDamageWhenAPartialIsRead) {
 
 TEST(PartialLog, LeavesASegmentThatCannotBeSynced) {
   TempFolder dir;
-  // A device takes all writes and refuses to sync.
+  // /dev/null accepts all writes but cannot be synced.
   std::filesystem::create_symlink("/dev/null", dir.path() / "partials-000.seg");
   auto log = PartialLog::open(dir.path()).value();
   ASSERT_TRUE(log->append(record(1), payload(1)));
@@ -235,7 +235,7 @@ TEST(PartialLog, AFullSegmentIsReadFromItsIndexAndWithoutOneFromItself) {
     auto log = PartialLog::open(dir.path()).value();
     for (std::uint32_t i = 0; i < count / 2; ++i) ASSERT_TRUE(log->append(record(i), payload(i, big)));
   }
-  {  // the second half by a later start
+  {  // the second half is appended after a restart
     auto log = PartialLog::open(dir.path()).value();
     for (std::uint32_t i = count / 2; i < count; ++i) ASSERT_TRUE(log->append(record(i), payload(i, big)));
   }
@@ -254,7 +254,7 @@ TEST(PartialLog, AFullSegmentIsReadFromItsIndexAndWithoutOneFromItself) {
   ASSERT_TRUE(std::filesystem::exists(index));
   EXPECT_FALSE(std::filesystem::exists(dir.path() / "partials-001.idx"));
 
-  // The first header of the segment is no longer needed...
+  // Damage to the segment's first header has no effect, since the index has a copy of it...
   const auto scribble = [](const std::filesystem::path& path, std::streamoff at) {
     std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
     file.seekp(at);
@@ -262,7 +262,7 @@ TEST(PartialLog, AFullSegmentIsReadFromItsIndexAndWithoutOneFromItself) {
   };
   scribble(dir.path() / "partials-000.seg", 20);
   EXPECT_EQ(found(), all);
-  // ...until the index is damaged, too: then what is behind it is left out.
+  // ...until the index is damaged, too: then the records behind the damage are left out.
   scribble(index, 20);
   EXPECT_EQ(found().size(), 3u);
 }

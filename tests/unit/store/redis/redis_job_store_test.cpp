@@ -1,5 +1,5 @@
-// Against a real redis-server that is killed, emptied and started again. A store that is destroyed has told
-// Redis all it could: no test waits for time to pass.
+// Tests against a real redis-server that is killed, emptied and restarted. The destructor of a store sends
+// all changes to Redis, so no test has to wait.
 #include "coordinator/store/redis/redis_job_store.h"
 
 #include <fmt/format.h>
@@ -19,7 +19,7 @@
 namespace ls::coordinator {
 namespace {
 
-// Looks again until it is true; a test that waits for what never comes fails after a minute.
+// Evaluates the condition repeatedly until it is true; returns false after a minute.
 template <class Condition>
 bool eventually(Condition condition) {
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::minutes(1);
@@ -200,7 +200,7 @@ TEST_F(RedisStores, DoNotBringBackWhatWasRemovedWhileRedisWasAway) {
     const auto store = open();
     ASSERT_TRUE(store->remove_job({"j-1"}));
   }
-  // As if Redis had come back with what it knew before.
+  // As if Redis had restarted with older data.
   ask({"SADD", kRedisJobs, "j-1"});
   for (std::size_t i = 0; i + 1 < kept.items.size(); i += 2)
     ask({"HSET", redis_job_key({"j-1"}), kept.items[i].text, kept.items[i + 1].text});
@@ -265,7 +265,7 @@ TEST_F(RedisStores, RememberQuarantinedWorkersThroughTheLossOfEither) {
   ASSERT_TRUE(open()->quarantine({{"w-1"}, "evidence"}));
   redis_.kill();
   redis_.start();
-  open().reset();  // tells the Redis that forgot
+  open().reset();  // sends the quarantine to the Redis that has lost it
   lose_the_disk();
 
   EXPECT_EQ(open()->quarantined().value(), (std::vector<QuarantinedWorker>{{{"w-1"}, "evidence"}}));
@@ -276,7 +276,8 @@ TEST_F(RedisStores, OneThatIsRefusedKeepsNoOtherFromBeingTold) {
   auto store = open();
   for (int i = 0; i < 200; ++i) ASSERT_TRUE(store->put_job(sample_job(fmt::format("j-{:03}", i))));
 
-  // Both at once: between two tries of the refused one, others may have been told without trouble.
+  // Both conditions must hold at once: between two attempts for the rejected job, the others may be sent
+  // without an error.
   const auto only_it = [](const StoreStatus& s) { return s.behind == 1 && !s.trouble.empty(); };
   ASSERT_TRUE(eventually([&] { return only_it(store->status()); }));
   EXPECT_TRUE(in_redis({"j-199"}));
@@ -289,7 +290,7 @@ struct SharedStores : RedisStores {
     return open_redis_job_store(open_sqlite_job_store(folder_.path() / (node + ".sqlite")).value(), with)
         .value();
   }
-  // What another one would have done.
+  // Makes the changes in Redis that another coordinator makes when it takes over the job.
   void give(const std::string& job, const std::string& from, const std::string& to, int fence) {
     ask({"HSET", redis_job_key({job}), "owner", to, "from", from, "fence", std::to_string(fence)});
     ask({"SMOVE", "lightshaft:owned:" + from, "lightshaft:owned:" + to, job});
@@ -318,7 +319,7 @@ TEST_F(SharedStores, AJobThatComesBackHasTheLogOfItsLastOwnerAlone) {
   std::vector<JobId> lost;
   ASSERT_TRUE(eventually([&] { return !(lost = a->moved().lost).empty(); }));
 
-  ASSERT_TRUE(a->add_log({"j-1"}, {2, "cancelled"}));  // what still stood in the queue
+  ASSERT_TRUE(a->add_log({"j-1"}, {2, "cancelled"}));  // a write that was queued before the job was lost
   ASSERT_TRUE(a->add_point({"j-1"}, {1, 2, 4, {}}));
   EXPECT_TRUE(a->log({"j-1"}).value().empty());
   EXPECT_TRUE(a->points({"j-1"}).value().empty());
@@ -345,8 +346,8 @@ TEST(RedisLink, SaysWhatAPasswordIsWantedFor) {
   EXPECT_TRUE(RedisLink::connect(address, {}));
 }
 
-// Random histories: changes, removals, a Redis that forgets all, a disk that is lost (never both at once
-// without a start in between that told the other). At the end both know what the history says.
+// Random histories: changes, removals, a Redis that loses its data, a disk that is lost. The second loss
+// comes only after a start that has copied the data between the two. At the end both match the history.
 TEST_F(RedisStores, AgreeWithTheHistoryWhateverIsLost) {
   for (std::uint32_t seed = 0; seed < 4; ++seed) {
     std::mt19937 random(seed);
@@ -363,7 +364,7 @@ TEST_F(RedisStores, AgreeWithTheHistoryWhateverIsLost) {
           ASSERT_TRUE(store->remove_job(reference_error.begin()->first));
           reference_error.erase(reference_error.begin());
           break;
-        case 1:  // Redis forgets while the store is open
+        case 1:  // Redis loses its data while the store is open
           redis_.kill();
           redis_.start();
           break;
@@ -377,7 +378,7 @@ TEST_F(RedisStores, AgreeWithTheHistoryWhateverIsLost) {
           store = open();
           break;
         default: {
-          // A removed id never comes again: ids are not used twice.
+          // The id of a removed job is not used again.
           StoredJob job = sample_job(fmt::format("j-{}-{}", step / 20, random() % 5));
           if (removed.contains(job.id)) break;
           job.name = std::to_string(step);

@@ -1,5 +1,5 @@
-// Several coordinators against a real redis-server. Beats are made by hand and leases end by deleting what
-// would have expired: no test waits for time to pass, and how many looks a takeover takes is counted.
+// Several coordinators and a real redis-server. Tests call beat() themselves and delete keys instead of
+// waiting for them to expire, so the number of polls until a takeover is known.
 #include "coordinator/store/redis/redis_members.h"
 
 #include <gtest/gtest.h>
@@ -38,13 +38,13 @@ struct OneMember {
   std::vector<LostJob> lost;
   std::vector<std::vector<QuarantinedWorker>> quarantined;
   std::set<JobId> known;
-  bool keeps = true;  // what it is told to take
+  bool keeps = true;  // false: storing a job that was taken over fails
   std::function<void()> on_taken = [] {};
   std::unique_ptr<RedisMembers> members;
 };
 
-// From the death of a coordinator until another one takes its jobs. Its last sign of life lasts for a lease;
-// the looks that miss it follow, and the first of them may come a beat later.
+// The time from a coordinator's death until another one takes over its jobs: its last heartbeat expires after
+// a lease, then `looks` polls must find no heartbeat.
 TEST(MemberOptions, HaveJobsTakenWithinTenSeconds) {
   const MemberOptions usual;
 
@@ -58,7 +58,7 @@ class Members : public testing::Test {
   OneMember& add(const std::string& node) {
     auto& one = all_[node];
     MemberOptions options{.address = {"127.0.0.1", redis_.port(), 0, "", ""}, .node = node};
-    options.lease = std::chrono::hours(1);  // ends when a test says so
+    options.lease = std::chrono::hours(1);  // a test ends it by deleting the key
     options.looks = kLooks;
     one.members = std::make_unique<RedisMembers>(
         options, RedisMembers::Callbacks{
@@ -126,7 +126,7 @@ TEST_F(Members, AJobIsToldAsTakenThoughTheAnswerToItsTakingWasLost) {
   auto& b = add("b");
   ASSERT_EQ(put("a", "j-1", 1), 1);
   ASSERT_TRUE(b.members->beat());
-  // What Redis does of a takeover, before the connection breaks.
+  // The changes that a takeover makes in Redis, without an answer: the connection breaks.
   ask({"HINCRBY", redis_job_key({"j-1"}), "fence", "1"});
   ask({"HSET", redis_job_key({"j-1"}), "owner", "b", "from", "a"});
   ask({"SMOVE", "lightshaft:owned:a", "lightshaft:owned:b", "j-1"});
@@ -247,7 +247,7 @@ TEST_F(Members, ALongTakeoverRenewsItsClaimAndSendsHeartbeats) {
   auto& b = add("b");
   for (int i = 1; i <= 300; ++i) ASSERT_EQ(put("a", frame_job({"j-film"}, i).value, 1), 1);
   lease_ends("a");
-  std::vector<std::int64_t> claims, beats;  // what the last pause before this one has left
+  std::vector<std::int64_t> claims, beats;  // state of the two keys when jobs are stored
   b.on_taken = [&] {
     claims.push_back(ask({"PTTL", "lightshaft:heir:a"}).number);
     beats.push_back(ask({"EXISTS", "lightshaft:alive:b"}).number);

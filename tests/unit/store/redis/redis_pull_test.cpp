@@ -1,5 +1,5 @@
-// Copying jobs from Redis to a disk: a coordinator that is killed at any write of the copy has lost nothing
-// when it starts again.
+// Copies jobs from Redis to a disk. If the coordinator is killed between any two writes of the copy, nothing
+// is lost: the next start completes the copy.
 #include "coordinator/store/redis/redis_pull.h"
 
 #include <fmt/format.h>
@@ -12,14 +12,11 @@
 namespace ls::coordinator {
 namespace {
 
-// A store whose writes fail from the one after the next `writes` on, as if the process had been killed.
+// A store that accepts `writes` writes and fails all later ones, as if the process had been killed.
 class Dying final : public JobStore {
  public:
   Dying(JobStore& inner, int writes) : inner_(inner), left_(writes) {}
 
-  Result<void> put_job(const StoredJob& job) override {
-    return write([&] { return inner_.put_job(job); });
-  }
   Result<void> put_jobs(std::span<const StoredJob> jobs) override {
     return write([&] { return inner_.put_jobs(jobs); });
   }
@@ -124,7 +121,7 @@ TEST_F(RedisPull, LosesNothingOfAnInheritedJobEither) {
   bool died = true;
   for (int writes = 0; died; ++writes) {
     const auto local = empty_disk();
-    ASSERT_TRUE(local->put_job(sample_job(id_.value)));  // of an earlier time
+    ASSERT_TRUE(local->put_job(sample_job(id_.value)));  // data from an earlier ownership of the job
     ASSERT_TRUE(local->add_log(id_, {0, "long ago"}));
     Dying dying(*local, writes);
     died = !keep_inherited(dying, job);

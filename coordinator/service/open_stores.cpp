@@ -1,13 +1,13 @@
-#include "coordinator/store/blobs/open_blobs.h"
+#include "coordinator/service/open_stores.h"
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <random>
 
 #include "coordinator/store/blobs/disk_blobs.h"
 #include "coordinator/store/blobs/s3_blobs.h"
 #include "coordinator/store/files.h"
+#include "coordinator/store/redis/redis_job_store.h"
 
 namespace ls::coordinator {
 namespace {
@@ -15,14 +15,23 @@ constexpr std::size_t kNodeIdLength = 16;
 bool is_s3(const std::string& where) { return where.starts_with("s3:"); }
 }  // namespace
 
-Result<std::vector<Digest>> BlobStore::missing(std::span<const Digest> digests) const {
-  std::vector<Digest> lacking;
-  for (const Digest& digest : digests) {
-    const auto there = find(digest);
-    if (!there) return tl::unexpected(there.error());
-    if (!*there) lacking.push_back(digest);
-  }
-  return lacking;
+Result<void> check_store(const std::string& store) {
+  if (store == "sqlite") return {};
+  if (!store.starts_with("redis"))
+    return fail(Errc::invalid_argument,
+                fmt::format("--store '{}' is unknown; use sqlite, or redis://HOST:PORT/DB", store));
+  const auto address = parse_redis_url(store);
+  return address ? Result<void>() : tl::unexpected(address.error());
+}
+
+Result<std::unique_ptr<JobStore>> open_jobs(const std::string& store, const std::filesystem::path& data,
+                                            bool shared, const std::string& node) {
+  if (auto known = check_store(store); !known) return tl::unexpected(known.error());
+  auto local = open_sqlite_job_store(data / "jobs.sqlite");
+  if (!local || store == "sqlite") return local;
+  RedisStoreOptions redis{.address = *parse_redis_url(store)};
+  if (shared) redis.node = node;
+  return open_redis_job_store(std::move(*local), std::move(redis));
 }
 
 Result<void> check_blobs(const std::string& where) {

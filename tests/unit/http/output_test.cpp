@@ -1,4 +1,4 @@
-// Layers of an image as numbers.
+// The output of jobs over HTTP: layers of an image as numbers, and the report as an HTML page.
 #include <cmath>
 #include <cstring>
 
@@ -62,6 +62,31 @@ TEST_F(Pixels, ThatAreNotThereAreRefusedWithTheBounds) {
   EXPECT_NE(text(ask(Method::get, url + "?rect=0,0,41,24")).find("0,0,40,24"), std::string::npos);
   EXPECT_NE(text(ask(Method::get, url + "?rect=0,0,1,1&layer=x")).find("rgb, stderr, error, spp"),
             std::string::npos);
+}
+
+using PagesTest = ApiTest;
+
+TEST_F(PagesTest, NeedNothingElseAndMayRunNothing) {
+  const std::string job = submit();
+  ASSERT_TRUE(FakeFarm(*coordinator, 1).finish({job}));
+
+  const Response page = ask(Method::get, "/api/v1/jobs/" + job + "/report.html");
+
+  EXPECT_EQ(page.status, 200);
+  EXPECT_EQ(page.content_type, "text/html; charset=utf-8");
+  EXPECT_NE(text(page).find("Samples per pixel</dt><dd><b>16</b>"), std::string::npos);
+  EXPECT_NE(text(page).find("src=\"data:image/png;base64,"), std::string::npos);
+  std::string policy;
+  for (const auto& [name, value] : page.headers)
+    if (name == "Content-Security-Policy") policy += value;
+  EXPECT_EQ(policy.find("default-src 'none'; img-src data:; style-src 'sha256-"), 0u) << policy;
+  EXPECT_EQ(policy.find("unsafe"), std::string::npos);
+  EXPECT_NE(policy.find("frame-ancestors 'none'"), std::string::npos);
+}
+
+TEST_F(PagesTest, OfNoJobAreNotThere) {
+  EXPECT_EQ(ask(Method::get, "/api/v1/jobs/j-99/report.html").status, 404);
+  EXPECT_EQ(ask(Method::get, "/api/v1/jobs/" + submit() + "/report.html?frame=x").status, 400);
 }
 
 }  // namespace

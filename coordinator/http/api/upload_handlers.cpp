@@ -1,14 +1,18 @@
+// Handlers of blobs and bundles: bodies that are stored while they arrive.
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <stdlib.h>
+#include <unistd.h>
 
-#include <cstdint>
-#include <optional>
-#include <string_view>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
 
+#include "common/base/helper_program.h"
 #include "common/base/parse_number.h"
-#include "coordinator/http/api/api.h"
 #include "coordinator/http/api/handlers.h"
+#include "coordinator/http/bundle/bundle.h"
 #include "coordinator/http/message/json_read.h"
-#include "coordinator/http/message/problem.h"
 
 namespace ls::http {
 namespace {
@@ -57,9 +61,9 @@ Response stored(const Digest& digest, int status) {
   return {.status = status, .headers = {{"Location", "/api/v1/blobs/" + digest.hex()}}};
 }
 
-std::optional<Response> over_limit(std::uint64_t received, std::uint64_t limit) {
+std::optional<Response> over_limit(std::string_view what, std::uint64_t received, std::uint64_t limit) {
   if (received <= limit) return std::nullopt;
-  return problem(413, fmt::format("the blob has more than the {} bytes that are accepted", limit));
+  return problem(413, fmt::format("the {} has more than the {} bytes that are accepted", what, limit));
 }
 
 class StoreSink final : public BodySink {
@@ -69,7 +73,7 @@ class StoreSink final : public BodySink {
 
   std::optional<Response> append(std::span<const std::byte> bytes) override {
     received_ += bytes.size();
-    if (auto refused = over_limit(received_, limit_)) return refused;
+    if (auto refused = over_limit("blob", received_, limit_)) return refused;
     if (const auto done = upload_->append(bytes); !done) return problem(done.error());
     return std::nullopt;
   }
@@ -84,15 +88,15 @@ class StoreSink final : public BodySink {
   std::uint64_t limit_, received_ = 0;
 };
 
-// Receives the body of a blob that exists already, undamaged. Writes nothing, but rejects a body that differs
-// from the blob.
+// Receives the body of a blob that is stored already and undamaged. It stores nothing, but rejects a body
+// that differs from the blob.
 class CompareSink final : public BodySink {
  public:
   CompareSink(const Digest& digest, std::uint64_t limit) : digest_(digest), limit_(limit) {}
 
   std::optional<Response> append(std::span<const std::byte> bytes) override {
     received_ += bytes.size();
-    if (auto refused = over_limit(received_, limit_)) return refused;
+    if (auto refused = over_limit("blob", received_, limit_)) return refused;
     sha_.update(bytes);
     return std::nullopt;
   }
@@ -122,8 +126,12 @@ Response refused_part(int status, std::string_view detail, std::uint64_t offset)
   return response;
 }
 
-// Receives and ignores a part of a blob that the store already has completely. An answer before the end of
-// the part would break the connection.
+Response refused_part(const Error& error, const BlobStore& blobs, const Digest& digest) {
+  return refused_part(status_of(error.code), error.message, blobs.received(digest));
+}
+
+// Receives and ignores a part of a blob that is stored completely already. The part is read to its end, since
+// an earlier answer would break the connection.
 class IgnoreSink final : public BodySink {
  public:
   IgnoreSink(const Digest& digest, std::uint64_t bytes) : digest_(digest), left_(bytes) {}
@@ -148,7 +156,7 @@ class PartSink final : public BodySink {
   std::optional<Response> append(std::span<const std::byte> bytes) override {
     if (bytes.size() > range_.bytes - received_)
       return refused_part(400, "the body is longer than its Content-Range says", blobs_.received(digest_));
-    if (const auto done = upload_->append(bytes); !done) return refused(done.error());
+    if (const auto done = upload_->append(bytes); !done) return refused_part(done.error(), blobs_, digest_);
     received_ += bytes.size();
     return std::nullopt;
   }
@@ -157,20 +165,15 @@ class PartSink final : public BodySink {
       return refused_part(400, "the body is shorter than its Content-Range says; what came is kept",
                           blobs_.received(digest_));
     if (!range_.is_last()) {
-      Response response;
-      response.status = 202;
+      Response response{.status = 202};
       send_offset(response, range_.first + received_, false);
       return response;
     }
-    if (const auto done = upload_->finish(); !done) return refused(done.error());
+    if (const auto done = upload_->finish(); !done) return refused_part(done.error(), blobs_, digest_);
     return stored(digest_, 201);
   }
 
  private:
-  Response refused(const Error& error) const {
-    return refused_part(status_of(error.code), error.message, blobs_.received(digest_));
-  }
-
   BlobStore& blobs_;
   std::unique_ptr<BlobStore::Upload> upload_;
   Digest digest_;
@@ -189,7 +192,7 @@ std::variant<Response, std::unique_ptr<BodySink>> open_part(Api& api, const Requ
         "was sent before");
   if (blobs.prove(digest)) return std::make_unique<IgnoreSink>(digest, range->bytes);
   const std::uint64_t there = blobs.received(digest);
-  if (auto refused = over_limit(range->size, api.limits().blob_bytes)) return *refused;
+  if (auto refused = over_limit("blob", range->size, api.limits().blob_bytes)) return *refused;
   if (!range->possible)
     return refused_part(416, "Content-Range names bytes that a blob of its size does not have", there);
   if (request.content_length && *request.content_length != range->bytes)
@@ -198,10 +201,87 @@ std::variant<Response, std::unique_ptr<BodySink>> open_part(Api& api, const Requ
         fmt::format("Content-Range names {} bytes, the body has {}", range->bytes, *request.content_length),
         there);
   auto upload = blobs.resume_upload(digest, range->first);
-  if (!upload)
-    return refused_part(status_of(upload.error().code), upload.error().message, blobs.received(digest));
+  if (!upload) return refused_part(upload.error(), blobs, digest);
   return std::make_unique<PartSink>(blobs, std::move(*upload), digest, *range);
 }
+
+Error no_spool(std::string_view what, int code) {
+  const bool full = code == ENOSPC || code == EDQUOT || code == EFBIG;
+  return {full ? Errc::resource_exhausted : Errc::unavailable,
+          fmt::format("{} for the request's body: {}{}", what, std::strerror(code),
+                      full ? "; free some space on the coordinator's disk and send it again" : "")};
+}
+
+// Creates a file for a request's body in `folder`, which is created if it is missing; an empty path means the
+// system's folder for temporary files. The file has no name, so it disappears with its descriptor.
+Result<std::unique_ptr<const Descriptor>> open_spool(const std::filesystem::path& folder) {
+  std::error_code error;
+  const auto place = folder.empty() ? std::filesystem::temp_directory_path(error) : folder;
+  if (!error) std::filesystem::create_directories(place, error);
+  if (error) return tl::unexpected(no_spool("no folder", error.value()));
+  std::string name = (place / "body-XXXXXX").string();
+  auto file = std::make_unique<const Descriptor>(::mkostemp(name.data(), O_CLOEXEC));
+  if (file->fd < 0) return tl::unexpected(no_spool("no file", errno));
+  ::unlink(name.c_str());
+  return file;
+}
+
+// Receives POST /api/v1/jobs with a zip or tar: the body is spooled to disk, checked, stored file by file,
+// and submitted.
+class BundleSink final : public BodySink {
+ public:
+  BundleSink(Api& api, std::unique_ptr<const Descriptor> spool, ArchiveKind kind, const Request& request)
+      : api_(api),
+        spool_(std::move(spool)),
+        kind_(kind),
+        query_(request.query),
+        caller_(request.caller),
+        traceparent_(request.header("traceparent")) {}
+
+  std::optional<Response> append(std::span<const std::byte> bytes) override {
+    received_ += bytes.size();
+    if (auto refused = over_limit("bundle", received_, api_.limits().bundle_bytes)) return refused;
+    while (!bytes.empty()) {
+      const ssize_t n = ::write(spool_->fd, bytes.data(), bytes.size());
+      if (n < 0 && errno == EINTR) continue;
+      if (n < 0) return problem(no_spool("no room", errno));
+      bytes = bytes.subspan(static_cast<std::size_t>(n));
+    }
+    return std::nullopt;
+  }
+
+  Response finish() override {
+    return guarded("bundle", [this] { return submit(); });
+  }
+
+ private:
+  Response submit() {
+    const BundleLimits limits{api_.limits().blob_bytes, api_.limits().unpacked_bytes};
+    const auto bundle =
+        read_bundle(spool_->fd, received_, kind_, limits, api_.coordinator().blobs(), api_.stop_token());
+    if (!bundle) return problem(bundle.error());
+    coordinator::SubmitRequest job;
+    auto spec = spec_from_query(query_, "", bundle->spec);
+    if (!spec) return problem(spec.error());
+    job.spec = std::move(*spec);
+    auto text = read_scene_blob(api_, bundle->scene_digest);
+    if (!text) return problem(text.error());
+    job.scene_text = std::move(*text);
+    job.scene_name = bundle->scene;
+    job.assets = bundle->assets;
+    job.owner = caller_.user;
+    job.traceparent = traceparent_;
+    return submit_job(api_, std::move(job), caller_);
+  }
+
+  Api& api_;
+  const std::unique_ptr<const Descriptor> spool_;
+  std::uint64_t received_ = 0;
+  ArchiveKind kind_;
+  Fields query_;
+  Caller caller_;
+  std::string traceparent_;
+};
 
 }  // namespace
 
@@ -214,7 +294,7 @@ std::variant<Response, std::unique_ptr<BodySink>> open_blob(Api& api, const Requ
   if (!request.header("content-range").empty()) return open_part(api, request, *digest);
   auto& blobs = api.coordinator().blobs();
   if (blobs.prove(*digest)) {
-    // A client that waits for '100 Continue' has not sent the body yet and does not have to.
+    // A client that waits for '100 Continue' has not sent the body yet and need not send it.
     if (!request.header("expect").empty()) return stored(*digest, 204);
     return std::make_unique<CompareSink>(*digest, api.limits().blob_bytes);
   }
@@ -263,6 +343,21 @@ Response post_blobs_missing(Api& api, const Request& request, const Params&) {
   auto missing = nlohmann::ordered_json::array();
   for (const Digest& digest : *lacking) missing.push_back(digest.hex());
   return json_response(200, write_json({{"missing", std::move(missing)}}));
+}
+
+std::variant<Response, std::unique_ptr<BodySink>> open_bundle(Api& api, const Request& request) {
+  if (!request.header("content-encoding").empty())
+    return problem(415, "send the bundle as it is: Content-Encoding is not decoded");
+  // The query is checked before the body, which may have gigabytes, is received.
+  const auto spec = spec_from_query(request.query, "");
+  if (!spec) return problem(spec.error());
+  if (auto refused = refuse_priority(api, request.caller, spec->priority)) return std::move(*refused);
+  auto spool = open_spool(api.limits().spool);
+  if (!spool) return problem(spool.error());
+  const std::string type = media_type(request.header("content-type"));
+  const bool zip = type.find("zip") != std::string::npos && type.find("gzip") == std::string::npos;
+  return std::make_unique<BundleSink>(api, std::move(*spool), zip ? ArchiveKind::zip : ArchiveKind::tar,
+                                      request);
 }
 
 }  // namespace ls::http

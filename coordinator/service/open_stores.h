@@ -1,4 +1,4 @@
-// Opens the blob store named by the option --blobs.
+// Opens the stores that the options --store and --blobs name.
 #pragma once
 
 #include <filesystem>
@@ -6,8 +6,20 @@
 #include <string>
 
 #include "coordinator/store/blobs/blob_store.h"
+#include "coordinator/store/jobs/job_store.h"
 
 namespace ls::coordinator {
+
+// Checks the value of --store: sqlite, or a redis:// address.
+Result<void> check_store(const std::string& store);
+
+// Opens the job store that `store` names: SQLite in the folder `data`, or also Redis. With `shared` other
+// coordinators use the same Redis; `node` is this coordinator's name among them.
+Result<std::unique_ptr<JobStore>> open_jobs(const std::string& store, const std::filesystem::path& data,
+                                            bool shared, const std::string& node);
+
+// Checks the value of --blobs: a folder, or an s3:// address with keys in the environment.
+Result<void> check_blobs(const std::string& where);
 
 // Opens the blob store that `where` names. If `where` is empty, blobs are kept in the folder `data`/blobs. If
 // it is an s3:// address, they are kept in that bucket, and `data`/blobs contains the ones that are being

@@ -1,8 +1,8 @@
-// Addresses of --blobs. That requests are signed rightly is seen by a server that checks it:
-// tests/system/test_s3.py.
+// Parts of the S3 blob store: addresses given to --blobs, and the choice of local copies. Signatures of
+// requests are tested in tests/system/test_s3.py, where a server verifies them.
 #include <gtest/gtest.h>
 
-#include "coordinator/store/blobs/s3_link.h"
+#include "coordinator/store/blobs/s3_blobs.h"
 
 namespace ls::coordinator {
 namespace {
@@ -46,6 +46,45 @@ TEST(S3Address, WhatCannotBeOneIsRefusedByName) {
     EXPECT_EQ(address.error().code, Errc::invalid_argument);
     EXPECT_NE(address.error().message.find("--blobs"), std::string::npos);
   }
+}
+
+using Digests = std::vector<Digest>;
+const Digest a = sha256("a"), b = sha256("b"), c = sha256("c");
+
+TEST(LocalCopies, TheOneNotUsedForTheLongestTimeGoesFirst) {
+  LocalCopies copies(100);
+  EXPECT_EQ(copies.used(a, 40), Digests{});
+  EXPECT_EQ(copies.used(b, 60), Digests{});
+  EXPECT_EQ(copies.used(a, 40), Digests{});
+
+  EXPECT_EQ(copies.used(c, 50), Digests{b});
+
+  EXPECT_EQ(copies.bytes(), 90u);
+}
+
+TEST(LocalCopies, OneThatIsTooLargeByItselfStaysAlone) {
+  LocalCopies copies(100);
+  copies.used(a, 40);
+  copies.used(b, 40);
+
+  EXPECT_EQ(copies.used(c, 1000), (Digests{a, b}));
+  EXPECT_EQ(copies.used(a, 40), Digests{c});
+}
+
+TEST(LocalCopies, CountEachOnceAndNotWhatIsGone) {
+  LocalCopies copies(100);
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(copies.used(a, 60), Digests{});
+  copies.gone(a);
+  copies.gone(b);
+
+  EXPECT_EQ(copies.bytes(), 0u);
+  EXPECT_EQ(copies.used(c, 100), Digests{});
+}
+
+TEST(LocalCopies, WithoutABoundAllStay) {
+  LocalCopies copies(0);
+  EXPECT_EQ(copies.used(a, 1ull << 60), Digests{});
+  EXPECT_EQ(copies.used(b, 1ull << 60), Digests{});
 }
 
 }  // namespace

@@ -1,14 +1,9 @@
-// One worker's gRPC stream. It passes the worker's messages to the worker's WorkerSession, and messages to
-// the worker through a queue of at most kQueuedMessages.
-//
-// A stream consists of two objects. The Outlet is the WorkerSink through which the coordinator sends; the
-// coordinator may keep it after the stream has ended. The WorkStream is gRPC's reactor and deletes itself in
-// OnDone. The outlet's lock is never held during calls to the coordinator, so the coordinator may call the
-// sink with its own locks held.
+// The two calls of a worker as gRPC's reactors: its stream of messages, and its fetches of blobs.
 #pragma once
 
 #include <atomic>
 #include <deque>
+#include <functional>
 #include <memory>
 
 #include "common/base/clock.h"
@@ -22,6 +17,13 @@ namespace ls::coordinator::rpc {
 
 namespace pb = ::lightshaft::farm::v1;
 
+// One worker's gRPC stream. It passes the worker's messages to the worker's WorkerSession, and messages to
+// the worker through a queue of at most kQueuedMessages.
+//
+// A stream consists of two objects. The Outlet is the WorkerSink through which the coordinator sends; the
+// coordinator may keep it after the stream has ended. The WorkStream is gRPC's reactor and deletes itself in
+// OnDone. The outlet's lock is never held during calls to the coordinator, so the coordinator may call the
+// sink with its own locks held.
 class WorkStream;
 
 class Outlet final : public WorkerSink {
@@ -81,6 +83,37 @@ class WorkStream final : public grpc::ServerBidiReactor<pb::FromWorker, pb::ToWo
   std::unique_ptr<WorkerSession> session_;
   std::atomic<bool> greeted_{false};
   pb::FromWorker incoming_;
+};
+
+using RunOn = std::function<void(std::function<void()>)>;  // runs the function on another thread
+
+// One FetchBlob call: sends a blob to a worker in chunks, as fast as the worker takes them. The blob is read
+// on separate threads: the coordinator may first have to fetch it from another machine, which can take
+// minutes, and gRPC's few threads must stay free for the messages of workers.
+class BlobStream final : public grpc::ServerWriteReactor<pb::BlobChunk> {
+ public:
+  BlobStream(Coordinator& coordinator, const pb::FetchBlobRequest& request, const JoinCheck& may_join,
+             RunOn run, std::function<void()> on_gone);
+  // Starts the first write, or ends the call with an error.
+  void begin(const JoinGuard& guard, const std::string& address);
+
+  void OnWriteDone(bool ok) override;
+  void OnDone() override;
+
+ private:
+  void open();
+  void next();
+  void refuse(const Error& why);
+
+  Coordinator& coordinator_;
+  BlobStore& blobs_;
+  const pb::FetchBlobRequest& request_;  // exists as long as the call
+  const JoinCheck& may_join_;
+  const RunOn run_;
+  const std::function<void()> on_gone_;
+  Digest digest_;
+  std::uint64_t offset_ = 0, size_ = 0;
+  pb::BlobChunk chunk_;
 };
 
 }  // namespace ls::coordinator::rpc
