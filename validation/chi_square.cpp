@@ -20,9 +20,9 @@ using render::V2;
 using render::V3;
 
 constexpr std::uint64_t kSamplesPerCell = 5000;
-// The density is integrated over each cell by the midpoint rule on successively finer grids, until a step
-// changes the integral by at most the share kConverged of it, or of kNegligible if the integral is smaller
-// than that. With 1e6 samples, such errors add 1e6 * kConverged^2 = 0.01 to the statistic.
+// The density is integrated over each cell by the midpoint rule. The grid is refined until a step changes the
+// integral by at most kConverged times the larger of the integral and kNegligible. With 1e6 samples, such
+// errors add 1e6 * kConverged^2 = 0.01 to the statistic.
 constexpr double kConverged = 1e-4, kNegligible = 1e-6;
 constexpr int kFirstGrid = 8, kLastGrid = 512;
 // A density whose integral exceeds 1 by more than this is an error; the integration is far more accurate.

@@ -18,8 +18,8 @@ struct ValidateOptions {
   std::function<void(const ValidateCase&)> done = {};  // called after each case
 };
 
-// Renders every case; the significance level of the whole file is shared by its cases. Returns an error if a
-// scene or file cannot be rendered.
+// Renders every case. The cases share the significance level that the file states for all of them. Returns an
+// error if a scene or file cannot be rendered.
 Result<std::vector<ValidateCase>> validate_test(const NoriTest& test, const render::AssetFiles& files,
                                                 const ValidateOptions& options);
 

@@ -1,4 +1,5 @@
-// Albedos 0, 1 and almost 1; Russian roulette; depths at which light is scattered hundreds of times.
+// Media of albedo 0, 1 and almost 1, slabs so deep that light is scattered hundreds of times, and Russian
+// roulette.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -24,8 +25,9 @@ void white(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     for (const double tau : {1e-6, 1., 64.}) {
       for (const double g : {0., .9999}) {
-        // Russian roulette acts on paths of more than 1024 vertices, so their weights are not all 1. At
-        // depth 64 with g = 0 such paths occur; in the other cases nearly all paths are shorter.
+        // Russian roulette acts on paths of more than 1024 vertices, and changes their weights from exactly
+        // 1. At depth 64 with g = 0 such paths occur, so that case is left out; in the others nearly all
+        // paths are shorter.
         if (tau > 1 && g == 0) continue;
         t.exact(fmt::format("N16-white-depth-{:g}-g-{:g}{}", tau, g, configuration.name()), "N16 N17 7.6c",
                 "Albedo 1 in a white sky: every path weighs 1 exactly, in every sample.",
@@ -60,9 +62,9 @@ void all_but_white(Table& t) {
   }
 }
 
-// The transmittance of a deep white slab at normal incidence, T = (4/3) K / (tau + 1.42089), with
-// K = (sqrt(3) / 4) H(1) and H(1) = 2.907811. Already at tau = 16 it equals the tabulated 0.096368 to all
-// digits.
+// The transmittance of a white slab at normal incidence by the formula for large depths tau:
+// T = (4/3) K / (tau + 1.42089) with K = (sqrt(3) / 4) H(1), where Chandrasekhar's H(1) is 2.907811. Already
+// at tau = 16 the formula gives the tabulated 0.096368 to all digits.
 double white_transmittance(double tau) { return std::sqrt(3.) / 3 * 2.907811 / (tau + 1.42089); }
 
 void deep(Table& t) {
@@ -73,8 +75,8 @@ void deep(Table& t) {
           fmt::format("N17-white-slab-{:g}{}", tau, configuration.name()), "N17 N16 7.2",
           "A white slab this deep: paths of hundreds of vertices, ended by no cap.",
           [=] { return column(configuration, {.tau = tau}, false); }, grey(1 - white_transmittance(tau)),
-          // At depth 256 few paths are long enough to contribute, and few pixels have one. A short first run
-          // would find none of them, or overestimate them.
+          // At depth 256 the error comes from a few very long paths, and few pixels have one. A short first
+          // run would find none of them, or overestimate their share.
           {.slack = 1e-6, .slow = true, .paths = tau < 100 ? 0u : 1u << 17, .frames = tau < 100 ? 0u : 64u});
     }
   }

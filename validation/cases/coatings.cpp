@@ -9,7 +9,7 @@
 namespace ls::cases {
 namespace {
 
-constexpr double kSheet = 2 * .04 / 1.04;  // what a sheet of index 1.5 reflects along its normal
+constexpr double kSheet = 2 * .04 / 1.04;  // reflectance of a sheet of index 1.5 at normal incidence
 
 BsdfIndex two_sided(SceneBuilder& builder, double reflectance) {
   const BsdfIndex one = builder.diffuse(reflectance);
@@ -155,8 +155,8 @@ void plastic_by_the_sun(Table& t) {
          builder, {f(.2), f(.5), f(.8)});
 }
 
-// A grey floor whose shading normal leans by 36.87 degrees, lit from straight above: the cosine is 0.8. The
-// bumps that a normal map stands for cast no shadows.
+// A grey floor whose shading normal leans by 36.87 degrees, lit from straight above: the cosine of the
+// incident light is 0.8. The bumps that a normal map describes cast no shadows.
 void normal_map(Table& t) {
   SceneBuilder builder;
   const BsdfIndex floor = builder.diffuse(.5);
@@ -168,8 +168,8 @@ void normal_map(Table& t) {
   sun.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(1)});
   t.mean("7.6g-normal-map-by-the-sun", "7.6g N37", "A floor whose normals lean: the cosine is theirs.", sun,
          reflected(.8), {.channels = true});
-  // The sphere lies in the direction of the leaning normal, all of it above the floor and above the plane
-  // perpendicular to that normal: E = pi r^2 / d^2.
+  // The sphere has radius r = 1 and lies at distance d = 3 in the direction of the leaning normal, all of it
+  // above the floor and above the plane perpendicular to that normal. So the irradiance is pi r^2 / d^2.
   builder.lamp(SphereShape{}, translate({1.8, 0, 2.4}));
   t.mean("7.6g-normal-map-by-a-sphere", "7.6g N37", "A floor whose normals lean towards a shining sphere.",
          builder, reflected(kPi / 9), {.channels = true});

@@ -105,10 +105,10 @@ void opaque(Table& t) {
   }
   // The answers are 1 - sqrt(1 - a) H(1), with a the albedo (Chandrasekhar 1950), to six digits. From depth
   // 1e5 on, the mean free path is shorter than the offset of rays from surfaces (2^-20 of the world), so the
-  // distance to the face must be measured from the path's true position. At depth 1e6 the mean free path is
-  // 17 ulps of float32 at the face's height. Next to the face the renderer then computes a trapezoidal sum
-  // over float32 positions z instead of an integral over z. For isotropic scattering the integrand is
-  // E_2(z), the second exponential integral, and the sum is 3.1e-3 too large.
+  // distance to the face must be measured from the path's true position, not from the offset one. At depth
+  // 1e6 the mean free path is 17 ulps of float32 at the face's height. Next to the face the renderer then
+  // computes a trapezoidal sum over float32 positions z instead of an integral over z. For isotropic
+  // scattering the integrand is E_2(z), the second exponential integral, and the sum is 3.1e-3 too large.
   constexpr double kDigits = 2e-6, kPlaces = 3.1e-3;
   for (const Configuration& configuration : all_configurations()) {
     for (const double tau : {1e3, 1e5, 1e6}) {
@@ -151,9 +151,9 @@ void shadows(Table& t) {
     }
   }
   // Where the density varies, a shadow ray estimates its transmittance step by step. When little
-  // transmittance is left, Russian roulette ends most of these estimates (kRouletteDepth), which keeps their
-  // mean. The density is 0, 1, 2, 3 at the centres of four voxels along z and constant beyond, so its
-  // integral is 1.5.
+  // transmittance is left, Russian roulette (kRouletteDepth) ends most of these estimates and weights up the
+  // others, so the mean stays the same. The density is 0, 1, 2, 3 at the centres of four voxels along z and
+  // constant beyond, so its integral is 1.5.
   t.mean("N05-shadow-ramp-8/grid/volpath", "N5 7.6a",
          "A shadow ray through a ramp of densities, by residual tracking.",
          [] {

@@ -1,4 +1,4 @@
-// Direct light on a white floor, and light reflected between surfaces.
+// Direct light on a grey floor, and light reflected between surfaces.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -51,7 +51,8 @@ void direct(Table& t) {
     add("direct-spot-falloff", builder, .5 * 2 * cosine * cosine * cosine);
   }
   {
-    // The sphere is checkered in two colours, in quarters; equal parts of both are seen from below.
+    // A checkerboard of two colours divides the sphere into quarters; from below, equal parts of both are
+    // seen.
     SceneBuilder builder = floor_point();
     const TextureIndex dark = builder.texture(rgb(.25)), bright = builder.texture(rgb(1.5));
     builder.lamp(SphereShape{}, translate({0, 0, 2}) * scale(.5)).emitter = AreaEmitter{
@@ -70,8 +71,8 @@ void direct(Table& t) {
 
 // The reflectance of m plates of n = 1.5 at normal incidence, in front of black, is 1 - T with
 // T = (1 - r) / (1 + (2 m - 1) r), since each face reflects r = 0.04. For 500 plates, a thousand interfaces,
-// T = 3 / 128. The band, half a per cent of the reflectance, is a fifth of T. Paths have a thousand vertices
-// on average.
+// T = 3 / 128, and paths have a thousand vertices on average. The band, half a per cent of the reflectance,
+// is a fifth of T, so the case also tests T.
 void plates(Table& table, int m) {
   SceneBuilder builder;
   const BsdfIndex glass = builder.glass(1.5), black = builder.diffuse(0);
@@ -93,7 +94,8 @@ void add_direct_light(Table& t) {
   direct(t);
   plates(t, 500);
   for (const bool sphere : {false, true}) {
-    // A closed room that emits 1 and reflects half: 1 / (1 - .5).
+    // The walls of a closed room emit radiance 1 and reflect half, so the radiance is 1 / (1 - .5)
+    // everywhere.
     SceneBuilder builder;
     const TextureIndex one = builder.texture(rgb(1));
     const BsdfIndex white = builder.diffuse(.5);

@@ -1,4 +1,4 @@
-// Grids: bounds far too high, single dense voxels, rays along cell faces, invalid densities.
+// Grids with majorants far too high, single dense voxels, rays along cell faces, and invalid densities.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -51,7 +51,8 @@ double shown(double transmittance, bool by_shadow) {
 const char* way_of(bool by_shadow) { return by_shadow ? "/grid/shadow" : "/grid/volpath"; }
 
 // The integral of the trilinear field along a line within the unit cube, from one of its faces to another.
-// Along the line, the field is a cubic between the planes of voxel centres, so Simpson's rule is exact.
+// Along the line, the field is a cubic polynomial between two planes of voxel centres, so Simpson's rule is
+// exact.
 double depth_along(const std::array<int, 3>& n, const std::vector<float>& values, const Vec3& from,
                    const Vec3& to) {
   const auto value = [&](double s) {
@@ -84,8 +85,8 @@ double depth_along(const std::array<int, 3>& n, const std::vector<float>& values
 }
 
 void bounds_too_high(Table& t) {
-  // A grid with sixteen voxels per side of density 1, and one voxel beside the ray that is many times denser.
-  // The ray crosses macro cells that contain this voxel, which sets their bounds.
+  // A grid with sixteen voxels per side, all of density 1 except one voxel beside the ray, which is `times`
+  // times denser. The ray crosses macro cells that contain this voxel, so its density is their bound.
   for (const bool shadow : {false, true}) {
     for (const double times : {1., 10., 1e4, 1e6}) {
       t.mean(
@@ -147,7 +148,8 @@ void hot_voxels(Table& t) {
 // Thin fog with a dense wall across it. The camera's ray stays three voxels away from the wall, and the light
 // that reaches the ray does not cross the wall, either. But macro cells on the ray contain part of the wall;
 // if their mean density were used, no light would get through. The light comes from a lamp in the fog and is
-// scattered once: the answer is the integral over the ray of sigma / (4 pi) e^-(sigma (t + r)) / r^2.
+// scattered once: the answer is the integral over the ray of sigma / (4 pi) e^-(sigma (t + r)) / r^2, with t
+// the position on the ray and r its distance from the lamp.
 void beside_a_wall(Table& t) {
   constexpr int n = 33, wall = 16;
   constexpr double sigma = .5, density = 1e4;
@@ -198,7 +200,7 @@ void along_faces(Table& t) {
                         {"all-but-an-axis", {0, .5, .5}, {1, .5 + 1e-7, .5 - 1e-7}}};
   for (const Line& line : lines) {
     for (const bool shadow : {false, true}) {
-      // Per unit length, the optical depth along these lines is between 0.4 and 0.7 of sigma.
+      // The mean density along each of these lines is between 0.4 and 0.7.
       const double tau = depth_along(n, values, line.from, line.to);
       t.mean(
           fmt::format("N12-{}{}", line.name, way_of(shadow)), "N12 N13",
@@ -351,8 +353,8 @@ void no_densities(Table& t) {
             if (!p) return {.why = p.error().message};
             return {1, static_cast<double>(p->clamped_inputs), 0, {}, 0};
           });
-  // All voxels are 1e-40 (or 1e-38), with an extinction that gives a depth of 1e-12: such values must neither
-  // get lost in products nor be slow.
+  // All densities are 1e-40 or 1e-38, and the scale of 1e20 makes the optical depth 2e-20 or 2e-18. Such
+  // denormal values must neither produce invalid results nor be slow.
   for (const float value : {1e-40f, 1e-38f}) {
     t.exact(fmt::format("N58-denormal-{:g}/grid/volpath", value), "N14 N58",
             "Densities around the smallest float32: nothing is in the way, and nothing goes wrong.",

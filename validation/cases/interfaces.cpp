@@ -12,7 +12,7 @@
 namespace ls::cases {
 namespace {
 
-// `m` glass plates between a white wall and the camera, at normal incidence.
+// `m` glass plates between a shining wall and the camera, at normal incidence.
 SceneBuilder plates(int m) {
   SceneBuilder builder;
   const BsdfIndex glass = builder.glass(1.5);
@@ -108,7 +108,8 @@ void shapes(Table& t) {
         "A box as an instance, mirrored or squeezed, is the box there.",
         [m = maps[i]] { return placed(true, m); }, [m = maps[i]] { return placed(false, m); },
         {.band = .003});
-  // First the whole scene is scaled by `s`, then a box in the scene is squeezed by 1e6.
+  // In the first two cases the whole scene is scaled by `s`. In the third, only the box in it is squeezed, by
+  // 1e6.
   for (const double s : {1e-6, 1e6})
     t.same(
         fmt::format("N44-instance-scaled-{:g}", s), "N44 N4",

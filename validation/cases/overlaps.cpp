@@ -39,8 +39,7 @@ void slabs_of_parts(Table& t) {
     add_layer(builder, half);
     add_layer(builder, half);
   });
-  // Both integrators, also the one that looks for light along segments (volpath_distant_mis), must see both
-  // media.
+  // Both integrators must see both media, also volpath_distant_mis, which samples light along whole segments.
   const auto grid_and_constant = [](SceneBuilder& builder) {
     add_layer(builder, builder.homogeneous(rgb(.4), kAlbedo));
     const VolumeIndex v =
@@ -58,8 +57,8 @@ void slabs_of_parts(Table& t) {
           CubeShape{},
           translate({i & 1 ? .3 : -.3, i & 2 ? .3 : -.3, i & 4 ? .75 : .25}) * scale(.3, .3, .25), null, m);
   });
-  // A thinner medium of higher priority replaces the other one in half of the slab. The other is thicker to
-  // make up for it.
+  // In the lower half of the slab a medium of extinction 0.5 and higher priority replaces one of extinction
+  // 1.5: their mean is 1.
   add_slab(t, "by-priority-R", false, {}, [](SceneBuilder& builder) {
     add_layer(builder, builder.homogeneous(rgb(1.5), kAlbedo));
     add_layer(builder, ranked(builder, rgb(.5), kAlbedo, 2), .5);
@@ -86,7 +85,8 @@ void white_crowd(Table& t) {
          builder, grey(1), {.channels = true});
 }
 
-// Two media in one box that absorb and emit. The radiance is (e1 + e2) (1 - e^(-(s1 + s2) d)) / (s1 + s2).
+// Two media in one box that absorb, with extinctions s1 and s2, and emit e1 and e2 per length. Over a path of
+// length d the radiance is (e1 + e2) (1 - e^(-(s1 + s2) d)) / (s1 + s2).
 void emitting(Table& t, const Configuration& configuration) {
   SceneBuilder builder;
   const Rgb s1{.5, 1, .2}, s2{1, .25, .6}, e1{1, 2, 0}, e2{.5, 1, 3};
@@ -103,7 +103,7 @@ void emitting(Table& t, const Configuration& configuration) {
          "Two media in one box that absorb and emit: their sums.", builder, expected);
 }
 
-// A lamp in two clouds, light scattered once.
+// A lamp in two media in the same place; light is scattered once.
 void lamp(Table& t) {
   constexpr double kHeight = .5, kSigma = 1;
   SceneBuilder builder;

@@ -10,14 +10,15 @@
 namespace ls::cases {
 namespace {
 
-// A light straight ahead: it travels against the view, so it arrives scattered by 0 degrees. For the phase
-// function p, 4 pi p(0) = (1 + g) / (1 - g)^2, which is 1.9999e8 at g = 0.9999.
+// Parallel light that reaches the camera scattered by 0 degrees if g > 0, by 180 degrees otherwise: the peak
+// of the phase function p in both cases. 4 pi p(0) = (1 + g) / (1 - g)^2, which is 1.9999e8 at g = 0.9999.
 void phase_peaks(Table& t) {
   const auto add = [&](const std::string& id, const char* rows, const Configuration& configuration,
                        double g) {
     t.mean(id, rows, "Light scattered straight on: 4 pi p = (1 + |g|) / (1 - |g|)^2, not clamped.",
            [=] { return head_on(configuration, g, .5, g > 0); }, grey(head_on_answer(g, .5)),
-           // In float32, 1 - g is known with a relative error of 2^-24 / (1 - g), and it enters squared.
+           // g is rounded to float32, by at most 2^-25, so 1 - g has a relative error of 2^-25 / (1 - g); the
+           // peak depends on its square.
            {.band = .003, .slack = 2 * 0x1p-25 / (1 - std::abs(g))});
   };
   for (const Configuration& configuration : all_configurations()) {

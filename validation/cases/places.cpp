@@ -1,5 +1,5 @@
-// Coincident objects: faces in the same place, overlapping media, cameras at a boundary and inside glass,
-// points to be lit on the light itself; and defocus.
+// Coincident objects: faces in the same place, overlapping media, cameras at a boundary and inside glass, and
+// lights that reflect light themselves; and defocus.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -143,7 +143,7 @@ void cameras_at_a_boundary(Table& t) {
   from_inside("N43-in-a-bubble-in-glass", "A camera in a bubble of air in a ball of glass: 1.", 1, true);
 }
 
-// Lights that also reflect: the points to be lit are on the light itself.
+// Lights that also reflect: the shaded points are on the light itself.
 void on_lights(Table& t) {
   const auto alone = [&](const char* name, const Geometry& g) {
     t.exact(fmt::format("N27-on-a-shining-{}", name), "N27",

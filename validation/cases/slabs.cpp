@@ -92,9 +92,7 @@ std::string named(const char* what, const Slab& s, const char* side, const Confi
   return fmt::format("7.2-{}-a{:g}-tau{:g}-{}{}", what, s.albedo, s.tau, side, configuration.name());
 }
 
-// Where a slab transmits little light, and only by long paths, the band is 1 %. The transmittance T of the
-// white slab of depth 16 is tested in the faster configuration only (by_both()); its reflectance R is tested
-// in both.
+// Where a slab transmits little light, and only by long paths, the band is 1 %.
 MeanOptions of_little(double through, bool slow) {
   const bool little = through < .3;
   return {.band = little ? .01 : kBand,
@@ -102,6 +100,8 @@ MeanOptions of_little(double through, bool slow) {
           .slack = kDigits * 10,
           .slow = slow};
 }
+// False: the slab's transmittance is tested in the faster configuration only. The reflectance is tested in
+// both.
 bool by_both(const Slab& slab) { return slab.tau < 10; }
 
 void isotropic(Table& t) {
@@ -133,7 +133,7 @@ void isotropic(Table& t) {
 SceneBuilder plate_above(const Configuration& configuration, Slab slab) {
   slab.wall = .5;
   SceneBuilder builder = column(configuration, slab, true);
-  Shape& end = builder.scene.shapes[4];  // black, behind what is seen from above
+  Shape& end = builder.scene.shapes[4];  // the black plate of empty_column()
   end.bsdf = builder.diffuse(.5);
   end.to_world = translate({0, 0, slab.tau + 2}) * rotate_x(180) * scale(slab.reach());
   builder.look({.1, .15, slab.tau + 1}, {.1, .15, slab.tau + 2}, 1e-3, {0, 1, 0});
@@ -189,7 +189,8 @@ void dielectric(Table& t) {
          grey(.10931), {.slack = 1e-4, .slow = true});
 }
 
-// The answer for single scattering, with a the albedo and mu the cosine of the incident light:
+// The share of uniform light that a slab reflects along its normal by single scattering, with a the albedo
+// and mu the cosine of the incident light:
 // R_1 = (a/2) int_0^1 mu / (1 + mu) (1 - e^(-tau (1 + 1/mu))) dmu.
 double first_order(double albedo, double tau) {
   return albedo / 2 *

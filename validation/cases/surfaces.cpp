@@ -41,8 +41,8 @@ SceneBuilder before_a_wall(SceneBuilder builder) {
 }
 
 // For a white GGX metal seen from this many degrees off its normal: the mean of the shadowing on the way out,
-// 1 / (1 + lambda), over the normals visible from there (Heitz 2018), by the midpoint rule. Masking and
-// shadowing are separable, as in Mitsuba.
+// 1 / (1 + lambda), over the facet normals that are visible from this direction (Heitz 2018), by the midpoint
+// rule. Masking and shadowing are separable, as in Mitsuba.
 double unmasked_at(double degrees, double alpha) {
   constexpr int kSteps = 400;
   const double a = degrees * kPi / 180, l = std::hypot(alpha * std::sin(a), std::cos(a));
@@ -117,8 +117,8 @@ void microfacets(Table& t) {
     t.mean(fmt::format("N35-grazing-rough-{:g}", alpha), "N35",
            "A rough white metal at 89.99 degrees: what facets leave of a white sky, by quadrature.",
            [=] { return in_white(sheet(89.99, [=](SceneBuilder& k) { return rough_mirror(k, alpha); })); },
-           // The answer comes from the midpoint rule, which is accurate to 2e-5 for the square root at the
-           // rim.
+           // The answer comes from the midpoint rule, which is accurate to 2e-5 here: the integrand has a
+           // square root at its rim.
            grey(unmasked_at(89.99, alpha)), {.slack = 2e-5});
 }
 
@@ -197,8 +197,8 @@ void diffuse_sheets(Table& t) {
             [behind](const Bench& b) {
               SceneBuilder builder = sheet(40, [](SceneBuilder& k) { return leaf(k, rgb(.25), rgb(.625)); });
               builder.scene.emitters.push_back(PointEmitter{{0, 0, behind ? -2. : 2.}, rgb(3)});
-              // The frame covers 1e-4 of the sheet at distance 2. Over it, cosine and distance vary by about
-              // 1e-9; float32 rounding is some 1e-6.
+              // The frame shows a width of 1e-4 of the sheet. Over it, the cosine and the distance to the
+              // lamp vary by about 1e-9; float32 rounding is about 1e-6.
               return every_value(b, builder, 4, grey((behind ? .625 : .25) * .75 / kPi), 1e-5);
             });
   // A lamp in the middle of a ball lights its wall through absorbing fog. The wall transmits T and reflects
@@ -247,8 +247,8 @@ BsdfIndex coated_metal(SceneBuilder& builder, double ior, double coat_alpha, dou
   return builder.bsdf(CoatedConductorBsdf{ior, 1, coat_alpha, alpha, alpha, eta, k, builder.texture(rgb(1))});
 }
 
-// At right angles, of a coat of 1.5 over a metal of the index 3 + 4i: F = 0.04, and R is that of the index
-// (3 + 4i) / 1.5.
+// A coat of index 1.5 over a metal of index 3 + 4i, at normal incidence. The coat reflects F = 0.04 and
+// transmits T = 1 - F; the metal below it has the relative index (3 + 4i) / 1.5 = a + b i and reflects R.
 void coated_metals(Table& t) {
   constexpr double F = .04, a = 2, b = 8. / 3;
   constexpr double R = ((a - 1) * (a - 1) + b * b) / ((a + 1) * (a + 1) + b * b);

@@ -11,8 +11,8 @@ namespace ls::cli {
 
 namespace {
 
-// Sets z, in units that include the allowance. In units of the standard error alone, the z of a figure with
-// almost no variance that is off by one ulp would be in the hundreds.
+// Sets z. Its unit includes the allowance: in units of the standard error alone, a figure with almost no
+// variance that is off by one ulp would have a z in the hundreds.
 void measure_z(ValidateCase& c, double allowance) {
   const double unit = std::hypot(c.standard_error, allowance);
   c.allowance = allowance;

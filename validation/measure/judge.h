@@ -35,15 +35,16 @@ struct ValidateCase {
   bool passed() const { return why.empty(); }
 };
 
-// Judges a case whose figures are known: sets z, p, allowance and why. `freedom` is the degrees of freedom of
-// the standard error, `rounding` the deviation allowed for float32 rounding. Without that allowance, a figure
-// whose samples are all equal (standard error 0) would fail for an error of one ulp.
+// Judges a case by its p: sets z, p, allowance and why. `freedom` is the degrees of freedom of the standard
+// error, `rounding` the deviation allowed for float32 rounding. Without that allowance, a figure whose
+// samples are all equal (standard error 0) would fail for an error of one ulp.
 void judge(ValidateCase& c, double freedom, double rounding);
 
-// Judges by equivalence, with the standard error's `freedom` degrees of freedom. Both intervals are widened
-// by `unknown`, the uncertainty of the answer. The interval at c.level must contain the answer, and the one
-// at c.band_level must lie inside the band around it, so a case with too few samples fails. A case also
-// fails if its standard error is above `rounding` and has fewer than `least` degrees of freedom.
+// Judges a case by two confidence intervals (equivalence test), with the standard error's `freedom` degrees
+// of freedom. Both intervals are widened by `unknown`, the uncertainty of the answer. The interval at c.level
+// must contain the answer, and the one at c.band_level must lie inside the band around it, so a case with too
+// few samples fails. A case also fails if its standard error is above `rounding` and has fewer than `least`
+// degrees of freedom.
 void judge_equivalence(ValidateCase& c, double freedom, double unknown, double rounding, double least);
 
 }  // namespace ls::cli

@@ -1,5 +1,5 @@
 // The agent's render threads. Each takes one unit (one tile and one range of samples) at a time: the first
-// one that waits in the table of leases, the lists of units assigned to this worker.
+// waiting unit of the leases, which are the lists of units assigned to this worker.
 #include <fmt/format.h>
 
 #include <algorithm>

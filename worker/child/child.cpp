@@ -23,10 +23,10 @@ using child::Reply;
 using child::Request;
 using child::Slot;
 
-// How many children in a row may die because of other units while they render the same unit. The next child
-// renders the unit again; after the last of these deaths the unit is reported as failed. Each death also
-// fails the unit that caused it, and after three failures the farm gives this worker no more units of that
-// job. The limit is so high that the farm does this before an innocent unit reaches it.
+// If a child dies because of another unit, the next child renders this unit again. After this many such
+// deaths in a row the unit is reported as failed. Each death also fails the unit that caused it, and after
+// three failures of a job the farm gives this worker no more of its units. The limit is so high that the farm
+// does so before an innocent unit reaches it.
 constexpr int kInnocentDeaths = 64;
 
 std::size_t floats_of(const LocalJob& job, const LeaseUnit& unit) {
@@ -136,8 +136,8 @@ Result<std::shared_ptr<Process>> ChildBackend::spawn_greeted() {
   }
 }
 
-// Waits for the child's hello. unavailable: the child exited before its hello, although an earlier child did
-// not.
+// Waits for the child's hello. unavailable: the child exited before its hello, not by a signal, and an
+// earlier child was ready; so another attempt may succeed.
 Result<void> ChildBackend::greet(Process& process) {
   const TimePoint deadline = clock_.now() + options_.start_limit;
   const auto answer = process.ask(process.control_fd(), Request{.kind = Kind::hello}, {}, [&] {
@@ -218,7 +218,7 @@ tl::expected<std::shared_ptr<Process>, UnitFailure> ChildBackend::ready_process(
   return *process;
 }
 
-// Requests the child to free the worlds of the jobs in `forgotten_`. False: the child is dead.
+// Makes the child free the worlds of the jobs in `forgotten_`. False: the child is dead.
 bool ChildBackend::send_forgotten(Process& process) {
   std::vector<std::uint64_t> forgotten;
   {

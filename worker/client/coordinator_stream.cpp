@@ -98,7 +98,7 @@ void WorkCall::OnReadDone(bool ok) {
     if (!state->writing) release_hold(*state);
     return;
   }
-  // A message type from a newer version: ignored, since newer coordinators must not rely on it.
+  // A message of an unknown type, which only newer coordinators send, is ignored: they must not rely on it.
   if (!wire::known(incoming_)) {
     StartRead(&incoming_);
     return;

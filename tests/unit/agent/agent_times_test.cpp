@@ -1,4 +1,4 @@
-// What an agent says of its time besides rendering.
+// The times that an agent reports besides rendering: loading, idling and waiting.
 #include <numeric>
 
 #include "tests/unit/agent/agent_rig.h"
@@ -6,8 +6,8 @@
 namespace ls::worker {
 namespace {
 
-// The fake, on a clock that only moves when it prepares a job (2 s) and begins a unit (1/4 s of standing
-// still, 1/2 s of rendering, of which its thread has a core for 1/8).
+// The fake renderer on a clock that advances only when it prepares a job (by 2 s) and when it renders a unit:
+// by 3/4 s, of which it reports 1/2 s as rendering, with 1/8 s of CPU time; the other 1/4 s counts as idle.
 class TimedBackend final : public RenderBackend {
  public:
   TimedBackend(std::unique_ptr<RenderBackend> fake, FakeClock& clock)

@@ -36,13 +36,13 @@ TEST_F(AgentInTrouble, DoesNotAskAFullDiskAgainAtOnce) {
   coordinator_.wait_for([](auto& c) { return c.returned.size() == 1; });
   coordinator_.tell(assign("l-2", "j-1", {0}));
   coordinator_.tell(assign("l-3", "j-2", {0}, 2));
-  coordinator_.wait_for([](auto& c) { return c.returned.size() == 2; });  // of the other job
+  coordinator_.wait_for([](auto& c) { return c.returned.size() == 2; });  // the second is of the other job
 
   EXPECT_EQ(coordinator_.returned[1].lease, LeaseId{"l-3"});
   EXPECT_EQ(coordinator_.fetches, 2);
 }
 
-// A backend that runs out of memory wherever it is told to.
+// A backend that runs out of memory while it loads a scene or, if not `at_loading`, while it renders.
 class Exhausted final : public RenderBackend {
  public:
   explicit Exhausted(bool at_loading) : at_loading_(at_loading) {}
@@ -76,7 +76,7 @@ TEST_F(AgentInTrouble, ReportsAUnitWhoseBackendRanOutOfMemoryAndLivesOn) {
   }
 }
 
-// A backend that finds itself unable to go on at its second unit.
+// A backend that renders tile 0 and reports itself as broken at any other tile.
 class Broken final : public RenderBackend {
  public:
   Digest numeric_class() const override { return fake_->numeric_class(); }

@@ -16,7 +16,8 @@ TEST(GapMeter, SaysQuantilesToAStepOfItsHistogram) {
   for (int i = 1; i <= 1000; ++i) gaps.add(i * 1e-5);  // 10 us to 10 ms
   EXPECT_EQ(gaps.count(), 1000u);
   EXPECT_THAT(gaps.text(), testing::HasSubstr("longest 10.00 ms"));
-  // The upper end of the bucket that holds the quantile: at most a factor 2^(1/8) above it, never below.
+  // quantile() returns the upper end of the bucket that contains the quantile, so it is never too small, and
+  // too large by a factor of at most 2^(1/8).
   for (const double q : {.01, .5, .99}) {
     EXPECT_GE(gaps.quantile(q), q * 1e-2 * (1 - 1e-12)) << q;
     EXPECT_LE(gaps.quantile(q), q * 1e-2 * 1.0906) << q;
