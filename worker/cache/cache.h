@@ -19,7 +19,6 @@
 #include <span>
 
 #include "common/base/error.h"
-#include "worker/agent/blob_files.h"
 #include "worker/agent/link.h"
 
 namespace ls::worker {

@@ -15,7 +15,6 @@
 #include <string_view>
 
 #include "common/base/spawn.h"
-#include "worker/agent/resident.h"
 
 namespace ls::worker::child {
 namespace {

@@ -5,6 +5,7 @@
 #include <new>
 
 #include "tests/unit/agent/agent_rig.h"
+#include "worker/agent/agent_impl.h"
 
 namespace ls::worker {
 namespace {
@@ -109,6 +110,18 @@ TEST_F(AgentInTrouble, EndsWithABrokenBackendsErrorAfterGivingUnitsBackUnharmed)
   std::size_t returned = 0;
   for (const LeaseReturned& r : coordinator_.returned) returned += r.unrendered.size();
   EXPECT_EQ(returned, 9U);
+}
+
+TEST(Backoff, DoublesUpToItsLimitWithinItsJitterAndStartsAgain) {
+  Backoff backoff(std::chrono::milliseconds(100), std::chrono::seconds(1), 42);
+  for (const int whole_ms : {100, 200, 400, 800, 1000, 1000}) {
+    const Duration pause = backoff.next();
+    EXPECT_LE(pause, std::chrono::milliseconds(whole_ms));
+    EXPECT_GE(pause, std::chrono::milliseconds(whole_ms) / 2);
+  }
+  for (int i = 0; i < 100; ++i) EXPECT_LE(backoff.next(), std::chrono::seconds(1));
+  backoff.reset();
+  EXPECT_LE(backoff.next(), std::chrono::milliseconds(100));
 }
 
 }  // namespace
