@@ -10,8 +10,7 @@
 #include <cstring>
 
 #include "common/base/log.h"
-#include "worker/cache/partial_file.h"
-#include "worker/cache/stored.h"
+#include "worker/cache/cache_files.h"
 
 namespace ls::worker {
 namespace fs = std::filesystem;
