@@ -18,7 +18,6 @@
 #include <thread>
 #include <vector>
 
-#include "worker/child/job_text.h"
 #include "worker/child/protocol.h"
 
 namespace ls::worker::child {
