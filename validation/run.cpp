@@ -11,7 +11,6 @@
 #include "validation/fixtures/checks.h"
 #include "validation/measure/hypothesis_tests.h"
 #include "validation/measure/measure.h"
-#include "validation/significance_level.h"
 
 namespace ls::cases {
 namespace {

@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/support/scene_builder.h"
-#include "validation/chi_square.h"
 #include "validation/measure/hypothesis_tests.h"
 #include "validation/nori_test_run.h"
 
