@@ -79,9 +79,7 @@ void null_collisions(Table& t) {
     t.mean("bug-null-collision-0-to-the-0th" + configuration.name(), "N15 N9 bug",
            "A grid without extinction in red: its light passes, whichever channel decides flights.",
            [=] {
-             SceneBuilder builder = unit_cube(configuration, {0, 1, 4});
-             builder.environment();
-             return builder;
+             return in_white(unit_cube(configuration, {0, 1, 4}));
            },
            {1, std::exp(-1.), std::exp(-4.)});
 }

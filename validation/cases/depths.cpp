@@ -27,9 +27,7 @@ void nothing(Table& t) {
         "A medium that takes a part in 1e30, and so stays in the scene, shows a white sky as 1 exactly, in "
         "every sample.",
         [configuration](const Bench& b) {
-          SceneBuilder builder = unit_cube(configuration, rgb(1e-30));
-          builder.environment();
-          return every_value(b, builder, 64, grey(1), 0);
+          return every_value(b, in_white(unit_cube(configuration, rgb(1e-30))), 64, grey(1), 0);
         });
     if (!configuration.grid) continue;
     t.exact("N01-zeros" + configuration.name(), "N1",
@@ -82,11 +80,7 @@ void thin_scattering(Table& t) {
     for (const Configuration& configuration : {kVolpath, kDistant, kDistantGrid}) {
       t.mean(fmt::format("N02-lamplit-{:g}{}", tau, configuration.name()), "N2 N22",
              "A lamp's light scattered once in a medium this thin: proportional to its depth.",
-             [=] {
-               SceneBuilder builder = passing(configuration, rgb(tau), rgb(1));
-               builder.scene.emitters.push_back(PointEmitter{{.5, 0, 0}, rgb(1 / (4 * kPi))});
-               return builder;
-             },
+             [=] { return beside_a_watt(passing(configuration, rgb(tau), rgb(1)), .5); },
              grey(passing_answer(.5, tau)), {.band = 1e-3});
     }
   }
@@ -97,9 +91,7 @@ void opaque(Table& t) {
     for (const double tau : {1e3, 1e6}) {
       t.exact(fmt::format("N03-nothing-gets-through-{:g}{}", tau, configuration.name()), "N3",
               "Of a white sky behind this depth nothing is left, exactly.", [=](const Bench& b) {
-                SceneBuilder builder = unit_cube(configuration, rgb(tau));
-                builder.environment();
-                return every_value(b, builder, 64, grey(0), 0);
+                return every_value(b, in_white(unit_cube(configuration, rgb(tau))), 64, grey(0), 0);
               });
     }
   }

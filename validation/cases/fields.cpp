@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "validation/fixtures/case.h"
-#include "validation/fixtures/closed_forms.h"
 #include "validation/fixtures/fixtures.h"
 
 namespace ls::cases {

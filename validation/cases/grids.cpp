@@ -110,9 +110,7 @@ void bounds_too_high(Table& t) {
                                 builder.heterogeneous(builder.grid({9, 7, 5}, std::vector<float>(315, value),
                                                                    box({-1, -1, -1}, {1, 1, 1})),
                                                       rgb(1), 2 / value));
-              builder.environment();
-              builder.look({.4, -6, .7}, {0, 0, 0}, 30);
-              return every_value(b, builder, 64, grey(1), 0);
+              return every_value(b, furnace(builder), 64, grey(1), 0);
             });
   }
 }
@@ -226,14 +224,15 @@ void along_faces(Table& t) {
   }
 }
 
-// Adds null boundaries that cut a unit cube of medium 0 into pieces along x.
-void cut(SceneBuilder& builder, int pieces) {
+// Returns the scene with null boundaries that cut a unit cube of medium 0 into pieces along x.
+SceneBuilder cut(SceneBuilder builder, int pieces) {
   const BsdfIndex null = builder.null();
   for (int i = 1; i < pieces; ++i)
     builder
         .container(RectangleShape{}, translate({1. * i / pieces, .5, .5}) * rotate_y(90) * scale(.5), null,
                    {0})
         .exterior = MediumIndex{0};
+  return builder;
 }
 
 void cut_in_pieces(Table& t) {
@@ -242,13 +241,7 @@ void cut_in_pieces(Table& t) {
       t.mean(
           fmt::format("N13-in-{}-pieces{}", pieces, configuration.name()), "N13 N42 7.7",
           "A ray cut by boundaries that change nothing: the same depth, by flights.",
-          [=] {
-            SceneBuilder builder = unit_cube(configuration, rgb(.25));
-            cut(builder, pieces);
-            builder.environment();
-            return builder;
-          },
-          grey(std::exp(-.25)));
+          [=] { return in_white(cut(unit_cube(configuration, rgb(.25)), pieces)); }, grey(std::exp(-.25)));
     }
     for (const int pieces : {10, 1000}) {
       // Each piece's length is a difference of float32 positions. A piece begins at the position where the
@@ -260,8 +253,7 @@ void cut_in_pieces(Table& t) {
               [=](const Bench& b) {
                 SceneBuilder builder = unit_cube(configuration, rgb(0));
                 builder.set_emission(MediumIndex{0}, rgb(1));
-                cut(builder, pieces);
-                return every_value(b, builder, 4, grey(1), tolerance);
+                return every_value(b, cut(builder, pieces), 4, grey(1), tolerance);
               });
       t.exact(
           fmt::format("N13-shadow-through-{}-pieces{}", pieces, configuration.name()), "N13 N42",
@@ -317,9 +309,7 @@ SceneBuilder with_voxel(float value, double sigma = 1) {
   builder.container(
       CubeShape{}, {}, builder.null(),
       builder.heterogeneous(builder.grid({4, 4, 4}, values, box({-1, -1, -1}, {1, 1, 1})), rgb(.5), sigma));
-  builder.environment();
-  builder.look({.4, -6, .7}, {0, 0, 0}, 30);
-  return builder;
+  return furnace(builder);
 }
 
 void no_densities(Table& t) {
@@ -364,9 +354,7 @@ void no_densities(Table& t) {
                                 builder.heterogeneous(builder.grid({8, 8, 8}, std::vector<float>(512, value),
                                                                    box({-1, -1, -1}, {1, 1, 1})),
                                                       rgb(.5), 1e20));
-              builder.environment();
-              builder.look({.4, -6, .7}, {0, 0, 0}, 30);
-              return every_value(b, builder, 64, grey(1), 0);
+              return every_value(b, furnace(builder), 64, grey(1), 0);
             });
   }
 }
@@ -378,9 +366,7 @@ void heroes(Table& t) {
     t.mean("N15-hero-without-extinction" + configuration.name(), "N15 7.6a",
            "Extinction 0, 1 and 16 in the channels: none starves the others.",
            [=] {
-             SceneBuilder builder = unit_cube(configuration, {0, 1, 16});
-             builder.environment();
-             return builder;
+             return in_white(unit_cube(configuration, {0, 1, 16}));
            },
            {1, std::exp(-1.), std::exp(-16.)});
   }

@@ -7,7 +7,6 @@
 #include "validation/fixtures/case.h"
 #include "validation/fixtures/checks.h"
 #include "validation/fixtures/fixtures.h"
-#include "validation/fixtures/sky_builder.h"
 
 namespace ls::cases {
 namespace {

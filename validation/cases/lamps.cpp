@@ -63,11 +63,7 @@ void passing_by(Table& t) {
       if (configuration.grid && !configuration.distant && h < .5) continue;
       t.mean(fmt::format("N22-passing-a-lamp-at-{:g}{}", h, configuration.name()), "N22 N23 7.6f",
              "A ray that passes a lamp at this distance, light scattered once.",
-             [=] {
-               SceneBuilder builder = passing(configuration, rgb(1), rgb(1));
-               builder.scene.emitters.push_back(PointEmitter{{h, 0, 0}, rgb(1 / (4 * kPi))});
-               return builder;
-             },
+             [=] { return beside_a_watt(passing(configuration, rgb(1), rgb(1)), h); },
              grey(passing_answer(h, 1)), {.slack = 4 * 0x1p-24 / h});
     }
   }
@@ -110,9 +106,8 @@ void from_afar(Table& t) {
       t.mean(fmt::format("N24-lamp-at-{:g}{}", distance, configuration.name()), "N24 N22",
              "A lamp this far away is a sun: parallel light of its irradiance.",
              [=] {
-               SceneBuilder builder = lit_cube(configuration, rgb(1), rgb(1));
-               builder.scene.emitters = {PointEmitter{{0, distance, 0}, rgb(distance * distance)}};
-               return builder;
+               return lit_by(lit_cube(configuration, rgb(1), rgb(1)),
+                             PointEmitter{{0, distance, 0}, rgb(distance * distance)});
              },
              grey(lit_cube_answer(1, 1)), {.slack = 4 / distance});
     t.mean("N24-sphere-of-1e2-at-1e3" + configuration.name(), "N24 N26",
@@ -195,9 +190,8 @@ void across_boundaries(Table& t) {
           fmt::format("N25-lamp-at-{:g}{}", y, configuration.name()), "N25",
           "A lamp inside a cube of a medium, just below and above its face, and outside.",
           [=] {
-            SceneBuilder builder = lit_cube(configuration, rgb(1), rgb(1));
-            builder.scene.emitters = {PointEmitter{{0, y, 0}, rgb(1 / (4 * kPi))}};
-            return builder;
+            return lit_by(lit_cube(configuration, rgb(1), rgb(1)),
+                          PointEmitter{{0, y, 0}, rgb(1 / (4 * kPi))});
           },
           // A ray from the view to a lamp above the cube always leaves through the cube's top, never through
           // a side, since it approaches the y axis.

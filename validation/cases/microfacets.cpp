@@ -90,12 +90,7 @@ void normals(Table& t) {
   // angle of this wedge about the shading normal is pi (1 + cos b) / 2.
   t.mean(
       "N37-furnace", "N37 N38", "That floor, white, in a white sky: it gives the part of it that it sees.",
-      [] {
-        SceneBuilder builder = leaning();
-        builder.environment();
-        return builder;
-      },
-      grey((1 + std::cos(kLean)) / 2));
+      [] { return in_white(leaning()); }, grey((1 + std::cos(kLean)) / 2));
 }
 
 }  // namespace

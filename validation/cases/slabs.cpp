@@ -14,6 +14,7 @@ namespace ls::cases {
 namespace {
 
 constexpr double kDigits = 5e-6;  // half a unit of the tables' sixth decimal, relative to a value of 0.1
+const DirectionalEmitter kSun{{0, 0, -1}, rgb(1)};
 
 void semi_infinite(Table& t) {
   struct Row {
@@ -29,12 +30,8 @@ void semi_infinite(Table& t) {
                grey(cosine == 1 ? row.normal : row.slanted), {.slack = kDigits, .slow = row.albedo < .9});
       t.mean(fmt::format("7.1-normal-to-normal-a{:g}{}", row.albedo, configuration.name()), "7.1",
              "An endless medium in the sun, both along the normal: L / E = a H(1)^2 / (8 pi).",
-             [=] {
-               SceneBuilder builder = half_space(configuration, row.albedo, 40, 1);
-               builder.scene.emitters = {DirectionalEmitter{{0, 0, -1}, rgb(1)}};
-               return builder;
-             },
-             grey(row.l_over_e), {.slack = row.digits});
+             [=] { return lit_by(half_space(configuration, row.albedo, 40, 1), kSun); }, grey(row.l_over_e),
+             {.slack = row.digits});
     }
   }
   // A white slab of optical depth 64: the half space's 0.336428 minus what the slab transmits,
@@ -42,9 +39,7 @@ void semi_infinite(Table& t) {
   const double k = std::sqrt(3.) / 4 * 2.907811;
   t.mean("7.1-normal-to-normal-a1/homogeneous/volpath", "7.1 N17", "The same of a white slab of depth 64.",
          [] {
-           SceneBuilder builder = column({}, {1, 0, 64}, false);
-           builder.scene.emitters = {DirectionalEmitter{{0, 0, -1}, rgb(1)}};
-           return builder;
+           return lit_by(column({}, {1, 0, 64}, false), kSun);
          },
          grey(.336428 - 4. / 3 * k * k / 65.42089 / kPi),
          {.band = .01, .why_band = "paths of hundreds of scatterings", .slack = 1e-5, .slow = true});

@@ -5,6 +5,7 @@
 
 #include "validation/fixtures/case.h"
 #include "validation/fixtures/checks.h"
+#include "validation/fixtures/fixtures.h"
 
 namespace ls::cases {
 namespace {
@@ -23,16 +24,12 @@ SceneBuilder sheet(double degrees, auto make) {
   builder.look({5 * std::sin(a), 0, 5 * std::cos(a)}, {0, 0, 0}, 1e-3, {0, 1, 0});
   return builder;
 }
-SceneBuilder in_white(SceneBuilder builder) {
-  builder.environment();
-  return builder;
-}
 // Adds a wall of two colours behind the rectangle and an environment, so that the direction of the ray
 // matters.
 SceneBuilder before_a_wall(SceneBuilder builder) {
   const TextureIndex dark = builder.texture(rgb(.25)), bright = builder.texture({1, .75, .5});
-  builder.scene.textures.push_back(CheckerboardTexture{dark, bright, {{8, 0, 0, 0, 8, 0, 0, 0, 1}}});
-  const TextureIndex board{static_cast<std::uint32_t>(builder.scene.textures.size() - 1)};
+  const TextureIndex board = SceneBuilder::push<TextureTag>(
+      builder.scene.textures, CheckerboardTexture{dark, bright, {{8, 0, 0, 0, 8, 0, 0, 0, 1}}});
   builder.shape(RectangleShape{}, translate({0, 0, -3}) * scale(6), builder.diffuse(0)).emitter =
       AreaEmitter{board};
   builder.environment(.125);
@@ -140,22 +137,16 @@ void indices(Table& t) {
         return before_a_wall(builder);
       },
       [] { return before_a_wall(SceneBuilder()); }, {.band = .003, .channels = true});
-  t.exact("N36-conductor-of-air", "N36", "A metal of index 1 + 0i reflects nothing.", [](const Bench& b) {
-    return every_value(b,
-                       in_white(sheet(40,
-                                      [](SceneBuilder& k) {
-                                        return k.bsdf(ConductorBsdf{{1, 1, 1}, {0, 0, 0}, k.texture(rgb(1))});
-                                      })),
-                       16, grey(0), 1e-6);
-  });
-  t.exact("N36-conductor-of-nothing", "N36", "A metal of index 0 + 0i reflects all.", [](const Bench& b) {
-    return every_value(b,
-                       in_white(sheet(40,
-                                      [](SceneBuilder& k) {
-                                        return k.bsdf(ConductorBsdf{{0, 0, 0}, {0, 0, 0}, k.texture(rgb(1))});
-                                      })),
-                       16, grey(1), 1e-6);
-  });
+  const auto conductor = [&](const char* id, const char* about, double eta, double expected) {
+    t.exact(id, "N36", about, [=](const Bench& b) {
+      const auto metal = [=](SceneBuilder& k) {
+        return k.bsdf(ConductorBsdf{rgb(eta), rgb(0), k.texture(rgb(1))});
+      };
+      return every_value(b, in_white(sheet(40, metal)), 16, grey(expected), 1e-6);
+    });
+  };
+  conductor("N36-conductor-of-air", "A metal of index 1 + 0i reflects nothing.", 1, 0);
+  conductor("N36-conductor-of-nothing", "A metal of index 0 + 0i reflects all.", 0, 1);
   t.exact("N36-fresnel-normal", "N36 7.6g",
           "Glass of 1.5 reflects .04 of the light straight on: seen before black.", [](const Bench& b) {
             SceneBuilder builder = sheet(0, [](SceneBuilder& k) {

@@ -8,8 +8,7 @@
 #include <set>
 
 #include "validation/fixtures/checks.h"
-#include "validation/fixtures/closed_forms.h"
-#include "validation/fixtures/configurations.h"
+#include "validation/fixtures/fixtures.h"
 #include "validation/measure/hypothesis_tests.h"
 #include "validation/run.h"
 
