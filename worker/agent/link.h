@@ -13,6 +13,9 @@
 
 namespace ls::worker {
 
+// Receives the bytes of a blob, piece by piece and in order.
+using BlobSink = std::function<Result<void>(std::span<const std::byte>)>;
+
 class LinkObserver {
  public:
   virtual ~LinkObserver() = default;
@@ -42,8 +45,7 @@ class CoordinatorLink {
   virtual void close() = 0;
   // Fetches the bytes and passes them to `sink` in order. The transfer ends if `sink` returns an error (disk
   // full, wrong digest).
-  virtual Result<void> fetch_blob(const BlobRequest& wanted,
-                                  const std::function<Result<void>(std::span<const std::byte>)>& sink) = 0;
+  virtual Result<void> fetch_blob(const BlobRequest& wanted, const BlobSink& sink) = 0;
 };
 
 // A complete, verified blob on this machine. The file is not removed while the object lives.

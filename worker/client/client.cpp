@@ -259,8 +259,7 @@ class GrpcLink final : public CoordinatorLink {
     if (call) call->close(kCloseLimit);
   }
 
-  Result<void> fetch_blob(const BlobRequest& wanted,
-                          const std::function<Result<void>(std::span<const std::byte>)>& sink) override {
+  Result<void> fetch_blob(const BlobRequest& wanted, const BlobSink& sink) override {
     grpc::ClientContext context;
     {
       const std::lock_guard lock(mutex_);

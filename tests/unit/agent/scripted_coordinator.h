@@ -109,8 +109,7 @@ class ScriptedCoordinator final : public CoordinatorLink {
   void close() override {
     change([&] { observer_.reset(); });
   }
-  Result<void> fetch_blob(const BlobRequest& wanted,
-                          const std::function<Result<void>(std::span<const std::byte>)>& sink) override {
+  Result<void> fetch_blob(const BlobRequest& wanted, const BlobSink& sink) override {
     std::string text;
     {
       const std::lock_guard lock(mutex_);

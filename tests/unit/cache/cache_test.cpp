@@ -37,7 +37,7 @@ struct Source {
     blobs[digest] = text;
     return {digest, text.size(), "blob"};
   }
-  Result<void> fetch(const BlobRequest& wanted, const BlobCache::Sink& sink) {
+  Result<void> fetch(const BlobRequest& wanted, const BlobSink& sink) {
     const auto& [digest, offset, arrived_wrong] = wanted;
     offsets.push_back(offset);
     complaints.push_back(arrived_wrong);
@@ -65,10 +65,9 @@ class Cache : public testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
   std::unique_ptr<BlobCache> open(std::uint64_t limit = 0) {
-    auto cache =
-        BlobCache::open(folder_, limit, [this](const BlobRequest& wanted, const BlobCache::Sink& sink) {
-          return source_.fetch(wanted, sink);
-        });
+    auto cache = BlobCache::open(folder_, limit, [this](const BlobRequest& wanted, const BlobSink& sink) {
+      return source_.fetch(wanted, sink);
+    });
     return std::move(cache.value());
   }
   Source source_;
