@@ -46,25 +46,23 @@ void nothing(Table& t) {
 // L = eps (1 - e^-tau) / sigma. The estimate has no variance, except in those macro cells of grids in which
 // a tracker (an algorithm that steps from collision to collision) samples free flights.
 void emission(Table& t) {
+  const auto emitting = [](const Configuration& configuration, double tau) {
+    SceneBuilder builder = unit_cube(configuration, rgb(tau));
+    builder.set_emission(MediumIndex{0}, rgb(1));
+    return builder;
+  };
   for (const Configuration& configuration : both_media()) {
     for (const double tau : kThin) {
       t.exact(fmt::format("N02-emission-{:g}{}", tau, configuration.name()), "N2 N7 7.6b",
               "A unit of a medium that absorbs this little gives off eps (1 - e^-tau) / sigma.",
               [=](const Bench& b) {
-                SceneBuilder builder = unit_cube(configuration, rgb(tau));
-                builder.set_emission(MediumIndex{0}, rgb(1));
-                return every_value(b, builder, 64, grey(phi(tau)), kTenRoundings);
+                return every_value(b, emitting(configuration, tau), 64, grey(phi(tau)), kTenRoundings);
               });
     }
     for (const double tau : {0., 1., 1e3, 1e6}) {
       t.mean(fmt::format("N67-emission-{:g}{}", tau, configuration.name()), "N67 N3 N7 7.6b",
              "Light given off without extinction is eps d; at depth it is eps / sigma.",
-             [=] {
-               SceneBuilder builder = unit_cube(configuration, rgb(tau));
-               builder.set_emission(MediumIndex{0}, rgb(1));
-               return builder;
-             },
-             grey(phi(tau)), {.band = 1e-4});
+             [=] { return emitting(configuration, tau); }, grey(phi(tau)), {.band = 1e-4});
     }
   }
 }

@@ -116,29 +116,23 @@ void bounds_too_high(Table& t) {
 }
 
 void hot_voxels(Table& t) {
-  const std::array<int, 3> n{16, 16, 16};
   const double centre = 8.5 / 16;
+  const auto ray = [=](double rho, double sigma, double y, bool shadow) {
+    const std::array<int, 3> n{16, 16, 16};
+    std::vector<float> values(16 * 16 * 16, 0);
+    values[at(n, 8, 8, 8)] = static_cast<float>(rho);
+    return seen_through(n, values, sigma, {0, y, centre}, {1, y, centre}, shadow);
+  };
   for (const bool shadow : {false, true}) {
     for (const double rho : {8., 1e3, 1e6}) {
       t.mean(
           fmt::format("N10-hot-voxel-{:g}{}", rho, way_of(shadow)), "N10 7.6a",
           "One voxel among empty ones, through its middle: the tent's area is rho h.",
-          [=] {
-            std::vector<float> values(16 * 16 * 16, 0);
-            values[at(n, 8, 8, 8)] = static_cast<float>(rho);
-            return seen_through(n, values, 8 / rho, {0, centre, centre}, {1, centre, centre}, shadow);
-          },
-          grey(shown(std::exp(-.5), shadow)));
+          [=] { return ray(rho, 8 / rho, centre, shadow); }, grey(shown(std::exp(-.5), shadow)));
       t.mean(
           fmt::format("N10-past-a-hot-voxel-{:g}{}", rho, way_of(shadow)), "N10",
           "The ray passes two voxels beside it: nothing is in the way.",
-          [=] {
-            std::vector<float> values(16 * 16 * 16, 0);
-            values[at(n, 8, 8, 8)] = static_cast<float>(rho);
-            return seen_through(n, values, 1, {0, centre + 2. / 16, centre}, {1, centre + 2. / 16, centre},
-                                shadow);
-          },
-          grey(shown(1, shadow)));
+          [=] { return ray(rho, 1, centre + 2. / 16, shadow); }, grey(shown(1, shadow)));
     }
   }
 }

@@ -14,6 +14,8 @@
 #include <string>
 #include <utility>
 
+#include "common/base/helper_program.h"
+
 namespace ls::worker {
 namespace fs = std::filesystem;
 namespace {
@@ -75,11 +77,8 @@ std::vector<StoredFile> stored_partials(const fs::path& folder) {
 }
 
 bool remove_unused(const fs::path& path) {
-  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
-  if (fd < 0) return false;
-  const bool removed = lock_at(fd, path, LOCK_EX) == Lock::taken && ::unlink(path.c_str()) == 0;
-  ::close(fd);
-  return removed;
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
+  return file.fd >= 0 && lock_at(file.fd, path, LOCK_EX) == Lock::taken && ::unlink(path.c_str()) == 0;
 }
 
 void remove_orphans(const fs::path& folder) {
