@@ -11,7 +11,6 @@
 #include "validation/fixtures/checks.h"
 #include "validation/measure/hypothesis_tests.h"
 #include "validation/measure/measure.h"
-#include "validation/significance_level.h"
 
 namespace ls::cases {
 namespace {
@@ -22,9 +21,9 @@ using cli::ValidateCase;
 // Number of paths of a case's first run, which determines how many paths the case needs.
 constexpr std::uint64_t kPilotPaths = 1 << 13;
 // The number of paths is planned so that kSpare standard errors remain between the interval and the band's
-// end. This margin is too small in about one run of seven, by chance, or if the first run underestimated the
-// variance. Then the case is repeated, with kAgain to kMostAgain times as many paths, according to the
-// better estimate.
+// end. In about one run of seven this margin is too small, by chance or because the first run underestimated
+// the variance. Then the case is repeated with kAgain to kMostAgain times as many paths, as the newer
+// estimate demands.
 constexpr double kSpare = 1.5, kAgain = 2, kMostAgain = 16;
 // The degrees of freedom of the standard error that are assumed when the number of paths is planned.
 constexpr double kPlannedFreedom = 1e3;

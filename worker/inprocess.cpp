@@ -12,7 +12,6 @@
 #include "common/scene/analysis/needs.h"
 #include "common/scene/json/serialize.h"
 #include "common/scene/schema/integrators.h"
-#include "worker/agent/resident.h"
 
 namespace ls::worker {
 namespace {
@@ -33,11 +32,10 @@ tl::expected<void, UnitFailure> check_needs(const Scene& scene, const JobBrief& 
       canonical_json(scene::needs_of(scene, scene::sees_media(brief.settings.integrator)));
   const std::string other = scene::first_difference(own, brief.needs);
   if (other.empty()) return {};
-  return tl::unexpected<UnitFailure>(
-      UnitFailure{.reason = fmt::format(
-                      "coordinator and worker do not agree on what the scene needs ({}; here: this worker, "
-                      "there: the coordinator): they are of different versions; install the same one on both",
-                      other)});
+  return unit_failure(fmt::format(
+      "coordinator and worker do not agree on what the scene needs ({}; here: this worker, there: "
+      "the coordinator): they are of different versions; install the same one on both",
+      other));
 }
 
 Result<std::string> read_file(const std::filesystem::path& path) {
@@ -72,13 +70,13 @@ class InProcessBackend final : public LocalBackend {
                                                         const std::atomic<bool>& stop,
                                                         render::Breadcrumb* where) override {
     const auto ready = world(job.brief);
-    if (!ready) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "the job was not prepared"});
+    if (!ready) return unit_failure("the job was not prepared");
     const double start = thread_cpu_seconds();
     const TimePoint begin = clock_.now();
     render::Breadcrumb own;
     render::TileResult tile =
         render::render_tile(*ready, unit.rect, unit.samples, &stop, where ? where : &own);
-    if (tile.stopped) return tl::unexpected<UnitFailure>(UnitFailure{.reason = "told to stop"});
+    if (tile.stopped) return unit_failure("told to stop");
     RenderedUnit out;
     const JobBrief& brief = job.brief;
     out.partial.header = {brief.scene, brief.settings_digest, numeric_class(), unit.rect, unit.samples};

@@ -91,11 +91,11 @@ int run_worker(const worker::Options& options, const sigset_t& signals) {
   }
   worker::raise_file_limit();
   const auto link = link_to(options);
-  auto cache = worker::BlobCache::open(
-      options.cache, options.cache_limit,
-      [&link](const worker::BlobRequest& wanted, const worker::BlobCache::Sink& sink) {
-        return link->fetch_blob(wanted, sink);
-      });
+  auto cache =
+      worker::BlobCache::open(options.cache, options.cache_limit,
+                              [&link](const worker::BlobRequest& wanted, const worker::BlobSink& sink) {
+                                return link->fetch_blob(wanted, sink);
+                              });
   if (!cache) return failed(cache.error());
   // The child starts after the cache is open: its sandbox lets it read the cache's folder, which must exist
   // by then.

@@ -14,7 +14,6 @@
 #include "coordinator/service/coordinator.h"
 #include "coordinator/store/blobs/memory_blobs.h"
 #include "worker/agent/agent.h"
-#include "worker/agent/blob_files.h"
 #include "worker/agent/link.h"
 
 namespace ls::cli {

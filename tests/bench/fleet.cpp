@@ -46,11 +46,11 @@ class Member {
 
   // The folder of the cache is that of all members.
   Result<void> open(const worker::Options& options) {
-    auto cache = worker::BlobCache::open(
-        options.cache, options.cache_limit,
-        [this](const worker::BlobRequest& wanted, const worker::BlobCache::Sink& sink) {
-          return link_->fetch_blob(wanted, sink);
-        });
+    auto cache =
+        worker::BlobCache::open(options.cache, options.cache_limit,
+                                [this](const worker::BlobRequest& wanted, const worker::BlobSink& sink) {
+                                  return link_->fetch_blob(wanted, sink);
+                                });
     if (!cache) return tl::unexpected(cache.error());
     cache_ = std::move(*cache);
     agent_.emplace(told_, *link_, *backend_, *cache_, clock_);

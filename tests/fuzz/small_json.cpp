@@ -5,7 +5,7 @@
 #include "coordinator/assemble/assembly.h"
 #include "coordinator/store/jobs/job_store.h"
 #include "tests/fuzz/all_targets.h"
-#include "worker/child/job_text.h"
+#include "worker/child/protocol.h"
 
 namespace ls::fuzz {
 namespace {

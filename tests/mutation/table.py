@@ -78,7 +78,7 @@ ROWS = [
      "a worker that finishes nothing holds its leases for ever", DOMAIN),
     (35, "coordinator/domain/farm/schedule.cpp", "if (!limit || job.frozen || «round_of(code) == 0») return false;", "false",
      "a time budget ends before every tile has its first round", DOMAIN),
-    (36, "worker/agent/held_leases.cpp", "«if (!is_new) leave(entry.held.lease, false);»", ";", "a unit that is lent again stays counted in its old lease", ("agent_test",)),
+    (36, "worker/agent/held_work.cpp", "«if (!is_new) leave(entry.held.lease, false);»", ";", "a unit that is lent again stays counted in its old lease", ("agent_test",)),
     # ---- audit
     (37, "coordinator/domain/farm/farm_trust.cpp", "mixed(mixed(«options.audit_seed ^ job.seq») ^ code)", "job.seq", "anybody can tell which units are audited", DOMAIN),
     (38, "coordinator/domain/farm/farm_trust.cpp", "if (!(draw < options.audit_rate) || «job.audits.size() >= kMaxAuditsOpen») return;", "false",

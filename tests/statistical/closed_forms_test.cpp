@@ -11,9 +11,8 @@
 #include <vector>
 
 #include "tests/support/significance.h"
-#include "validation/result_table.h"
+#include "validation/measure/judge.h"
 #include "validation/run.h"
-#include "validation/significance_level.h"
 
 namespace ls::test {
 namespace {

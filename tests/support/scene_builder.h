@@ -2,7 +2,6 @@
 #pragma once
 
 #include "validation/fixtures/scene_builder.h"
-#include "validation/fixtures/sky_builder.h"
 
 namespace ls::test {
 

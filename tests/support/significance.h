@@ -34,7 +34,7 @@ struct Rate {
   Family family;
   double rate;
 };
-// The rates of table and closed_forms are the product's own (validation/significance_level.h). Test files
+// The rates of table and closed_forms are the product's own (validation/measure/judge.h). Test files
 // passed to `lightshaft validate` have the level that they state, .01 by default: they are not included here.
 inline constexpr std::array kRates = {Rate{Family::table, 2e-4},      Rate{Family::closed_forms, 2e-4},
                                       Rate{Family::chi_square, 1e-4}, Rate{Family::scenes, 1e-4},

@@ -9,7 +9,7 @@ from local_farm import ROOT
 
 pytestmark = pytest.mark.slow
 
-ATTEMPTS = 3  # of an interval that came out too wide (validation/significance_level.h)
+ATTEMPTS = 3  # of an interval that came out too wide (validation/measure/judge.h)
 SECTION_7 = ["7.1", "7.2", "7.5", "7.6a", "7.6b", "7.6c", "7.6d", "7.6e", "7.6f", "7.6g", "7.6h", "7.7"]
 
 

@@ -26,31 +26,12 @@ void Table::exact(std::string id, std::string rows, std::string about,
 
 Table all_cases() {
   Table t;
-  add_depths(t);
-  add_scales(t);
-  add_grids(t);
-  add_albedos(t);
-  add_phases(t);
-  add_lamps(t);
-  add_light_shapes(t);
-  add_slabs(t);
-  add_single(t);
-  add_fields(t);
-  add_emission(t);
-  add_furnaces(t);
-  add_direct_light(t);
-  add_seed(t);
-  add_surfaces(t);
-  add_rooms(t);
-  add_interfaces(t);
-  add_microfacets(t);
-  add_places(t);
-  add_bodies(t);
-  add_skies(t);
-  add_coatings(t);
-  add_overlaps(t);
-  add_slopes(t);
-  add_bugs(t);
+  for (AddCases* const add : {add_depths,   add_scales,       add_grids,        add_albedos, add_phases,
+                              add_lamps,    add_light_shapes, add_slabs,        add_single,  add_fields,
+                              add_emission, add_furnaces,     add_direct_light, add_seed,    add_surfaces,
+                              add_rooms,    add_interfaces,   add_microfacets,  add_places,  add_bodies,
+                              add_skies,    add_coatings,     add_overlaps,     add_slopes,  add_bugs})
+    add(t);
   return t;
 }
 

@@ -3,13 +3,12 @@
 #include <cmath>
 
 #include "validation/fixtures/case.h"
-#include "validation/fixtures/closed_forms.h"
 #include "validation/fixtures/fixtures.h"
 
 namespace ls::cases {
 namespace {
 
-constexpr double kSheet = 2 * .04 / 1.04;  // what a sheet of index 1.5 reflects along its normal
+constexpr double kSheet = 2 * .04 / 1.04;  // reflectance of a sheet of index 1.5 at normal incidence
 
 BsdfIndex two_sided(SceneBuilder& builder, double reflectance) {
   const BsdfIndex one = builder.diffuse(reflectance);
@@ -57,23 +56,15 @@ void null_transmission(Table& t) {
            "Light on a floor below a mask or a sheet: what they let pass.", std::move(builder),
            reflected(irradiance), {.channels = true});
   };
-  {
-    // Only shadow rays find the light of a point or a single direction: paths never hit it by chance.
-    SceneBuilder builder = floor_below(third);
-    builder.scene.emitters.push_back(PointEmitter{{.5, 0, 2}, rgb(3)});
-    direct("mask-below-a-point", builder, .7 * 3 * 2 / std::pow(4.25, 1.5));
-  }
-  {
-    SceneBuilder builder = floor_below(thin_sheet);
-    builder.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(2)});
-    direct("sheet-below-the-sun", builder, 2 * (1 - kSheet));
-  }
-  {
-    // Shadow rays and paths both find the light through the mask.
-    SceneBuilder builder = floor_below(third);
-    builder.lamp(SphereShape{}, translate({0, 0, 3}) * scale(1.5));
-    direct("mask-below-a-sphere", builder, .7 * kPi * 2.25 / 9);
-  }
+  // Only shadow rays find the light of a point or a single direction: paths never hit it by chance.
+  direct("mask-below-a-point", with(floor_below(third), PointEmitter{{.5, 0, 2}, rgb(3)}),
+         .7 * 3 * 2 / std::pow(4.25, 1.5));
+  direct("sheet-below-the-sun", with(floor_below(thin_sheet), DirectionalEmitter{{0, 0, -1}, rgb(2)}),
+         2 * (1 - kSheet));
+  // Shadow rays and paths both find the light through the mask.
+  direct("mask-below-a-sphere",
+         with_lamp(floor_below(third), SphereShape{}, translate({0, 0, 3}) * scale(1.5)),
+         .7 * kPi * 2.25 / 9);
   // Two masks and an absorbing medium between them.
   const Rgb sigma{1, .5, .25};
   Channels passed, lit;
@@ -99,10 +90,8 @@ void coated(Table& t) {
   const auto add = [&](const char* name, const Geometry& g, auto material, double slack = 0) {
     SceneBuilder builder;
     builder.shape(g, rotate_x(30) * rotate_y(20), material(builder));
-    builder.environment();
-    builder.look({.4, -6, .7}, {0, 0, 0}, 10);
-    t.mean(std::string("7.6c-") + name, "7.6c N64", "What absorbs nothing is as bright as the sky.", builder,
-           grey(1), {.slack = slack, .channels = true});
+    t.mean(std::string("7.6c-") + name, "7.6c N64", "What absorbs nothing is as bright as the sky.",
+           furnace(builder, 10), grey(1), {.slack = slack, .channels = true});
   };
   add("sheet-cube", CubeShape{}, thin_sheet);
   add("masked-cube", CubeShape{}, [](SceneBuilder& k) { return mask(k, .4, two_sided(k, 1)); });
@@ -155,8 +144,8 @@ void plastic_by_the_sun(Table& t) {
          builder, {f(.2), f(.5), f(.8)});
 }
 
-// A grey floor whose shading normal leans by 36.87 degrees, lit from straight above: the cosine is 0.8. The
-// bumps that a normal map stands for cast no shadows.
+// A grey floor whose shading normal leans by 36.87 degrees, lit from straight above: the cosine of the
+// incident light is 0.8. The bumps that a normal map describes cast no shadows.
 void normal_map(Table& t) {
   SceneBuilder builder;
   const BsdfIndex floor = builder.diffuse(.5);
@@ -164,15 +153,12 @@ void normal_map(Table& t) {
                 builder.bsdf(NormalMapBsdf{builder.texture({.8, .5, .9}), floor, true, false}));
   builder.scene.integrator.max_depth = kOnce;
   builder.look({2, 1, 1}, {0, 0, 0}, 1e-3);
-  SceneBuilder sun = builder;
-  sun.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(1)});
-  t.mean("7.6g-normal-map-by-the-sun", "7.6g N37", "A floor whose normals lean: the cosine is theirs.", sun,
-         reflected(.8), {.channels = true});
-  // The sphere lies in the direction of the leaning normal, all of it above the floor and above the plane
-  // perpendicular to that normal: E = pi r^2 / d^2.
-  builder.lamp(SphereShape{}, translate({1.8, 0, 2.4}));
+  t.mean("7.6g-normal-map-by-the-sun", "7.6g N37", "A floor whose normals lean: the cosine is theirs.",
+         with(builder, DirectionalEmitter{{0, 0, -1}, rgb(1)}), reflected(.8), {.channels = true});
+  // The sphere has radius r = 1 and lies at distance d = 3 in the direction of the leaning normal, all of it
+  // above the floor and above the plane perpendicular to that normal. So the irradiance is pi r^2 / d^2.
   t.mean("7.6g-normal-map-by-a-sphere", "7.6g N37", "A floor whose normals lean towards a shining sphere.",
-         builder, reflected(kPi / 9), {.channels = true});
+         with_lamp(builder, SphereShape{}, translate({1.8, 0, 2.4})), reflected(kPi / 9), {.channels = true});
 }
 
 }  // namespace

@@ -27,9 +27,7 @@ void nothing(Table& t) {
         "A medium that takes a part in 1e30, and so stays in the scene, shows a white sky as 1 exactly, in "
         "every sample.",
         [configuration](const Bench& b) {
-          SceneBuilder builder = unit_cube(configuration, rgb(1e-30));
-          builder.environment();
-          return every_value(b, builder, 64, grey(1), 0);
+          return every_value(b, in_white(unit_cube(configuration, rgb(1e-30))), 64, grey(1), 0);
         });
     if (!configuration.grid) continue;
     t.exact("N01-zeros" + configuration.name(), "N1",
@@ -48,25 +46,23 @@ void nothing(Table& t) {
 // L = eps (1 - e^-tau) / sigma. The estimate has no variance, except in those macro cells of grids in which
 // a tracker (an algorithm that steps from collision to collision) samples free flights.
 void emission(Table& t) {
+  const auto emitting = [](const Configuration& configuration, double tau) {
+    SceneBuilder builder = unit_cube(configuration, rgb(tau));
+    builder.set_emission(MediumIndex{0}, rgb(1));
+    return builder;
+  };
   for (const Configuration& configuration : both_media()) {
     for (const double tau : kThin) {
       t.exact(fmt::format("N02-emission-{:g}{}", tau, configuration.name()), "N2 N7 7.6b",
               "A unit of a medium that absorbs this little gives off eps (1 - e^-tau) / sigma.",
               [=](const Bench& b) {
-                SceneBuilder builder = unit_cube(configuration, rgb(tau));
-                builder.set_emission(MediumIndex{0}, rgb(1));
-                return every_value(b, builder, 64, grey(phi(tau)), kTenRoundings);
+                return every_value(b, emitting(configuration, tau), 64, grey(phi(tau)), kTenRoundings);
               });
     }
     for (const double tau : {0., 1., 1e3, 1e6}) {
       t.mean(fmt::format("N67-emission-{:g}{}", tau, configuration.name()), "N67 N3 N7 7.6b",
              "Light given off without extinction is eps d; at depth it is eps / sigma.",
-             [=] {
-               SceneBuilder builder = unit_cube(configuration, rgb(tau));
-               builder.set_emission(MediumIndex{0}, rgb(1));
-               return builder;
-             },
-             grey(phi(tau)), {.band = 1e-4});
+             [=] { return emitting(configuration, tau); }, grey(phi(tau)), {.band = 1e-4});
     }
   }
 }
@@ -82,11 +78,7 @@ void thin_scattering(Table& t) {
     for (const Configuration& configuration : {kVolpath, kDistant, kDistantGrid}) {
       t.mean(fmt::format("N02-lamplit-{:g}{}", tau, configuration.name()), "N2 N22",
              "A lamp's light scattered once in a medium this thin: proportional to its depth.",
-             [=] {
-               SceneBuilder builder = passing(configuration, rgb(tau), rgb(1));
-               builder.scene.emitters.push_back(PointEmitter{{.5, 0, 0}, rgb(1 / (4 * kPi))});
-               return builder;
-             },
+             [=] { return beside_a_watt(passing(configuration, rgb(tau), rgb(1)), .5); },
              grey(passing_answer(.5, tau)), {.band = 1e-3});
     }
   }
@@ -97,18 +89,16 @@ void opaque(Table& t) {
     for (const double tau : {1e3, 1e6}) {
       t.exact(fmt::format("N03-nothing-gets-through-{:g}{}", tau, configuration.name()), "N3",
               "Of a white sky behind this depth nothing is left, exactly.", [=](const Bench& b) {
-                SceneBuilder builder = unit_cube(configuration, rgb(tau));
-                builder.environment();
-                return every_value(b, builder, 64, grey(0), 0);
+                return every_value(b, in_white(unit_cube(configuration, rgb(tau))), 64, grey(0), 0);
               });
     }
   }
   // The answers are 1 - sqrt(1 - a) H(1), with a the albedo (Chandrasekhar 1950), to six digits. From depth
   // 1e5 on, the mean free path is shorter than the offset of rays from surfaces (2^-20 of the world), so the
-  // distance to the face must be measured from the path's true position. At depth 1e6 the mean free path is
-  // 17 ulps of float32 at the face's height. Next to the face the renderer then computes a trapezoidal sum
-  // over float32 positions z instead of an integral over z. For isotropic scattering the integrand is
-  // E_2(z), the second exponential integral, and the sum is 3.1e-3 too large.
+  // distance to the face must be measured from the path's true position, not from the offset one. At depth
+  // 1e6 the mean free path is 17 ulps of float32 at the face's height. Next to the face the renderer then
+  // computes a trapezoidal sum over float32 positions z instead of an integral over z. For isotropic
+  // scattering the integrand is E_2(z), the second exponential integral, and the sum is 3.1e-3 too large.
   constexpr double kDigits = 2e-6, kPlaces = 3.1e-3;
   for (const Configuration& configuration : all_configurations()) {
     for (const double tau : {1e3, 1e5, 1e6}) {
@@ -151,9 +141,9 @@ void shadows(Table& t) {
     }
   }
   // Where the density varies, a shadow ray estimates its transmittance step by step. When little
-  // transmittance is left, Russian roulette ends most of these estimates (kRouletteDepth), which keeps their
-  // mean. The density is 0, 1, 2, 3 at the centres of four voxels along z and constant beyond, so its
-  // integral is 1.5.
+  // transmittance is left, Russian roulette (kRouletteDepth) ends most of these estimates and weights up the
+  // others, so the mean stays the same. The density is 0, 1, 2, 3 at the centres of four voxels along z and
+  // constant beyond, so its integral is 1.5.
   t.mean("N05-shadow-ramp-8/grid/volpath", "N5 7.6a",
          "A shadow ray through a ramp of densities, by residual tracking.",
          [] {

@@ -18,8 +18,8 @@ std::vector<float> hills(std::size_t n) {
   return v;
 }
 
-// A cube of an absorbing medium without any other light, seen through its middle, so that the path through it
-// has length 1.
+// A cube of a medium that emits and absorbs, without any other light. It is seen through its middle, so that
+// the path through it has length 1.
 void absorbing(Table& t) {
   const auto add = [&](const char* name, bool grid, bool per_absorption, const Rgb& sigma) {
     SceneBuilder builder;

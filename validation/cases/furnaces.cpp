@@ -3,7 +3,6 @@
 
 #include "validation/fixtures/case.h"
 #include "validation/fixtures/fixtures.h"
-#include "validation/fixtures/sky_builder.h"
 
 namespace ls::cases {
 namespace {
@@ -12,9 +11,10 @@ constexpr Rgb kColours{1, 2.5, 4};
 const Transform kBox = box({-1, -1, -1}, {1, 1, 1});
 
 void white_sky(Table& t) {
-  const auto add = [&](const char* name, SceneBuilder builder) {
-    builder.environment();
-    builder.look({.4, -6, .7}, {0, 0, 0}, 30);
+  const auto add = [&](const char* name, auto fill) {
+    SceneBuilder contents;
+    fill(contents);
+    SceneBuilder builder = furnace(contents);
     for (const bool distant : {false, true}) {
       const Configuration configuration{false, distant};
       configuration.choose(builder);
@@ -23,65 +23,40 @@ void white_sky(Table& t) {
              {.channels = true});
     }
   };
-  {
-    SceneBuilder builder;
-    builder.container(SphereShape{}, {}, builder.null(), builder.homogeneous(rgb(2), rgb(1)));
-    add("sphere-isotropic", builder);
-  }
-  {
-    SceneBuilder builder;
-    builder.container(CubeShape{}, {}, builder.null(), builder.homogeneous(kColours, rgb(1), .9));
-    add("cube-forward-chromatic", builder);
-  }
-  {
-    SceneBuilder builder;
-    const VolumeIndex v = builder.grid({12, 9, 7}, patchy(12 * 9 * 7, 5), kBox);
-    builder.container(CubeShape{}, {}, builder.null(), builder.heterogeneous(v, rgb(1), 2, -.5));
-    add("grid-backward", builder);
-  }
-  {
-    SceneBuilder builder;
+  add("sphere-isotropic",
+      [](SceneBuilder& k) { k.container(SphereShape{}, {}, k.null(), k.homogeneous(rgb(2), rgb(1))); });
+  add("cube-forward-chromatic",
+      [](SceneBuilder& k) { k.container(CubeShape{}, {}, k.null(), k.homogeneous(kColours, rgb(1), .9)); });
+  add("grid-backward", [](SceneBuilder& k) {
+    const VolumeIndex v = k.grid({12, 9, 7}, patchy(12 * 9 * 7, 5), kBox);
+    k.container(CubeShape{}, {}, k.null(), k.heterogeneous(v, rgb(1), 2, -.5));
+  });
+  add("rotated-grid-in-sphere", [](SceneBuilder& k) {
     const Transform box = rotate_x(20) * translate({-.5, -.5, -.5});
-    const MediumIndex m = builder.heterogeneous(builder.grid({6, 5, 4}, patchy(120, 9), box), rgb(1), 3, .6);
-    builder.container(SphereShape{}, {}, builder.null(), m);
-    add("rotated-grid-in-sphere", builder);
-  }
-  {
-    // A grid with a density for each channel: without absorption, and (`warm`) with absorption and emission
-    // in balance with its surroundings. A medium whose source radiance equals the radiance around it is
-    // invisible, whatever its albedo.
-    for (const bool warm : {false, true}) {
-      SceneBuilder builder;
-      const VolumeIndex v = builder.grid({12, 9, 7}, patchy(12 * 9 * 7 * 3, 5), kBox, 3);
-      const MediumIndex m = builder.heterogeneous(v, warm ? Rgb{.8, .3, .5} : rgb(1), 2, -.5);
-      if (warm) builder.set_emission(m, rgb(1), true);
-      builder.container(CubeShape{}, {}, builder.null(), m);
-      add(warm ? "three-channel-grid-in-balance" : "three-channel-grid", builder);
-    }
-  }
-  {
-    // Some macro cells are so dense that the field is integrated voxel by voxel; in the others a tracker (an
-    // algorithm that steps from collision to collision) samples tentative collisions.
-    SceneBuilder builder;
-    const VolumeIndex v = builder.grid({12, 9, 7}, patchy(12 * 9 * 7, 6), kBox);
-    builder.container(CubeShape{}, {}, builder.null(), builder.heterogeneous(v, rgb(1), 30, .8));
-    add("dense-grid", builder);
-  }
-  {
-    SceneBuilder builder;
-    builder.shape(SphereShape{}, {}, builder.glass(1.5));
-    add("glass-sphere", builder);
-  }
-  {
-    SceneBuilder builder;
-    builder.container(SphereShape{}, {}, builder.glass(1.4), builder.homogeneous(rgb(2), rgb(1), .5));
-    add("glass-sphere-filled", builder);
-  }
-  {
-    SceneBuilder builder;
-    builder.shape(CubeShape{}, rotate_x(30) * rotate_y(20), builder.mirror());
-    add("mirror-cube", builder);
-  }
+    const MediumIndex m = k.heterogeneous(k.grid({6, 5, 4}, patchy(120, 9), box), rgb(1), 3, .6);
+    k.container(SphereShape{}, {}, k.null(), m);
+  });
+  // A grid with a density for each channel: without absorption, and (`warm`) with absorption and emission in
+  // balance with its surroundings. A medium whose source radiance equals the radiance around it is invisible,
+  // whatever its albedo.
+  for (const bool warm : {false, true})
+    add(warm ? "three-channel-grid-in-balance" : "three-channel-grid", [warm](SceneBuilder& k) {
+      const VolumeIndex v = k.grid({12, 9, 7}, patchy(12 * 9 * 7 * 3, 5), kBox, 3);
+      const MediumIndex m = k.heterogeneous(v, warm ? Rgb{.8, .3, .5} : rgb(1), 2, -.5);
+      if (warm) k.set_emission(m, rgb(1), true);
+      k.container(CubeShape{}, {}, k.null(), m);
+    });
+  // Some macro cells are so dense that the field is integrated voxel by voxel; in the others a tracker (an
+  // algorithm that steps from collision to collision) samples tentative collisions.
+  add("dense-grid", [](SceneBuilder& k) {
+    const VolumeIndex v = k.grid({12, 9, 7}, patchy(12 * 9 * 7, 6), kBox);
+    k.container(CubeShape{}, {}, k.null(), k.heterogeneous(v, rgb(1), 30, .8));
+  });
+  add("glass-sphere", [](SceneBuilder& k) { k.shape(SphereShape{}, {}, k.glass(1.5)); });
+  add("glass-sphere-filled", [](SceneBuilder& k) {
+    k.container(SphereShape{}, {}, k.glass(1.4), k.homogeneous(rgb(2), rgb(1), .5));
+  });
+  add("mirror-cube", [](SceneBuilder& k) { k.shape(CubeShape{}, rotate_x(30) * rotate_y(20), k.mirror()); });
 }
 
 // Walls that emit 1 around a medium without absorption: light sampling, phase sampling and equi-angular

@@ -1,4 +1,4 @@
-// Grids: bounds far too high, single dense voxels, rays along cell faces, invalid densities.
+// Grids with majorants far too high, single dense voxels, rays along cell faces, and invalid densities.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -51,7 +51,8 @@ double shown(double transmittance, bool by_shadow) {
 const char* way_of(bool by_shadow) { return by_shadow ? "/grid/shadow" : "/grid/volpath"; }
 
 // The integral of the trilinear field along a line within the unit cube, from one of its faces to another.
-// Along the line, the field is a cubic between the planes of voxel centres, so Simpson's rule is exact.
+// Along the line, the field is a cubic polynomial between two planes of voxel centres, so Simpson's rule is
+// exact.
 double depth_along(const std::array<int, 3>& n, const std::vector<float>& values, const Vec3& from,
                    const Vec3& to) {
   const auto value = [&](double s) {
@@ -84,8 +85,8 @@ double depth_along(const std::array<int, 3>& n, const std::vector<float>& values
 }
 
 void bounds_too_high(Table& t) {
-  // A grid with sixteen voxels per side of density 1, and one voxel beside the ray that is many times denser.
-  // The ray crosses macro cells that contain this voxel, which sets their bounds.
+  // A grid with sixteen voxels per side, all of density 1 except one voxel beside the ray, which is `times`
+  // times denser. The ray crosses macro cells that contain this voxel, so its density is their bound.
   for (const bool shadow : {false, true}) {
     for (const double times : {1., 10., 1e4, 1e6}) {
       t.mean(
@@ -109,37 +110,29 @@ void bounds_too_high(Table& t) {
                                 builder.heterogeneous(builder.grid({9, 7, 5}, std::vector<float>(315, value),
                                                                    box({-1, -1, -1}, {1, 1, 1})),
                                                       rgb(1), 2 / value));
-              builder.environment();
-              builder.look({.4, -6, .7}, {0, 0, 0}, 30);
-              return every_value(b, builder, 64, grey(1), 0);
+              return every_value(b, furnace(builder), 64, grey(1), 0);
             });
   }
 }
 
 void hot_voxels(Table& t) {
-  const std::array<int, 3> n{16, 16, 16};
   const double centre = 8.5 / 16;
+  const auto ray = [=](double rho, double sigma, double y, bool shadow) {
+    const std::array<int, 3> n{16, 16, 16};
+    std::vector<float> values(16 * 16 * 16, 0);
+    values[at(n, 8, 8, 8)] = static_cast<float>(rho);
+    return seen_through(n, values, sigma, {0, y, centre}, {1, y, centre}, shadow);
+  };
   for (const bool shadow : {false, true}) {
     for (const double rho : {8., 1e3, 1e6}) {
       t.mean(
           fmt::format("N10-hot-voxel-{:g}{}", rho, way_of(shadow)), "N10 7.6a",
           "One voxel among empty ones, through its middle: the tent's area is rho h.",
-          [=] {
-            std::vector<float> values(16 * 16 * 16, 0);
-            values[at(n, 8, 8, 8)] = static_cast<float>(rho);
-            return seen_through(n, values, 8 / rho, {0, centre, centre}, {1, centre, centre}, shadow);
-          },
-          grey(shown(std::exp(-.5), shadow)));
+          [=] { return ray(rho, 8 / rho, centre, shadow); }, grey(shown(std::exp(-.5), shadow)));
       t.mean(
           fmt::format("N10-past-a-hot-voxel-{:g}{}", rho, way_of(shadow)), "N10",
           "The ray passes two voxels beside it: nothing is in the way.",
-          [=] {
-            std::vector<float> values(16 * 16 * 16, 0);
-            values[at(n, 8, 8, 8)] = static_cast<float>(rho);
-            return seen_through(n, values, 1, {0, centre + 2. / 16, centre}, {1, centre + 2. / 16, centre},
-                                shadow);
-          },
-          grey(shown(1, shadow)));
+          [=] { return ray(rho, 1, centre + 2. / 16, shadow); }, grey(shown(1, shadow)));
     }
   }
 }
@@ -147,7 +140,8 @@ void hot_voxels(Table& t) {
 // Thin fog with a dense wall across it. The camera's ray stays three voxels away from the wall, and the light
 // that reaches the ray does not cross the wall, either. But macro cells on the ray contain part of the wall;
 // if their mean density were used, no light would get through. The light comes from a lamp in the fog and is
-// scattered once: the answer is the integral over the ray of sigma / (4 pi) e^-(sigma (t + r)) / r^2.
+// scattered once: the answer is the integral over the ray of sigma / (4 pi) e^-(sigma (t + r)) / r^2, with t
+// the position on the ray and r its distance from the lamp.
 void beside_a_wall(Table& t) {
   constexpr int n = 33, wall = 16;
   constexpr double sigma = .5, density = 1e4;
@@ -198,7 +192,7 @@ void along_faces(Table& t) {
                         {"all-but-an-axis", {0, .5, .5}, {1, .5 + 1e-7, .5 - 1e-7}}};
   for (const Line& line : lines) {
     for (const bool shadow : {false, true}) {
-      // Per unit length, the optical depth along these lines is between 0.4 and 0.7 of sigma.
+      // The mean density along each of these lines is between 0.4 and 0.7.
       const double tau = depth_along(n, values, line.from, line.to);
       t.mean(
           fmt::format("N12-{}{}", line.name, way_of(shadow)), "N12 N13",
@@ -224,14 +218,15 @@ void along_faces(Table& t) {
   }
 }
 
-// Adds null boundaries that cut a unit cube of medium 0 into pieces along x.
-void cut(SceneBuilder& builder, int pieces) {
+// Returns the scene with null boundaries that cut a unit cube of medium 0 into pieces along x.
+SceneBuilder cut(SceneBuilder builder, int pieces) {
   const BsdfIndex null = builder.null();
   for (int i = 1; i < pieces; ++i)
     builder
         .container(RectangleShape{}, translate({1. * i / pieces, .5, .5}) * rotate_y(90) * scale(.5), null,
                    {0})
         .exterior = MediumIndex{0};
+  return builder;
 }
 
 void cut_in_pieces(Table& t) {
@@ -240,13 +235,7 @@ void cut_in_pieces(Table& t) {
       t.mean(
           fmt::format("N13-in-{}-pieces{}", pieces, configuration.name()), "N13 N42 7.7",
           "A ray cut by boundaries that change nothing: the same depth, by flights.",
-          [=] {
-            SceneBuilder builder = unit_cube(configuration, rgb(.25));
-            cut(builder, pieces);
-            builder.environment();
-            return builder;
-          },
-          grey(std::exp(-.25)));
+          [=] { return in_white(cut(unit_cube(configuration, rgb(.25)), pieces)); }, grey(std::exp(-.25)));
     }
     for (const int pieces : {10, 1000}) {
       // Each piece's length is a difference of float32 positions. A piece begins at the position where the
@@ -258,8 +247,7 @@ void cut_in_pieces(Table& t) {
               [=](const Bench& b) {
                 SceneBuilder builder = unit_cube(configuration, rgb(0));
                 builder.set_emission(MediumIndex{0}, rgb(1));
-                cut(builder, pieces);
-                return every_value(b, builder, 4, grey(1), tolerance);
+                return every_value(b, cut(builder, pieces), 4, grey(1), tolerance);
               });
       t.exact(
           fmt::format("N13-shadow-through-{}-pieces{}", pieces, configuration.name()), "N13 N42",
@@ -315,9 +303,7 @@ SceneBuilder with_voxel(float value, double sigma = 1) {
   builder.container(
       CubeShape{}, {}, builder.null(),
       builder.heterogeneous(builder.grid({4, 4, 4}, values, box({-1, -1, -1}, {1, 1, 1})), rgb(.5), sigma));
-  builder.environment();
-  builder.look({.4, -6, .7}, {0, 0, 0}, 30);
-  return builder;
+  return furnace(builder);
 }
 
 void no_densities(Table& t) {
@@ -351,8 +337,8 @@ void no_densities(Table& t) {
             if (!p) return {.why = p.error().message};
             return {1, static_cast<double>(p->clamped_inputs), 0, {}, 0};
           });
-  // All voxels are 1e-40 (or 1e-38), with an extinction that gives a depth of 1e-12: such values must neither
-  // get lost in products nor be slow.
+  // All densities are 1e-40 or 1e-38, and the scale of 1e20 makes the optical depth 2e-20 or 2e-18. Such
+  // denormal values must neither produce invalid results nor be slow.
   for (const float value : {1e-40f, 1e-38f}) {
     t.exact(fmt::format("N58-denormal-{:g}/grid/volpath", value), "N14 N58",
             "Densities around the smallest float32: nothing is in the way, and nothing goes wrong.",
@@ -362,9 +348,7 @@ void no_densities(Table& t) {
                                 builder.heterogeneous(builder.grid({8, 8, 8}, std::vector<float>(512, value),
                                                                    box({-1, -1, -1}, {1, 1, 1})),
                                                       rgb(.5), 1e20));
-              builder.environment();
-              builder.look({.4, -6, .7}, {0, 0, 0}, 30);
-              return every_value(b, builder, 64, grey(1), 0);
+              return every_value(b, furnace(builder), 64, grey(1), 0);
             });
   }
 }
@@ -376,9 +360,7 @@ void heroes(Table& t) {
     t.mean("N15-hero-without-extinction" + configuration.name(), "N15 7.6a",
            "Extinction 0, 1 and 16 in the channels: none starves the others.",
            [=] {
-             SceneBuilder builder = unit_cube(configuration, {0, 1, 16});
-             builder.environment();
-             return builder;
+             return in_white(unit_cube(configuration, {0, 1, 16}));
            },
            {1, std::exp(-1.), std::exp(-16.)});
   }

@@ -7,12 +7,11 @@
 #include "validation/fixtures/case.h"
 #include "validation/fixtures/checks.h"
 #include "validation/fixtures/fixtures.h"
-#include "validation/fixtures/sky_builder.h"
 
 namespace ls::cases {
 namespace {
 
-// `m` glass plates between a white wall and the camera, at normal incidence.
+// `m` glass plates between a shining wall and the camera, at normal incidence.
 SceneBuilder plates(int m) {
   SceneBuilder builder;
   const BsdfIndex glass = builder.glass(1.5);
@@ -108,7 +107,8 @@ void shapes(Table& t) {
         "A box as an instance, mirrored or squeezed, is the box there.",
         [m = maps[i]] { return placed(true, m); }, [m = maps[i]] { return placed(false, m); },
         {.band = .003});
-  // First the whole scene is scaled by `s`, then a box in the scene is squeezed by 1e6.
+  // In the first two cases the whole scene is scaled by `s`. In the third, only the box in it is squeezed, by
+  // 1e6.
   for (const double s : {1e-6, 1e6})
     t.same(
         fmt::format("N44-instance-scaled-{:g}", s), "N44 N4",
@@ -205,6 +205,15 @@ Figure cropped(const Bench& b, double radius) {
   return f;
 }
 
+// A white sky that fills the frame, with a sphere behind the camera.
+SceneBuilder sky_only(double fov = 40, FrameSize size = {16, 16}) {
+  SceneBuilder builder(size);
+  builder.shape(SphereShape{}, translate({0, 0, -1e4}), builder.diffuse(.5));
+  builder.environment();
+  builder.look({0, 0, 0}, {0, 0, 1}, fov, {0, 1, 0});
+  return builder;
+}
+
 void cameras(Table& t) {
   t.exact("N47-lens-of-nothing", "N47",
           "A lens of radius 0 is a pinhole, bit for bit, wherever it is focused.", [](const Bench& b) {
@@ -224,32 +233,18 @@ void cameras(Table& t) {
             });
   t.exact("N47-lens-wider-than-its-focus", "N47",
           "A lens ten times as wide as its focus is far: the sky stays white.", [](const Bench& b) {
-            SceneBuilder builder;
-            builder.shape(SphereShape{}, translate({0, 0, -1e4}), builder.diffuse(.5));
-            builder.environment();
-            builder.look({0, 0, 0}, {0, 0, 1}, 40, {0, 1, 0});
+            SceneBuilder builder = sky_only();
             builder.scene.sensor.aperture_radius = 1;
             builder.scene.sensor.focus_distance = .1;
             return every_value(b, builder, 64, grey(1), 0);
           });
   for (const FrameSize size : {FrameSize{10'000, 1}, FrameSize{1, 10'000}})
     t.exact(fmt::format("N48-frame-of-{}x{}", size.width, size.height), "N48",
-            "A white sky is white in a frame ten thousand times as long as wide.", [=](const Bench& b) {
-              SceneBuilder builder(size);
-              builder.shape(SphereShape{}, translate({0, 0, -1e4}), builder.diffuse(.5));
-              builder.environment();
-              builder.look({0, 0, 0}, {0, 0, 1}, 40, {0, 1, 0});
-              return every_value(b, builder, 2, grey(1), 0);
-            });
+            "A white sky is white in a frame ten thousand times as long as wide.",
+            [=](const Bench& b) { return every_value(b, sky_only(40, size), 2, grey(1), 0); });
   for (const double fov : {179.9, .01, 1e-9})
     t.exact(fmt::format("N48-fov-{:g}", fov), "N48", "A white sky is white in any field of view.",
-            [=](const Bench& b) {
-              SceneBuilder builder;
-              builder.shape(SphereShape{}, translate({0, 0, -1e4}), builder.diffuse(.5));
-              builder.environment();
-              builder.look({0, 0, 0}, {0, 0, 1}, fov, {0, 1, 0});
-              return every_value(b, builder, 4, grey(1), 0);
-            });
+            [=](const Bench& b) { return every_value(b, sky_only(fov), 4, grey(1), 0); });
   // The second filter has the largest allowed width: 64 pixels, more than the frame and than any of its
   // tiles.
   for (const double radius : {2., 32.})

@@ -1,5 +1,4 @@
-// Lamps: rays that pass one at any distance, light from very far away, from very small lights and from
-// inside.
+// Lamps at any distance from a ray, very far away, enormous, and inside or just outside a medium.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -64,11 +63,7 @@ void passing_by(Table& t) {
       if (configuration.grid && !configuration.distant && h < .5) continue;
       t.mean(fmt::format("N22-passing-a-lamp-at-{:g}{}", h, configuration.name()), "N22 N23 7.6f",
              "A ray that passes a lamp at this distance, light scattered once.",
-             [=] {
-               SceneBuilder builder = passing(configuration, rgb(1), rgb(1));
-               builder.scene.emitters.push_back(PointEmitter{{h, 0, 0}, rgb(1 / (4 * kPi))});
-               return builder;
-             },
+             [=] { return beside_a_watt(passing(configuration, rgb(1), rgb(1)), h); },
              grey(passing_answer(h, 1)), {.slack = 4 * 0x1p-24 / h});
     }
   }
@@ -111,9 +106,8 @@ void from_afar(Table& t) {
       t.mean(fmt::format("N24-lamp-at-{:g}{}", distance, configuration.name()), "N24 N22",
              "A lamp this far away is a sun: parallel light of its irradiance.",
              [=] {
-               SceneBuilder builder = lit_cube(configuration, rgb(1), rgb(1));
-               builder.scene.emitters = {PointEmitter{{0, distance, 0}, rgb(distance * distance)}};
-               return builder;
+               return lit_by(lit_cube(configuration, rgb(1), rgb(1)),
+                             PointEmitter{{0, distance, 0}, rgb(distance * distance)});
              },
              grey(lit_cube_answer(1, 1)), {.slack = 4 / distance});
     t.mean("N24-sphere-of-1e2-at-1e3" + configuration.name(), "N24 N26",
@@ -125,8 +119,9 @@ void from_afar(Table& t) {
                           rgb(1 / (2 * kPi * (1 - std::sqrt(.99)))));
              return builder;
            },
-           // The lamp's rim is 0.1 rad off the vertical, so paths down through the cube are longer by at most
-           // 0.005, times the extinction 0.01. Free flights rarely scatter in a grid this thin.
+           // The slack: the lamp's rim is 0.1 rad off the vertical, so paths down through the cube are longer
+           // by at most 0.005; the extinction is 0.01. The first run: on grids volpath samples free flights,
+           // which rarely scatter in a medium this thin.
            grey(lit_cube_answer(.01, 1)),
            {.slack = 5e-5,
             .slow = configuration.grid && !configuration.distant,
@@ -141,10 +136,10 @@ void enormous(Table& t) {
   const double cone = 2 * kPi * (1 - std::sqrt(1 - kSize * kSize / kFar / kFar)),
                disk = 2 * kPi * (1 - kFar / std::hypot(kFar, kSize)),
                square = 4 * std::atan(kSize * kSize / (kFar * std::sqrt(kFar * kFar + 2 * kSize * kSize)));
-  // The view is a line along z through the cube. Consider light tilted by the angle q along that line. Where
-  // it reaches the line within q of an end, it has entered through the cube's side instead of its top, so
-  // its path inside has a length u < 1 instead of 1. At each end this adds
-  // q int_0^1 (e^-u - e^-1) du = q (1 - 2 / e). `lean` is the mean of max(q, 0) over the light.
+  // The view is a line along z through the cube's middle; light straight from above has a path of length 1 to
+  // it inside the cube. Light that is tilted along z by the angle q and reaches the line within q of one end
+  // has entered through the cube's side instead of its top, so its path has a length u < 1. At that end
+  // this adds q int_0^1 (e^-u - e^-1) du = q (1 - 2 / e). `lean` is the mean of max(q, 0) over the light.
   const auto leaning = [](double lean) {
     return 1 + lean * (std::exp(1.) - 2) * (1 + std::exp(-2.)) / -std::expm1(-2.);
   };
@@ -168,7 +163,7 @@ void enormous(Table& t) {
                return builder;
              },
              // The light's rim is 0.01 rad off the vertical, 0.014 in the corners, so paths down through the
-             // cube are longer by at most 1e-4.
+             // cube are longer by a share of at most 1e-4.
              grey(lit_cube_answer(1, 1) * leaning(light.lean)), {.slack = 1e-4});
   }
 }
@@ -195,9 +190,8 @@ void across_boundaries(Table& t) {
           fmt::format("N25-lamp-at-{:g}{}", y, configuration.name()), "N25",
           "A lamp inside a cube of a medium, just below and above its face, and outside.",
           [=] {
-            SceneBuilder builder = lit_cube(configuration, rgb(1), rgb(1));
-            builder.scene.emitters = {PointEmitter{{0, y, 0}, rgb(1 / (4 * kPi))}};
-            return builder;
+            return lit_by(lit_cube(configuration, rgb(1), rgb(1)),
+                          PointEmitter{{0, y, 0}, rgb(1 / (4 * kPi))});
           },
           // A ray from the view to a lamp above the cube always leaves through the cube's top, never through
           // a side, since it approaches the y axis.

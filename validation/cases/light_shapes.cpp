@@ -13,29 +13,18 @@ namespace {
 
 void tiny(Table& t) {
   for (const double ratio : {1e-1, 1e-3, 1e-5}) {
-    const double r = 1000 * ratio, slack = 1e-6;
-    t.mean(fmt::format("N26-sphere-r/d-{:g}", ratio), "N26 7.6g", "A shining sphere: pi r^2 / d^2.",
-           [=] {
-             SceneBuilder builder = floor_point();
-             builder.lamp(SphereShape{}, translate({0, 0, 1000}) * scale(r));
-             return builder;
-           },
-           reflected(kPi * ratio * ratio), {.slack = slack});
-    t.mean(fmt::format("N26-disk-r/d-{:g}", ratio), "N26 7.6g", "A shining disk: pi sin^2 of its half angle.",
-           [=] {
-             SceneBuilder builder = floor_point();
-             builder.lamp(DiskShape{}, translate({0, 0, 1000}) * rotate_x(180) * scale(r));
-             return builder;
-           },
-           reflected(kPi * ratio * ratio / (1 + ratio * ratio)), {.slack = slack});
-    t.mean(fmt::format("N26-square-a/d-{:g}", ratio), "N26 7.6g",
-           "A shining square: Lambert's formula at its corners.",
-           [=] {
-             SceneBuilder builder = floor_point();
-             builder.lamp(RectangleShape{}, translate({0, 0, 1000}) * rotate_x(180) * scale(r));
-             return builder;
-           },
-           reflected(below_a_square(ratio)), {.slack = slack});
+    const auto add = [&](const char* name, const char* about, const Geometry& lamp, const Transform& facing,
+                         double irradiance) {
+      t.mean(fmt::format("N26-{}-{:g}", name, ratio), "N26 7.6g", about,
+             with_lamp(floor_point(), lamp, translate({0, 0, 1000}) * facing * scale(1000 * ratio)),
+             reflected(irradiance), {.slack = 1e-6});
+    };
+    const Transform down = rotate_x(180);
+    add("sphere-r/d", "A shining sphere: pi r^2 / d^2.", SphereShape{}, {}, kPi * ratio * ratio);
+    add("disk-r/d", "A shining disk: pi sin^2 of its half angle.", DiskShape{}, down,
+        kPi * ratio * ratio / (1 + ratio * ratio));
+    add("square-a/d", "A shining square: Lambert's formula at its corners.", RectangleShape{}, down,
+        below_a_square(ratio));
   }
 }
 
@@ -170,15 +159,11 @@ void orders_apart(Table& t) {
         fmt::format("N32-lengths-of-{:g}", s), "N32",
         "Densities a length of 1e15 or 1e-15 apart: strategies are weighed in a world of unit size.",
         [=] {
-          Configuration configuration{false, true};
-          SceneBuilder builder = lit_cube(configuration, rgb(1), rgb(1), 0, {0, 0, 0}, s);
-          builder.scene.emitters = {PointEmitter{{0, 4 * s, 0}, rgb(s * s)}};
-          return builder;
+          return lit_by(lit_cube({false, true}, rgb(1), rgb(1), 0, {0, 0, 0}, s),
+                        PointEmitter{{0, 4 * s, 0}, rgb(s * s)});
         },
         [] {
-          SceneBuilder builder = lit_cube({false, true}, rgb(1), rgb(1));
-          builder.scene.emitters = {PointEmitter{{0, 4, 0}, rgb(1)}};
-          return builder;
+          return lit_by(lit_cube({false, true}, rgb(1), rgb(1)), PointEmitter{{0, 4, 0}, rgb(1)});
         });
   }
 }

@@ -50,8 +50,8 @@ void peaks(Table& t) {
         const double shape =
                          ggx ? std::pow(1 + s2, -2) * unmasked(alpha, view, view + 2 * off) : std::exp(-s2),
                      density = shape * std::pow(1 + tangent * tangent, 2) / (kPi * alpha * alpha);
-        // Directions are accurate to 2^-24, so the error of a slope is 2^-24 / alpha; the exponent contains
-        // the square of the slope.
+        // Directions are accurate to 2^-24, so slopes in units of alpha are accurate to 2^-24 / alpha. The
+        // density depends on their square.
         const double tolerance = 1e-5 + 2. * slopes * 4 * 0x1p-24 / alpha;
         t.exact(
             fmt::format("N34-{}-alpha-{:g}-{}", ggx ? "ggx" : "beckmann", alpha,
@@ -85,16 +85,12 @@ void normals(Table& t) {
             builder.lamp(SphereShape{}, translate({6, 0, -1.5}), rgb(10));
             return every_value(b, builder, 64, grey(0), 0);
           });
-  // A white floor whose shading normals lean by b from the geometric one receives light from the wedge above
-  // both planes: its projected solid angle about the leaning normal is pi (1 + cos b) / 2.
+  // A white floor whose shading normals lean by b from the geometric one receives light from the directions
+  // that are above both its plane and the plane perpendicular to the shading normal. The projected solid
+  // angle of this wedge about the shading normal is pi (1 + cos b) / 2.
   t.mean(
       "N37-furnace", "N37 N38", "That floor, white, in a white sky: it gives the part of it that it sees.",
-      [] {
-        SceneBuilder builder = leaning();
-        builder.environment();
-        return builder;
-      },
-      grey((1 + std::cos(kLean)) / 2));
+      [] { return in_white(leaning()); }, grey((1 + std::cos(kLean)) / 2));
 }
 
 }  // namespace

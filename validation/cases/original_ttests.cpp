@@ -38,11 +38,7 @@ void absorption(Table& t, const Configuration& configuration) {
   const Rgb sigma{.2, .5, 3};
   t.mean(
       "seed-absorption" + configuration.name(), "seed 7.6a", "Light of 1 from behind: exp(-sigma_a d).",
-      [=] {
-        SceneBuilder builder = cube(configuration, sigma, rgb(0));
-        builder.environment();
-        return builder;
-      },
+      [=] { return in_white(cube(configuration, sigma, rgb(0))); },
       each([&](std::size_t k) { return std::exp(-sigma[k] * kWay); }));
 }
 
@@ -88,9 +84,7 @@ void furnace(Table& t, const Configuration& configuration) {
            "Light of 1 from everywhere: 1, where red and green meet nothing of the medium and where all is "
            "scattered.",
            [=] {
-             SceneBuilder builder = cube(configuration, rgb(0), scatters ? Rgb{.5, 1, 2} : Rgb{0, 0, .5});
-             builder.environment();
-             return builder;
+             return in_white(cube(configuration, rgb(0), scatters ? Rgb{.5, 1, 2} : Rgb{0, 0, .5}));
            },
            grey(1), {.channels = true});
   }

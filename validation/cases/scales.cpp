@@ -1,4 +1,4 @@
-// Lengths: extinctions of 1e8 over 1e-8, scenes of any scale, at any position, and far away.
+// Scenes of any scale (extinctions of 1e8 over lengths of 1e-8), at any position, and seen from far away.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -84,7 +84,7 @@ void anywhere(Table& t) {
   }
 }
 
-// Tests the first point of every sample sequence.
+// Renders one sample in each half with seed 0: the first point of every sample sequence.
 void first_samples(Table& t) {
   for (const Configuration& configuration : all_configurations()) {
     t.exact("N70-first-samples-of-seed-0" + configuration.name(), "N70 N6",

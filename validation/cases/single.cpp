@@ -114,36 +114,28 @@ void lights(Table& t) {
       t.mean(
           "7.6f-square-light" + s.name, "7.6f N26", "A ray past a shining square.",
           [=] {
-            SceneBuilder builder = passing_lit(s, rgb(.7), rgb(1));
-            builder.lamp(RectangleShape{}, translate({.3, 0, 0}) * rotate_y(-90) * scale(.5));
-            return builder;
+            return with_lamp(passing_lit(s, rgb(.7), rgb(1)), RectangleShape{},
+                             translate({.3, 0, 0}) * rotate_y(-90) * scale(.5));
           },
           grey(square), of_square);
       t.mean(
           "7.6f-sphere-light" + s.name, "7.6f N26", "A ray past a shining sphere.",
           [=] {
-            SceneBuilder builder = passing_lit(s, rgb(.7), rgb(1));
-            builder.lamp(SphereShape{}, translate({.5, 0, 0}) * scale(.3));
-            return builder;
+            return with_lamp(passing_lit(s, rgb(.7), rgb(1)), SphereShape{},
+                             translate({.5, 0, 0}) * scale(.3));
           },
           grey(sphere), options);
       t.mean(
           "7.6f-spot" + s.name, "7.6f", "A ray through a spot's cone.",
           [=] {
-            SceneBuilder builder = passing_lit(s, rgb(.7), rgb(1));
-            builder.scene.emitters.push_back(
-                SpotEmitter{look_at({.5, 0, 0}, {0, 0, 0}, {0, 1, 0}), rgb(1), 60, 30, {}});
-            return builder;
+            return with(passing_lit(s, rgb(.7), rgb(1)),
+                        SpotEmitter{look_at({.5, 0, 0}, {0, 0, 0}, {0, 1, 0}), rgb(1), 60, 30, {}});
           },
           grey(spot), options);
       if (by_chance) continue;
       const Rgb sigma{.5, 1, 2}, albedo{1, .8, .5};
       t.mean("7.6f-lamp-chromatic" + s.name, "7.6f N22", "A ray past a lamp, channels of their own.",
-             [=] {
-               SceneBuilder builder = passing_lit(s, sigma, albedo);
-               builder.scene.emitters.push_back(PointEmitter{{.5, 0, 0}, rgb(1 / (4 * kPi))});
-               return builder;
-             },
+             [=] { return beside_a_watt(passing_lit(s, sigma, albedo), .5); },
              {passing_answer(.5, sigma[0], albedo[0]), passing_answer(.5, sigma[1], albedo[1]),
               passing_answer(.5, sigma[2], albedo[2])});
     }
@@ -151,12 +143,7 @@ void lights(Table& t) {
   t.mean(
       "7.6f-lamp-in-thin-air/homogeneous/volpath", "7.6f",
       "1 W passed at 1 in a medium of sigma .1: .00102117618.",
-      [] {
-        SceneBuilder builder = passing({}, rgb(.1), rgb(1));
-        builder.scene.emitters.push_back(PointEmitter{{1, 0, 0}, rgb(1 / (4 * kPi))});
-        return builder;
-      },
-      grey(.00102117618));
+      [] { return beside_a_watt(passing({}, rgb(.1), rgb(1)), 1); }, grey(.00102117618));
 }
 
 }  // namespace

@@ -14,6 +14,7 @@ namespace ls::cases {
 namespace {
 
 constexpr double kDigits = 5e-6;  // half a unit of the tables' sixth decimal, relative to a value of 0.1
+const DirectionalEmitter kSun{{0, 0, -1}, rgb(1)};
 
 void semi_infinite(Table& t) {
   struct Row {
@@ -29,12 +30,8 @@ void semi_infinite(Table& t) {
                grey(cosine == 1 ? row.normal : row.slanted), {.slack = kDigits, .slow = row.albedo < .9});
       t.mean(fmt::format("7.1-normal-to-normal-a{:g}{}", row.albedo, configuration.name()), "7.1",
              "An endless medium in the sun, both along the normal: L / E = a H(1)^2 / (8 pi).",
-             [=] {
-               SceneBuilder builder = half_space(configuration, row.albedo, 40, 1);
-               builder.scene.emitters = {DirectionalEmitter{{0, 0, -1}, rgb(1)}};
-               return builder;
-             },
-             grey(row.l_over_e), {.slack = row.digits});
+             [=] { return lit_by(half_space(configuration, row.albedo, 40, 1), kSun); }, grey(row.l_over_e),
+             {.slack = row.digits});
     }
   }
   // A white slab of optical depth 64: the half space's 0.336428 minus what the slab transmits,
@@ -42,9 +39,7 @@ void semi_infinite(Table& t) {
   const double k = std::sqrt(3.) / 4 * 2.907811;
   t.mean("7.1-normal-to-normal-a1/homogeneous/volpath", "7.1 N17", "The same of a white slab of depth 64.",
          [] {
-           SceneBuilder builder = column({}, {1, 0, 64}, false);
-           builder.scene.emitters = {DirectionalEmitter{{0, 0, -1}, rgb(1)}};
-           return builder;
+           return lit_by(column({}, {1, 0, 64}, false), kSun);
          },
          grey(.336428 - 4. / 3 * k * k / 65.42089 / kPi),
          {.band = .01, .why_band = "paths of hundreds of scatterings", .slack = 1e-5, .slow = true});
@@ -92,9 +87,7 @@ std::string named(const char* what, const Slab& s, const char* side, const Confi
   return fmt::format("7.2-{}-a{:g}-tau{:g}-{}{}", what, s.albedo, s.tau, side, configuration.name());
 }
 
-// Where a slab transmits little light, and only by long paths, the band is 1 %. The transmittance T of the
-// white slab of depth 16 is tested in the faster configuration only (by_both()); its reflectance R is tested
-// in both.
+// Where a slab transmits little light, and only by long paths, the band is 1 %.
 MeanOptions of_little(double through, bool slow) {
   const bool little = through < .3;
   return {.band = little ? .01 : kBand,
@@ -102,6 +95,8 @@ MeanOptions of_little(double through, bool slow) {
           .slack = kDigits * 10,
           .slow = slow};
 }
+// False: the slab's transmittance is tested in the faster configuration only. The reflectance is tested in
+// both.
 bool by_both(const Slab& slab) { return slab.tau < 10; }
 
 void isotropic(Table& t) {
@@ -133,7 +128,7 @@ void isotropic(Table& t) {
 SceneBuilder plate_above(const Configuration& configuration, Slab slab) {
   slab.wall = .5;
   SceneBuilder builder = column(configuration, slab, true);
-  Shape& end = builder.scene.shapes[4];  // black, behind what is seen from above
+  Shape& end = builder.scene.shapes[4];  // the black plate of empty_column()
   end.bsdf = builder.diffuse(.5);
   end.to_world = translate({0, 0, slab.tau + 2}) * rotate_x(180) * scale(slab.reach());
   builder.look({.1, .15, slab.tau + 1}, {.1, .15, slab.tau + 2}, 1e-3, {0, 1, 0});
@@ -189,7 +184,8 @@ void dielectric(Table& t) {
          grey(.10931), {.slack = 1e-4, .slow = true});
 }
 
-// The answer for single scattering, with a the albedo and mu the cosine of the incident light:
+// The share of uniform light that a slab reflects along its normal by single scattering, with a the albedo
+// and mu the cosine of the incident light:
 // R_1 = (a/2) int_0^1 mu / (1 + mu) (1 - e^(-tau (1 + 1/mu))) dmu.
 double first_order(double albedo, double tau) {
   return albedo / 2 *

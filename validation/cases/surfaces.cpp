@@ -5,6 +5,7 @@
 
 #include "validation/fixtures/case.h"
 #include "validation/fixtures/checks.h"
+#include "validation/fixtures/fixtures.h"
 
 namespace ls::cases {
 namespace {
@@ -23,16 +24,12 @@ SceneBuilder sheet(double degrees, auto make) {
   builder.look({5 * std::sin(a), 0, 5 * std::cos(a)}, {0, 0, 0}, 1e-3, {0, 1, 0});
   return builder;
 }
-SceneBuilder in_white(SceneBuilder builder) {
-  builder.environment();
-  return builder;
-}
 // Adds a wall of two colours behind the rectangle and an environment, so that the direction of the ray
 // matters.
 SceneBuilder before_a_wall(SceneBuilder builder) {
   const TextureIndex dark = builder.texture(rgb(.25)), bright = builder.texture({1, .75, .5});
-  builder.scene.textures.push_back(CheckerboardTexture{dark, bright, {{8, 0, 0, 0, 8, 0, 0, 0, 1}}});
-  const TextureIndex board{static_cast<std::uint32_t>(builder.scene.textures.size() - 1)};
+  const TextureIndex board = SceneBuilder::push<TextureTag>(
+      builder.scene.textures, CheckerboardTexture{dark, bright, {{8, 0, 0, 0, 8, 0, 0, 0, 1}}});
   builder.shape(RectangleShape{}, translate({0, 0, -3}) * scale(6), builder.diffuse(0)).emitter =
       AreaEmitter{board};
   builder.environment(.125);
@@ -41,8 +38,8 @@ SceneBuilder before_a_wall(SceneBuilder builder) {
 }
 
 // For a white GGX metal seen from this many degrees off its normal: the mean of the shadowing on the way out,
-// 1 / (1 + lambda), over the normals visible from there (Heitz 2018), by the midpoint rule. Masking and
-// shadowing are separable, as in Mitsuba.
+// 1 / (1 + lambda), over the facet normals that are visible from this direction (Heitz 2018), by the midpoint
+// rule. Masking and shadowing are separable, as in Mitsuba.
 double unmasked_at(double degrees, double alpha) {
   constexpr int kSteps = 400;
   const double a = degrees * kPi / 180, l = std::hypot(alpha * std::sin(a), std::cos(a));
@@ -117,8 +114,8 @@ void microfacets(Table& t) {
     t.mean(fmt::format("N35-grazing-rough-{:g}", alpha), "N35",
            "A rough white metal at 89.99 degrees: what facets leave of a white sky, by quadrature.",
            [=] { return in_white(sheet(89.99, [=](SceneBuilder& k) { return rough_mirror(k, alpha); })); },
-           // The answer comes from the midpoint rule, which is accurate to 2e-5 for the square root at the
-           // rim.
+           // The answer comes from the midpoint rule, which is accurate to 2e-5 here: the integrand has a
+           // square root at its rim.
            grey(unmasked_at(89.99, alpha)), {.slack = 2e-5});
 }
 
@@ -140,22 +137,16 @@ void indices(Table& t) {
         return before_a_wall(builder);
       },
       [] { return before_a_wall(SceneBuilder()); }, {.band = .003, .channels = true});
-  t.exact("N36-conductor-of-air", "N36", "A metal of index 1 + 0i reflects nothing.", [](const Bench& b) {
-    return every_value(b,
-                       in_white(sheet(40,
-                                      [](SceneBuilder& k) {
-                                        return k.bsdf(ConductorBsdf{{1, 1, 1}, {0, 0, 0}, k.texture(rgb(1))});
-                                      })),
-                       16, grey(0), 1e-6);
-  });
-  t.exact("N36-conductor-of-nothing", "N36", "A metal of index 0 + 0i reflects all.", [](const Bench& b) {
-    return every_value(b,
-                       in_white(sheet(40,
-                                      [](SceneBuilder& k) {
-                                        return k.bsdf(ConductorBsdf{{0, 0, 0}, {0, 0, 0}, k.texture(rgb(1))});
-                                      })),
-                       16, grey(1), 1e-6);
-  });
+  const auto conductor = [&](const char* id, const char* about, double eta, double expected) {
+    t.exact(id, "N36", about, [=](const Bench& b) {
+      const auto metal = [=](SceneBuilder& k) {
+        return k.bsdf(ConductorBsdf{rgb(eta), rgb(0), k.texture(rgb(1))});
+      };
+      return every_value(b, in_white(sheet(40, metal)), 16, grey(expected), 1e-6);
+    });
+  };
+  conductor("N36-conductor-of-air", "A metal of index 1 + 0i reflects nothing.", 1, 0);
+  conductor("N36-conductor-of-nothing", "A metal of index 0 + 0i reflects all.", 0, 1);
   t.exact("N36-fresnel-normal", "N36 7.6g",
           "Glass of 1.5 reflects .04 of the light straight on: seen before black.", [](const Bench& b) {
             SceneBuilder builder = sheet(0, [](SceneBuilder& k) {
@@ -197,8 +188,8 @@ void diffuse_sheets(Table& t) {
             [behind](const Bench& b) {
               SceneBuilder builder = sheet(40, [](SceneBuilder& k) { return leaf(k, rgb(.25), rgb(.625)); });
               builder.scene.emitters.push_back(PointEmitter{{0, 0, behind ? -2. : 2.}, rgb(3)});
-              // The frame covers 1e-4 of the sheet at distance 2. Over it, cosine and distance vary by about
-              // 1e-9; float32 rounding is some 1e-6.
+              // The frame shows a width of 1e-4 of the sheet. Over it, the cosine and the distance to the
+              // lamp vary by about 1e-9; float32 rounding is about 1e-6.
               return every_value(b, builder, 4, grey((behind ? .625 : .25) * .75 / kPi), 1e-5);
             });
   // A lamp in the middle of a ball lights its wall through absorbing fog. The wall transmits T and reflects
@@ -247,8 +238,8 @@ BsdfIndex coated_metal(SceneBuilder& builder, double ior, double coat_alpha, dou
   return builder.bsdf(CoatedConductorBsdf{ior, 1, coat_alpha, alpha, alpha, eta, k, builder.texture(rgb(1))});
 }
 
-// At right angles, of a coat of 1.5 over a metal of the index 3 + 4i: F = 0.04, and R is that of the index
-// (3 + 4i) / 1.5.
+// A coat of index 1.5 over a metal of index 3 + 4i, at normal incidence. The coat reflects F = 0.04 and
+// transmits T = 1 - F; the metal below it has the relative index (3 + 4i) / 1.5 = a + b i and reflects R.
 void coated_metals(Table& t) {
   constexpr double F = .04, a = 2, b = 8. / 3;
   constexpr double R = ((a - 1) * (a - 1) + b * b) / ((a + 1) * (a + 1) + b * b);

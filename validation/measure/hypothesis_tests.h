@@ -1,4 +1,5 @@
-// Statistical significance of a measured figure with a standard error against an expected one.
+// Distributions and tests that judge whether a measured figure agrees with the expected one: Student's t and
+// Pearson's chi-square.
 #pragma once
 
 #include <cstddef>
@@ -25,7 +26,7 @@ double chi2_tail(double x, double freedom);
 struct ChiSquare {
   double statistic = 0, p = 1;
   int freedom = 1;
-  double impossible = 0;  // samples in a cell where none is expected, if there are more than `least`
+  double impossible = 0;  // samples in a cell where none is expected; 0 if there are at most `least`
 };
 ChiSquare chi_square(std::span<const double> expected, std::span<const double> observed, double least);
 

@@ -28,7 +28,7 @@ FrameSize enough(FrameSize size) {
 }
 
 // Sums over the pixels of a frame: of the pixels' means, of their estimated squared errors, and of the
-// squares of these errors.
+// squares of these squared errors.
 struct Sums {
   double mean = 0, square = 0, fourth = 0;
   void add(double weight, double a, double b) {

@@ -158,26 +158,19 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
     // A job with a known id but another brief (its settings and files) is a different job: the coordinator's
     // data were replaced.
     if (it != jobs.end() && it->second.brief != *assign.brief) {
-      table.drop_job(id);
-      outbox.drop_job(id);
-      std::erase_if(unsent, [&](const auto& one) { return one.first.job == id; });
-      stop_dropped_units();
+      drop_work(id);
       jobs.erase(it);
       backend.forget(id);
     }
-    Job& job = jobs.try_emplace(id, Job{.brief = *assign.brief}).first->second;
-    job.cancelled = false;
-    job.last_use = ++uses;
+    jobs.try_emplace(id, Job{.brief = *assign.brief}).first->second.last_use = ++uses;
   }
-  const auto job = jobs.find(id);
-  if (draining || job == jobs.end() || table.lease_count() >= limits::kLeasesPerWorker) {
+  if (draining || !jobs.contains(id) || table.lease_count() >= limits::kLeasesPerWorker) {
     LeaseReturned returned{assign.lease.id, {}};
     for (const LeaseUnit& unit : assign.lease.units)
       returned.unrendered.push_back({id, unit.tile, unit.round});
     outgoing.push_back(std::move(returned));
     return;
   }
-  job->second.cancelled = false;
   const bool traced = options.tracer && assign.trace && assign.trace->sampled;
   table.add(
       assign.lease, [this](const UnitKey& key) { return outbox.has_result(key); },
@@ -196,14 +189,15 @@ void Agent::Impl::accept_lease(AssignLease& assign) {
 
 void Agent::Impl::cancel(const JobId& job) {
   const std::lock_guard lock(mutex);
+  drop_work(job);
+  if (const auto it = jobs.find(job); it != jobs.end()) it->second.trouble.clear();
+}
+
+void Agent::Impl::drop_work(const JobId& job) {
   table.drop_job(job);
   outbox.drop_job(job);
   std::erase_if(unsent, [&](const auto& one) { return one.first.job == job; });
   stop_dropped_units();
-  if (const auto it = jobs.find(job); it != jobs.end()) {
-    it->second.cancelled = true;
-    it->second.trouble.clear();
-  }
 }
 
 void Agent::Impl::stop_dropped_units() {
@@ -288,6 +282,29 @@ std::optional<Result<void>> Agent::Impl::verdict() {
       fmt::format("gave up draining after {:.0f} s: {} finished units could not be handed in; they will be "
                   "rendered again elsewhere",
                   seconds(options.drain_limit), outbox.size()));
+}
+
+void Agent::Impl::record(const char* name, const trace::SpanContext& parent, TimePoint begin, TimePoint end,
+                         trace::Attributes attributes, bool failed) const {
+  options.tracer->record({.context = {parent.trace, options.tracer->new_span_id(), true},
+                          .parent = parent.span,
+                          .name = name,
+                          .start_ns = options.tracer->unix_ns(begin),
+                          .end_ns = options.tracer->unix_ns(std::max(begin, end)),
+                          .attributes = std::move(attributes),
+                          .failed = failed});
+}
+
+void Agent::Impl::trace_sent(const UnitKey& unit) {
+  Unsent sent;
+  {
+    const std::lock_guard lock(mutex);
+    const auto found = unsent.find(unit);
+    if (found == unsent.end()) return;  // the lease is not traced, or the result was sent before
+    sent = found->second;
+    unsent.erase(found);
+  }
+  record("send partial", sent.lease, sent.since, clock.now(), {{"lightshaft.job", unit.job.value}});
 }
 
 Duration Agent::Impl::until_next_timer() const {

@@ -6,7 +6,7 @@
 // Threads: run() is the control thread (connection, progress reports, timers). One loader thread fetches
 // blobs and prepares worlds (scenes that are built and ready to render) ahead of need. Each of `threads`
 // render threads takes the next unit as soon as it has delivered the previous one. One mutex guards the state
-// (worker/agent/held_leases.h, result_outbox.h). While a thread holds it, it makes no call that may block: of
+// (worker/agent/held_work.h). While a thread holds it, it makes no call that may block: of
 // the backend it calls only forget() and rss_bytes(), of the link and the files nothing.
 #pragma once
 
@@ -18,7 +18,6 @@
 #include "common/protocol/messages.h"
 #include "common/trace/tracer.h"
 #include "worker/agent/backend.h"
-#include "worker/agent/blob_files.h"
 #include "worker/agent/link.h"
 
 namespace ls::worker {

@@ -2,24 +2,98 @@
 // the loader thread, agent_render.cpp the render threads.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
+#include <cstdint>
 #include <deque>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <random>
 #include <thread>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "worker/agent/agent.h"
-#include "worker/agent/backoff.h"
 #include "worker/agent/gap_meter.h"
-#include "worker/agent/held_leases.h"
-#include "worker/agent/inbox.h"
-#include "worker/agent/result_outbox.h"
+#include "worker/agent/held_work.h"
 
 namespace ls::worker {
+
+// Exponential back-off with jitter: the n-th wait, from n = 0, is between 50 % and 100 % of min(first * 2^n,
+// `most`). The jitter keeps a thousand workers from reconnecting at the same instant; it is seeded, so that
+// tests can predict it.
+class Backoff {
+ public:
+  Backoff(Duration first, Duration most, std::uint64_t seed) : first_(first), most_(most), random_(seed) {}
+
+  Duration next() {
+    const Duration whole = std::min(first_ * (std::int64_t{1} << std::min(attempts_, 20)), most_);
+    ++attempts_;
+    const double part = 0.5 + 0.5 * static_cast<double>(random_() >> 11) * 0x1p-53;
+    return std::chrono::duration_cast<Duration>(whole * part);
+  }
+  void reset() { attempts_ = 0; }
+
+ private:
+  Duration first_, most_;
+  int attempts_ = 0;
+  std::mt19937_64 random_;
+};
+
+struct ConnectionLost {
+  Error why;
+};
+struct Arrival {
+  // Number of the connection, given by the agent; events of older connections are ignored
+  std::uint64_t connection = 0;
+  std::variant<ToWorker, ConnectionLost> what;
+};
+
+// The queue of events for the agent's control thread: messages from the coordinator and the loss of the
+// connection. Another thread can also wake the control thread without an event (nudge). The link's observer
+// shares ownership of the queue, so that a late callback cannot reach a destroyed agent.
+class Inbox {
+ public:
+  void push(Arrival arrival) {
+    const std::lock_guard lock(mutex_);
+    arrivals_.push_back(std::move(arrival));
+    changed_.notify_one();
+  }
+  void nudge() {
+    const std::lock_guard lock(mutex_);
+    nudged_ = true;
+    changed_.notify_one();
+  }
+  // Waits for an event or a nudge, at most this long, and returns all events in the queue.
+  std::deque<Arrival> wait(Duration at_most) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, at_most, [this] { return nudged_ || !arrivals_.empty(); });
+    nudged_ = false;
+    return std::exchange(arrivals_, {});
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Arrival> arrivals_;
+  bool nudged_ = false;
+};
+
+class InboxObserver final : public LinkObserver {
+ public:
+  InboxObserver(std::shared_ptr<Inbox> inbox, std::uint64_t connection)
+      : inbox_(std::move(inbox)), connection_(connection) {}
+  void received(ToWorker message) override { inbox_->push({connection_, std::move(message)}); }
+  void lost(Error why) override { inbox_->push({connection_, ConnectionLost{std::move(why)}}); }
+
+ private:
+  std::shared_ptr<Inbox> inbox_;
+  const std::uint64_t connection_;
+};
 
 struct Agent::Impl {
   Impl(AgentOptions o, CoordinatorLink& l, RenderBackend& b, BlobFiles& f, const Clock& c);
@@ -32,7 +106,6 @@ struct Agent::Impl {
     std::vector<std::shared_ptr<const BlobFile>> files;  // these objects keep the job's files in the cache
     std::uint64_t last_use = 0;  // value of the counter `uses` when the job was used last; the least recently
                                  // used job is forgotten first
-    bool cancelled = false;
     TimePoint retry_at{};  // earliest next attempt to load, after a broken transfer or a fault of the machine
     std::string trouble;   // the fault of this machine that made the last attempt to load fail
     UnitTimes unreported;  // time spent on loading the job, not yet reported to the coordinator
@@ -56,7 +129,8 @@ struct Agent::Impl {
   void open_connection();
   void accept_lease(AssignLease& assign);
   void cancel(const JobId& job);
-  void stop_dropped_units();  // sets the stop flag of each running unit that is no longer in `table`
+  void drop_work(const JobId& job);  // drops the job's units and results; call with the mutex held
+  void stop_dropped_units();         // sets the stop flag of each running unit that is no longer in `table`
   void begin_drain();
   void look_at_backend();   // drains if the backend is broken, so that run() ends with the backend's error
   void look_at_idleness();  // drains or ends this worker after options.idle_limit without work
@@ -91,8 +165,7 @@ struct Agent::Impl {
                                                       const HeldLeases::Held& held);
   tl::expected<UnitResult, UnitFailure> render(RenderSlot& slot, const LocalJob& job,
                                                const HeldLeases::Held& held);
-  // Record trace spans as children of `parent` or of the span of the unit's lease. Call only with a tracer
-  // (agent_trace.cpp).
+  // Record trace spans as children of `parent` or of the span of the unit's lease. Call only with a tracer.
   void record(const char* name, const trace::SpanContext& parent, TimePoint begin, TimePoint end,
               trace::Attributes attributes, bool failed = false) const;
   void trace_unit(const RenderSlot& slot, const HeldLeases::Held& held,

@@ -72,6 +72,34 @@ bool Agent::Impl::make_room() {
   return true;
 }
 
+std::optional<trace::SpanContext> Agent::Impl::trace_of(const JobId& job) const {
+  if (!options.tracer) return std::nullopt;
+  const std::lock_guard lock(mutex);
+  const auto first = table.first_waiting(job);
+  return first ? first->trace : std::nullopt;
+}
+
+Agent::Impl::LoadSpan::LoadSpan(const Impl& a, const JobId& id, TimePoint at)
+    : agent(a),
+      job(id),
+      begin(at),
+      parent(a.trace_of(id)),
+      own(parent ? trace::SpanContext{parent->trace, a.options.tracer->new_span_id(), true}
+                 : trace::SpanContext{}) {}
+
+Agent::Impl::LoadSpan::~LoadSpan() {
+  if (!parent) return;
+  const trace::Tracer& tracer = *agent.options.tracer;
+  agent.options.tracer->record(
+      {.context = own,
+       .parent = parent->span,
+       .name = "load scene",
+       .start_ns = tracer.unix_ns(begin),
+       .end_ns = tracer.unix_ns(loaded_at ? *loaded_at : agent.clock.now()),
+       .attributes = {{"lightshaft.job", job.value}, {"lightshaft.worker", agent.options.hello.name}},
+       .failed = !loaded_at});
+}
+
 void Agent::Impl::try_to_load(const JobBrief& brief) {
   try {
     load(brief);

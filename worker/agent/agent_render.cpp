@@ -1,5 +1,5 @@
 // The agent's render threads. Each takes one unit (one tile and one range of samples) at a time: the first
-// one that waits in the table of leases, the lists of units assigned to this worker.
+// waiting unit of the leases, which are the lists of units assigned to this worker.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -43,9 +43,7 @@ tl::expected<UnitResult, UnitFailure> Agent::Impl::rendered_unit(RenderSlot& slo
   const double gap = note_gap(slot, held.key.job, rendered->wall_seconds);
   const TimePoint packing = clock.now();
   auto exr = encode_partial(rendered->partial, job.brief.settings.size);
-  if (!exr)
-    return tl::unexpected<UnitFailure>(
-        UnitFailure{.reason = "cannot encode the result: " + exr.error().message});
+  if (!exr) return unit_failure("cannot encode the result: " + exr.error().message);
   UnitResult result;
   result.unit = held.key;
   result.exr = std::move(*exr);
@@ -63,15 +61,13 @@ tl::expected<UnitResult, UnitFailure> Agent::Impl::rendered_unit(RenderSlot& slo
 // the process continues.
 tl::expected<UnitResult, UnitFailure> Agent::Impl::render(RenderSlot& slot, const LocalJob& job,
                                                           const HeldLeases::Held& held) {
-  UnitFailure failure;
   try {
     return rendered_unit(slot, job, held);
   } catch (const std::bad_alloc&) {
-    failure.reason = "out of memory while rendering";
+    return unit_failure("out of memory while rendering");
   } catch (const std::exception& e) {
-    failure.reason = std::string("the renderer failed: ") + e.what();
+    return unit_failure(std::string("the renderer failed: ") + e.what());
   }
-  return tl::unexpected<UnitFailure>(std::move(failure));
 }
 
 double Agent::Impl::note_gap(RenderSlot& slot, const JobId& job, double wall_seconds) {
@@ -117,6 +113,29 @@ std::optional<HeldLeases::Held> Agent::Impl::next_unit(RenderSlot& slot, std::st
   slot.unit = held->key;
   slot.stop = false;
   return held;
+}
+
+// Records the spans of a unit: of rendering it and, unless it failed, of packing its result. Call with the
+// mutex held, before the unit leaves the table.
+void Agent::Impl::trace_unit(const RenderSlot& slot, const HeldLeases::Held& held,
+                             tl::expected<UnitResult, UnitFailure>& outcome) {
+  trace::Attributes attributes{{"lightshaft.job", held.key.job.value},
+                               {"lightshaft.worker", options.hello.name},
+                               {"lightshaft.tile", std::int64_t{held.key.tile}},
+                               {"lightshaft.round", std::int64_t{held.key.round}},
+                               {"lightshaft.first_sample", static_cast<std::int64_t>(held.unit.samples.s0)},
+                               {"lightshaft.last_sample", static_cast<std::int64_t>(held.unit.samples.s1)}};
+  if (!outcome) {
+    return record("render unit", *held.trace, slot.began, clock.now(), std::move(attributes), true);
+  }
+  attributes.emplace_back("lightshaft.core_seconds", outcome->cpu_seconds);
+  record("render unit", *held.trace, slot.began, slot.last_end, std::move(attributes));
+  const TimePoint packed = slot.last_end + from_seconds(outcome->times.transfer);
+  record("encode partial", *held.trace, slot.last_end, packed,
+         {{"lightshaft.job", held.key.job.value},
+          {"lightshaft.bytes", static_cast<std::int64_t>(outcome->exr.size())}});
+  outcome->held_unix_ns = static_cast<std::uint64_t>(std::max<std::int64_t>(held.since_unix_ns, 0));
+  unsent.insert_or_assign(held.key, Unsent{*held.trace, packed});
 }
 
 void Agent::Impl::finished(RenderSlot& slot, const UnitKey& key,

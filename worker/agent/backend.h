@@ -2,8 +2,12 @@
 // implementations are the renderer in this process, the renderer in a child process, and the fake renderer.
 #pragma once
 
+#include <sys/types.h>
+#include <unistd.h>
+
 #include <atomic>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <map>
 #include <memory>
@@ -42,6 +46,11 @@ struct RenderedUnit {
   TechniqueSet techniques;  // techniques that the integrator uses for this world
 };
 
+// Returns a failure of a unit with this reason, which is not the scene's fault.
+inline tl::unexpected<UnitFailure> unit_failure(std::string reason) {
+  return tl::unexpected<UnitFailure>(UnitFailure{.reason = std::move(reason)});
+}
+
 // Renders units. All calls block, and the agent makes them from several threads concurrently. If the caller
 // sets `stop`, render() should return early; its result is then ignored. UnitFailure::scene_at_fault is true
 // if the scene caused the failure.
@@ -65,6 +74,14 @@ class RenderBackend {
   // more than once.
   virtual void shutdown() {}
 };
+
+// Returns the resident bytes of the process, for rss_bytes(); 0 if it has ended.
+inline std::uint64_t resident_bytes(pid_t process) {
+  std::uint64_t total = 0, resident = 0;
+  std::ifstream statm("/proc/" + std::to_string(process) + "/statm");
+  statm >> total >> resident;
+  return statm ? resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)) : 0;
+}
 
 // A backend that renders in this process and can show which sample it is rendering.
 class LocalBackend : public RenderBackend {

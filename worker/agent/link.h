@@ -1,16 +1,20 @@
-// The agent's connection to its coordinator. There are two implementations: over gRPC (worker/client) and
-// within one process (cli/local/local_farm.h).
+// How the agent reaches its coordinator (CoordinatorLink) and gets the files of jobs (BlobFiles).
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "common/base/error.h"
 #include "common/protocol/messages.h"
 
 namespace ls::worker {
+
+// Receives the bytes of a blob, piece by piece and in order.
+using BlobSink = std::function<Result<void>(std::span<const std::byte>)>;
 
 class LinkObserver {
  public:
@@ -28,6 +32,8 @@ struct BlobRequest {
   bool arrived_wrong = false;
 };
 
+// The agent's connection to its coordinator. There are two implementations: over gRPC (worker/client) and
+// within one process (cli/local/local_farm.h).
 class CoordinatorLink {
  public:
   virtual ~CoordinatorLink() = default;
@@ -39,8 +45,31 @@ class CoordinatorLink {
   virtual void close() = 0;
   // Fetches the bytes and passes them to `sink` in order. The transfer ends if `sink` returns an error (disk
   // full, wrong digest).
-  virtual Result<void> fetch_blob(const BlobRequest& wanted,
-                                  const std::function<Result<void>(std::span<const std::byte>)>& sink) = 0;
+  virtual Result<void> fetch_blob(const BlobRequest& wanted, const BlobSink& sink) = 0;
+};
+
+// A complete, verified blob on this machine. The file is not removed while the object lives.
+class BlobFile {
+ public:
+  virtual ~BlobFile() = default;
+  virtual const std::filesystem::path& path() const = 0;
+};
+
+// Provides the files of a job's blobs (its scene and assets). There are two implementations: a cache that
+// fetches missing blobs from the coordinator (worker/cache), and `lightshaft render`, whose files are local
+// already (cli/local).
+class BlobFiles {
+ public:
+  virtual ~BlobFiles() = default;
+  // Returns the blob's file, and blocks while it is fetched. unavailable: the transfer was interrupted; the
+  // bytes received are kept, and the caller should try again later. resource_exhausted, internal: this
+  // machine or its coordinator has a problem (a full disk, the cache limit, a blob missing at the
+  // coordinator) that is not the job's fault and may pass. Other errors are final: for example not_found, if
+  // no source has the blob.
+  virtual Result<std::shared_ptr<const BlobFile>> acquire(const BlobRef& blob) = 0;
+  // Returns the digests of the blobs on this machine, at most `limit`, most recently used first. The worker's
+  // hello sends this list to the coordinator.
+  virtual std::vector<Digest> held(std::size_t limit) const = 0;
 };
 
 }  // namespace ls::worker

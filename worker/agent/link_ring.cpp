@@ -84,8 +84,7 @@ void LinkRing::send(FromWorker message) {
 
 void LinkRing::close() { current().close(); }
 
-Result<void> LinkRing::fetch_blob(const BlobRequest& wanted,
-                                  const std::function<Result<void>(std::span<const std::byte>)>& sink) {
+Result<void> LinkRing::fetch_blob(const BlobRequest& wanted, const BlobSink& sink) {
   return current().fetch_blob(wanted, sink);
 }
 

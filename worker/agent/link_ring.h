@@ -28,8 +28,7 @@ class LinkRing final : public CoordinatorLink {
   Result<void> connect(const WorkerHello& hello, std::shared_ptr<LinkObserver> observer) override;
   void send(FromWorker message) override;
   void close() override;
-  Result<void> fetch_blob(const BlobRequest& wanted,
-                          const std::function<Result<void>(std::span<const std::byte>)>& sink) override;
+  Result<void> fetch_blob(const BlobRequest& wanted, const BlobSink& sink) override;
 
  private:
   class Watch;

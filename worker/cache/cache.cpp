@@ -9,9 +9,9 @@
 #include <cerrno>
 #include <cstring>
 
+#include "common/base/helper_program.h"
 #include "common/base/log.h"
-#include "worker/cache/partial_file.h"
-#include "worker/cache/stored.h"
+#include "worker/cache/cache_files.h"
 
 namespace ls::worker {
 namespace fs = std::filesystem;
@@ -23,15 +23,12 @@ constexpr int kAttempts = 3;
 // A blob's file with a shared lock, which the object holds while it lives.
 class LockedFile final : public BlobFile {
  public:
-  LockedFile(fs::path path, int fd) : path_(std::move(path)), fd_(fd) {}
-  LockedFile(const LockedFile&) = delete;
-  LockedFile& operator=(const LockedFile&) = delete;
-  ~LockedFile() override { ::close(fd_); }
+  LockedFile(fs::path path, int fd) : path_(std::move(path)), file_(fd) {}
   const fs::path& path() const override { return path_; }
 
  private:
-  fs::path path_;
-  int fd_;
+  const fs::path path_;
+  const Descriptor file_;
 };
 
 // Maps a transfer error to one after which the agent tries again: codes other than unavailable and

@@ -19,7 +19,6 @@
 #include <span>
 
 #include "common/base/error.h"
-#include "worker/agent/blob_files.h"
 #include "worker/agent/link.h"
 
 namespace ls::worker {
@@ -28,9 +27,8 @@ class PartialFile;
 
 class BlobCache final : public BlobFiles {
  public:
-  using Sink = std::function<Result<void>(std::span<const std::byte>)>;
   // Fetches the bytes of a blob; the same as CoordinatorLink::fetch_blob
-  using Fetch = std::function<Result<void>(const BlobRequest&, const Sink& sink)>;
+  using Fetch = std::function<Result<void>(const BlobRequest&, const BlobSink&)>;
 
   // Creates the folder if it is missing. The cache keeps at most `limit_bytes` bytes; 0: no limit. It gets
   // missing blobs by `fetch`.

@@ -9,7 +9,6 @@
 
 #include "common/base/check.h"
 #include "common/base/log.h"
-#include "worker/child/job_text.h"
 #include "worker/child/process.h"
 #include "worker/child/protocol.h"
 
@@ -23,10 +22,10 @@ using child::Reply;
 using child::Request;
 using child::Slot;
 
-// How many children in a row may die because of other units while they render the same unit. The next child
-// renders the unit again; after the last of these deaths the unit is reported as failed. Each death also
-// fails the unit that caused it, and after three failures the farm gives this worker no more units of that
-// job. The limit is so high that the farm does this before an innocent unit reaches it.
+// If a child dies because of another unit, the next child renders this unit again. After this many such
+// deaths in a row the unit is reported as failed. Each death also fails the unit that caused it, and after
+// three failures of a job the farm gives this worker no more of its units. The limit is so high that the farm
+// does so before an innocent unit reaches it.
 constexpr int kInnocentDeaths = 64;
 
 std::size_t floats_of(const LocalJob& job, const LeaseUnit& unit) {
@@ -38,8 +37,11 @@ constexpr int kUnreadyChildren = 5;
 // Time after setting the stop flag within which the child must answer; otherwise it is killed
 constexpr Duration kStopLimit = std::chrono::seconds(10);
 
-tl::unexpected<UnitFailure> failed(std::string reason) {
-  return tl::unexpected<UnitFailure>(UnitFailure{.reason = std::move(reason)});
+// Copies the sample that the slot is rendering, if it has begun one, to the failure.
+void note_place(const Slot& slot, UnitFailure& failure) {
+  if (slot.where.x < 0) return;
+  failure.pixel = {slot.where.x, slot.where.y};
+  failure.sample = slot.where.sample;
 }
 
 class ChildBackend final : public RenderBackend {
@@ -50,8 +52,7 @@ class ChildBackend final : public RenderBackend {
 
   Result<void> start() {
     const std::lock_guard control(control_mutex_);
-    auto process = living_process();
-    if (!process) return tl::unexpected<Error>(process.error());
+    if (auto process = living_process(); !process) return tl::unexpected<Error>(process.error());
     return {};
   }
 
@@ -136,8 +137,8 @@ Result<std::shared_ptr<Process>> ChildBackend::spawn_greeted() {
   }
 }
 
-// Waits for the child's hello. unavailable: the child exited before its hello, although an earlier child did
-// not.
+// Waits for the child's hello. unavailable: the child exited before its hello, not by a signal, and an
+// earlier child was ready; so another attempt may succeed.
 Result<void> ChildBackend::greet(Process& process) {
   const TimePoint deadline = clock_.now() + options_.start_limit;
   const auto answer = process.ask(process.control_fd(), Request{.kind = Kind::hello}, {}, [&] {
@@ -200,25 +201,22 @@ tl::expected<std::shared_ptr<Process>, UnitFailure> ChildBackend::ready_process(
     const std::lock_guard lock(process.prepared_mutex);
     return process.prepared.contains(number);
   };
-  {
-    std::shared_ptr<Process> process;
-    {
-      const std::lock_guard lock(mutex_);
-      process = process_;
-    }
-    if (process && knows(*process) && process->alive()) return process;
-  }
+  const auto current = [&] {
+    const std::lock_guard lock(mutex_);
+    return process_;
+  }();
+  if (current && knows(*current) && current->alive()) return current;
   const std::lock_guard control(control_mutex_);
   auto process = living_process();
   // If the child dies while freeing worlds, its replacement has none to free.
   if (process && !send_forgotten(**process)) process = living_process();
-  if (!process) return failed(process.error().message);
+  if (!process) return unit_failure(process.error().message);
   if (knows(**process)) return *process;
   if (auto ok = prepare_in(**process, job, number); !ok) return tl::unexpected<UnitFailure>(ok.error());
   return *process;
 }
 
-// Requests the child to free the worlds of the jobs in `forgotten_`. False: the child is dead.
+// Makes the child free the worlds of the jobs in `forgotten_`. False: the child is dead.
 bool ChildBackend::send_forgotten(Process& process) {
   std::vector<std::uint64_t> forgotten;
   {
@@ -245,7 +243,7 @@ tl::expected<void, UnitFailure> ChildBackend::prepare_in(Process& process, const
                                                          std::uint64_t number) {
   const std::string text = child::to_text(job);
   if (text.size() > child::kTextBytes)
-    return failed("the job names more files than the render child can be told of");
+    return unit_failure("the job names more files than the render child can be told of");
   const TimePoint deadline = clock_.now() + options_.prepare_limit;
   bool too_long = false;
   process.preparing = true;
@@ -256,20 +254,16 @@ tl::expected<void, UnitFailure> ChildBackend::prepare_in(Process& process, const
       });
   if (!answer) {
     const Process::End end = process.end();
-    UnitFailure failure;
-    failure.signal = end.signal;
-    failure.reason = too_long ? fmt::format("building the scene took longer than {:.0f} s",
-                                            seconds(options_.prepare_limit))
-                              : fmt::format("the renderer {} while it built the scene", end.text);
-    return tl::unexpected<UnitFailure>(std::move(failure));
+    return tl::unexpected<UnitFailure>(
+        UnitFailure{.reason = too_long ? fmt::format("building the scene took longer than {:.0f} s",
+                                                     seconds(options_.prepare_limit))
+                                       : fmt::format("the renderer {} while it built the scene", end.text),
+                    .signal = end.signal});
   }
   process.preparing = false;
-  if (answer->reply.outcome != Outcome::ok) {
-    UnitFailure failure;
-    failure.scene_at_fault = answer->reply.outcome == Outcome::scene_at_fault;
-    failure.reason = answer->text;
-    return tl::unexpected<UnitFailure>(std::move(failure));
-  }
+  if (answer->reply.outcome != Outcome::ok)
+    return tl::unexpected<UnitFailure>(UnitFailure{
+        .scene_at_fault = answer->reply.outcome == Outcome::scene_at_fault, .reason = answer->text});
   const std::lock_guard lock(process.prepared_mutex);
   process.prepared.insert(number);
   return {};
@@ -277,7 +271,7 @@ tl::expected<void, UnitFailure> ChildBackend::prepare_in(Process& process, const
 
 tl::expected<RenderedUnit, UnitFailure> ChildBackend::render(const LocalJob& job, const LeaseUnit& unit,
                                                              const std::atomic<bool>& stop) {
-  if (floats_of(job, unit) > child::kSlotFloats) return failed("the tile is too large");
+  if (floats_of(job, unit) > child::kSlotFloats) return unit_failure("the tile is too large");
   int slot = -1;
   {
     const std::lock_guard lock(mutex_);
@@ -285,7 +279,7 @@ tl::expected<RenderedUnit, UnitFailure> ChildBackend::render(const LocalJob& job
     slot = free_slots_.back();
     free_slots_.pop_back();
   }
-  Attempt last{failed("the renderer kept dying of other units"), true};
+  Attempt last{unit_failure("the renderer kept dying of other units"), true};
   for (int i = 0; i < kInnocentDeaths && last.innocent && !stop; ++i) {
     std::uint64_t number = 0;
     const auto process = ready_process(job, number);
@@ -331,10 +325,7 @@ ChildBackend::Attempt ChildBackend::attempt(Process& process, int index, std::ui
   const Reply& reply = answer->reply;
   if (reply.outcome != Outcome::ok) {
     UnitFailure failure{.scene_at_fault = reply.outcome == Outcome::scene_at_fault, .reason = answer->text};
-    if (slot.where.x >= 0) {
-      failure.pixel = {slot.where.x, slot.where.y};
-      failure.sample = slot.where.sample;
-    }
+    note_place(slot, failure);
     return {tl::unexpected<UnitFailure>(std::move(failure)), false};
   }
   RenderedUnit out;
@@ -347,7 +338,8 @@ ChildBackend::Attempt ChildBackend::attempt(Process& process, int index, std::ui
   out.techniques = TechniqueSet::of_bits(reply.techniques);
   if (!answer->text.empty()) {
     auto health = parse_health(answer->text);
-    if (!health) return {failed("the renderer's answer cannot be read: " + health.error().message), false};
+    if (!health)
+      return {unit_failure("the renderer's answer cannot be read: " + health.error().message), false};
     out.health = std::move(*health);
   }
   return {std::move(out), false};
@@ -360,12 +352,9 @@ ChildBackend::Attempt ChildBackend::judge_death(Process& process, int index) {
   const int hung = process.hung_slot;
   const bool known = hung >= 0 || process.some_slot_crashed() || process.preparing;
   const bool guilty = hung >= 0 ? hung == index : crashed || !known;
-  if (!guilty) return {failed("the renderer died of another unit"), true};
+  if (!guilty) return {unit_failure("the renderer died of another unit"), true};
   UnitFailure failure;
-  if (slot.where.x >= 0) {
-    failure.pixel = {slot.where.x, slot.where.y};
-    failure.sample = slot.where.sample;
-  }
+  note_place(slot, failure);
   failure.signal = end.signal;
   failure.reason = hung == index ? fmt::format("the renderer hung: no sample finished within {:.3g} s",
                                                seconds(options_.hang_limit))

@@ -15,7 +15,6 @@
 #include <string_view>
 
 #include "common/base/spawn.h"
-#include "worker/agent/resident.h"
 
 namespace ls::worker::child {
 namespace {
@@ -25,24 +24,6 @@ tl::unexpected<Error> system_error(const char* what, int error = errno) {
   return fail(Errc::internal,
               fmt::format("cannot start the render child: {}: {}{}", what, std::strerror(error), help));
 }
-
-// Collects the file descriptors that the child will get, in the order of their numbers in the child. The
-// first one gets the number kSharedMemoryFd.
-class TheirEnds {
- public:
-  TheirEnds() = default;
-  ~TheirEnds() {
-    for (const int fd : fds_) ::close(fd);
-  }
-  TheirEnds(const TheirEnds&) = delete;
-  TheirEnds& operator=(const TheirEnds&) = delete;
-
-  void add(int fd) { fds_.push_back(fd); }
-  const std::vector<int>& fds() const { return fds_; }
-
- private:
-  std::vector<int> fds_;
-};
 
 // True for environment variables that are passed to the child: only those that its libraries use. Others may
 // contain secrets of the agent (the join token, cloud keys), and the renderer reads untrusted files.
@@ -59,11 +40,13 @@ bool may_see(std::string_view variable) {
 
 Result<std::shared_ptr<Process>> Process::spawn(const ChildOptions& options) {
   std::shared_ptr<Process> process(new Process);
-  TheirEnds theirs;
+  // The descriptors that the child will get, in the order of their numbers in the child. The first one gets
+  // the number kSharedMemoryFd.
+  std::list<Descriptor> theirs;
   process->memory_bytes_ = sizeof(Slot) * static_cast<std::size_t>(options.slots);
   const int memory_fd = ::memfd_create("lightshaft-render", MFD_CLOEXEC);
   if (memory_fd < 0) return system_error("memfd_create");
-  theirs.add(memory_fd);
+  theirs.emplace_back(memory_fd);
   if (::ftruncate(memory_fd, static_cast<off_t>(process->memory_bytes_)) != 0)
     return system_error("shared memory");
   void* mapped = ::mmap(nullptr, process->memory_bytes_, PROT_READ | PROT_WRITE, MAP_SHARED, memory_fd, 0);
@@ -73,13 +56,13 @@ Result<std::shared_ptr<Process>> Process::spawn(const ChildOptions& options) {
     int pair[2];
     if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) != 0) return system_error("socketpair");
     (i == 0 ? process->control_ : process->slot_fds_.emplace_back()) = pair[0];
-    theirs.add(pair[1]);
+    theirs.emplace_back(pair[1]);
   }
-  if (const auto ok = process->start(options, theirs.fds()); !ok) return tl::unexpected<Error>(ok.error());
+  if (const auto ok = process->start(options, theirs); !ok) return tl::unexpected<Error>(ok.error());
   return process;
 }
 
-Result<void> Process::start(const ChildOptions& options, const std::vector<int>& theirs) {
+Result<void> Process::start(const ChildOptions& options, const std::list<Descriptor>& theirs) {
   std::error_code no_link;  // the process list should show the name behind /proc/self/exe
   const std::filesystem::path behind = std::filesystem::read_symlink(options.executable, no_link);
   Program program{.path = options.executable.string(),
@@ -87,7 +70,7 @@ Result<void> Process::start(const ChildOptions& options, const std::vector<int>&
                   .files = {kDevNull, STDOUT_FILENO, STDERR_FILENO},
                   .inherits = may_see};
   program.arguments.insert(program.arguments.end(), options.arguments.begin(), options.arguments.end());
-  program.files.insert(program.files.end(), theirs.begin(), theirs.end());
+  for (const Descriptor& end : theirs) program.files.push_back(end.fd);
   const auto pid = ls::spawn(std::move(program));
   if (!pid) return fail(Errc::internal, "cannot start the render child: " + pid.error().message);
   pid_ = *pid;
@@ -118,10 +101,8 @@ Process::End Process::end() {
   const std::lock_guard lock(reap_mutex_);
   if (end_) return *end_;
   End end;
-  int status = 0;
   if (pid_ > 0) {
-    while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
-    }
+    const int status = wait_for_end(pid_);
     if (WIFSIGNALED(status)) {
       end.signal = WTERMSIG(status);
       end.text = fmt::format("died of signal {} ({})", *end.signal, ::strsignal(*end.signal));

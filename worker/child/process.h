@@ -4,6 +4,7 @@
 #include <sys/types.h>
 
 #include <atomic>
+#include <list>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -13,6 +14,7 @@
 
 #include "common/base/clock.h"
 #include "common/base/error.h"
+#include "common/base/helper_program.h"
 #include "worker/child/child.h"
 #include "worker/child/protocol.h"
 
@@ -62,7 +64,7 @@ class Process {
  private:
   Process() = default;
   std::optional<Answer> exchange(int fd, const Request& request, const std::string& text, const Watch& watch);
-  Result<void> start(const ChildOptions& options, const std::vector<int>& theirs);
+  Result<void> start(const ChildOptions& options, const std::list<Descriptor>& theirs);
 
   pid_t pid_ = -1;
   int control_ = -1;

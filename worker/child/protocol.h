@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <type_traits>
 
 #include "common/base/error.h"
@@ -28,7 +29,7 @@ inline constexpr int kControlFd = 4;
 inline constexpr int kFirstSlotFd = 5;
 inline constexpr int kMostSlots = kMostChildThreads;
 
-// Upper limit for the bytes of one asset in the text of a job (child/job_text.h): its digest, size and name,
+// Upper limit for the bytes of one asset in the text of a job (to_text()): its digest, size and name,
 // then the digest again with the path. Escapes may double the bytes of names and paths.
 inline constexpr std::size_t kAssetTextBytes = 2 * 64 + 20 + 2 * limits::kNameBytes + 2 * PATH_MAX + 64;
 // Upper limit for the bytes of the whole text: the settings as a JSON string, all assets and the scene's
@@ -46,7 +47,7 @@ enum class Kind : std::uint32_t { hello, prepare, forget, render };
 // A request of the agent, followed by `text_bytes` bytes of text.
 struct Request {
   Kind kind{};
-  std::uint32_t text_bytes = 0;  // for `prepare`: length of the text of the job (child/job_text.h)
+  std::uint32_t text_bytes = 0;  // for `prepare`: length of the text of the job (to_text())
   std::uint64_t job = 0;         // number of the job, assigned by the agent
   std::uint32_t tile = 0, round = 0;
   PixelRect rect;
@@ -80,5 +81,9 @@ static_assert(std::atomic<std::uint64_t>::is_always_lock_free && std::atomic<boo
 using Watch = std::function<void()>;
 bool send_all(int fd, const void* data, std::size_t bytes, const Watch& watch = {});
 bool receive_all(int fd, void* data, std::size_t bytes, const Watch& watch = {});
+
+// Converts a LocalJob (a job whose files are on this machine) to the text of a `prepare` request, and back.
+std::string to_text(const LocalJob& job);
+Result<LocalJob> from_text(std::string_view text);
 
 }  // namespace ls::worker::child

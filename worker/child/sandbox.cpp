@@ -98,7 +98,7 @@ struct Decided {
   std::vector<std::uint32_t> values;
 };
 std::vector<Decided> decided() {
-  // used by raise and abort: only signals to this process itself are allowed
+  // tgkill is allowed for signals to this process itself, which raise and abort send.
   return {{SYS_tgkill, 0, true, {static_cast<std::uint32_t>(::getpid())}},
           {SYS_prlimit64, 0, true, {0}},
           {SYS_sched_setaffinity, 0, true, {0}},

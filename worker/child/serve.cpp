@@ -18,7 +18,6 @@
 #include <thread>
 #include <vector>
 
-#include "worker/child/job_text.h"
 #include "worker/child/protocol.h"
 
 namespace ls::worker::child {
@@ -126,12 +125,9 @@ class Server {
       std::shared_ptr<const LocalJob> job;
       {
         const std::lock_guard lock(mutex_);
-        const auto it = jobs_.find(request.job);
-        if (it == jobs_.end()) return {};
-        job = it->second;
-        jobs_.erase(it);
+        if (const auto node = jobs_.extract(request.job)) job = node.mapped();
       }
-      backend_.forget(job->brief.job);
+      if (job) backend_.forget(job->brief.job);
     }
     return {};
   }

@@ -3,12 +3,16 @@
 #include <fmt/format.h>
 #include <grpcpp/grpcpp.h>
 
+#include <condition_variable>
+#include <deque>
 #include <mutex>
 #include <set>
 
+#include "common/base/clock.h"
+#include "common/base/guarded.h"
 #include "common/protocol/limits.h"
 #include "proto/convert.h"
-#include "worker/client/coordinator_stream.h"
+#include "proto/farm.grpc.pb.h"
 
 namespace ls::worker {
 namespace pb = ::lightshaft::farm::v1;
@@ -19,6 +23,178 @@ namespace {
 // A longer one would delay the next attempt after a broken connection.
 constexpr int kConnectMs = 10'000;
 constexpr Duration kCloseLimit = std::chrono::seconds(2);
+
+Errc code_of(grpc::StatusCode code) {
+  switch (code) {
+    case grpc::StatusCode::INVALID_ARGUMENT:
+    case grpc::StatusCode::OUT_OF_RANGE:
+      return Errc::invalid_argument;
+    case grpc::StatusCode::NOT_FOUND:
+      return Errc::not_found;
+    case grpc::StatusCode::ALREADY_EXISTS:
+      return Errc::already_exists;
+    case grpc::StatusCode::FAILED_PRECONDITION:
+      return Errc::failed_precondition;
+    case grpc::StatusCode::RESOURCE_EXHAUSTED:
+      return Errc::resource_exhausted;
+    case grpc::StatusCode::PERMISSION_DENIED:
+      return Errc::permission_denied;
+    case grpc::StatusCode::UNAUTHENTICATED:
+      return Errc::unauthenticated;
+    // The coordinator vanished, was unreachable or shut down: the caller should try again later.
+    case grpc::StatusCode::UNAVAILABLE:
+    case grpc::StatusCode::CANCELLED:
+    case grpc::StatusCode::ABORTED:
+    case grpc::StatusCode::DEADLINE_EXCEEDED:
+      return Errc::unavailable;
+    default:
+      return Errc::internal;
+  }
+}
+
+// Converts a gRPC status to an Error: the inverse of to_status() in coordinator/rpc/streams.cpp.
+Error to_error(const grpc::Status& status) {
+  return {code_of(status.error_code()), std::string(status.error_message())};
+}
+
+// One gRPC stream to the coordinator. Messages to the coordinator are queued; the size of the agent's outbox
+// bounds the queue. Messages from the coordinator are passed to the observer. The object keeps itself alive
+// from StartCall to OnDone. The link must call close() before it releases the channel.
+class WorkCall final : public grpc::ClientBidiReactor<pb::FromWorker, pb::ToWorker> {
+ public:
+  static std::shared_ptr<WorkCall> start(pb::Farm::Stub& stub, const WorkerHello& hello,
+                                         std::shared_ptr<LinkObserver> observer);
+
+  void send(const FromWorker& message);
+  // Sends the queued messages, ends the stream, and waits until it has ended and the observer has been
+  // notified. If that takes longer than `at_most`, the stream is cancelled. Must not be called by the
+  // observer.
+  void close(Duration at_most);
+
+  void OnReadDone(bool ok) override;
+  void OnWriteDone(bool ok) override;
+  void OnDone(const grpc::Status& status) override;
+
+ private:
+  explicit WorkCall(std::shared_ptr<LinkObserver> observer) : observer_(std::move(observer)) {}
+  struct State {
+    std::deque<pb::FromWorker> queue;
+    bool writing = false, closing = false, writes_done = false, held = true, done = false;
+    std::optional<Error> broken;  // error of a message that could not be parsed
+  };
+  void pump(State& state);  // starts the next write, or ends the writes
+  void release_hold(State& state);
+
+  std::shared_ptr<LinkObserver> observer_;                     // null once the stream has ended
+  std::shared_ptr<WorkCall> self_;                             // owns this object until OnDone
+  std::optional<grpc::ClientContext> context_{std::in_place};  // nullopt once the stream has ended
+  pb::ToWorker incoming_;
+
+  Guarded<State> state_;
+  std::condition_variable_any done_changed_;
+};
+
+std::shared_ptr<WorkCall> WorkCall::start(pb::Farm::Stub& stub, const WorkerHello& hello,
+                                          std::shared_ptr<LinkObserver> observer) {
+  std::shared_ptr<WorkCall> call(new WorkCall(std::move(observer)));
+  call->self_ = call;
+  call->context_->set_wait_for_ready(false);
+  stub.async()->Work(&*call->context_, call.get());
+  call->AddHold();  // keeps the call open for writes that are started outside of gRPC's callbacks
+  call->StartRead(&call->incoming_);
+  call->send(hello);
+  call->StartCall();
+  return call;
+}
+
+void WorkCall::send(const FromWorker& message) {
+  pb::FromWorker wire = wire::to_wire(message);
+  const auto state = state_.lock();
+  if (state->closing || state->done) return;
+  state->queue.push_back(std::move(wire));
+  pump(*state);
+}
+
+void WorkCall::pump(State& state) {
+  if (state.writing || state.writes_done || !state.held) return;
+  if (!state.queue.empty()) {
+    state.writing = true;
+    StartWrite(&state.queue.front());
+  } else if (state.closing) {
+    state.writes_done = true;
+    StartWritesDone();
+    release_hold(state);
+  }
+}
+
+void WorkCall::release_hold(State& state) {
+  if (!state.held) return;
+  state.held = false;
+  RemoveHold();
+}
+
+void WorkCall::close(Duration at_most) {
+  auto state = state_.lock();
+  state->closing = true;
+  pump(*state);
+  const auto done = [&] { return state->done; };
+  if (done_changed_.wait_for(state, at_most, done)) return;
+  context_->TryCancel();
+  release_hold(*state);
+  done_changed_.wait(state, done);  // short: a cancelled call ends here, whatever the network does
+}
+
+void WorkCall::OnReadDone(bool ok) {
+  if (!ok) {
+    const auto state = state_.lock();
+    state->closing = true;
+    if (!state->writing) release_hold(*state);
+    return;
+  }
+  // A message of an unknown type, which only newer coordinators send, is ignored: they must not rely on it.
+  if (!wire::known(incoming_)) {
+    StartRead(&incoming_);
+    return;
+  }
+  auto message = wire::from_wire(incoming_);
+  if (!message) {
+    const auto state = state_.lock();
+    state->broken = message.error();
+    state->closing = true;
+    context_->TryCancel();
+    if (!state->writing) release_hold(*state);
+    return;
+  }
+  observer_->received(std::move(*message));
+  StartRead(&incoming_);
+}
+
+void WorkCall::OnWriteDone(bool ok) {
+  const auto state = state_.lock();
+  state->writing = false;
+  state->queue.pop_front();
+  if (!ok) {
+    state->queue.clear();
+    state->closing = true;
+    release_hold(*state);
+    return;
+  }
+  pump(*state);
+}
+
+void WorkCall::OnDone(const grpc::Status& status) {
+  Error why = status.ok() ? Error{Errc::unavailable, "the coordinator ended the stream"} : to_error(status);
+  if (const auto state = state_.lock(); state->broken) why = *state->broken;
+  observer_->lost(std::move(why));
+  observer_.reset();
+  const std::shared_ptr<WorkCall> self = std::move(self_);
+  const auto state = state_.lock();
+  // The context shares ownership of the channel. When the last channel of a process ends, gRPC joins its
+  // threads, and this may be one of them. So only the link may own the channel once `done` is true.
+  context_.reset();
+  state->done = true;
+  done_changed_.notify_all();
+}
 
 std::shared_ptr<grpc::ChannelCredentials> credentials(const std::optional<LinkTls>& tls) {
   if (!tls) return grpc::InsecureChannelCredentials();
@@ -83,8 +259,7 @@ class GrpcLink final : public CoordinatorLink {
     if (call) call->close(kCloseLimit);
   }
 
-  Result<void> fetch_blob(const BlobRequest& wanted,
-                          const std::function<Result<void>(std::span<const std::byte>)>& sink) override {
+  Result<void> fetch_blob(const BlobRequest& wanted, const BlobSink& sink) override {
     grpc::ClientContext context;
     {
       const std::lock_guard lock(mutex_);

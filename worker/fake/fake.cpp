@@ -45,8 +45,7 @@ class FakeBackend final : public LocalBackend {
     if (faulty) inject_fault(stop);
     const double work = options_.sample_seconds * static_cast<double>(unit.rect.pixels()) *
                         static_cast<double>(unit.samples.count());
-    if (!pause(options_.delay + from_seconds(work), stop))
-      return tl::unexpected<UnitFailure>(UnitFailure{.reason = "told to stop"});
+    if (!pause(options_.delay + from_seconds(work), stop)) return unit_failure("told to stop");
     RenderedUnit out;
     out.partial =
         fake_partial({brief.scene, brief.settings_digest, options_.numeric_class, unit.rect, unit.samples},
@@ -69,27 +68,13 @@ class FakeBackend final : public LocalBackend {
            is(f.round, unit.round);
   }
 
-  static void inject_fault_with_memory() {
-    std::vector<std::vector<char>> chunks;
-    while (true) chunks.emplace_back(kAllocationChunk, 'x');
-  }
-
+  // Injects the faults that keep a unit from being finished.
   void inject_fault(const std::atomic<bool>& stop) {
-    switch (options_.fault.kind) {
-      case FakeFault::Kind::crash:
-        ::raise(SIGSEGV);
-        break;
-      case FakeFault::Kind::memory:
-        inject_fault_with_memory();
-        break;
-      case FakeFault::Kind::hang:
-        while (!stop) ::usleep(1000);
-        break;
-      case FakeFault::Kind::wrong:
-      case FakeFault::Kind::unhealthy:
-      case FakeFault::Kind::none:
-        break;
-    }
+    const FakeFault::Kind kind = options_.fault.kind;
+    if (kind == FakeFault::Kind::crash) ::raise(SIGSEGV);
+    while (kind == FakeFault::Kind::hang && !stop) ::usleep(1000);
+    std::vector<std::vector<char>> chunks;
+    while (kind == FakeFault::Kind::memory) chunks.emplace_back(kAllocationChunk, 'x');
   }
 
   // Sleeps for `delay`. Returns false if `stop` was set meanwhile. It checks `stop` every 1 to 20 ms (a
@@ -120,19 +105,16 @@ Result<FakeFault> parse_fake_fault(std::string_view text) {
   if (text.empty()) return fault;
   std::size_t end = std::min(text.find(','), text.size());
   const std::string_view kind = text.substr(0, end);
-  if (kind == "crash")
-    fault.kind = FakeFault::Kind::crash;
-  else if (kind == "hang")
-    fault.kind = FakeFault::Kind::hang;
-  else if (kind == "memory")
-    fault.kind = FakeFault::Kind::memory;
-  else if (kind == "wrong")
-    fault.kind = FakeFault::Kind::wrong;
-  else if (kind == "unwell")
-    fault.kind = FakeFault::Kind::unhealthy;
-  else
+  constexpr std::pair<std::string_view, FakeFault::Kind> kKinds[] = {{"crash", FakeFault::Kind::crash},
+                                                                     {"hang", FakeFault::Kind::hang},
+                                                                     {"memory", FakeFault::Kind::memory},
+                                                                     {"wrong", FakeFault::Kind::wrong},
+                                                                     {"unwell", FakeFault::Kind::unhealthy}};
+  const auto known = std::ranges::find(kKinds, kind, &std::pair<std::string_view, FakeFault::Kind>::first);
+  if (known == std::end(kKinds))
     return fail(Errc::invalid_argument,
                 fmt::format("unknown fault '{}'; known: crash, hang, memory, wrong, unwell", kind));
+  fault.kind = known->second;
   while (end < text.size()) {
     const std::size_t begin = end + 1;
     end = std::min(text.find(',', begin), text.size());

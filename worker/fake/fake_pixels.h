@@ -66,7 +66,7 @@ inline std::array<double, 3> fake_sample(std::uint64_t pixel_seed, int x, int y,
   return rgb;
 }
 
-// Returns the round that contains a sample.
+// Returns the round that contains a sample; common/image/frame/rounds.h defines the rounds.
 inline RoundIndex fake_round(std::uint64_t sample) {
   if (sample < 2) return 0;
   if (sample < 64) return static_cast<RoundIndex>(std::bit_width(sample) - 1);

@@ -16,7 +16,7 @@
 
 namespace ls::worker {
 
-// Blobs straight from the coordinator, no disk.
+// Fetches blobs from the coordinator and discards their bytes: the fake renderer opens no file.
 class FetchedFiles final : public BlobFiles {
  public:
   explicit FetchedFiles(CoordinatorLink& link) : link_(link) {}

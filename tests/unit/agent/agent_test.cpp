@@ -51,7 +51,7 @@ TEST_F(AgentTest, SendsUnacknowledgedResultsAgainAfterAReconnectAndShowsItsOldId
 }
 
 TEST_F(AgentTest, KeepsRenderingWhileDisconnectedUntilTheOutboxIsFull) {
-  const std::size_t one = 6 * 4 * 64;  // a result counts at least its floats
+  const std::size_t one = 6 * 4 * 64;  // least size of a result: the bytes of its floats
   coordinator_.acknowledge_results(false);
   start({.outbox_bytes = 3 * one});
 
@@ -59,7 +59,7 @@ TEST_F(AgentTest, KeepsRenderingWhileDisconnectedUntilTheOutboxIsFull) {
   coordinator_.wait_for([](auto& c) { return c.results.size() >= 2; });
   wait_while_time_passes([](auto& c) { return c.progress.size() >= 5; });
 
-  // Three fill the outbox at the latest; a fourth may have been begun before.
+  // The third result fills the outbox at the latest; a fourth unit may have been begun before that.
   agent_->stop();
   join();
   EXPECT_LE(coordinator_.results.size(), 4U);
@@ -93,7 +93,7 @@ TEST_F(AgentTest, EndsWhenItHasHadNoWorkForItsIdleLimit) {
   coordinator_.tell(assign("l-1", "j-1", {0, 1}));
   coordinator_.wait_for([](auto& c) { return c.results.size() == 2; });
 
-  // 118 s since the start are 59 s since the work: a lease is still taken.
+  // The start was 118 s ago, but the last work only 59 s: the agent still takes a lease.
   pass(std::chrono::seconds(59));
   coordinator_.tell(assign("l-2", "j-1", {2}));
   coordinator_.wait_for([](auto& c) { return c.results.size() == 3; });

@@ -5,6 +5,7 @@
 #include <new>
 
 #include "tests/unit/agent/agent_rig.h"
+#include "worker/agent/agent_impl.h"
 
 namespace ls::worker {
 namespace {
@@ -36,13 +37,13 @@ TEST_F(AgentInTrouble, DoesNotAskAFullDiskAgainAtOnce) {
   coordinator_.wait_for([](auto& c) { return c.returned.size() == 1; });
   coordinator_.tell(assign("l-2", "j-1", {0}));
   coordinator_.tell(assign("l-3", "j-2", {0}, 2));
-  coordinator_.wait_for([](auto& c) { return c.returned.size() == 2; });  // of the other job
+  coordinator_.wait_for([](auto& c) { return c.returned.size() == 2; });  // the second is of the other job
 
   EXPECT_EQ(coordinator_.returned[1].lease, LeaseId{"l-3"});
   EXPECT_EQ(coordinator_.fetches, 2);
 }
 
-// A backend that runs out of memory wherever it is told to.
+// A backend that runs out of memory while it loads a scene or, if not `at_loading`, while it renders.
 class Exhausted final : public RenderBackend {
  public:
   explicit Exhausted(bool at_loading) : at_loading_(at_loading) {}
@@ -76,7 +77,7 @@ TEST_F(AgentInTrouble, ReportsAUnitWhoseBackendRanOutOfMemoryAndLivesOn) {
   }
 }
 
-// A backend that finds itself unable to go on at its second unit.
+// A backend that renders tile 0 and reports itself as broken at any other tile.
 class Broken final : public RenderBackend {
  public:
   Digest numeric_class() const override { return fake_->numeric_class(); }
@@ -109,6 +110,18 @@ TEST_F(AgentInTrouble, EndsWithABrokenBackendsErrorAfterGivingUnitsBackUnharmed)
   std::size_t returned = 0;
   for (const LeaseReturned& r : coordinator_.returned) returned += r.unrendered.size();
   EXPECT_EQ(returned, 9U);
+}
+
+TEST(Backoff, DoublesUpToItsLimitWithinItsJitterAndStartsAgain) {
+  Backoff backoff(std::chrono::milliseconds(100), std::chrono::seconds(1), 42);
+  for (const int whole_ms : {100, 200, 400, 800, 1000, 1000}) {
+    const Duration pause = backoff.next();
+    EXPECT_LE(pause, std::chrono::milliseconds(whole_ms));
+    EXPECT_GE(pause, std::chrono::milliseconds(whole_ms) / 2);
+  }
+  for (int i = 0; i < 100; ++i) EXPECT_LE(backoff.next(), std::chrono::seconds(1));
+  backoff.reset();
+  EXPECT_LE(backoff.next(), std::chrono::milliseconds(100));
 }
 
 }  // namespace

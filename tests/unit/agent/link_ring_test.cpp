@@ -15,10 +15,7 @@ struct FakeLink final : CoordinatorLink {
   }
   void send(FromWorker) override { ++sent; }
   void close() override { ++closed; }
-  Result<void> fetch_blob(const BlobRequest&,
-                          const std::function<Result<void>(std::span<const std::byte>)>&) override {
-    return {};
-  }
+  Result<void> fetch_blob(const BlobRequest&, const BlobSink&) override { return {}; }
 };
 
 struct FakeAgent final : LinkObserver {

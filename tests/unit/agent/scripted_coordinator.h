@@ -1,5 +1,5 @@
-// A coordinator in this process for tests of the agent: keeps what the worker said, answers as told. No
-// clock, no sockets.
+// A coordinator in this process for tests of the agent. It records the worker's messages and answers as the
+// test has set. It has no clock and no sockets.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ namespace ls::worker {
 
 class ScriptedCoordinator final : public CoordinatorLink {
  public:
-  // ---- what it does; set before or while the agent runs ----
+  // The coordinator's behaviour: may be set before or while the agent runs.
   void acknowledge_results(bool on) {
     change([&] { acknowledge_ = on; });
   }
@@ -45,14 +45,13 @@ class ScriptedCoordinator final : public CoordinatorLink {
     if (gone) gone->lost({Errc::unavailable, "cut"});
   }
 
-  // ---- what it saw ----
-  // Waits for a condition on what was received; fails the test if it does not come true.
+  // Waits for a condition on what the coordinator has received; fails the test if it does not come true.
   template <class Condition>
   void wait_for(Condition condition) {
     std::unique_lock lock(mutex_);
     ASSERT_TRUE(changed_.wait_for(lock, kPatience, [&] { return condition(*this); }));
   }
-  // The same while `drive` (which moves a fake clock) is called again and again.
+  // The same; meanwhile calls `drive`, which advances a fake clock, again and again.
   template <class Condition, class Drive>
   void wait_for(Condition condition, Drive drive) {
     const auto deadline = std::chrono::steady_clock::now() + kPatience;
@@ -73,7 +72,7 @@ class ScriptedCoordinator final : public CoordinatorLink {
   int draining = 0;
   int fetches = 0;
 
-  // ---- CoordinatorLink ----
+  // CoordinatorLink.
   Result<void> connect(const WorkerHello& hello, std::shared_ptr<LinkObserver> observer) override {
     ToWorker greeting;
     {
@@ -110,8 +109,7 @@ class ScriptedCoordinator final : public CoordinatorLink {
   void close() override {
     change([&] { observer_.reset(); });
   }
-  Result<void> fetch_blob(const BlobRequest& wanted,
-                          const std::function<Result<void>(std::span<const std::byte>)>& sink) override {
+  Result<void> fetch_blob(const BlobRequest& wanted, const BlobSink& sink) override {
     std::string text;
     {
       const std::lock_guard lock(mutex_);

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "tests/unit/bsdf/materials.h"
-#include "validation/fixtures/closed_forms.h"
+#include "validation/fixtures/fixtures.h"
 #include "worker/render/bsdf/fresnel.h"
 
 namespace ls::render::test {

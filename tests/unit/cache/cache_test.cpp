@@ -22,22 +22,22 @@ std::string content(const fs::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// A coordinator's blobs, in small pieces; counts what it was asked.
+// Serves blobs like a coordinator, in small pieces, and records the requests.
 struct Source {
   std::map<Digest, std::string> blobs;
   std::vector<std::uint64_t> offsets;      // of each fetch
-  std::vector<bool> complaints;            // whether it said that the last one had brought other bytes
-  std::optional<std::uint64_t> cut_after;  // bytes, once
-  std::optional<std::string> lie;          // sent instead, once
-  bool damaged = false;                    // other bytes every time
-  std::function<void()> meanwhile;         // before the first byte, once
+  std::vector<bool> complaints;            // arrived_wrong of each fetch
+  std::optional<std::uint64_t> cut_after;  // the next transfer ends after this many bytes
+  std::optional<std::string> lie;          // the next fetch sends this instead of the blob
+  bool damaged = false;                    // every fetch sends wrong bytes
+  std::function<void()> meanwhile;         // called once, before the first byte of the next fetch
 
   BlobRef add(const std::string& text) {
     const Digest digest = sha256(std::string_view(text));
     blobs[digest] = text;
     return {digest, text.size(), "blob"};
   }
-  Result<void> fetch(const BlobRequest& wanted, const BlobCache::Sink& sink) {
+  Result<void> fetch(const BlobRequest& wanted, const BlobSink& sink) {
     const auto& [digest, offset, arrived_wrong] = wanted;
     offsets.push_back(offset);
     complaints.push_back(arrived_wrong);
@@ -65,10 +65,9 @@ class Cache : public testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
   std::unique_ptr<BlobCache> open(std::uint64_t limit = 0) {
-    auto cache =
-        BlobCache::open(folder_, limit, [this](const BlobRequest& wanted, const BlobCache::Sink& sink) {
-          return source_.fetch(wanted, sink);
-        });
+    auto cache = BlobCache::open(folder_, limit, [this](const BlobRequest& wanted, const BlobSink& sink) {
+      return source_.fetch(wanted, sink);
+    });
     return std::move(cache.value());
   }
   Source source_;
@@ -222,7 +221,7 @@ TEST_F(Cache, KeepsAGoodFileThatItCannotRead) {
   const BlobRef blob = source_.add("a grid");
   const fs::path path = open()->acquire(blob).value()->path();
   fs::remove(path);
-  fs::create_directory(path);  // opens, but reading it is an error
+  fs::create_directory(path);  // can be opened, but not read
 
   const auto file = open()->acquire(blob);
 
@@ -235,7 +234,7 @@ TEST_F(Cache, KeepsAGoodFileThatItCannotRead) {
 TEST_F(Cache, SaysWhyAFetchedFileCannotBeOpened) {
   const BlobRef blob = source_.add("a grid");
   const fs::path inner = folder_ / blob.digest.hex().substr(0, 2);
-  source_.meanwhile = [&] {  // the place is a link to itself: opening it fails for good
+  source_.meanwhile = [&] {  // makes the blob's path a link to itself, so it can never be opened
     fs::create_directory(inner);
     fs::create_symlink(blob.digest.hex(), inner / blob.digest.hex());
   };

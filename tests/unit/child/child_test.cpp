@@ -1,4 +1,5 @@
-// The render child: this very test binary, started again with other arguments (see main below).
+// Tests of the backend with a render child. The child is this test program, started with other arguments (see
+// main below).
 #include "worker/child/child.h"
 
 #include <fmt/format.h>
@@ -172,7 +173,8 @@ TEST(Child, ReplacesARendererThatHangsWhenItFreesAScene) {
   EXPECT_TRUE(child->prepare(job_with_seed(4)));
 }
 
-// A coordinator whose data were replaced gives an id again, and a unit of the old job is under way.
+// A coordinator whose data were replaced assigns a job's id to another job while a unit of the old one is
+// being rendered.
 TEST(Child, RendersTheNewOfTwoJobsOfOneIdAfterAUnitOfTheOldOneCameBetween) {
   const auto child = backend("");
   const LocalJob old = job_with_seed(3);
@@ -187,7 +189,8 @@ TEST(Child, RendersTheNewOfTwoJobsOfOneIdAfterAUnitOfTheOldOneCameBetween) {
   expect_right_pixels(child->render(other, unit(0), kGoOn), 4, 0);
 }
 
-// Its fault is not another's: jobs that are ready are rendered meanwhile, and afterwards.
+// A scene that takes too long to build does not affect other jobs: those that are ready are rendered
+// meanwhile and afterwards.
 TEST(Child, RendersOtherJobsWhileAWorldIsBuiltWithoutEnd) {
   ChildOptions options{.arguments = {"--render-child", "1", "odd,builds"},
                        .prepare_limit = std::chrono::milliseconds(500)};
@@ -236,7 +239,7 @@ TEST(Child, SaysThatThereAreTooFewFileDescriptors) {
   EXPECT_THAT(made.error().message, HasSubstr("ulimit -n"));
 }
 
-// The class of the child is the content of this file.
+// The child's numeric class is the SHA-256 of the content of `file_`.
 class ChildOfAFile : public testing::Test {
  protected:
   ChildOfAFile() { std::ofstream(file_) << "one"; }
@@ -268,7 +271,7 @@ TEST_F(ChildOfAFile, IsBrokenWhenNewChildrenEndBeforeTheyAreReadyAgainAndAgain) 
   EXPECT_THAT(child->broken()->message, HasSubstr("ended with exit code 3 before it was ready"));
 }
 
-// As where there is not enough address space for a moment.
+// The new child fails as if there were not enough address space for a moment.
 TEST_F(ChildOfAFile, StartsAnotherAfterANewChildThatEndsBeforeItIsReady) {
   const auto child = backend("later," + file_.string());
   for (int i = 0; i < 10; ++i) {
@@ -280,7 +283,7 @@ TEST_F(ChildOfAFile, StartsAnotherAfterANewChildThatEndsBeforeItIsReady) {
   EXPECT_FALSE(child->broken());
 }
 
-// Builds the world of seed 4 without end.
+// A fake renderer that never finishes building the world of the job with seed 4.
 class Builder final : public LocalBackend {
  public:
   Digest numeric_class() const override { return fake_->numeric_class(); }
@@ -300,7 +303,7 @@ class Builder final : public LocalBackend {
   const std::unique_ptr<LocalBackend> fake_ = make_fake_backend({});
 };
 
-// Children that no renderer would be.
+// Children that behave as no renderer would: they answer half a reply, close a channel, or never answer.
 int serve_oddly(const std::string& kind) {
   using namespace child;
   if (kind == "builds") {
@@ -333,7 +336,8 @@ int serve_oddly(const std::string& kind) {
 int serve_as_told(int slots, const std::string& how) {
   if (how.starts_with("odd,")) return serve_oddly(how.substr(4));
   FakeOptions options;
-  const bool later = how.starts_with("later,");  // ends, but lets the next one live
+  // A child that finds no file creates it and ends; the next one serves.
+  const bool later = how.starts_with("later,");
   if (later || how.starts_with("class,")) {
     std::ifstream in(how.substr(6));
     std::string text;

@@ -1,4 +1,4 @@
-// What a renderer can still do once it is shut in. Each try is made in a process of its own.
+// What a process in the sandbox can still do. Each attempt is made in a new process.
 #include "worker/child/sandbox.h"
 
 #include <fcntl.h>
@@ -43,7 +43,8 @@ class Cage : public testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(root_); }
 
-  // 0 if `attempt` gave 0 in a caged process, else the errno that it left.
+  // Returns 0 if `attempt` returned 0 in a sandboxed process, otherwise its errno; kNotSandboxed if the
+  // sandbox lacks `needs`.
   int try_sandboxed(const std::function<int()>& attempt, bool Sandboxed::*needs) const {
     const pid_t pid = ::fork();
     if (pid == 0) {
@@ -62,12 +63,13 @@ class Cage : public testing::Test {
   std::filesystem::path root_;
 };
 
-// Which version of Landlock the kernel has; less than 1: none.
+// Returns the version of the kernel's Landlock; less than 1: it has none.
 [[maybe_unused]] long landlock() {
   return ::syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
 }
 
-// What is left out without a reason is a failure.
+// Returns the reason for which the sandbox may lack `needs` here; empty: there is none, and the test must
+// fail.
 std::string why_uncaged(bool Sandboxed::*needs) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   (void)needs;
@@ -114,7 +116,7 @@ TEST_F(Cage, MovesAndLinksNothing) {
   const int moved = try_sandboxed([&] { return ::rename(asset.c_str(), beside.c_str()); }, &Sandboxed::files);
   SKIP_UNCAGED(moved, &Sandboxed::files);
   EXPECT_EQ(moved, EACCES);
-  // Into another folder: as if it were another disk, where the kernel does not know better.
+  // Older kernels answer moves and links between folders as if the folders were on different disks (EXDEV).
   EXPECT_THAT(try_sandboxed([&] { return ::rename(asset.c_str(), out.c_str()); }, &Sandboxed::files),
               testing::AnyOf(EACCES, EXDEV));
   EXPECT_THAT(try_sandboxed([&] { return ::link(asset.c_str(), out.c_str()); }, &Sandboxed::files),
@@ -157,7 +159,7 @@ TEST_F(Cage, SignalsNobodyButItself) {
   EXPECT_TRUE(denied([] { return ::syscall(SYS_tgkill, ::getppid(), ::getppid(), 0); }));
   EXPECT_TRUE(denied([&] { return ::syscall(SYS_rt_sigqueueinfo, ::getppid(), SIGTERM, &info); }));
   EXPECT_TRUE(denied([] { return ::syscall(SYS_pidfd_open, ::getppid(), 0); }));
-  // By way of the kernel, when a pipe becomes ready.
+  // Signals that the kernel would send for this process when a pipe becomes ready.
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
   EXPECT_TRUE(denied([&] { return ::fcntl(ends[0], F_SETOWN, ::getppid()); }));

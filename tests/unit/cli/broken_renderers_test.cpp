@@ -1,7 +1,7 @@
-// The table of `lightshaft validate` is asked of broken renderers: every case must fail for one that renders
-// black and for one that renders everything twice as bright. Cases that cannot see one of them are listed
-// here, each with a case that stands in for it. Renderers that drop a single term: tests/mutation,
-// docs/design/validation.md.
+// Judges simulated broken renderers by the cases of `lightshaft validate`: every case must fail for a
+// renderer whose image is black and for one whose image is twice as bright. Cases that pass for one of these
+// are listed here, each with a partner, a case that fails for it. Renderers that lack a single term are
+// tested by tests/mutation (docs/design/validation.md).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,8 +15,8 @@ namespace {
 
 struct Blind {
   const char *ids, *why;
-  bool black, twice;    // the renderers that the case passes
-  const char* partner;  // what fails for them on the same code path; null where nothing is rendered
+  bool black, twice;    // true if the case passes for the black renderer, for the one that is twice as bright
+  const char* partner;  // a case on the same code path that fails for them; null: nothing is rendered
 };
 
 constexpr const char *kNoPicture = "the scene is refused, or its inputs are counted: nothing is rendered",
@@ -114,7 +114,7 @@ TEST(BrokenRenderers, ArePassedByCasesThatHaveAPartnerWhichFails) {
     }
 }
 
-// The same judgement passes figures that are right: it is not that everything fails.
+// The same judgement passes right figures: it does not fail everything.
 TEST(BrokenRenderers, AreToldFromARightOneByTheSameFigures) {
   const Table table = all_cases();
   std::size_t measured = 0;

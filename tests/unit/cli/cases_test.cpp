@@ -1,4 +1,5 @@
-// How the table's cases are judged: a renderer that is off by the band fails, and so do too few samples.
+// How the cases of `lightshaft validate` are judged: a renderer that is off by the band fails, and so do too
+// few samples.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -7,8 +8,7 @@
 #include <set>
 
 #include "validation/fixtures/checks.h"
-#include "validation/fixtures/closed_forms.h"
-#include "validation/fixtures/configurations.h"
+#include "validation/fixtures/fixtures.h"
 #include "validation/measure/hypothesis_tests.h"
 #include "validation/run.h"
 
@@ -59,7 +59,7 @@ TEST(Equivalence, HasALevelOfItsOwnForTheBand) {
     judge_equivalence(c, 1e6, 0, 1e-9, 40);
     return c;
   };
-  // 1e-6: +- 4.89 standard errors; .01: +- 2.58.
+  // An interval at level 1e-6 is +- 4.89 standard errors, one at .01 is +- 2.58.
   EXPECT_TRUE(judged_at(0, 1e-6, .01).passed());
   EXPECT_TRUE(judged_at(0, .01, 1e-6).too_wide);
   EXPECT_TRUE(judged_at(.0016, 1e-6, .01).too_wide);
@@ -72,7 +72,7 @@ TEST(Equivalence, QuantilesAreThoseOfTheTables) {
   EXPECT_NEAR(cli::student_quantile(.01, 1e9), 2.575829, 1e-5);
 }
 
-// White light through half a mean free path.
+// One case: a white environment seen through half a mean free path.
 Table one_case(double expected, double band) {
   Table t;
   t.mean("one", "N0", "",
@@ -116,7 +116,7 @@ TEST(Cases, ASceneThatIsRefusedFails) {
   EXPECT_NE(line.why.find("extinction"), std::string::npos) << line.why;
 }
 
-// Pruning may take out just what a case is about: then it would pass whatever the renderer does.
+// If pruning removes the medium that a case is about, the case would pass whatever the renderer does.
 TEST(Cases, AskNothingWhereTheirMediumIsLeftOut) {
   const auto nothing = [](bool grid) {
     SceneBuilder builder;
@@ -163,7 +163,8 @@ TEST(Cases, SayWhyTheirBandIsWiderThanOthers) {
     EXPECT_EQ(c.options.band > kBand, !c.options.why_band.empty()) << c.id << ": " << c.options.band;
 }
 
-// Eight digits of the fluence of a point, by quadrature of its Fourier transform: a way of its own.
+// The expected values, with eight digits, are from an independent method: quadrature of the Fourier
+// transform.
 TEST(EndlessMedium, FluenceOfAPointIsThatOfItsFourierTransform) {
   constexpr double kRadii[] = {.25, 1, 2, 5};
   const std::map<double, std::array<double, 4>> known = {
@@ -174,13 +175,13 @@ TEST(EndlessMedium, FluenceOfAPointIsThatOfItsFourierTransform) {
       {.99, {1.8031446, .22019457, .084976895, .019841736}},
       {.999, {1.8404525, .24795726, .10858551, .036265014}}};
   for (const auto& [c, phi] : known)
-    for (std::size_t i = 0; i < 4; ++i)  // digits given: half of the last of eight is 5e-8 at most
+    for (std::size_t i = 0; i < 4; ++i)  // half a unit of the eighth digit is at most 5e-8
       EXPECT_NEAR(endless_fluence(c, kRadii[i], 0), phi[i], 6e-8 * phi[i]) << c << ' ' << kRadii[i];
 }
 
-// Over a ball: the mean of points' fluence, here along the ball's shells (midpoints; the angle in closed form
-// would be what is tested). 40 x 40 midpoints of a function that curves by about 1 per unit of each: off by
-// h^2 = 6e-4 of it.
+// The fluence of a ball is the mean of the fluence of its points, here by the midpoint rule over radius and
+// angle (the code under test has the angle's integral in closed form). With 40 x 40 midpoints and second
+// derivatives of about 1, the rule is off by a share of h^2 = 6e-4.
 TEST(EndlessMedium, FluenceOfABallIsTheMeanOfItsPoints) {
   constexpr double kRadius = .5, kDistance = 1, kAlbedo = .8;
   constexpr int kSteps = 40;

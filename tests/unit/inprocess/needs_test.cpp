@@ -1,4 +1,5 @@
-// A worker whose idea of what a scene needs differs from the coordinator's renders nothing of it.
+// A worker that derives other needs of a scene (features and files) than the coordinator refuses to render
+// it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

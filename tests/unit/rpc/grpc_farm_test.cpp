@@ -28,7 +28,7 @@ class GrpcWorker {
              const std::string& token = kToken)
       : link_(worker::make_grpc_link(address, token)) {
     auto files = worker::BlobCache::open(
-        cache, 0, [this](const worker::BlobRequest& wanted, const worker::BlobCache::Sink& sink) {
+        cache, 0, [this](const worker::BlobRequest& wanted, const worker::BlobSink& sink) {
           return link_->fetch_blob(wanted, sink);
         });
     EXPECT_TRUE(files) << (files ? "" : files.error().message);

@@ -1,4 +1,4 @@
-#include "worker/agent/held_leases.h"
+#include "worker/agent/held_work.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -103,6 +103,63 @@ TEST(HeldLeases, ReturnsWhatWaitsAndKeepsWhatRuns) {
   EXPECT_THAT(table.return_waiting(), testing::ElementsAre(LeaseReturned{LeaseId{"b"}, {{kOther, 2, 0}}}));
   EXPECT_EQ(table.finish(key(0)), LeaseId{"a"});
   EXPECT_EQ(table.lease_count(), 0U);
+}
+
+UnitResult result(TileIndex tile) {
+  UnitResult r;
+  r.unit = {JobId{"j"}, tile, 0};
+  r.exr.resize(100);
+  return r;
+}
+UnitFailure failure(TileIndex tile) {
+  UnitFailure f;
+  f.unit = {JobId{"j"}, tile, 0};
+  return f;
+}
+
+TEST(Outbox, SendsEachOnceUntilTheConnectionIsLost) {
+  Outbox outbox;
+  outbox.add(result(0));
+
+  EXPECT_EQ(outbox.take_unsent().size(), 1U);
+  EXPECT_EQ(outbox.take_unsent().size(), 0U);
+  outbox.connection_lost();
+  outbox.add(result(1));
+  EXPECT_THAT(outbox.take_unsent(), testing::ElementsAre(FromWorker{result(0)}, FromWorker{result(1)}));
+}
+
+TEST(Outbox, ForgetsWhatIsAcknowledgedAndItsBytes) {
+  Outbox outbox;
+  outbox.add(result(0));
+  outbox.take_unsent();
+
+  EXPECT_TRUE(outbox.acknowledge({JobId{"j"}, 0, 0}));
+  EXPECT_FALSE(outbox.acknowledge({JobId{"j"}, 0, 0}));
+  EXPECT_TRUE(outbox.empty());
+  EXPECT_EQ(outbox.bytes(), 0U);
+}
+
+TEST(Outbox, AcknowledgesTheFailureBeforeTheResultOfTheSecondTry) {
+  Outbox outbox;
+  outbox.add(failure(0));
+  outbox.take_unsent();
+  outbox.add(result(0));
+
+  outbox.acknowledge({JobId{"j"}, 0, 0});
+
+  EXPECT_TRUE(outbox.has_result({JobId{"j"}, 0, 0}));
+  EXPECT_THAT(outbox.take_unsent(), testing::ElementsAre(FromWorker{result(0)}));
+}
+
+TEST(Outbox, DropsAJobWithItsBytes) {
+  Outbox outbox;
+  outbox.add(result(0));
+  outbox.add(failure(1));
+
+  outbox.drop_job(JobId{"j"});
+
+  EXPECT_EQ(outbox.bytes(), 0U);
+  EXPECT_TRUE(outbox.take_unsent().empty());
 }
 
 }  // namespace

@@ -1,8 +1,12 @@
-#include "worker/agent/held_leases.h"
+#include "worker/agent/held_work.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace ls::worker {
+namespace {
+constexpr std::size_t kEntryOverhead = 256;  // approximate memory of an entry besides its bytes
+}  // namespace
 
 void HeldLeases::add(const Lease& lease, const std::function<bool(const UnitKey&)>& handed_in,
                      const std::optional<trace::SpanContext>& trace, std::int64_t unix_ns) {
@@ -97,8 +101,8 @@ const HeldLeases::Held* HeldLeases::find(const UnitKey& key) const {
 }
 
 bool HeldLeases::is_running(const UnitKey& key) const {
-  const auto it = units_.find(key);
-  return it != units_.end() && it->second.held.state == State::running;
+  const Held* held = find(key);
+  return held && held->state == State::running;
 }
 
 bool HeldLeases::holds(const JobId& job) const {
@@ -143,6 +147,52 @@ void HeldLeases::drop_if(const std::function<bool(const Held&)>& goes) {
     leave(entry.held.lease, false);
     it = units_.erase(it);
   }
+}
+
+void Outbox::add(UnitResult result) {
+  const std::size_t bytes = result.exr.size() + kEntryOverhead;
+  entries_.push_back({result.unit, std::move(result), bytes});
+  bytes_ += bytes;
+}
+
+void Outbox::add(UnitFailure failure) {
+  const std::size_t bytes = failure.reason.size() + kEntryOverhead;
+  entries_.push_back({failure.unit, std::move(failure), bytes});
+  bytes_ += bytes;
+}
+
+bool Outbox::acknowledge(const UnitKey& unit) {
+  const auto it = std::find_if(entries_.begin(), entries_.end(),
+                               [&](const Entry& e) { return e.sent && e.unit == unit; });
+  if (it == entries_.end()) return false;
+  bytes_ -= it->bytes;
+  entries_.erase(it);
+  return true;
+}
+
+void Outbox::drop_job(const JobId& job) {
+  std::erase_if(entries_, [&](const Entry& entry) {
+    if (entry.unit.job != job) return false;
+    bytes_ -= entry.bytes;
+    return true;
+  });
+}
+
+std::vector<FromWorker> Outbox::take_unsent() {
+  std::vector<FromWorker> out;
+  for (Entry& entry : entries_)
+    if (!std::exchange(entry.sent, true)) out.push_back(entry.message);
+  return out;
+}
+
+void Outbox::connection_lost() {
+  for (Entry& entry : entries_) entry.sent = false;
+}
+
+bool Outbox::has_result(const UnitKey& unit) const {
+  return std::any_of(entries_.begin(), entries_.end(), [&](const Entry& e) {
+    return e.unit == unit && std::holds_alternative<UnitResult>(e.message);
+  });
 }
 
 }  // namespace ls::worker

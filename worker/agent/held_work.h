@@ -1,19 +1,20 @@
-// The leases by which the coordinator has assigned work to this worker, in order of arrival, and their units.
-// A unit is one tile and one round (range of samples) to render. The class has no locks and no clock. A unit
-// is held only once: if a later lease contains it again, it belongs to that lease from then on.
+// The work that a worker holds: units of leases, and results on their way to the coordinator. A unit is one
+// tile and one round (range of samples) to render. The classes have no locks and no clock.
 #pragma once
 
 #include <cstdint>
 #include <functional>
+#include <list>
 #include <map>
 #include <optional>
-#include <set>
 #include <vector>
 
 #include "common/protocol/messages.h"
 
 namespace ls::worker {
 
+// The leases by which the coordinator has assigned work to this worker, in order of arrival, and their units.
+// A unit is held only once: if a later lease contains it again, it belongs to that lease from then on.
 class HeldLeases {
  public:
   enum class State {
@@ -82,6 +83,36 @@ class HeldLeases {
   std::map<LeaseId, LeaseState> leases_;  // leases with units that are not finished yet
   std::uint64_t next_order_ = 0;
   std::size_t running_ = 0;
+};
+
+// Results and failures of units that the coordinator has not acknowledged, oldest first. After a reconnect
+// all of them are sent again.
+class Outbox {
+ public:
+  void add(UnitResult result);
+  void add(UnitFailure failure);
+  // Removes the oldest entry of this unit that was sent. False: there is no such entry.
+  bool acknowledge(const UnitKey& unit);
+  void drop_job(const JobId& job);
+
+  // Returns the entries not yet sent on this connection and marks them as sent.
+  std::vector<FromWorker> take_unsent();
+  void connection_lost();  // marks all entries as not sent
+
+  bool has_result(const UnitKey& unit) const;
+  std::size_t bytes() const { return bytes_; }
+  std::size_t size() const { return entries_.size(); }
+  bool empty() const { return entries_.empty(); }
+
+ private:
+  struct Entry {
+    UnitKey unit;
+    FromWorker message;
+    std::size_t bytes = 0;
+    bool sent = false;
+  };
+  std::list<Entry> entries_;
+  std::size_t bytes_ = 0;
 };
 
 }  // namespace ls::worker
