@@ -18,8 +18,9 @@ struct Features {
   bool passing = false;
   // The radiance of each sample is split into the components of the light AOVs (light_components.h).
   bool split = false;
-  // Light is sampled at several points of the camera's segments through media (camera_segment_nee.h), or the
-  // sampling of directions and flights prefers the neighbourhood of lamps (lamp_directions.h, lamp_flight.h).
+  // The path tracer samples light at several points of each camera ray's segment in a medium
+  // (camera_segment_nee.h), or directions and flights that pass close to lamps, that is, lights without
+  // extent (lamp_directions.h, lamp_flight.h).
   bool aimed = false;
   // Vertices of paths are connected to points that a directional emitter lights (light_vertices.h).
   bool connected = false;

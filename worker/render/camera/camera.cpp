@@ -61,8 +61,8 @@ CameraRay Camera::ray(double fx, double fy, V2 lens) const {
   return lens_ray(x, y, textures_ ? aperture_at(fx * per_pixel_x_, fy * per_pixel_y_) : aperture_, lens);
 }
 
-// Returns the aperture for the film position (u, v): the sensor's aperture times the mean of the aperture
-// map's channels there, clamped to [0, 1].
+// Returns the radius of the aperture for the film position (u, v): the radius that the sensor gives, times
+// the value of the aperture map there (the mean of its channels, clamped to [0, 1]).
 float Camera::aperture_at(double u, double v) const {
   const V2 uv(static_cast<float>(std::clamp(u, 0., 1.)), static_cast<float>(std::clamp(v, 0., 1.)));
   return aperture_ * std::clamp(mean_component(textures_->eval(aperture_scale_, uv)), 0.f, 1.f);

@@ -67,7 +67,7 @@ class EquiAngular {
   // Nothing is cut off if the line passes the pivot so closely that the direction of the foot is lost in
   // rounding.
   void keep_lit(const Pivot& pivot, const V3& off) {
-    constexpr float kCloseness = 1e-5f, kRightAngle = 1.57079f;  // above all angles: atan(1 / kCloseness)
+    constexpr float kCloseness = 1e-5f, kRightAngle = 1.57079f;  // > atan(1 / kCloseness), the largest angle
     const float size = std::max(std::abs(a_), std::abs(b_)), r = std::sqrt(dot(off, off));
     if (!(r > kCloseness * size)) return;
     limited_ = true;

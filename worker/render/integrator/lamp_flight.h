@@ -16,11 +16,11 @@ namespace ls::render {
 // The share of flights whose distance is sampled about a lamp.
 inline constexpr float kLampFlightShare = .1f;
 
-// Samples a flight from o along d, of length t_max at most (finite). bits[0] gives the exponential distance,
-// u(1) chooses the distribution, and u(2) gives the distance sampled about a lamp. There must be at least one
-// lamp. `hero` is the colour channel that decides distances (medium.h). Weights and densities have the same
-// meaning as in free_flight(). The density of a distance is the mixture's, so the weights follow the balance
-// heuristic.
+// Samples a flight from o along d that ends at t_max at the latest; t_max must be finite. `hero` is the
+// colour channel that decides distances (medium.h). There must be at least one lamp. The random number u(1)
+// of `numbers` decides whether the distance is exponential, given by bits[0], or sampled about a lamp, given
+// by u(2). The weight and the densities of the result mean the same as those of free_flight(). The density of
+// a distance is that of the mixture, so the weights follow the balance heuristic.
 inline Flight fly_past_lamps(const Medium& medium, int hero, const Group& numbers, const V3& o, const V3& d,
                              float t_max, const Lamps& lamps) {
   const auto about = [&](std::size_t i) { return EquiAngular(o, d, t_max, lamps.position[i]); };

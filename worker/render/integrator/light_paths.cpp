@@ -29,34 +29,37 @@ constexpr std::uint64_t kPortalPaths = 1 << 14;
 constexpr std::uint64_t kLearningPathsPerPixel = 16;
 // Paths are traced in batches of this many, on several threads.
 constexpr std::uint64_t kLearningBatch = 1 << 10;
-// Learning stops after this many batches if they show that connections or portals do not pay (light_paths.h).
+// After this many batches learning stops if they show that the technique (connections or portals) does not
+// pay (light_paths.h).
 constexpr std::uint64_t kFirstBatches = 4;
-// Portals are tried if at most the share kLeftThatPays of the directions that BSDFs and phase functions
-// sample leads to the sky. Portals pay if the noise of some pixels is more than kPortalGainThatPays times as
-// high without portals as with them. In a scene in which next-event estimation had no light to sample before,
-// portals add shadow rays, so the factor there is kShadowGainThatPays.
+// Portals are tried if, of all directions that BSDFs and phase functions sample, at most the share
+// kLeftThatPays leads to the sky. Portals pay if the noise of some pixels is more than kPortalGainThatPays
+// times as high without portals as with them. If next-event estimation had no light to sample before, portals
+// add shadow rays; then the factor is kShadowGainThatPays.
 constexpr double kLeftThatPays = .125;
 constexpr double kPortalGainThatPays = 1.1;
 constexpr double kShadowGainThatPays = 2;
 // Portals are learned from paths of at most this many segments.
 constexpr int kLongestPortalPath = 4;
 // The choice of lights by place is learned from camera paths of at most kLongestLocalLightPath segments,
-// which sample every light at each vertex. There are at most kLocalLightPaths such paths, and fewer with many
-// lights (kLocalLightLooks). The choice is tried if next-event estimation at these vertices has a mean square
-// of more than kSpreadThatPays times the square of its mean. It pays if the noise of the direct light of some
-// pixels is more than kLocalGainThatPays times as high without it. This limit is high for two reasons:
-// samples take up to 1.5 times as long, because a light that reaches the vertex costs more time than one that
-// does not; and the few pixels of a pilot hardly show the edges of small patches of light.
+// which sample every light at each vertex. There are at most kLocalLightPaths such paths, and fewer if there
+// are many lights (kLocalLightLooks). The choice is tried if, over the vertices of the first paths, the
+// estimates of direct light have a mean square of more than kSpreadThatPays times the square of their mean.
+// It pays if the noise of the direct light of some pixels is more than kLocalGainThatPays times as high
+// without it. This limit is high for two reasons: samples take up to 1.5 times as long, because a light that
+// reaches the vertex costs more time than one that does not; and the few pixels of a pilot hardly show the
+// edges of small patches of light.
 constexpr std::uint64_t kLocalLightPaths = 1 << 14;
-constexpr std::uint64_t kLocalLightLooks = 1 << 17;  // lights times paths
-constexpr std::uint64_t kLocalLightTrial = 4;        // 1 / (share of the paths that decide if it is tried)
+constexpr std::uint64_t kLocalLightLooks = 1 << 17;  // limit of lights times paths
+constexpr std::uint64_t kLocalLightTrial = 4;        // one path in this many decides if it is tried
 constexpr int kLongestLocalLightPath = 6;
 constexpr double kSpreadThatPays = 1.2;
 constexpr double kLocalGainThatPays = 3;
 // A batch ends after this many vertices, since paths may be long.
 constexpr double kLearningVertices = 1 << 15;
-// A batch also ends after this many rays and boundaries on shadow rays: between two vertices a path may pass
-// any number of boundaries. In few scenes do paths pass 1,024 each, as those of such a batch.
+// A batch also ends after this many rays, counting also the boundaries that shadow rays pass: a path may pass
+// any number of boundaries between two vertices. The limit is 1,024 for each path of a batch, which paths
+// exceed in few scenes.
 constexpr std::uint64_t kLearningRaysOfBatch = 1 << 20;
 constexpr std::uint64_t kSunRays = 1 << 14;  // rays of the sun for one set of light vertices
 // Number of rays from which the mean number of light vertices per ray of the sun is estimated.
@@ -83,7 +86,7 @@ constexpr std::uint64_t kSunRaySeed = 0x5eed0f5a1;
 // The paths of one learning pass and the data that they record. All passes record where paths find the sun
 // (SunMap).
 struct Lesson {
-  bool sky = false, lights = false;  // record the light of the sky, and that of each light
+  bool sky = false, lights = false;  // whether to record the light of the sky, and that of each light source
   std::uint64_t first_path = 0, batch = kLearningBatch;
 };
 
@@ -232,10 +235,10 @@ LightVertices::Look look_of(const World& w, const LightVertex& y) {
     for (const V3& to : {V3(.5f, .5f, z), V3(-.5f, .5f, z), V3(.5f, -.5f, z), V3(-.5f, -.5f, z)})
       even += mean_component(eval(to).f_cos) * cosine / (4 * std::abs(z));
     look.even = light * std::max(even, kLeastReflected * cosine);
-    // A Henyey-Greenstein lobe around the mirrored direction stands for the glossy part of the BSDF; there
-    // both parts together are as high as the BSDF. The lobe is as wide as that of the BSDF for light along
-    // the normal. For light at other angles a microfacet lobe has this width in one direction, and is
-    // narrower by the cosine in the other.
+    // A Henyey-Greenstein lobe around the mirrored direction stands for the glossy part of the BSDF. In the
+    // mirrored direction the sum of this lobe and the even part is as high as the BSDF. The lobe is as wide
+    // as that of the BSDF for light along the normal. For light at other angles a microfacet lobe has this
+    // width in one direction, and is narrower by the cosine in the other.
     const V3 mirrored(-to_light.x, -to_light.y, to_light.z);
     const BsdfEval at_peak = eval(mirrored);
     const float peak = mean_component(at_peak.f_cos), q = at_peak.pdf * cosine / kInvFourPi;
@@ -275,7 +278,7 @@ void learn_connections(const IntegratorSettings& settings, int threads, World& w
   w.sun_map = std::move(learned.learner.map);
   w.faint = kFaintConnection * static_cast<float>(learned.radiance / static_cast<double>(learned.paths));
   w.need.connected = true;
-  aim(settings, w);  // again, since with connections points on camera segments pay more often
+  aim(settings, w);  // again: with connections, points on camera segments pay more often
   w.rr_depth = std::min(w.rr_depth, kConnectedRoulette);
   const FlushDenormals mode;
   const std::size_t count = trace(w, kLearningSeed, 0, kLearningRays).count();
@@ -310,7 +313,7 @@ void learn_portals(const IntegratorSettings& settings, int threads, World& w) {
   const bool adds_rays = !w.lights.can_sample(), may_share = w.lights.single_environment_sample();
   const auto without = in_any_case ? std::vector<PilotPixel>{} : pilot_pixels(w, kLongestPilot, threads);
   w.lights.set_portals(std::move(portals));
-  aim(settings, w);  // again, since a constant environment may now be a light that is sampled
+  aim(settings, w);  // again: next-event estimation may now sample a constant environment
   if (in_any_case) return;
   const auto with = pilot_pixels(w, kLongestPilot, threads);
   const double gain = adds_rays ? kShadowGainThatPays : kPortalGainThatPays;

@@ -77,11 +77,11 @@ class SegmentNee;
 // Data for paths of a scene with Features::connected, in addition to the world.
 struct Connections {
   const LightVertices* vertices = nullptr;  // null: paths are not connected
-  // Records, in learning paths, where they find light that connections could find, too. `learner` is null for
-  // other paths.
+  // What learning paths record about the light that connections, portals or local lights could find.
+  // `learner` is null for other paths.
   struct Learner {
     SunMap map;
-    double light = 0;     // the sum of the light found
+    double light = 0;     // sum of the sun's light that was found
     double vertices = 0;  // number of vertices at which the sun could be found
     double lit = 0;       // estimated number of those vertices at which the sun was found
     // True if a ray towards the sun met other media than a ray from the sun would. The scene then declares
@@ -125,7 +125,7 @@ class PathTracer {
   static void sort_to_share(std::span<PathTracer*> paths);
   static void share(std::span<PathTracer* const> group);
   const SampleOutcome& outcome() const { return outcome_; }
-  // With F.connected: the number of rays of the path so far, and of boundaries that its shadow rays passed.
+  // With F.connected: the number of the path's rays so far, plus the boundaries that its shadow rays passed.
   std::uint64_t rays() const { return static_cast<std::uint64_t>(segment_) + boundaries_; }
 
  private:
@@ -157,8 +157,8 @@ class PathTracer {
   // Follows the path from its current vertex to its end. The first ray of the path ends at t_max.
   void go_on(float t_max);
   // Samples a free flight up to the surface hit at `end`, or, if `end` is null, up to the distance `reach`.
-  // If the flight was sampled before the ray was traced (kFliesFirst), `flown` is this flight, whose length
-  // was not limited.
+  // If the flight was sampled before the ray was traced (kFliesFirst), `flown` is this flight, sampled
+  // without an upper limit.
   Step fly(const SurfaceHit* end, float reach, const std::optional<Flight>& flown);
   Step fly_through(const Medium& medium, const SurfaceHit* end, float reach,
                    const std::optional<Flight>& flown);
@@ -336,9 +336,9 @@ class PathTracer {
   float eta_scale_ = 1;  // cancels the radiance scaling of refraction in Russian roulette
   int hero_ = 0;
   int depth_ = 0;                 // scatterings so far
-  int passed_ = 0;                // null boundaries and null transmissions so far
-  std::uint64_t boundaries_ = 0;  // with F.connected: those that shadow rays passed
-  int segment_ = 0;               // number of rays so far, including those after null crossings
+  int passed_ = 0;                // null boundaries and null-transmitting surfaces passed so far
+  std::uint64_t boundaries_ = 0;  // with F.connected: number of boundaries that shadow rays passed
+  int segment_ = 0;               // number of rays so far; behind each passed surface a new one begins
   Within medium_;
   bool looked_for_sky_ = false;   // true if the first vertex sampled a second direction (look_for_sky)
   bool first_in_medium_ = false;  // with F.split: true if the first scattering was in a medium
@@ -441,8 +441,8 @@ void PathTracer<F, Light>::go_on(float t_max) {
   outcome_.majorant_violations += counters_.majorant_violations;
 }
 
-// Passes every index-matched surface, and each null-transmitting one with its probability. The random numbers
-// are those of trace() for the same ray, as long as both hit the same surfaces.
+// The path passes every index-matched surface, and each null-transmitting one with its probability. It uses
+// the random numbers of trace() for the same ray, as long as both hit the same surfaces.
 template <Features F, template <Features> class Light>
 std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay& ray) {
   ray_ = {ray.o, ray.o, ray.d};
@@ -500,8 +500,8 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
     const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), hit.shading.to_local(-ray_.d), g.u(2),
                                        {g.u(0), g.u(1)});
     if (!s) break;
-    // Because refraction scales radiance, the weight has the factor 1 / eta^2. This factor is removed, since
-    // it is no property of the surface behind.
+    // A refracted sample's weight contains 1 / eta^2, by which refraction scales radiance. This factor is
+    // removed, since it is no property of the surface behind.
     beta_ *= s->weight * (s->transmitted ? s->eta * s->eta : 1.f);
     if (!s->delta) {
       guide.albedo += beta_;
@@ -636,8 +636,8 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
     last_.ng = hit.ng;
     last_.sum = densities_sum([&] { return world_.bsdfs.eval(surface.bsdf, hit.uv_point(), s->wi, wo).pdf; });
   }
-  // The medium is set for reflected rays too: the media on the two sides are those that the scene declares,
-  // as for next-event estimation.
+  // Reflected rays too get the medium that the surface declares for their side, as shadow rays do. It may
+  // differ from the medium in which the path arrived.
   if constexpr (F.media) medium_ = beyond(hit, surface, w, ray_.d, medium_);
   ray_.leave(hit, w);
   return {Collision::scattered, g.u(3)};

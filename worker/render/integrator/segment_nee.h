@@ -45,10 +45,11 @@ class SegmentNee {
     float flight_pdf = 0, t = 0;
     V3 o{0, 0, 0}, d{0, 0, 0};
     float length = 0;
-    float points = 1;  // number of points sampled by depth; one more is sampled by angle
+    float points = 1;  // number of points of the segment sampled by depth; one more is sampled by angle
 
-    // False, because vertices on surfaces have this type too. In media either answer gives the same
-    // probability, since worlds of this strategy never use the light tree there (Lights::use_tree_in_media).
+    // False, because vertices on surfaces have this type too, and their lights are chosen otherwise. In media
+    // either answer gives the same probability, since worlds of this strategy never use the light tree there
+    // (Lights::use_tree_in_media).
     static bool light_chosen_first() { return false; }
     float found_as_light() const { return std::min(points * depth_ratio, kMaxRatio); }
     float found_as_light(const Pivot& pivot) const {
@@ -98,8 +99,9 @@ class SegmentNee {
   static void at_vertex(Path&, const Medium&, const V3&, const V3&) {}
 
  private:
-  // Derives the random numbers of point i of several from those of a single point. Positions are stratified
-  // along the segment; the numbers that choose a light and a point on it advance by constant steps, modulo 1.
+  // Returns the random numbers of point i out of `points`; `g` are those that a single point would use.
+  // Positions are stratified along the segment. The numbers that choose a light, and a point on it, advance
+  // by constant steps, modulo 1.
   static Group point_of(const Group& g, int i, int points) {
     if (points == 1) return g;
     const auto k = static_cast<std::uint32_t>(i), n = static_cast<std::uint32_t>(points);
@@ -194,7 +196,8 @@ class SegmentNee {
     const bool both = choice.has_place && v.by_angle && v.by_depth;
     const float e_depth = at_point.rate * depth_pdf(path, medium, plan, at_point.x);
     if (both && !by_angle) e_angle = v.angle_pdf(pivot);
-    // The expected number of points per unit length, by depth and by the strategy of this point
+    // The expected number of points per unit length at this point: of those sampled by depth, and of those
+    // sampled as this point was
     const float by_depth = e_depth * v.points;
     const float own = by_angle ? e_angle : by_depth;
     if (!(own > 0)) return;

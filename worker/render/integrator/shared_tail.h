@@ -29,7 +29,7 @@ struct FirstVertex {
   C3 beta{0, 0, 0};     // the weight of the path up to the vertex
   C3 density{1, 1, 1};  // the path's density with each channel as the hero (medium.h), over their mean
   OneMedium around;     // the medium in front of the vertex
-  int passed = 0;       // null crossings between the camera and the vertex
+  int passed = 0;       // surfaces passed straight through between the camera and the vertex
   // A cache for a diffuse surface: the BSDF for a direction along the normal, on the normal's side [0] or on
   // the other [1]; nullopt if it was not evaluated yet.
   std::array<std::optional<BsdfEval>, 2> by_side;
@@ -39,7 +39,7 @@ struct FirstVertex {
 struct SharedTail {
   bool usable = false;  // false: there is none, or it was not sampled by a smooth lobe
   PathVertex at;
-  int passed = 0;  // null crossings between the camera and the vertex
+  int passed = 0;  // surfaces passed straight through between the camera and the vertex
   // Along the way from the path's own first vertex: the optical depth of the media in each channel, the null
   // transmission of the surfaces, and the probability of passing them.
   C3 depth{0, 0, 0}, transmission{1, 1, 1};
@@ -51,8 +51,9 @@ struct SharedTail {
   bool light_is_delta = false;
   C3 light{0, 0, 0};
 
-  // Light from `onward`, the direction in which the path goes on. `emitted` comes straight from a light
-  // source, which next-event estimation finds with the density hit_pdf; `scattered` was scattered on its way.
+  // Light from `onward`, the direction in which the path goes on: `emitted` by the light source that the ray
+  // hits, if any, and `scattered` at later vertices. Next-event estimation finds that light source with the
+  // density hit_pdf.
   bool goes_on = false;
   V3 onward{0, 0, 0};
   C3 emitted{0, 0, 0}, scattered{0, 0, 0};
@@ -73,7 +74,7 @@ struct SharingPath {
   SharedTail tail;
   C3 scale{1, 1, 1};   // the factor of light that counts for this pixel only
   float survival = 1;  // factor of the throughput that Russian roulette compares (size())
-  // look_at() traces a shadow ray, which sets these two:
+  // look_at() sets these two for the shadow ray that it traces:
   C3 flight{1, 1, 1};  // the transmittance of its media times the probability of passing its surfaces
   int crossed = 0;     // number of surfaces that it passed
 };

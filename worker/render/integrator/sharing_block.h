@@ -17,10 +17,9 @@
 
 namespace ls::render {
 
-// Makes pixels share the tails of their paths, by setting `reuse` and Features::reuse of a world that is
-// otherwise complete. This requires that the densities of second vertices are known in the scene. It is done
-// if the settings request it, or if they leave the decision to a pilot (reuse_variants.cpp) and the pilot
-// finds that sharing pays.
+// If sharing of tails (path_reuse.h) is possible in this world, which is otherwise complete, and pays, sets
+// its `reuse` and Features::reuse. Sharing is possible if the densities of second vertices are known. The
+// settings request or forbid it, or leave the decision to a pilot (reuse_variants.cpp).
 void share_tails(const IntegratorSettings& settings, int threads, World& w);
 
 class SharingBlock {

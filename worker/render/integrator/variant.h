@@ -15,8 +15,7 @@
 namespace ls::render {
 
 // Renders one sample. The parameters are the world, the pixel's x and y in the image, the sample's index, the
-// light components and the connections. The last two are used only by variants with Features::split and
-// Features::connected.
+// light components (used only with Features::split) and the connections (only with Features::connected).
 using SampleFn = SampleOutcome (*)(const World&, int, int, std::uint64_t, LightSplit*, Connections);
 
 // Renders sample number `sample` of several pixels, at most kMostTogether. The paths share the light that

@@ -24,8 +24,8 @@ struct MacroCell {
   float residual = 0;  // upper bound of |value - control|
 };
 
-// The result of integrating the field along an interval of a ray. Integration stops at the t where the
-// integral reaches a wanted value (`reached`), else at the end of the interval.
+// The result of integrating the field along an interval of a ray. Integration stops where the integral
+// reaches a wanted value (`reached` is then true, and t the place), else at the end of the interval.
 struct Passage {
   bool reached = false;
   float t = 0;
@@ -197,8 +197,9 @@ class CellWalk {
   const MacroCell* cell_ = nullptr;
   double entry_ = 0;
   V3 origin_, direction_;
-  // Per axis: boundary i between cells is at the distance first_ + i * spacing_; left_ is the number of cells
-  // ahead, and stride_ the step in the cell table to the next one.
+  // Per axis: boundary number i between cells is at the distance first_ + i * spacing_. The walk leaves its
+  // cell through boundary plane_, at distance exit_, and step_ (1 or -1) leads to the boundary after it.
+  // left_ is the number of cells ahead, and stride_ the step in the cell table to the next one.
   float plane_[3], step_[3], first_[3], spacing_[3], exit_[3];
   int left_[3];
   std::ptrdiff_t stride_[3];

@@ -41,7 +41,7 @@ std::vector<std::byte> contents(const std::filesystem::path& path) {
 
 struct Entry {
   std::string name;
-  std::uint64_t at = 0, stored = 0, bytes = 0;  // offset in the file, size there, and size when decompressed
+  std::uint64_t at = 0, stored = 0, bytes = 0;  // offset and size in the file; decompressed size
   std::uint16_t codec = kPlain;
 };
 
