@@ -125,13 +125,9 @@ class Grid {
   Passage pass(const V3& origin, const V3& direction, float t0, float t1,
                double wanted = std::numeric_limits<double>::infinity()) const;
 
-  // Returns the integral of the field along o + t d, t in [t0, t1]. It is exact up to rounding: within a
-  // voxel the field is a cubic in t, or constant, and two-point Gauss-Legendre integrates cubics exactly.
-  // Since it has no variance, it is the reference in tests of the trackers.
-  double exact_integral(const V3d& o, const V3d& d, double t0, double t1) const;
-
  private:
   friend class CellWalk;
+  friend double exact_integral(const Grid&, const V3d& o, const V3d& d, double t0, double t1);  // of tests
   void repeat_ends();
   V3 wrapped(const V3& index) const;
   int wanted_cell_size(double density_to_sigma) const;

@@ -9,7 +9,6 @@
 #include "tests/unit/render/grids.h"
 #include "worker/render/media/emission.h"
 #include "worker/render/media/optical_depth.h"
-#include "worker/render/media/spectral_grids.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {
@@ -36,7 +35,7 @@ struct Coloured {
     return m;
   }
   double depth(int c, double t) const {
-    return sigma * grids[static_cast<std::size_t>(c)].exact_integral(V3d(kFrom), V3d(kAlong), 0, t);
+    return sigma * exact_integral(grids[static_cast<std::size_t>(c)], V3d(kFrom), V3d(kAlong), 0, t);
   }
 };
 

@@ -94,7 +94,7 @@ TEST(MediumEmission, OfAGridInClearAirIsItsIntegral) {
   Medium m = of_grid(none, C3(1), EmissionKind::per_length);
   emit(m, fire);
   const V3 o(-1, .3f, 1.1f), d = normalize(V3(9, 7.1f, 6.2f));
-  const double expected = fire.exact_integral(V3d(o), V3d(d), 0, 30);
+  const double expected = exact_integral(fire, V3d(o), V3d(d), 0, 30);
   ASSERT_GT(expected, .5);
 
   for (int i = 0; i < 20; ++i) {
@@ -132,7 +132,7 @@ TEST(MediumEmission, OfAnIsothermalGridIsWhatItDoesNotLetThrough) {
     for (const C3& sigma : {C3(.3f), C3(0, .3f, 6), C3(1e3f), C3(.1f, 1e2f, 1e7f)}) {
       const Grid g = unit_grid({9, 9, 9}, random_values({9, 9, 9}, 5, sparse), 0, max_component(sigma));
       const Medium m = of_grid(g, sigma, EmissionKind::per_absorption);
-      const double depth = g.exact_integral(V3d(o), V3d(d), 0, 30);
+      const double depth = exact_integral(g, V3d(o), V3d(d), 0, 30);
       const Mean r = mean_of(m, o, d, 4000);
       for (int c = 0; c < 3; ++c) {
         const double expected = kEmission[c] * -std::expm1(-sigma[c] * depth);
@@ -258,7 +258,7 @@ TEST(MediumEmission, OfGridsWithoutInterpolationAgreesToo) {
 
   const Mean r = mean_of(m, o, d, 4000);
 
-  const double expected = -std::expm1(-density.exact_integral(V3d(o), V3d(d), 0, 30));
+  const double expected = -std::expm1(-exact_integral(density, V3d(o), V3d(d), 0, 30));
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(r.mean[c] / kEmission[c], expected, 5 * r.error[c] + 1e-5);
 }
 

@@ -33,23 +33,24 @@ TEST(Grid, InterpolatesToItsNodesAndClampsBeyondThem) {
 TEST(Grid, DiagonalOfTheProductOfCoordinatesIsTheRootOfThreeQuarters) {
   std::vector<float> v(8, 0);
   v[7] = 1;  // density = x y z
-  EXPECT_NEAR(unit_grid({2, 2, 2}, v).exact_integral({0, 0, 0}, {1, 1, 1}, 0, 1) * std::sqrt(3.),
+  EXPECT_NEAR(exact_integral(unit_grid({2, 2, 2}, v), {0, 0, 0}, {1, 1, 1}, 0, 1) * std::sqrt(3.),
               std::sqrt(3.) / 4, 1e-15);
 }
 
 TEST(Grid, IntegralsOfTentRampAndConstantMatchClosedForms) {
   std::vector<float> tent(27, 0);
   tent[13] = 5;
-  EXPECT_NEAR(unit_grid({3, 3, 3}, tent).exact_integral({-4, 1, 1}, {1, 0, 0}, 0, 10), 5, 1e-14);  // rho h
+  EXPECT_NEAR(exact_integral(unit_grid({3, 3, 3}, tent), {-4, 1, 1}, {1, 0, 0}, 0, 10), 5, 1e-14);  // rho h
 
   const Grid ramp = unit_grid({4, 1, 1}, {0, 1, 2, 3}, .5);
-  EXPECT_NEAR(ramp.exact_integral({-9, 0, 0}, {1, 0, 0}, 0, 99), 4.5 + 1.5,
+  EXPECT_NEAR(exact_integral(ramp, {-9, 0, 0}, {1, 0, 0}, 0, 99), 4.5 + 1.5,
               1e-13);  // the clamped half voxels add 0 and 3/2
-  EXPECT_NEAR(ramp.exact_integral({1.25, 0, 0}, {-1, 0, 0}, 0, 1), .5 * (1.25 * 1.25 - .25 * .25), 1e-14);
+  EXPECT_NEAR(exact_integral(ramp, {1.25, 0, 0}, {-1, 0, 0}, 0, 1), .5 * (1.25 * 1.25 - .25 * .25), 1e-14);
 
   const Grid constant = unit_grid({2, 3, 4}, std::vector<float>(24, 3), .5);
-  EXPECT_NEAR(constant.exact_integral({-9, 1, 1}, {1, 0, 0}, 0, 99), 3 * 2, 1e-13);  // 1 voxel and two halves
-  EXPECT_EQ(constant.exact_integral({-9, 7, 1}, {1, 0, 0}, 0, 99), 0);
+  EXPECT_NEAR(exact_integral(constant, {-9, 1, 1}, {1, 0, 0}, 0, 99), 3 * 2,
+              1e-13);  // 1 voxel and two halves
+  EXPECT_EQ(exact_integral(constant, {-9, 7, 1}, {1, 0, 0}, 0, 99), 0);
 }
 
 TEST(Grid, WithoutInterpolationEachVoxelHasItsOwnValue) {
@@ -70,10 +71,10 @@ TEST(Grid, WithoutInterpolationEachVoxelHasItsOwnValue) {
 
 TEST(Grid, IntegralsWithoutInterpolationAreSumsOfVoxels) {
   const Grid g = voxel_grid({4, 1, 1}, {7, 1, 2, 5}, kNearest, Wrap::clamp);
-  EXPECT_NEAR(g.exact_integral({-9, 0, 0}, {1, 0, 0}, 0, 99), 7 + 1 + 2 + 5, 1e-13);
-  EXPECT_NEAR(g.exact_integral({-.25, 0, 0}, {1, 0, 0}, 0, 1), .75 * 7 + .25 * 1, 1e-14);
+  EXPECT_NEAR(exact_integral(g, {-9, 0, 0}, {1, 0, 0}, 0, 99), 7 + 1 + 2 + 5, 1e-13);
+  EXPECT_NEAR(exact_integral(g, {-.25, 0, 0}, {1, 0, 0}, 0, 1), .75 * 7 + .25 * 1, 1e-14);
   const Grid block = voxel_grid({2, 2, 2}, {1, 2, 3, 4, 5, 6, 7, 8}, kNearest, Wrap::clamp);
-  EXPECT_NEAR(block.exact_integral({-.5, -.5, -.5}, {1, 1, 1}, 0, 2), 1 + 8, 1e-14);
+  EXPECT_NEAR(exact_integral(block, {-.5, -.5, -.5}, {1, 1, 1}, 0, 2), 1 + 8, 1e-14);
 }
 
 TEST(Grid, RepeatedEndsAreInterpolatedWithEachOther) {
@@ -88,7 +89,7 @@ TEST(Grid, RepeatedEndsAreInterpolatedWithEachOther) {
     EXPECT_EQ(value_at(clamped, {x, 0, 0}), std::min(std::max(x, 0.f), 3.f));
     EXPECT_EQ(value_at(mirrored, {x, 0, 0}), std::min(std::max(x, 0.f), 3.f));
   }
-  const auto first_half = [](const Grid& g) { return g.exact_integral({-9, 0, 0}, {1, 0, 0}, 0, 9); };
+  const auto first_half = [](const Grid& g) { return exact_integral(g, {-9, 0, 0}, {1, 0, 0}, 0, 9); };
   EXPECT_NEAR(first_half(clamped), 0, 1e-14);
   EXPECT_NEAR(first_half(mirrored), 0, 1e-14);
   EXPECT_NEAR(first_half(repeated), .5 * (1.5 + 0) / 2, 1e-14);  // a trapezium
@@ -196,7 +197,7 @@ TEST(Grid, ABorderOnlyTakesPartInTheInterpolation) {
   EXPECT_FALSE(g.in_domain(g.to_index({1.001f, .5f, .5f})));
   EXPECT_FALSE(g.in_domain(g.to_index({.5f, -.001f, .5f})));
   // The field is 0 outside of the box. The integral is that of trapezoids of widths 1/4, 1/2 and 1/4.
-  EXPECT_NEAR(g.exact_integral(V3d(-3, .5, .5), V3d(1, 0, 0), 0, 9), .25 * 1.5 + .5 * 4 + .25 * 4.5, 1e-6);
+  EXPECT_NEAR(exact_integral(g, V3d(-3, .5, .5), V3d(1, 0, 0), 0, 9), .25 * 1.5 + .5 * 4 + .25 * 4.5, 1e-6);
 
   EXPECT_FALSE(load({4, 2, 3}, Wrap::clamp, false));
   EXPECT_FALSE(load({4, 3, 3}, Wrap::repeat, false));
@@ -209,8 +210,8 @@ TEST(Grid, AConstantVolumeFillsTheCubeThatItsTransformMoves) {
   const auto length = [&](const Transform& to_world, const V3d& o, double center, double scale) {
     const auto loaded = load_volume(ConstVolume{{2, 2, 2}, to_world},
                                     AssetLoader{builder.scene, builder.files}, V3d(center), scale, 1);
-    return loaded.value().channels.at(0).exact_integral((o - V3d(center)) * scale, V3d(1, 0, 0), 0,
-                                                        20 * scale) /
+    return exact_integral(loaded.value().channels.at(0), (o - V3d(center)) * scale, V3d(1, 0, 0), 0,
+                          20 * scale) /
            (2 * scale);
   };
   EXPECT_NEAR(length({}, {-9, .25, .25}, 0, 1), 1, 1e-6);
@@ -409,7 +410,7 @@ TEST(Grid, PassagesAgreeWithTheExactIntegral) {
         ASSERT_NEAR(up_to, whole.integral / 3, 2e-6 * w.end());
       }
       // Float32 positions have an error of 2^-20 in an index, on each of up to 40 voxels with values below 1.
-      ASSERT_NEAR(sum, g.exact_integral(V3d(r.o), V3d(r.d), 0, 100), 40 * 0x1p-20);
+      ASSERT_NEAR(sum, exact_integral(g, V3d(r.o), V3d(r.d), 0, 100), 40 * 0x1p-20);
     }
   }
 }

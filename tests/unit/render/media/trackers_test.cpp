@@ -42,7 +42,7 @@ TEST(Trackers, TransmittancesAverageToTheExactOnes) {
     m.density = &t.grid;
     m.sigma_t = t.sigma;
     const V3 o(-1, .3f, 1.1f), d = normalize(V3(9, 7.1f, 6.2f));
-    const double tau = t.grid.exact_integral(V3d(o), V3d(d), 0, 30);
+    const double tau = exact_integral(t.grid, V3d(o), V3d(d), 0, 30);
     double sum[3] = {}, square[3] = {}, fly[3] = {}, fly2[3] = {};
     MediumCounters counters;
     for (int i = 0; i < kTrackedFlights; ++i) {
@@ -93,7 +93,7 @@ TEST(Trackers, AHotVoxelDoesNotDarkenItsCell) {
     m.sigma_t = C3(1, 1, 0);
     for (const float offset : {0.f, .5f, .99f, 1.f, 2.f}) {
       const V3 o(-1, 8 + offset, 8), d(1, 0, 0);
-      const double expected = std::exp(-g.exact_integral(V3d(o), V3d(d), 0, 30));
+      const double expected = std::exp(-exact_integral(g, V3d(o), V3d(d), 0, 30));
       double sum = 0, square = 0;
       constexpr int kRays = 4000;
       for (int i = 0; i < kRays; ++i) {
@@ -139,7 +139,7 @@ TEST(Trackers, DensitiesBeyondAllBoundsTakeNoTimeAndStopLightAtOnce) {
         } else if (sigma > 1e8f) {
           // The flight ends at the first density on the ray, up to float32 positions: an error of 2^-19 over
           // at most 64, with values below 1.
-          ASSERT_LT(g.exact_integral(V3d(o), V3d(d), 0, f.t * (1 - 1e-6)), 64 * 0x1p-19 + 40 / s[i % 3])
+          ASSERT_LT(exact_integral(g, V3d(o), V3d(d), 0, f.t * (1 - 1e-6)), 64 * 0x1p-19 + 40 / s[i % 3])
               << sigma;
         }
       }
@@ -168,7 +168,7 @@ TEST(Trackers, FlightsThroughDenseCellsAreExponentialInDepth) {
     const std::uint32_t bits = r.bits();
     const Flight f = free_flight<kEverything>(m, 0, bits, o, d, 100, r, counters);
     ASSERT_TRUE(f.scattered);
-    const double share = -std::expm1(-40 * g.exact_integral(V3d(o), V3d(d), 0, f.t));
+    const double share = -std::expm1(-40 * exact_integral(g, V3d(o), V3d(d), 0, f.t));
     ++count[static_cast<std::size_t>(std::min(kBins - 1, static_cast<int>(share * kBins)))];
   }
   test::ChiSquareTally tally("render/trackers");
