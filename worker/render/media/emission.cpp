@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "worker/render/math/blackbody.h"
-#include "worker/render/media/emission_points.h"
 
 namespace ls::render {
 namespace {

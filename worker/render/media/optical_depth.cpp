@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "worker/render/media/spectral_grids.h"
-
 namespace ls::render {
 namespace {
 

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "tests/support/render_check.h"
-#include "worker/render/camera/pixel_filter.h"
 #include "worker/render/math/random.h"
 #include "worker/render/world/world.h"
 
