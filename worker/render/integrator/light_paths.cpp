@@ -1,5 +1,6 @@
 #include "worker/render/integrator/light_paths.h"
-#include "worker/render/integrator/sharing_block.h"
+
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +9,7 @@
 #include <utility>
 
 #include "worker/render/base/in_order.h"
-#include "worker/render/integrator/camera_segment_nee.h"
+#include "worker/render/integrator/segment_nee.h"
 #include "worker/render/integrator/variant.h"
 #include "worker/render/math/processor.h"
 #include "worker/render/world/aim.h"
@@ -184,11 +185,7 @@ LightVertices trace_with(const World& w, std::uint64_t seed, std::uint32_t set, 
 
 constexpr Features kSurfaces{.passing = true, .connected = true};
 constexpr Features kMedia{.media = true, .grids = true, .passing = true, .connected = true};
-constexpr Features kAimed = [] {
-  Features f = kMedia;
-  f.aimed = true;
-  return f;
-}();
+constexpr Features kAimed = kMedia.with(&Features::aimed);
 
 template <class GoOn>
 Learned learn(const World& w, std::uint64_t paths, int threads, const GoOn& go_on,
@@ -255,6 +252,13 @@ LightVertices::Look look_of(const World& w, const LightVertex& y) {
   return look;
 }
 
+namespace {
+
+// If connections to light vertices pay or the settings request them, sets `sun`, `sun_map`, `faint`,
+// `connections_per_ray` and Features::connected of a world that is otherwise complete, lowers its `rr_depth`,
+// and calls aim() again. The result depends only on the scene, the depth limits and the size of the full
+// frame: not on the seed, the number of samples, a crop or the number of threads. The integrator must be
+// `volpath` or `path`.
 void learn_connections(const IntegratorSettings& settings, int threads, World& w) {
   if (settings.light_vertices < 0 || !w.depth_allows(2)) return;
   // Light vertices do not record how many null-transmitting surfaces the light has passed
@@ -286,8 +290,6 @@ void learn_connections(const IntegratorSettings& settings, int threads, World& w
       float{LightVertices::kCandidates * kLearningRays} / static_cast<float>(std::max<std::size_t>(count, 1));
 }
 
-namespace {
-
 constexpr int kLongestPilot = 64;  // segments; paths in a white and dense medium have thousands
 
 std::unique_ptr<const Portals> find_portals(bool in_any_case, int threads, World& w) {
@@ -301,8 +303,8 @@ std::unique_ptr<const Portals> find_portals(bool in_any_case, int threads, World
   return portals->any() ? std::move(portals) : nullptr;
 }
 
-}  // namespace
-
+// Sets the portals of a world's lights if they pay or the settings request them. Depends on the same data,
+// and requires the same integrators, as learn_connections().
 void learn_portals(const IntegratorSettings& settings, int threads, World& w) {
   const bool sky = w.lights.map() || !is_black(w.lights.constant_environment());
   const bool in_any_case = settings.sky_portals > 0;
@@ -322,6 +324,8 @@ void learn_portals(const IntegratorSettings& settings, int threads, World& w) {
   aim(settings, w);
 }
 
+// Enables the choice of lights by place if it pays or the settings request it. Depends on the same data, and
+// requires the same integrators, as learn_connections().
 void learn_local_lights(const IntegratorSettings& settings, int threads, World& w) {
   const bool in_any_case = settings.local_lights > 0;
   if (settings.local_lights < 0 || !w.lights.can_be_local() || !w.depth_allows(1) || !can_learn(w)) return;
@@ -353,13 +357,6 @@ void learn_local_lights(const IntegratorSettings& settings, int threads, World& 
   if (!visits.places.empty()) w.lights.set_local(&visits);
 }
 
-LightVertices trace_light_vertices(const World& w, std::uint64_t set) {
-  const FlushDenormals mode;
-  return trace(w, w.seed, static_cast<std::uint32_t>(set), kSunRays);
-}
-
-namespace {
-
 // Sets up shadow roulette and path splitting, which need the mean radiance of the image, in scenes with
 // grids.
 void learn_roulette(const IntegratorSettings& settings, World& w) {
@@ -371,6 +368,11 @@ void learn_roulette(const IntegratorSettings& settings, World& w) {
 }
 
 }  // namespace
+
+LightVertices trace_light_vertices(const World& w, std::uint64_t set) {
+  const FlushDenormals mode;
+  return trace(w, w.seed, static_cast<std::uint32_t>(set), kSunRays);
+}
 
 Result<std::shared_ptr<const World>> build_world(const Scene& scene, const RenderSettings& settings,
                                                  const AssetFiles& files, int threads) {
@@ -385,6 +387,11 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
     if ((*world)->need.grids && !(*world)->need.connected) learn_roulette(scene.integrator, **world);
   }
   return std::shared_ptr<const World>(std::move(*world));
+}
+
+std::shared_ptr<void> limit_threads(int threads) {
+  const auto most = static_cast<std::size_t>(std::max(1, threads));
+  return std::make_shared<tbb::global_control>(tbb::global_control::max_allowed_parallelism, most);
 }
 
 }  // namespace ls::render

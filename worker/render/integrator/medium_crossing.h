@@ -10,7 +10,7 @@
 #include <cmath>
 
 #include "worker/render/base/work_counters.h"
-#include "worker/render/integrator/lamp_flight.h"
+#include "worker/render/integrator/equiangular.h"
 #include "worker/render/media/emission.h"
 #include "worker/render/world/world.h"
 

@@ -5,8 +5,8 @@
 // relative to that of the hero. A contribution is beta * light / mean(density): the balance heuristic over
 // channels. Direct light is found both by BSDF or phase-function sampling and by next-event estimation,
 // combined by the balance heuristic. At surfaces next-event estimation starts from the path's own vertices.
-// In media next-event estimation is a strategy, `Light` (vertex_nee.h, the default; segment_nee.h;
-// camera_segment_nee.h), with these members:
+// In media next-event estimation is a strategy, `Light` (VertexNee, the default; SegmentNee;
+// CameraSegmentNee), with these members:
 //   Plan ahead(path, medium, segment)               called before each flight through a medium: adds light
 //                                                   scattered once, anywhere on the segment;
 //   Plan::matters()                                 true if vertices on this segment need a Vertex;
@@ -28,11 +28,9 @@
 #include <type_traits>
 
 #include "worker/render/base/features.h"
-#include "worker/render/integrator/light_components.h"
 #include "worker/render/integrator/mis.h"
 #include "worker/render/integrator/offset_ray.h"
-#include "worker/render/integrator/shared_tail.h"
-#include "worker/render/integrator/termination.h"
+#include "worker/render/integrator/path_records.h"
 #include "worker/render/integrator/vertex_nee.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/medium_stack.h"
@@ -41,29 +39,31 @@
 
 namespace ls::render {
 
-struct SampleOutcome {
-  C3 radiance{0, 0, 0};
-  // The first reason to reject the sample regardless of its radiance; none if there is no such reason.
-  HealthCause cut_off = HealthCause::none;
-  std::uint64_t majorant_violations = 0;
-
-  void reject(HealthCause cause) {
-    if (cut_off == HealthCause::none) cut_off = cause;
-  }
-};
-struct FirstSurface {
-  SurfaceHit hit;
-  // 1 / (1 - probability of passing straight through): the weight that compensates for the random decision to
-  // be scattered.
-  float not_passed = 1;
-};
-
-// Albedo and normal that guide a denoiser: one sample of each of the AOVs denoising_albedo and
-// denoising_normal.
-struct DenoisingGuide {
-  C3 albedo{0, 0, 0};
-  V3d normal{0, 0, 0};
-};
+// The largest numbers of rays of one path and of surfaces on one shadow ray. A sample that exceeds either is
+// rejected and counted. Paths subject to forced roulette (below) reach the limit with probability e^-60.
+inline constexpr int kMaxSegments = 1 << 20;
+inline constexpr int kMaxShadowSegments = 1 << 16;
+// From kForcedRouletteDepth scatterings on, roulette may end even paths that lose no energy; otherwise
+// nothing would end a path in a closed white room. After n scatterings the survival probability is n / (n +
+// 1), so a share of 1024 / n of these paths reaches n scatterings, and weights grow only linearly. A constant
+// survival probability q would have infinite variance in dense media: in a white slab of optical depth tau, a
+// share exp(-n pi^2 / (3 (tau + 1.42)^2)) of the light is still inside after n scatterings, and the variance
+// is finite only where 1 - q is below the rate of this decay, pi^2 / (3 (tau + 1.42)^2). Beyond
+// kLastRouletteDepth q is constant, as otherwise the length of paths in a white room would have no mean; the
+// variance is then finite up to tau = 230, where a path has 5500 vertices on average.
+inline constexpr int kForcedRouletteDepth = 1024;
+inline constexpr int kLastRouletteDepth = 1 << 16;
+inline constexpr float kLastSurvival = 1 - 0x1p-14f;
+// In media that lose no light, light subpaths would be so long that their vertices fill the memory. So from
+// kMostUnforced scatterings on, a light subpath survives each scattering with probability kForcedLight at
+// most.
+inline constexpr int kMostUnforced = 8;
+inline constexpr float kForcedLight = .5f;
+constexpr float forced_survival(int depth) {
+  if (depth < kForcedRouletteDepth) return 1;
+  if (depth >= kLastRouletteDepth) return kLastSurvival;
+  return static_cast<float>(depth) / static_cast<float>(depth + 1);
+}
 
 enum class Collision : std::uint8_t {
   escaped,    // the path reached the end of the segment
@@ -73,33 +73,6 @@ enum class Collision : std::uint8_t {
 
 template <Features F>
 class SegmentNee;
-
-// Data for paths of a scene with Features::connected, in addition to the world.
-struct Connections {
-  const LightVertices* vertices = nullptr;  // null: paths are not connected
-  // What learning paths record about the light that connections, portals or local lights could find.
-  // `learner` is null for other paths.
-  struct Learner {
-    SunMap map;
-    double light = 0;     // sum of the sun's light that was found
-    double vertices = 0;  // number of vertices at which the sun could be found
-    double lit = 0;       // estimated number of those vertices at which the sun was found
-    // True if a ray towards the sun met other media than a ray from the sun would. The scene then declares
-    // different media on the two sides of a boundary, or the medium outside is not a vacuum.
-    bool media_differ = false;
-    bool keeps_sky = false;  // true if the light of the sky that vertices found is kept in `sky`
-    std::vector<Portals::Found> sky;
-    double scatterings = 0;     // number of vertices
-    double left = 0;            // number of those that the path left towards the sky
-    bool keeps_lights = false;  // true if each vertex samples all lights and keeps their light in `lights`
-    LightVisits lights;
-
-    void found_sky(const V3& p, const V3& d, float found) {
-      if (keeps_sky && found > 0 && std::isfinite(found)) sky.push_back({p, d, found});
-    }
-  };
-  Learner* learner = nullptr;
-};
 
 template <Features F, template <Features> class Light = VertexNee>
 class PathTracer {

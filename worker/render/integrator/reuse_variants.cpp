@@ -1,5 +1,5 @@
 // The path tracers with Features::reuse (pixels share the tails of their paths: path_reuse.h), and the
-// decision which worlds use them. They take long to compile, so they have their own source file.
+// decision which worlds use them.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "common/image/error/relative_weights.h"
 #include "worker/render/base/in_order.h"
-#include "worker/render/integrator/sharing_block.h"
+#include "worker/render/integrator/light_paths.h"
 #include "worker/render/integrator/variant.h"
 #include "worker/render/math/processor.h"
 #include "worker/render/render.h"
@@ -15,9 +15,6 @@
 
 namespace ls::render {
 namespace {
-
-constexpr Features kSharedAndSplit{
-    .media = true, .chromatic = true, .passing = true, .split = true, .reuse = true};
 
 constexpr std::size_t kSharing = kUsualPathReuse;
 
@@ -122,12 +119,12 @@ std::span<const Variant> reuse_variants() {
           "homogeneous grey media, tails shared"),
       group_variant<Features{.media = true, .chromatic = true, .passing = true, .reuse = true}>(
           "homogeneous chromatic media, tails shared"),
+      group_variant<Features{
+          .media = true, .chromatic = true, .passing = true, .split = true, .reuse = true}>(
+          "homogeneous media, tails shared, and light in parts"),
   };
   return kVariants;
 }
-
-const Variant kReuseSplitVariant =
-    group_variant<kSharedAndSplit>("homogeneous media, tails shared, and light in parts");
 
 void share_tails(const IntegratorSettings& settings, int threads, World& w) {
   Features need = w.need;

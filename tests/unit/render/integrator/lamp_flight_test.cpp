@@ -1,6 +1,6 @@
 // Tests flights past lamps: the means of their weights have closed forms, in every channel, and the second
 // moment of light near a lamp is bounded.
-#include "worker/render/integrator/lamp_flight.h"
+#include "worker/render/integrator/equiangular.h"
 
 #include <gtest/gtest.h>
 

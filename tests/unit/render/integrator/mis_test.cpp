@@ -9,7 +9,7 @@
 
 #include "tests/support/render_check.h"
 #include "worker/render/integrator/equiangular.h"
-#include "worker/render/integrator/truncated_exponential.h"
+#include "worker/render/integrator/segment_nee.h"
 
 namespace ls::render {
 namespace {
