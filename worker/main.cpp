@@ -21,7 +21,7 @@
 #include "worker/options.h"
 #ifdef LIGHTSHAFT_RENDERER
 #include "worker/inprocess.h"
-#include "worker/render/base/thread_limit.h"
+#include "worker/render/render.h"
 #endif
 
 namespace {

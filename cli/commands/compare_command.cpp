@@ -14,7 +14,7 @@
 #include "compare/race_machine.h"
 #include "compare/results.h"
 #include "worker/machine.h"
-#include "worker/render/base/thread_limit.h"
+#include "worker/render/render.h"
 
 namespace ls::cli {
 namespace {

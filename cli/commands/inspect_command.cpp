@@ -11,7 +11,7 @@
 #include "cli/output/job_options.h"
 #include "common/scene/analysis/prune.h"
 #include "worker/machine.h"
-#include "worker/render/base/work_counters_list.h"
+#include "worker/render/base/work_counters.h"
 
 namespace ls::cli {
 namespace {
@@ -73,7 +73,7 @@ tl::expected<nlohmann::ordered_json, coordinator::Rejected> count_work(
   render::work_counters() = {};
   render::render_tile(**world, {0, 0, size.width, size.height}, kSmallSamples, nullptr, nullptr);
   nlohmann::ordered_json work;
-  for (const auto& [name, count] : render::listed(render::work_counters())) work[name] = count;
+  for (const auto& [name, counter] : render::kWorkCounters) work[name] = render::work_counters().*counter;
   return work;
 #else
   return tl::unexpected(coordinator::Rejected{

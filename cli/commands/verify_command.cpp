@@ -23,7 +23,7 @@
 #include "coordinator/admission/cryptomatte_manifests.h"
 #include "coordinator/store/files.h"
 #include "worker/machine.h"
-#include "worker/render/base/thread_limit.h"
+#include "worker/render/render.h"
 
 namespace ls::cli {
 namespace {

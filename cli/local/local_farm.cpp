@@ -16,7 +16,7 @@
 #include "worker/child/serve.h"
 #include "worker/inprocess.h"
 #include "worker/machine.h"
-#include "worker/render/base/thread_limit.h"
+#include "worker/render/render.h"
 
 namespace ls::cli {
 namespace {

@@ -19,7 +19,7 @@
 #include "common/image/reference/reference.h"
 #include "common/report/job_page.h"
 #include "coordinator/service/coordinator.h"
-#include "worker/render/base/thread_limit.h"
+#include "worker/render/render.h"
 
 namespace ls::cli {
 namespace {

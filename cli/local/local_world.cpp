@@ -3,7 +3,7 @@
 #include "common/scene/json/serialize.h"
 #include "common/scene/schema/integrators.h"
 #include "coordinator/store/blobs/memory_blobs.h"
-#include "worker/render/base/thread_limit.h"
+#include "worker/render/render.h"
 
 namespace ls::cli {
 

@@ -18,9 +18,7 @@
 #include "tests/unit/nvdb/nvdb_builder.h"
 #include "worker/fake/fake_pixels.h"
 #include "worker/render/media/vdb_reply.h"
-#include "worker/render/media/vdb_validate.h"
 #include "worker/render/vdb/nvdb.h"
-#include "worker/render/vdb/refused.h"
 
 namespace ls::fuzz {
 namespace {

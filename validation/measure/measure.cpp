@@ -12,7 +12,7 @@
 #include "common/base/clock.h"
 #include "common/scene/analysis/prune.h"
 #include "common/scene/json/serialize.h"
-#include "worker/render/base/thread_limit.h"
+#include "worker/render/render.h"
 
 namespace ls::cli {
 namespace {

@@ -32,6 +32,11 @@ using AssetFiles = std::map<Digest, std::filesystem::path>;
 Result<std::shared_ptr<const World>> build_world(const Scene& scene, const RenderSettings& settings,
                                                  const AssetFiles& files, int threads);
 
+// Limits TBB, the library under Embree and OpenVDB, to `threads` threads in this process as long as the
+// returned object lives. Embree's own setting does not limit the threads that TBB starts while a world is
+// built. If several such objects live, the lowest limit applies.
+std::shared_ptr<void> limit_threads(int threads);
+
 // The pixel and index of the sample that a thread renders, for crash reports. With path reuse (path_reuse.h)
 // the thread renders a square of 16 x 16 pixels together, and the pixel is one of these. The thread writes
 // with relaxed stores.

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "tests/unit/nvdb/nvdb_builder.h"
-#include "worker/render/vdb/refused.h"
 
 namespace ls::render {
 namespace {

@@ -1,4 +1,4 @@
-// Environment maps of small images.
+// Makes environment maps of small images.
 #pragma once
 
 #include <stdexcept>

@@ -1,4 +1,4 @@
-// Scenes of lights, and the irradiance that their own sampling gives.
+// Scenes with one light, and the irradiance that sampling this light gives.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,13 +12,13 @@
 
 namespace ls::render {
 
-// From numbers in [0, 1).
+// The numbers for light sampling, from values in [0, 1).
 inline LightNumbers numbers(float light, float x, float y) {
   const auto bits = [](float f) { return static_cast<std::uint32_t>(f * 0x1p32f); };
   return {bits(light), bits(x), bits(y)};
 }
 
-// A scene of one light; its world, and points given in scene coordinates.
+// The world of a scene with one light. Points are given in scene coordinates.
 struct LightBench {
   std::shared_ptr<const World> world;
   explicit LightBench(const test::SceneBuilder& builder) : world(test::world_of(builder)) {}
@@ -27,7 +27,7 @@ struct LightBench {
   struct Irradiance {
     double mean, se;
   };
-  // On a plane through x with normal n, over a stratified square of light samples.
+  // The irradiance at x of a plane with normal n, from a stratified square of light samples.
   Irradiance irradiance(const V3d& x, const V3& n, int side = 128) const {
     RandomStream r(11);
     double sum = 0, square = 0;
@@ -41,7 +41,7 @@ struct LightBench {
     }
     const double count = double{1} * side * side, mean = sum / count;
     return {mean,
-            std::sqrt(std::max(0., square / count - mean * mean) / count)};  // of unstratified samples: more
+            std::sqrt(std::max(0., square / count - mean * mean) / count)};  // larger than that of strata
   }
 };
 inline test::SceneBuilder area(const ls::Geometry& g, const Transform& t, bool flip = false) {
@@ -49,8 +49,8 @@ inline test::SceneBuilder area(const ls::Geometry& g, const Transform& t, bool f
   builder.lamp(g, t).flip_normals = flip;
   return builder;
 }
-// 5 standard errors of what independent samples would give, and float32 (the light's offset from its own
-// surface: 2^-20 of the world).
+// Checks that the irradiance is within 5 standard errors of independent samples, plus float32 errors (the
+// light's offset from its own surface is 2^-20 of the world).
 inline void expect_close(const LightBench::Irradiance& e, double expected) {
   EXPECT_NEAR(e.mean, expected, 5 * e.se + expected * 1e-5);
   EXPECT_LT(e.se, .02 * expected);

@@ -8,7 +8,7 @@
 #include "tests/support/jacobian.h"
 #include "tests/unit/render/grids.h"
 #include "worker/render/integrator/equiangular.h"
-#include "worker/render/integrator/truncated_exponential.h"
+#include "worker/render/integrator/segment_nee.h"
 #include "worker/render/integrator/variant.h"
 #include "worker/render/media/medium.h"
 #include "worker/render/media/optical_depth.h"
@@ -123,7 +123,7 @@ void channel_flights(test::ChiSquareTally& tally) {
     m.sigma_t = C3(sigma);
     for (const int hero : {0, 1, 2}) {
       const Grid& own = grids[static_cast<std::size_t>(hero)];
-      const auto depth = [&](double t) { return double{sigma} * own.exact_integral(V3d(o), V3d(d), 0, t); };
+      const auto depth = [&](double t) { return double{sigma} * exact_integral(own, V3d(o), V3d(d), 0, t); };
       MediumCounters counters;
       compare(
           tally, fmt::format("channel {} of a grid of {}", hero, sigma), even(1, sigma > 10 ? 3 : 14),
@@ -198,7 +198,7 @@ void flights(test::ChiSquareTally& tally) {
       m.density = &f.grid;
       m.sigma_t = f.sigma;
       const auto depth = [&](double t) {
-        return double{f.sigma[hero]} * f.grid.exact_integral(V3d(o), V3d(d), 0, t);
+        return double{f.sigma[hero]} * exact_integral(f.grid, V3d(o), V3d(d), 0, t);
       };
       MediumCounters counters;
       const double reach = f.sigma.x > 10 ? 2.5 : 14;

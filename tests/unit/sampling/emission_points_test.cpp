@@ -7,7 +7,7 @@
 #include "tests/support/jacobian.h"
 #include "tests/unit/render/grids.h"
 #include "worker/render/math/sampler.h"
-#include "worker/render/media/emission_points.h"
+#include "worker/render/media/emission.h"
 
 namespace ls::render {
 namespace {

@@ -6,7 +6,6 @@
 #include "tests/support/chi_square.h"
 #include "tests/support/jacobian.h"
 #include "worker/render/camera/camera.h"
-#include "worker/render/camera/pixel_filter.h"
 #include "worker/render/math/random.h"
 
 namespace ls::render {

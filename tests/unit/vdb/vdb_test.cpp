@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "worker/render/media/vdb_module.h"
+#include "worker/render/media/vdb_reply.h"
 
 namespace {
 

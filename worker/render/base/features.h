@@ -16,10 +16,11 @@ struct Features {
   bool overlaps = false;
   // The scene has surfaces that light passes straight through: index-matched ones, masks, thin dielectrics.
   bool passing = false;
-  // The radiance of each sample is split into the components of the light AOVs (light_components.h).
+  // The radiance of each sample is split into the components of the light AOVs (path_records.h).
   bool split = false;
-  // Light is sampled at several points of the camera's segments through media (camera_segment_nee.h), or the
-  // sampling of directions and flights prefers the neighbourhood of lamps (lamp_directions.h, lamp_flight.h).
+  // The path tracer samples light at several points of each camera ray's segment in a medium
+  // (segment_nee.h), or directions and flights that pass close to lamps, that is, lights without
+  // extent (lamp_directions.h, equiangular.h).
   bool aimed = false;
   // Vertices of paths are connected to points that a directional emitter lights (light_vertices.h).
   bool connected = false;
@@ -36,13 +37,14 @@ struct Features {
            (aimed || !need.aimed) && (connected || !need.connected) && (whitted || !need.whitted) &&
            (reuse || !need.reuse) && (split || !need.split);
   }
+  constexpr Features with(bool Features::*feature) const {
+    Features more = *this;
+    more.*feature = true;
+    return more;
+  }
 };
 inline constexpr Features kEveryScene{
     .media = true, .grids = true, .chromatic = true, .emission = true, .overlaps = true, .passing = true};
-inline constexpr Features kEverything = [] {
-  Features all = kEveryScene;
-  all.split = true;
-  return all;
-}();
+inline constexpr Features kEverything = kEveryScene.with(&Features::split);
 
 }  // namespace ls::render

@@ -10,8 +10,8 @@
 namespace ls::render {
 
 // Computes make(0), make(1), ..., make(count - 1) on up to `threads` threads, and passes the results to
-// take() one by one in this order until take() returns false. So the calls of take() do not depend on the
-// number of threads. Results that take() does not get are dropped. make() must be thread-safe.
+// take(), one by one and in this order, until take() returns false. So the calls of take() do not depend on
+// the number of threads. Results that were computed after that one are dropped. make() must be thread-safe.
 template <class Make, class Take>
 void in_order(int threads, std::size_t count, const Make& make, Take take) {
   const auto wave = static_cast<std::size_t>(std::max(1, threads));

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <cstdint>
+#include <iterator>
+#include <utility>
 
 namespace ls::render {
 
@@ -24,6 +26,27 @@ struct WorkCounters {
   std::uint64_t lens = 0;               // aperture samples
   std::uint64_t shadow_rays = 0;
 };
+
+// The counters and their names, in the order in which they are printed.
+inline constexpr std::pair<const char*, std::uint64_t WorkCounters::*> kWorkCounters[] = {
+    {"shadow_rays", &WorkCounters::shadow_rays},
+    {"density", &WorkCounters::density},
+    {"macro_cells", &WorkCounters::macro_cells},
+    {"phase", &WorkCounters::phase},
+    {"transmittance", &WorkCounters::transmittance},
+    {"glow", &WorkCounters::medium_emission},
+    {"equiangular", &WorkCounters::equiangular},
+    {"boundary_rays", &WorkCounters::boundary_rays},
+    {"veils", &WorkCounters::null_transmission},
+    {"texels", &WorkCounters::texels},
+    {"instances", &WorkCounters::instances},
+    {"user_geometry", &WorkCounters::user_geometry},
+    {"light_tree", &WorkCounters::light_tree},
+    {"environment_map", &WorkCounters::environment_map},
+    {"lens", &WorkCounters::lens},
+};
+static_assert(sizeof(WorkCounters) == std::size(kWorkCounters) * sizeof(std::uint64_t),
+              "add the new counter here");
 
 #ifdef LIGHTSHAFT_COUNT
 inline WorkCounters& work_counters() {

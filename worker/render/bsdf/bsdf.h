@@ -21,8 +21,8 @@
 #include "common/base/error.h"
 #include "common/scene/scene.h"
 #include "worker/render/math/math.h"
+#include "worker/render/texture/surface_attributes.h"
 #include "worker/render/texture/texture.h"
-#include "worker/render/texture/uv_point.h"
 
 namespace ls::render {
 

@@ -1,6 +1,9 @@
 // Perspective (with optional thin lens), orthographic and spherical cameras, in Mitsuba's conventions: the
-// camera looks along its +z axis, and its +x axis points to the left of the image.
+// camera looks along its +z axis, and its +x axis points to the left of the image. Also the pixel filters.
 #pragma once
+
+#include <cmath>
+#include <vector>
 
 #include "common/image/frame/frame.h"
 #include "common/scene/scene.h"
@@ -8,6 +11,25 @@
 #include "worker/render/texture/texture.h"
 
 namespace ls::render {
+
+// Returns the tangent of half the horizontal field of view. `fov` is the field of view in degrees along
+// `axis`; `aspect` is the width of the frame over its height.
+inline double tan_half_fov_x(double fov, FovAxis axis, double aspect) {
+  const double t = std::tan(fov * (kPiD / 360));
+  switch (axis) {
+    case FovAxis::x:
+      return t;
+    case FovAxis::y:
+      return t * aspect;
+    case FovAxis::smaller:
+      return aspect > 1 ? t * aspect : t;
+    case FovAxis::larger:
+      return aspect > 1 ? t : t * aspect;
+    case FovAxis::diagonal:
+      return t * aspect / std::sqrt(1 + aspect * aspect);
+  }
+  return t;
+}
 
 struct CameraRay {
   V3 o, d;      // d has unit length
@@ -54,6 +76,23 @@ class Camera {
   double per_pixel_x_ = 1, per_pixel_y_ = 1;  // size of a pixel as a share of the frame
   const TextureTable* textures_ = nullptr;    // set only with an aperture_scale
   TextureIndex aperture_scale_;
+};
+
+// Applies a reconstruction filter by importance sampling. Each sample belongs to one pixel, and its position
+// is drawn from the filter around that pixel; so no sample contributes to the pixels of another tile (Ernst,
+// Stamminger, Greiner 2006). The scene reader rejects filters with negative lobes.
+class PixelFilter {
+ public:
+  PixelFilter() = default;
+  explicit PixelFilter(const ReconstructionFilter& filter);
+  // Returns the offset of a sample from the pixel's centre along one axis, in pixels, for the random number u
+  // in [0, 1).
+  double offset(float u) const;
+
+ private:
+  enum class Kind { box, tent, table } kind_ = Kind::box;
+  double radius_ = .5;
+  std::vector<double> cdf_;  // table: cdf of the filter on [-radius, radius] in cdf_.size() - 1 equal steps
 };
 
 }  // namespace ls::render

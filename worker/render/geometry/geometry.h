@@ -16,7 +16,6 @@
 #include "worker/render/math/math.h"
 #include "worker/render/math/transform.h"
 #include "worker/render/texture/surface_attributes.h"
-#include "worker/render/texture/uv_point.h"
 
 namespace ls::render {
 

@@ -30,7 +30,10 @@ constexpr AovSet kOfLight = AovSet{}
 constexpr AovSet kOfGuide = AovSet{}.with(Aov::denoising_albedo).with(Aov::denoising_normal);
 static_assert((kOfSurface.bits() ^ kOfLight.bits() ^ kOfGuide.bits()) == (1u << kAovs) - 1);
 
-V2 uv_of_sphere(const Geometry& g, const SurfaceHit& hit) {
+// Returns the uv of a hit. On spheres it is computed from the position, because SurfaceHit::uv is set there
+// only if a material or a light needs it.
+V2 uv_of(const Geometry& g, const SurfaceHit& hit) {
+  if (hit.primitive.kind != PrimitiveId::Kind::sphere) return hit.uv;
   const Sphere& s = g.spheres[hit.primitive.index];
   V3d p(hit.p);
   if (hit.primitive.instance != kNone) p = g.instances[hit.primitive.instance].to_local.point(p);
@@ -51,10 +54,6 @@ C3 albedo_of(const World& w, const FirstSurface& first, const SampleStream& stre
 
 }  // namespace
 
-V2 uv_of(const Geometry& g, const SurfaceHit& hit) {
-  return hit.primitive.kind == PrimitiveId::Kind::sphere ? uv_of_sphere(g, hit) : hit.uv;
-}
-
 AovPixel::AovPixel(const World& world)
     : world_(world),
       planes_(planes_of(world.aovs)),
@@ -69,11 +68,9 @@ void AovPixel::begin_pixel() {
   materials_.clear();
 }
 
-void AovPixel::add(Aov aov, double a, double b, double c, std::size_t half) {
+void AovPixel::add(Aov aov, const V3d& v, std::size_t half) {
   Sums& s = sums_[half][static_cast<std::size_t>(aov)];
-  s[0] += a;
-  s[1] += b;
-  s[2] += c;
+  for (std::size_t c = 0; c < 3; ++c) s[c] += v[static_cast<int>(c)];
 }
 
 void AovPixel::end_sample(int x, int y, std::uint64_t sample, bool usable) {
@@ -100,36 +97,31 @@ void AovPixel::add_light() {
   const V3d e = part(LightPart::unscattered), s1 = part(LightPart::surface_once),
             s2 = part(LightPart::surface_again), v1 = part(LightPart::volume_once),
             v2 = part(LightPart::volume_again);
-  const auto put = [&](Aov aov, const V3d& c) { add(aov, c.x, c.y, c.z); };
-  put(Aov::emission, e);
-  put(Aov::direct, e + s1 + v1);
-  put(Aov::indirect, s2 + v2);
-  put(Aov::surface, s1 + s2);
-  put(Aov::volume, v1 + v2);
-  put(Aov::single, v1);
-  put(Aov::multiple, v2);
+  add(Aov::emission, e);
+  add(Aov::direct, e + s1 + v1);
+  add(Aov::indirect, s2 + v2);
+  add(Aov::surface, s1 + s2);
+  add(Aov::volume, v1 + v2);
+  add(Aov::single, v1);
+  add(Aov::multiple, v2);
 }
 
 void AovPixel::add_surface(const FirstSurface& first, const SampleStream& stream, const CameraRay& ray) {
   const SurfaceHit& hit = first.hit;
   const AovSet wanted = world_.aovs;
   hits_ += 1;
-  add(Aov::coverage, 1);
+  add(Aov::coverage, {1, 0, 0});
   const double distance =
       (V3d(hit.p) - V3d(ray.o)).dot(V3d(ray.d)) + double{world_.camera.near_distance(ray.d)};
-  add(Aov::depth, distance / world_.geometry.scale);
-  const V3d p = V3d(hit.p) / world_.geometry.scale + world_.geometry.center;
-  add(Aov::position, p.x, p.y, p.z);
-  add(Aov::normal, hit.shading.n.x, hit.shading.n.y, hit.shading.n.z);
-  add(Aov::geo_normal, hit.ng.x, hit.ng.y, hit.ng.z);
+  add(Aov::depth, {distance / world_.geometry.scale, 0, 0});
+  add(Aov::position, V3d(hit.p) / world_.geometry.scale + world_.geometry.center);
+  add(Aov::normal, V3d(hit.shading.n));
+  add(Aov::geo_normal, V3d(hit.ng));
   if (wanted.has(Aov::uv)) {
     const V2 uv = uv_of(world_.geometry, hit);
-    add(Aov::uv, uv.x, uv.y);
+    add(Aov::uv, {uv.x, uv.y, 0});
   }
-  if (wanted.has(Aov::albedo)) {
-    const C3 a = albedo_of(world_, first, stream, ray.d);
-    add(Aov::albedo, a.x, a.y, a.z);
-  }
+  if (wanted.has(Aov::albedo)) add(Aov::albedo, V3d(albedo_of(world_, first, stream, ray.d)));
   const std::uint32_t instance = hit.primitive.instance;
   if (wanted.has(Aov::shape_id))
     add_id(shapes_, instance == kNone ? world_.shape_ids[hit.surface] : world_.instance_ids[instance]);
@@ -138,9 +130,9 @@ void AovPixel::add_surface(const FirstSurface& first, const SampleStream& stream
 
 void AovPixel::add_guide(const CameraRay& ray, const SampleStream& stream, std::size_t half) {
   const DenoisingGuide guide = PathTracer<kEveryScene>(world_, stream).denoising_guide(ray);
-  if (const C3& a = guide.albedo; is_finite(a)) add(Aov::denoising_albedo, a.x, a.y, a.z, half);
+  if (is_finite(guide.albedo)) add(Aov::denoising_albedo, V3d(guide.albedo), half);
   const V3d& n = guide.normal;
-  if (std::isfinite(n.x + n.y + n.z)) add(Aov::denoising_normal, n.x, n.y, n.z, half);
+  if (std::isfinite(n.x + n.y + n.z)) add(Aov::denoising_normal, n, half);
 }
 
 void AovPixel::add_id(std::vector<IdSlot>& seen, float id) {

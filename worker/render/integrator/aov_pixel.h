@@ -7,16 +7,11 @@
 #include <vector>
 
 #include "common/image/aov/id_slots.h"
-#include "worker/render/integrator/light_components.h"
 #include "worker/render/integrator/path_tracer.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {
-
-// Returns the uv of a hit. On spheres it is computed from the position, because SurfaceHit::uv is set there
-// only if a material or a light needs it.
-V2 uv_of(const Geometry& geometry, const SurfaceHit& hit);
 
 class AovPixel {
  public:
@@ -34,7 +29,7 @@ class AovPixel {
 
  private:
   using Sums = std::array<double, 3>;
-  void add(Aov aov, double a, double b = 0, double c = 0, std::size_t half = 0);
+  void add(Aov aov, const V3d& v, std::size_t half = 0);
   void add_light();
   void add_surface(const FirstSurface& first, const SampleStream& stream, const CameraRay& ray);
   void add_guide(const CameraRay& ray, const SampleStream& stream, std::size_t half);

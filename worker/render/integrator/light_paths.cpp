@@ -1,5 +1,6 @@
 #include "worker/render/integrator/light_paths.h"
-#include "worker/render/integrator/sharing_block.h"
+
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +9,7 @@
 #include <utility>
 
 #include "worker/render/base/in_order.h"
-#include "worker/render/integrator/camera_segment_nee.h"
+#include "worker/render/integrator/segment_nee.h"
 #include "worker/render/integrator/variant.h"
 #include "worker/render/math/processor.h"
 #include "worker/render/world/aim.h"
@@ -29,34 +30,37 @@ constexpr std::uint64_t kPortalPaths = 1 << 14;
 constexpr std::uint64_t kLearningPathsPerPixel = 16;
 // Paths are traced in batches of this many, on several threads.
 constexpr std::uint64_t kLearningBatch = 1 << 10;
-// Learning stops after this many batches if they show that connections or portals do not pay (light_paths.h).
+// After this many batches learning stops if they show that the technique (connections or portals) does not
+// pay (light_paths.h).
 constexpr std::uint64_t kFirstBatches = 4;
-// Portals are tried if at most the share kLeftThatPays of the directions that BSDFs and phase functions
-// sample leads to the sky. Portals pay if the noise of some pixels is more than kPortalGainThatPays times as
-// high without portals as with them. In a scene in which next-event estimation had no light to sample before,
-// portals add shadow rays, so the factor there is kShadowGainThatPays.
+// Portals are tried if, of all directions that BSDFs and phase functions sample, at most the share
+// kLeftThatPays leads to the sky. Portals pay if the noise of some pixels is more than kPortalGainThatPays
+// times as high without portals as with them. If next-event estimation had no light to sample before, portals
+// add shadow rays; then the factor is kShadowGainThatPays.
 constexpr double kLeftThatPays = .125;
 constexpr double kPortalGainThatPays = 1.1;
 constexpr double kShadowGainThatPays = 2;
 // Portals are learned from paths of at most this many segments.
 constexpr int kLongestPortalPath = 4;
 // The choice of lights by place is learned from camera paths of at most kLongestLocalLightPath segments,
-// which sample every light at each vertex. There are at most kLocalLightPaths such paths, and fewer with many
-// lights (kLocalLightLooks). The choice is tried if next-event estimation at these vertices has a mean square
-// of more than kSpreadThatPays times the square of its mean. It pays if the noise of the direct light of some
-// pixels is more than kLocalGainThatPays times as high without it. This limit is high for two reasons:
-// samples take up to 1.5 times as long, because a light that reaches the vertex costs more time than one that
-// does not; and the few pixels of a pilot hardly show the edges of small patches of light.
+// which sample every light at each vertex. There are at most kLocalLightPaths such paths, and fewer if there
+// are many lights (kLocalLightLooks). The choice is tried if, over the vertices of the first paths, the
+// estimates of direct light have a mean square of more than kSpreadThatPays times the square of their mean.
+// It pays if the noise of the direct light of some pixels is more than kLocalGainThatPays times as high
+// without it. This limit is high for two reasons: samples take up to 1.5 times as long, because a light that
+// reaches the vertex costs more time than one that does not; and the few pixels of a pilot hardly show the
+// edges of small patches of light.
 constexpr std::uint64_t kLocalLightPaths = 1 << 14;
-constexpr std::uint64_t kLocalLightLooks = 1 << 17;  // lights times paths
-constexpr std::uint64_t kLocalLightTrial = 4;        // 1 / (share of the paths that decide if it is tried)
+constexpr std::uint64_t kLocalLightLooks = 1 << 17;  // limit of lights times paths
+constexpr std::uint64_t kLocalLightTrial = 4;        // one path in this many decides if it is tried
 constexpr int kLongestLocalLightPath = 6;
 constexpr double kSpreadThatPays = 1.2;
 constexpr double kLocalGainThatPays = 3;
 // A batch ends after this many vertices, since paths may be long.
 constexpr double kLearningVertices = 1 << 15;
-// A batch also ends after this many rays and boundaries on shadow rays: between two vertices a path may pass
-// any number of boundaries. In few scenes do paths pass 1,024 each, as those of such a batch.
+// A batch also ends after this many rays, counting also the boundaries that shadow rays pass: a path may pass
+// any number of boundaries between two vertices. The limit is 1,024 for each path of a batch, which paths
+// exceed in few scenes.
 constexpr std::uint64_t kLearningRaysOfBatch = 1 << 20;
 constexpr std::uint64_t kSunRays = 1 << 14;  // rays of the sun for one set of light vertices
 // Number of rays from which the mean number of light vertices per ray of the sun is estimated.
@@ -83,7 +87,7 @@ constexpr std::uint64_t kSunRaySeed = 0x5eed0f5a1;
 // The paths of one learning pass and the data that they record. All passes record where paths find the sun
 // (SunMap).
 struct Lesson {
-  bool sky = false, lights = false;  // record the light of the sky, and that of each light
+  bool sky = false, lights = false;  // whether to record the light of the sky, and that of each light source
   std::uint64_t first_path = 0, batch = kLearningBatch;
 };
 
@@ -181,11 +185,7 @@ LightVertices trace_with(const World& w, std::uint64_t seed, std::uint32_t set, 
 
 constexpr Features kSurfaces{.passing = true, .connected = true};
 constexpr Features kMedia{.media = true, .grids = true, .passing = true, .connected = true};
-constexpr Features kAimed = [] {
-  Features f = kMedia;
-  f.aimed = true;
-  return f;
-}();
+constexpr Features kAimed = kMedia.with(&Features::aimed);
 
 template <class GoOn>
 Learned learn(const World& w, std::uint64_t paths, int threads, const GoOn& go_on,
@@ -232,10 +232,10 @@ LightVertices::Look look_of(const World& w, const LightVertex& y) {
     for (const V3& to : {V3(.5f, .5f, z), V3(-.5f, .5f, z), V3(.5f, -.5f, z), V3(-.5f, -.5f, z)})
       even += mean_component(eval(to).f_cos) * cosine / (4 * std::abs(z));
     look.even = light * std::max(even, kLeastReflected * cosine);
-    // A Henyey-Greenstein lobe around the mirrored direction stands for the glossy part of the BSDF; there
-    // both parts together are as high as the BSDF. The lobe is as wide as that of the BSDF for light along
-    // the normal. For light at other angles a microfacet lobe has this width in one direction, and is
-    // narrower by the cosine in the other.
+    // A Henyey-Greenstein lobe around the mirrored direction stands for the glossy part of the BSDF. In the
+    // mirrored direction the sum of this lobe and the even part is as high as the BSDF. The lobe is as wide
+    // as that of the BSDF for light along the normal. For light at other angles a microfacet lobe has this
+    // width in one direction, and is narrower by the cosine in the other.
     const V3 mirrored(-to_light.x, -to_light.y, to_light.z);
     const BsdfEval at_peak = eval(mirrored);
     const float peak = mean_component(at_peak.f_cos), q = at_peak.pdf * cosine / kInvFourPi;
@@ -252,6 +252,13 @@ LightVertices::Look look_of(const World& w, const LightVertex& y) {
   return look;
 }
 
+namespace {
+
+// If connections to light vertices pay or the settings request them, sets `sun`, `sun_map`, `faint`,
+// `connections_per_ray` and Features::connected of a world that is otherwise complete, lowers its `rr_depth`,
+// and calls aim() again. The result depends only on the scene, the depth limits and the size of the full
+// frame: not on the seed, the number of samples, a crop or the number of threads. The integrator must be
+// `volpath` or `path`.
 void learn_connections(const IntegratorSettings& settings, int threads, World& w) {
   if (settings.light_vertices < 0 || !w.depth_allows(2)) return;
   // Light vertices do not record how many null-transmitting surfaces the light has passed
@@ -275,15 +282,13 @@ void learn_connections(const IntegratorSettings& settings, int threads, World& w
   w.sun_map = std::move(learned.learner.map);
   w.faint = kFaintConnection * static_cast<float>(learned.radiance / static_cast<double>(learned.paths));
   w.need.connected = true;
-  aim(settings, w);  // again, since with connections points on camera segments pay more often
+  aim(settings, w);  // again: with connections, points on camera segments pay more often
   w.rr_depth = std::min(w.rr_depth, kConnectedRoulette);
   const FlushDenormals mode;
   const std::size_t count = trace(w, kLearningSeed, 0, kLearningRays).count();
   w.connections_per_ray =
       float{LightVertices::kCandidates * kLearningRays} / static_cast<float>(std::max<std::size_t>(count, 1));
 }
-
-namespace {
 
 constexpr int kLongestPilot = 64;  // segments; paths in a white and dense medium have thousands
 
@@ -298,8 +303,8 @@ std::unique_ptr<const Portals> find_portals(bool in_any_case, int threads, World
   return portals->any() ? std::move(portals) : nullptr;
 }
 
-}  // namespace
-
+// Sets the portals of a world's lights if they pay or the settings request them. Depends on the same data,
+// and requires the same integrators, as learn_connections().
 void learn_portals(const IntegratorSettings& settings, int threads, World& w) {
   const bool sky = w.lights.map() || !is_black(w.lights.constant_environment());
   const bool in_any_case = settings.sky_portals > 0;
@@ -310,7 +315,7 @@ void learn_portals(const IntegratorSettings& settings, int threads, World& w) {
   const bool adds_rays = !w.lights.can_sample(), may_share = w.lights.single_environment_sample();
   const auto without = in_any_case ? std::vector<PilotPixel>{} : pilot_pixels(w, kLongestPilot, threads);
   w.lights.set_portals(std::move(portals));
-  aim(settings, w);  // again, since a constant environment may now be a light that is sampled
+  aim(settings, w);  // again: next-event estimation may now sample a constant environment
   if (in_any_case) return;
   const auto with = pilot_pixels(w, kLongestPilot, threads);
   const double gain = adds_rays ? kShadowGainThatPays : kPortalGainThatPays;
@@ -319,6 +324,8 @@ void learn_portals(const IntegratorSettings& settings, int threads, World& w) {
   aim(settings, w);
 }
 
+// Enables the choice of lights by place if it pays or the settings request it. Depends on the same data, and
+// requires the same integrators, as learn_connections().
 void learn_local_lights(const IntegratorSettings& settings, int threads, World& w) {
   const bool in_any_case = settings.local_lights > 0;
   if (settings.local_lights < 0 || !w.lights.can_be_local() || !w.depth_allows(1) || !can_learn(w)) return;
@@ -350,13 +357,6 @@ void learn_local_lights(const IntegratorSettings& settings, int threads, World& 
   if (!visits.places.empty()) w.lights.set_local(&visits);
 }
 
-LightVertices trace_light_vertices(const World& w, std::uint64_t set) {
-  const FlushDenormals mode;
-  return trace(w, w.seed, static_cast<std::uint32_t>(set), kSunRays);
-}
-
-namespace {
-
 // Sets up shadow roulette and path splitting, which need the mean radiance of the image, in scenes with
 // grids.
 void learn_roulette(const IntegratorSettings& settings, World& w) {
@@ -368,6 +368,11 @@ void learn_roulette(const IntegratorSettings& settings, World& w) {
 }
 
 }  // namespace
+
+LightVertices trace_light_vertices(const World& w, std::uint64_t set) {
+  const FlushDenormals mode;
+  return trace(w, w.seed, static_cast<std::uint32_t>(set), kSunRays);
+}
 
 Result<std::shared_ptr<const World>> build_world(const Scene& scene, const RenderSettings& settings,
                                                  const AssetFiles& files, int threads) {
@@ -382,6 +387,11 @@ Result<std::shared_ptr<const World>> build_world(const Scene& scene, const Rende
     if ((*world)->need.grids && !(*world)->need.connected) learn_roulette(scene.integrator, **world);
   }
   return std::shared_ptr<const World>(std::move(*world));
+}
+
+std::shared_ptr<void> limit_threads(int threads) {
+  const auto most = static_cast<std::size_t>(std::max(1, threads));
+  return std::make_shared<tbb::global_control>(tbb::global_control::max_allowed_parallelism, most);
 }
 
 }  // namespace ls::render

@@ -10,7 +10,7 @@
 #include <cmath>
 
 #include "worker/render/base/work_counters.h"
-#include "worker/render/integrator/lamp_flight.h"
+#include "worker/render/integrator/equiangular.h"
 #include "worker/render/media/emission.h"
 #include "worker/render/world/world.h"
 
@@ -31,9 +31,10 @@ auto PathTracer<F, Light>::fly_through(const Medium& medium, const SurfaceHit* e
   const float t_max = end ? ray_.length_to(*end) : reach;
   const Segment segment{t_max, ray_.lead(), end};
   if constexpr (kFliesFirst) {
-    // The flight that was sampled before the ray was traced is cut off at t_max. A flight that is sampled
-    // anew up to t_max may differ from it, because t_max can shorten a dense cell so that a different
-    // algorithm is used there (kExactDepth), and a choice between the two flights would be biased.
+    // The flight that was sampled before the ray was traced is kept, and only cut off at t_max. A new flight
+    // up to t_max could differ from it: t_max may shorten a dense cell, and then another algorithm is used in
+    // the cell (kExactDepth). To replace by new flights only those flights that leave the clear region would
+    // be biased.
     if (flown)
       return collide(medium, segment, {}, flown->scattered && flown->t < t_max ? *flown : Flight{.t = t_max});
   }
@@ -190,8 +191,8 @@ auto PathTracer<F, Light>::fly_through_several(const SurfaceHit* end, float reac
   return scatter_in(*met);
 }
 
-// Next-event estimation at a vertex p in a medium, where d is the direction of travel before the scattering.
-// It is weighted only against sampling of the phase function, not against equi-angular sampling.
+// Next-event estimation at a vertex p in a medium, without equi-angular points on the segment: it is weighted
+// against phase-function sampling alone. d is the direction of travel before the scattering.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::light_vertex(const Medium& medium, const V3& p, const V3& d) {
   const Lights& lights = world_.lights;
@@ -304,8 +305,8 @@ void PathTracer<F, Light>::stand(const SurfaceInfo& s, bool outside, bool throug
 }
 
 // Returns the primitives that coincide with the hit one, for a ray that arrives along `from` and continues
-// along w. They are found by a short ray. It begins in front of everything that may coincide with the
-// surface, but not behind the original ray's origin, and ends where the path continues.
+// along w. A short ray finds them: it begins in front of everything that may coincide with the surface, but
+// not behind the original ray's origin, and ends at the origin of the continued ray.
 template <Features F, template <Features> class Light>
 CoincidentHits PathTracer<F, Light>::others_at(const SurfaceHit& hit, const V3& from, const V3& w) const {
   const V3 back = offset_point(hit, -w) - hit.p;
@@ -316,9 +317,9 @@ CoincidentHits PathTracer<F, Light>::others_at(const SurfaceHit& hit, const V3& 
   return all;
 }
 
-// The media after crossing the hit surface and all null surfaces that coincide with it. All boundaries are
-// left before any is entered, so that a path is never counted as inside more boundaries than there are: cells
-// of one mesh that share a wall are one boundary.
+// The media after crossing the hit surface and all null surfaces that coincide with it. All boundaries that
+// the path leaves are handled before those that it enters. Otherwise the path would for a moment be inside
+// more boundaries than there are at any point: two cells of one mesh that share a wall are one boundary.
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::through_all(const SurfaceHit& hit, const V3& w, const V3& from, Within in) const
     -> Within {

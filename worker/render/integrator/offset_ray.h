@@ -70,8 +70,8 @@ struct OffsetRay {
     const float share = dot(from_surface, offset) / dot(offset, offset);
     return share < 1 ? offset * (1 - share) : V3(0);
   }
-  // For a ray that is directed at the surface from which its origin was moved away, but that does not reach
-  // it: returns the displacement that puts the point at distance t as far from the surface's plane as
+  // For a ray that points back at the surface from which its origin was moved away, but ends before it (lead
+  // < 0): returns the displacement that puts the point at distance t as far from the surface's plane as
   // `origin` is.
   V3 remaining_lead(float t) const {
     const V3 offset = origin - start;

@@ -31,7 +31,7 @@
 
 namespace ls::render {
 
-// Records the path's current vertex as its first vertex if it is at depth 1; else does nothing.
+// If the path's current vertex is at depth 1, records it as the path's first vertex.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::begin_sharing(const SurfaceHit* hit, const Medium* medium) {
   FirstVertex& first = sharing_.first;
@@ -107,8 +107,8 @@ void PathTracer<F, Light>::go_on_as_tail(const V3& w, const C3& weight) {
   beta_ = C3(1);
 }
 
-// Keeps light that the path found straight from a light source when it left its second vertex. Next-event
-// estimation finds it with the density `pdf`.
+// Stores the light of a light source that the ray from the path's second vertex hit. Next-event estimation
+// would find this light with the density `pdf`.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::keep_emitted(const C3& emitted, float pdf) {
   sharing_.tail.emitted = beta_ * emitted;
@@ -133,8 +133,8 @@ BsdfEval PathTracer<F, Light>::scattered_at_first(const V3& wi) {
   return {known->f_cos * cosine, known->pdf * cosine};
 }
 
-// Computes how the vertex y of a tail looks from this path's first vertex x. `own` is true for the path's own
-// tail, whose vertex y is visible from x.
+// Computes how the vertex y of a tail looks from this path's first vertex x (struct Look). `own` is true for
+// the path's own tail, whose vertex y is visible from x.
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::look_at(const SharedTail& tail, bool own) -> Look {
   Look look;
@@ -272,8 +272,9 @@ template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::share(std::span<PathTracer* const> group) {
   struct Seen {
     Look look;
-    C3 lit, onward;  // BSDF or phase function towards this path, for light from the light source and from the
-                     // tail
+    // BSDF or phase function at the tail's vertex, towards this path: for light from the light source and for
+    // light that arrives along the tail
+    C3 lit, onward;
   };
   boost::container::static_vector<Seen, kMostSharing> seen(group.size());
   const auto onward_pdf = [](const BsdfEval& eval) { return is_black(eval.f_cos) ? 0 : eval.pdf; };

@@ -5,8 +5,8 @@
 // relative to that of the hero. A contribution is beta * light / mean(density): the balance heuristic over
 // channels. Direct light is found both by BSDF or phase-function sampling and by next-event estimation,
 // combined by the balance heuristic. At surfaces next-event estimation starts from the path's own vertices.
-// In media next-event estimation is a strategy, `Light` (vertex_nee.h, the default; segment_nee.h;
-// camera_segment_nee.h), with these members:
+// In media next-event estimation is a strategy, `Light` (VertexNee, the default; SegmentNee;
+// CameraSegmentNee), with these members:
 //   Plan ahead(path, medium, segment)               called before each flight through a medium: adds light
 //                                                   scattered once, anywhere on the segment;
 //   Plan::matters()                                 true if vertices on this segment need a Vertex;
@@ -28,11 +28,9 @@
 #include <type_traits>
 
 #include "worker/render/base/features.h"
-#include "worker/render/integrator/light_components.h"
 #include "worker/render/integrator/mis.h"
 #include "worker/render/integrator/offset_ray.h"
-#include "worker/render/integrator/shared_tail.h"
-#include "worker/render/integrator/termination.h"
+#include "worker/render/integrator/path_records.h"
 #include "worker/render/integrator/vertex_nee.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/medium_stack.h"
@@ -41,29 +39,31 @@
 
 namespace ls::render {
 
-struct SampleOutcome {
-  C3 radiance{0, 0, 0};
-  // The first reason to reject the sample regardless of its radiance; none if there is no such reason.
-  HealthCause cut_off = HealthCause::none;
-  std::uint64_t majorant_violations = 0;
-
-  void reject(HealthCause cause) {
-    if (cut_off == HealthCause::none) cut_off = cause;
-  }
-};
-struct FirstSurface {
-  SurfaceHit hit;
-  // 1 / (1 - probability of passing straight through): the weight that compensates for the random decision to
-  // be scattered.
-  float not_passed = 1;
-};
-
-// Albedo and normal that guide a denoiser: one sample of each of the AOVs denoising_albedo and
-// denoising_normal.
-struct DenoisingGuide {
-  C3 albedo{0, 0, 0};
-  V3d normal{0, 0, 0};
-};
+// The largest numbers of rays of one path and of surfaces on one shadow ray. A sample that exceeds either is
+// rejected and counted. Paths subject to forced roulette (below) reach the limit with probability e^-60.
+inline constexpr int kMaxSegments = 1 << 20;
+inline constexpr int kMaxShadowSegments = 1 << 16;
+// From kForcedRouletteDepth scatterings on, roulette may end even paths that lose no energy; otherwise
+// nothing would end a path in a closed white room. After n scatterings the survival probability is n / (n +
+// 1), so a share of 1024 / n of these paths reaches n scatterings, and weights grow only linearly. A constant
+// survival probability q would have infinite variance in dense media: in a white slab of optical depth tau, a
+// share exp(-n pi^2 / (3 (tau + 1.42)^2)) of the light is still inside after n scatterings, and the variance
+// is finite only where 1 - q is below the rate of this decay, pi^2 / (3 (tau + 1.42)^2). Beyond
+// kLastRouletteDepth q is constant, as otherwise the length of paths in a white room would have no mean; the
+// variance is then finite up to tau = 230, where a path has 5500 vertices on average.
+inline constexpr int kForcedRouletteDepth = 1024;
+inline constexpr int kLastRouletteDepth = 1 << 16;
+inline constexpr float kLastSurvival = 1 - 0x1p-14f;
+// In media that lose no light, light subpaths would be so long that their vertices fill the memory. So from
+// kMostUnforced scatterings on, a light subpath survives each scattering with probability kForcedLight at
+// most.
+inline constexpr int kMostUnforced = 8;
+inline constexpr float kForcedLight = .5f;
+constexpr float forced_survival(int depth) {
+  if (depth < kForcedRouletteDepth) return 1;
+  if (depth >= kLastRouletteDepth) return kLastSurvival;
+  return static_cast<float>(depth) / static_cast<float>(depth + 1);
+}
 
 enum class Collision : std::uint8_t {
   escaped,    // the path reached the end of the segment
@@ -73,33 +73,6 @@ enum class Collision : std::uint8_t {
 
 template <Features F>
 class SegmentNee;
-
-// Data for paths of a scene with Features::connected, in addition to the world.
-struct Connections {
-  const LightVertices* vertices = nullptr;  // null: paths are not connected
-  // Records, in learning paths, where they find light that connections could find, too. `learner` is null for
-  // other paths.
-  struct Learner {
-    SunMap map;
-    double light = 0;     // the sum of the light found
-    double vertices = 0;  // number of vertices at which the sun could be found
-    double lit = 0;       // estimated number of those vertices at which the sun was found
-    // True if a ray towards the sun met other media than a ray from the sun would. The scene then declares
-    // different media on the two sides of a boundary, or the medium outside is not a vacuum.
-    bool media_differ = false;
-    bool keeps_sky = false;  // true if the light of the sky that vertices found is kept in `sky`
-    std::vector<Portals::Found> sky;
-    double scatterings = 0;     // number of vertices
-    double left = 0;            // number of those that the path left towards the sky
-    bool keeps_lights = false;  // true if each vertex samples all lights and keeps their light in `lights`
-    LightVisits lights;
-
-    void found_sky(const V3& p, const V3& d, float found) {
-      if (keeps_sky && found > 0 && std::isfinite(found)) sky.push_back({p, d, found});
-    }
-  };
-  Learner* learner = nullptr;
-};
 
 template <Features F, template <Features> class Light = VertexNee>
 class PathTracer {
@@ -125,7 +98,7 @@ class PathTracer {
   static void sort_to_share(std::span<PathTracer*> paths);
   static void share(std::span<PathTracer* const> group);
   const SampleOutcome& outcome() const { return outcome_; }
-  // With F.connected: the number of rays of the path so far, and of boundaries that its shadow rays passed.
+  // With F.connected: the number of the path's rays so far, plus the boundaries that its shadow rays passed.
   std::uint64_t rays() const { return static_cast<std::uint64_t>(segment_) + boundaries_; }
 
  private:
@@ -157,8 +130,8 @@ class PathTracer {
   // Follows the path from its current vertex to its end. The first ray of the path ends at t_max.
   void go_on(float t_max);
   // Samples a free flight up to the surface hit at `end`, or, if `end` is null, up to the distance `reach`.
-  // If the flight was sampled before the ray was traced (kFliesFirst), `flown` is this flight, whose length
-  // was not limited.
+  // If the flight was sampled before the ray was traced (kFliesFirst), `flown` is this flight, sampled
+  // without an upper limit.
   Step fly(const SurfaceHit* end, float reach, const std::optional<Flight>& flown);
   Step fly_through(const Medium& medium, const SurfaceHit* end, float reach,
                    const std::optional<Flight>& flown);
@@ -336,9 +309,9 @@ class PathTracer {
   float eta_scale_ = 1;  // cancels the radiance scaling of refraction in Russian roulette
   int hero_ = 0;
   int depth_ = 0;                 // scatterings so far
-  int passed_ = 0;                // null boundaries and null transmissions so far
-  std::uint64_t boundaries_ = 0;  // with F.connected: those that shadow rays passed
-  int segment_ = 0;               // number of rays so far, including those after null crossings
+  int passed_ = 0;                // null boundaries and null-transmitting surfaces passed so far
+  std::uint64_t boundaries_ = 0;  // with F.connected: number of boundaries that shadow rays passed
+  int segment_ = 0;               // number of rays so far; behind each passed surface a new one begins
   Within medium_;
   bool looked_for_sky_ = false;   // true if the first vertex sampled a second direction (look_for_sky)
   bool first_in_medium_ = false;  // with F.split: true if the first scattering was in a medium
@@ -441,8 +414,8 @@ void PathTracer<F, Light>::go_on(float t_max) {
   outcome_.majorant_violations += counters_.majorant_violations;
 }
 
-// Passes every index-matched surface, and each null-transmitting one with its probability. The random numbers
-// are those of trace() for the same ray, as long as both hit the same surfaces.
+// The path passes every index-matched surface, and each null-transmitting one with its probability. It uses
+// the random numbers of trace() for the same ray, as long as both hit the same surfaces.
 template <Features F, template <Features> class Light>
 std::optional<FirstSurface> PathTracer<F, Light>::first_surface(const CameraRay& ray) {
   ray_ = {ray.o, ray.o, ray.d};
@@ -500,8 +473,8 @@ DenoisingGuide PathTracer<F, Light>::denoising_guide(const CameraRay& ray) {
     const auto s = world_.bsdfs.sample(surface.bsdf, hit.uv_point(), hit.shading.to_local(-ray_.d), g.u(2),
                                        {g.u(0), g.u(1)});
     if (!s) break;
-    // Because refraction scales radiance, the weight has the factor 1 / eta^2. This factor is removed, since
-    // it is no property of the surface behind.
+    // A refracted sample's weight contains 1 / eta^2, by which refraction scales radiance. This factor is
+    // removed, since it is no property of the surface behind.
     beta_ *= s->weight * (s->transmitted ? s->eta * s->eta : 1.f);
     if (!s->delta) {
       guide.albedo += beta_;
@@ -636,8 +609,8 @@ auto PathTracer<F, Light>::scatter_on_surface(const SurfaceHit& hit) -> Step {
     last_.ng = hit.ng;
     last_.sum = densities_sum([&] { return world_.bsdfs.eval(surface.bsdf, hit.uv_point(), s->wi, wo).pdf; });
   }
-  // The medium is set for reflected rays too: the media on the two sides are those that the scene declares,
-  // as for next-event estimation.
+  // Reflected rays too get the medium that the surface declares for their side, as shadow rays do. It may
+  // differ from the medium in which the path arrived.
   if constexpr (F.media) medium_ = beyond(hit, surface, w, ray_.d, medium_);
   ray_.leave(hit, w);
   return {Collision::scattered, g.u(3)};

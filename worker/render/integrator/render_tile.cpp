@@ -1,15 +1,16 @@
 #include "worker/render/render.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
 #include <map>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "worker/render/integrator/aov_pixel.h"
 #include "worker/render/integrator/light_paths.h"
-#include "worker/render/integrator/sharing_block.h"
 #include "worker/render/integrator/variant.h"
 #include "worker/render/math/math.h"
 #include "worker/render/math/processor.h"
@@ -18,38 +19,32 @@
 namespace ls::render {
 namespace {
 
-// The variants of the integrators `volpath` and `path`, cheapest first. A variant is the path tracer compiled
-// for one set of features (features.h); the last one has the features of every scene.
-constexpr Variant kVariants[] = {
-    variant<Features{}>("surfaces"),
-    variant<Features{.passing = true}>("surfaces that light passes"),
-    variant<Features{.media = true, .passing = true}>("homogeneous grey media"),
-    variant<Features{.media = true, .chromatic = true, .passing = true}>("homogeneous chromatic media"),
-    variant<Features{.media = true, .grids = true, .passing = true}>("grey grids"),
-    variant<Features{.media = true, .grids = true, .chromatic = true, .passing = true}>("chromatic grids"),
-    variant<kEveryScene>("everything"),
-};
-static_assert(std::end(kVariants)[-1].covers == kEveryScene);
+// The variants of `volpath` and `path` without the features of the lists in variant.h.
+std::span<const Variant> plain_variants() {
+  static const Variant kVariants[] = {
+      variant<Features{}>("surfaces"),
+      variant<Features{.passing = true}>("surfaces that light passes"),
+      variant<Features{.media = true, .passing = true}>("homogeneous grey media"),
+      variant<Features{.media = true, .chromatic = true, .passing = true}>("homogeneous chromatic media"),
+      variant<Features{.media = true, .grids = true, .passing = true}>("grey grids"),
+      variant<Features{.media = true, .grids = true, .chromatic = true, .passing = true}>("chromatic grids"),
+      variant<kEveryScene>("everything"),
+      kSplitVariant,
+  };
+  return kVariants;
+}
 
 std::span<const Variant> variants_for(const World& w) {
   if (w.need.connected) return connected_variants();
   if (w.need.aimed) return aimed_variants();
   if (w.need.reuse) return reuse_variants();
   if (w.need.whitted) return whitted_variants();
-  return w.distant_mis ? distant_variants() : std::span<const Variant>(kVariants);
-}
-const Variant& split_variant(const World& w) {
-  if (w.need.connected) return kConnectedSplitVariant;
-  if (w.need.aimed) return kAimedSplitVariant;
-  if (w.need.reuse) return kReuseSplitVariant;
-  if (w.need.whitted) return kWhittedSplitVariant;
-  return w.distant_mis ? kDistantSplitVariant : kSplitVariant;
+  return w.distant_mis ? distant_variants() : plain_variants();
 }
 const Variant& choose(const World& w) {
-  for (const Variant& v : variants_for(w)) {
-    if (v.covers.covers(w.need)) return v;
-  }
-  return split_variant(w);
+  const auto all = variants_for(w);
+  const auto first = std::ranges::find_if(all, [&](const Variant& v) { return v.covers.covers(w.need); });
+  return first == all.end() ? all.back() : *first;
 }
 
 // The largest usable radiance: 2^31 samples of it can be summed in float32. A larger sample is an error of
@@ -230,11 +225,6 @@ TileResult render_tile_with(const World& w, const Variant& v, PixelRect tile, Sa
   return render_tile_with(w, v, tile, range, stop, crumb, AovPixel(w));
 }
 
-// Renders with a variant that computes light components, whether or not the settings request them.
-TileResult render_split(const World& w, const Variant& v, PixelRect tile, SampleRange range) {
-  return render_tile_with(w, v, tile, range, nullptr, nullptr, AovPixel(w));
-}
-
 }  // namespace
 
 TileResult render_tile(const World& world, PixelRect tile, SampleRange samples, const std::atomic<bool>* stop,
@@ -247,25 +237,23 @@ int tile_alignment(const World& world) { return world.need.reuse ? SharingBlock:
 std::vector<std::string> all_variants(const World& world) {
   std::vector<std::string> names;
   for (const Variant& v : variants_for(world)) names.emplace_back(v.name);
-  names.emplace_back(split_variant(world).name);
   return names;
 }
 
 std::vector<std::string> covering_variants(const World& world) {
   std::vector<std::string> names;
   for (const Variant& v : variants_for(world)) {
-    if (v.covers.covers(world.need)) names.emplace_back(v.name);
+    if (v.covers.split || v.covers.covers(world.need)) names.emplace_back(v.name);
   }
-  names.emplace_back(split_variant(world).name);
   return names;
 }
 
 TileResult render_tile_as(const World& world, const std::string& name, PixelRect tile, SampleRange samples) {
   for (const Variant& v : variants_for(world)) {
-    if (name == v.name) return render_tile_with(world, v, tile, samples, nullptr, nullptr);
+    if (name != v.name) continue;
+    if (!v.covers.split) return render_tile_with(world, v, tile, samples, nullptr, nullptr);
+    return render_tile_with(world, v, tile, samples, nullptr, nullptr, AovPixel(world));
   }
-  const Variant& split = split_variant(world);
-  if (name == split.name) return render_split(world, split, tile, samples);
   return {};
 }
 

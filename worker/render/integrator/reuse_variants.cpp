@@ -1,5 +1,5 @@
 // The path tracers with Features::reuse (pixels share the tails of their paths: path_reuse.h), and the
-// decision which worlds use them. They take long to compile, so they have their own source file.
+// decision which worlds use them.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "common/image/error/relative_weights.h"
 #include "worker/render/base/in_order.h"
-#include "worker/render/integrator/sharing_block.h"
+#include "worker/render/integrator/light_paths.h"
 #include "worker/render/integrator/variant.h"
 #include "worker/render/math/processor.h"
 #include "worker/render/render.h"
@@ -16,14 +16,11 @@
 namespace ls::render {
 namespace {
 
-constexpr Features kSharedAndSplit{
-    .media = true, .chromatic = true, .passing = true, .split = true, .reuse = true};
-
 constexpr std::size_t kSharing = kUsualPathReuse;
 
-// The pilot renders some groups of pixels to find out whether sharing pays. It takes as many samples as a
-// quick image has: with fewer samples, more of the noise would come from edges and soft shadows, which
-// sharing does not reduce.
+// A pilot renders some groups of pixels to find out whether sharing pays. It takes kPilotSamples samples per
+// pixel, as many as a quick image has. With fewer samples, a larger part of the noise would come from edges
+// and soft shadows, which sharing does not reduce.
 constexpr std::uint64_t kSharingPilotSeed = 0x5eed0f9a7e;
 constexpr std::uint64_t kPilotGroups = 64;  // at most
 constexpr std::uint64_t kFewestPilotGroups = 4;
@@ -124,27 +121,29 @@ std::span<const Variant> reuse_variants() {
           "homogeneous grey media, tails shared"),
       group_variant<Features{.media = true, .chromatic = true, .passing = true, .reuse = true}>(
           "homogeneous chromatic media, tails shared"),
+      group_variant<Features{
+          .media = true, .chromatic = true, .passing = true, .split = true, .reuse = true}>(
+          "homogeneous media, tails shared, and light in parts"),
   };
   return kVariants;
 }
-
-const Variant kReuseSplitVariant =
-    group_variant<kSharedAndSplit>("homogeneous media, tails shared, and light in parts");
 
 void share_tails(const IntegratorSettings& settings, int threads, World& w) {
   Features need = w.need;
   need.split = false;
   need.reuse = true;
-  // Paths are not shared in scenes with grids (the density of flights has no closed form), or with lamps in
-  // media, light vertices or points on segments (these change how directions are sampled).
+  // Paths are not shared in scenes with grids, where the density of flights has no closed form, nor in scenes
+  // with lamps in media, light vertices or points on camera segments, which change how directions are
+  // sampled.
   const auto variants = reuse_variants();
   const auto sharing =
       std::ranges::find_if(variants, [&](const Variant& v) { return v.covers.covers(need); });
   if (settings.path_reuse < 0 || settings.path_reuse == 1 || sharing == variants.end()) return;
-  // A tail keeps one density of next-event estimation for light that is hit (SharedTail::hit_pdf), so at most
-  // one sampled light may be hit by paths that leave the scene.
+  // A tail keeps only one density of next-event estimation for a light that its path hits
+  // (SharedTail::hit_pdf). So next-event estimation may sample at most one of the lights that paths hit when
+  // they leave the scene.
   if (!w.lights.single_environment_sample() || !w.depth_allows(2)) return;
-  // Russian roulette at the first vertex would have to be a part of the densities
+  // With Russian roulette at the first vertex, the densities would have to contain its probabilities
   if (w.rr_depth < 2) return;
   for (const SurfaceInfo& s : w.geometry.surfaces)
     // Rays from two sides may find different media behind an open boundary. A path may pass several surfaces

@@ -18,16 +18,59 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <optional>
 
 #include "worker/render/integrator/equiangular.h"
 #include "worker/render/integrator/mis.h"
 #include "worker/render/integrator/offset_ray.h"
-#include "worker/render/integrator/truncated_exponential.h"
+#include "worker/render/integrator/vertex_nee.h"
+#include "worker/render/math/random.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/optical_depth.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {
+
+// The exponential density sigma e^(-sigma x) truncated to [0, length], written with expm1 and log1p so that
+// it is accurate for optical depths sigma * length from 1e-20, where it is uniform, to 1e6. The textbook form
+// divides by 1 - exp(-sigma length), which is 0 in float32 for all depths below 6e-8.
+//
+// Below kThinDepth the density is uniform to the last bit. The value is large enough that products with it do
+// not underflow.
+inline constexpr float kThinDepth = 1e-20f;
+
+// The density at x. Requires sigma >= 0, length > 0 (may be infinite) and x in [0, length]. Returns 0 if
+// sigma is 0 and length infinite: then there is no density.
+inline float truncated_pdf(float sigma, float length, float x) {
+  const float depth = sigma * length;
+  if (!(depth > kThinDepth)) return 1 / length;
+  return sigma * std::exp(-sigma * x) / -std::expm1(-depth);
+}
+
+// Samples x with the density truncated_pdf() from v, a uniform random number in (0, 1). The result is not
+// finite if no such density exists.
+inline float truncated_sample(float sigma, float length, double v) {
+  const float depth = sigma * length;
+  if (!(depth > kThinDepth)) return static_cast<float>(v) * length;
+  const double through = std::exp(-double{depth}), rest = -std::expm1(-double{depth});
+  const float x = minus_log(static_cast<float>((1 - v) + v * through), static_cast<float>(v * rest));
+  return std::min(x / sigma, length);
+}
+
+// The truncated exponential mixed with a uniform density. It is used for grids, where the mean density of the
+// cells may be far above the density along the ray. kEvenShare is the probability of the uniform part, in
+// units of 2^-32.
+inline constexpr std::uint32_t kEvenShare = 429496730;  // a tenth
+
+inline float mixed_depth_pdf(float sigma, float length, float x) {
+  constexpr float kEven = static_cast<float>(kEvenShare) * 0x1p-32f;
+  return (1 - kEven) * truncated_pdf(sigma, length, x) + kEven / length;
+}
+inline float mixed_depth_sample(float sigma, float length, std::uint32_t bits) {
+  if (bits < kEvenShare) return static_cast<float>((bits + .5) / kEvenShare * length);
+  return truncated_sample(sigma, length, (bits - kEvenShare + .5) / (0x1p32 - kEvenShare));
+}
 
 template <Features F>
 class SegmentNee {
@@ -45,10 +88,11 @@ class SegmentNee {
     float flight_pdf = 0, t = 0;
     V3 o{0, 0, 0}, d{0, 0, 0};
     float length = 0;
-    float points = 1;  // number of points sampled by depth; one more is sampled by angle
+    float points = 1;  // number of points of the segment sampled by depth; one more is sampled by angle
 
-    // False, because vertices on surfaces have this type too. In media either answer gives the same
-    // probability, since worlds of this strategy never use the light tree there (Lights::use_tree_in_media).
+    // False, because vertices on surfaces have this type too, and their lights are chosen otherwise. In media
+    // either answer gives the same probability, since worlds of this strategy never use the light tree there
+    // (Lights::use_tree_in_media).
     static bool light_chosen_first() { return false; }
     float found_as_light() const { return std::min(points * depth_ratio, kMaxRatio); }
     float found_as_light(const Pivot& pivot) const {
@@ -98,8 +142,9 @@ class SegmentNee {
   static void at_vertex(Path&, const Medium&, const V3&, const V3&) {}
 
  private:
-  // Derives the random numbers of point i of several from those of a single point. Positions are stratified
-  // along the segment; the numbers that choose a light and a point on it advance by constant steps, modulo 1.
+  // Returns the random numbers of point i out of `points`; `g` are those that a single point would use.
+  // Positions are stratified along the segment. The numbers that choose a light, and a point on it, advance
+  // by constant steps, modulo 1.
   static Group point_of(const Group& g, int i, int points) {
     if (points == 1) return g;
     const auto k = static_cast<std::uint32_t>(i), n = static_cast<std::uint32_t>(points);
@@ -194,7 +239,8 @@ class SegmentNee {
     const bool both = choice.has_place && v.by_angle && v.by_depth;
     const float e_depth = at_point.rate * depth_pdf(path, medium, plan, at_point.x);
     if (both && !by_angle) e_angle = v.angle_pdf(pivot);
-    // The expected number of points per unit length, by depth and by the strategy of this point
+    // The expected number of points per unit length at this point: of those sampled by depth, and of those
+    // sampled as this point was
     const float by_depth = e_depth * v.points;
     const float own = by_angle ? e_angle : by_depth;
     if (!(own > 0)) return;
@@ -209,6 +255,59 @@ class SegmentNee {
     const C3 through =
         transmittance<F>(medium, path.ray_.start, path.ray_.d, 0, at_point.t, RandomStream(stream.next()));
     path.add(path.beta_ * scattering * through * arriving * (phase * weight / (light->pdf * own)), true);
+  }
+};
+
+// The strategy with Features::aimed. On segments that start at the camera or at a delta lobe (mirror, smooth
+// glass), light scattered on the segment is estimated at several points of the segment, as by SegmentNee,
+// instead of at the vertex where the free flight ends. On all other segments the default strategy is used
+// (vertex_nee.h).
+//
+// In a thin medium few flights end on the camera's segment, and the few that do carry all of its scattered
+// light: this is most of the noise of light shafts. Points on the segment exist in every sample, and share
+// the cost of the camera ray.
+template <Features F>
+class CameraSegmentNee {
+  using Points = SegmentNee<F>;
+  using Single = VertexNee<F>;
+
+ public:
+  struct Plan {
+    std::optional<typename Points::Plan> points;  // nullopt: the default strategy
+    typename Single::Plan single;
+
+    bool matters() const { return points || single.matters(); }
+  };
+  struct Vertex {
+    bool by_points = false;
+    typename Points::Vertex points;
+    typename Single::Vertex single;
+
+    float found_as_light() const { return by_points ? points.found_as_light() : single.found_as_light(); }
+    float found_as_light(const Pivot& pivot) const {
+      return by_points ? points.found_as_light(pivot) : single.found_as_light(pivot);
+    }
+    bool light_chosen_first() const { return by_points; }
+    bool uses_equiangular(bool is_point) const { return single.uses_equiangular(is_point); }
+    float equiangular_ratio(const Pivot& pivot) const { return single.equiangular_ratio(pivot); }
+  };
+
+  template <class Path>
+  static Plan ahead(Path& path, const Medium& medium, Segment segment) {
+    if (path.last_.delta && path.world_.camera_points > 0)
+      return {Points::ahead(path, medium, segment, path.world_.camera_points), {}};
+    return {std::nullopt, Single::ahead(path, medium, segment)};
+  }
+
+  template <class Path>
+  static Vertex vertex(const Path& path, const Medium& medium, const Plan& plan, float t) {
+    if (plan.points) return {true, Points::vertex(path, medium, *plan.points, t), {}};
+    return {false, {}, Single::vertex(path, medium, plan.single, t)};
+  }
+
+  template <class Path>
+  static void at_vertex(Path& path, const Medium& medium, const V3& p, const V3& d) {
+    if (!path.last_.in_medium.by_points) Single::at_vertex(path, medium, p, d);
   }
 };
 

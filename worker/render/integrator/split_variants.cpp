@@ -1,5 +1,4 @@
-// The path tracers with Features::split of the integrators `volpath` and `volpath_distant_mis`. They take
-// long to compile, so they have their own source file.
+// The path tracers with Features::split of the integrators `volpath` and `volpath_distant_mis`.
 #include "worker/render/integrator/segment_nee.h"
 #include "worker/render/integrator/variant.h"
 

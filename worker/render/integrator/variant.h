@@ -7,16 +7,17 @@
 #include <boost/container/static_vector.hpp>
 #include <cstdint>
 #include <span>
+#include <utility>
 
 #include "worker/render/base/features.h"
 #include "worker/render/integrator/path_tracer.h"
+#include "worker/render/math/random.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {
 
 // Renders one sample. The parameters are the world, the pixel's x and y in the image, the sample's index, the
-// light components and the connections. The last two are used only by variants with Features::split and
-// Features::connected.
+// light components (used only with Features::split) and the connections (only with Features::connected).
 using SampleFn = SampleOutcome (*)(const World&, int, int, std::uint64_t, LightSplit*, Connections);
 
 // Renders sample number `sample` of several pixels, at most kMostTogether. The paths share the light that
@@ -77,23 +78,63 @@ constexpr Variant group_variant(const char* name) {
   return {F, name, nullptr, &group_with<F>};
 }
 
-// The variants of the integrator `volpath` with Features::aimed, cheapest first; the last one has the
-// features of every scene.
+// Pixels whose paths share their tails (path_reuse.h). The full frame is cut into squares (blocks). For each
+// sample the pixels of a block are put in random order and then divided into groups, so that two pixels are
+// rarely in the same group and their errors are nearly independent. Blocks begin at the corner of the full
+// frame and do not depend on tiles, so a tile or crop has the same pixels as the whole image.
+class SharingBlock {
+ public:
+  static constexpr int kSide = 16;  // pixels
+  static_assert(kSide * kSide <= kMostTogether);
+
+  // The block of a pixel of the image.
+  SharingBlock(const World& w, PixelAt pixel) : w_(w) {
+    row_ = (pixel.y + w.origin_y) / kSide;
+    column_ = (pixel.x + w.origin_x) / kSide;
+    width_ = std::min(kSide, w.frame.width - column_ * kSide);
+    height_ = std::min(kSide, w.frame.height - row_ * kSide);
+  }
+  int row() const { return row_; }
+  int column() const { return column_; }
+  std::size_t pixels() const { return static_cast<std::size_t>(width_ * height_); }
+  std::size_t index(PixelAt p) const {
+    return static_cast<std::size_t>((p.y + w_.origin_y - row_ * kSide) * width_ + p.x + w_.origin_x -
+                                    column_ * kSide);
+  }
+  using Pixels = boost::container::static_vector<PixelAt, kMostTogether>;
+  // Returns the pixels of the block in a random order, which depends on the sample. Pixels may be outside the
+  // image if it is a crop.
+  Pixels in_order_of(std::uint64_t sample) const {
+    Pixels order;
+    for (int y = 0; y < height_; ++y)
+      for (int x = 0; x < width_; ++x)
+        order.push_back({column_ * kSide + x - w_.origin_x, row_ * kSide + y - w_.origin_y});
+    const auto corner = (static_cast<std::uint64_t>(row_) << 32) | static_cast<std::uint64_t>(column_);
+    RandomStream dice(combine(combine(combine(w_.seed, kDealing), corner), sample));
+    for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[dice.next() % i]);
+    return order;
+  }
+
+ private:
+  static constexpr std::uint64_t kDealing = 0x6465'616c;  // keys the random numbers
+
+  const World& w_;
+  int row_, column_, width_, height_;
+};
+
+// The variants of an integrator, cheapest first. The last one of each list also computes light components,
+// and has all features that the list supports.
+std::span<const Variant> distant_variants();  // of `volpath_distant_mis`
+std::span<const Variant> whitted_variants();  // of `whitted`, which ignores media
+// Those of `volpath` and `path` with Features::aimed.
 std::span<const Variant> aimed_variants();
-// The variants of the integrator `volpath` with Features::connected, cheapest first. They support only grey
-// media that neither overlap nor emit light.
+// Those with Features::connected. They support only grey media that neither overlap nor emit light.
 std::span<const Variant> connected_variants();
-// The variants of the integrator `volpath_distant_mis`, cheapest first; the last one has the features of
-// every scene.
-std::span<const Variant> distant_variants();
-// The variants in which paths of several pixels share their tails, cheapest first. They support only
-// homogeneous media that neither overlap nor emit light.
+// Those with Features::reuse. They support only homogeneous media that neither overlap nor emit light.
 std::span<const Variant> reuse_variants();
-// The variants of the integrator `whitted`, which ignores media, cheapest first.
-std::span<const Variant> whitted_variants();
-// The variants that also compute light components: one for each list of variants above, and kSplitVariant for
-// `volpath` without the features of these lists. Each has all features that its list supports.
-extern const Variant kSplitVariant, kAimedSplitVariant, kDistantSplitVariant, kConnectedSplitVariant,
-    kReuseSplitVariant, kWhittedSplitVariant;
+
+// The last variants of the lists of `volpath`. They have source files of their own, because the compiler
+// inlines less into the variants of a file if these are among them.
+extern const Variant kSplitVariant, kAimedSplitVariant, kDistantSplitVariant;
 
 }  // namespace ls::render

@@ -25,9 +25,9 @@ void PathTracer<F, Light>::arrive(const Vertex& from, const V3& p, const V3& ng)
     densities_ = SubpathDensities::extended(f, from.pdf, from.sum, ng, from.ng);
 }
 
-// While the choice of lights by place is learned (lights/local_lights.h), estimates the light that each light
-// source adds at `place`, and records the estimates. look_for(choice) does the next-event estimation with one
-// light. At other times the function does nothing.
+// If the path learns the choice of lights by place (lights/local_lights.h), estimates the light that each
+// light source adds at `place`, and records the estimates. look_for(choice) does the next-event estimation
+// with one light.
 template <Features F, template <Features> class Light>
 template <class LookFor>
 void PathTracer<F, Light>::learn_lights(const LightPlace& place, const LookFor& look_for) {
@@ -165,9 +165,9 @@ void PathTracer<F, Light>::connect(const Receiver& x, const V3& start, const Sca
   --depth_;
 }
 
-// A light path is scattered like a camera path: at a surface the next direction is sampled as if the light
-// came from the camera. The weight evaluates the BSDF with the two directions exchanged, because light
-// travels the other way.
+// A light path is scattered like a camera path: at a surface the next direction is sampled as for a camera
+// path that arrives there the same way. The weight evaluates the BSDF with the two directions exchanged,
+// because the light travels the other way.
 template <Features F, template <Features> class Light>
 template <class Keep>
 void PathTracer<F, Light>::follow_light(const SunMap::Ray& from, const Keep& keep) {

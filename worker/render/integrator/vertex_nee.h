@@ -1,12 +1,12 @@
-// The default strategy of path_tracer.h for light in media. It combines (1) next-event estimation at each
-// vertex with (3) next-event estimation at points sampled equi-angularly about the light on each segment. In
-// homogeneous media (3) is used for every light with a position; in grids it is used for point lights, on the
-// part of a segment that has any density (docs/decisions/0011-equi-angular-points-in-grids.md).
+// The default strategy of path_tracer.h for light in media. It combines three strategies: (1) next-event
+// estimation at each vertex, (2) phase-function sampling that hits a light, and (3) next-event estimation at
+// points sampled equi-angularly about the light on each segment. In homogeneous media (3) is used for every
+// light with a position; in grids it is used for point lights, on the part of a segment that has any density
+// (docs/decisions/0011-equi-angular-points-in-grids.md).
 //
-// Strategy (2) is phase-function sampling that hits a light. At distance t on a segment, (1) and (2) sample t
-// with the free-flight density f(t), and (3) with the equi-angular density e(t). Let p_l and p_s be the
-// solid-angle densities of light sampling and phase-function sampling. The balance-heuristic weights are
-// proportional to (1) f p_l, (2) f p_s, (3) e p_l.
+// At distance t on a segment, (1) and (2) sample t with the free-flight density f(t), and (3) with the
+// equi-angular density e(t). Let p_l and p_s be the solid-angle densities of light sampling and
+// phase-function sampling. The balance-heuristic weights are proportional to (1) f p_l, (2) f p_s, (3) e p_l.
 // Only the ratio e / f matters: equiangular_ratio() below. In grids f is the density of flights through the
 // macro cells' means (optical_depth.h): weights need not use the true density, only the same function of the
 // vertex for all strategies.
@@ -25,7 +25,7 @@
 
 namespace ls::render {
 
-// The density with which a free flight ends at this point: the mean over each channel as the hero (the
+// The density with which a free flight ends at this point, averaged over the three choices of the hero (the
 // channel that decides distances: medium.h). `density` is each channel's density of the path so far, relative
 // to that of the hero.
 template <Features F>
@@ -40,8 +40,8 @@ float flight_pdf(const Medium& m, [[maybe_unused]] const C3& density, const Opti
   }
 }
 
-// The ratio e / f at one point. With the macro cells' means f may underflow to 0 where flights still end;
-// then the ratio is clamped, for all strategies alike.
+// The ratio e / f at one point. f may underflow to 0 where flights still end, since it uses the macro cells'
+// means; then all strategies use the same clamped ratio.
 inline float ratio_to_flight(float e, float f) { return f > 0 ? std::min(e / f, kMaxRatio) : kMaxRatio; }
 
 template <Features F>
@@ -65,13 +65,13 @@ class VertexNee {
     float equiangular_ratio(const Pivot& pivot) const {
       return ratio_to_flight(EquiAngular(o, d, length, pivot).pdf(t), flight_pdf);
     }
-    // The density of (1) and (3) together over that of the flight, for a light that was hit. Such a light is
-    // never a point light.
+    // The density with which (1) and (3) sample this vertex, divided by that of the flight, for a light that
+    // was hit. Such a light is never a point light.
     float found_as_light(const Pivot& pivot) const {
       return uses_equiangular(false) ? 1 + equiangular_ratio(pivot) : 1.f;
     }
     static float found_as_light() { return 1; }
-    // False: strategy (1) chooses its light for the vertex, not by Lights::choose_before_point().
+    // False: strategy (1) chooses its light by the vertex, not by Lights::choose_before_point().
     static bool light_chosen_first() { return false; }
   };
 
@@ -95,8 +95,8 @@ class VertexNee {
     v.t = t - depths.from();
     const OpticalDepth::Point at_point = depths.at(t);
     v.flight_pdf = flight_pdf<F>(medium, path.density_, at_point);
-    // True also where the flight density underflows to 0, because equi-angular points are sampled there too
-    // (sample_equiangular).
+    // The vertex counts as equi-angularly sampled even if the flight density underflows to 0, because
+    // sample_equiangular() samples points there too.
     v.equiangular = at_point.rate > 0 && v.length > 0;
     return v;
   }

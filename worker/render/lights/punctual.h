@@ -1,7 +1,7 @@
 // Lights with a position but without extent.
 #pragma once
 
-#include "worker/render/camera/fov.h"
+#include "worker/render/camera/camera.h"
 #include "worker/render/lights/light_kind.h"
 #include "worker/render/lights/pivot.h"
 #include "worker/render/math/equal_area.h"

@@ -6,15 +6,14 @@
 #include <optional>
 
 #include "worker/render/math/blackbody.h"
-#include "worker/render/media/emission_points.h"
 
 namespace ls::render {
 namespace {
 
 constexpr double kNoBoundary = std::numeric_limits<double>::infinity();
 
-// The maximum length of an interval that gets one emission sample, in voxels of the density or the emission
-// grid.
+// The maximum length, in voxels of the density or the emission grid, of an interval that gets one emission
+// sample.
 constexpr double kOpticalDepthVoxels = 1;
 
 // Walks along a ray through the cells of a grid. The functions take positions as distances from the ray's
@@ -32,8 +31,8 @@ class Steps {
   }
   bool past() const { return !more_; }
   bool inside(double at) const { return more_ && begin() <= at; }
-  // Returns the distance from the ray's origin at which the walk's cell begins, if `at` lies in front of it,
-  // or else ends.
+  // Returns the next boundary after `at`, as a distance from the ray's origin: the beginning of the walk's
+  // cell if `at` lies before it, else the cell's end.
   double boundary(double at) const { return !more_ ? kNoBoundary : begin() <= at ? end() : begin(); }
   double longest() const { return longest_; }
   const MacroCell& cell() const { return walk_.cell(); }

@@ -11,25 +11,6 @@ namespace {
 // their maximum by a few ulps (docs/measurements/stability.md N09).
 constexpr float kInflate = 1 + 4 * 0x1p-23f;
 
-// The part [t0, t1] of an interval of a ray that is inside a box; empty if t0 > t1. If the ray is parallel to
-// a face, the part is empty if the ray is outside of that face; otherwise the face does not limit it.
-struct Interval {
-  double t0, t1;
-};
-Interval clip(const V3d& lo, const V3d& hi, const V3d& o, const V3d& d, double t0, double t1) {
-  for (int k = 0; k < 3; ++k) {
-    if (d[k] == 0) {
-      if (o[k] < lo[k] || o[k] > hi[k]) return {1, 0};
-      continue;
-    }
-    double a = (lo[k] - o[k]) / d[k], b = (hi[k] - o[k]) / d[k];
-    if (a > b) std::swap(a, b);
-    t0 = std::max(t0, a);
-    t1 = std::min(t1, b);
-  }
-  return {t0, t1};
-}
-
 }  // namespace
 
 Grid::Grid(std::array<int, 3> size, std::vector<float> values, const Affine& world_to_index, V3d domain_lo,
@@ -217,50 +198,6 @@ Passage Grid::pass(const V3& origin, const V3& direction, float t0, float t1, do
   }
   p.t = t1;
   return p;
-}
-
-double Grid::exact_integral(const V3d& o, const V3d& d, double t0, double t1) const {
-  const V3d oi = exact_.point(o), di = exact_.vector(d);
-  const Interval part = clip(V3d(lo_), V3d(hi_), oi, di, t0, t1);
-  if (!(part.t0 < part.t1)) return 0;
-  // `cuts` contains all crossings of the planes that separate the field's polynomial pieces, in order.
-  // Between two successive cuts the field is one polynomial.
-  const double offset = filter_ == VolumeFilter::trilinear ? 0 : .5;
-  std::vector<double> cuts{part.t0, part.t1};
-  for (int k = 0; k < 3; ++k) {
-    if (di[k] == 0) continue;
-    for (int i = 0; i < size_[k]; ++i) {
-      const double t = (i + offset - oi[k]) / di[k];
-      if (t > part.t0 && t < part.t1) cuts.push_back(t);
-    }
-  }
-  std::sort(cuts.begin(), cuts.end());
-  const auto at = [&](double t) {
-    const V3d q = oi + di * t;
-    if (filter_ == VolumeFilter::nearest) return static_cast<double>(nearest(V3(q)));
-    double v = 0;
-    int c[3];
-    double f[3];
-    for (int k = 0; k < 3; ++k) {
-      const double x = std::clamp(q[k], 0., static_cast<double>(size_[k] - 1));
-      c[k] = std::min(static_cast<int>(x), last_[k]);
-      f[k] = x - c[k];
-    }
-    for (int corner = 0; corner < 8; ++corner) {
-      const int i = corner & 1, j = (corner >> 1) & 1, k = corner >> 2;
-      const double w = (i ? f[0] : 1 - f[0]) * (j ? f[1] : 1 - f[1]) * (k ? f[2] : 1 - f[2]);
-      const std::size_t at = (static_cast<std::size_t>(c[2]) * size_[1] + c[1]) * size_[0] + c[0] +
-                             i * step_[0] + j * step_[1] + k * step_[2];
-      v += w * values_[at];
-    }
-    return v;
-  };
-  double sum = 0;
-  for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
-    const double h = cuts[i + 1] - cuts[i], m = (cuts[i] + cuts[i + 1]) / 2, g = h / (2 * std::sqrt(3.));
-    sum += h / 2 * (at(m - g) + at(m + g));
-  }
-  return sum;
 }
 
 }  // namespace ls::render

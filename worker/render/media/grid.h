@@ -24,8 +24,8 @@ struct MacroCell {
   float residual = 0;  // upper bound of |value - control|
 };
 
-// The result of integrating the field along an interval of a ray. Integration stops at the t where the
-// integral reaches a wanted value (`reached`), else at the end of the interval.
+// The result of integrating the field along an interval of a ray. Integration stops where the integral
+// reaches a wanted value (`reached` is then true, and t the place), else at the end of the interval.
 struct Passage {
   bool reached = false;
   float t = 0;
@@ -125,13 +125,9 @@ class Grid {
   Passage pass(const V3& origin, const V3& direction, float t0, float t1,
                double wanted = std::numeric_limits<double>::infinity()) const;
 
-  // Returns the integral of the field along o + t d, t in [t0, t1]. It is exact up to rounding: within a
-  // voxel the field is a cubic in t, or constant, and two-point Gauss-Legendre integrates cubics exactly.
-  // Since it has no variance, it is the reference in tests of the trackers.
-  double exact_integral(const V3d& o, const V3d& d, double t0, double t1) const;
-
  private:
   friend class CellWalk;
+  friend double exact_integral(const Grid&, const V3d& o, const V3d& d, double t0, double t1);  // of tests
   void repeat_ends();
   V3 wrapped(const V3& index) const;
   int wanted_cell_size(double density_to_sigma) const;
@@ -197,8 +193,9 @@ class CellWalk {
   const MacroCell* cell_ = nullptr;
   double entry_ = 0;
   V3 origin_, direction_;
-  // Per axis: boundary i between cells is at the distance first_ + i * spacing_; left_ is the number of cells
-  // ahead, and stride_ the step in the cell table to the next one.
+  // Per axis: boundary number i between cells is at the distance first_ + i * spacing_. The walk leaves its
+  // cell through boundary plane_, at distance exit_, and step_ (1 or -1) leads to the boundary after it.
+  // left_ is the number of cells ahead, and stride_ the step in the cell table to the next one.
   float plane_[3], step_[3], first_[3], spacing_[3], exit_[3];
   int left_[3];
   std::ptrdiff_t stride_[3];

@@ -43,7 +43,7 @@ struct Medium {
   // Set if the density differs between channels: one density grid per channel, all of the same shape and with
   // macro cells of the same size. Then `density` is the mean of the three. It determines where points on a
   // ray are sampled for next-event estimation (optical_depth.h); free flights and transmittance use the three
-  // grids. sigma_t is the same for all channels (spectral_grids.h).
+  // grids. sigma_t is the same for all channels.
   std::array<const Grid*, 3> by_channel{};
   std::array<const Grid*, 3> albedo{};  // null: the albedo is constant and already in sigma_s
   // For a grid with constant albedo, this is 1 - albedo, the share of extinction that is absorption. It is
@@ -100,11 +100,13 @@ struct MediumCounters {
   std::uint64_t majorant_violations = 0;
 };
 
-// free_flight() and transmittance() for grids with a density per channel (spectral_grids.cpp). Only chromatic
-// code calls them.
+// free_flight() and transmittance() for grids with a density per channel (medium.cpp). Only chromatic code
+// calls them.
 Flight fly_channels(const Medium& m, int hero, float depth, const V3& o, const V3& d, float t_max,
                     RandomStream stream, MediumCounters& counters);
 C3 transmittance_channels(const Medium& m, const V3& o, const V3& d, float t0, float t1, RandomStream stream);
+// Returns the densities of the channels of such a grid at index coordinates inside its domain.
+C3 densities(const Medium& m, const V3& index);
 
 namespace detail {
 

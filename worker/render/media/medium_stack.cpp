@@ -18,9 +18,9 @@ void MediaState::stand(const SurfaceInfo& s, bool outside, bool through, const s
   settle(media);
 }
 
-// Adds a boundary's interior to those that the path is in. A sheet is a surface that is not closed: it
-// encloses a volume only together with others, or none at all. A path may have come around its edge; then the
-// path is inside already, and nothing is added.
+// The path enters a boundary: adds it to those that the path is inside of. A sheet is a surface that is not
+// closed: it encloses a volume only together with others, or none at all. A path may have come around the
+// edge of a sheet; then it is inside already, and nothing is added.
 void MediaState::enter(const Body& b, bool sheet) {
   if (sheet && std::find(body_.begin(), body_.begin() + bodies_, b) != body_.begin() + bodies_) return;
   if (bodies_ == kCapacity) {
@@ -30,10 +30,11 @@ void MediaState::enter(const Body& b, bool sheet) {
   body_[static_cast<std::size_t>(bodies_++)] = b;
 }
 
-// Removes a boundary's interior from those that the path is in. A path that leaves an interior without having
-// entered it began inside, with the interior counted as its background. The boundary's exterior becomes the
-// background, unless other boundaries around the path account for this exterior, or the path had entered the
-// boundary and has a background already.
+// The path leaves a boundary: removes it from those that the path is inside of. If the path is not inside of
+// it, the path began there, and the boundary's interior was counted as the background. The boundary's
+// exterior then becomes the background. It also does if the path entered the boundary while no background was
+// known, and if the path only touches the boundary from outside (`through` is false) and is in no medium. It
+// does not if other boundaries around the path account for the exterior.
 void MediaState::leave(const Body& b, bool through) {
   const auto end = body_.begin() + bodies_;
   bool known = false;

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "worker/render/media/spectral_grids.h"
-
 namespace ls::render {
 namespace {
 
@@ -39,7 +37,7 @@ OpticalDepth::Point OpticalDepth::grid_at(float t) const {
     passed += double{rate} * (w.end() - w.begin());
     last = {t, static_cast<float>(passed), rate, w.index(w.end())};
   }
-  // Rounding may place a distance from a far origin at the very end of the medium; then the last non-empty
+  // By rounding, a distance from a far origin may lie at the very end of the medium; then the last non-empty
   // cell is used.
   return t <= to_ ? last : Point{t, total_, 0, {0, 0, 0}};
 }

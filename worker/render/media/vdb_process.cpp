@@ -3,18 +3,19 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
-#include <utility>
+#include <fstream>
+#include <mutex>
 
 #include "common/base/helper_program.h"
-#include "worker/render/media/vdb_reply.h"
-#include "worker/render/media/vdb_validate.h"
 
 namespace ls::render {
 namespace {
@@ -44,16 +45,38 @@ tl::unexpected<Error> how_it_ended(int status) {
   }
 }
 
+// Guards the limit, which is read and then set.
+std::mutex& limit_mutex() {
+  static std::mutex one;
+  return one;
+}
+
+// Lowers the limit RLIMIT_DATA by `bytes`, if there is one. Returns by how much.
+std::uint64_t lower_limit(std::uint64_t bytes) {
+  const std::lock_guard lock(limit_mutex());
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_DATA, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return 0;
+  bytes = std::min<std::uint64_t>(bytes, limit.rlim_cur);
+  limit.rlim_cur -= bytes;
+  return ::setrlimit(RLIMIT_DATA, &limit) == 0 ? bytes : 0;
+}
+void raise_limit(std::uint64_t bytes) {
+  const std::lock_guard lock(limit_mutex());
+  rlimit limit{};
+  if (bytes == 0 || ::getrlimit(RLIMIT_DATA, &limit) != 0) return;
+  limit.rlim_cur += bytes;
+  ::setrlimit(RLIMIT_DATA, &limit);
+}
+
 }  // namespace
 
-VdbFile::VdbFile(VdbFile&& from) noexcept
-    : grid_(std::exchange(from.grid_, {})),
-      mapped_(std::exchange(from.mapped_, nullptr)),
-      mapped_bytes_(from.mapped_bytes_),
-      taken_(std::move(from.taken_)) {}
-
-VdbFile::~VdbFile() {
-  if (mapped_) ::munmap(mapped_, mapped_bytes_);
+std::uint64_t data_left() {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_DATA, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kNoDataLimit;
+  std::uint64_t size = 0, resident = 0, shared = 0, text = 0, library = 0, data = 0;
+  std::ifstream("/proc/self/statm") >> size >> resident >> shared >> text >> library >> data;
+  const std::uint64_t bytes = data * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  return limit.rlim_cur - std::min<std::uint64_t>(bytes, limit.rlim_cur);
 }
 
 Result<VdbFile> VdbFile::read(const std::filesystem::path& path, const std::string& grid_name,
@@ -73,11 +96,12 @@ Result<VdbFile> VdbFile::read(const std::filesystem::path& path, const std::stri
   const auto bytes = static_cast<std::uint64_t>(written.st_size);
   if (bytes == 0) return vdb_nonsense();
   VdbFile file;
-  file.mapped_bytes_ = bytes;
   void* mapped = ::mmap(nullptr, bytes, PROT_READ, MAP_PRIVATE, reply.fd, 0);
   if (mapped == MAP_FAILED) return no_program("mmap", errno);
-  file.mapped_ = mapped;
-  file.taken_ = DataTaken(bytes);
+  file.mapped_ = {mapped, [bytes, taken = lower_limit(bytes)](void* m) {
+                    ::munmap(m, bytes);
+                    raise_limit(taken);
+                  }};
   const auto grid = validated_grid({static_cast<const std::byte*>(mapped), bytes}, max_values);
   if (!grid) return tl::unexpected(grid.error());
   file.grid_ = *grid;

@@ -3,18 +3,26 @@
 // bounds. In a separate process without secrets this leads only to an error message. The memory of the
 // process and its reply count towards the caller's limit. The separate process also keeps OpenVDB from being
 // mapped into the renderer, which would take 30 ms and 29 MB.
+//
+// The child process that reads a file may use as much memory as remains of this process's limit
+// (RLIMIT_DATA). Its reply is a mapped file, which the kernel does not count towards that limit, so this
+// process lowers its limit by the size of the file while the file is mapped.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 
 #include "common/base/error.h"
 #include "common/base/helper_program.h"
-#include "worker/render/media/vdb_limit.h"
-#include "worker/render/media/vdb_module.h"
+#include "worker/render/media/vdb_reply.h"
 
 namespace ls::render {
+
+// Returns the number of bytes that this process may still allocate under the limit; kNoDataLimit if there is
+// no limit.
+std::uint64_t data_left();
 
 class VdbFile {
  public:
@@ -24,10 +32,6 @@ class VdbFile {
   static Result<VdbFile> read(const std::filesystem::path& path, const std::string& grid_name,
                               std::uint64_t max_values,
                               const std::filesystem::path& program = program_beside_us("lightshaft-vdb"));
-  VdbFile(VdbFile&& from) noexcept;
-  VdbFile& operator=(VdbFile&&) = delete;
-  ~VdbFile();
-
   // The grid. Its sizes are at least 1, its values finite and not negative, and its transform is finite.
   const LsVdbGrid& grid() const { return grid_; }
 
@@ -35,9 +39,7 @@ class VdbFile {
   VdbFile() = default;
 
   LsVdbGrid grid_{};
-  void* mapped_ = nullptr;
-  std::uint64_t mapped_bytes_ = 0;
-  DataTaken taken_;
+  std::shared_ptr<const void> mapped_;
 };
 
 }  // namespace ls::render

@@ -39,11 +39,9 @@ void add_math(Sha256& h) {
   RandomStream r(1);
   for (int i = 0; i < 4096; ++i) {
     const float u = r.uniform(), x = 40 * u - 20;
-    for (float y :
-         {std::exp(x), std::expm1(x), std::log(u + 0x1p-30f), std::log1p(u), std::sin(x), std::cos(x),
-          std::tan(u), std::atan2(u, x), std::acos(2 * u - 1), std::pow(u, 2.4f), std::erf(x / 8)}) {
-      v.push_back(y);
-    }
+    v.insert(v.end(),
+             {std::exp(x), std::expm1(x), std::log(u + 0x1p-30f), std::log1p(u), std::sin(x), std::cos(x),
+              std::tan(u), std::atan2(u, x), std::acos(2 * u - 1), std::pow(u, 2.4f), std::erf(x / 8)});
   }
   add(h, v);
 }
@@ -54,11 +52,9 @@ void add_math_in_double(Sha256& h) {
     const double u = static_cast<double>(r.next() >> 11) * 0x1p-53, x = 40 * u - 20;
     // Sine and cosine have different arguments, as in the renderer: with equal arguments, the compiler calls
     // another function that computes both.
-    for (double y : {std::exp(x), std::log(u + 0x1p-60), std::sin(x), std::cos(x + 1), std::tan(1.5 * u),
-                     std::atan2(u, x), std::acos(2 * u - 1), std::pow(u, 2.4), std::erfc(x / 4),
-                     std::hypot(u, x), std::expm1(x), std::log1p(u)}) {
-      v.push_back(y);
-    }
+    v.insert(v.end(), {std::exp(x), std::log(u + 0x1p-60), std::sin(x), std::cos(x + 1), std::tan(1.5 * u),
+                       std::atan2(u, x), std::acos(2 * u - 1), std::pow(u, 2.4), std::erfc(x / 4),
+                       std::hypot(u, x), std::expm1(x), std::log1p(u)});
   }
   add(h, v);
 }

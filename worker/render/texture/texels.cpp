@@ -27,8 +27,8 @@ float fold(float u, Wrap wrap) {
   return std::clamp(u, 0.f, 1.f);
 }
 
-// The derivative of fold() by u. Beyond the edges of a clamped image both neighbours() are the same texel, so
-// slopes are 0 anyway.
+// The derivative of fold() by u. For Wrap::clamp it is 1 even outside of [0, 1], where fold() is constant:
+// both neighbours() are the same texel there, so slopes are 0 anyway.
 float fold_slope(float u, Wrap wrap) {
   return wrap == Wrap::mirror && u - 2 * std::floor(u * .5f) > 1 ? -1.f : 1.f;
 }
@@ -92,8 +92,9 @@ void keep_channel(ImageData& image, Channel channel) {
   image.channels = 1;
 }
 
-// True if the last channel is an alpha channel that masks, that is, falls below 1/2 somewhere. Some images
-// whose colour is the mask also have an alpha channel, but a nearly opaque one.
+// True if the last channel is an alpha channel that serves as a mask, that is, falls below 1/2 somewhere. An
+// alpha channel that never does is no mask: in some images the colour is the mask, and the alpha channel is
+// nearly opaque.
 bool has_alpha(const ImageData& image) {
   if (image.channels % 2) return false;
   const auto transparent = [&](const auto& v, auto half) {

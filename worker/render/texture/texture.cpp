@@ -61,8 +61,8 @@ struct TextureTable::Data {
 
 namespace {
 
-// Makes the texels of bitmaps. Bitmaps that read a file in the same way share their texels, and a file that
-// is read in several ways is decoded once; its decoded image is kept only until the last of these.
+// Makes the texels of bitmaps. Bitmaps that read a file in the same way share their texels. A file is decoded
+// once, even if it is read in several ways; the decoded image is kept until the last of these has used it.
 class TexelsLoader {
  public:
   TexelsLoader(const Scene& scene, const ImageLoader& load, TextureTable::Data& data)
@@ -103,7 +103,7 @@ class TexelsLoader {
   const Scene& scene_;
   const ImageLoader& load_;
   TextureTable::Data& data_;
-  std::map<std::uint32_t, int> left_;  // of each file, the ways to read it that are still to come
+  std::map<std::uint32_t, int> left_;  // for each file, the number of ways to read it that remain
   std::map<std::uint32_t, ImageData> decoded_;
   std::map<Key, std::uint32_t> made_;
 };

@@ -12,7 +12,6 @@
 #include <limits>
 
 #include "common/base/helper_program.h"
-#include "worker/render/media/vdb_limit.h"
 #include "worker/render/media/vdb_reply.h"
 
 namespace {

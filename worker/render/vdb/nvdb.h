@@ -4,15 +4,44 @@
 // library's portable description of it.
 #pragma once
 
+#include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
+#include <new>
 #include <span>
 #include <string>
+#include <vector>
 
-#include "worker/render/media/vdb_module.h"
+#include "worker/render/media/vdb_reply.h"
 
 namespace ls::render {
+
+// The readers of .vdb and .nvdb files throw this to reject a file; ls_vdb_read catches it.
+struct Refused {
+  int code;  // the return value of ls_vdb_read: 1 if the file is at fault, 2 if a limit is exceeded
+  std::string text;
+};
+
+// Allocates an array of `values` values; the caller has already checked that number against the limit.
+inline float* room_for(std::uint64_t values) {
+  float* room = new (std::nothrow) float[values];
+  if (!room)
+    throw Refused{2, "the grid of " + std::to_string(values >> 18) +
+                         " MiB needs more memory than the renderer has left of its limit"};
+  return room;
+}
+
+// Returns the index of the grid to read among the file's grids: the one called `wanted` or, if that is empty,
+// the only one, or "density" if there are several.
+std::size_t choose_grid(const std::vector<std::string>& names, const std::string& wanted);
+
+// Sets the size of a grid whose number of channels is set, unless the size is above the limits. `name` is for
+// messages.
+void set_size(const std::string& name, const std::array<std::int64_t, 3>& size, std::uint64_t max_values,
+              LsVdbGrid& out);
 
 bool is_nvdb(const std::filesystem::path& path);  // true for an .nvdb file, decided by its first bytes
 
@@ -27,5 +56,36 @@ void decode_nvdb(std::span<const std::byte> file, const std::string& wanted, std
                  LsVdbGrid& out);
 void expand_nvdb(const std::string& name, std::span<const std::byte> buffer, std::uint64_t max_values,
                  LsVdbGrid& out);
+
+static_assert(std::endian::native == std::endian::little);
+
+// Access to an untrusted buffer. Every offset is checked; an access beyond the end throws Refused.
+class NvdbBytes {
+ public:
+  NvdbBytes(std::span<const std::byte> data, const char* what) : data_(data), what_(what) {}
+
+  std::uint64_t size() const { return data_.size(); }
+  // Returns the n bytes of the buffer from the offset `at` on.
+  std::span<const std::byte> part(std::uint64_t at, std::uint64_t n) const {
+    if (at > data_.size() || n > data_.size() - at)
+      throw Refused{1, "not a readable NanoVDB file: damaged, or cut short: " + std::string(what_) + " of " +
+                           std::to_string(data_.size()) + " bytes, of which " + std::to_string(n) +
+                           " are wanted from byte " + std::to_string(at) + " on"};
+    return data_.subspan(at, n);
+  }
+  template <class T>
+  T get(std::uint64_t at) const {
+    T v;
+    std::memcpy(&v, part(at, sizeof v).data(), sizeof v);
+    return v;
+  }
+  bool bit(std::uint64_t mask, std::uint32_t i) const {
+    return std::to_integer<unsigned>(part(mask + i / 8, 1)[0]) >> i % 8 & 1;
+  }
+
+ private:
+  std::span<const std::byte> data_;
+  const char* what_;
+};
 
 }  // namespace ls::render

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "worker/render/vdb/nvdb.h"
-#include "worker/render/vdb/nvdb_bytes.h"
 
 namespace ls::render {
 namespace {
@@ -41,7 +40,7 @@ std::vector<std::byte> contents(const std::filesystem::path& path) {
 
 struct Entry {
   std::string name;
-  std::uint64_t at = 0, stored = 0, bytes = 0;  // offset in the file, size there, and size when decompressed
+  std::uint64_t at = 0, stored = 0, bytes = 0;  // offset and size in the file; decompressed size
   std::uint16_t codec = kPlain;
 };
 
@@ -84,25 +83,6 @@ std::vector<Entry> table_of(const NvdbBytes& file) {
   return all;
 }
 
-std::string names_of(const std::vector<Entry>& all) {
-  std::string names;
-  for (const Entry& e : all) names += (names.empty() ? "'" : ", '") + e.name + "'";
-  return names;
-}
-
-// Returns the grid called `wanted`. If `wanted` is empty, returns the only grid, or the grid "density" if
-// there are several.
-const Entry& choose(const std::vector<Entry>& all, const std::string& wanted) {
-  if (all.empty()) throw Refused{1, "the file holds no grid"};
-  if (wanted.empty() && all.size() == 1) return all.front();
-  for (const Entry& e : all)
-    if (e.name == (wanted.empty() ? "density" : wanted)) return e;
-  if (wanted.empty())
-    throw Refused{1, "the file holds several grids and no single one is called 'density'; name one of " +
-                         names_of(all)};
-  throw Refused{1, "it has no grid '" + wanted + "'; there are " + names_of(all)};
-}
-
 [[noreturn]] void damaged(const Entry& e) {
   throw Refused{1, "not a readable NanoVDB file: the data of grid '" + e.name + "' is damaged"};
 }
@@ -133,6 +113,36 @@ void unblosc(const Entry& e, const NvdbBytes& file, std::span<std::byte> to) {
 
 }  // namespace
 
+std::size_t choose_grid(const std::vector<std::string>& names, const std::string& wanted) {
+  if (names.empty()) throw Refused{1, "the file holds no grid"};
+  if (wanted.empty() && names.size() == 1) return 0;
+  const auto found = std::ranges::find(names, wanted.empty() ? "density" : wanted);
+  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+  std::string all;
+  for (const std::string& name : names) all += (all.empty() ? "'" : ", '") + name + "'";
+  if (wanted.empty())
+    throw Refused{1,
+                  "the file holds several grids and no single one is called 'density'; name one of " + all};
+  throw Refused{1, "it has no grid '" + wanted + "'; there are " + all};
+}
+
+void set_size(const std::string& name, const std::array<std::int64_t, 3>& size, std::uint64_t max_values,
+              LsVdbGrid& out) {
+  std::uint64_t count = 1;
+  for (int k = 0; k < 3; ++k) {
+    const std::int64_t n = size[k];
+    if (n <= 0 || n > (1 << 14))
+      throw Refused{
+          2, "grid '" + name + "' spans " + std::to_string(n) + " voxels along an axis; the limit is 16384"};
+    out.size[k] = static_cast<std::int32_t>(n);
+    count *= static_cast<std::uint64_t>(n);
+  }
+  if (const std::uint64_t most = max_values / static_cast<std::uint64_t>(out.channels); count > most)
+    throw Refused{2, "grid '" + name + "' spans " + std::to_string(count) +
+                         (out.channels > 1 ? " voxels of 3 values" : " voxels") + "; the limit is " +
+                         std::to_string(most)};
+}
+
 bool is_nvdb(const std::filesystem::path& path) {
   char magic[8] = {};
   std::ifstream(path, std::ios::binary).read(magic, sizeof magic);
@@ -148,7 +158,9 @@ void decode_nvdb(std::span<const std::byte> bytes, const std::string& wanted, st
                  LsVdbGrid& out) {
   const NvdbBytes file(bytes, "a file");
   const std::vector<Entry> all = table_of(file);
-  const Entry& e = choose(all, wanted);
+  std::vector<std::string> names;
+  for (const Entry& entry : all) names.push_back(entry.name);
+  const Entry& e = all[choose_grid(names, wanted)];
   if (e.codec == kPlain) {
     if (e.stored != e.bytes) damaged(e);
     return expand_nvdb(e.name, file.part(e.at, e.bytes), max_values, out);

@@ -6,7 +6,6 @@
 #include <set>
 
 #include "worker/render/vdb/nvdb.h"
-#include "worker/render/vdb/nvdb_bytes.h"
 
 namespace ls::render {
 namespace {
@@ -31,6 +30,7 @@ enum Type : std::uint32_t {
   kFp16 = 15,
   kFpN = 16
 };
+constexpr std::uint32_t kTypes[] = {kFloat, kDouble, kVec3f, kVec3d, kHalf, kFp4, kFp8, kFp16, kFpN};
 struct Layout {
   std::uint64_t background, root_size, tile_value, root_tile, upper_table, lower_table, table_step,
       leaf_table;
@@ -61,9 +61,7 @@ class Tree {
     root_ = kGrid + b_.get<std::uint64_t>(kGrid + kRootOffset);
     if (root_ < kGrid) fault("its tree lies before it");
     place();
-    const auto count = std::uint64_t{static_cast<std::uint64_t>(out_.size[0])} *
-                       static_cast<std::uint64_t>(out_.size[1]) * static_cast<std::uint64_t>(out_.size[2]);
-    out_.values = room_for(count * channels());
+    out_.values = room_for(values_of(out_));
     fill(lo_, end_, value(root_ + layout_.background));
     read_root();
   }
@@ -81,23 +79,11 @@ class Tree {
     const auto type = b_.get<std::uint32_t>(kType), grid_class = b_.get<std::uint32_t>(kClass);
     if (grid_class == 1)
       throw Refused{1, "grid '" + name_ + "' is a level set, not a density; convert it to a fog volume"};
-    switch (type) {
-      case kFloat:
-      case kDouble:
-      case kVec3f:
-      case kVec3d:
-      case kHalf:
-      case kFp4:
-      case kFp8:
-      case kFp16:
-      case kFpN:
-        type_ = static_cast<Type>(type);
-        break;
-      default:
-        throw Refused{
-            1, "grid '" + name_ + "' has values of type " + type_name(type) +
-                   "; a density is float, double, vec3f, vec3d, half or one of Fp4, Fp8, Fp16 and FpN"};
-    }
+    if (!std::ranges::count(kTypes, type))
+      throw Refused{1,
+                    "grid '" + name_ + "' has values of type " + type_name(type) +
+                        "; a density is float, double, vec3f, vec3d, half or one of Fp4, Fp8, Fp16 and FpN"};
+    type_ = static_cast<Type>(type);
     layout_ = layout_of(type_);
     out_.channels = type_ == kVec3f || type_ == kVec3d ? 3 : 1;
   }
@@ -105,24 +91,16 @@ class Tree {
   // Finds the box of the active voxels, enlarged by one voxel on each side, and the transform from its nodes
   // to the scene.
   void place() {
-    std::uint64_t count = 1;
+    std::array<std::int64_t, 3> size;
     for (int k = 0; k < 3; ++k) {
       const std::int64_t lo = b_.get<std::int32_t>(root_ + 4 * k),
                          hi = b_.get<std::int32_t>(root_ + 12 + 4 * k);
       if (hi < lo) throw Refused{1, "grid '" + name_ + "' is empty: it has no active voxel"};
       lo_[k] = lo - 1;
       end_[k] = hi + 2;
-      const std::int64_t n = end_[k] - lo_[k];
-      if (n > (1 << 14))
-        throw Refused{2, "grid '" + name_ + "' spans " + std::to_string(n) +
-                             " voxels along an axis; the limit is 16384"};
-      out_.size[k] = static_cast<std::int32_t>(n);
-      count *= static_cast<std::uint64_t>(n);
+      size[k] = end_[k] - lo_[k];
     }
-    if (const std::uint64_t most = max_values_ / channels(); count > most)
-      throw Refused{2, "grid '" + name_ + "' spans " + std::to_string(count) +
-                           (channels() > 1 ? " voxels of 3 values" : " voxels") + "; the limit is " +
-                           std::to_string(most)};
+    set_size(name_, size, max_values_, out_);
     double m[9], v[3];
     for (int i = 0; i < 9; ++i) m[i] = b_.get<double>(kMap + kMatrix + 8 * i);
     for (int i = 0; i < 3; ++i) v[i] = b_.get<double>(kMap + kOffset + 8 * i);
@@ -278,11 +256,10 @@ void expand_nvdb(const std::string& name, std::span<const std::byte> buffer, std
                  LsVdbGrid& out) {
   const NvdbBytes bytes(buffer, "its buffer");
   Tree(name, bytes, max_values, out).expand();
-  const auto n = static_cast<std::size_t>(out.size[0]) * out.size[1] * out.size[2] * out.channels;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (!(out.values[i] < 0)) continue;
+  for (float& v : std::span(out.values, values_of(out))) {
+    if (!(v < 0)) continue;
     ++out.negatives;
-    out.values[i] = 0;
+    v = 0;
   }
 }
 

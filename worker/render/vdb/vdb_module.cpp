@@ -1,8 +1,9 @@
-#include "worker/render/media/vdb_module.h"
+#include "worker/render/media/vdb_reply.h"
 
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -13,7 +14,6 @@
 #include <vector>
 
 #include "worker/render/vdb/nvdb.h"
-#include "worker/render/vdb/refused.h"
 
 namespace {
 
@@ -24,33 +24,6 @@ constexpr std::uintmax_t kSmallFile = 16 << 20;
 void initialize_once() {
   static std::once_flag flag;
   std::call_once(flag, [] { openvdb::initialize(); });
-}
-
-std::string names_of(const openvdb::io::File& file) {
-  std::string names;
-  for (auto it = file.beginName(); it != file.endName(); ++it)
-    names += (names.empty() ? "'" : ", '") + it.gridName() + "'";
-  return names.empty() ? "none" : names;
-}
-
-// Returns the name of the grid to read: `wanted` or, if that is empty, the only grid, or "density" if there
-// are several.
-std::string choose(const openvdb::io::File& file, const std::string& wanted) {
-  std::vector<std::string> names;
-  for (auto it = file.beginName(); it != file.endName(); ++it) names.push_back(it.gridName());
-  if (names.empty()) throw Refused{1, "the file holds no grid"};
-  if (wanted.empty()) {
-    if (names.size() == 1) return names.front();
-    for (const auto& n : names) {
-      if (n == "density") return n;
-    }
-    throw Refused{1, "the file holds several grids and no single one is called 'density'; name one of " +
-                         names_of(file)};
-  }
-  for (const auto& n : names) {
-    if (n == wanted) return n;
-  }
-  throw Refused{1, "it has no grid '" + wanted + "'; there are " + names_of(file)};
 }
 
 template <class T>
@@ -112,22 +85,11 @@ void convert(const openvdb::GridBase::Ptr& base, std::uint64_t max_values, LsVdb
   if (box.empty()) throw Refused{1, "grid '" + grid->getName() + "' is empty: it has no active voxel"};
   box.expand(1);
   out.channels = openvdb::VecTraits<typename GridType::ValueType>::IsVec ? 3 : 1;
-  std::uint64_t count = 1;
-  for (int k = 0; k < 3; ++k) {
-    const auto n = static_cast<std::int64_t>(box.max()[k]) - box.min()[k] + 1;
-    if (n <= 0 || n > (1 << 14))
-      throw Refused{2, "grid '" + grid->getName() + "' spans " + std::to_string(n) +
-                           " voxels along an axis; the limit is 16384"};
-    out.size[k] = static_cast<std::int32_t>(n);
-    count *= static_cast<std::uint64_t>(n);
-  }
-  if (count > max_values / static_cast<std::uint64_t>(out.channels)) {
-    throw Refused{2, "grid '" + grid->getName() + "' spans " + std::to_string(count) + " voxels" +
-                         (out.channels > 1 ? " of 3 values; the limit is " : "; the limit is ") +
-                         std::to_string(max_values / static_cast<std::uint64_t>(out.channels))};
-  }
+  std::array<std::int64_t, 3> size;
+  for (int k = 0; k < 3; ++k) size[k] = static_cast<std::int64_t>(box.max()[k]) - box.min()[k] + 1;
+  ls::render::set_size(grid->getName(), size, max_values, out);
   place(*grid, box.min(), out);
-  out.values = ls::render::room_for(count * static_cast<std::uint64_t>(out.channels));
+  out.values = ls::render::room_for(ls::render::values_of(out));
   copy_values(*grid, box, out);
 }
 
@@ -141,7 +103,9 @@ void read(const char* path, const std::string& wanted, std::uint64_t max_values,
     throw Refused{1, "it is of version " + std::to_string(file.fileVersion()) +
                          " of the OpenVDB format; versions up to " +
                          std::to_string(openvdb::OPENVDB_FILE_VERSION) + " can be read"};
-  const openvdb::GridBase::Ptr base = file.readGrid(choose(file, wanted));
+  std::vector<std::string> names;
+  for (auto it = file.beginName(); it != file.endName(); ++it) names.push_back(it.gridName());
+  const openvdb::GridBase::Ptr base = file.readGrid(names[ls::render::choose_grid(names, wanted)]);
   if (!base) throw Refused{1, "the grid cannot be read"};
   if (base->getGridClass() == openvdb::GRID_LEVEL_SET) {
     throw Refused{1,

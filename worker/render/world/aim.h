@@ -1,4 +1,4 @@
-// Decides at which additional points (camera_segment_nee.h) and in which additional directions
+// Decides at which additional points (segment_nee.h) and in which additional directions
 // (lamp_directions.h) a world's paths sample light.
 #pragma once
 

@@ -9,7 +9,6 @@
 #include "worker/render/base/features.h"
 #include "worker/render/bsdf/bsdf.h"
 #include "worker/render/camera/camera.h"
-#include "worker/render/camera/pixel_filter.h"
 #include "worker/render/geometry/accel.h"
 #include "worker/render/geometry/geometry.h"
 #include "worker/render/lights/lamp_directions.h"
@@ -64,7 +63,7 @@ class World {
   // With Features::aimed:
   Lamps lamps;                // lights without extent, near which directions are also sampled
   bool lamp_flights = false;  // a share of the flights through homogeneous media end near lamps
-  int camera_points = 0;      // number of points on a segment (camera_segment_nee.h); 0: none
+  int camera_points = 0;      // number of points on a segment (segment_nee.h); 0: none
   // With Features::connected:
   Lights::Directional sun;  // the light that the light vertices come from
   SunMap sun_map;

@@ -49,7 +49,7 @@ TEST(InOrder, ComputesSeveralAtOnce) {
   in_order(
       2, 2,
       [&](std::size_t i) {
-        both.arrive_and_wait();  // forever, if one were computed after the other
+        both.arrive_and_wait();  // would wait forever if one were computed after the other
         return i;
       },
       [&](std::size_t i) {

@@ -1,4 +1,4 @@
-// The camera and the pixel filters.
+// Tests the camera and the pixel filters.
 #include "worker/render/camera/camera.h"
 
 #include <gtest/gtest.h>
@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "tests/support/render_check.h"
-#include "worker/render/camera/pixel_filter.h"
 #include "worker/render/math/random.h"
 #include "worker/render/world/world.h"
 
@@ -32,15 +31,15 @@ TEST(Camera, LooksAlongItsZWithXToTheLeftAndYUp) {
   const Camera c = camera({});
 
   EXPECT_EQ(c.ray(100, 50, {}).d, V3(0, 0, 1));
-  EXPECT_GT(c.ray(0, 50, {}).d.x, 0.f);   // the left of the film
-  EXPECT_GT(c.ray(100, 0, {}).d.y, 0.f);  // its top
+  EXPECT_GT(c.ray(0, 50, {}).d.x, 0.f);   // the left edge of the film
+  EXPECT_GT(c.ray(100, 0, {}).d.y, 0.f);  // its top edge
   EXPECT_LT(c.ray(200, 100, {}).d.x, 0.f);
 }
 
 TEST(Camera, FieldOfViewIsMeasuredAlongTheAxisAsked) {
   Sensor s;
   s.fov = 40;
-  const double tolerance = 1e-4;  // degrees: directions are float32
+  const double tolerance = 1e-4;  // degrees; directions are float32
 
   s.fov_axis = FovAxis::x;
   EXPECT_NEAR(horizontal(camera(s)), 40, tolerance);
@@ -90,12 +89,13 @@ TEST(Camera, AllRaysOfAPixelThroughTheLensMeetInThePlaneOfFocus) {
   for (const V2& lens : {V2(.1f, .2f), V2(.5f, .5f), V2(.9f, .3f), V2(.7f, .99f)}) {
     const CameraRay r = camera(s).ray(40, 20, lens);
     const V3 at = r.o + r.d * ((3 - r.o.z) / r.d.z);
-    EXPECT_LT((at - target).length(), 3e-6f);  // of 3: a few roundings
+    EXPECT_LT((at - target).length(), 3e-6f);  // a few roundings of distances of 3
   }
 }
 
 TEST(Camera, CircleOfConfusionIsTheApertureSeenThroughThePointInFocus) {
-  // On a plane at depth z the lens point p lands |p| |z - zf| / zf away from the pinhole's point.
+  // On a plane at depth z, the ray from the lens point p is |p| |z - zf| / zf away from the ray of the
+  // pinhole.
   Sensor s, pinhole;
   s.aperture_radius = .2;
   s.focus_distance = 2;
@@ -111,7 +111,7 @@ TEST(Camera, CircleOfConfusionIsTheApertureSeenThroughThePointInFocus) {
   }
   EXPECT_LE(widest, .2 * 3 / 2 + 1e-5);
   EXPECT_GT(widest,
-            .2 * 3 / 2 * .99);  // 4000 uniform points of a disk: the outermost 1 % of radius holds 2 %
+            .2 * 3 / 2 * .99);  // the outermost 1 % of the radius has 2 % of 4000 points
 }
 
 TEST(Camera, RaysRunFromTheNearToTheFarPlane) {
@@ -125,8 +125,8 @@ TEST(Camera, RaysRunFromTheNearToTheFarPlane) {
   }
 }
 
-// What Mitsuba 3.9.1 gives (scalar_rgb, sample_ray) for a frame of 200 x 100: origin and direction at shares
-// of the rendered part.
+// Rays of Mitsuba 3.9.1 (scalar_rgb, sample_ray) for a frame of 200 x 100: origin and direction at the
+// position (u, v), in shares of the rendered part.
 struct SeenRay {
   double u, v;
   V3 o, d;
@@ -171,7 +171,7 @@ TEST(Camera, OrthographicRaysAreMitsubas) {
 }
 
 TEST(Camera, OrthographicIsTheSameInAnyWorld) {
-  // The world is the scene moved by its centre and scaled.
+  // The world is the scene, moved by its centre and scaled.
   Sensor s;
   s.projection = Projection::orthographic;
   s.to_world.m = {.5, 0, 0, 7, 0, .5, 0, 8, 0, 0, 1, 9, 0, 0, 0, 1};
@@ -215,9 +215,10 @@ TEST(Camera, AThinLensWithoutAnApertureIsAPinholeToTheLastBit) {
   }
 }
 
-// ---- aperture maps and crops, in whole worlds
+// ---- aperture maps and crops, in complete worlds
 
-// A checkerboard of 2 x 2 over the frame: closed at the upper left and lower right, open elsewhere.
+// The aperture map is a checkerboard of 2 x 2 over the frame: closed at the upper left and lower right, open
+// elsewhere.
 test::SceneBuilder with_aperture_map(double closed, double open) {
   test::SceneBuilder builder({16, 8});
   builder.shape(RectangleShape{}, {}, builder.diffuse(.5));
@@ -307,7 +308,7 @@ RadiusMoments moments(const ReconstructionFilter& f) {
   const PixelFilter filter(f);
   constexpr int kN = 1 << 20;
   double m = 0, v = 0;
-  for (int i = 0; i < kN; ++i) {  // midpoints of 2^20 strata: exact in float32
+  for (int i = 0; i < kN; ++i) {  // midpoints of 2^20 strata, exact in float32
     const double x = filter.offset(static_cast<float>((i + .5) / kN));
     m += x;
     v += x * x;
@@ -326,15 +327,16 @@ TEST(PixelFilter, HasTheMomentsOfTheFilter) {
 }
 
 TEST(PixelFilter, GaussianIsCutAtFourDeviationsAndShiftedToReachZero) {
-  // max(0, e^(-x^2 / 2) - e^-8) on [-4, 4] in units of the deviation: moments by the error function.
+  // The filter is max(0, e^(-x^2 / 2) - e^-8) on [-4, 4], in units of the standard deviation. Its moments
+  // follow from the error function.
   const double e = std::exp(-8.), root = std::sqrt(2 * M_PI), inside = std::erf(4 / std::sqrt(2.));
   const double mass = root * inside - 8 * e, second = root * inside - 2 * 4 * e - e * 2 * 64 / 3;
   const double deviation = .7;
 
   const RadiusMoments m = moments(GaussianFilter{deviation});
 
-  // The table's density is constant in steps of h = 1/128 of a deviation: adds h^2 / 6 = 1.02e-5 to the
-  // variance.
+  // The table's density is constant over steps of h = 1/128 of a deviation, which adds h^2 / 6 = 1.02e-5 to
+  // the variance.
   EXPECT_NEAR(m.variance / (deviation * deviation), second / mass + 1.02e-5, 1e-6);
   EXPECT_LE(PixelFilter(GaussianFilter{deviation}).offset(1 - 0x1p-24f), 4 * deviation);
   EXPECT_GE(PixelFilter(GaussianFilter{deviation}).offset(0), -4 * deviation);

@@ -1,4 +1,5 @@
-// AOVs on scenes where their values are known, and the light's parts, which must add up to the whole.
+// Tests of AOVs on scenes in which their values are known, and of the light AOVs, whose sum must be the whole
+// light.
 #include "common/image/aov/aov.h"
 
 #include <fmt/format.h>
@@ -20,11 +21,12 @@ using test::translate;
 using test::operator*;
 
 constexpr std::uint64_t kSamples = 16;
-// Positions in the unit-size world, uv and unit vectors are float32 after a few operations each: 2^-20 of the
-// largest of them is 16 units in the last place.
+// The test compares positions in a world of unit size, uv and unit vectors. They are float32 after a few
+// operations each. 2^-20 of the largest of them is 16 units in the last place.
 constexpr double kClose = 0x1p-20;
 
-// One picture with AOVs: means by name and component over the pixel (of the hits, where they are).
+// A picture with AOVs. Its functions return, by the plane's name, sums over the samples of a pixel, and means
+// over all its samples or over those that hit a surface.
 class Picture {
  public:
   Picture(const SceneBuilder& builder, std::vector<std::string> names, std::uint64_t samples = kSamples)
@@ -66,7 +68,8 @@ class Picture {
   std::vector<float> sums_;
 };
 
-// A wall of side 4 in z = 0, seen straight on at (x, y) from five above, wherever the scene lies.
+// A wall of side 4 in the plane z = 0, moved by `at`. The camera looks straight at its point (x, y) from a
+// distance of 5.
 SceneBuilder wall(double x = .4, double y = .6, const Vec3& at = {0, 0, 0}) {
   SceneBuilder builder({2, 2});
   builder.shape(RectangleShape{}, translate(at) * test::scale(2), builder.diffuse(.3));
@@ -106,8 +109,8 @@ TEST(Aovs, DepthIsFromTheCameraWhateverItsNearClip) {
   EXPECT_NEAR(Picture(builder, {"depth"}).of_hits("aov.depth.Z"), 5, 8 * kClose);
 
   builder = wall();
-  builder.look({0, 3, 4}, {0, 0, 0});  // along the ray, not the axis or the normal
-  EXPECT_NEAR(Picture(builder, {"depth"}).of_hits("aov.depth.Z"), 5, 5e-4);  // the view's half width, slanted
+  builder.look({0, 3, 4}, {0, 0, 0});  // depth is measured along the ray
+  EXPECT_NEAR(Picture(builder, {"depth"}).of_hits("aov.depth.Z"), 5, 5e-4);  // the view has an extent
 
   builder = wall();
   builder.scene.sensor.projection = Projection::orthographic;
@@ -134,7 +137,7 @@ TEST(Aovs, SphereGivesNormalAndUv) {
   builder.shape(SphereShape{}, translate({1, 2, 9}), builder.diffuse(.5)).flip_normals = true;
   builder.look({5, 2, 3}, {1, 2, 3});
   const Picture p(builder, {"normal", "uv", "depth"});
-  // Met at +x: azimuth 0 (or 1), polar angle a quarter turn.
+  // The ray hits the sphere at +x: the azimuth is 0 (or 1), the polar angle a quarter turn.
   EXPECT_NEAR(p.of_all("aov.normal.X"), 1, 1e-8 + kClose);
   EXPECT_NEAR(p.of_hits("aov.uv.V"), .5, 1e-4);
   EXPECT_NEAR(p.of_hits("aov.depth.Z"), 3, 16 * kClose);
@@ -153,11 +156,11 @@ TEST(Aovs, AlbedoIsTheShareOfLightThatAMaterialSendsOn) {
   };
   EXPECT_NEAR(albedo([](SceneBuilder& k) { return k.mirror(); }), 1, kClose);
   EXPECT_NEAR(albedo([](SceneBuilder& k) { return k.glass(1.5); }), 1,
-              kClose);  // not 1.5^-2 of what goes through
+              kClose);  // without the factor 1.5^-2 of refraction
   EXPECT_NEAR(albedo([](SceneBuilder& k) { return k.diffuse(0); }), 0, 0);
 }
 
-// Sums of a guide over both halves of the samples, and that each half has its own.
+// Returns the mean of a denoising guide. Also checks that the two halves of the samples have the same sum.
 double guide(const Picture& p, const std::string& name, char component) {
   const double a = p.sum(fmt::format("aov.{}.A.{}", name, component), 0),
                b = p.sum(fmt::format("aov.{}.B.{}", name, component), 0);
@@ -184,7 +187,7 @@ TEST(Aovs, GuidesOfADenoiserSeeThroughMirrorsGlassAndBoundaries) {
   EXPECT_NEAR(guide(Picture(empty, kGuides), "denoising_albedo", 'R'), .3, kClose);
 }
 
-// A cube of side 2 with sigma_t 0.5: e^-1 of the light is not scattered in it.
+// The cube has side 2 and sigma_t 0.5: it transmits e^-1 of the light without scattering.
 TEST(Aovs, GuidesOfADenoiserMixInMediaByTheirTransmittance) {
   SceneBuilder builder = wall();
   builder.container(CubeShape{}, translate({0, 0, 2}), builder.null(),
@@ -200,10 +203,10 @@ TEST(Aovs, GuidesOfADenoiserMixInMediaByTheirTransmittance) {
 TEST(Aovs, NothingIsZeroAndMeansAreOfHits) {
   SceneBuilder builder({1, 1});
   builder.shape(RectangleShape{}, translate({-2, 0, 0}) * test::scale(2),
-                builder.diffuse(.5));  // x from -4 to 0
+                builder.diffuse(.5));  // covers x in [-4, 0]
   builder.look({0, 0, 1}, {0, 0, 0}, 60, {0, 1, 0});
   const Picture half(builder, kOfSurface, 64);
-  EXPECT_NEAR(half.of_all("aov.coverage.A"), .5, 3. / 64);  // a Sobol sequence halves: within few samples
+  EXPECT_NEAR(half.of_all("aov.coverage.A"), .5, 3. / 64);  // a Sobol sequence errs by few samples
   EXPECT_NEAR(half.of_all("aov.normal.Z"), half.of_all("aov.coverage.A"), kClose);
   EXPECT_GE(half.of_hits("aov.depth.Z"), 1);
   EXPECT_LT(half.of_hits("aov.position.X"), 0);
@@ -229,7 +232,8 @@ TEST(Aovs, MattesCountTheSamplesOfEachThing) {
   EXPECT_EQ(shape.slots[0].id, cryptomatte_id("wall"));
   EXPECT_EQ(shape.slots[1].id, cryptomatte_id("veil"));
   EXPECT_EQ(shape.slots[0].n + shape.slots[1].n, 256);
-  // A quarter of 2 x 128 points of the first dimension of two Sobol sequences: exactly, up to one of each.
+  // A quarter of 2 x 128 points, which are the first dimension of two Sobol sequences. Each sequence errs by
+  // one point at most.
   EXPECT_NEAR(shape.slots[1].n, 64, 2);
   EXPECT_EQ(material.slots[0], (IdSlot{cryptomatte_id("plaster"), shape.slots[0].n}));
   EXPECT_EQ(material.slots[1].id, cryptomatte_id("lace"));
@@ -249,10 +253,10 @@ TEST(Aovs, InstancesAreThingsOfTheirOwn) {
 
   EXPECT_EQ(p.ids(1).slots[0], (IdSlot{cryptomatte_id("right"), kSamples}));
   EXPECT_EQ(p.ids(0).slots[0], (IdSlot{cryptomatte_id("clay"), kSamples}));
-  EXPECT_NEAR(p.of_hits("aov.uv.V"), 0, 1e-4);  // its pole
+  EXPECT_NEAR(p.of_hits("aov.uv.V"), 0, 1e-4);  // the ball's pole
 }
 
-// ---- light ----
+// ---- light AOVs
 SceneBuilder hall(bool media, bool grids) {
   SceneBuilder builder({8, 6});
   const BsdfIndex white = builder.diffuse(.7);
@@ -276,8 +280,9 @@ SceneBuilder hall(bool media, bool grids) {
 const std::vector<std::string> kOfLight = {"direct", "indirect", "surface", "volume",
                                            "single", "multiple", "emission"};
 
-// Each part is a double sum of the same float32 numbers in another order, rounded once; a sample's own sum is
-// of float32: with n contributions of one sign, n 2^-24 of the whole. These paths have below 256.
+// Each AOV sums the same float32 numbers in another order, in double, and is rounded once. The radiance of a
+// sample is summed in float32: with n contributions of one sign its error is n 2^-24 of the sum. These paths
+// have fewer than 256 contributions.
 TEST(Aovs, PartsOfTheLightAddUpToIt) {
   for (const char* integrator : {"volpath", "volpath_distant_mis"})
     for (const int media : {0, 1, 2}) {
@@ -339,7 +344,7 @@ TEST(Aovs, WithOneScatteringThereIsNoIndirectLightAndNoMultiple) {
   EXPECT_GT(single, 0);
 }
 
-// A wall of albedo a in a white furnace: direct light is a, and no more comes.
+// A wall of albedo a in a white furnace: its direct light is a, and it has no indirect light.
 TEST(Aovs, DirectLightOfAWallIsItsAlbedo) {
   const Picture p(wall(), {"surface", "indirect", "direct"}, 64);
   EXPECT_NEAR(p.of_all("aov.surface.R"), .3, 64 * kClose);

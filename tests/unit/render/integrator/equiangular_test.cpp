@@ -1,4 +1,4 @@
-// Equi-angular distances where textbook arctangents cancel.
+// Tests equi-angular sampling on segments on which the textbook difference of arctangents cancels.
 #include "worker/render/integrator/equiangular.h"
 
 #include <gtest/gtest.h>
@@ -10,13 +10,13 @@
 namespace ls::render {
 namespace {
 
-// A segment whose ends lie at offsets a and b from the foot of a pivot at distance D. The foot lies at the
-// origin, so that a, b and D are exact in float32.
+// A segment whose ends have the offsets a and b from the foot of the perpendicular from a pivot at distance
+// D. The foot is at the origin, so that a, b and D are exact in float32.
 struct TestSegment {
   float a, b, distance;
   EquiAngular make() const { return {V3(a, 0, 0), V3(1, 0, 0), b - a, V3(0, distance, 0)}; }
   double length() const { return double{b - a}; }
-  double angle() const {  // in double, by the difference that does not cancel
+  double angle() const {  // in double, without a difference that cancels
     const double d = distance;
     return std::atan2(d * (double{b} - a), d * d + double{a} * b);
   }
@@ -32,8 +32,8 @@ TEST(EquiAngular, DensityIsThatOfTheAngle) {
     for (int i = 0; i <= 16; ++i) {
       const float t = (s.b - s.a) * static_cast<float>(i) / 16;
       const double x = double{s.a} + t;
-      // The foot is computed from a point |a| away: its place is good to 2^-24 |a|, and nearer than
-      // 1e-7 of the ends to the pivot the distance is a lower bound.
+      // The foot is computed from a point at distance |a|, so its position has an error of 2^-24 |a|. Pivots
+      // closer to the segment than 1e-7 of its ends are treated as if they were at that distance.
       const double d = std::max<double>(s.distance, 1e-7 * std::max(std::abs(s.a), std::abs(s.b)));
       const double angle = std::atan2(d * (double{s.b} - s.a), d * d + double{s.a} * s.b);
       const double near = std::sqrt(d * d + x * x), place = 0x1p-23 * (std::abs(s.a) + t);
@@ -52,8 +52,8 @@ TEST(EquiAngular, EstimatesTheInverseSquareIntegralWithoutVariance) {
       const auto sample = s.make().sample(r.uniform());
       const V3d p(sample.p);
       const double value = 1 / (d * d + p.x * p.x) / sample.pdf;
-      // Position measured from the foot, which lies at the origin: relative errors only. The uniform branch
-      // takes over where the integrand is flat to (b - a) / D = 1e-6.
+      // Errors are relative, since positions are measured from the foot at the origin. Up to (b - a) / D =
+      // 1e-6 the sampling is uniform, as the density is flat there.
       ASSERT_NEAR(value / integral, 1, 4e-6) << s.a << " " << s.b << " " << s.distance << " at " << p.x;
     }
   }
@@ -70,11 +70,11 @@ TEST(EquiAngular, SamplesLieOnTheSegmentAndFollowTheAngle) {
       ASSERT_LE(sample.t, (s.b - s.a) * (1 + 0x1p-22f));
       ASSERT_GE(sample.t, last) << "order";
       last = sample.t;
-      // Share of the angle below the sample: xi, in double.
+      // The share of the angle up to the sample must be xi; it is computed in double.
       const double d = std::max<double>(s.distance, 1e-7 * std::max(std::abs(s.a), std::abs(s.b)));
       const double x = sample.p.x, below = std::atan2(d * (x - s.a), d * d + x * s.a);
       const double all = std::atan2(d * (double{s.b} - s.a), d * d + double{s.a} * s.b);
-      // One rounding of x by 2^-24 |x| turns the angle by d / (d^2 + x^2) of it.
+      // Rounding x once, by 2^-24 |x|, changes the angle by this times d / (d^2 + x^2).
       const double turn = 0x1p-22 * std::abs(x) * d / (d * d + x * x) / all;
       ASSERT_NEAR(below / all, xi, 4e-6 + turn) << s.a << " " << s.b << " " << s.distance;
     }
@@ -87,15 +87,15 @@ TEST(EquiAngular, DensityOfASampleIsTheDensityAtItsPlace) {
     for (int i = 0; i < 200; ++i) {
       const auto sample = s.make().sample(r.uniform());
       const double x = sample.p.x, near = std::hypot(x, double{s.distance}) + 1e-7 * std::abs(s.a);
-      const double place = 0x1p-23 * (std::abs(s.a) + std::abs(s.b));  // t is coarse near the light
+      const double place = 0x1p-23 * (std::abs(s.a) + std::abs(s.b));  // t is rounded coarsely
       ASSERT_NEAR(s.make().pdf(sample.t) / sample.pdf, 1,
                   2e-6 + 4 * place / near + 4 * place * place / near / near);
     }
   }
 }
 
-// A light at the origin's height D that shines into a cone: all of the segment inside the cone is sampled, by
-// its angle, and nothing outside of it. At the cone's edge the two may differ by the rounding that keep_lit()
+// A light at distance D from the segment shines into a cone. The sampled part must be the part of the segment
+// inside the cone, by angle. At the edge of the cone the two may differ by the rounding error that keep_lit()
 // allows for.
 TEST(EquiAngular, SamplesTheLitPartOfTheSegment) {
   RandomStream r(11);
@@ -109,7 +109,7 @@ TEST(EquiAngular, SamplesTheLitPartOfTheSegment) {
       const V3 axis(w * std::cos(turn), w * std::sin(turn), z);
       const float reach = .05f + .94f * r.uniform();
       const EquiAngular e(V3(s.a, 0, 0), V3(1, 0, 0), s.b - s.a, Pivot(V3(0, s.distance, 0), axis, reach));
-      const auto beyond = [&](double x) {  // the cosine of the direction to the point x, less cos_reach
+      const auto beyond = [&](double x) {  // > 0 for points x inside the cone
         return (axis.x * x - double{axis.y} * s.distance) / std::hypot(x, double{s.distance}) - reach;
       };
       // Steps of equal angle
@@ -132,7 +132,8 @@ TEST(EquiAngular, SamplesTheLitPartOfTheSegment) {
       }
       if (lit < 200) continue;
       ++lit_segments;
-      // Two ends of the lit part, each within a step, and coarse t where the segment is far from the light
+      // The integral has an error of one step at each end of the lit part, and one from rounding t if the
+      // segment is far from the light
       EXPECT_NEAR(integral, 1, 3 / lit + 1e-6 * size / s.distance);
       ASSERT_GT(sample.pdf, 0);
       EXPECT_GT(beyond(double{sample.p.x}), -edge);

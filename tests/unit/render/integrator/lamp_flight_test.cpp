@@ -1,6 +1,6 @@
-// Flights past lamps: their weights have the means that closed forms give, in every channel, and they bound
-// the second moment of light near a lamp.
-#include "worker/render/integrator/lamp_flight.h"
+// Tests flights past lamps: the means of their weights have closed forms, in every channel, and the second
+// moment of light near a lamp is bounded.
+#include "worker/render/integrator/equiangular.h"
 
 #include <gtest/gtest.h>
 
@@ -37,7 +37,7 @@ struct Moments {
     return std::sqrt((squares / static_cast<double>(n) - mean() * mean()) / static_cast<double>(n));
   }
 };
-// Calls take(flight) for flights along +x from the origin to kEnd, each with a hero of its own.
+// Calls take(flight) for flights along +x from the origin to kEnd, each with its own hero.
 template <class Take>
 void fly(const Medium& medium, const Lamps& all, Take take) {
   RandomStream random(11);
@@ -48,9 +48,10 @@ void fly(const Medium& medium, const Lamps& all, Take take) {
   }
 }
 
-// With the channels combined as in path_tracer.h: what scatters in a channel is albedo (1 - e^(-sigma end)),
-// with t as a factor albedo (1 - (1 + sigma end) e^(-sigma end)) / sigma, and what passes e^(-sigma end).
-// Five standard errors each: 6e-7.
+// The channels are combined as in path_tracer.h. In a channel with the extinction sigma, flights scatter with
+// the weight albedo (1 - e^(-sigma end)) and pass with e^(-sigma end); the mean of t times the weight is
+// albedo (1 - (1 + sigma end) e^(-sigma end)) / sigma. Each check allows five standard errors and fails by
+// chance with probability 6e-7.
 TEST(LampFlight, HasTheMeansOfTheMedium) {
   for (const Lamps& all : {lamps({{1, .01f, 0}}), lamps({{1, .2f, .1f}, {-2, 1, 0}, {2.9f, 0, .001f}})})
     for (const C3& sigma : {C3(.5f, .5f, .5f), C3(0, .3f, 4), C3(1e-4f, 2, 30)}) {
@@ -75,10 +76,10 @@ TEST(LampFlight, HasTheMeansOfTheMedium) {
     }
 }
 
-// A flight past a lamp at the distance D, and light as 1 / r^2 in a thin medium. Flights of the medium alone
-// have the second moment sigma int 1 / r^4 dt = sigma pi / (2 D^3). A share q of flights has the density e =
-// D / (a r^2), with a < pi the angle that the way takes up about the lamp: the second moment is below int
-// (sigma / r^2)^2 / (q e) dt = sigma^2 a pi / (q D^2).
+// A flight passes a lamp at the distance D in a thin medium, and the light is 1 / r^2. Plain flights through
+// the medium have the second moment sigma int 1 / r^4 dt = sigma pi / (2 D^3). A share q of the flights has
+// the density e = D / (a r^2), where a < pi is the angle of the segment as seen from the lamp. So the second
+// moment is below int (sigma / r^2)^2 / (q e) dt = sigma^2 a pi / (q D^2).
 TEST(LampFlight, BoundsTheSecondMomentOfLightNearALamp) {
   constexpr float kDistance = .01f, kSigma = .01f;
   const Medium medium = homogeneous(C3(kSigma), C3(kSigma));
@@ -91,7 +92,7 @@ TEST(LampFlight, BoundsTheSecondMomentOfLightNearALamp) {
   const double alone = s * pi / (2 * d * d * d), bound = s * s * pi * pi / (kLampFlightShare * d * d);
   EXPECT_LT(bound, .01 * alone);
   EXPECT_LT(light.squares / static_cast<double>(light.n), bound);
-  // From the first to the last angle, without the little that the medium takes away on the way
+  // The integral of 1 / r^2 over the segment; the tolerance includes the attenuation by the medium
   EXPECT_NEAR(light.mean(), s / d * (std::atan(2 / d) + std::atan(1 / d)),
               5 * light.error() + s * s / d * pi);
 }
@@ -108,10 +109,9 @@ TEST(LampFlight, StaysFiniteInMediaWithoutAndBeyondAnyExtinction) {
     });
 }
 
-// Directions that are aimed near a lamp have a small weight, and what they meet there is bright. Roulette
-// that went by the weight alone would end most of these paths, and the few others would be fireflies.
-// Measured: the error with roulette is 1.21 times that without, and 1.87 times where roulette goes by the
-// weight alone.
+// Directions that are sampled near a lamp have a small weight, and lead to bright light. Roulette by the
+// weight alone would end most of these paths, and the few others would be fireflies. Measured: the error with
+// roulette is 1.21 times that without; with roulette by the weight alone it is 1.87 times.
 TEST(Roulette, SparesPathsThatAreAimedNearALamp) {
   const auto error = [](int rr_depth) {
     test::SceneBuilder b({16, 16});

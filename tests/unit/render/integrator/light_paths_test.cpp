@@ -1,5 +1,5 @@
-// Which scenes connect paths to light vertices, what that brings, and that it depends on nothing that it
-// should not depend on. That the image stays the same is tested in tests/property/connections_test.cpp.
+// Tests which scenes connect paths to light vertices, that connections reduce noise, and that they do not
+// depend on threads or variants. tests/property/connections_test.cpp tests that they do not change the image.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -58,7 +58,7 @@ TEST(LightPaths, LeaveOutWhatASceneDoesNotNeed) {
           << "in `path`, sheets passed count for max_depth";
 }
 
-// The number of threads that learn has no part in the image.
+// The image does not depend on the number of threads that learn.
 TEST(LightPaths, AreTheSameForAnyNumberOfThreads) {
   const auto sums = [](int threads) {
     const auto world = test::world_of(SunnyRoom{.glossy = true, .fog = .3}.builder({128, 128}), 3, threads);
@@ -69,14 +69,14 @@ TEST(LightPaths, AreTheSameForAnyNumberOfThreads) {
   for (const int threads : {2, 5}) EXPECT_EQ(sums(threads), one) << threads;
 }
 
-// Rays of the sun start in a vacuum, and find the media that the boundaries on their way declare. Where a
-// path would find others, it is not connected.
+// Rays of the sun start in a vacuum and pass the media that the boundaries on their way declare. If camera
+// paths find other media there, the scene does not connect paths.
 TEST(LightPaths, AreNotThereIfMediaDifferByTheWay) {
   const SunnyRoom room{.light_vertices = 1};
-  SceneBuilder fog_everywhere = room.builder();  // without end, if it were not for the walls
+  SceneBuilder fog_everywhere = room.builder();  // the fog also fills the space outside the room
   fog_everywhere.scene.sensor.medium = fog_everywhere.homogeneous({.1, .1, .1}, {.9, .9, .9});
   EXPECT_FALSE(connects(fog_everywhere));
-  SceneBuilder fog_around = room.builder();  // but the camera says that it stands in no medium
+  SceneBuilder fog_around = room.builder();  // at first the camera declares to be in no medium
   fog_around.container(CubeShape{}, test::scale(3), fog_around.null(),
                        fog_around.homogeneous({.1, .1, .1}, {.9, .9, .9}));
   EXPECT_FALSE(connects(fog_around));
@@ -88,7 +88,7 @@ TEST(LightPaths, AreNotThereIfMediaDifferByTheWay) {
   EXPECT_FALSE(connects(open));
 }
 
-// A room whose slit is closed: the sun is found nowhere, whatever is asked for.
+// The slit of the room is closed, so paths find no sun. Then the settings cannot enforce connections.
 TEST(LightPaths, AreNotThereIfTheSunIsNot) {
   SceneBuilder dark = SunnyRoom{.light_vertices = 1}.builder();
   dark.shape(RectangleShape{}, test::translate({1.1, 0, 0}) * test::rotate_y(90) * test::scale(2),
@@ -96,8 +96,8 @@ TEST(LightPaths, AreNotThereIfTheSunIsNot) {
   EXPECT_FALSE(connects(dark));
 }
 
-// The test prints the ratios: 0.15 without fog and 0.25 with it. Half leaves room for other sequences of
-// random numbers.
+// The test prints the ratios of the squared errors: 0.15 without fog and 0.25 with it. The limit of one half
+// leaves room for other sequences of random numbers.
 TEST(LightPaths, TakeTheNoiseFromIndirectLight) {
   for (const double fog : {0., .5}) {
     const auto squared_error = [&](int light_vertices) {
@@ -111,11 +111,11 @@ TEST(LightPaths, TakeTheNoiseFromIndirectLight) {
   }
 }
 
-// Where a glossy surface is bright, its look must not be much darker: its vertices would be chosen too
-// seldom, and count too much when they are. At an angle t from the mirrored direction a narrow Beckmann lobe
-// has the share exp(-x) of its peak, x = t^2 / (4 alpha^2), and the Henyey-Greenstein lobe of the same peak
-// and integral has (1 + 2 x)^-1.5. So the look is at most 3^1.5 / e = 1.91 times too dark, at x = 1. For wide
-// lobes, some of which are all even, the test finds up to 2.54.
+// The estimate (look) of a glossy light vertex must not be much too dark where the surface is bright: the
+// vertex would be chosen too rarely, with too much weight. At an angle t from the mirrored direction a narrow
+// Beckmann lobe has the share exp(-x) of its peak, x = t^2 / (4 alpha^2), and the Henyey-Greenstein lobe of
+// the same peak and integral has (1 + 2 x)^-1.5. So the look is at most 3^1.5 / e = 1.91 times too dark, at x
+// = 1. For wide lobes, some of which the even part describes alone, the test finds up to 2.54.
 TEST(LightPaths, SeeHowBrightGlossySurfacesAre) {
   for (const double alpha : {.03, .1, .15, .3, .6}) {
     SceneBuilder b({4, 4});
@@ -187,7 +187,7 @@ TEST(LightPaths, GiveTheSameSumsHoweverSamplesAreSplit) {
   EXPECT_FLOAT_EQ(static_cast<float>(sum), whole.sums[static_cast<std::size_t>(tile.pixels())]);
 }
 
-// Deep white fog, in which light is scattered a hundred times and more before it leaves.
+// In deep white fog light is scattered a hundred times and more before it leaves.
 TEST(LightPaths, OfLightThatIsNeverLostAreBounded) {
   SceneBuilder room = SunnyRoom{.fog = 100, .light_vertices = 1, .max_depth = -1}.builder();
   for (auto& medium : room.scene.media) std::get<HomogeneousMedium>(medium).albedo = {1, 1, 1};
@@ -207,7 +207,7 @@ TEST(LightPaths, OfACropAreThoseOfTheWholeFrame) {
   EXPECT_EQ(a.sums, b.sums);
 }
 
-// The variants of a scene differ in what they leave out, not in the image.
+// All variants that have the features of a scene render it to the same bits.
 TEST(LightPaths, GiveTheSameBitsByEveryVariant) {
   const auto world = test::world_of(SunnyRoom{.light_vertices = 1}.builder());
   const auto expected = render_tile(*world, {0, 0, 8, 8}, {0, 4}, nullptr, nullptr).sums;
@@ -222,7 +222,7 @@ TEST(LightPaths, GiveTheSameBitsByEveryVariant) {
 
 #ifdef LIGHTSHAFT_COUNT
 
-// 2,000 panes that nothing stops at stand between the camera and a floor in the sun, in thin fog.
+// 2,000 index-matched panes stand between the camera and a floor in the sun, in thin fog.
 TEST(LightPaths, LearnNoLongerWherePathsPassThousandsOfBoundaries) {
   constexpr int kPanes = 2000;
   SceneBuilder b({8, 8});
@@ -238,8 +238,9 @@ TEST(LightPaths, LearnNoLongerWherePathsPassThousandsOfBoundaries) {
 
   test::world_of(b);
 
-  // A path passes the panes twice, down and up, and its shadow ray once: a third of the limit of 2^20 is left
-  // for shadow rays. All 1,024 paths would have 2 million.
+  // A path passes the panes twice, down and up, and its shadow ray passes them once. So a third of the limit
+  // of 2^20 rays and boundaries is used by shadow rays. Without the limit, all 1,024 paths would use 2
+  // million for shadow rays.
   EXPECT_GT(work_counters().boundary_rays, 300'000u);
   EXPECT_LT(work_counters().boundary_rays, 400'000u);
 }

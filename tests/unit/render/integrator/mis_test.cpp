@@ -1,6 +1,6 @@
-// The weights of strategies that find the same light. Their mean is right whatever the heuristic: what tells
-// one from another is the weights themselves, and the second moment of a sample, which has a closed form
-// where both densities are known.
+// Tests the MIS weights of strategies that find the same light. The mean is right with every heuristic. So
+// the tests compare the weights themselves, and the second moment of a sample, which has a closed form if
+// both densities are known.
 #include "worker/render/integrator/mis.h"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 
 #include "tests/support/render_check.h"
 #include "worker/render/integrator/equiangular.h"
-#include "worker/render/integrator/truncated_exponential.h"
+#include "worker/render/integrator/segment_nee.h"
 
 namespace ls::render {
 namespace {
@@ -26,7 +26,7 @@ TEST(MisWeight, IsThatOfItsHeuristic) {
   EXPECT_EQ(mis_weight(MisHeuristic::power, 1, 0), 1);
 }
 
-// Of independent samples, the first of each pixel.
+// The first two moments of the first samples of all pixels, which are independent.
 struct TwoMoments {
   double mean = 0, square = 0, mean_error = 0, square_error = 0;
 };
@@ -52,17 +52,18 @@ double integrated(double from, double to, F f) {
   return sum * (to - from) / kSteps;
 }
 
-// Within five of their standard errors: 6e-7 each.
+// Both moments must be within five standard errors; each check fails by chance with probability 6e-7.
 void expect_moments(const TwoMoments& m, double mean, double square) {
   EXPECT_NEAR(m.mean, mean, 5 * m.mean_error);
   EXPECT_NEAR(m.square, square, 5 * m.square_error);
 }
 
-// A floor in the middle of a ball that shines 1. Light is sampled over all directions alike, so p_l = 1 / (4
-// pi), the floor's directions with p_s = c / pi, c their cosine. By the balance heuristic either way brings
-// a p_s / (p_l + p_s) = a g(c), g = 4 c / (1 + 4 c): next-event estimation for half of its directions, of
-// which c is uniform, and found light for c of density 2 c. By the power heuristic squares would add up to
-// 1.5 times as much in the one way and a fifth more in the other.
+// A floor of albedo a in the middle of a ball that emits radiance 1. Let c be the cosine of a direction to
+// the normal. Light sampling draws directions uniformly, p_l = 1 / (4 pi), and BSDF sampling by p_s = c / pi.
+// With the balance heuristic each strategy contributes a p_s / (p_l + p_s) = a g(c), g = 4 c / (1 + 4 c):
+// next-event estimation for the half of its directions above the floor, whose c is uniform, and BSDF sampling
+// for c of density 2 c. With the power heuristic the squares would add up to 1.5 times as much for the one
+// strategy and to a fifth more for the other.
 TEST(MisWeight, AtSurfacesIsTheBalanceHeuristic) {
   constexpr double kAlbedo = .5;
   SceneBuilder builder({kSide, kSide});
@@ -81,10 +82,10 @@ TEST(MisWeight, AtSurfacesIsTheBalanceHeuristic) {
   expect_moments(m, kAlbedo, kAlbedo * kAlbedo * (lit2 + found2 + 2 * lit * found));
 }
 
-// A lamp beside a ray through a cube of a medium, whose light is scattered once: a point of the ray is drawn
-// by depth, of density e_D, and another by angle, of density e_A. What light f(t) either brings has the
-// second moment of w^2 f^2 / e^2. With the lamp as far aside as here, those of the two heuristics
-// are fifteen standard errors apart.
+// A lamp stands beside a ray through a cube of a medium, in which light is scattered once. One point of the
+// ray is sampled by depth, with density e_D, and one by angle, with density e_A. If the single-scattered
+// light is f(t), a strategy with weight w and density e has the second moment int w^2 f^2 / e dt. The lamp is
+// so far from the ray that the second moments of the two heuristics differ by fifteen standard errors.
 TEST(MisWeight, AlongSegmentsIsThatWhichIsAskedFor) {
   constexpr float kSigma = 2, kAside = .4f, kAlong = .7f;
   const auto f = [](double t) {

@@ -1,5 +1,6 @@
-// Which scenes share paths between pixels, what that brings, and that the pixels depend on nothing that they
-// should not depend on. That the image stays the same is tested in tests/property/path_reuse_test.cpp.
+// Tests in which scenes pixels share paths, that sharing reduces noise, and that pixels do not depend on
+// seeds, crops, threads or variants. tests/property/path_reuse_test.cpp tests that sharing does not change
+// the image.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -65,7 +66,7 @@ TEST(PathReuse, IsThereIfAskedForAndPossible) {
   }))) << "an open boundary";
 }
 
-// A lamp above a grey floor in the open, where light that was scattered once is nearly all there is.
+// A lamp above a grey floor in the open: nearly all light is scattered once.
 SceneBuilder open_floor() {
   SceneBuilder b;
   b.scene.integrator.path_reuse = 0;
@@ -78,7 +79,7 @@ SceneBuilder open_floor() {
   return b;
 }
 
-// A glass ball between a lamp and the floor: the noise is of the caustic, which paths find beyond delta
+// A glass ball between a lamp and the floor: the noise comes from the caustic, which paths find behind delta
 // lobes.
 SceneBuilder caustic() {
   SceneBuilder b;
@@ -102,7 +103,7 @@ TEST(PathReuse, IsThereByDefaultWhereNoiseIsOfLightScatteredSeveralTimes) {
 std::vector<float> tile(const World& w, PixelRect rect, SampleRange samples) {
   return render_tile(w, rect, samples, nullptr, nullptr).sums;
 }
-// The sums of the part `rect` of the sums of `all`.
+// Returns those of the sums of `all` that belong to its part `rect`.
 std::vector<float> part(const std::vector<float>& sums, PixelRect all, PixelRect rect) {
   std::vector<float> out;
   const auto pixels = static_cast<std::size_t>(all.pixels());
@@ -113,9 +114,10 @@ std::vector<float> part(const std::vector<float>& sums, PixelRect all, PixelRect
   return out;
 }
 
-// In `path` surfaces passed count for the maximum depth. A box that light passes stands before the left half
-// of the picture. A lamp that shines upwards lights the ceiling alone, and the ceiling the floor: of the
-// floor behind the box paths see nothing, since they may not go on to the ceiling.
+// In the integrator `path`, passed surfaces count towards the maximum depth. A null box stands in front of
+// the left half of the picture. A lamp that shines upwards lights the ceiling only, and the ceiling lights
+// the floor. Behind the box the floor stays black, since paths that passed the box may not go on to the
+// ceiling.
 TEST(PathReuse, LooksOnlyAtSecondVerticesThatItsOwnPathCouldReach) {
   SceneBuilder b({16, 16});
   b.scene.integrator.name = "path";
@@ -157,8 +159,8 @@ TEST(PathReuse, GivesTheSamePixelsInEveryTileCropAndSampleRange) {
   EXPECT_FLOAT_EQ(static_cast<float>(sum), part(whole, kAll, {18, 17, 19, 18})[1]);
 }
 
-// Neither the job's seed nor a crop has a say in whether sharing pays, and the pilot leaves the world as it
-// was.
+// Whether sharing pays depends neither on the job's seed nor on a crop, and the pilot leaves the world
+// unchanged.
 TEST(PathReuse, IsTheSameByDefaultAsIfAskedFor) {
   constexpr PixelRect kAll{0, 0, 16, 16};
   for (const std::uint64_t seed : {0, 1, 2}) {
@@ -174,7 +176,7 @@ TEST(PathReuse, IsTheSameByDefaultAsIfAskedFor) {
   EXPECT_EQ(tile(*test::world_of(cropped), {0, 0, 2, 1}, {0, 2}), part(whole, kAll, {5, 3, 7, 4}));
 }
 
-// The number of threads of the pilot has no say in its decision. Frames of this size have 64 groups.
+// The decision does not depend on the pilot's number of threads. Frames of this size have 64 groups.
 TEST(PathReuse, IsDecidedAlikeByAnyNumberOfThreads) {
   for (SceneBuilder b : {LampRoom{.path_reuse = 0}.builder(), open_floor(), caustic()}) {
     b.scene.film.size = {256, 256};
@@ -204,8 +206,9 @@ TEST(PathReuse, GivesTheSameBitsInEveryVariant) {
   }
 }
 
-// The test prints the ratios: 0.58 without fog and 0.29 with it. A square in which pixels share is a quarter
-// of this small image. Three quarters leave room for other sequences of random numbers.
+// The test prints the ratios of the squared errors: 0.58 without fog and 0.29 with it. A square in which
+// pixels share is a quarter of this small image. The limit of three quarters leaves room for other sequences
+// of random numbers.
 TEST(PathReuse, TakesTheNoiseFromIndirectLight) {
   for (const double fog : {0., .8}) {
     const auto squared_error = [&](int path_reuse) {

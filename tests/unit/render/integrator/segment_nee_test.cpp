@@ -1,5 +1,6 @@
-// The integrator `volpath_distant_mis`, where its answers are exact: the density that it proposes depths
-// with, what a stretch of a medium measures, and what it shares with the default integrator to the bit.
+// Tests the integrator `volpath_distant_mis` where the result is known exactly: its density of depths, its
+// estimate of the light scattered on a segment, and the bits that it has in common with the default
+// integrator.
 #include "worker/render/integrator/segment_nee.h"
 
 #include <gmock/gmock.h>
@@ -17,8 +18,8 @@ using test::SceneBuilder;
 using test::translate;
 using test::operator*;
 
-// The whole mass lies in [0, length], at any depth: by midpoints over quantiles, where the textbook form
-// returns 0 everywhere below depths of 6e-8.
+// The density integrates to 1 over [0, length] at any optical depth; the test uses midpoints between
+// quantiles. The textbook form returns 0 everywhere below depths of 6e-8.
 TEST(TruncatedExponential, HasItsMassInTheStretchAtAnyDepth) {
   for (const double depth : {1e-30, 1e-12, 1e-7, 1e-3, 1., 30., 1e6}) {
     for (const float length : {1e-3f, 1.f, 1e4f}) {
@@ -27,7 +28,7 @@ TEST(TruncatedExponential, HasItsMassInTheStretchAtAnyDepth) {
         const float x = truncated_sample(sigma, length, v);
         ASSERT_GT(x, 0) << depth;
         ASSERT_LE(x, length) << depth;
-        // The distribution function there, in double.
+        // The distribution function at x, in double.
         const double s = sigma, cdf = s * length < 1e-15 ? x / double{length}
                                                          : std::expm1(-s * x) / std::expm1(-s * length);
         EXPECT_NEAR(cdf, v, 1e-6 * v + 2e-7) << "depth " << depth << " length " << length;
@@ -46,8 +47,8 @@ TEST(TruncatedExponential, IsTheExponentialWithoutAnEndAndNothingWithoutDepth) {
   EXPECT_EQ(truncated_pdf(0, 4, 1), .25f);
 }
 
-// Shares of strategies whose densities are as far apart as float32 can say (kMaxRatio): numbers in [0, 1],
-// whatever the light's density beside them is.
+// The weights of strategies are numbers in [0, 1] even if their densities differ by the whole range of
+// float32 (kMaxRatio), whatever the density of the light is.
 TEST(SegmentLightVertex, SharesAreNumbersAtTheEndsOfFloat32) {
   using Vertex = SegmentNee<Features{}>::Vertex;
   constexpr float kTiny = 1e-45f, kHuge = std::numeric_limits<float>::max();
@@ -121,7 +122,7 @@ TEST(DistantMis, EveryCoveringVariantGivesTheSameBits) {
       builder.scene.integrator.distance = distance;
       const auto world = test::world_of(builder);
       const auto names = covering_variants(*world);
-      EXPECT_EQ(names.size(), grid ? 3u : 4u);  // the one that parts the light among them
+      EXPECT_EQ(names.size(), grid ? 3u : 4u);  // including the variant that splits the light
       const auto first = render_tile_as(*world, names.front(), {0, 0, 6, 4}, {0, 32});
       for (const std::string& name : names)
         EXPECT_EQ(render_tile_as(*world, name, {0, 0, 6, 4}, {0, 32}).sums, first.sums) << name;
@@ -130,7 +131,8 @@ TEST(DistantMis, EveryCoveringVariantGivesTheSameBits) {
   }
 }
 
-// Light that next-event estimation can't reach is found in one way only, by both integrators.
+// Light that next-event estimation cannot sample is found by phase-function sampling alone, in both
+// integrators.
 TEST(DistantMis, IsTheDefaultIntegratorToTheBitWhereNoLightCanBeSampled) {
   SceneBuilder builder = cloud_builder();
   builder.scene.emitters.clear();

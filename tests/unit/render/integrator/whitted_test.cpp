@@ -1,5 +1,5 @@
-// Nori's `whitted` and `direct` against closed forms. In a closed room that shines 1 and reflects all alike a
-// surface is as bright everywhere, so that each bounce is a factor.
+// Tests Nori's `whitted` and `direct` against closed forms. In a closed room of one material, whose walls
+// emit radiance 1, the radiance is the same everywhere, so each bounce is a factor.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -20,11 +20,11 @@ void expect_brightness(SceneBuilder builder, const char* integrator, int max_dep
   const test::Estimate e = test::estimate(builder, 256, 0, 1);
 
   EXPECT_EQ(e.health.nonfinite, 0u);
-  // 1e-5: sums of some hundred terms in single precision.
+  // The term 1e-5 accounts for sums of some hundred terms in float32.
   EXPECT_NEAR(e.mean[1], expected, test::kStandardErrors * e.standard_error[1] + 1e-5 * expected);
 }
 
-// A ball seen from within.
+// A ball that emits light, seen from inside.
 SceneBuilder room(const auto& material) {
   SceneBuilder builder;
   const BsdfIndex bsdf = material(builder);
@@ -41,14 +41,14 @@ BsdfIndex tinted_mirror(SceneBuilder& b, double r) {
   return b.bsdf(ConductorBsdf{{0, 0, 0}, {1, 1, 1}, b.texture({r, r, r})});
 }
 
-// Emission, and half of it reflected once: 1.5 where all light is 1 / (1 - .5).
+// The emission, plus half of it reflected once, is 1.5. With all reflections it is 1 / (1 - .5) = 2.
 TEST(Whitted, EndsWithTheDirectLightOfADiffuseSurface) {
   expect_brightness(diffuse_room(), "whitted", -1, 1.5);
   expect_brightness(diffuse_room(), "path", 2, 1.5);
   expect_brightness(diffuse_room(), "path", -1, 2);
 }
 
-// A mirror shows itself: 1 + .8 (1 + .8 (...)) = 1 / (1 - .8); with one bounce 1.8.
+// The mirror reflects itself: the radiance is 1 + .8 (1 + .8 (...)) = 1 / (1 - .8), and 1.8 with one bounce.
 TEST(Whitted, FollowsMirrorsToTheEnd) {
   const auto mirrors = [] { return room([](SceneBuilder& b) { return tinted_mirror(b, .8); }); };
   expect_brightness(mirrors(), "whitted", -1, 5);
@@ -56,8 +56,8 @@ TEST(Whitted, FollowsMirrorsToTheEnd) {
   expect_brightness(mirrors(), "path", 2, 1.8);
 }
 
-// Of a blend, half of a mirror and half diffuse, L = 1 + .5 * .8 L + .5 * .5: the diffuse half has direct
-// light alone.
+// Half of the material is a mirror and half is diffuse: L = 1 + .5 * .8 L + .5 * .5, since the diffuse half
+// reflects direct light only.
 TEST(Whitted, TellsThePartsOfAMaterialApart) {
   expect_brightness(room([](SceneBuilder& b) {
                       const BsdfIndex first = tinted_mirror(b, .8), second = b.diffuse(.5);
@@ -66,10 +66,10 @@ TEST(Whitted, TellsThePartsOfAMaterialApart) {
                     "whitted", -1, 1.25 / .6);
 }
 
-// A floor below a ball of radius r = .5 that shines 1 at height 2, and a mirror in the plane x = 1, of which
-// the ball's image is at (2, 0, 2). A ball at distance d, whole above the horizon, gives the irradiance pi
-// r^2 / d^2 cos: pi / 16 by itself, and pi .25 / 8 * sqrt(.5) by way of the mirror, which `whitted` leaves
-// out. The mirror shows the floor at (2, 0, 0), as bright as it is.
+// A floor below a ball of radius r = .5 that emits radiance 1 at height 2. A mirror in the plane x = 1 has
+// the ball's image at (2, 0, 2). A ball at distance d, all of it above the horizon, gives the irradiance pi
+// r^2 / d^2 cos: pi / 16 directly, and pi .25 / 8 * sqrt(.5) through the mirror, which `whitted` leaves out.
+// The mirror shows the floor at (2, 0, 0) with the same radiance.
 TEST(Whitted, LeavesOutWhatMirrorsThrowOnASurface) {
   SceneBuilder builder;
   builder.shape(RectangleShape{}, test::scale(.2), builder.diffuse(.5));
@@ -86,7 +86,7 @@ TEST(Whitted, LeavesOutWhatMirrorsThrowOnASurface) {
   }
 }
 
-// All variants that cover a scene give the same bits.
+// All variants that have the features of a scene give the same bits.
 TEST(Whitted, HasTheSameBitsInAllItsVariants) {
   SceneBuilder builder = diffuse_room();
   builder.shape(SphereShape{{.5, 0, 0}, .2}, {}, builder.glass(1.5));

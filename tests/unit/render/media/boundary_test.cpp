@@ -1,4 +1,5 @@
-// Where media begin and end: no way through them is left out, and no sample that was cut off is counted.
+// Tests paths at the boundaries of media: the whole length inside a medium counts, and samples that were cut
+// off do not.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +14,8 @@ using test::SceneBuilder;
 using test::translate;
 using test::operator*;
 
-// A floor in the light of a sun overhead, seen from below a slab of the medium that hangs over it.
+// Returns the radiance of a floor under the sun, attenuated by a slab of the medium between them. The camera
+// sees the floor from below the slab.
 double lit_through(double half_thickness, double sigma_t) {
   SceneBuilder builder({1, 1});
   builder.scene.integrator.max_depth = 2;
@@ -26,20 +28,21 @@ double lit_through(double half_thickness, double sigma_t) {
   return render_sample(*test::world_of(builder), 0, 0, 0).rgb[0];
 }
 
-// The ray that goes on behind a boundary starts 2^-20 of the world farther in. Places are rounded to 2^-24 at
-// both faces, so a slab of 8 * 2^-20 is thick to 2 * 2^-24 / (8 * 2^-20) = 1/64; without the way that the
-// ray starts in it would be thinner by 1/8.
+// The ray that continues behind a boundary starts 2^-20 of the world inside the medium. Positions are rounded
+// to 2^-24 at both faces, so the length through a slab of 8 * 2^-20 has the error 2 * 2^-24 / (8 * 2^-20) =
+// 1/64. If the part before the ray's start did not count, the length would be too short by 1/8.
 TEST(Boundaries, LoseNoneOfTheWayThroughAMedium) {
   EXPECT_NEAR(lit_through(.1, 0), 1, 1e-5);
   EXPECT_NEAR(lit_through(.1, 5), std::exp(-1), 1e-5);
-  // The world's scale is a power of two that brings its radius, here about 1.5, to at most 1: half the unit.
+  // The world's scale is a power of two that brings its radius, here about 1.5, to at most 1. So it is one
+  // half.
   const double thickness = 2 * 8 * 0x1p-20;
   const double depth = -std::log(lit_through(thickness / 2, 1 / thickness));
   EXPECT_NEAR(depth, 1, 1. / 32);
 }
 
-// A mirror that looks into fog, met by a ray that was in none: what it reflects has come through the fog, by
-// whichever strategy it is found.
+// A ray outside of any medium hits a mirror whose front side declares fog. The reflected light has passed the
+// fog, whichever strategy finds it.
 TEST(Boundaries, GiveReflectedRaysTheMediumOfTheirSide) {
   SceneBuilder builder({8, 8});
   const MediumIndex fog = builder.homogeneous({.7, .7, .7}, {0, 0, 0});
@@ -48,16 +51,16 @@ TEST(Boundaries, GiveReflectedRaysTheMediumOfTheirSide) {
   mirror.is_medium_transition = true;
   builder.lamp(RectangleShape{}, translate({0, 2, 1}) * test::rotate_x(180));
   builder.look({0, -1, .5}, {0, 0, 0});
-  // From the mirror at the origin the light's plane z = 1 is met at (0, 2, 1).
+  // The ray reflected at the origin hits the light's plane z = 1 at (0, 2, 1).
   const auto e = test::estimate(builder, 256);
   EXPECT_NEAR(e.mean[0], std::exp(-.7 * std::sqrt(5.)), 5 * e.standard_error[0] + 1e-5);
   EXPECT_LT(e.standard_error[0], .02);
 }
 
-// A ray that enters a ball at so flat an angle that the line from its moved start leaves it farther on than
-// the true one does: a vertex between the two ends stands outside. Rays that are sent on from there must meet
-// the ball; one that does not has a medium without end ahead of it, which here gives off light: infinitely
-// much.
+// A ray enters a ball at a very flat angle. The line from its offset origin leaves the ball later than the
+// true line does, so a vertex near the end of the segment may lie outside of the ball. Rays that continue
+// from there must hit the ball. A ray that misses it would have an infinite, emitting medium ahead of it, and
+// thus infinite radiance.
 TEST(Boundaries, KeepPathsInsideOfABallThatTheyGraze) {
   SceneBuilder builder({32, 32});
   const MediumIndex m = builder.heterogeneous(
@@ -71,8 +74,9 @@ TEST(Boundaries, KeepPathsInsideOfABallThatTheyGraze) {
   EXPECT_EQ(e.health.nonfinite, 0u);
 }
 
-// More null sheets than a ray may cross between a floor and its sun: a column over the little that the camera
-// sees of the floor, so that most paths leave the scene beside it after their shadow ray was cut off.
+// Between a floor and the sun stand more null sheets than a shadow ray may cross. They form a column over the
+// small part of the floor that the camera sees. So most paths leave the scene beside the column after their
+// shadow ray was cut off.
 TEST(Boundaries, RejectSamplesWhoseShadowRaysAreCutOff) {
   std::string text;
   constexpr int kSheets = (1 << 16) + 1;
@@ -85,8 +89,8 @@ TEST(Boundaries, RejectSamplesWhoseShadowRaysAreCutOff) {
   SceneBuilder builder({1, 1});
   MeshShape mesh;
   mesh.file = builder.asset("sheets.obj", text);
-  const MediumIndex thin =
-      builder.homogeneous({.01, .01, .01}, {0, 0, 0});  // of none, nothing would be walked
+  // Without a medium, shadow rays would not cross the sheets one by one.
+  const MediumIndex thin = builder.homogeneous({.01, .01, .01}, {0, 0, 0});
   const BsdfIndex null = builder.null();
   builder.container(mesh, {}, null, thin);
   builder.shape(RectangleShape{}, {}, builder.diffuse(1));

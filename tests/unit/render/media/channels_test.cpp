@@ -1,5 +1,5 @@
-// Grids with a density of its own for each channel: the trackers against exact integrals, what is scattered,
-// what glows, and files of three equal channels, which are grey.
+// Tests grids with a density per channel: the trackers against exact integrals, scattering, emission, and
+// files with three equal channels, which are grey.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -9,20 +9,20 @@
 #include "tests/unit/render/grids.h"
 #include "worker/render/media/emission.h"
 #include "worker/render/media/optical_depth.h"
-#include "worker/render/media/spectral_grids.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {
 namespace {
 
-// Means within 5 standard errors (6e-7 a check, 105 checks: 6e-5)
+// The means are within 5 standard errors (each of 105 checks fails by chance with probability 6e-7, any of
+// them with 6e-5)
 constexpr int kFlights = 40000;
 const Size kChannelsSize{9, 9, 9};
 const V3 kFrom(-1, .3f, 1.1f), kAlong = normalize(V3(9, 7.1f, 6.2f));
 
 struct Coloured {
   const char* name;
-  std::vector<Grid> grids;  // of the channels, and their mean
+  std::vector<Grid> grids;  // those of the channels, then their mean
   float sigma;
 
   Medium medium() const {
@@ -35,7 +35,7 @@ struct Coloured {
     return m;
   }
   double depth(int c, double t) const {
-    return sigma * grids[static_cast<std::size_t>(c)].exact_integral(V3d(kFrom), V3d(kAlong), 0, t);
+    return sigma * exact_integral(grids[static_cast<std::size_t>(c)], V3d(kFrom), V3d(kAlong), 0, t);
   }
 };
 
@@ -60,7 +60,7 @@ std::vector<Coloured> media() {
   all.push_back(coloured("dense", .3f, [&](int c) { return unit_grid(kChannelsSize, values(c)); }));
   all.push_back(coloured("sparse, where others are not", 1.5f,
                          [&](int c) { return unit_grid(kChannelsSize, values(c, true)); }));
-  // One channel sees nothing; of the others some cells are tracked and some followed exactly.
+  // The first channel has no extinction. In the others some cells are tracked and some integrated exactly.
   all.push_back(coloured("apart", .6f, [&](int c) {
     return unit_grid(kChannelsSize, scaled(values(c, c == 2), c == 0 ? 0.f : c == 1 ? .5f : 20.f));
   }));
@@ -81,7 +81,7 @@ struct Sums {
   void expect(int c, double expected, const std::string& what, double slack = 0) const {
     const double mean = sum[c] / kFlights,
                  se = std::sqrt(std::max(0., square[c] / kFlights - mean * mean) / kFlights);
-    // Depths are sums of float32: each of about 30 steps rounded by 2^-24 of the depth.
+    // Optical depths are sums of about 30 steps in float32, each rounded by 2^-24 of the depth.
     EXPECT_NEAR(mean, expected, 5 * se + expected * (30 * 0x1p-23 + slack)) << what << " channel " << c;
     EXPECT_LT(se, .1 * expected + 1e-6) << what << " channel " << c;
   }
@@ -111,7 +111,7 @@ TEST(Channels, TransmittancesAverageToEachChannelsOwn) {
   }
 }
 
-// Of what is scattered within each third of the way: the albedo's share of what is lost there.
+// Light scattered within each third of the ray: the albedo times the light that is lost there.
 TEST(Channels, FlightsScatterWhereEachChannelIsLost) {
   for (const Coloured& m : media()) {
     const Medium medium = m.medium();
@@ -143,14 +143,14 @@ TEST(Channels, WhatPassedIsExactForEveryHero) {
       const Flight f = passed(m.medium(), hero, kFrom, kAlong, 8);
       for (int c = 0; c < 3; ++c) {
         const double expected = std::exp(m.depth(hero, 8) - m.depth(c, 8));
-        // Positions of float32 shift the ends of 30 steps by 2^-19 voxels.
+        // Rounding positions to float32 shifts the ends of 30 steps by 2^-19 voxels.
         EXPECT_NEAR(f.weight[c] / expected, 1, m.sigma * 20 * 30 * 0x1p-19) << m.name;
         EXPECT_EQ(f.weight[c], f.density[c]);
       }
     }
 }
 
-// The weights that share an experiment out among channels never exceed their number.
+// The weights by which channels are combined are never larger than the number of channels.
 TEST(Channels, NoWeightIsAboveThree) {
   for (const Coloured& m : media()) {
     MediumCounters counters;
@@ -165,7 +165,7 @@ TEST(Channels, NoWeightIsAboveThree) {
   }
 }
 
-// A source of one radiance: what each channel does not let through of it.
+// With a constant source radiance, each channel emits that radiance times 1 - transmittance.
 TEST(Channels, GlowIsEachChannelsOwn) {
   for (const Coloured& m : media()) {
     Medium medium = m.medium();
@@ -241,8 +241,8 @@ TEST(Channels, ThreeEqualOnesAreAGreyGridToTheLastBit) {
   EXPECT_NE(render(lit_box(three, 3)).sums, render(lit_box(one, 1)).sums);
 }
 
-// A file of three channels that are multiples of one is what a constant colour times a grid would be; light
-// that is scattered once differs by noise alone, and by none where nothing is random.
+// A file whose three channels are multiples of one grid gives the same light as a colour times that grid.
+// Light that is scattered once differs only by noise; light that involves no random numbers is equal.
 TEST(Channels, AFileOfThreeChannelsIsReadInOrder) {
   std::vector<float> three;
   for (int i = 0; i < 60; ++i)
@@ -263,7 +263,7 @@ TEST(Channels, AFileOfThreeChannelsIsReadInOrder) {
   EXPECT_LT(e.standard_error[1], .01);
 }
 
-// Likewise of one channel and a tint: absorption alone, and no light but the environment's.
+// The same with one channel and a tint. The medium only absorbs, and the only light is the environment.
 TEST(Channels, ATintIsAFactorByChannel) {
   const std::vector<float> one(60, 1);
   SceneBuilder builder = lit_box(one, 1);

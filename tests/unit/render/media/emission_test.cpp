@@ -1,4 +1,4 @@
-// Light given off by media, against closed forms and quadrature.
+// Tests medium emission against closed forms and quadrature.
 #include "worker/render/media/emission.h"
 
 #include <gtest/gtest.h>
@@ -39,7 +39,7 @@ TEST(MediumEmission, WithoutExtinctionIsEmissionTimesLength) {
   for (int c = 0; c < 3; ++c) EXPECT_EQ(light[c], kEmission[c] * 3.5f);
 }
 
-// The thin limit: e L (1 - tau/2 + tau^2/6 - ...), where 1 - e^-tau of float32 is 0.
+// In the thin limit the emission is e L (1 - tau/2 + tau^2/6 - ...). In float32 1 - e^-tau would be 0 there.
 TEST(MediumEmission, OfThinMediaHasFullPrecision) {
   for (const double tau : {1e-30, 1e-12, 1e-9, 1e-6, 1e-3}) {
     const C3 light = emission_of_length(homogeneous(C3(static_cast<float>(tau / 2))), 2);
@@ -57,19 +57,19 @@ TEST(MediumEmission, OfOpaqueAndEndlessMediaIsEmissionOverExtinction) {
   Medium half = homogeneous(C3(0));
   half.emission = C3(1, 0, 0);
   const C3 light = emission_of_length(half, kInfinity);
-  EXPECT_TRUE(std::isinf(light.x));  // light without end: the sample is rejected, and counted
+  EXPECT_TRUE(std::isinf(light.x));  // the sample will be rejected and counted
   EXPECT_EQ(light.y, 0);
 }
 
-// Every random number gives the closed form, per channel.
+// In each channel, every random number gives the closed form.
 TEST(MediumEmission, OfAConstantGridIsThatOfAHomogeneousMedium) {
   const Grid one = voxel_grid({3, 3, 3}, std::vector<float>(27, 1), kTrilinear, Wrap::clamp);
   for (const C3& sigma : {C3(0), C3(.3f), C3(0, 1, 16), C3(1e-9f, 1e3f, 1e9f)}) {
-    // In its cells of 4 voxels some of these are tracked and some followed exactly.
+    // In the grid's cells of 4 voxels, some of these extinctions are tracked and some integrated exactly.
     const Medium m = of_grid(one, sigma, EmissionKind::per_length);
     const C3 expected = emission_of_length(homogeneous(sigma), 3);
     for (int i = 0; i < 50; ++i) {
-      // From face to face: [-1/2, 5/2].
+      // The ray passes the grid from face to face: [-1/2, 5/2].
       const C3 light = emission_of_grid(m, {-.5f, 1, 1}, {1, 0, 0}, 3, RandomStream(mix64(i)));
       for (int c = 0; c < 3; ++c) ASSERT_NEAR(light[c] / expected[c], 1, 1e-5) << sigma << " " << c;
     }
@@ -82,19 +82,19 @@ TEST(MediumEmission, PerLengthGoesOnAroundTheDensity) {
 
   const C3 light = emission_of_grid(m, {-2.5f, 1, 1}, {1, 0, 0}, 10, RandomStream(1));
 
-  // 2 in front, 3 within, 5 behind.
+  // The ray's length is 2 in front of the grid, 3 inside and 5 behind.
   const double through = std::exp(-1.5), within = (1 - through) / .5;
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(light[c] / (kEmission[c] * (2 + within + 5 * through)), 1, 1e-5);
 }
 
-// Nothing is absorbed: the integral of the grid itself, without noise.
+// Nothing is absorbed, so the result is the integral of the emission grid, without noise.
 TEST(MediumEmission, OfAGridInClearAirIsItsIntegral) {
   const Grid none = unit_grid({2, 2, 2}, std::vector<float>(8, 0));
   const Grid fire = unit_grid({9, 9, 9}, random_values({9, 9, 9}, 3, true));
   Medium m = of_grid(none, C3(1), EmissionKind::per_length);
   emit(m, fire);
   const V3 o(-1, .3f, 1.1f), d = normalize(V3(9, 7.1f, 6.2f));
-  const double expected = fire.exact_integral(V3d(o), V3d(d), 0, 30);
+  const double expected = exact_integral(fire, V3d(o), V3d(d), 0, 30);
   ASSERT_GT(expected, .5);
 
   for (int i = 0; i < 20; ++i) {
@@ -123,26 +123,27 @@ Mean mean_of(const Medium& m, const V3& o, const V3& d, int n) {
   return r;
 }
 
-// A source of one radiance B everywhere: B times what is not let through, whatever the density. Means within
-// 5 standard errors (6e-7 a check, 24 checks), and float32's rounding of 40 steps.
+// With the source radiance B everywhere, the emission is B (1 - transmittance) for any density. Means are
+// within 5 standard errors (each of 24 checks fails by chance with probability 6e-7) and the float32 rounding
+// of 40 steps.
 TEST(MediumEmission, OfAnIsothermalGridIsWhatItDoesNotLetThrough) {
   const V3 o(-1, .3f, 1.1f), d = normalize(V3(9, 7.1f, 6.2f));
   for (const bool sparse : {false, true})
     for (const C3& sigma : {C3(.3f), C3(0, .3f, 6), C3(1e3f), C3(.1f, 1e2f, 1e7f)}) {
       const Grid g = unit_grid({9, 9, 9}, random_values({9, 9, 9}, 5, sparse), 0, max_component(sigma));
       const Medium m = of_grid(g, sigma, EmissionKind::per_absorption);
-      const double depth = g.exact_integral(V3d(o), V3d(d), 0, 30);
+      const double depth = exact_integral(g, V3d(o), V3d(d), 0, 30);
       const Mean r = mean_of(m, o, d, 4000);
       for (int c = 0; c < 3; ++c) {
         const double expected = kEmission[c] * -std::expm1(-sigma[c] * depth);
         EXPECT_NEAR(r.mean[c], expected, 5 * r.error[c] + 40 * 0x1p-23 * expected) << sigma << " " << c;
-        // All the noise there is comes from roulette, where next to nothing is let through.
+        // The only noise comes from roulette, which acts where the transmittance is nearly 0.
         EXPECT_LE(r.error[c], 1e-4 * expected) << sigma << " " << c;
       }
     }
 }
 
-// Integral of e(t) exp(-sigma integral of rho), by Simpson's rule on fine steps.
+// Integral of e(t) exp(-sigma integral of rho), by Simpson's rule with fine steps.
 double quadrature(const Grid& density, double sigma, const std::function<double(const V3&)>& e, const V3& o,
                   const V3& d, double length) {
   constexpr int kSteps = 20000;
@@ -166,8 +167,8 @@ double quadrature(const Grid& density, double sigma, const std::function<double(
   return sum;
 }
 
-// Grids of different places and sizes, channels of different depths. 5 standard errors and 1e-3 of the
-// quadrature, whose steps end beside the voxels.
+// The grids have different positions and sizes, and the channels different optical depths. The tolerance is 5
+// standard errors plus 1e-3 of the quadrature, whose steps do not end at voxel boundaries.
 TEST(MediumEmission, OfTwoGridsAgreesWithQuadrature) {
   const Grid density = unit_grid({9, 9, 9}, random_values({9, 9, 9}, 5, true), 0, 3);
   const Affine finer = Affine::scale_translate(1.7, V3d(1, 2, 1.5));
@@ -213,8 +214,8 @@ TEST(MediumEmission, OfTwoGridsAgreesWithQuadrature) {
   }
 }
 
-// Density, temperatures and weights in different places, and the ray passes out of the weights' box where
-// there is still a density. 5 standard errors and 1e-3 of the quadrature, as above.
+// Density, temperatures and weights have different positions, and the ray leaves the box of the weights where
+// there is still density. The tolerance is 5 standard errors plus 1e-3 of the quadrature, as above.
 TEST(MediumEmission, OfBodiesOfPeakOneIsWeighted) {
   const Grid density = unit_grid({9, 9, 9}, random_values({9, 9, 9}, 5), 0, 3);
   const Grid fire({11, 8, 9}, random_values({11, 8, 9}, 8), Affine::scale_translate(1.7, V3d(1, 2, 1.5)),
@@ -257,7 +258,7 @@ TEST(MediumEmission, OfGridsWithoutInterpolationAgreesToo) {
 
   const Mean r = mean_of(m, o, d, 4000);
 
-  const double expected = -std::expm1(-density.exact_integral(V3d(o), V3d(d), 0, 30));
+  const double expected = -std::expm1(-exact_integral(density, V3d(o), V3d(d), 0, 30));
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(r.mean[c] / kEmission[c], expected, 5 * r.error[c] + 1e-5);
 }
 
@@ -270,25 +271,27 @@ TEST(MediumEmission, OfRaysThatAreNoneIsDark) {
   EXPECT_EQ(emission_of_grid(m, {0, 9, 0}, {1, 0, 0}, kInfinity, RandomStream(1)), C3(0));
 }
 
-// CIE 15: illuminant A is a black body of 2856 K with x = .44758, y = .40745; the candela was once a sixtieth
-// of a square centimetre of platinum at its freezing point, 2041.4 K: 600,000 cd/m^2 within half a per cent,
-// with 683 lm/W at 555 nm and an observer whose y integrates to 106.857 nm.
+// Illuminant A of CIE 15 is a black body of 2856 K, with x = .44758, y = .40745. The candela was once defined
+// by a black body at the freezing point of platinum, 2041.4 K, as one sixtieth of the light of 1 cm^2:
+// 600,000 cd/m^2, within half a per cent. The luminance uses 683 lm/W at 555 nm and an observer whose y
+// integrates to 106.857 nm.
 TEST(BlackBody, HasTheColourAndLuminanceOfItsTemperature) {
   const auto luminance = [](const C3& c) {
     return .212639005871510 * c.x + .715168678767756 * c.y + .072192315360734 * c.z;
   };
   const C3 a = black_body_radiance(2856);
-  // x, y of linear sRGB by the primaries' own matrix.
+  // The chromaticity x, y of linear sRGB, by the matrix of its primaries.
   const double x = .412390799265959 * a.x + .357584339383878 * a.y + .180480788401834 * a.z, y = luminance(a),
                z = .019330818715592 * a.x + .119194779794626 * a.y + .950532152249661 * a.z;
   EXPECT_NEAR(x / (x + y + z), .44758, 2e-4);
   EXPECT_NEAR(y / (x + y + z), .40745, 2e-4);
-  // Its blue is outside of sRGB and made 0, which adds less than .1 % of the luminance.
+  // The blue component is outside of sRGB and set to 0, which adds less than .1 % of the luminance.
   EXPECT_NEAR(luminance(black_body_radiance(2041.4f)) * 683.002 * 106.857 / 600000, 1, .006);
 }
 
-// Planck's law by its constants, and its largest value found by trying: steps of 1e-4 of the wavelength are
-// off the peak by at most (5e-5)^2 / 2 times its bend, which is below 20 there.
+// Planck's law, with its constants; its largest value is found by trying wavelengths in steps of 1e-4. The
+// nearest one is off the peak by at most 5e-5, so the error is at most (5e-5)^2 / 2 times the curvature,
+// which is below 20 there.
 TEST(BlackBody, OfPeakOneIsDividedByItsLargestValue) {
   const double h = 6.62607015e-34, c = 299792458, k = 1.380649e-23;
   for (const double t : {250., 1500., 2856., 6500., 30000.}) {
@@ -303,7 +306,7 @@ TEST(BlackBody, OfPeakOneIsDividedByItsLargestValue) {
   }
 }
 
-// No component is above the bound that media_build.cpp checks emission with, and cold bodies are dark.
+// No component is above the bound by which media_build.cpp checks emission, and cold bodies are black.
 TEST(BlackBody, OfPeakOneIsBounded) {
   EXPECT_EQ(black_body_of_peak_one(199), C3(0));
   EXPECT_EQ(black_body_of_peak_one(std::numeric_limits<float>::quiet_NaN()), C3(0));

@@ -1,4 +1,4 @@
-// Density grids: interpolation, exact integrals, and the walk through macro cells.
+// Tests density grids: interpolation, exact integrals, and the traversal of macro cells.
 #include "worker/render/media/grid.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ TEST(Grid, InterpolatesToItsNodesAndClampsBeyondThem) {
   for (int z = 0; z < 4; ++z)
     for (int y = 0; y < 3; ++y)
       for (int x = 0; x < 2; ++x)
-        // Three lerps of numbers below 1, each rounded twice.
+        // The tolerance allows for three lerps of numbers below 1, each rounded twice.
         EXPECT_NEAR(g.value<kTrilinear>(V3(x, y, z)), values[static_cast<std::size_t>((z * 3 + y) * 2 + x)],
                     6 * 0x1p-25);
 
@@ -33,23 +33,24 @@ TEST(Grid, InterpolatesToItsNodesAndClampsBeyondThem) {
 TEST(Grid, DiagonalOfTheProductOfCoordinatesIsTheRootOfThreeQuarters) {
   std::vector<float> v(8, 0);
   v[7] = 1;  // density = x y z
-  EXPECT_NEAR(unit_grid({2, 2, 2}, v).exact_integral({0, 0, 0}, {1, 1, 1}, 0, 1) * std::sqrt(3.),
+  EXPECT_NEAR(exact_integral(unit_grid({2, 2, 2}, v), {0, 0, 0}, {1, 1, 1}, 0, 1) * std::sqrt(3.),
               std::sqrt(3.) / 4, 1e-15);
 }
 
 TEST(Grid, IntegralsOfTentRampAndConstantMatchClosedForms) {
   std::vector<float> tent(27, 0);
   tent[13] = 5;
-  EXPECT_NEAR(unit_grid({3, 3, 3}, tent).exact_integral({-4, 1, 1}, {1, 0, 0}, 0, 10), 5, 1e-14);  // rho h
+  EXPECT_NEAR(exact_integral(unit_grid({3, 3, 3}, tent), {-4, 1, 1}, {1, 0, 0}, 0, 10), 5, 1e-14);  // rho h
 
   const Grid ramp = unit_grid({4, 1, 1}, {0, 1, 2, 3}, .5);
-  EXPECT_NEAR(ramp.exact_integral({-9, 0, 0}, {1, 0, 0}, 0, 99), 4.5 + 1.5,
-              1e-13);  // clamped half voxels: 0 and 3/2
-  EXPECT_NEAR(ramp.exact_integral({1.25, 0, 0}, {-1, 0, 0}, 0, 1), .5 * (1.25 * 1.25 - .25 * .25), 1e-14);
+  EXPECT_NEAR(exact_integral(ramp, {-9, 0, 0}, {1, 0, 0}, 0, 99), 4.5 + 1.5,
+              1e-13);  // the clamped half voxels add 0 and 3/2
+  EXPECT_NEAR(exact_integral(ramp, {1.25, 0, 0}, {-1, 0, 0}, 0, 1), .5 * (1.25 * 1.25 - .25 * .25), 1e-14);
 
   const Grid constant = unit_grid({2, 3, 4}, std::vector<float>(24, 3), .5);
-  EXPECT_NEAR(constant.exact_integral({-9, 1, 1}, {1, 0, 0}, 0, 99), 3 * 2, 1e-13);  // 1 + two half voxels
-  EXPECT_EQ(constant.exact_integral({-9, 7, 1}, {1, 0, 0}, 0, 99), 0);
+  EXPECT_NEAR(exact_integral(constant, {-9, 1, 1}, {1, 0, 0}, 0, 99), 3 * 2,
+              1e-13);  // 1 voxel and two halves
+  EXPECT_EQ(exact_integral(constant, {-9, 7, 1}, {1, 0, 0}, 0, 99), 0);
 }
 
 TEST(Grid, WithoutInterpolationEachVoxelHasItsOwnValue) {
@@ -70,10 +71,10 @@ TEST(Grid, WithoutInterpolationEachVoxelHasItsOwnValue) {
 
 TEST(Grid, IntegralsWithoutInterpolationAreSumsOfVoxels) {
   const Grid g = voxel_grid({4, 1, 1}, {7, 1, 2, 5}, kNearest, Wrap::clamp);
-  EXPECT_NEAR(g.exact_integral({-9, 0, 0}, {1, 0, 0}, 0, 99), 7 + 1 + 2 + 5, 1e-13);
-  EXPECT_NEAR(g.exact_integral({-.25, 0, 0}, {1, 0, 0}, 0, 1), .75 * 7 + .25 * 1, 1e-14);
+  EXPECT_NEAR(exact_integral(g, {-9, 0, 0}, {1, 0, 0}, 0, 99), 7 + 1 + 2 + 5, 1e-13);
+  EXPECT_NEAR(exact_integral(g, {-.25, 0, 0}, {1, 0, 0}, 0, 1), .75 * 7 + .25 * 1, 1e-14);
   const Grid block = voxel_grid({2, 2, 2}, {1, 2, 3, 4, 5, 6, 7, 8}, kNearest, Wrap::clamp);
-  EXPECT_NEAR(block.exact_integral({-.5, -.5, -.5}, {1, 1, 1}, 0, 2), 1 + 8, 1e-14);
+  EXPECT_NEAR(exact_integral(block, {-.5, -.5, -.5}, {1, 1, 1}, 0, 2), 1 + 8, 1e-14);
 }
 
 TEST(Grid, RepeatedEndsAreInterpolatedWithEachOther) {
@@ -82,13 +83,13 @@ TEST(Grid, RepeatedEndsAreInterpolatedWithEachOther) {
              repeated = voxel_grid({4, 1, 1}, {0, 1, 2, 3}, kTrilinear, Wrap::repeat);
   for (int i = -8; i <= 56; ++i) {
     const float x = static_cast<float>(i) / 16;
-    // Between the last node and the first: from 3 at distance 0 to 0 at distance 1.
+    // Between the last node and the first, the value falls from 3 to 0 over the distance 1.
     const float expected = x < 0 ? -3 * x : x > 3 ? 3 * (4 - x) : x;
     EXPECT_FLOAT_EQ(value_at(repeated, {x, 0, 0}), expected) << x;
     EXPECT_EQ(value_at(clamped, {x, 0, 0}), std::min(std::max(x, 0.f), 3.f));
     EXPECT_EQ(value_at(mirrored, {x, 0, 0}), std::min(std::max(x, 0.f), 3.f));
   }
-  const auto first_half = [](const Grid& g) { return g.exact_integral({-9, 0, 0}, {1, 0, 0}, 0, 9); };
+  const auto first_half = [](const Grid& g) { return exact_integral(g, {-9, 0, 0}, {1, 0, 0}, 0, 9); };
   EXPECT_NEAR(first_half(clamped), 0, 1e-14);
   EXPECT_NEAR(first_half(mirrored), 0, 1e-14);
   EXPECT_NEAR(first_half(repeated), .5 * (1.5 + 0) / 2, 1e-14);  // a trapezium
@@ -103,7 +104,7 @@ TEST(Grid, BeyondItsBoxAGridGoesOnAsItsWrapModeSays) {
                repeated = voxel_grid(n, values, filter, Wrap::repeat),
                mirrored = voxel_grid(n, values, filter, Wrap::mirror);
     for (int i = 0; i < 1000; ++i) {
-      // Multiples of 1/16 that are no border between voxels: sums with whole boxes are exact.
+      // Multiples of 1/16, moved by 1/32 away from the faces of voxels: adding multiples of the box is exact.
       const auto draw = [&](int cells) {
         return static_cast<float>(rng() % static_cast<unsigned>(16 * cells)) / 16 - .5f + 1.f / 32;
       };
@@ -111,7 +112,7 @@ TEST(Grid, BeyondItsBoxAGridGoesOnAsItsWrapModeSays) {
       const int turn = static_cast<int>(rng() % 7) - 3;
       const V3 out(in.x + static_cast<float>(3 * turn), in.y, in.z);
       const float width = 3, folded = turn % 2 == 0 ? in.x : width - 1 - in.x;
-      // Positions are rounded to 2^-22 and voxels differ by at most 1.
+      // Positions are rounded to 2^-22, and neighbouring voxels differ by at most 1.
       const float slack = filter == kNearest ? 0 : 0x1p-18f;
       ASSERT_NEAR(value_at(repeated, out), value_at(repeated, in), slack) << out;
       ASSERT_NEAR(value_at(mirrored, out), value_at(mirrored, {folded, in.y, in.z}), slack) << out;
@@ -131,7 +132,7 @@ TEST(Grid, ASceneChoosesFilterAndWrapMode) {
     auto loaded = load_volume(volume, AssetLoader{builder.scene, builder.files}, V3d(0), 1, 1);
     return std::move(loaded.value().channels.at(0));
   };
-  // Voxels are half a unit wide: centres at 1/4 and 3/4.
+  // Voxels are half a unit wide; their centres are at 1/4 and 3/4.
   const V3 near_left(.125f, .5f, .5f), middle(.4375f, .5f, .5f), outside(1.25f, .5f, .5f);
   EXPECT_FLOAT_EQ(value_at(grid_of(kTrilinear, Wrap::clamp), near_left), 1);
   EXPECT_FLOAT_EQ(value_at(grid_of(kTrilinear, Wrap::clamp), middle), 1.75f);
@@ -169,7 +170,7 @@ TEST(Grid, NodesReachFromFaceToFaceAndNothingIsBeyond) {
       << flat.error().message;
 }
 
-// Four voxels along x, of which the two in the middle fill the box.
+// The grid has four voxels along x, of which the middle two fill the box.
 TEST(Grid, ABorderOnlyTakesPartInTheInterpolation) {
   const auto load = [](const std::array<int, 3>& size, Wrap wrap, bool node_centred) {
     test::SceneBuilder builder({1, 1});
@@ -195,8 +196,8 @@ TEST(Grid, ABorderOnlyTakesPartInTheInterpolation) {
   EXPECT_TRUE(g.in_domain(g.to_index({1, 1, 1})));
   EXPECT_FALSE(g.in_domain(g.to_index({1.001f, .5f, .5f})));
   EXPECT_FALSE(g.in_domain(g.to_index({.5f, -.001f, .5f})));
-  // Nothing is outside of the box: trapezoids of widths 1/4, 1/2 and 1/4.
-  EXPECT_NEAR(g.exact_integral(V3d(-3, .5, .5), V3d(1, 0, 0), 0, 9), .25 * 1.5 + .5 * 4 + .25 * 4.5, 1e-6);
+  // The field is 0 outside of the box. The integral is that of trapezoids of widths 1/4, 1/2 and 1/4.
+  EXPECT_NEAR(exact_integral(g, V3d(-3, .5, .5), V3d(1, 0, 0), 0, 9), .25 * 1.5 + .5 * 4 + .25 * 4.5, 1e-6);
 
   EXPECT_FALSE(load({4, 2, 3}, Wrap::clamp, false));
   EXPECT_FALSE(load({4, 3, 3}, Wrap::repeat, false));
@@ -209,8 +210,8 @@ TEST(Grid, AConstantVolumeFillsTheCubeThatItsTransformMoves) {
   const auto length = [&](const Transform& to_world, const V3d& o, double center, double scale) {
     const auto loaded = load_volume(ConstVolume{{2, 2, 2}, to_world},
                                     AssetLoader{builder.scene, builder.files}, V3d(center), scale, 1);
-    return loaded.value().channels.at(0).exact_integral((o - V3d(center)) * scale, V3d(1, 0, 0), 0,
-                                                        20 * scale) /
+    return exact_integral(loaded.value().channels.at(0), (o - V3d(center)) * scale, V3d(1, 0, 0), 0,
+                          20 * scale) /
            (2 * scale);
   };
   EXPECT_NEAR(length({}, {-9, .25, .25}, 0, 1), 1, 1e-6);
@@ -258,7 +259,7 @@ TEST(CellWalk, CoversTheRaysPartInTheDomainOnceAndInOrder) {
       last = w.end();
       ASSERT_LE(count, cells[0] + cells[1] + cells[2] + 3);
     }
-    // The domain's chord, in double.
+    // The chord of the ray through the domain, in double.
     double t0 = 0, t1 = 2e6;
     const double hi[3] = {12, 13, 10};
     for (int k = 0; k < 3; ++k) {
@@ -271,7 +272,7 @@ TEST(CellWalk, CoversTheRaysPartInTheDomainOnceAndInOrder) {
       t1 = std::min(t1, std::max(a, b));
     }
     const double chord = std::max(0., t1 - t0);
-    // Ends are rounded to float32 at their distance.
+    // The ends are rounded to float32, relative to their distance.
     ASSERT_NEAR(last >= 0 ? last - first : 0, chord, 0x1p-22 * std::max(1., std::abs(t1)))
         << "o " << r.o << " d " << r.d;
   }
@@ -314,14 +315,15 @@ TEST(CellWalk, MajorantDepthDoesNotDependOnHowARayIsCut) {
   std::mt19937 rng(8);
   for (int i = 0; i < 50; ++i) {
     const Ray r{V3(V3d(6) + random_direction(rng) * 20.), V3(random_direction(rng))};
-    // Each cut and each of up to 12 boundaries is good to 2^-23 of 40; rates are at most 1.
+    // Each cut, and each of up to 12 boundaries, has an error of 2^-23 of 40, the largest distance; rates are
+    // at most 1.
     EXPECT_NEAR(depth(r, 1), depth(r, 10), (12 + 10) * 40 * 0x1p-22);
     EXPECT_NEAR(depth(r, 1), depth(r, 1000), (12 + 1000) * 40 * 0x1p-22);
   }
 }
 
-// A grid of a thousandth of the world, seen from across it: 128 voxels of 8e-6, where the ray's origin and
-// distances of float32 are 1.2e-7 and more apart.
+// A grid of a thousandth of the world, seen from the other end of the world. It has 128 voxels of width 8e-6.
+// Float32 positions of the ray's origin, and distances from it, are at least 1.2e-7 apart.
 TEST(CellWalk, TellsTheVoxelsOfASmallGridApartFromAfar) {
   const Size n{128, 128, 128};
   constexpr double kSide = 1e-3;
@@ -330,8 +332,8 @@ TEST(CellWalk, TellsTheVoxelsOfASmallGridApartFromAfar) {
   to_index.b = V3d(-.3, .4, .2) * (-128 / kSide) + V3d(-.5);
   const Grid g(n, random_values(n, 14, true), to_index, V3d(-.5), V3d(127.5), 1e5);
   std::mt19937 rng(3);
-  // Made beforehand: GCC 12 leaves out the rounding of a number that goes from double to float32 and back
-  // within one function.
+  // The rays are stored first: within one function, GCC 12 leaves out the rounding of a number that is
+  // converted from double to float32 and back.
   std::vector<Ray> rays(300);
   for (Ray& r : rays) {
     const V3d at = V3d(-.3, .4, .2) + V3d(kSide / 2) + random_direction(rng) * (kSide / 4),
@@ -344,7 +346,8 @@ TEST(CellWalk, TellsTheVoxelsOfASmallGridApartFromAfar) {
       for (int k = 0; k <= 8; ++k) {
         const float t = w.begin() + (w.end() - w.begin()) * static_cast<float>(k) / 8;
         const V3d exact = to_index.point(V3d(o) + V3d(d) * (w.entry() + t)), off = V3d(w.index(t)) - exact;
-        // Index coordinates up to 128 and distances along them, each rounded by a unit in the last place.
+        // Index coordinates up to 128, and distances along them, are each rounded by one unit in the last
+        // place.
         ASSERT_LT(off.length(), 6 * 128 * 0x1p-23);
         ASSERT_LE(g.value<kTrilinear>(w.index(t)), w.cell().hi);
         ASSERT_LE(std::abs(g.value<kTrilinear>(w.index(t)) - w.cell().control), w.cell().residual);
@@ -390,24 +393,24 @@ TEST(Grid, PassagesAgreeWithTheExactIntegral) {
     const Grid g = voxel_grid(n, random_values(n, 3, true), filter, Wrap::clamp);
     for (const Ray& r : awkward_rays()) {
       if (std::abs(r.o.x) > 1e5f)
-        continue;  // nothing of its direction is left in the exact integral's double
+        continue;  // the exact integral cannot resolve the direction, even in double
       double sum = 0;
       for (CellWalk w(g, r.o, r.d, 0, 100); w.next();) {
         const Passage whole = g.pass(w.origin(), w.direction(), w.begin(), w.end());
         ASSERT_FALSE(whole.reached);
         sum += whole.integral;
         if (!(whole.integral > 1e-3)) continue;
-        // The point where a third is behind it: found from the integral, checked by the integral up to there.
+        // The point up to which a third of the integral accumulates, checked by integrating up to it.
         const Passage third = g.pass(w.origin(), w.direction(), w.begin(), w.end(), whole.integral / 3);
         ASSERT_TRUE(third.reached);
         ASSERT_GE(third.t, w.begin());
         ASSERT_LE(third.t, w.end());
         const double up_to = g.pass(w.origin(), w.direction(), w.begin(), third.t).integral;
-        // t is rounded to float32, where values are below 1.
+        // t is rounded to float32; values are below 1.
         ASSERT_NEAR(up_to, whole.integral / 3, 2e-6 * w.end());
       }
-      // Positions of float32: 2^-20 in an index, on each of up to 40 voxels with values below 1.
-      ASSERT_NEAR(sum, g.exact_integral(V3d(r.o), V3d(r.d), 0, 100), 40 * 0x1p-20);
+      // Float32 positions have an error of 2^-20 in an index, on each of up to 40 voxels with values below 1.
+      ASSERT_NEAR(sum, exact_integral(g, V3d(r.o), V3d(r.d), 0, 100), 40 * 0x1p-20);
     }
   }
 }

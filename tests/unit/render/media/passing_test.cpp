@@ -1,4 +1,5 @@
-// What passing a surface costs of max_depth: a segment in `path`, nothing in `volpath`, as in Mitsuba 3.
+// Tests how passed surfaces count towards max_depth: one segment each in `path`, nothing in `volpath`, as in
+// Mitsuba 3.
 #include <gtest/gtest.h>
 
 #include "tests/support/render_check.h"
@@ -21,8 +22,8 @@ double brightness(SceneBuilder builder, const char* integrator, int max_depth) {
   return e.mean[1];
 }
 
-// Seen through two panes, a wall of radiance 1; through masks of one half each, a quarter of it. The noise of
-// 65,536 samples that see all or nothing is .0017 at most.
+// The camera sees a wall of radiance 1 through two null panes, or a quarter of its radiance through two
+// half-transparent masks. The noise of 65,536 samples that see all or nothing is at most .0017.
 TEST(PassedSurfaces, EndSegmentsOfPathButNotOfVolpath) {
   for (const bool null : {true, false}) {
     SceneBuilder builder;
@@ -40,8 +41,9 @@ TEST(PassedSurfaces, EndSegmentsOfPathButNotOfVolpath) {
   }
 }
 
-// A floor below a pane below a point of intensity 4 pi at height 2: radiance .5 / pi * 4 pi / 4 = .5, and
-// half of that through a mask. The way has three segments, the light's two included.
+// A floor lies below a pane, which lies below a point light of intensity 4 pi at height 2. The floor's
+// radiance is .5 / pi * 4 pi / 4 = .5 with a null pane, and half of that with a mask. The path has three
+// segments, two of which belong to the shadow ray.
 TEST(PassedSurfaces, EndSegmentsOfShadowRaysOfPathToo) {
   for (const bool null : {true, false}) {
     SceneBuilder builder;

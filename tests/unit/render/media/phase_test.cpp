@@ -1,4 +1,4 @@
-// Henyey and Greenstein up to its extremes, against their formula in double.
+// Tests the Henyey-Greenstein phase function up to extreme g, against its formula in double.
 #include "worker/render/media/phase.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,8 @@ namespace {
 
 const double kAnisotropies[] = {-.9999, -.9, -.5, -1e-7, 0, 1e-7, .3, .75, .99, .9999};
 
-// 1 - cos of the angle to the peak is the natural coordinate: x in [0, 2], p dx 2 pi.
+// The phase function in terms of x = 1 - cos of the angle to the peak, in [0, 2]; its integral is int p(x) 2
+// pi dx.
 double reference(double g, double x) {
   const double a = std::abs(g), s = (1 - a) * (1 - a) + 2 * a * x;
   return (1 - a) * (1 + a) / (4 * M_PI * s * std::sqrt(s));
@@ -32,8 +33,9 @@ TEST(HenyeyGreenstein, MatchesItsFormulaForAllAnglesFromThePeak) {
       const float sign = g >= 0 ? 1.f : -1.f;
       const V3 w1 = frame.to_world({sine, 0, sign * cosine});
       const double got = HenyeyGreenstein{g_of(g)}.value(w, w1);
-      // x is |w - w1|^2 / 2 of unit vectors good to 1e-7: relative 2e-7 / sin(angle / 2), at worst 4e-4 at
-      // 1e-3 where the value depends on x; twice that for the power 3/2.
+      // x is |w - w1|^2 / 2 of unit vectors with errors of 1e-7. So its relative error is 2e-7 / sin(angle /
+      // 2), which is at most 4e-4 (at the angle 1e-3) where the value depends on x. The power 3/2 at most
+      // doubles it.
       const double tolerance = 8e-7 / std::sin(angle / 2) + 2e-6;
       const double exact = reference(double{g_of(g)}, 2 * std::pow(std::sin(angle / 2), 2));
       EXPECT_NEAR(got / exact, 1, tolerance) << "g " << g << " angle " << angle;
@@ -43,7 +45,7 @@ TEST(HenyeyGreenstein, MatchesItsFormulaForAllAnglesFromThePeak) {
 
 TEST(HenyeyGreenstein, ForwardPeakIsExact) {
   const V3 w(0, 0, 1);
-  // 4 pi p(0) = (1 + g) / (1 - g)^2 with the g that float32 holds.
+  // 4 pi p(0) = (1 + g) / (1 - g)^2, with g rounded to float32.
   const double g = g_of(.9999);
   EXPECT_NEAR(4 * M_PI * HenyeyGreenstein{g_of(.9999)}.value(w, w) / ((1 + g) / ((1 - g) * (1 - g))), 1,
               1e-6);
@@ -58,16 +60,16 @@ TEST(HenyeyGreenstein, DensityOfASampleIsItsValue) {
       const float u = r.uniform(), v = r.uniform();
       const PhaseSample s = hg.sample(w, {u, v});
       ASSERT_NEAR(dot(s.w, s.w), 1, 1e-6);
-      // value() sees the direction rounded to 1e-7, which at |g| = .9999 is a share of (1e-7 / 1e-4) of the
-      // peak's width times its steepness of 3.
+      // value() uses the direction rounded to 1e-7. At |g| = .9999 this is a share of 1e-7 / 1e-4 of the
+      // peak's width, times the peak's slope of 3.
       const double width = std::max(1 - std::abs(g), 1e-4);
       ASSERT_NEAR(hg.value(w, s.w) / s.pdf, 1, 2e-6 / width + 1e-5) << "g " << g;
     }
   }
 }
 
-// The largest anisotropy below 1 that float32 has is sharp, but finite, also at the ends of the random
-// numbers.
+// With the largest float32 number below 1 as g, the phase function is narrow but finite, also for random
+// numbers at the ends of their range.
 TEST(HenyeyGreenstein, IsFiniteUpToTheLastFloatBelowOne) {
   for (const float sign : {1.f, -1.f}) {
     const HenyeyGreenstein hg{sign * (1 - 0x1p-24f)};
@@ -84,8 +86,6 @@ TEST(HenyeyGreenstein, IsFiniteUpToTheLastFloatBelowOne) {
 
 TEST(HenyeyGreenstein, IsNormalisedAndItsMeanCosineIsG) {
   for (const double g : kAnisotropies) {
-    // Substituting the distribution's inverse makes both integrals smooth: x_i at equal probabilities, from
-    // the sampling itself; the density there times the spacing must give back each cell's probability.
     double mass = 0, cosine = 0;
     constexpr int kSteps = 200000;
     const HenyeyGreenstein hg{g_of(g)};
@@ -93,7 +93,8 @@ TEST(HenyeyGreenstein, IsNormalisedAndItsMeanCosineIsG) {
     double last = 0;
     for (int i = 0; i < kSteps; ++i) {
       const double a = std::abs(double{g_of(g)});
-      // Geometric grid in (1 - a)^2 + x: resolves the peak.
+      // Both integrals are over x = 1 - cos of the angle to the peak. A geometric grid in (1 - a)^2 + x
+      // resolves the peak.
       const double lo = (1 - a) * (1 - a), x1 = lo * std::pow((lo + 2) / lo, (i + 1.) / kSteps) - lo,
                    x = (last + x1) / 2;
       const double sine = std::sqrt(x * (2 - x)), c = g >= 0 ? 1 - x : x - 1;
@@ -102,7 +103,8 @@ TEST(HenyeyGreenstein, IsNormalisedAndItsMeanCosineIsG) {
       cosine += 2 * M_PI * p * c * (x1 - last);
       last = x1;
     }
-    // Midpoint rule: steps of 1e-4 relative; float32 directions: 1e-7 / (1 - g)... as above, averaged.
+    // The midpoint rule has relative steps of 1e-4, and float32 directions have relative errors of 1e-7 / (1
+    // - g), which average out.
     EXPECT_NEAR(mass, 1, 1e-3) << "g " << g;
     EXPECT_NEAR(cosine, g, 1e-3) << "g " << g;
   }

@@ -1,4 +1,5 @@
-// Delta tracking, residual ratio tracking and dense cells followed exactly, against exact integrals.
+// Tests delta tracking, residual ratio tracking and the exact integration of dense cells against exact
+// integrals.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,7 +11,8 @@
 namespace ls::render {
 namespace {
 
-// Means within 5 standard errors of the exact integral (6e-7 a check, 42 checks: 3e-5)
+// The means are within 5 standard errors of the exact integral (each of 42 checks fails by chance with
+// probability 6e-7, any of them with 3e-5)
 constexpr int kTrackedFlights = 40000;
 
 struct Track {
@@ -23,7 +25,7 @@ std::vector<Track> tracks() {
   t.push_back({"dense", unit_grid({9, 9, 9}, random_values({9, 9, 9}, 5)), C3(.3f)});
   t.push_back({"sparse", unit_grid({9, 9, 9}, random_values({9, 9, 9}, 6, true)), C3(2)});
   t.push_back({"chromatic", unit_grid({9, 9, 9}, random_values({9, 9, 9}, 7)), C3(0, .2f, .6f)});
-  // Some cells are tracked and some followed exactly; one channel sees nothing, one is all but opaque.
+  // Some cells are tracked and some integrated exactly. One channel has no extinction, one is nearly opaque.
   t.push_back({"dense chromatic", unit_grid({9, 9, 9}, random_values({9, 9, 9}, 17, true)), C3(0, .3f, 6)});
   const auto voxels = [](unsigned seed) { return random_values({9, 9, 9}, seed); };
   t.push_back({"nearest", voxel_grid({9, 9, 9}, voxels(11), kNearest, Wrap::clamp), C3(.3f)});
@@ -40,12 +42,12 @@ TEST(Trackers, TransmittancesAverageToTheExactOnes) {
     m.density = &t.grid;
     m.sigma_t = t.sigma;
     const V3 o(-1, .3f, 1.1f), d = normalize(V3(9, 7.1f, 6.2f));
-    const double tau = t.grid.exact_integral(V3d(o), V3d(d), 0, 30);
+    const double tau = exact_integral(t.grid, V3d(o), V3d(d), 0, 30);
     double sum[3] = {}, square[3] = {}, fly[3] = {}, fly2[3] = {};
     MediumCounters counters;
     for (int i = 0; i < kTrackedFlights; ++i) {
       const C3 r = transmittance<kEverything>(m, o, d, 0, 30, RandomStream(mix64(i)));
-      // Delta tracking: the flight that gets through, by the balance heuristic over heroes.
+      // Delta tracking: the weight of flights that pass, by the balance heuristic over heroes.
       const int hero = i % 3;
       RandomStream s(mix64(i + (1ull << 40)));
       const std::uint32_t bits = s.bits();
@@ -63,7 +65,7 @@ TEST(Trackers, TransmittancesAverageToTheExactOnes) {
     const auto check = [&](double s, double s2, double expected, const char* what, int c) {
       const double mean = s / kTrackedFlights,
                    se = std::sqrt(std::max(0., s2 / kTrackedFlights - mean * mean) / kTrackedFlights);
-      // Depths are sums of float32: each of about 30 steps rounded by 2^-24 of the depth.
+      // Optical depths are sums of about 30 steps in float32, each rounded by 2^-24 of the depth.
       EXPECT_NEAR(mean, expected, 5 * se + expected * 30 * 0x1p-23)
           << t.name << " " << what << " channel " << c;
       EXPECT_LT(se, .05 * expected) << t.name << " " << what;
@@ -75,12 +77,13 @@ TEST(Trackers, TransmittancesAverageToTheExactOnes) {
   }
 }
 
-// One voxel of 1e6 among empty ones: past it the way is free, through it nothing gets.
+// One voxel of density 1e6 among empty ones: rays that miss it are not attenuated, rays through it are
+// blocked.
 TEST(Trackers, AHotVoxelDoesNotDarkenItsCell) {
   const Size n{16, 16, 16};
   std::vector<float> values(16 * 16 * 16, 0);
   values[(8 * 16 + 8) * 16 + 8] = 1e6f;
-  for (const float rho : {1.f, 2e-5f, 1e-6f}) {  // of the peak: a million, and where trackers collide
+  for (const float rho : {1.f, 2e-5f, 1e-6f}) {  // scale of the density; the small ones are tracked
     std::vector<float> v = values;
     for (float& x : v) x *= rho;
     const Grid g = unit_grid(n, v);
@@ -90,7 +93,7 @@ TEST(Trackers, AHotVoxelDoesNotDarkenItsCell) {
     m.sigma_t = C3(1, 1, 0);
     for (const float offset : {0.f, .5f, .99f, 1.f, 2.f}) {
       const V3 o(-1, 8 + offset, 8), d(1, 0, 0);
-      const double expected = std::exp(-g.exact_integral(V3d(o), V3d(d), 0, 30));
+      const double expected = std::exp(-exact_integral(g, V3d(o), V3d(d), 0, 30));
       double sum = 0, square = 0;
       constexpr int kRays = 4000;
       for (int i = 0; i < kRays; ++i) {
@@ -107,7 +110,8 @@ TEST(Trackers, AHotVoxelDoesNotDarkenItsCell) {
   }
 }
 
-// Rates at which a tracker's steps are below the last place of its distance. The work is bounded by voxels.
+// The densities are so high that a tracker's steps would be smaller than the rounding of its distance. The
+// number of voxels limits the work.
 TEST(Trackers, DensitiesBeyondAllBoundsTakeNoTimeAndStopLightAtOnce) {
   const Size n{64, 64, 64};
   std::vector<float> v = random_values(n, 15, true);
@@ -133,8 +137,9 @@ TEST(Trackers, DensitiesBeyondAllBoundsTakeNoTimeAndStopLightAtOnce) {
         if (!f.scattered) {
           ASSERT_EQ(s[i % 3], 0);
         } else if (sigma > 1e8f) {
-          // At the first density met, but for positions of float32: 2^-19 of up to 64, values below 1.
-          ASSERT_LT(g.exact_integral(V3d(o), V3d(d), 0, f.t * (1 - 1e-6)), 64 * 0x1p-19 + 40 / s[i % 3])
+          // The flight ends at the first density on the ray, up to float32 positions: an error of 2^-19 over
+          // at most 64, with values below 1.
+          ASSERT_LT(exact_integral(g, V3d(o), V3d(d), 0, f.t * (1 - 1e-6)), 64 * 0x1p-19 + 40 / s[i % 3])
               << sigma;
         }
       }
@@ -143,12 +148,12 @@ TEST(Trackers, DensitiesBeyondAllBoundsTakeNoTimeAndStopLightAtOnce) {
   }
 }
 
-// Flights through cells that are followed exactly end where the closed form says: the depth in front of them
-// has density e^-depth.
+// Flights through cells that are integrated exactly end as the closed form requires: the optical depth at the
+// end has the density e^-depth.
 TEST(Trackers, FlightsThroughDenseCellsAreExponentialInDepth) {
   const Size n{32, 32, 32};
   std::vector<float> v = random_values(n, 16, true);
-  // One voxel in 8 is dense: walks pass cells of both sorts.
+  // One voxel in 8 is dense, so rays cross tracked cells as well as integrated ones.
   const Grid g = unit_grid(n, v, 0, 40);
   Medium m;
   m.grid = true;
@@ -163,7 +168,7 @@ TEST(Trackers, FlightsThroughDenseCellsAreExponentialInDepth) {
     const std::uint32_t bits = r.bits();
     const Flight f = free_flight<kEverything>(m, 0, bits, o, d, 100, r, counters);
     ASSERT_TRUE(f.scattered);
-    const double share = -std::expm1(-40 * g.exact_integral(V3d(o), V3d(d), 0, f.t));
+    const double share = -std::expm1(-40 * exact_integral(g, V3d(o), V3d(d), 0, f.t));
     ++count[static_cast<std::size_t>(std::min(kBins - 1, static_cast<int>(share * kBins)))];
   }
   test::ChiSquareTally tally("render/trackers");

@@ -1,11 +1,9 @@
-#include "worker/render/media/vdb_validate.h"
+#include "worker/render/media/vdb_reply.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <string>
-
-#include "worker/render/media/vdb_reply.h"
 
 namespace ls::render {
 namespace {

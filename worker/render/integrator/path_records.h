@@ -1,0 +1,162 @@
+// The results of paths: the radiance and its components, data for AOVs, what learning paths record, and the
+// tails that the paths of several pixels share.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/image/film/health.h"
+#include "worker/render/bsdf/bsdf.h"
+#include "worker/render/geometry/geometry.h"
+#include "worker/render/math/math.h"
+#include "worker/render/media/medium.h"
+#include "worker/render/media/medium_stack.h"
+#include "worker/render/world/world.h"
+
+namespace ls::render {
+
+struct SampleOutcome {
+  C3 radiance{0, 0, 0};
+  // The first reason to reject the sample regardless of its radiance; none if there is no such reason.
+  HealthCause cut_off = HealthCause::none;
+  std::uint64_t majorant_violations = 0;
+
+  void reject(HealthCause cause) {
+    if (cut_off == HealthCause::none) cut_off = cause;
+  }
+};
+struct FirstSurface {
+  SurfaceHit hit;
+  // 1 / (1 - probability of passing straight through): the weight that compensates for the random decision to
+  // be scattered.
+  float not_passed = 1;
+};
+
+// Albedo and normal that guide a denoiser: one sample of each of the AOVs denoising_albedo and
+// denoising_normal.
+struct DenoisingGuide {
+  C3 albedo{0, 0, 0};
+  V3d normal{0, 0, 0};
+};
+
+// The components into which the radiance of a sample is split, by the scatterings on the light's path. The
+// light AOVs (auxiliary images) are sums of components.
+//
+// A component is defined by the first scattering of the path, counted from the camera, and by whether more
+// scatterings follow.
+enum class LightPart : std::uint8_t {
+  unscattered,    // directly visible: lights, environment, medium emission
+  surface_once,   // one scattering, at a surface
+  surface_again,  // several scatterings, the first at a surface
+  volume_once,    // one scattering, in a medium
+  volume_again,   // several scatterings, the first in a medium
+};
+inline constexpr std::size_t kLightParts = 5;
+
+using LightSplit = std::array<C3, kLightParts>;
+
+constexpr LightPart part_of(int scatterings, bool first_in_medium) {
+  if (scatterings == 0) return LightPart::unscattered;
+  if (first_in_medium) return scatterings == 1 ? LightPart::volume_once : LightPart::volume_again;
+  return scatterings == 1 ? LightPart::surface_once : LightPart::surface_again;
+}
+
+// Data for paths of a scene with Features::connected, in addition to the world.
+struct Connections {
+  const LightVertices* vertices = nullptr;  // null: paths are not connected
+  // What learning paths record about the light that connections, portals or local lights could find.
+  // `learner` is null for other paths.
+  struct Learner {
+    SunMap map;
+    double light = 0;     // sum of the sun's light that was found
+    double vertices = 0;  // number of vertices at which the sun could be found
+    double lit = 0;       // estimated number of those vertices at which the sun was found
+    // True if a ray towards the sun met other media than a ray from the sun would. The scene then declares
+    // different media on the two sides of a boundary, or the medium outside is not a vacuum.
+    bool media_differ = false;
+    bool keeps_sky = false;  // true if the light of the sky that vertices found is kept in `sky`
+    std::vector<Portals::Found> sky;
+    double scatterings = 0;     // number of vertices
+    double left = 0;            // number of those that the path left towards the sky
+    bool keeps_lights = false;  // true if each vertex samples all lights and keeps their light in `lights`
+    LightVisits lights;
+
+    void found_sky(const V3& p, const V3& d, float found) {
+      if (keeps_sky && found > 0 && std::isfinite(found)) sky.push_back({p, d, found});
+    }
+  };
+  Learner* learner = nullptr;
+};
+
+// The pixels of a group share the parts of their paths from the second vertices on, their tails
+// (path_reuse.h). This is the largest number of pixels in a group.
+inline constexpr std::size_t kMostSharing = 64;
+
+struct PathVertex {
+  V3 p{0, 0, 0};
+  const Medium* medium = nullptr;  // null: on a surface, at `hit`
+  SurfaceHit hit;
+};
+
+// The first vertex of a path, which is connected to the second vertices of other paths.
+struct FirstVertex {
+  bool usable = false;  // false: there is none, or it scatters by delta lobes alone
+  PathVertex at;
+  V3 d{0, 0, 0};        // the direction of travel before the vertex
+  C3 beta{0, 0, 0};     // the weight of the path up to the vertex
+  C3 density{1, 1, 1};  // the path's density with each channel as the hero (medium.h), over their mean
+  OneMedium around;     // the medium in front of the vertex
+  int passed = 0;       // surfaces passed straight through between the camera and the vertex
+  // A cache for a diffuse surface: the BSDF for a direction along the normal, on the normal's side [0] or on
+  // the other [1]; nullopt if it was not evaluated yet.
+  std::array<std::optional<BsdfEval>, 2> by_side;
+};
+
+// The second vertex of a path, and the light that arrives there.
+struct SharedTail {
+  bool usable = false;  // false: there is none, or it was not sampled by a smooth lobe
+  PathVertex at;
+  int passed = 0;  // surfaces passed straight through between the camera and the vertex
+  // Along the way from the path's own first vertex: the optical depth of the media in each channel, the null
+  // transmission of the surfaces, and the probability of passing them.
+  C3 depth{0, 0, 0}, transmission{1, 1, 1};
+  float passing = 1;
+
+  // Light found by next-event estimation; light_pdf = 0: none.
+  V3 to_light{0, 0, 0};
+  float light_pdf = 0;
+  bool light_is_delta = false;
+  C3 light{0, 0, 0};
+
+  // Light from `onward`, the direction in which the path goes on: `emitted` by the light source that the ray
+  // hits, if any, and `scattered` at later vertices. Next-event estimation finds that light source with the
+  // density hit_pdf.
+  bool goes_on = false;
+  V3 onward{0, 0, 0};
+  C3 emitted{0, 0, 0}, scattered{0, 0, 0};
+  float hit_pdf = 0;
+
+  bool brings_light() const { return light_pdf > 0 || !is_black(emitted) || !is_black(scattered); }
+};
+
+// The state of a path that records its first vertex and its tail.
+struct SharingPath {
+  enum class Part : std::uint8_t {
+    alone,   // before the first vertex, and where light counts for this pixel only
+    second,  // on the way from the first vertex to the second
+    tail,    // from the second vertex on
+  };
+  Part part = Part::alone;
+  FirstVertex first;
+  SharedTail tail;
+  C3 scale{1, 1, 1};   // the factor of light that counts for this pixel only
+  float survival = 1;  // factor of the throughput that Russian roulette compares (size())
+  // look_at() sets these two for the shadow ray that it traces:
+  C3 flight{1, 1, 1};  // the transmittance of its media times the probability of passing its surfaces
+  int crossed = 0;     // number of surfaces that it passed
+};
+
+}  // namespace ls::render
