@@ -57,8 +57,9 @@ struct FilmSettings {
   bool operator==(const FilmSettings&) const = default;
 };
 
-// How `volpath_distant_mis` samples the point on a ray through a medium that it connects to a light, and how
-// it weights the two samples of `mis` against each other.
+// On a ray through a medium, the integrator `volpath_distant_mis` samples a point and connects it to a light.
+// DistanceSampling: the density of this point; `mis` takes one sample of each density, and weights the two by
+// the MisHeuristic.
 enum class DistanceSampling { exponential, equiangular, mis };
 enum class MisHeuristic { power, balance };
 

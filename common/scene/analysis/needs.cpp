@@ -47,7 +47,7 @@ class Analyst {
   void lights();
   void files();
   void file(AssetIndex i, const std::string& use) {
-    if (i.value >= n_.files.size()) return;  // the index may be out of range, if the volume is not used
+    if (i.value >= n_.files.size()) return;  // indices of unused volumes are not checked
     auto& uses = n_.files[i.value].uses;
     const auto at = std::lower_bound(uses.begin(), uses.end(), use);
     if (at == uses.end() || *at != use) uses.insert(at, use);

@@ -21,8 +21,8 @@ Values turned(const Values& a, Values b, double s) {
   if (cosine < 0)
     for (double& x : b) x = -x;
   const double angle = std::acos(std::min(std::abs(cosine), 1.)), sine = std::sin(angle);
-  // For quaternions that are nearly equal, linear interpolation differs from slerp by less than rounding
-  // does.
+  // For quaternions that are nearly equal, the difference of linear interpolation from slerp is below the
+  // rounding of a double.
   const double of_a = sine > 1e-6 ? std::sin((1 - s) * angle) / sine : 1 - s,
                of_b = sine > 1e-6 ? std::sin(s * angle) / sine : s;
   for (std::size_t i = 0; i < 4; ++i) b[i] = of_a * a[i] + of_b * b[i];
@@ -41,7 +41,7 @@ class Sampler {
     if (!is_new) return known->second;
     Values values = read(sampler, is_rotation);
     numbers_ += values.size();
-    // The limit is the same as for the values of the file's JSON.
+    // The values of the file's JSON have the same limit.
     if (numbers_ > kMaxGltfValues)
       values = wrong(sampler, fmt::format("animations give more than {} numbers at a time: split the scene",
                                           kMaxGltfValues));
@@ -109,7 +109,7 @@ class Sampler {
   Translation& t_;
   const double seconds_;
   std::map<std::pair<const Value*, bool>, std::shared_ptr<const Values>> known_;
-  std::size_t numbers_ = 0;  // how many numbers the values in known_ have together
+  std::size_t numbers_ = 0;  // number of all numbers in known_
 };
 
 // Returns the animations that `-D animation` chooses.

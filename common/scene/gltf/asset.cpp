@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::string_view kMagic = "glTF";
 constexpr std::size_t kHeaderBytes = 12, kChunkBytes = 8;
-constexpr double kFramesPerSecond = 24;  // of a sequence, unless -D fps sets another rate
+constexpr double kFramesPerSecond = 24;  // the rate of a sequence of frames, unless -D fps sets another
 constexpr std::uint32_t kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
 
 std::uint32_t word(std::string_view bytes, std::size_t at) {

@@ -130,7 +130,7 @@ std::optional<std::string_view> Buffers::view(const Item& index) {
 
 // Returns where the `count` elements of `owner` (an accessor, or a part of a sparse one) are in its buffer
 // view. `like` gives their type. If `strided`, the buffer view may set the distance between elements
-// (byteStride). nullopt: they are beyond the view or it is wrong, which has been reported.
+// (byteStride). nullopt: the view is wrong, or too short for the elements, which has been reported.
 std::optional<Buffers::Layout> Buffers::layout_in(const Item& owner, Layout like, std::size_t count,
                                                   bool strided) {
   const auto bytes = view(owner["bufferView"]);

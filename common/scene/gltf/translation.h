@@ -156,7 +156,7 @@ class Meshes {
   Translation& t_;
   Materials& materials_;
   std::size_t bytes_ = 0;  // of the files of all meshes
-  std::size_t parts_ = 0;  // primitives and morph targets; a mesh counts again for each skin and each weights
+  std::size_t parts_ = 0;  // primitives and morph targets, once for each skin and each set of weights
   Box box_;
 };
 

@@ -88,10 +88,11 @@ Element dielectric(Object& o) {
   return out;
 }
 
-// Nori's microfacet bsdf is kd / pi + (1 - m) D F G / (4 cos_i cos_o) with m = the largest channel of kd.
-// This is the mixture of (1 - m) times a rough reflection and m times a diffuse surface whose reflectance is
-// kd / m. F is the Fresnel term of a dielectric seen from outside, which equals that of a conductor with a
-// real index.
+// Nori's microfacet bsdf is kd / pi + (1 - m) D F G / (4 cos_i cos_o), where the colour kd is its diffuse
+// reflectance, m is the largest channel of kd, and D, F and G are the usual microfacet distribution, Fresnel
+// term and shadowing. It is translated to a blend: (1 - m) times a rough reflection, and m times a diffuse
+// surface with the reflectance kd / m. F is that of a dielectric seen from outside, which equals the Fresnel
+// term of a conductor with a real index.
 std::optional<Element> microfacet(Object& o, const Mesh& mesh, Report& report) {
   const Span at = o.element().at;
   Element gloss = bsdf_of("roughconductor", o.element());

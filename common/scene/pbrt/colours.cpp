@@ -12,9 +12,9 @@
 namespace ls::scene::pbrt {
 namespace {
 
-// Returns the luminance Y of a linear sRGB colour, a weighted sum of its channels. The weights w follow from
-// linear_srgb(), which converts XYZ to sRGB: w is orthogonal to the colours of (1, 0, 0) and (0, 0, 1), and
-// its product with the colour of (0, 1, 0) is 1.
+// Returns the luminance Y of a linear sRGB colour, a weighted sum of its channels. The vector w of the
+// weights follows from linear_srgb(), which converts (X, Y, Z) to sRGB: its dot product is 0 with the sRGB
+// colours of (1, 0, 0) and (0, 0, 1), and 1 with that of (0, 1, 0).
 double luminance(const Rgb& c) {
   static const Vec3 weights = [] {
     const auto column = [](const std::array<double, 3>& xyz) {

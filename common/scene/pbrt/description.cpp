@@ -512,7 +512,8 @@ class Loader {
   Settings settings_;
   Attributes now_;
   std::vector<Saved> saved_;
-  // Within an imported file: number of entries of saved_ that were begun outside, which it cannot end.
+  // While an imported file is read: the number of entries of saved_ that were begun before it. The file
+  // cannot end these.
   std::size_t floor_ = 0;
   std::map<std::string, Placed> systems_;
   std::optional<Element> group_;

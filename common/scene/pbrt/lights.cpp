@@ -142,8 +142,8 @@ class LightTranslator {
     if (above_zero("illuminance", 0) > 0)
       p_.error(p_.at(), fmt::format("{} has an illuminance, which depends on its image's pixels: give scale",
                                     p_.title()));
-    // Only pbrt-v3, where the image is called mapname, multiplies it by L. With a filename (pbrt-v4) neither
-    // L nor mapname is taken, so finish() rejects them; pbrt-v4 rejects L there too.
+    // In pbrt-v3 the image is called mapname, and is multiplied by L. In pbrt-v4 it is called filename, and L
+    // is an error. So with a filename neither L nor mapname is taken here, and finish() rejects both.
     const bool is_square = p_.has("filename");
     const Rgb c = is_square ? times({1, 1, 1}, p_.number("scale", 1) * t_.exposure()) : colour("L");
     add(out, "string", "filename", p_.text(is_square ? "filename" : "mapname", ""), p_.at());
@@ -190,7 +190,7 @@ void add_light(Translation& t, Params& p, const Placed& ctm) {
 AreaLight area_light(Translation& t, Params& p) {
   const Rgb c = times(light_colour(t, p, "L"), p.number("scale", 1) * t.exposure());
   std::optional<double> power;
-  // pbrt ignores a value of 0 or less.
+  // pbrt ignores a power of 0 or less.
   if (const double given = p.has("power") ? p.number("power", 0) : 0; given > 0) power = given;
   const bool two_sided = p.boolean("twosided", false);
   p.finish();

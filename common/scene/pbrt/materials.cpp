@@ -100,8 +100,8 @@ class MaterialTranslator {
     add(out, "coat_alpha", is_smooth(coat) ? 0. : coat.first, p_.at());
     add(out, "alpha_u", is_smooth(metal) ? 0. : metal.first, p_.at());
     add(out, "alpha_v", is_smooth(metal) ? 0. : metal.second, p_.at());
-    // pbrt divides both by the index of the coat, also those that it makes of a reflectance. So does the
-    // bsdf.
+    // pbrt divides eta and k by the coat's index of refraction, also if it computes them from a reflectance.
+    // Our bsdf does the same, so they are passed on undivided.
     if (p_.has("reflectance"))
       by_reflectance(out);
     else
@@ -189,7 +189,7 @@ class MaterialTranslator {
   using Alpha = std::pair<double, double>;
   static bool is_smooth(const Alpha& a) { return a.first < kSmooth && a.second < kSmooth; }
 
-  // The names of the parameters begin with `layer`.
+  // `layer` is a prefix of the parameters' names, such as "interface.".
   Alpha roughness(std::string_view layer = "") {
     const auto one = [&](std::string_view what, double fallback) {
       const std::string name = fmt::format("{}{}", layer, what);

@@ -49,8 +49,8 @@ void need_inverse(const Transform& to_world, const Element& e, Report& report) {
     report.error(e.at, "to_world flattens this volume or leaves the range of numbers: it can't be inverted");
 }
 
-// Records which of the parameters are given that have an effect only together with another one. Construct it
-// before parameters are taken.
+// Parameters that have no effect without another one: `light` needs an emission, `heat` and `of_heat` need a
+// temperature. Records which are given, and so must be constructed before parameters are taken.
 struct Factors {
   explicit Factors(const Params& p)
       : light(p.has("emission_scale")), heat(p.has("temperature_scale") || p.has("temperature_offset")) {

@@ -39,8 +39,8 @@ class Reader {
   std::optional<MediumIndex> medium(const Element& object, const Element& use);
 
   // A spectrum given as an object. Rgb: a colour for any use. LightColour: the colour of a light, allowed for
-  // emitters only. SpectralCurve: the use determines the colour: a curve of light is converted as it is, any
-  // other curve is multiplied by D65.
+  // emitters only. SpectralCurve: a curve whose colour depends on its use; an emitter's is converted as it
+  // is, any other is multiplied by D65 first.
   struct LightColour {
     Rgb value;
   };
@@ -149,9 +149,9 @@ class Reader {
   // parts_: the films, filters and samplers at the top level. used_parts_: those that a sensor refers to.
   std::vector<const Element*> parts_;
   std::unordered_set<const Element*> used_parts_;
-  // bounds of the first textures of scene_; more are added when needed
+  // texture_bounds_ and bsdf_traits_ begin with the first object of scene_, and are extended when needed.
   std::vector<std::optional<Bounds>> texture_bounds_;
-  std::vector<BsdfTraits> bsdf_traits_;  // traits of the first bsdfs of scene_; more are added when needed
+  std::vector<BsdfTraits> bsdf_traits_;
 
   bool reads_attributes_ = false;  // true if some texture read so far is a mesh attribute
   // Results of old_number() (textures with swapped colours), by the texture as it was read

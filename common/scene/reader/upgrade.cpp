@@ -18,8 +18,8 @@ constexpr Renamed kRenamed[] = {
     {"medium", "heterogeneous", "density", "sigma_t"},
 };
 
-// Values that have new names. The old filters also handled minification, for which the new ones need more
-// samples.
+// Values that have new names. `trilinear` and `ewa` also filtered minified textures; `bilinear` does not, so
+// it needs more samples there.
 constexpr struct {
   std::string_view tag, plugin, parameter, before, now;
 } kValues[] = {

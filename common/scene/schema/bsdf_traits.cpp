@@ -30,9 +30,9 @@ std::array<std::optional<BsdfIndex>, 2> nested_bsdfs(const Bsdf& bsdf) {
 
 namespace {
 
-// True if alpha, given by the texture, may be kStraightAlpha or less at some point. A texture that is not
-// constant is not examined: it may. A constant colour stands for a mean of its channels, which is that small
-// only if at least one channel is.
+// True if the roughness alpha, which is the mean of the texture's channels, may be kStraightAlpha or less at
+// some point. The test is conservative: it is true for every texture that is not constant, and for a constant
+// one if any channel is that small.
 bool may_be_straight(TextureIndex t, const std::vector<Texture>& textures) {
   if (t.value >= textures.size()) return true;
   const auto* constant = std::get_if<ConstantTexture>(&textures[t.value]);
@@ -67,8 +67,8 @@ BsdfTraits traits_of(const Bsdf& bsdf, const std::vector<BsdfTraits>& known,
   return t;
 }
 
-// Computes the traits by repeated passes over the list, which may be in any order. A chain of n nested bsdfs
-// is known after n passes; a cycle would never be.
+// Computes the traits by repeated passes over the list, which may be in any order, until none changes. A
+// chain of n nested bsdfs takes n passes. In a cycle the depth grows until it exceeds the limit.
 std::optional<std::vector<BsdfTraits>> bsdf_traits(const Scene& scene) {
   for (const Bsdf& b : scene.bsdfs)
     for (const auto& inner : nested_bsdfs(b))

@@ -23,8 +23,8 @@ struct BsdfTraits {
 // Returns the bsdfs that `bsdf` contains directly.
 std::array<std::optional<BsdfIndex>, 2> nested_bsdfs(const Bsdf& bsdf);
 
-// Where both roughnesses of a rough thin sheet are below this, light passes straight through it. The renderer
-// uses a value that is not larger.
+// Where both roughnesses of a rough thin sheet are at most this, light may pass straight through it. The
+// limit of the renderer itself (kSpecularAlpha in worker/render/bsdf/dielectric.h) is this or smaller.
 inline constexpr double kStraightAlpha = 1e-3;
 
 // Returns the traits of `bsdf`. `known` contains the traits of other bsdfs of the scene, at least of those

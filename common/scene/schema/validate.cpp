@@ -173,7 +173,8 @@ class ValueChecker {
                   outside(f.crop_offset[1], f.crop_size.height, f.size.height)))
       wrong_ = "scene.film: the crop is not within the frame";
   }
-  // Checks the nesting depth of textures by repeated passes over the list: as many as textures may nest.
+  // Computes the nesting depths of textures by repeated passes over the list, until none changes. Allowed
+  // scenes take at most kMaxReferenceDepth + 1 passes.
   void check_texture_nesting() {
     std::vector<int> depth(s_.textures.size(), 0);
     for (int round = 0; round <= kMaxReferenceDepth; ++round) {

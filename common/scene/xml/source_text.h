@@ -23,8 +23,8 @@ struct Span {
 
 class SourceText {
  public:
-  // A function that returns the path in the document of the value at an offset. Messages about that place
-  // begin with the path. An empty function: the text has no paths.
+  // Returns the path of the value at an offset in a JSON document. Messages about this place begin with the
+  // path. An empty function: the text is not JSON.
   using PathOf = std::function<std::string(std::size_t)>;
   SourceText(std::string name, std::string text, PathOf path_of = {});
 

@@ -29,7 +29,7 @@ TEST(FileNames, OfOtherProgramsSayWhatToDo) {
     EXPECT_NE(told_of(name).find(want), std::string::npos) << told_of(name);
 }
 
-// As the Python package sends a stage of USD: as XML, under the stage's name
+// The Python package converts a USD stage to XML, and sends the XML under the stage's name.
 TEST(FileNames, OfOtherProgramsMayBeThoseOfScenes) {
   MemoryAssets assets;
   const ReadResult r = read_scene("shot.usda", "<?xml version=\"1.0\"?>\n<scene version=\"3.0.0\"/>", assets);

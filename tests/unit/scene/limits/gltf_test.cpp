@@ -15,7 +15,7 @@ TEST(GltfHostile, ManyValuesAreRefused) {
   EXPECT_NE(said_of(many).find("more than 2000000 values"), std::string::npos);
 }
 
-// Every primitive asks its material for several members: searched in order they would take hours.
+// Every primitive looks up several members of its material. A linear search for them would take hours.
 TEST(GltfHostile, MembersAreFoundAmongAMillion) {
   GltfFile file;
   json& primitives = file.j["meshes"][0]["primitives"];

@@ -1,4 +1,4 @@
-// XML files at and beyond the size limits: the time to answer grows only with the size.
+// XML files at and beyond the limits of their size: the time to read or refuse them is linear in the size.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// Compared with every id, and each pair of names letter by letter, these would take days.
+// Comparing each reference with every id, letter by letter, would take days.
 TEST(HostileScenes, ManyUnresolvedReferencesBesideManyIdsAreSoonAnswered) {
   const std::string filler(40, 'y');
   std::string text;
@@ -23,7 +23,7 @@ TEST(HostileScenes, ManyUnresolvedReferencesBesideManyIdsAreSoonAnswered) {
   EXPECT_THAT(first(r), HasSubstr("no object has the id \"xxx"));
 }
 
-// The same in references of objects within objects, which are resolved when they are converted.
+// The same for references in nested objects, which are resolved only when the outer object is converted.
 TEST(HostileScenes, AFullReportEndsReadingWithinAnObject) {
   const std::string filler(40, 'y');
   std::string text;
@@ -51,13 +51,13 @@ TEST(HostileScenes, ALongRunAfterADollarIsNotTriedPrefixByPrefix) {
   EXPECT_THAT(first(read(with_sensor(text))), HasSubstr("is given twice"));
 }
 
-// Each compared with all before it, these would take half an hour.
+// Comparing each name with all names before it would take half an hour.
 TEST(HostileScenes, ANoriObjectOfCountlessElementsIsRefusedBeforeAnyIsLookedAt) {
   std::string text = "<mesh type=\"sphere\">";
   for (int i = 0; i < 400'000; ++i) text += fmt::format("<float name=\"a{}\" value=\"1\"/>", i);
   const auto r = read(nori_scene(text + "</mesh>"));
   EXPECT_FALSE(r.scene);
-  ASSERT_EQ(r.diagnostics.size(), 1u);  // of none of the elements
+  ASSERT_EQ(r.diagnostics.size(), 1u);  // about the mesh, none about its elements
   EXPECT_THAT(first(r), HasSubstr("mesh \"sphere\" has 400000 elements in it; 4096 are allowed"));
 }
 

@@ -1,4 +1,4 @@
-// Lights as they are read: what is our own, what follows from what, what is refused.
+// Reading of emitters: extensions of Mitsuba's, derived parameters, and errors.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
