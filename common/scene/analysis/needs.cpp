@@ -2,10 +2,8 @@
 
 #include <algorithm>
 
-#include "common/scene/schema/bsdf_traits.h"
 #include "common/scene/schema/describe_fields.h"
-#include "common/scene/schema/emitter_traits.h"
-#include "common/scene/schema/medium_traits.h"
+#include "common/scene/schema/traits.h"
 
 namespace ls::scene {
 namespace {

@@ -8,10 +8,8 @@
 
 #include "common/scene/analysis/unreachable.h"
 #include "common/scene/limits.h"
-#include "common/scene/schema/bsdf_traits.h"
-#include "common/scene/schema/emitter_traits.h"
 #include "common/scene/schema/integrators.h"
-#include "common/scene/schema/medium_traits.h"
+#include "common/scene/schema/traits.h"
 #include "common/scene/schema/validate.h"
 
 namespace ls::scene {

@@ -4,9 +4,7 @@
 
 #include "common/scene/analysis/shape_place.h"
 #include "common/scene/limits.h"
-#include "common/scene/schema/bsdf_traits.h"
-#include "common/scene/schema/emitter_traits.h"
-#include "common/scene/schema/medium_traits.h"
+#include "common/scene/schema/traits.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene {

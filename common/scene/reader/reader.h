@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "common/scene/reader/params.h"
-#include "common/scene/schema/bsdf_traits.h"
+#include "common/scene/schema/traits.h"
 #include "common/scene/xml/grammar.h"
 #include "common/scene/xml/spectrum.h"
 

@@ -8,9 +8,9 @@
 #include "common/scene/limits.h"
 #include "common/scene/reader/reader.h"
 #include "common/scene/reader/unsupported.h"
-#include "common/scene/schema/bsdf_traits.h"
 #include "common/scene/schema/materials.h"
 #include "common/scene/schema/mesh_attributes.h"
+#include "common/scene/schema/traits.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene {

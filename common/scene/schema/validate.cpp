@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "common/scene/limits.h"
-#include "common/scene/schema/bsdf_traits.h"
 #include "common/scene/schema/describe_fields.h"
+#include "common/scene/schema/traits.h"
 
 namespace ls::scene {
 namespace {

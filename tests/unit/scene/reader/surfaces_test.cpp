@@ -6,7 +6,7 @@
 
 #include "common/scene/limits.h"
 #include "common/scene/reader/xml_write.h"
-#include "common/scene/schema/bsdf_traits.h"
+#include "common/scene/schema/traits.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {

@@ -1,4 +1,4 @@
-#include "common/scene/schema/bsdf_traits.h"
+#include "common/scene/schema/traits.h"
 
 #include <algorithm>
 
@@ -85,6 +85,90 @@ std::optional<std::vector<BsdfTraits>> bsdf_traits(const Scene& scene) {
     if (!changed) return traits;
   }
   return std::nullopt;
+}
+
+namespace {
+
+Vec3 origin_of(const Transform& t) { return {t.m[3], t.m[7], t.m[11]}; }
+
+struct TraitsOfEmitter {
+  const std::vector<Texture>& textures;
+
+  bool black(TextureIndex t) const {
+    const auto* c = std::get_if<ConstantTexture>(&textures[t.value]);
+    return c && all_zero(c->value);
+  }
+
+  EmitterTraits operator()(const ConstantEmitter& e) const { return {.dark = all_zero(e.radiance)}; }
+  EmitterTraits operator()(const DirectionalEmitter& e) const {
+    return {.dark = all_zero(e.irradiance), .delta = !(e.angular_radius > 0)};
+  }
+  EmitterTraits operator()(const PointEmitter& e) const {
+    return {.dark = all_zero(e.intensity), .delta = true, .position = e.position};
+  }
+  EmitterTraits operator()(const SpotEmitter& e) const {
+    return {.dark = all_zero(e.intensity) || (e.texture && black(*e.texture)),
+            .delta = true,
+            .position = origin_of(e.to_world)};
+  }
+  EmitterTraits operator()(const EnvmapEmitter& e) const { return {.dark = e.scale == 0}; }
+  EmitterTraits operator()(const ProjectorEmitter& e) const {
+    return {.dark = e.scale == 0 || black(e.irradiance), .delta = true, .position = origin_of(e.to_world)};
+  }
+  EmitterTraits operator()(const GoniometricEmitter& e) const {
+    return {
+        .dark = all_zero(e.intensity) || black(e.texture), .delta = true, .position = origin_of(e.to_world)};
+  }
+};
+
+}  // namespace
+
+EmitterTraits traits_of(const Emitter& emitter, const std::vector<Texture>& textures) {
+  return std::visit(TraitsOfEmitter{textures}, emitter);
+}
+
+namespace {
+
+bool grey(const Rgb& c) { return c[0] == c[1] && c[1] == c[2]; }
+
+struct TraitsOfMedium {
+  const std::vector<Volume>& volumes;
+
+  const ConstVolume* constant(VolumeIndex v) const { return std::get_if<ConstVolume>(&volumes[v.value]); }
+  bool zero(VolumeIndex v) const { return constant(v) && all_zero(constant(v)->value); }
+
+  MediumTraits operator()(const HomogeneousMedium& m) const {
+    Rgb sigma_t = m.sigma_t;
+    for (double& x : sigma_t) x *= m.scale;
+    MediumTraits t;
+    t.extinguishes = !all_zero(sigma_t);
+    t.scatters = t.extinguishes && !all_zero(m.albedo);
+    t.emits = !all_zero(m.emission) || (t.extinguishes && !all_zero(m.source_radiance));
+    t.chromatic = !grey(sigma_t);
+    return t;
+  }
+  MediumTraits operator()(const HeterogeneousMedium& m) const {
+    MediumTraits t;
+    t.extinguishes = m.scale != 0 && !all_zero(m.tint) && !zero(m.sigma_t);
+    t.scatters = t.extinguishes && !zero(m.albedo);
+    t.emits =
+        m.emission_scale != 0 &&
+        ((m.emission && !zero(*m.emission)) ||
+         (t.extinguishes && ((m.source_radiance && !zero(*m.source_radiance)) || m.temperature.has_value())));
+    Rgb sigma_t = m.tint;
+    if (const ConstVolume* c = constant(m.sigma_t))
+      for (std::size_t i = 0; i < 3; ++i) sigma_t[i] *= c->value[i];
+    t.chromatic = !grey(sigma_t);
+    t.grids = true;
+    t.density_file = !constant(m.sigma_t);
+    return t;
+  }
+};
+
+}  // namespace
+
+MediumTraits traits_of(const Medium& medium, const std::vector<Volume>& volumes) {
+  return std::visit(TraitsOfMedium{volumes}, medium);
 }
 
 }  // namespace ls::scene
