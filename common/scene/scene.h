@@ -11,7 +11,6 @@
 #include <variant>
 #include <vector>
 
-#include "common/scene/scene_camera.h"
 #include "common/scene/scene_shapes.h"
 #include "common/scene/scene_values.h"
 

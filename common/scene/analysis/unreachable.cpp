@@ -18,12 +18,9 @@ Box with_margin(const Box& b, const Box& beside) {
   return grown(b, kApart * std::max(largest_coordinate(b), largest_coordinate(beside)));
 }
 
-Vec3 place_of(const Transform& t) { return {t.m[3], t.m[7], t.m[11]}; }
-Vec3 column(const Transform& t, std::size_t k) { return {t.m[k], t.m[4 + k], t.m[8 + k]}; }
-
 // True if the camera and its near plane, where rays begin, are completely outside the box.
 bool camera_is_outside(const Sensor& s, const Box& tight) {
-  const Vec3 camera = place_of(s.to_world);
+  const Vec3 camera = origin_of(s.to_world);
   const Box box = with_margin(tight, {camera, camera});
   if (touch(box, {camera, camera})) return false;
   if (s.projection == Projection::spherical) return true;
@@ -32,7 +29,7 @@ bool camera_is_outside(const Sensor& s, const Box& tight) {
   bool before = true, behind = true;
   for (int k = 0; k < 8; ++k) {
     const Vec3 p = corner(box, k);
-    const double depth = dot(normal, {p[0] - camera[0], p[1] - camera[1], p[2] - camera[2]}) / unit;
+    const double depth = dot(normal, minus(p, camera)) / unit;
     before = before && depth < 0;
     behind = behind && depth > s.near_clip * (1 + kApart);
   }

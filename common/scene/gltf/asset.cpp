@@ -176,8 +176,7 @@ std::optional<Document> load_document(std::string_view file_name, std::string_vi
                                       const ReadOptions& options, Report& report) {
   const auto refused = [&](std::string why) {
     const std::uint32_t file = report.add_file(SourceText(std::string(file_name), ""));
-    report.error({file, 0, 1}, std::move(why));
-    return std::nullopt;
+    return report.refuse({file, 0, 1}, std::move(why));
   };
   if (text.size() > kMaxTextBytes) return refused(too_large(text.size()));
   const auto pieces = taken_apart(text);

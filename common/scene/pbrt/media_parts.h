@@ -28,6 +28,14 @@ void add_albedo(MediumSource& m, Element& out, const Rgb& albedo);
 // Adds the factor on the density of a `heterogeneous` medium: a number, and a tint if it differs by channel.
 void add_extinction(MediumSource& m, Element& out, const Rgb& extinction);
 
+// Measured coefficients of a substance, by the name that pbrt-v4 has for it.
+struct Substance {
+  std::string_view name;
+  Rgb absorption, scattering;  // per mm; scattering is the reduced coefficient
+};
+const Substance* find_substance(std::string_view name);  // nullptr: there is none
+std::vector<std::string> substance_names();
+
 // The integral of the CIE observer's y over wavelengths in nm, as pbrt-v4 has it (CIE_Y_integral in
 // src/pbrt/util/spectrum.h). pbrt divides the spectrum of a light by this integral, but neither the spectrum
 // of a black body in a medium nor the Le of "rgbgrid" (GridMedium, NanoVDBMedium and RGBGridMedium in
@@ -57,7 +65,7 @@ bool add_grid(MediumSource& m, Element& out, const char* name, const MadeGrid& g
 bool uniform_grid(MediumSource& m, Element& out);
 bool rgb_grid(MediumSource& m, Element& out);
 
-// cloud_medium.cpp
+// cloud.cpp
 bool cloud(MediumSource& m, Element& out);
 
 }  // namespace ls::scene::pbrt

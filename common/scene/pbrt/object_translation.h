@@ -11,7 +11,7 @@
 #include "common/scene/pbrt/cloud.h"
 #include "common/scene/pbrt/parameters.h"
 #include "common/scene/read.h"
-#include "common/scene/xml/make_element.h"
+#include "common/scene/xml/document.h"
 
 namespace ls::scene::pbrt {
 
@@ -131,14 +131,5 @@ struct Settings {
 };
 double exposure_of(Settings& s);  // returns Translation::exposure_factor
 void add_settings(Translation& t, Settings& s, const Span& file);
-
-// In made_files.cpp: files made from numbers in the scene's text. The returned name is derived from the
-// file's bytes; empty: the file could not be kept, which was reported.
-struct Mesh {
-  std::vector<double> positions, normals, uvs;  // per corner: three, three and two numbers
-  std::vector<double> indices;                  // three per triangle; integers in range
-};
-std::string keep_mesh(Translation& t, const Span& at, const Mesh& mesh);
-std::string keep_grid(Translation& t, const Span& at, const MadeGrid& grid);
 
 }  // namespace ls::scene::pbrt

@@ -48,8 +48,8 @@ class Reader {
   static bool is_spectrum(const Element& object);
   std::optional<Spectrum> spectrum(const Element& object, const Element& use);
 
-  TextureIndex add_constant_texture(const Rgb& value);
-  VolumeIndex add_constant_volume(const Rgb& value);
+  TextureIndex add_constant_texture(const Rgb& value) { return added<TextureIndex>(ConstantTexture{value}); }
+  VolumeIndex add_constant_volume(const Rgb& value) { return added<VolumeIndex>(ConstVolume{value}); }
   // Bounds of a texture's values. nullopt if they depend on an image.
   struct Bounds {
     double low, high;
@@ -65,6 +65,14 @@ class Reader {
   template <class I, class F>
   std::optional<I> once(Memo<I>& memo, std::string_view kind, const Element& object, const Element& use,
                         F read);
+
+  // Adds an object to its list in the scene, and returns its index.
+  template <class I, class T>
+  I added(T&& object) {
+    auto& list = pool(scene_, I{});
+    list.emplace_back(std::forward<T>(object));
+    return {static_cast<std::uint32_t>(list.size() - 1)};
+  }
 
   std::string hint_for(const Element& reference) const;
   void read_child(const Element& child);
@@ -85,7 +93,7 @@ class Reader {
   template <class T>
   void bind_alphas(Params& p, T& b, const Range& range);
   template <class T>
-  void bind_rough(Params& p, T& b);
+  std::optional<BsdfIndex> add_around_one(Params& p, T& b);
   TextureIndex old_number(const Element& e, TextureIndex t);
   void check_multiple_scattering(const Element& e, TextureIndex alpha_u, TextureIndex alpha_v);
   bool read_heights(Params& p, BumpMapBsdf& b);

@@ -2,30 +2,19 @@
 
 #include <algorithm>
 
-#include "common/base/overloaded.h"
 #include "common/scene/limits.h"
 
 namespace ls::scene {
 
 std::array<std::optional<BsdfIndex>, 2> nested_bsdfs(const Bsdf& bsdf) {
-  using Nested = std::array<std::optional<BsdfIndex>, 2>;
-  return std::visit(overloaded{[](const TwoSidedBsdf& b) {
-                                 return Nested{b.front, b.back};
-                               },
-                               [](const MaskBsdf& b) {
-                                 return Nested{b.bsdf, std::nullopt};
-                               },
-                               [](const NormalMapBsdf& b) {
-                                 return Nested{b.bsdf, std::nullopt};
-                               },
-                               [](const BumpMapBsdf& b) {
-                                 return Nested{b.bsdf, std::nullopt};
-                               },
-                               [](const BlendBsdf& b) {
-                                 return Nested{b.first, b.second};
-                               },
-                               [](const auto&) { return Nested{}; }},
-                    bsdf);
+  return std::visit(
+      [](const auto& b) -> std::array<std::optional<BsdfIndex>, 2> {
+        if constexpr (requires { b.front; }) return {b.front, b.back};
+        if constexpr (requires { b.first; }) return {b.first, b.second};
+        if constexpr (requires { b.bsdf; }) return {b.bsdf, std::nullopt};
+        return {};
+      },
+      bsdf);
 }
 
 namespace {
@@ -89,8 +78,6 @@ std::optional<std::vector<BsdfTraits>> bsdf_traits(const Scene& scene) {
 
 namespace {
 
-Vec3 origin_of(const Transform& t) { return {t.m[3], t.m[7], t.m[11]}; }
-
 struct TraitsOfEmitter {
   const std::vector<Texture>& textures;
 
@@ -129,8 +116,6 @@ EmitterTraits traits_of(const Emitter& emitter, const std::vector<Texture>& text
 
 namespace {
 
-bool grey(const Rgb& c) { return c[0] == c[1] && c[1] == c[2]; }
-
 struct TraitsOfMedium {
   const std::vector<Volume>& volumes;
 
@@ -144,7 +129,7 @@ struct TraitsOfMedium {
     t.extinguishes = !all_zero(sigma_t);
     t.scatters = t.extinguishes && !all_zero(m.albedo);
     t.emits = !all_zero(m.emission) || (t.extinguishes && !all_zero(m.source_radiance));
-    t.chromatic = !grey(sigma_t);
+    t.chromatic = !is_grey(sigma_t);
     return t;
   }
   MediumTraits operator()(const HeterogeneousMedium& m) const {
@@ -158,7 +143,7 @@ struct TraitsOfMedium {
     Rgb sigma_t = m.tint;
     if (const ConstVolume* c = constant(m.sigma_t))
       for (std::size_t i = 0; i < 3; ++i) sigma_t[i] *= c->value[i];
-    t.chromatic = !grey(sigma_t);
+    t.chromatic = !is_grey(sigma_t);
     t.grids = true;
     t.density_file = !constant(m.sigma_t);
     return t;

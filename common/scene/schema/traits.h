@@ -1,5 +1,5 @@
-// Properties of bsdfs, emitters and media that follow from their parameters and from what they contain. No files are
-// read.
+// Properties of bsdfs, emitters and media that follow from their parameters and from what they contain. No
+// files are read.
 #pragma once
 
 #include <array>

@@ -4,7 +4,6 @@
 #include <cctype>
 #include <cmath>
 
-#include "common/scene/reader/aov_names.h"
 #include "common/scene/reader/unsupported.h"
 #include "common/scene/reader/upgrade.h"
 #include "common/scene/schema/describe_fields.h"

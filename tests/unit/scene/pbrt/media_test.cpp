@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "common/scene/pbrt/substances.h"
+#include "common/scene/pbrt/media_parts.h"
 #include "tests/unit/scene/pbrt/pbrt_testing.h"
 
 namespace ls {
