@@ -27,14 +27,13 @@ std::string why_no_scene(std::string_view file_name) {
     const std::string_view stem = file_name.substr(0, file_name.rfind('.'));
     const std::string folder = std::string(stem.substr(stem.rfind('/') + 1)) + "-scene";
     return fmt::format(
-        "a stage of USD is read by the Python package: python3 -m lightshaft.usd {} -o {} writes {}, "
-        "which lightshaft reads (install the package by: pip install './python[usd]')",
+        "a stage of USD is read by the Python package: python3 -m lightshaft.usd {} -o {} writes {}, which "
+        "lightshaft reads (install the package by: pip install './python[usd]')",
         shell_word(std::string(file_name)), shell_word(folder), shell_word(folder + "/scene.xml"));
   }
   if (is({".blend"}))
     return "a file of Blender is rendered from within Blender, with Lightshaft's add-on, or exported there "
-           "as "
-           "glTF: File > Export > glTF 2.0";
+           "as glTF: File > Export > glTF 2.0";
   if (is({".abc", ".fbx", ".dae", ".3ds", ".max", ".ma", ".mb", ".c4d", ".hip", ".stl", ".lxo", ".lwo"}))
     return "files of this kind are not read: export the scene as glTF 2.0 (.gltf or .glb), from its program "
            "or through Blender";

@@ -30,6 +30,12 @@ std::vector<Part> parts_of(const MadeMesh& mesh) {
   return parts;
 }
 
+Result<std::string> kept(AssetSource& assets, const std::string& name, const std::string& bytes) {
+  const auto asset = assets.keep(name, bytes);
+  if (!asset) return tl::unexpected<Error>(asset.error());
+  return name;
+}
+
 }  // namespace
 
 std::size_t MadeMesh::bytes() const {
@@ -40,10 +46,7 @@ std::size_t MadeMesh::bytes() const {
 
 Result<std::string> keep_made(AssetSource& assets, std::string_view kind, std::string_view ending,
                               const std::string& bytes) {
-  const std::string name = fmt::format("{}-{}{}", kind, sha256(bytes).hex().substr(0, 16), ending);
-  const auto kept = assets.keep(name, bytes);
-  if (!kept) return tl::unexpected<Error>(kept.error());
-  return name;
+  return kept(assets, fmt::format("{}-{}{}", kind, sha256(bytes).hex().substr(0, 16), ending), bytes);
 }
 
 Result<std::string> keep_made(AssetSource& assets, const MadeMesh& mesh) {
@@ -84,9 +87,7 @@ Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid) {
 }
 
 Result<std::string> keep_made(AssetSource& assets, const MadeGrid& grid, const std::string& name) {
-  const auto kept = assets.keep(name, bytes_of(grid));
-  if (!kept) return tl::unexpected<Error>(kept.error());
-  return name;
+  return kept(assets, name, bytes_of(grid));
 }
 
 }  // namespace ls::scene

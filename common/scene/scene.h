@@ -11,7 +11,6 @@
 #include <variant>
 #include <vector>
 
-#include "common/scene/scene_camera.h"
 #include "common/scene/scene_shapes.h"
 #include "common/scene/scene_values.h"
 
@@ -394,8 +393,8 @@ struct IntegratorSettings {
   // that depend on the place and are learned from camera paths. 0: chosen for the scene; -1: never; 1: where
   // possible.
   int local_lights = 0;
-  // For "volpath" only: whether, in scenes with grids, paths may split at their first scattering, and
-  // Russian roulette may end them where their throughput is below that behind the first scattering
+  // For "volpath" only, in scenes with grids: whether paths may split at their first scattering, and Russian
+  // roulette may end them where their throughput is lower than just after that scattering
   // (worker/render/world/splitting.h). 0: chosen for the scene; -1: neither.
   int path_splitting = 0;
   bool operator==(const IntegratorSettings&) const = default;

@@ -11,6 +11,7 @@ namespace ls {
 
 using Rgb = std::array<double, 3>;
 inline bool all_zero(const Rgb& c) { return c == Rgb{0, 0, 0}; }
+inline bool is_grey(const Rgb& c) { return c[0] == c[1] && c[1] == c[2]; }
 // A point or direction. A type of its own, different from Rgb, because files write points and colours
 // differently.
 struct Vec3 : std::array<double, 3> {};
@@ -20,6 +21,7 @@ struct Transform {
   std::array<double, 16> m{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   bool operator==(const Transform&) const = default;
 };
+inline Vec3 origin_of(const Transform& t) { return {t.m[3], t.m[7], t.m[11]}; }
 // A row-major 3 x 3 matrix that acts on (u, v, 1).
 struct UvTransform {
   std::array<double, 9> m{1, 0, 0, 0, 1, 0, 0, 0, 1};

@@ -24,7 +24,7 @@ WORDS = {
 }
 # (identifier, file): why it stays.
 ALLOWED = {
-    ("say", "common/scene/analysis/needs_text.cpp"): "adds a sentence to a text for people",
+    ("say", "common/scene/analysis/needs.cpp"): "adds a sentence to a text for people",
     ("say", "worker/render/vdb/vdb_module.cpp"): "writes a message to the standard error stream",
     ("said", "common/report/log_plot.cpp"): "numbers that the drawing's text already has",
     ("glows", "worker/render/world/world_build.cpp"): "a local name",

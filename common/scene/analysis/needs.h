@@ -60,8 +60,8 @@ Needs needs_of(const Scene& scene, bool sees_media);
 // scene.
 std::string canonical_json(const Needs& needs);
 
-// Returns the first difference of two such texts ("lights.point: 2 here, 3 there"), for a message; empty if
-// they are equal. Any text is accepted.
+// Returns the first difference between two texts of canonical_json(), for a message, such as "lights.point: 2
+// here, 3 there"; empty if they are equal. A text that is not JSON counts as a difference.
 std::string first_difference(const std::string& here, const std::string& there);
 
 // A part of the renderer (for example "volume grids"), whether the scene needs it, and the reason.

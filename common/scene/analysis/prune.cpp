@@ -8,10 +8,8 @@
 
 #include "common/scene/analysis/unreachable.h"
 #include "common/scene/limits.h"
-#include "common/scene/schema/bsdf_traits.h"
-#include "common/scene/schema/emitter_traits.h"
 #include "common/scene/schema/integrators.h"
-#include "common/scene/schema/medium_traits.h"
+#include "common/scene/schema/traits.h"
 #include "common/scene/schema/validate.h"
 
 namespace ls::scene {
@@ -184,16 +182,14 @@ bool Pruner::simplify(Bsdf& b) {
     const bool first = everywhere(blend->weight, 0);
     if (!first && !everywhere(blend->weight, 1)) return false;
     ++blends_;
-    const Bsdf kept = s_.bsdfs[(first ? blend->first : blend->second).value];
-    b = kept;
+    b = Bsdf(s_.bsdfs[(first ? blend->first : blend->second).value]);
     return true;
   }
   if (const auto* mask = std::get_if<MaskBsdf>(&b)) {
     const bool clear = everywhere(mask->opacity, 0);
     if (!clear && !everywhere(mask->opacity, 1)) return false;
     ++masks_;
-    const Bsdf kept = clear ? Bsdf(NullBsdf{}) : s_.bsdfs[mask->bsdf.value];
-    b = kept;
+    b = clear ? Bsdf(NullBsdf{}) : s_.bsdfs[mask->bsdf.value];
     return true;
   }
   return false;

@@ -12,7 +12,7 @@ namespace {
 
 // Returns the image of p under the inverse of t (Cramer's rule); t must be invertible.
 Vec3 local_point(const Transform& t, const Vec3& p) {
-  const Vec3 q{p[0] - t.m[3], p[1] - t.m[7], p[2] - t.m[11]};
+  const Vec3 q = minus(p, origin_of(t));
   Vec3 local;
   for (std::size_t k = 0; k < 3; ++k) {
     Transform replaced = t;

@@ -4,27 +4,23 @@
 
 #include "common/scene/analysis/shape_place.h"
 #include "common/scene/limits.h"
-#include "common/scene/schema/bsdf_traits.h"
-#include "common/scene/schema/emitter_traits.h"
-#include "common/scene/schema/medium_traits.h"
+#include "common/scene/schema/traits.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene {
 namespace {
 
-// A distance relative to the largest coordinate. It is 16 times the renderer's offset of ray origins. So if
-// two objects are at least this far apart, a ray from the surface of one cannot start inside the other.
+// The margin around boxes, as a fraction of the largest coordinate of the two boxes that are compared. It is
+// 16 times the renderer's offset of ray origins. So if two objects are at least this far apart, a ray that
+// leaves the surface of one cannot start inside the other.
 constexpr double kApart = 0x1p-16;
 Box with_margin(const Box& b, const Box& beside) {
   return grown(b, kApart * std::max(largest_coordinate(b), largest_coordinate(beside)));
 }
 
-Vec3 place_of(const Transform& t) { return {t.m[3], t.m[7], t.m[11]}; }
-Vec3 column(const Transform& t, std::size_t k) { return {t.m[k], t.m[4 + k], t.m[8 + k]}; }
-
 // True if the camera and its near plane, where rays begin, are completely outside the box.
 bool camera_is_outside(const Sensor& s, const Box& tight) {
-  const Vec3 camera = place_of(s.to_world);
+  const Vec3 camera = origin_of(s.to_world);
   const Box box = with_margin(tight, {camera, camera});
   if (touch(box, {camera, camera})) return false;
   if (s.projection == Projection::spherical) return true;
@@ -33,7 +29,7 @@ bool camera_is_outside(const Sensor& s, const Box& tight) {
   bool before = true, behind = true;
   for (int k = 0; k < 8; ++k) {
     const Vec3 p = corner(box, k);
-    const double depth = dot(normal, {p[0] - camera[0], p[1] - camera[1], p[2] - camera[2]}) / unit;
+    const double depth = dot(normal, minus(p, camera)) / unit;
     before = before && depth < 0;
     behind = behind && depth > s.near_clip * (1 + kApart);
   }
@@ -79,9 +75,10 @@ class Search {
     return invertible(s.to_world) && determinant3(s.to_world) > 0 && (!mesh || mesh->face_normals);
   }
 
-  // True if the shape is a sphere or cube and no light reaches the medium inside it: light does not pass its
-  // surface, neither it nor the medium emits, and no emitter and no other surface through or from which light
-  // may come is inside it or touches it. False if flipped normals put the interior medium on the outside.
+  // True if the shape is a sphere or cube and no light reaches the medium inside it. Light must not pass its
+  // surface, and neither the surface nor the medium may emit. No emitter and no other entrance (a surface
+  // through or from which light may come) may touch the shape or be inside it. False if flipped normals put
+  // the interior medium on the outside.
   bool sealed(const Shape& s, std::size_t i, const Box& box) {
     const bool closed =
         std::holds_alternative<SphereShape>(s.geometry) || std::holds_alternative<CubeShape>(s.geometry);
@@ -97,8 +94,8 @@ class Search {
                        [&](const Entrance& e) { return e.shape != i && e.box && apart(box, e); });
   }
 
-  // True if the entrance (a surface through or from which light may come) does not touch the shape whose box
-  // is `tight`: the entrance is beside the shape or encloses it.
+  // True if the entrance does not touch the shape whose box is `tight`: it is beside the shape or encloses
+  // it.
   bool apart(const Box& tight, const Entrance& e) const {
     const Box box = with_margin(tight, *e.box);
     if (!touch(box, *e.box)) return true;

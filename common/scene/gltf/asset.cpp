@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::string_view kMagic = "glTF";
 constexpr std::size_t kHeaderBytes = 12, kChunkBytes = 8;
-constexpr double kFramesPerSecond = 24;  // of a sequence, unless -D fps sets another rate
+constexpr double kFramesPerSecond = 24;  // the rate of a sequence of frames, unless -D fps sets another
 constexpr std::uint32_t kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
 
 std::uint32_t word(std::string_view bytes, std::size_t at) {
@@ -176,8 +176,7 @@ std::optional<Document> load_document(std::string_view file_name, std::string_vi
                                       const ReadOptions& options, Report& report) {
   const auto refused = [&](std::string why) {
     const std::uint32_t file = report.add_file(SourceText(std::string(file_name), ""));
-    report.error({file, 0, 1}, std::move(why));
-    return std::nullopt;
+    return report.refuse({file, 0, 1}, std::move(why));
   };
   if (text.size() > kMaxTextBytes) return refused(too_large(text.size()));
   const auto pieces = taken_apart(text);

@@ -4,16 +4,75 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <type_traits>
 #include <utility>
 
-#include "common/scene/gltf/uri.h"
+#include "common/base/percent_code.h"
 #include "common/scene/limits.h"
 #include "common/scene/xml/document.h"
 
 namespace ls::scene::gltf {
+namespace {
+
+constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
+// Decodes base64 (RFC 4648), with or without the padding. nullopt: the text is not base64.
+std::optional<std::string> decode_base64(std::string_view text) {
+  while (text.ends_with('=')) text.remove_suffix(1);
+  if (text.size() % 4 == 1) return std::nullopt;
+  std::array<int, 256> value;
+  value.fill(-1);
+  for (std::size_t i = 0; i < kDigits.size(); ++i)
+    value[static_cast<unsigned char>(kDigits[i])] = static_cast<int>(i);
+  std::string out;
+  out.reserve(text.size() / 4 * 3 + 2);
+  unsigned bits = 0;
+  int held = 0;
+  for (const char c : text) {
+    const int digit = value[static_cast<unsigned char>(c)];
+    if (digit < 0) return std::nullopt;
+    bits = (bits << 6 | static_cast<unsigned>(digit)) & 0xffff;
+    held += 6;
+    if (held < 8) continue;
+    held -= 8;
+    out += static_cast<char>(bits >> held & 0xff);
+  }
+  return out;
+}
+
+// True if the name can be written to XML and JSON and read back unchanged.
+bool is_name(const std::string& name) {
+  const bool is_text = std::min(find_invalid_utf8(name), find_control(name)) == std::string::npos;
+  return is_text && !name.empty() && name.find_first_of("\t\r\n") == std::string::npos;
+}
+
+// True for "https://...", false for "C:/..." and "a:b".
+bool has_scheme(std::string_view uri) {
+  const auto colon = uri.find("://");
+  return colon != std::string_view::npos && colon > 1;
+}
+
+}  // namespace
+
+std::optional<Uri> read_uri(const Item& uri) {
+  const std::string given = uri.text("");
+  if (given.starts_with("data:")) {
+    const auto comma = given.find(',');
+    const bool is_base64 = comma != std::string::npos && given.substr(0, comma).ends_with(";base64");
+    auto bytes = is_base64 ? decode_base64(std::string_view(given).substr(comma + 1)) : std::nullopt;
+    if (bytes) return Uri{true, std::move(*bytes)};
+    return uri.refuse("this data URI is broken: only base64 is read, as in \"data:image/png;base64,...\"");
+  }
+  if (has_scheme(given))
+    return uri.refuse("nothing is fetched from elsewhere: put the file beside this one, and name it");
+  auto name = percent_decode(given);
+  if (name && is_name(*name)) return Uri{false, std::move(*name)};
+  return uri.refuse("this names no file");
+}
+
 namespace {
 
 // Largest length, offset and count in a file, by glTF's limit of 32 bits.
@@ -72,10 +131,7 @@ std::optional<std::string_view> Buffers::buffer(const Item& index) {
     return known->second ? std::optional<std::string_view>(*known->second) : std::nullopt;
   std::optional<std::string>& bytes = read_[buffer.identity()];
   const auto length = buffer["byteLength"].whole(1, kMost);
-  if (!length) {
-    buffer.error("a buffer needs its byteLength");
-    return std::nullopt;
-  }
+  if (!length) return buffer.refuse("a buffer needs its byteLength");
   const Item uri = buffer["uri"];
   if (uri.given()) {
     auto read = read_uri(uri);
@@ -84,18 +140,14 @@ std::optional<std::string_view> Buffers::buffer(const Item& index) {
       bytes = std::move(read->text);
     } else {
       auto file = assets_.text(join_path("", read->text));
-      if (!file) {
-        uri.error(file.error().message);
-        return std::nullopt;
-      }
+      if (!file) return uri.refuse(file.error().message);
       bytes = std::move(*file);
     }
   } else if (chunk_) {
     bytes = std::string(*chunk_);
   } else {
-    buffer.error(
+    return buffer.refuse(
         "this buffer has no uri: only the first of a .glb may have none, whose bytes follow its JSON");
-    return std::nullopt;
   }
   total_bytes_ += bytes->size();
   if (bytes->size() < *length)
@@ -114,23 +166,19 @@ std::optional<std::string_view> Buffers::buffer(const Item& index) {
 std::optional<std::string_view> Buffers::view(const Item& index) {
   const Item view = index.in(root_["bufferViews"]);
   if (!view.given()) return std::nullopt;
-  if (!view["buffer"].given()) {
-    view.error("a buffer view needs its buffer");
-    return std::nullopt;
-  }
+  if (!view["buffer"].given()) return view.refuse("a buffer view needs its buffer");
   const auto bytes = buffer(view["buffer"]);
   if (!bytes) return std::nullopt;
   const std::size_t offset = view["byteOffset"].whole(0, kMost).value_or(0);
   const std::size_t length = view["byteLength"].whole(0, kMost).value_or(0);
   if (offset + length <= bytes->size()) return bytes->substr(offset, length);
-  view.error(fmt::format("bytes {} to {} are beyond its buffer, which has {}", offset, offset + length,
-                         bytes->size()));
-  return std::nullopt;
+  return view.refuse(fmt::format("bytes {} to {} are beyond its buffer, which has {}", offset,
+                                 offset + length, bytes->size()));
 }
 
 // Returns where the `count` elements of `owner` (an accessor, or a part of a sparse one) are in its buffer
 // view. `like` gives their type. If `strided`, the buffer view may set the distance between elements
-// (byteStride). nullopt: they are beyond the view or it is wrong, which has been reported.
+// (byteStride). nullopt: the view is wrong, or too short for the elements, which has been reported.
 std::optional<Buffers::Layout> Buffers::layout_in(const Item& owner, Layout like, std::size_t count,
                                                   bool strided) {
   const auto bytes = view(owner["bufferView"]);
@@ -145,11 +193,9 @@ std::optional<Buffers::Layout> Buffers::layout_in(const Item& owner, Layout like
   }
   const std::size_t offset = owner["byteOffset"].whole(0, kMost).value_or(0);
   const std::size_t end = offset + (count - 1) * like.stride + like.element();
-  if (end > bytes->size()) {
-    owner.error(fmt::format("{} elements end at byte {}, beyond the buffer view, which has {}", count, end,
-                            bytes->size()));
-    return std::nullopt;
-  }
+  if (end > bytes->size())
+    return owner.refuse(fmt::format("{} elements end at byte {}, beyond the buffer view, which has {}", count,
+                                    end, bytes->size()));
   like.data = bytes->substr(offset);
   return like;
 }
@@ -163,10 +209,9 @@ std::optional<Buffers::Layout> Buffers::layout(const Item& accessor) {
   const auto* type =
       std::find_if(std::begin(kTypes), std::end(kTypes), [&](const auto& t) { return t.first == name; });
   const auto count = accessor["count"].whole(1, kMost);
-  if (component == std::end(kComponents) || type == std::end(kTypes) || !count) {
-    accessor.error("an accessor needs a componentType of 5120 to 5126, a type such as \"VEC3\", and a count");
-    return std::nullopt;
-  }
+  if (component == std::end(kComponents) || type == std::end(kTypes) || !count)
+    return accessor.refuse(
+        "an accessor needs a componentType of 5120 to 5126, a type such as \"VEC3\", and a count");
   out.code = component->code;
   out.bytes = component->bytes;
   out.width = type->second;
@@ -175,19 +220,16 @@ std::optional<Buffers::Layout> Buffers::layout(const Item& accessor) {
   out.count = *count;
   empty_elements_ += *count;
   if (empty_elements_ <= kMaxGltfEmptyCount) return out;
-  accessor.error(fmt::format("elements without a buffer view, which are all 0: at most {} of a file are read",
-                             kMaxGltfEmptyCount));
-  return std::nullopt;
+  return accessor.refuse(fmt::format(
+      "elements without a buffer view, which are all 0: at most {} of a file are read", kMaxGltfEmptyCount));
 }
 
 template <class T>
 std::optional<std::vector<T>> Buffers::read(const Item& accessor, const Layout& from) {
   read_numbers_ += from.count * from.width;
-  if (read_numbers_ > kMaxGltfNumbers) {
-    accessor.error(
+  if (read_numbers_ > kMaxGltfNumbers)
+    return accessor.refuse(
         fmt::format("accessors of more than {} numbers in all are read: split the scene", kMaxGltfNumbers));
-    return std::nullopt;
-  }
   std::vector<T> out(from.count * from.width);
   for (std::size_t i = 0; i < from.count && !from.data.empty(); ++i)
     for (std::size_t k = 0; k < from.width; ++k)
@@ -203,10 +245,10 @@ bool Buffers::read_sparse(const Item& sparse, const Layout& like, std::vector<T>
   const auto count = sparse["count"].whole(1, like.count);
   const Item where = sparse["indices"];
   const auto code = where["componentType"].whole(5121, 5125);
-  if (!count || !code || *code == 5122 || *code == 5124) {
-    sparse.error("a sparse accessor needs a count, and indices whose componentType is 5121, 5123 or 5125");
-    return false;
-  }
+  if (!count || !code || *code == 5122 || *code == 5124)
+    return sparse.error(
+               "a sparse accessor needs a count, and indices whose componentType is 5121, 5123 or 5125"),
+           false;
   Layout index;
   index.code = *code;
   index.bytes = *code == 5121 ? 1 : *code == 5123 ? 2 : 4;
@@ -216,10 +258,9 @@ bool Buffers::read_sparse(const Item& sparse, const Layout& like, std::vector<T>
   for (std::size_t i = 0; i < *count; ++i) {
     const auto at =
         static_cast<std::size_t>(component(places->data.data() + i * places->stride, places->code, false));
-    if (at >= like.count) {
-      where.error(fmt::format("number {} is {}, but the accessor has {} elements", i, at, like.count));
-      return false;
-    }
+    if (at >= like.count)
+      return where.error(fmt::format("number {} is {}, but the accessor has {} elements", i, at, like.count)),
+             false;
     for (std::size_t k = 0; k < like.width; ++k)
       out[at * like.width + k] = static_cast<T>(component(
           values->data.data() + i * values->stride + k * values->bytes, values->code, values->normalised));
@@ -233,18 +274,14 @@ std::optional<Numbers<float>> Buffers::floats(const Item& index,
   if (!accessor.given()) return std::nullopt;
   const auto from = layout(accessor);
   if (!from) return std::nullopt;
-  if (std::find(types.begin(), types.end(), accessor["type"].text("")) == types.end()) {
-    accessor["type"].error(fmt::format("{} is wanted for this use", fmt::join(types, " or ")));
-    return std::nullopt;
-  }
+  if (std::find(types.begin(), types.end(), accessor["type"].text("")) == types.end())
+    return accessor["type"].refuse(fmt::format("{} is wanted for this use", fmt::join(types, " or ")));
   auto values = read<float>(accessor, *from);
   if (!values) return std::nullopt;
   const auto bad = std::find_if(values->begin(), values->end(), [](float x) { return !std::isfinite(x); });
-  if (bad != values->end()) {
-    accessor.error(fmt::format("element {} is not a finite number",
-                               static_cast<std::size_t>(bad - values->begin()) / from->width));
-    return std::nullopt;
-  }
+  if (bad != values->end())
+    return accessor.refuse(fmt::format("element {} is not a finite number",
+                                       static_cast<std::size_t>(bad - values->begin()) / from->width));
   return Numbers<float>{from->width, std::move(*values)};
 }
 
@@ -256,8 +293,7 @@ std::optional<std::vector<std::uint32_t>> Buffers::indices(const Item& index) {
   if (from->width == 1 && (from->code == 5121 || from->code == 5123 || from->code == 5125) &&
       !from->normalised)
     return read<std::uint32_t>(accessor, *from);
-  accessor.error("indices are of type SCALAR and of componentType 5121, 5123 or 5125");
-  return std::nullopt;
+  return accessor.refuse("indices are of type SCALAR and of componentType 5121, 5123 or 5125");
 }
 
 }  // namespace ls::scene::gltf

@@ -1,4 +1,5 @@
-// Reads the buffers of a glTF file, and the numbers of its accessors.
+// Reads the files and data that a glTF file refers to: its URIs, its buffers, and the numbers of its
+// accessors.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +14,15 @@
 #include "common/scene/read.h"
 
 namespace ls::scene::gltf {
+
+// A "uri": the name of a file beside the glTF file, or a data URI, which contains the bytes.
+struct Uri {
+  bool is_data = false;
+  std::string text;  // the bytes of a data URI; otherwise the name of the file
+};
+
+// nullopt: the text is neither, which has been reported.
+std::optional<Uri> read_uri(const Item& uri);
 
 // The numbers of an accessor, `width` of them for each element.
 template <class T>

@@ -15,10 +15,11 @@ namespace {
 constexpr int kHeight = 720, kWidth = 1280;  // pixels; glTF does not specify the frame's size
 constexpr int kSamples = 64;
 constexpr double kFarthest = 1e7;  // far clip plane of a camera without zfar
-// The default camera of a scene without cameras. kFrom is the direction to it: in front, to the right, above.
+// A scene without cameras gets one that frames the bounding sphere of its meshes. kFrom is the direction from
+// the sphere's centre to this camera: in front, to the right and above.
 constexpr Vec3 kFrom{{{.5, .35, 1}}};
 constexpr double kFov = 40;       // degrees, along the shorter side
-constexpr double kMargin = 1.05;  // factor on its distance; at 1 the bounding sphere just fits the frame
+constexpr double kMargin = 1.05;  // factor on the distance from which the sphere just fits the frame
 
 std::string name_of(const Translation& t, const Standing& camera) {
   const std::string own = camera.node["camera"].in(t.root["cameras"])["name"].text("");

@@ -11,8 +11,6 @@
 namespace ls::scene::gltf {
 namespace {
 
-std::string text_of(const Vec3& v) { return fmt::format("{} {} {}", v[0], v[1], v[2]); }
-
 // Adds the two angles of a spot light, measured from its axis: full intensity within innerConeAngle, no
 // light beyond outerConeAngle.
 void add_cone(Translation& t, const Item& spot, Element& out) {
@@ -40,7 +38,6 @@ void add_light(Translation& t, const Standing& light) {
   const double intensity = given["intensity"].number(1);
   for (double& x : colour) x *= intensity;
   if (colour == std::array<double, 3>{0, 0, 0}) return;
-  const auto& m = light.to_world.m;
   const std::string type = given["type"].text("");
   const Span at = given.at();
   const auto facing_world = facing(light.to_world);
@@ -50,11 +47,11 @@ void add_light(Translation& t, const Standing& light) {
   if (type == "directional") {
     out = made("emitter", "directional", at);
     scene::add(out, "vector", "direction",
-               text_of(Vec3{{facing_world->m[2], facing_world->m[6], facing_world->m[10]}}), at);
+               Vec3{{facing_world->m[2], facing_world->m[6], facing_world->m[10]}}, at);
     scene::add(out, "irradiance", Rgb{colour}, at);
   } else if (type == "point") {
     out = made("emitter", "point", at);
-    scene::add(out, "point", "position", text_of(Vec3{{m[3], m[7], m[11]}}), at);
+    scene::add(out, "point", "position", origin_of(light.to_world), at);
     scene::add(out, "intensity", Rgb{colour}, at);
   } else if (type == "spot") {
     out = made("emitter", "spot", at);

@@ -296,10 +296,9 @@ std::size_t Materials::uv_set(const Item& index) {
     if (!info.given()) continue;
     const std::size_t own = gltf::uv_set(info);
     if (set && own != *set)
-      t_.warn_once(
-          info, fmt::format("this texture asks for TEXCOORD_{}, but a mesh has one set here, and others of "
-                            "this material ask for TEXCOORD_{}",
-                            own, *set));
+      t_.warn_once(info, fmt::format("this texture asks for TEXCOORD_{}, but a mesh has one set here, and "
+                                     "others of this material ask for TEXCOORD_{}",
+                                     own, *set));
     set = set.value_or(own);
   }
   return set.value_or(0);

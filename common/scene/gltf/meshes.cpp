@@ -48,13 +48,11 @@ bool has_mirrored_uvs(const MadeMesh& mesh) {
 
 std::optional<Meshes::Surface> Meshes::read_primitive(const Item& primitive, const Use& use) {
   const Item attributes = primitive["attributes"], position = attributes["POSITION"];
-  if (!position.given()) {
-    if (primitive.extension("KHR_draco_mesh_compression").given())
-      primitive.error("Draco's packed meshes are not read: unpack them, as by `gltf-transform copy`");
-    else
-      primitive.error("a primitive needs the attribute POSITION");
-    return std::nullopt;
-  }
+  if (!position.given())
+    return primitive.refuse(
+        primitive.extension("KHR_draco_mesh_compression").given()
+            ? "Draco's packed meshes are not read: unpack them, as by `gltf-transform copy`"
+            : "a primitive needs the attribute POSITION");
   const std::size_t mode = primitive["mode"].whole(0, kFan).value_or(kTriangles);
   if (mode < kTriangles) {
     t_.warn_once(primitive, "points and lines are not rendered: only triangles are");
@@ -125,10 +123,9 @@ std::optional<Meshes::Surface> Meshes::read_primitive(const Item& primitive, con
   out.flat = mesh.normals.empty();
   out.material = materials_.of(material, kind);
   if (out.material.has_normal_map && has_mirrored_uvs(mesh))
-    t_.warn_once(
-        primitive["attributes"],
-        "where an image is mirrored on this mesh, its normal map leans the other way across u: tangents "
-        "follow from the texture coordinates here, without a sign");
+    t_.warn_once(primitive["attributes"],
+                 "where an image is mirrored on this mesh, its normal map leans the other way across u: "
+                 "tangents follow from the texture coordinates here, without a sign");
   for (std::size_t i = 0; i < mesh.corners(); ++i) {
     const float* p = &mesh.positions[3 * i];
     out.box.include(Vec3{{double{p[0]}, double{p[1]}, double{p[2]}}});
@@ -144,10 +141,9 @@ std::vector<Meshes::Surface> Meshes::read(const Use& use) {
   const std::vector<Item> primitives = use.mesh["primitives"].list();
   parts_ += primitives.size() * (1 + (use.weights ? use.weights->size() : 0));
   if (parts_ > kMaxElements)
-    return use.mesh.error(fmt::format(
-               "more than {} primitives and morph targets are read, those of a mesh again for each "
-               "skin and each weights: split the scene",
-               kMaxElements)),
+    return use.mesh.error(fmt::format("more than {} primitives and morph targets are read, those of a mesh "
+                                      "again for each skin and each weights: split the scene",
+                                      kMaxElements)),
            out;
   for (const Item& primitive : primitives) {
     if (t_.report.full()) break;

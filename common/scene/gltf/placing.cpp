@@ -8,22 +8,12 @@
 namespace ls::scene::gltf {
 namespace {
 
-Vec3 column(const Transform& t, std::size_t i) { return Vec3{{t.m[i], t.m[4 + i], t.m[8 + i]}}; }
-
 // Returns the transform of a camera at `at` that looks along `along`. Our cameras have +x on the left.
 std::optional<Transform> upright(const Vec3& at, const Vec3& along, const Vec3& up) {
   const auto ahead = unit(along);
   const auto left = ahead ? unit(cross(up, *ahead)) : std::nullopt;
   if (!left) return std::nullopt;
-  const Vec3 above = cross(*ahead, *left);
-  Transform out;
-  for (std::size_t i = 0; i < 3; ++i) {
-    out.m[4 * i] = (*left)[i];
-    out.m[4 * i + 1] = above[i];
-    out.m[4 * i + 2] = (*ahead)[i];
-    out.m[4 * i + 3] = at[i];
-  }
-  return out;
+  return of_columns(*left, cross(*ahead, *left), *ahead, at);
 }
 
 }  // namespace
@@ -70,8 +60,7 @@ std::optional<Transform> facing(const Transform& to_world) {
 }
 
 Transform looking(const Vec3& eye, const Vec3& target) {
-  const Vec3 along{{target[0] - eye[0], target[1] - eye[1], target[2] - eye[2]}};
-  return upright(eye, along, Vec3{{0, 1, 0}}).value_or(Transform{});
+  return upright(eye, minus(target, eye), Vec3{{0, 1, 0}}).value_or(Transform{});
 }
 
 void Box::include(const Vec3& p) {

@@ -52,8 +52,7 @@ constexpr Row kObjects[] = {
      "surfaces are seen from both sides; only emission is on the front"},
     {"cameras", "perspective", kRead,
      "`yfov`; the frame is 720 pixels high and as wide as aspectRatio says (1280 without); clipped at znear "
-     "and "
-     "zfar"},
+     "and zfar"},
     {"cameras", "orthographic", kRead, "`xmag`, `ymag`"},
     {"animations", "channels, samplers", kRead,
      "translation, rotation, scale and weights at the second of `-D time` or of a frame: STEP, LINEAR and "
@@ -83,8 +82,7 @@ constexpr Row kExtensions[] = {
     {"", "KHR_materials_sheen", kIgnored, "Burley's sheen is another: cloth has none"},
     {"", "KHR_materials_specular", kRead,
      "specularFactor and the largest channel of specularColorFactor scale the reflection straight on; "
-     "textures "
-     "have no effect, which is a warning"},
+     "textures have no effect, which is a warning"},
     {"", "KHR_materials_transmission", kRead,
      "with a volume a body of glass; without one a sheet, `thindielectric`, or `roughthindielectric` where "
      "it is rough"},

@@ -5,8 +5,8 @@
 #include <cctype>
 #include <cmath>
 
+#include "common/scene/gltf/buffers.h"
 #include "common/scene/gltf/translation.h"
-#include "common/scene/gltf/uri.h"
 #include "common/scene/made_files.h"
 #include "common/scene/xml/transform_element.h"
 
@@ -65,8 +65,7 @@ std::string image_of(Translation& t, const Item& texture) {
   if (!texture["source"].given()) {
     texture.error(
         "this texture has no source that is read: images in KTX2 (KHR_texture_basisu), WebP or AVIF are not, "
-        "so "
-        "convert them to PNG or JPEG");
+        "so convert them to PNG or JPEG");
     return {};
   }
   const Item image = texture["source"].in(t.root["images"]);
@@ -97,18 +96,11 @@ void add_to_uv(const Item& transform, Element& out) {
 }
 
 std::string_view channel_of(Part part) {
-  switch (part) {
-    case Part::red:
-      return "red";
-    case Part::green:
-      return "green";
-    case Part::blue:
-      return "blue";
-    case Part::alpha:
-      return "alpha";
-    default:
-      return "";
-  }
+  static constexpr std::pair<Part, std::string_view> kChannels[] = {
+      {Part::red, "red"}, {Part::green, "green"}, {Part::blue, "blue"}, {Part::alpha, "alpha"}};
+  for (const auto& [one, name] : kChannels)
+    if (one == part) return name;
+  return "";
 }
 
 Element named(Element e, std::string_view name, const Span& at) {
@@ -125,10 +117,7 @@ std::size_t uv_set(const Item& info) {
 
 std::optional<Element> texture(Translation& t, const Item& info, Part part) {
   if (!info.given()) return std::nullopt;
-  if (!info["index"].given()) {
-    info.error("this needs the index of a texture");
-    return std::nullopt;
-  }
+  if (!info["index"].given()) return info.refuse("this needs the index of a texture");
   const Item texture = info["index"].in(t.root["textures"]);
   if (!texture.given()) return std::nullopt;
   const std::string file = image_of(t, texture);
@@ -161,12 +150,9 @@ Source colour_source(Translation& t, const std::array<double, 3>& factor, const 
 // Several images, or an image and a factor, become nested textures "product"; the last image is innermost.
 void give(Element& parent, std::string_view name, const Source& source, const Span& at, double threshold) {
   if (source.is_constant()) {
-    const auto& c = source.factor;
-    if (c[0] == c[1] && c[1] == c[2])
-      add(parent, std::string(name), c[0], at);
-    else
-      add(parent, std::string(name), Rgb{c[0], c[1], c[2]}, at);
-    return;
+    const Rgb& c = source.factor;
+    if (is_grey(c)) return add(parent, std::string(name), c[0], at);
+    return add(parent, std::string(name), c, at);
   }
   if (source.images.size() == 1 && source.is_factor_one() && threshold == 0)
     return add(parent, named(source.images[0], name, at));

@@ -13,7 +13,7 @@
 #include "common/scene/gltf/buffers.h"
 #include "common/scene/made_files.h"
 #include "common/scene/read.h"
-#include "common/scene/xml/make_element.h"
+#include "common/scene/xml/document.h"
 
 namespace ls::scene::gltf {
 
@@ -38,7 +38,7 @@ struct Translation {
   void warn_once(const Item& at, std::string text);
 };
 
-// In animation.cpp: the pose of animated nodes at one moment.
+// In motion.cpp: the pose of animated nodes at one moment.
 struct Moment {
   std::optional<double> seconds;  // nullopt: animations have no effect
   std::string animation;          // name of an animation; empty: the first one; "*": all
@@ -51,7 +51,7 @@ struct Pose {
 using Poses = std::map<const Value*, Pose>;  // by the node
 Poses read_poses(Translation& t, const Moment& moment);
 
-// In deform.cpp. Each changes the positions and normals of `mesh`, which was read from `primitive`. False:
+// In motion.cpp. Each changes the positions and normals of `mesh`, which was read from `primitive`. False:
 // the file is wrong, which has been reported.
 //
 // Adds the morph targets, each multiplied by its weight.
@@ -156,7 +156,7 @@ class Meshes {
   Translation& t_;
   Materials& materials_;
   std::size_t bytes_ = 0;  // of the files of all meshes
-  std::size_t parts_ = 0;  // primitives and morph targets; a mesh counts again for each skin and each weights
+  std::size_t parts_ = 0;  // primitives and morph targets, once for each skin and each set of weights
   Box box_;
 };
 

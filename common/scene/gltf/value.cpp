@@ -179,10 +179,7 @@ std::shared_ptr<const Value> parse_json(std::string name, std::string text, Repo
 Item Item::operator[](std::string_view name) const {
   if (!value_) return {nullptr, near_, report_};
   const auto* members = std::get_if<Value::Members>(&value_->is);
-  if (!members) {
-    error("an object is wanted here, {...}");
-    return {nullptr, near_, report_};
-  }
+  if (!members) return error("an object is wanted here, {...}"), Item{nullptr, near_, report_};
   const auto found = std::lower_bound(members->begin(), members->end(), name,
                                       [](const Member& m, std::string_view x) { return m.name < x; });
   if (found == members->end() || found->name != name) return {nullptr, value_, report_};
@@ -193,35 +190,23 @@ std::vector<Item> Item::list() const {
   std::vector<Item> all;
   if (!value_) return all;
   const auto* list = std::get_if<Value::List>(&value_->is);
-  if (!list) {
-    error("a list is wanted here, [...]");
-    return all;
-  }
+  if (!list) return error("a list is wanted here, [...]"), all;
   all.reserve(list->size());
   for (const Value& v : *list) all.push_back(Item(v, *report_));
   return all;
 }
 
-bool Item::is_true(bool fallback) const {
+template <class T>
+T Item::read(T fallback, std::string_view wanted) const {
   if (!value_) return fallback;
-  if (const auto* x = std::get_if<bool>(&value_->is)) return *x;
-  error("true or false is wanted here");
+  if (const auto* x = std::get_if<T>(&value_->is)) return *x;
+  error(fmt::format("{} is wanted here", wanted));
   return fallback;
 }
 
-double Item::number(double fallback) const {
-  if (!value_) return fallback;
-  if (const auto* x = std::get_if<double>(&value_->is)) return *x;
-  error("a number is wanted here");
-  return fallback;
-}
-
-std::string Item::text(std::string_view fallback) const {
-  if (!value_) return std::string(fallback);
-  if (const auto* x = std::get_if<std::string>(&value_->is)) return *x;
-  error("a text is wanted here");
-  return std::string(fallback);
-}
+bool Item::is_true(bool fallback) const { return read(fallback, "true or false"); }
+double Item::number(double fallback) const { return read(fallback, "a number"); }
+std::string Item::text(std::string_view fallback) const { return read(std::string(fallback), "a text"); }
 
 void Item::read_numbers(std::vector<double>& all) const {
   if (!value_) return;
@@ -236,8 +221,7 @@ std::optional<std::size_t> Item::whole(std::size_t least, std::size_t most) cons
   const auto* x = std::get_if<double>(&value_->is);
   if (x && *x == std::floor(*x) && *x >= static_cast<double>(least) && *x <= static_cast<double>(most))
     return static_cast<std::size_t>(*x);
-  error(fmt::format("a whole number from {} to {} is wanted here", least, most));
-  return std::nullopt;
+  return refuse(fmt::format("a whole number from {} to {} is wanted here", least, most));
 }
 
 Item Item::in(const Item& all) const {
@@ -245,10 +229,8 @@ Item Item::in(const Item& all) const {
   if (!value_) return none;
   const auto* list = all.value_ ? std::get_if<Value::List>(&all.value_->is) : nullptr;
   const std::size_t count = list ? list->size() : 0;
-  if (count == 0) {
-    error("there is nothing that this index could mean: the file has no such list");
-    return none;
-  }
+  if (count == 0)
+    return error("there is nothing that this index could mean: the file has no such list"), none;
   const auto index = whole(0, count - 1);
   return index ? Item((*list)[*index], *report_) : none;
 }

@@ -12,7 +12,7 @@
 #include <variant>
 #include <vector>
 
-#include "common/scene/xml/error_report.h"
+#include "common/scene/xml/source_text.h"
 
 namespace ls::scene::gltf {
 
@@ -67,11 +67,14 @@ class Item {
 
   Span at() const { return {0, near_->offset, 1}; }
   void error(std::string text) const { report_->error(at(), std::move(text)); }
+  std::nullopt_t refuse(std::string text) const { return report_->refuse(at(), std::move(text)); }
   void warning(std::string text) const { report_->warning(at(), std::move(text)); }
   const Value* identity() const { return value_; }
 
  private:
   Item(const Value* value, const Value* near, Report* report) : value_(value), near_(near), report_(report) {}
+  template <class T>
+  T read(T fallback, std::string_view wanted) const;
   void read_numbers(std::vector<double>& all) const;
 
   const Value* value_;

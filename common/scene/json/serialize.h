@@ -13,8 +13,15 @@
 namespace ls {
 
 std::string serialize(const Scene& scene);
-Result<Scene> deserialize_scene(
-    std::string_view json);  // untrusted input: sizes, indices and ranges are checked
+// Untrusted input: sizes, indices and ranges are checked.
+Result<Scene> deserialize_scene(std::string_view json);
 Digest digest_of(const Scene& scene);
 
+namespace scene {
+
+// Returns the shortest text that reads back to the same bits. x must be finite; -0 is written as 0, so that
+// equal numbers have equal texts.
+std::string shortest_number(double x);
+
+}  // namespace scene
 }  // namespace ls

@@ -3,7 +3,7 @@
 
 #include "common/base/suggest.h"
 #include "common/image/frame/render_limits.h"
-#include "common/scene/nori/translators.h"
+#include "common/scene/nori/object.h"
 #include "common/scene/schema/integrators.h"
 #include "common/scene/xml/transform_element.h"
 #include "common/scene/xml/values.h"
@@ -61,8 +61,7 @@ std::optional<Element> sampler(const Element* e, const Span& at, Report& report)
   if (plugin->type != "independent")
     report.warning(
         value_place(*e, "type"),
-        fmt::format("of {} only the number of samples is used: which they are is this program's own "
-                    "matter",
+        fmt::format("of {} only the number of samples is used: which they are is this program's own matter",
                     o.title()));
   if (o.has("sampleCount"))
     add_as(out, o.take("sampleCount"), "sample_count");

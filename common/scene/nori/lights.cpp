@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "common/scene/nori/translators.h"
+#include "common/scene/nori/object.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene::nori {
@@ -55,10 +55,11 @@ Element disk(Object& o, Report& report) {
     return out;
   }
   if (angle > 90)
-    report.error(o.element().at,
-                 fmt::format("{} has an angle thetaA of {}: it can be 90 at most, or 180, which "
-                             "is light from everywhere",
-                             o.title(), angle));
+    report.error(
+        o.element().at,
+        fmt::format(
+            "{} has an angle thetaA of {}: it can be 90 at most, or 180, which is light from everywhere",
+            o.title(), angle));
   Element out = light("directional", o), mirror = made("scale", "", o.element().at);
   // A directional emitter's direction is that in which its light travels, away from the disk: z is mirrored.
   set(mirror, "value", "1 1 -1", o.element().at);
@@ -111,10 +112,8 @@ std::optional<Element> emitter(const Element& e, Report& report) {
   if (!plugin) return std::nullopt;
   Object o(e, *plugin, report);
   std::optional<Element> out;
-  if (plugin->type == "area") {
-    report.error(e.at, "an emitter \"area\" stands in the mesh that shines");
-    return std::nullopt;
-  }
+  if (plugin->type == "area")
+    return report.refuse(e.at, "an emitter \"area\" stands in the mesh that shines");
   if (plugin->type == "point") out = point(o);
   if (plugin->type == "directional" || plugin->type == "distant") out = parallel(o);
   if (plugin->type == "distantdisk") out = disk(o, report);
@@ -135,11 +134,10 @@ std::optional<Element> mesh_emitter(const Element& e, Report& report) {
   const Plugin* plugin = known_plugin(e, report);
   if (!plugin) return std::nullopt;
   Object o(e, *plugin, report);
-  if (plugin->type != "area" && plugin->type != "spot") {
-    report.error(value_place(e, "type"),
-                 fmt::format("a mesh can hold an emitter \"area\" or \"spot\", not \"{}\"", plugin->type));
-    return std::nullopt;
-  }
+  if (plugin->type != "area" && plugin->type != "spot")
+    return report.refuse(
+        value_place(e, "type"),
+        fmt::format("a mesh can hold an emitter \"area\" or \"spot\", not \"{}\"", plugin->type));
   need(o, "radiance");
   Element out = light("area", o);
   add_as(out, o.take("radiance"), "radiance");

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "common/scene/nori/translators.h"
+#include "common/scene/nori/object.h"
 #include "common/scene/xml/transform_element.h"
 #include "common/scene/xml/values.h"
 
@@ -27,18 +27,15 @@ class Reader {
     o_.both("sigma_s", "scattering");
     const bool apart = any({"sigma_a", "sigma_s", "absorption", "scattering"});
     const bool together = any({"sigma_t", "albedo"});
-    if (apart && together) {
-      report_.error(o_.element().at,
-                    fmt::format("{} gives both absorption or scattering and sigma_t or albedo", o_.title()));
-      return std::nullopt;
-    }
+    if (apart && together)
+      return report_.refuse(
+          o_.element().at,
+          fmt::format("{} gives both absorption or scattering and sigma_t or albedo", o_.title()));
     if (together) return Coefficients{o_.color("sigma_t", {.5, .5, .5}), o_.color("albedo", {.5, .5, .5})};
-    if (!apart && !any({"emission", "source_radiance"})) {
-      report_.error(
+    if (!apart && !any({"emission", "source_radiance"}))
+      return report_.refuse(
           o_.element().at,
           fmt::format("{} needs its coefficients: sigma_a and sigma_s, or sigma_t and albedo", o_.title()));
-      return std::nullopt;
-    }
     const Rgb a = o_.color(o_.has("absorption") ? "absorption" : "sigma_a", kBlack);
     const Rgb s = o_.color(o_.has("scattering") ? "scattering" : "sigma_s", kBlack);
     Coefficients c{};
@@ -59,10 +56,7 @@ class Reader {
 
 // Returns the value of a constant volume; nullopt for a grid.
 std::optional<Rgb> constant_of(const Element& e, Report& report) {
-  if (e.tag != "volume") {
-    const auto v = parse_numbers(e.get("value"), 3);  // already checked
-    return v->size() == 3 ? Rgb{(*v)[0], (*v)[1], (*v)[2]} : Rgb{v->front(), v->front(), v->front()};
-  }
+  if (e.tag != "volume") return rgb_of(*parse_numbers(e.get("value"), 3));  // already checked
   if (e.get("type") != "constvolume") return std::nullopt;
   Object o(e, *find_plugin("volume", "constvolume"), report);
   const Rgb value = o.color("value", kBlack);
@@ -88,12 +82,11 @@ std::optional<Element> grid(const Element* filename, const Element* order, std::
   add_as(out, filename, "filename");
   add_as(out, order, "order");
   if (!filename->get("value").ends_with(".vol")) return out;
-  if (!mesh.low) {
-    report.error(filename->at,
-                 "a `.vol` fills the bounding box of its mesh, which is only known here of a <mesh "
-                 "type=\"sphere\"> without toWorld; put it into one, or take a file that has its own box");
-    return std::nullopt;
-  }
+  if (!mesh.low)
+    return report.refuse(
+        filename->at,
+        "a `.vol` fills the bounding box of its mesh, which is only known here of a <mesh type=\"sphere\"> "
+        "without toWorld; put it into one, or take a file that has its own box");
   add(out, "boolean", "node_centred", "true", at);
   fit(out, mesh);
   return out;
@@ -149,14 +142,10 @@ std::optional<Element> scaled_grid(Object& o, const Mesh& mesh, Report& report) 
   const double scale = o.number("scale", 1) * o.number("density_scale", 1);
   if (!filename || !c) return std::nullopt;
   const Rgb& t = c->sigma_t;
-  if (t[0] != t[1] || t[1] != t[2]) {
-    report.error(
-        o.element().at,
-        fmt::format("{} has an extinction of {} {} {} times its densities: with a grid it can only be "
-                    "the same in all channels",
-                    o.title(), t[0], t[1], t[2]));
-    return std::nullopt;
-  }
+  if (!is_grey(t))
+    return report.refuse(o.element().at, fmt::format("{} has an extinction of {} {} {} times its densities: "
+                                                     "with a grid it can only be the same in all channels",
+                                                     o.title(), t[0], t[1], t[2]));
   auto densities = grid(filename, o.take("order"), "sigma_t", o.element().at, mesh, report);
   if (!densities) return std::nullopt;
   Element out = made("medium", "heterogeneous", o.element().at);
@@ -180,12 +169,10 @@ std::optional<Element> two_volumes(Object& o, const Mesh& mesh, Report& report) 
   if (constant_t && constant_a) return homogeneous({*constant_t, *constant_a}, scale, at);
   Element out = made("medium", "heterogeneous", at);
   if (constant_t) {
-    if (!mesh.low) {
-      report.error(t->at,
-                   "beside an albedo that varies a constant density must end somewhere, which is only known "
-                   "here in a <mesh type=\"sphere\"> without toWorld");
-      return std::nullopt;
-    }
+    if (!mesh.low)
+      return report.refuse(t->at,
+                           "beside an albedo that varies a constant density must end somewhere, which is "
+                           "only known here in a <mesh type=\"sphere\"> without toWorld");
     Element volume = made("volume", "constvolume", t->at);
     set(volume, "name", "sigma_t", t->at);
     add(volume, "value", *constant_t, t->at);

@@ -14,6 +14,121 @@
 namespace ls::scene::nori {
 namespace {
 
+const std::vector<TagRow>& tags() {
+  static const std::vector<TagRow> rows = [] {
+    std::vector<TagRow> r;
+    r.push_back({"scene", TagKind::object, {}, {"type", "id", "name"}});
+    for (const char* tag : {"test", "mesh", "texture", "bsdf", "emitter", "camera", "medium", "phase",
+                            "volume", "integrator", "sampler", "rfilter", "denoiser"})
+      r.push_back({tag, TagKind::object, {"type"}, {"name", "id"}});
+    for (const char* tag : {"boolean", "integer", "float", "string", "point", "vector", "color"})
+      r.push_back({tag, TagKind::property, {"name", "value"}, {}});
+    r.push_back({"transform", TagKind::transform, {"name"}, {}});
+    for (const char* tag : {"translate", "scale", "matrix"}) r.push_back({tag, TagKind::step, {"value"}, {}});
+    r.push_back({"rotate", TagKind::step, {"angle", "axis"}, {}});
+    r.push_back({"lookat", TagKind::step, {"origin", "target", "up"}, {}});
+    return r;
+  }();
+  return rows;
+}
+
+const TagRow* row_of(const Element& e) {
+  for (const TagRow& row : tags())
+    if (row.tag == e.tag) return &row;
+  return nullptr;
+}
+
+// Returns a suggestion for an element that exists only in Mitsuba's format.
+std::string_view instead(std::string_view tag) {
+  static constexpr std::pair<std::string_view, std::string_view> kOthers[] = {
+      {"shape", "in Nori it is called <mesh>"},
+      {"sensor", "in Nori it is called <camera>"},
+      {"film", "in Nori width and height stand in the <camera>"},
+      {"rgb", "in Nori it is called <color>"},
+      {"spectrum", "in Nori it is called <color>"},
+      {"ref", "in Nori every object stands where it is used"},
+  };
+  for (const auto& [other, text] : kOthers)
+    if (other == tag) return text;
+  return {};
+}
+
+class NoriChecker {
+ public:
+  explicit NoriChecker(Report& report) : report_(report) {}
+
+  // The depth of recursion is bounded by kMaxNesting.
+  void check(const Element& e, const TagRow* parent) {
+    if (report_.full()) return;
+    const TagRow* row = row_of(e);
+    if (!row) return unknown_tag(e);
+    check_attributes(e, *row, report_);
+    if (parent) check_parent(e, *row, *parent);
+    if (row->kind == TagKind::step) check_step(e);
+    for (const Element& child : e.children) check(child, row);
+  }
+
+ private:
+  void unknown_tag(const Element& e) {
+    if (const auto text = instead(e.tag); !text.empty())
+      return report_.error(e.at, fmt::format("Nori has no element <{}>: {}", e.tag, text));
+    std::vector<std::string> known;
+    for (const TagRow& row : tags()) known.emplace_back(row.tag);
+    const auto near = nearest_name(e.tag, known);
+    report_.error(e.at, fmt::format("Nori has no element <{}>{}", e.tag,
+                                    near ? fmt::format("; did you mean <{}>?", *near) : ""));
+  }
+
+  void check_parent(const Element& e, const TagRow& row, const TagRow& parent) {
+    const bool step = row.kind == TagKind::step;
+    if (step != (parent.kind == TagKind::transform))
+      return report_.error(
+          e.at, step ? fmt::format("<{}> is a step of a <transform> and can only stand in one", e.tag)
+                     : fmt::format("<{}> can't stand in <{}>", e.tag, parent.tag));
+    const bool nested_scene = e.tag == "scene" && parent.tag != "test";
+    if ((parent.kind != TagKind::object && !step) || nested_scene || e.tag == "test")
+      report_.error(e.at, fmt::format("<{}> can't stand in <{}>", e.tag, parent.tag));
+  }
+
+  void check_step(const Element& e) {
+    if (e.tag == "matrix") return numbers(e, "value", 16);
+    if (e.tag == "lookat")
+      for (const char* attribute : {"origin", "target", "up"}) numbers(e, attribute, 3);
+    if (e.tag == "translate" || e.tag == "scale") numbers(e, "value", 3);
+    if (e.tag != "rotate") return;
+    numbers(e, "angle", 1);
+    numbers(e, "axis", 3);
+    const auto axis = parse_numbers(e.get("axis"), 3);
+    if (axis && std::all_of(axis->begin(), axis->end(), [](double x) { return x == 0; }))
+      report_.error(value_place(e, "axis"), "<rotate> needs an axis that is not zero");
+  }
+
+  void numbers(const Element& e, std::string_view attribute, std::size_t count) {
+    if (!e.find(attribute)) return;  // already reported
+    const auto given = parse_numbers(e.get(attribute), count);
+    if (given && given->size() == count) return;
+    report_.error(value_place(e, attribute),
+                  fmt::format("'{}' of <{}> wants {} number{}, not \"{}\"", attribute, e.tag, count,
+                              count == 1 ? "" : "s", e.get(attribute)));
+  }
+
+  Report& report_;
+};
+
+}  // namespace
+
+TagKind object_kind(const Element& e) {
+  const TagRow* row = row_of(e);
+  return row ? row->kind : TagKind::unknown;
+}
+
+bool check_objects(const Element& root, Report& report) {
+  NoriChecker(report).check(root, nullptr);
+  return !report.has_errors();
+}
+
+namespace {
+
 unsigned type_of(const Element& e) {
   static constexpr std::pair<std::string_view, unsigned> kTags[] = {
       {"float", kFloat},     {"integer", kInteger}, {"boolean", kBoolean}, {"string", kString},
@@ -48,6 +163,10 @@ std::optional<std::vector<double>> values_of(const Element& e) {
 }
 
 }  // namespace
+
+Rgb rgb_of(const std::vector<double>& v) {
+  return v.size() == 3 ? Rgb{v[0], v[1], v[2]} : Rgb{v[0], v[0], v[0]};
+}
 
 const Plugin* known_plugin(const Element& e, Report& report) {
   const std::string_view type = e.get("type");
@@ -109,22 +228,21 @@ bool Object::fits(const Parameter& p, const Element& e) {
     ok = values.has_value();
   }
   if (ok && type == kBoolean) ok = parse_boolean(e.get("value")).has_value();
-  if (!ok) {
-    report_.error(
-        e.find("value") ? value_place(e, "value") : e.at,
-        fmt::format("'{}' of {} wants {}, not {}", p.name, title(), text_of(p.types), described(e)));
-    return false;
-  }
+  if (!ok)
+    return report_.error(
+               e.find("value") ? value_place(e, "value") : e.at,
+               fmt::format("'{}' of {} wants {}, not {}", p.name, title(), text_of(p.types), described(e))),
+           false;
   return !values || in_range(p, e, *values);
 }
 
 bool Object::in_range(const Parameter& p, const Element& e, const std::vector<double>& values) {
   for (const double x : values)
-    if (!p.range.contains(x)) {
-      report_.error(value_place(e, "value"), fmt::format("'{}' of {} is {}, out of its range {}", p.name,
-                                                         title(), x, range_text(p.name, p.range)));
-      return false;
-    }
+    if (!p.range.contains(x))
+      return report_.error(value_place(e, "value"),
+                           fmt::format("'{}' of {} is {}, out of its range {}", p.name, title(), x,
+                                       range_text(p.name, p.range))),
+             false;
   return true;
 }
 
@@ -136,8 +254,7 @@ double Object::number(std::string_view parameter, double fallback) {
 Rgb Object::color(std::string_view parameter, const Rgb& fallback) {
   const Element* e = take(parameter);
   if (!e) return fallback;
-  const auto v = *values_of(*e);
-  return v.size() == 3 ? Rgb{v[0], v[1], v[2]} : Rgb{v[0], v[0], v[0]};
+  return rgb_of(*values_of(*e));
 }
 
 Vec3 Object::triple(std::string_view parameter, const Vec3& fallback) {
@@ -212,7 +329,7 @@ void Object::left_over(const Child& c) {
           fmt::format("'{}' of {} has no meaning beside its other parameters", name, title()));
     names.emplace_back(p.name);
   }
-  if (name.empty() || object_kind(*c.e) == Kind::object)
+  if (name.empty() || object_kind(*c.e) == TagKind::object)
     return report_.error(c.e->at, fmt::format("{} has no use for a <{}>{}", title(), c.e->tag,
                                               name.empty() ? "" : fmt::format(" called '{}'", name)));
   report_.error(value_place(*c.e, "name"),

@@ -1,5 +1,4 @@
-// One object of a Nori file during translation to Mitsuba. Its parameters are taken by name and checked
-// against the table of parameters; parameters that are not taken are reported.
+// Translates the objects of a Nori file to Mitsuba.
 #pragma once
 
 #include <optional>
@@ -9,13 +8,12 @@
 
 #include "common/scene/schema/nori_words.h"
 #include "common/scene/xml/document.h"
-#include "common/scene/xml/error_report.h"
-#include "common/scene/xml/make_element.h"
+#include "common/scene/xml/grammar.h"
+#include "common/scene/xml/source_text.h"
 
 namespace ls::scene::nori {
 
-enum class Kind { object, property, transform, step, unknown };
-Kind object_kind(const Element& e);
+TagKind object_kind(const Element& e);
 // Checks elements, their attributes and nesting; false if errors were reported.
 bool check_objects(const Element& root, Report& report);
 
@@ -23,6 +21,11 @@ bool check_objects(const Element& root, Report& report);
 // returns nullptr; for an unknown type the message has a suggestion.
 const Plugin* known_plugin(const Element& e, Report& report);
 
+// Returns a colour of three numbers, or a grey of one.
+Rgb rgb_of(const std::vector<double>& numbers);
+
+// One object of a Nori file. Its parameters are taken by name and checked against the table of parameters;
+// finish() reports those that are not taken.
 class Object {
  public:
   Object(const Element& e, const Plugin& plugin, Report& report);
@@ -66,5 +69,34 @@ class Object {
   Report& report_;
   std::vector<Child> children_;
 };
+
+// The functions below translate the kinds of objects. nullopt: the object cannot be translated, which has
+// been reported.
+
+// Properties of a mesh on which its nested objects may depend.
+struct Mesh {
+  bool sphere = false;
+  std::optional<Vec3> low, high;  // its bounding box, if known without reading files
+};
+
+std::optional<Element> bsdf(const Element& e, const Mesh& mesh, Report& report);
+// Translates a colour or a <texture> to a property or object called `name` of a bsdf.
+std::optional<Element> texture(const Element& given, std::string name, const Mesh& mesh, Report& report);
+
+std::optional<Element> medium(const Element& e, const Mesh& mesh, Report& report);
+
+// Translate an emitter of the scene, and an emitter of a mesh.
+std::optional<Element> emitter(const Element& e, Report& report);
+std::optional<Element> mesh_emitter(const Element& e, Report& report);
+
+// Translates a camera to a <sensor> with film and sampler; `sampler` may be nullptr.
+std::optional<Element> camera(const Element& e, const Element* sampler, Report& report);
+
+struct Integrator {
+  Element element;
+  // An option of Kombu, a descendant of Nori: the camera is in the medium of the mesh that surrounds it.
+  bool inmedium = false;
+};
+std::optional<Integrator> integrator(const Element& e, Report& report);
 
 }  // namespace ls::scene::nori

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "common/scene/nori/translators.h"
+#include "common/scene/nori/object.h"
 #include "common/scene/xml/transform_element.h"
 #include "common/scene/xml/values.h"
 
@@ -88,10 +88,11 @@ Element dielectric(Object& o) {
   return out;
 }
 
-// Nori's microfacet bsdf is kd / pi + (1 - m) D F G / (4 cos_i cos_o) with m = the largest channel of kd.
-// This is the mixture of (1 - m) times a rough reflection and m times a diffuse surface whose reflectance is
-// kd / m. F is the Fresnel term of a dielectric seen from outside, which equals that of a conductor with a
-// real index.
+// Nori's microfacet bsdf is kd / pi + (1 - m) D F G / (4 cos_i cos_o), where the colour kd is its diffuse
+// reflectance, m is the largest channel of kd, and D, F and G are the usual microfacet distribution, Fresnel
+// term and shadowing. It is translated to a blend: (1 - m) times a rough reflection, and m times a diffuse
+// surface with the reflectance kd / m. F is that of a dielectric seen from outside, which equals the Fresnel
+// term of a conductor with a real index.
 std::optional<Element> microfacet(Object& o, const Mesh& mesh, Report& report) {
   const Span at = o.element().at;
   Element gloss = bsdf_of("roughconductor", o.element());
@@ -120,16 +121,12 @@ std::optional<Element> microfacet(Object& o, const Mesh& mesh, Report& report) {
     add(blend, std::move(weight));
     add(diffuse, std::move(hue));
   } else {
-    const auto v = parse_numbers(base.get("value"), 3);
-    const Rgb color =
-        v->size() == 3 ? Rgb{(*v)[0], (*v)[1], (*v)[2]} : Rgb{v->front(), v->front(), v->front()};
+    const Rgb color = rgb_of(*parse_numbers(base.get("value"), 3));
     const double peak = *std::max_element(color.begin(), color.end());
     if (peak == 0) return gloss;
-    if (!(peak <= 1)) {
-      report.error(kd ? value_place(*kd, "value") : at,
-                   fmt::format("'kd' of {} is {}, out of its range 0 <= kd <= 1", o.title(), peak));
-      return std::nullopt;
-    }
+    if (!(peak <= 1))
+      return report.refuse(kd ? value_place(*kd, "value") : at,
+                           fmt::format("'kd' of {} is {}, out of its range 0 <= kd <= 1", o.title(), peak));
     add(blend, "weight", peak, at);
     add(diffuse, "reflectance", Rgb{color[0] / peak, color[1] / peak, color[2] / peak}, at);
   }

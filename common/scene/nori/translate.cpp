@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "common/scene/nori/translators.h"
+#include "common/scene/nori/object.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene::nori {
@@ -46,7 +46,7 @@ class SceneTranslator {
       return report_.warning(e.at,
                              "<denoiser> has no effect here: what is written is the picture as rendered");
     report_.error(e.at,
-                  object_kind(e) == Kind::object
+                  object_kind(e) == TagKind::object
                       ? fmt::format("a <{}> can't stand in <scene>", e.tag)
                       : fmt::format("<{}> stands in no object: <scene> itself has no parameters", e.tag));
   }
@@ -78,7 +78,7 @@ class SceneTranslator {
     if (m.sphere) {
       const Vec3 center = o.triple("center", {{0, 0, 0}});
       const double radius = o.number("radius", 1);
-      add(out, "point", "center", fmt::format("{} {} {}", center[0], center[1], center[2]), e.at);
+      add(out, "point", "center", center, e.at);
       add(out, "radius", radius, e.at);
       if (!to_world) {
         m.low = Vec3{{center[0] - radius, center[1] - radius, center[2] - radius}};
@@ -187,10 +187,9 @@ bool is_nori(const Element& root) {
 
 bool translate(Document& document, Report& report) {
   if (!is_nori(document.root)) return true;
-  if (document.root.tag == "test") {
-    report.error(document.root.at, "this is a test, not a scene: run it by lightshaft validate FILE");
-    return false;
-  }
+  if (document.root.tag == "test")
+    return report.error(document.root.at, "this is a test, not a scene: run it by lightshaft validate FILE"),
+           false;
   if (!check_objects(document.root, report)) return false;
   auto scene = translate_scene(document.root, report);
   if (!scene) return false;

@@ -48,10 +48,11 @@ class SettingsTranslator {
     add_size(film, p.integer("xresolution", 1280), p.integer("yresolution", 720));
     crop(film, p);
     if (const std::string sensor = p.text("sensor", "cie1931"); sensor != "cie1931")
-      t_.report.warning(p.at(),
-                        fmt::format("the sensor \"{}\" is not known here: colours are those that the CIE "
-                                    "1931 observer sees",
-                                    sensor));
+      t_.report.warning(
+          p.at(),
+          fmt::format(
+              "the sensor \"{}\" is not known here: colours are those that the CIE 1931 observer sees",
+              sensor));
     p.finish();
   }
 
@@ -122,10 +123,11 @@ class SettingsTranslator {
     if (type != "path" && type != "volpath")
       t_.report.warning(
           p.at(),
-          fmt::format("{} is read as \"volpath\", which gives the same picture by other means{}", p.title(),
-                      type == "sppm" ? ", but for its maxdepth: there it counts what the light and "
-                                       "what the camera sends each"
-                                     : ""));
+          fmt::format(
+              "{} is read as \"volpath\", which gives the same picture by other means{}", p.title(),
+              type == "sppm"
+                  ? ", but for its maxdepth: there it counts what the light and what the camera sends each"
+                  : ""));
     Element out = made("integrator", type == "path" ? "path" : "volpath", p.at());
     const int depth = p.integer("maxdepth", 5);
     if (depth < 0 || depth > 1'000'000)

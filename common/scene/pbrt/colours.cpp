@@ -12,9 +12,9 @@
 namespace ls::scene::pbrt {
 namespace {
 
-// Returns the luminance Y of a linear sRGB colour, a weighted sum of its channels. The weights w follow from
-// linear_srgb(), which converts XYZ to sRGB: w is orthogonal to the colours of (1, 0, 0) and (0, 0, 1), and
-// its product with the colour of (0, 1, 0) is 1.
+// Returns the luminance Y of a linear sRGB colour, a weighted sum of its channels. The vector w of the
+// weights follows from linear_srgb(), which converts (X, Y, Z) to sRGB: its dot product is 0 with the sRGB
+// colours of (1, 0, 0) and (0, 0, 1), and 1 with that of (0, 1, 0).
 double luminance(const Rgb& c) {
   static const Vec3 weights = [] {
     const auto column = [](const std::array<double, 3>& xyz) {
@@ -27,11 +27,6 @@ double luminance(const Rgb& c) {
     return w;
   }();
   return weights[0] * c[0] + weights[1] * c[1] + weights[2] * c[2];
-}
-
-std::optional<Rgb> wrong(Translation& t, const Param& p, std::string text) {
-  t.report.error(p.at, std::move(text));
-  return std::nullopt;
 }
 
 // Clips colours that sRGB cannot represent.
@@ -70,12 +65,11 @@ std::optional<SpectralCurve> curve_of(Translation& t, const Param& p) {
   if (!p.texts.empty()) {
     const auto text = t.assets.text(p.texts[0]);
     if (!text)
-      return wrong(t, p,
-                   fmt::format("the spectrum \"{}\" is no name that is known here, and as a file: {}",
-                               p.texts[0], text.error().message)),
-             std::nullopt;
+      return t.report.refuse(
+          p.at, fmt::format("the spectrum \"{}\" is no name that is known here, and as a file: {}",
+                            p.texts[0], text.error().message));
     const auto read = numbers_in(*text);
-    if (!read) return wrong(t, p, fmt::format("\"{}\" is no list of numbers", p.texts[0])), std::nullopt;
+    if (!read) return t.report.refuse(p.at, fmt::format("\"{}\" is no list of numbers", p.texts[0]));
     numbers = *read;
   }
   SpectralCurve curve;
@@ -85,18 +79,19 @@ std::optional<SpectralCurve> curve_of(Translation& t, const Param& p) {
     curve.value.push_back(numbers[i + 1]);
   }
   if (numbers.size() >= 4 && 2 * curve.nm.size() == numbers.size()) return curve;
-  wrong(t, p, fmt::format("'{}' wants pairs of a wavelength in nm, which increases, and a value", p.name));
-  return std::nullopt;
+  return t.report.refuse(
+      p.at, fmt::format("'{}' wants pairs of a wavelength in nm, which increases, and a value", p.name));
 }
 
 bool is_rgb(const Param& p) { return p.type == "rgb" && p.numbers.size() == 3 && p.texts.empty(); }
 
 std::optional<Rgb> black_body(Translation& t, const Param& p) {
   if (p.numbers.size() != 1 || !p.texts.empty() || !(p.numbers[0] > 0 && p.numbers[0] <= 1e6))
-    return wrong(t, p, fmt::format("'{}' wants one temperature in kelvin, at most 1e6", p.name));
+    return t.report.refuse(p.at, fmt::format("'{}' wants one temperature in kelvin, at most 1e6", p.name));
   auto xyz = black_body_xyz(p.numbers[0]);
   const double y = xyz[1];
-  if (!std::isnormal(y)) return wrong(t, p, fmt::format("a black body of {} K gives no light", p.numbers[0]));
+  if (!std::isnormal(y))
+    return t.report.refuse(p.at, fmt::format("a black body of {} K gives no light", p.numbers[0]));
   for (double& x : xyz) x /= y;
   return within_srgb(t, p, linear_srgb(xyz));
 }
@@ -106,7 +101,7 @@ std::optional<Rgb> black_body(Translation& t, const Param& p) {
 std::optional<Rgb> light_colour(Translation& t, const Param& p) {
   if (is_rgb(p)) return Rgb{p.numbers[0], p.numbers[1], p.numbers[2]};
   if (p.type == "blackbody") return black_body(t, p);
-  if (p.type != "spectrum") return wrong(t, p, fmt::format("'{}' wants three numbers", p.name));
+  if (p.type != "spectrum") return t.report.refuse(p.at, fmt::format("'{}' wants three numbers", p.name));
   if (p.texts.size() == 1 && p.texts[0] == "stdillum-D65") return Rgb{1, 1, 1};
   const auto curve = curve_of(t, p);
   if (!curve) return std::nullopt;
@@ -116,7 +111,8 @@ std::optional<Rgb> light_colour(Translation& t, const Param& p) {
 std::optional<Rgb> surface_colour(Translation& t, const Param& p) {
   if (is_rgb(p)) return Rgb{p.numbers[0], p.numbers[1], p.numbers[2]};
   if (p.type == "float" && p.numbers.size() == 1) return Rgb{p.numbers[0], p.numbers[0], p.numbers[0]};
-  if (p.type != "spectrum") return wrong(t, p, fmt::format("'{}' can't be given as {} here", p.name, p.type));
+  if (p.type != "spectrum")
+    return t.report.refuse(p.at, fmt::format("'{}' can't be given as {} here", p.name, p.type));
   const auto curve = curve_of(t, p);
   if (!curve) return std::nullopt;
   // A constant curve is a grey, even if it does not cover all wavelengths.

@@ -62,8 +62,7 @@ class Loader {
                                 kMaxTextBytes >> 20, kMaxTotalTextBytes >> 20));
     else if (bad != std::string::npos)
       report_.error({file, bad, 1},
-                    "this is no UTF-8 text: a pbrt file is text, and if its name ends in .gz "
-                    "unpack it");
+                    "this is no UTF-8 text: a pbrt file is text, and if its name ends in .gz unpack it");
     else
       return file;
     return std::nullopt;
@@ -166,41 +165,34 @@ class Loader {
   std::optional<Params> object(const Token& d) {
     const auto type = quoted(d);
     if (!type) return std::nullopt;
-    return object(d.text, *type, last_);
+    const Span at = last_;
+    auto params = parameters();
+    return params ? known(d.text, *type, at, std::move(*params)) : std::nullopt;
   }
 
-  std::optional<Params> object(std::string_view directive, const std::string& type, const Span& at) {
+  std::optional<std::vector<Param>> parameters() {
     auto params = read_params(*tokens_, report_);
-    if (!params) {
-      lost_ = true;
-      return std::nullopt;
-    }
-    return known(directive, type, at, std::move(*params));
+    lost_ = lost_ || !params;
+    return params;
   }
 
   std::optional<Params> known(std::string_view directive, const std::string& type, const Span& at,
                               std::vector<Param> params) {
     const Row* row = find_row(directive, type);
     if (row && row->is_read) return Params(*row, at, std::move(params), report_);
-    report_.error(at, row ? fmt::format("{} \"{}\" is not read: {}", directive, type, row->meaning)
-                          : fmt::format("there is no {} \"{}\"{}", directive, type,
-                                        suggestion(type, types_of(directive))));
-    return std::nullopt;
+    return report_.refuse(at, row ? fmt::format("{} \"{}\" is not read: {}", directive, type, row->meaning)
+                                  : fmt::format("there is no {} \"{}\"{}", directive, type,
+                                                suggestion(type, types_of(directive))));
   }
 
   // Reads the parameters of a named object, whose type is one of the parameters.
   std::optional<Params> named(std::string_view directive, const Span& at) {
-    auto params = read_params(*tokens_, report_);
-    if (!params) {
-      lost_ = true;
-      return std::nullopt;
-    }
+    auto params = parameters();
+    if (!params) return std::nullopt;
     const auto type =
         std::find_if(params->begin(), params->end(), [](const Param& p) { return p.name == "type"; });
-    if (type == params->end() || type->texts.size() != 1) {
-      report_.error(at, "\"string type\" is missing, which meaning what this is");
-      return std::nullopt;
-    }
+    if (type == params->end() || type->texts.size() != 1)
+      return report_.refuse(at, "\"string type\" is missing, which meaning what this is");
     const std::string name = type->texts[0];
     const Span type_at = type->at;
     params->erase(type);
@@ -242,7 +234,7 @@ class Loader {
     systems_["camera"] = world;
   }
   void accelerator(const Token& d) {
-    if (quoted(d) && !read_params(*tokens_, report_)) lost_ = true;
+    if (quoted(d)) parameters();
   }
   void color_space(const Token& d) {
     const auto name = quoted(d);
@@ -252,11 +244,8 @@ class Loader {
   }
   void option(const Token& d) {
     const Span at = d.at;
-    const auto all = read_params(*tokens_, report_);
-    if (!all) {
-      lost_ = true;
-      return;
-    }
+    const auto all = parameters();
+    if (!all) return;
     static constexpr std::string_view kIdle[] = {
         "seed", "disablewavelengthjitter", "msereferenceimage", "msereferenceout", "rendercoordsys", "quiet"};
     for (const Param& p : *all)
@@ -512,7 +501,8 @@ class Loader {
   Settings settings_;
   Attributes now_;
   std::vector<Saved> saved_;
-  // Within an imported file: number of entries of saved_ that were begun outside, which it cannot end.
+  // While an imported file is read: the number of entries of saved_ that were begun before it. The file
+  // cannot end these.
   std::size_t floor_ = 0;
   std::map<std::string, Placed> systems_;
   std::optional<Element> group_;

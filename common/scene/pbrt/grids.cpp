@@ -69,8 +69,6 @@ MadeGrid padded(const std::array<int, 3>& sides, int channels, F value, float be
   return g;
 }
 
-bool is_grey(const Rgb& c) { return c[0] == c[1] && c[1] == c[2]; }
-
 // Translates the emission of a "uniformgrid".
 class GridLight {
  public:
@@ -223,9 +221,10 @@ bool read_box(MediumSource& m, Box& box) {
 
 bool add_grid(MediumSource& m, Element& out, const char* name, const MadeGrid& grid, const Box& box,
               Filling filling) {
-  const std::string file = keep_grid(m.t, m.p.at(), grid);
-  add_volume(m, out, name, file, box, filling);
-  return !file.empty();
+  const auto file = keep_made(m.t.assets, grid);
+  if (!file) return m.wrong(m.p.at(), file.error().message);
+  add_volume(m, out, name, *file, box, filling);
+  return true;
 }
 
 void add_volume(MediumSource& m, Element& out, const char* name, const std::string& file, const Box& box,

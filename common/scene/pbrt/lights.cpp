@@ -14,8 +14,6 @@ constexpr double kPi = std::numbers::pi;
 
 Rgb times(const Rgb& c, double x) { return {c[0] * x, c[1] * x, c[2] * x}; }
 
-std::string text_of(const Vec3& v) { return fmt::format("{} {} {}", v[0], v[1], v[2]); }
-
 class LightTranslator {
  public:
   LightTranslator(Translation& t, Params& p, const Placed& ctm) : t_(t), p_(p), ctm_(ctm) {}
@@ -55,7 +53,7 @@ class LightTranslator {
   Element point() {
     Element out = made("emitter", "point", p_.at());
     const Vec3 at = transform_point(ctm_.to, p_.triple("from", Vec3{{0, 0, 0}}));
-    add(out, "point", "position", text_of(at), p_.at());
+    add(out, "point", "position", at, p_.at());
     add(out, "intensity", intensity(4 * kPi), p_.at());
     return out;
   }
@@ -63,7 +61,7 @@ class LightTranslator {
   Element spot() {
     Element out = made("emitter", "spot", p_.at());
     const Vec3 from = p_.triple("from", Vec3{{0, 0, 0}}), to = p_.triple("to", Vec3{{0, 0, 1}});
-    const Vec3 ahead{{to[0] - from[0], to[1] - from[1], to[2] - from[2]}};
+    const Vec3 ahead = minus(to, from);
     const bool is_upright =
         std::abs(ahead[2]) > std::abs(ahead[0]) && std::abs(ahead[2]) > std::abs(ahead[1]);
     if (const auto aimed = looking(from, to, is_upright ? Vec3{{0, 1, 0}} : Vec3{{0, 0, 1}}))
@@ -76,8 +74,8 @@ class LightTranslator {
                fmt::format("{} has a conedeltaangle of {}, beyond 0 to coneangle", p_.title(), edge));
     else if (edge > 0)
       t_.warn_once(p_.at(),
-                   "between coneangle - conedeltaangle and coneangle a spot falls off linearly in the "
-                   "angle here, in pbrt as a smooth step of its cosine");
+                   "between coneangle - conedeltaangle and coneangle a spot falls off linearly in the angle "
+                   "here, in pbrt as a smooth step of its cosine");
     add(out, "cutoff_angle", cutoff, p_.at());
     add(out, "beam_width", cutoff - edge, p_.at());
     const double end = std::cos(cutoff * kPi / 180), start = std::cos((cutoff - edge) * kPi / 180);
@@ -88,8 +86,8 @@ class LightTranslator {
   Element distant() {
     Element out = made("emitter", "directional", p_.at());
     const Vec3 from = p_.triple("from", Vec3{{0, 0, 0}}), to = p_.triple("to", Vec3{{0, 0, 1}});
-    const Vec3 way = transform_vector(ctm_.to, Vec3{{to[0] - from[0], to[1] - from[1], to[2] - from[2]}});
-    add(out, "vector", "direction", text_of(way), p_.at());
+    const Vec3 way = transform_vector(ctm_.to, minus(to, from));
+    add(out, "vector", "direction", way, p_.at());
     add(out, "irradiance", times(colour("L"), above_zero("illuminance", 1)), p_.at());
     return out;
   }
@@ -142,13 +140,13 @@ class LightTranslator {
     if (above_zero("illuminance", 0) > 0)
       p_.error(p_.at(), fmt::format("{} has an illuminance, which depends on its image's pixels: give scale",
                                     p_.title()));
-    // Only pbrt-v3, where the image is called mapname, multiplies it by L. With a filename (pbrt-v4) neither
-    // L nor mapname is taken, so finish() rejects them; pbrt-v4 rejects L there too.
+    // In pbrt-v3 the image is called mapname, and is multiplied by L. In pbrt-v4 it is called filename, and L
+    // is an error. So with a filename neither L nor mapname is taken here, and finish() rejects both.
     const bool is_square = p_.has("filename");
     const Rgb c = is_square ? times({1, 1, 1}, p_.number("scale", 1) * t_.exposure()) : colour("L");
     add(out, "string", "filename", p_.text(is_square ? "filename" : "mapname", ""), p_.at());
     add(out, "scale", c[0], p_.at());
-    if (c[0] != c[1] || c[1] != c[2])
+    if (!is_grey(c))
       p_.error(p_.at(), fmt::format("{} tints its image by L: do that to the image itself", p_.title()));
     if (is_square) {
       add(out, "string", "mapping", "equal_area", p_.at());
@@ -190,7 +188,7 @@ void add_light(Translation& t, Params& p, const Placed& ctm) {
 AreaLight area_light(Translation& t, Params& p) {
   const Rgb c = times(light_colour(t, p, "L"), p.number("scale", 1) * t.exposure());
   std::optional<double> power;
-  // pbrt ignores a value of 0 or less.
+  // pbrt ignores a power of 0 or less.
   if (const double given = p.has("power") ? p.number("power", 0) : 0; given > 0) power = given;
   const bool two_sided = p.boolean("twosided", false);
   p.finish();

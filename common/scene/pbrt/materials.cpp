@@ -100,8 +100,8 @@ class MaterialTranslator {
     add(out, "coat_alpha", is_smooth(coat) ? 0. : coat.first, p_.at());
     add(out, "alpha_u", is_smooth(metal) ? 0. : metal.first, p_.at());
     add(out, "alpha_v", is_smooth(metal) ? 0. : metal.second, p_.at());
-    // pbrt divides both by the index of the coat, also those that it makes of a reflectance. So does the
-    // bsdf.
+    // pbrt divides eta and k by the coat's index of refraction, also if it computes them from a reflectance.
+    // Our bsdf does the same, so they are passed on undivided.
     if (p_.has("reflectance"))
       by_reflectance(out);
     else
@@ -109,8 +109,8 @@ class MaterialTranslator {
     if (!is_smooth(coat) || !is_smooth(metal))
       t_.warn_once(
           p_.at(),
-          "a rough \"coatedconductor\" is approximated: pbrt follows light at random between coat and "
-          "metal, here a formula describes it (docs/design/coated-metal.md says how far they differ)");
+          "a rough \"coatedconductor\" is approximated: pbrt follows light at random between coat and metal, "
+          "here a formula describes it (docs/design/coated-metal.md says how far they differ)");
     return out;
   }
 
@@ -142,13 +142,15 @@ class MaterialTranslator {
       return;
     }
     if (metal != same)
-      return p_.error(p_.at(), fmt::format("{} and {} of {} are not of one metal: give both of the same, or "
-                                           "both as numbers",
-                                           eta_name, k_name, p_.title()));
+      return p_.error(
+          p_.at(),
+          fmt::format("{} and {} of {} are not of one metal: give both of the same, or both as numbers",
+                      eta_name, k_name, p_.title()));
     if (std::find(std::begin(kMetals), std::end(kMetals), metal) == std::end(kMetals))
-      return p_.error(eta->at, fmt::format("there is no metal \"{}\" in the table (Ag, Al, Au, Cu): give {} "
-                                           "and {} as rgb",
-                                           metal, eta_name, k_name));
+      return p_.error(
+          eta->at,
+          fmt::format("there is no metal \"{}\" in the table (Ag, Al, Au, Cu): give {} and {} as rgb", metal,
+                      eta_name, k_name));
     add(out, "string", "material", metal, p_.at());
   }
 
@@ -169,16 +171,12 @@ class MaterialTranslator {
     const Param* names = p_.take("materials");
     Element out = made("bsdf", "blendbsdf", p_.at());
     add_value(t_, out, p_, {"amount", "weight"}, {.5, .5, .5});
-    if (!names || names->texts.size() != 2) {
-      p_.error(p_.at(), fmt::format("{} needs 'materials', the names of two", p_.title()));
-      return std::nullopt;
-    }
+    if (!names || names->texts.size() != 2)
+      return p_.refuse(p_.at(), fmt::format("{} needs 'materials', the names of two", p_.title()));
     for (const std::string& name : names->texts) {
       const auto found = t_.materials.find(name);
-      if (found == t_.materials.end()) {
-        p_.error(names->at, fmt::format("no MakeNamedMaterial \"{}\" stands before this", name));
-        return std::nullopt;
-      }
+      if (found == t_.materials.end())
+        return p_.refuse(names->at, fmt::format("no MakeNamedMaterial \"{}\" stands before this", name));
       m.transmits |= found->second.transmits;
       m.has_texture |= found->second.has_texture;
       refer(out, "", found->second.id, names->at);
@@ -189,7 +187,7 @@ class MaterialTranslator {
   using Alpha = std::pair<double, double>;
   static bool is_smooth(const Alpha& a) { return a.first < kSmooth && a.second < kSmooth; }
 
-  // The names of the parameters begin with `layer`.
+  // `layer` is a prefix of the parameters' names, such as "interface.".
   Alpha roughness(std::string_view layer = "") {
     const auto one = [&](std::string_view what, double fallback) {
       const std::string name = fmt::format("{}{}", layer, what);
@@ -201,10 +199,9 @@ class MaterialTranslator {
       } else if (p->numbers.size() == 1 && p->numbers[0] >= 0) {
         return p->numbers[0];
       }
-      p_.error(p->at,
-               fmt::format("'{}' of {} wants one number, not an image or a negative one: pbrt takes the "
-                           "square root of a texture, so render it to one of alpha",
-                           name, p_.title()));
+      p_.error(p->at, fmt::format("'{}' of {} wants one number, not an image or a negative one: pbrt takes "
+                                  "the square root of a texture, so render it to one of alpha",
+                                  name, p_.title()));
       return fallback;
     };
     const double both = one("roughness", 0);

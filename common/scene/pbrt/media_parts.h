@@ -28,11 +28,19 @@ void add_albedo(MediumSource& m, Element& out, const Rgb& albedo);
 // Adds the factor on the density of a `heterogeneous` medium: a number, and a tint if it differs by channel.
 void add_extinction(MediumSource& m, Element& out, const Rgb& extinction);
 
+// Measured coefficients of a substance, by the name that pbrt-v4 has for it.
+struct Substance {
+  std::string_view name;
+  Rgb absorption, scattering;  // per mm; scattering is the reduced coefficient
+};
+const Substance* find_substance(std::string_view name);  // nullptr: there is none
+std::vector<std::string> substance_names();
+
 // The integral of the CIE observer's y over wavelengths in nm, as pbrt-v4 has it (CIE_Y_integral in
-// src/pbrt/util/spectrum.h). pbrt scales the spectrum of a light so that its integral with y is 1. It does
-// not scale black bodies in media and the Le of "rgbgrid" (GridMedium, NanoVDBMedium and RGBGridMedium in
-// src/pbrt/media.h). So their luminance in pbrt is kPhotometric times the luminance of the same spectrum
-// here, where a radiance of 1 at all wavelengths has luminance 1.
+// src/pbrt/util/spectrum.h). pbrt divides the spectrum of a light by this integral, but neither the spectrum
+// of a black body in a medium nor the Le of "rgbgrid" (GridMedium, NanoVDBMedium and RGBGridMedium in
+// src/pbrt/media.h). Here a radiance of 1 at all wavelengths has luminance 1. So the luminance of these two
+// in pbrt is kPhotometric times that of the same spectrum here.
 inline constexpr double kPhotometric = 106.856895;
 
 // Adds the parameters that turn the values of `temperature` into emission as in pbrt: `factor` times the
@@ -57,7 +65,7 @@ bool add_grid(MediumSource& m, Element& out, const char* name, const MadeGrid& g
 bool uniform_grid(MediumSource& m, Element& out);
 bool rgb_grid(MediumSource& m, Element& out);
 
-// cloud_medium.cpp
+// cloud.cpp
 bool cloud(MediumSource& m, Element& out);
 
 }  // namespace ls::scene::pbrt

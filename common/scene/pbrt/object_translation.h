@@ -11,7 +11,7 @@
 #include "common/scene/pbrt/cloud.h"
 #include "common/scene/pbrt/parameters.h"
 #include "common/scene/read.h"
-#include "common/scene/xml/make_element.h"
+#include "common/scene/xml/document.h"
 
 namespace ls::scene::pbrt {
 
@@ -45,7 +45,9 @@ struct Material {
   bool has_texture = false;  // an image or a pattern depends on the uv of the shape
 };
 struct AreaLight {
-  Rgb radiance;  // if `power` is given: the radiance of a shape whose shining sides have the area power / pi
+  // With `power`, the radiance of a shape is this times power / (pi A), where A is the area of its shining
+  // sides.
+  Rgb radiance;
   std::optional<double> power;
   bool two_sided = false;
   Span at;
@@ -88,12 +90,11 @@ struct Translation {
   void warn_once(const Span& at, std::string text);
 };
 
-// These functions are in colours.cpp. nullopt: the value was reported as wrong. light_colour() keeps the
-// luminance that the light has in pbrt: an rgb is relative to the white of sRGB, and all other values are
-// scaled to luminance 1.
+// In colours.cpp. nullopt: the value was reported as wrong. light_colour() gives lights the luminance that
+// they have in pbrt: an rgb is relative to the white of sRGB, all other notations are scaled to luminance 1.
 std::optional<Rgb> light_colour(Translation& t, const Param& p);
 std::optional<Rgb> surface_colour(Translation& t, const Param& p);
-// Returns white if there is no such parameter
+// Returns white if the parameter is not given.
 Rgb light_colour(Translation& t, Params& params, std::string_view name);
 
 // textures.cpp
@@ -130,14 +131,5 @@ struct Settings {
 };
 double exposure_of(Settings& s);  // returns Translation::exposure_factor
 void add_settings(Translation& t, Settings& s, const Span& file);
-
-// In made_files.cpp: files made from numbers in the scene's text. The returned name is derived from the
-// file's bytes; empty: the file could not be kept, which was reported.
-struct Mesh {
-  std::vector<double> positions, normals, uvs;  // per corner: three, three and two numbers
-  std::vector<double> indices;                  // three per triangle; integers in range
-};
-std::string keep_mesh(Translation& t, const Span& at, const Mesh& mesh);
-std::string keep_grid(Translation& t, const Span& at, const MadeGrid& grid);
 
 }  // namespace ls::scene::pbrt

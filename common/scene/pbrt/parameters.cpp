@@ -15,6 +15,70 @@
 namespace ls::scene::pbrt {
 namespace {
 
+constexpr std::string_view kBlanks = " \t\r\n";
+
+char unescaped(char c) {
+  const std::size_t i = std::string_view("bfnrt").find(c);
+  return i == std::string_view::npos ? c : "\b\f\n\r\t"[i];
+}
+
+}  // namespace
+
+const Token* Tokens::peek() {
+  if (!next_ && !broken_) next_ = scan();
+  return next_ ? &*next_ : nullptr;
+}
+
+Token Tokens::take() { return *std::exchange(next_, std::nullopt); }
+
+std::optional<Token> Tokens::scan() {
+  const std::string& text = report_.file(file_).text();
+  for (;;) {
+    at_ = text.find_first_not_of(kBlanks, at_);
+    if (at_ == std::string::npos || text[at_] != '#') break;
+    at_ = text.find_first_of("\r\n", at_);
+    if (at_ == std::string::npos) break;
+  }
+  if (at_ == std::string::npos) at_ = text.size();
+  if (at_ == text.size()) return std::nullopt;
+  if (text[at_] == '"') return quoted(text);
+  const std::size_t begin = at_;
+  if (text[at_] == '[' || text[at_] == ']') {
+    ++at_;
+    return Token{text[begin] == '[' ? Token::Kind::open : Token::Kind::close, {}, {file_, begin, 1}};
+  }
+  at_ = std::min(text.find_first_of(" \t\r\n\"[]", begin), text.size());
+  return Token{Token::Kind::word,
+               text.substr(begin, std::min(at_ - begin, kMaxValueBytes)),
+               {file_, begin, at_ - begin}};
+}
+
+std::optional<Token> Tokens::quoted(const std::string& text) {
+  const std::size_t begin = at_++;
+  Token token{Token::Kind::quoted, {}, {file_, begin + 1, 1}};
+  while (at_ < text.size() && text[at_] != '"' && text[at_] != '\n' && token.text.size() < kMaxValueBytes) {
+    if (text[at_] == '\\' && at_ + 1 < text.size())
+      token.text += unescaped(text[++at_]);
+    else
+      token.text += text[at_];
+    ++at_;
+  }
+  if (at_ >= text.size() || text[at_] != '"') {
+    broken_ = true;
+    return report_.refuse({file_, begin, 1},
+                          token.text.size() < kMaxValueBytes
+                              ? std::string("this quoted text does not end in its line: a \" is missing")
+                              : fmt::format("this quoted text is longer than {} bytes", kMaxValueBytes));
+  }
+  token.at.length = std::max<std::size_t>(1, at_ - begin - 1);
+  ++at_;
+  if (find_control(token.text) == std::string_view::npos) return token;
+  broken_ = true;
+  return report_.refuse({file_, begin, 1}, "this quoted text has control characters in it");
+}
+
+namespace {
+
 // pbrt's numbers have single precision.
 constexpr double kLargest = std::numeric_limits<float>::max();
 
@@ -50,11 +114,12 @@ class ParamReader {
     std::vector<Param> all;
     for (const Token* next = tokens_.peek(); next && next->kind == Token::Kind::quoted;
          next = tokens_.peek()) {
-      if (all.size() >= kMaxPbrtParameters) return complain(next->at, "more parameters than any object has");
+      if (all.size() >= kMaxPbrtParameters)
+        return report_.refuse(next->at, "more parameters than any object has");
       auto p = declared(tokens_.take());
       if (!p || !read_values(*p)) return std::nullopt;
       if (std::any_of(all.begin(), all.end(), [&](const Param& other) { return other.name == p->name; }))
-        return complain(p->at, fmt::format("a second '{}'", p->name));
+        return report_.refuse(p->at, fmt::format("a second '{}'", p->name));
       all.push_back(std::move(*p));
     }
     if (tokens_.broken()) return std::nullopt;
@@ -62,18 +127,13 @@ class ParamReader {
   }
 
  private:
-  std::nullopt_t complain(const Span& at, std::string text) {
-    report_.error(at, std::move(text));
-    return std::nullopt;
-  }
-
   // Parses a declaration "type name".
   std::optional<Param> declared(const Token& token) {
     const std::string& text = token.text;
     const std::size_t begin = text.find_first_not_of(" \t"), blank = text.find_first_of(" \t", begin);
     const std::size_t name = blank == std::string::npos ? blank : text.find_first_not_of(" \t", blank);
     if (name == std::string::npos)
-      return complain(token.at, "a parameter is written as \"type name\", such as \"float radius\"");
+      return report_.refuse(token.at, "a parameter is written as \"type name\", such as \"float radius\"");
     const std::size_t end = std::min(text.find_first_of(" \t", name), text.size());
     return Param{std::string(plain_type(std::string_view(text).substr(begin, blank - begin))),
                  text.substr(name, end - name),
@@ -85,17 +145,17 @@ class ParamReader {
   bool read_values(Param& p) {
     const Token* next = tokens_.peek();
     if (!next || next->kind == Token::Kind::close) {
-      if (!tokens_.broken()) complain(next ? next->at : p.at, fmt::format("'{}' has no value", p.name));
+      if (!tokens_.broken()) report_.refuse(next ? next->at : p.at, fmt::format("'{}' has no value", p.name));
       return false;
     }
     if (next->kind != Token::Kind::open) return read_value(p, tokens_.take());
     const Span open = tokens_.take().at;
     for (next = tokens_.peek(); next && next->kind != Token::Kind::close; next = tokens_.peek()) {
-      if (next->kind == Token::Kind::open) return complain(next->at, "a [ within a ["), false;
+      if (next->kind == Token::Kind::open) return report_.refuse(next->at, "a [ within a ["), false;
       if (!read_value(p, tokens_.take())) return false;
     }
     if (!next) {
-      if (!tokens_.broken()) complain(open, fmt::format("the ] of '{}' is missing", p.name));
+      if (!tokens_.broken()) report_.refuse(open, fmt::format("the ] of '{}' is missing", p.name));
       return false;
     }
     tokens_.take();
@@ -106,7 +166,8 @@ class ParamReader {
     const bool is_word = token.kind == Token::Kind::word;
     if (token.kind == Token::Kind::quoted || (is_word && (token.text == "true" || token.text == "false"))) {
       if (p.texts.size() >= kMaxPbrtTexts)
-        return complain(token.at, fmt::format("'{}' has more than {} texts", p.name, kMaxPbrtTexts)), false;
+        return report_.refuse(token.at, fmt::format("'{}' has more than {} texts", p.name, kMaxPbrtTexts)),
+               false;
       p.texts.push_back(token.text);
       return true;
     }
@@ -114,7 +175,8 @@ class ParamReader {
     if (text.starts_with('+')) text.remove_prefix(1);
     const auto x = ls::parse_number<double>(text);
     if (!x || !(std::abs(*x) <= kLargest))
-      return complain(token.at, fmt::format("'{}' is not a number; '{}' wants one", shown(text), p.name)),
+      return report_.refuse(token.at,
+                            fmt::format("'{}' is not a number; '{}' wants one", shown(text), p.name)),
              false;
     p.numbers.push_back(*x);
     return true;
@@ -127,8 +189,8 @@ class ParamReader {
   bool check_count(const Param& p) {
     const std::size_t n = stride(p.type);
     if (p.numbers.size() % n == 0) return true;
-    return complain(p.at, fmt::format("'{}' has {} numbers, which is no multiple of {}", p.name,
-                                      p.numbers.size(), n)),
+    return report_.refuse(p.at, fmt::format("'{}' has {} numbers, which is no multiple of {}", p.name,
+                                            p.numbers.size(), n)),
            false;
   }
 

@@ -1,5 +1,4 @@
-// The parameters of one pbrt object. The object's reader takes parameters by name, checked against the table
-// of vocabulary.h; finish() reports those that the table lacks.
+// Splits the text of a pbrt file into tokens, and reads the parameters of objects from them.
 #pragma once
 
 #include <optional>
@@ -7,11 +6,39 @@
 #include <string_view>
 #include <vector>
 
-#include "common/scene/pbrt/tokens.h"
 #include "common/scene/pbrt/vocabulary.h"
 #include "common/scene/scene_values.h"
+#include "common/scene/xml/source_text.h"
 
 namespace ls::scene::pbrt {
+
+struct Token {
+  enum class Kind { word, quoted, open, close };
+  Kind kind = Kind::word;
+  std::string text;  // for a quoted text: without its quotes, and with escapes decoded
+  Span at;
+};
+
+// Splits the text of a file into words, quoted texts and brackets, with their places.
+class Tokens {
+ public:
+  Tokens(std::uint32_t file, Report& report) : file_(file), report_(report) {}
+
+  // Returns the next token. Returns nullptr at the end, and also where the text is malformed, which is
+  // reported.
+  const Token* peek();
+  Token take();  // requires that peek() returned a token
+  bool broken() const { return broken_; }
+
+ private:
+  std::optional<Token> scan();
+  std::optional<Token> quoted(const std::string& text);
+  std::uint32_t file_;
+  Report& report_;
+  std::size_t at_ = 0;
+  bool broken_ = false;
+  std::optional<Token> next_;
+};
 
 struct Param {
   std::string type, name;  // for example "rgb" and "reflectance"
@@ -23,6 +50,8 @@ struct Param {
 // Reads the parameters that follow a directive. nullopt: they are wrong, which was reported.
 std::optional<std::vector<Param>> read_params(Tokens& tokens, Report& report);
 
+// The parameters of one object. The object's reader takes parameters by name, checked against the table of
+// vocabulary.h; finish() reports those that the table lacks.
 class Params {
  public:
   Params(const Row& row, const Span& at, std::vector<Param> params, Report& report);
@@ -39,6 +68,7 @@ class Params {
   std::string text(std::string_view name, std::string_view fallback);
   Vec3 triple(std::string_view name, const Vec3& fallback);
   void error(const Span& at, std::string text) { report_->error(at, std::move(text)); }
+  std::nullopt_t refuse(const Span& at, std::string text) { return report_->refuse(at, std::move(text)); }
   void missing(std::string_view name);
   void finish();
 

@@ -78,22 +78,14 @@ Placed turned(double degrees, const Vec3& axis) {
 }
 
 std::optional<Placed> looking(const Vec3& eye, const Vec3& target, const Vec3& up) {
-  const auto ahead = unit(Vec3{{target[0] - eye[0], target[1] - eye[1], target[2] - eye[2]}});
+  const auto ahead = unit(minus(target, eye));
   const auto above = unit(up);
   const auto right = ahead && above ? unit(cross(*above, *ahead)) : std::nullopt;
   if (!right) return std::nullopt;
-  const Vec3 upright = cross(*ahead, *right);
-  Placed p;  // `from` is the inverse: it places the camera in the world
-  for (std::size_t i = 0; i < 3; ++i) {
-    p.from.m[4 * i] = (*right)[i];
-    p.from.m[4 * i + 1] = upright[i];
-    p.from.m[4 * i + 2] = (*ahead)[i];
-    p.from.m[4 * i + 3] = eye[i];
-  }
-  const auto to = inverse(p.from);
-  if (!to) return std::nullopt;
-  p.to = *to;
-  return p;
+  // `from` is the inverse: it places the camera in the world.
+  const Transform from = scene::of_columns(*right, cross(*ahead, *right), *ahead, eye);
+  const auto to = inverse(from);
+  return to ? std::optional(Placed{*to, from}) : std::nullopt;
 }
 
 Unscaled without_scale(const Transform& t) {

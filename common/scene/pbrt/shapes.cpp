@@ -11,6 +11,11 @@
 namespace ls::scene::pbrt {
 namespace {
 
+struct Mesh {
+  std::vector<double> positions, normals, uvs;  // per corner: three, three and two numbers
+  std::vector<double> indices;                  // three per triangle; integers in range
+};
+
 class ShapeTranslator {
  public:
   ShapeTranslator(Translation& t, Params& p, const Attributes& a) : t_(t), p_(p), a_(a) {}
@@ -89,10 +94,9 @@ class ShapeTranslator {
       p_.missing("filename");
       return std::nullopt;
     }
-    if (file.ends_with(".gz")) {
-      p_.error(p_.at(), fmt::format("\"{}\" is packed: unpack it by gunzip, and name it without .gz", file));
-      return std::nullopt;
-    }
+    if (file.ends_with(".gz"))
+      return p_.refuse(p_.at(),
+                       fmt::format("\"{}\" is packed: unpack it by gunzip, and name it without .gz", file));
     return ply(file);
   }
 
@@ -101,11 +105,6 @@ class ShapeTranslator {
     add(out, "string", "filename", file, p_.at());
     add(out, "boolean", "flat_without_normals", "true", p_.at());
     return out;
-  }
-
-  std::optional<Element> wrong(const Span& at, std::string text) {
-    p_.error(at, std::move(text));
-    return std::nullopt;
   }
 
   // Returns the parameter `indices`, which has `each` indices per face. If it is not given and the shape has
@@ -124,10 +123,10 @@ class ShapeTranslator {
     };
     const auto bad = std::find_if(p->numbers.begin(), p->numbers.end(), is_wrong);
     if (bad != p->numbers.end())
-      return wrong(p->at, fmt::format("there is no corner {}: P has {}, counted from 0", *bad, corners)),
+      return p_.error(p->at, fmt::format("there is no corner {}: P has {}, counted from 0", *bad, corners)),
              std::vector<double>{};
     if (!p->numbers.empty() && p->numbers.size() % each == 0) return p->numbers;
-    return wrong(p->at, fmt::format("{} indices are no multiple of {}", p->numbers.size(), each)),
+    return p_.error(p->at, fmt::format("{} indices are no multiple of {}", p->numbers.size(), each)),
            std::vector<double>{};
   }
 
@@ -141,24 +140,28 @@ class ShapeTranslator {
     };
     for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
       const Vec3 a = corner(i), b = corner(i + 1), c = corner(i + 2);
-      const Vec3 normal =
-          cross(Vec3{{b[0] - a[0], b[1] - a[1], b[2] - a[2]}}, Vec3{{c[0] - a[0], c[1] - a[1], c[2] - a[2]}});
+      const Vec3 normal = cross(minus(b, a), minus(c, a));
       if (i / 3 % size == 0) areas_.push_back(0);
       areas_.back() += .5 * std::sqrt(dot(normal, normal));
     }
   }
 
   std::optional<Element> kept(const Mesh& mesh) {
-    const std::string file = keep_mesh(t_, p_.at(), mesh);
-    return file.empty() ? std::nullopt : std::optional(ply(file));
+    const auto single = [](const std::vector<double>& all) {
+      return std::vector<float>(all.begin(), all.end());
+    };
+    const auto file = keep_made(t_.assets, MadeMesh{.positions = single(mesh.positions),
+                                                    .normals = single(mesh.normals),
+                                                    .uvs = single(mesh.uvs),
+                                                    .indices = {mesh.indices.begin(), mesh.indices.end()}});
+    return file ? std::optional(ply(*file)) : p_.refuse(p_.at(), file.error().message);
   }
 
   const Param* take_corners() {  // null: there are none, which has been reported
     const Param* corners = p_.take("P");
     if (!corners) p_.missing("P");
     if (!corners || !corners->numbers.empty()) return corners;
-    wrong(corners->at, "P has no corners");
-    return nullptr;
+    return p_.error(corners->at, "P has no corners"), nullptr;
   }
 
   std::optional<Element> triangles() {
@@ -173,8 +176,8 @@ class ShapeTranslator {
       const Param* p = p_.take(name);
       if (!p) return std::nullopt;
       if (p->numbers.size() != size * n)
-        return wrong(p->at,
-                     fmt::format("'{}' has {} numbers, but P has {} corners", name, p->numbers.size(), n));
+        return p_.refuse(
+            p->at, fmt::format("'{}' has {} numbers, but P has {} corners", name, p->numbers.size(), n));
       *list = p->numbers;
     }
     has_normals_ = !mesh.normals.empty();
@@ -189,9 +192,9 @@ class ShapeTranslator {
   // bytes of text, but its corner up to 200 bytes of memory until the file is written.
   static constexpr std::size_t kMaxOwnCorners = std::size_t{1} << 22;
   std::optional<Element> too_many_corners() {
-    return wrong(p_.at(), fmt::format("{} has more than {} corners that need uv of their own: give uv, or a "
-                                      "plymesh",
-                                      p_.title(), kMaxOwnCorners));
+    return p_.refuse(
+        p_.at(), fmt::format("{} has more than {} corners that need uv of their own: give uv, or a plymesh",
+                             p_.title(), kMaxOwnCorners));
   }
 
   // Gives each triangle corners of its own, with pbrt's default uv of triangles.
@@ -226,8 +229,8 @@ class ShapeTranslator {
       const double size = std::sqrt(dot(normal, normal)) * std::sqrt(dot(side[2], side[2]));
       // The tolerance allows for corners in single precision, which are rounded to 2^-24 of their distance.
       if (std::abs(dot(normal, side[2])) > 1e-5 * size)
-        return wrong(p_.at(),
-                     fmt::format("{} is bent, and only flat patches are read: give a plymesh", p_.title()));
+        return p_.refuse(
+            p_.at(), fmt::format("{} is bent, and only flat patches are read: give a plymesh", p_.title()));
       for (const std::size_t k : {0, 1, 3, 0, 3, 2}) mesh.indices.push_back(static_cast<double>(i + k));
       for (std::size_t k = 0; k < 4; ++k) {
         const auto corner = x.begin() + 3 * static_cast<std::ptrdiff_t>(four[i + k]);
@@ -249,11 +252,12 @@ class ShapeTranslator {
     const bool has_sides =
         (a_.light && !a_.light->two_sided) || a_.inside != a_.outside || a_.material.transmits;
     if (mirrored && has_sides && (!by_corners || a_.reversed))
-      p_.error(p_.at(),
-               fmt::format("{} is mirrored by its transform, and its sides matter, as it gives light, "
-                           "bounds a medium or lets light through: leave the mirror out (and turn "
-                           "ReverseOrientation round if it is on)",
-                           p_.title()));
+      p_.error(
+          p_.at(),
+          fmt::format(
+              "{} is mirrored by its transform, and its sides matter, as it gives light, bounds a medium or "
+              "lets light through: leave the mirror out (and turn ReverseOrientation round if it is on)",
+              p_.title()));
     const bool turned_round =
         type == "sphere" ? mirrored != (determinant3(to_world_.to) < 0) : mirrored && by_corners;
     if (a_.reversed != turned_round) add(out, "boolean", "flip_normals", "true", p_.at());
@@ -271,10 +275,9 @@ class ShapeTranslator {
       refer(out, "", a_.material.id, p_.at());
     }
     if (a_.light && is_masked)
-      t_.warn_once(
-          p_.at(),
-          "a shape's alpha does not mask its light here; in pbrt it does, and with alpha 0 the shape "
-          "is unseen and gives all of its light");
+      t_.warn_once(p_.at(),
+                   "a shape's alpha does not mask its light here; in pbrt it does, and with alpha 0 the "
+                   "shape is unseen and gives all of its light");
     if (a_.light && a_.material.null)
       t_.warn_once(p_.at(), "shapes of Material \"interface\" give no light, in pbrt neither");
     if (a_.light && !a_.material.null) {
@@ -299,10 +302,9 @@ class ShapeTranslator {
     // The tolerance allows for corners in single precision, as in patches().
     if (areas_.empty() || !(*least > 0) || *most > *least * (1 + 1e-4)) {
       p_.error(light.at,
-               fmt::format("the power of this light can't be spread over {}: {}; give L, which is power / "
-                           "(pi area)",
-                           p_.title(),
-                           areas_.empty() ? "its area is in its file" : "its triangles differ in area"));
+               fmt::format(
+                   "the power of this light can't be spread over {}: {}; give L, which is power / (pi area)",
+                   p_.title(), areas_.empty() ? "its area is in its file" : "its triangles differ in area"));
       return light.radiance;
     }
     const double sides = light.two_sided ? 2 : 1, factor = *light.power / (std::numbers::pi * *most * sides);

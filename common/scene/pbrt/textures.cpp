@@ -17,9 +17,9 @@ std::optional<Texture> texture_of(Translation& t, const Param& p) {
   }
   const auto found = p.texts.size() == 1 ? t.textures.find(p.texts[0]) : t.textures.end();
   if (found != t.textures.end()) return found->second;
-  t.report.error(p.at, p.texts.size() == 1 ? fmt::format("no Texture \"{}\" stands before this", p.texts[0])
-                                           : fmt::format("'{}' wants the name of one texture", p.name));
-  return std::nullopt;
+  return t.report.refuse(p.at, p.texts.size() == 1
+                                   ? fmt::format("no Texture \"{}\" stands before this", p.texts[0])
+                                   : fmt::format("'{}' wants the name of one texture", p.name));
 }
 
 void give(Element& parent, std::string_view name, const Texture& texture, const Span& at) {
@@ -95,8 +95,7 @@ std::optional<Texture> product(Translation& t, Params& p) {
   }
   if (scale->value == Rgb{1, 1, 1}) return tex;
   if (tex->value == Rgb{1, 1, 1}) return scale;
-  p.error(p.at(), fmt::format("{} multiplies an image: do that to the image itself", p.title()));
-  return std::nullopt;
+  return p.refuse(p.at(), fmt::format("{} multiplies an image: do that to the image itself", p.title()));
 }
 
 }  // namespace

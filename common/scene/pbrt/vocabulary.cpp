@@ -313,17 +313,12 @@ void add_textures(std::vector<Row>& r) {
              {"maxanisotropy", "float", "8", "it is not filtered over pixels", kIgnored},
              {"trilinear", "bool", "false", "it is not filtered over pixels", kIgnored}} +
            mapping_words()});
-  r.push_back({"Texture",
-               "constant",
-               true,
-               "a colour or a number",
-               {{"value", "float|rgb|spectrum", "1", "the value"}}});
-  r.push_back(
-      {"Texture",
-       "scale",
-       true,
-       "a product, of which one factor at most is a texture, and the others make 1 with it",
-       {{"tex", "float|rgb|spectrum|texture", "1", "what is scaled"}, {"scale", kNumber, "1", "factor"}}});
+  r.push_back({"Texture", "constant", true, "a colour or a number",
+               Words{{"value", "float|rgb|spectrum", "1", "the value"}}});
+  r.push_back({"Texture", "scale", true,
+               "a product, of which one factor at most is a texture, and the others make 1 with it",
+               Words{{"tex", "float|rgb|spectrum|texture", "1", "what is scaled"},
+                     {"scale", kNumber, "1", "factor"}}});
   r.push_back({"Texture", "checkerboard", true, "a `checkerboard`",
                Words{{"tex1", "float|rgb|spectrum|texture", "1", "first colour"},
                      {"tex2", "float|rgb|spectrum|texture", "0", "second colour"},
@@ -351,8 +346,8 @@ void add_lights(std::vector<Row>& r) {
                                 {"illuminance", "float", "", "in place of the colour's brightness"}}});
   r.push_back(
       {"LightSource", "infinite", true,
-       "a `constant`, or an `envmap` of an image: of a filename with the mapping `equal_area`, of a "
-       "mapname in latitude-longitude form",
+       "a `constant`, or an `envmap` of an image: of a filename with the mapping `equal_area`, of a mapname "
+       "in latitude-longitude form",
        light_words("L") +
            Words{{"illuminance", "float", "", "in place of the colour's brightness; refused with an image"},
                  {"filename", "string", "", "a square equal-area image, +z in its centre; without L"},
@@ -376,27 +371,24 @@ void add_lights(std::vector<Row>& r) {
     r.push_back(
         {"AreaLightSource", type, true, "an `area` in each shape that follows",
          light_words("L") +
-             Words{{"twosided", "bool", "false", "`two_sided`: the back shines, too"},
-                   {"power", "float", "",
-                    "luminous power of each sphere, disk, cylinder, patch or triangle: L is multiplied by "
-                    "power / "
-                    "(pi area), half of that if it is twosided. Of a quadric the area is that without its "
-                    "transform, as in pbrt; triangles of "
-                    "different areas, and plymesh, are refused"},
-                   {"filename", "string", "", "a light's image is not read", kRefused},
-                   {"samples", "integer", "", kSampling, kIgnored},
-                   {"nsamples", "integer", "", kSampling, kIgnored}}});
+             Words{
+                 {"twosided", "bool", "false", "`two_sided`: the back shines, too"},
+                 {"power", "float", "",
+                  "luminous power of each sphere, disk, cylinder, patch or triangle: L is multiplied by "
+                  "power / (pi area), half of that if it is twosided. Of a quadric the area is that without "
+                  "its transform, as in pbrt; triangles of different areas, and plymesh, are refused"},
+                 {"filename", "string", "", "a light's image is not read", kRefused},
+                 {"samples", "integer", "", kSampling, kIgnored},
+                 {"nsamples", "integer", "", kSampling, kIgnored}}});
 }
 
 void add_media(std::vector<Row>& r) {
-  r.push_back(
-      {"MakeNamedMedium", "homogeneous", true, "a `homogeneous` medium",
-       medium_words() +
-           Words{{"Le", kColour, "0", "light given off: sigma_a times this"},
-                 {"Lescale", "float", "1", "factor on Le"},
-                 {"preset", "string", "",
-                  "a substance by name in place of sigma_a and sigma_s, which are then per mm: `scale` is "
-                  "the length of a scene unit in mm"}}});
+  r.push_back({"MakeNamedMedium", "homogeneous", true, "a `homogeneous` medium",
+               medium_words() + Words{{"Le", kColour, "0", "light given off: sigma_a times this"},
+                                      {"Lescale", "float", "1", "factor on Le"},
+                                      {"preset", "string", "",
+                                       "a substance by name in place of sigma_a and sigma_s, which are then "
+                                       "per mm: `scale` is the length of a scene unit in mm"}}});
   r.push_back({"MakeNamedMedium", "uniformgrid", true,
                "a `heterogeneous` medium; its grids are each a `.vol` that is written of its numbers",
                medium_words() + box_words() +
@@ -408,16 +400,15 @@ void add_media(std::vector<Row>& r) {
                           "in its corners, as pbrt has it"},
                          {"temperature", "float", "", "in place of Le: black bodies, a value a voxel"}} +
                    temperature_words()});
-  r.push_back(
-      {"MakeNamedMedium", "rgbgrid", true, "likewise, with a colour a voxel",
-       box_words() + Words{{"sigma_a", "rgb", "", "absorption; 1 if it is not given"},
-                           {"sigma_s", "rgb", "", "scattering; 1 if it is not given"},
-                           {"scale", "float", "1", "factor on both"},
-                           {"g", "float", "0", "mean cosine of Henyey-Greenstein"},
-                           {"Le", "rgb", "",
-                            "light given off: sigma_a times 106.857 times this, as pbrt does not scale it to "
-                            "the white's luminance; it needs sigma_a"},
-                           {"Lescale", "float", "1", "factor on Le"}}});
+  r.push_back({"MakeNamedMedium", "rgbgrid", true, "likewise, with a colour a voxel",
+               box_words() + Words{{"sigma_a", "rgb", "", "absorption; 1 if it is not given"},
+                                   {"sigma_s", "rgb", "", "scattering; 1 if it is not given"},
+                                   {"scale", "float", "1", "factor on both"},
+                                   {"g", "float", "0", "mean cosine of Henyey-Greenstein"},
+                                   {"Le", "rgb", "",
+                                    "light given off: sigma_a times 106.857 times this, as pbrt does not "
+                                    "scale it to the white's luminance; it needs sigma_a"},
+                                   {"Lescale", "float", "1", "factor on Le"}}});
   r.push_back({"MakeNamedMedium", "nanovdb", true, "a `heterogeneous` medium of that file",
                medium_words() +
                    Words{{"filename", "string", "needed", "a NanoVDB file"},

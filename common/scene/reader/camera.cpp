@@ -23,11 +23,10 @@ void Reader::read_sensor(const Element& e) {
   Sensor& s = scene_.sensor;
   read_projection(e, p, s);
   read_sensor_medium(p, s);
-  const auto films = p.take_nested("film"), samplers = p.take_nested("sampler");
-  if (films.size() > 1) report_.error(films[1].use->at, "this sensor has a second film");
-  if (samplers.size() > 1) report_.error(samplers[1].use->at, "this sensor has a second sampler");
-  if (!films.empty()) read_film(*films[0].object);
-  if (!samplers.empty()) read_sampler(*samplers[0].object);
+  const auto film = p.take_only("film", "this sensor", "film");
+  const auto sampler = p.take_only("sampler", "this sensor", "sampler");
+  if (film) read_film(*film->object);
+  if (sampler) read_sampler(*sampler->object);
   p.finish();
 }
 
@@ -57,10 +56,9 @@ void Reader::read_projection(const Element& e, Params& p, Sensor& s) {
       report_.error(e.at,
                     "to_world flattens this camera or leaves the range of numbers: it can't be inverted");
   } else if (!is_rigid(s.to_world)) {
-    report_.error(
-        e.at,
-        "to_world of a sensor may only move, turn and mirror: this one scales or shears, which Mitsuba 3 "
-        "refuses, too; leave its <scale> out");
+    report_.error(e.at,
+                  "to_world of a sensor may only move, turn and mirror: this one scales or shears, which "
+                  "Mitsuba 3 refuses, too; leave its <scale> out");
   }
 }
 
@@ -99,8 +97,7 @@ void Reader::read_fov(Params& p, Sensor& s) {
   if (const Element* axis = p.take("fov_axis"))
     report_.warning(
         value_place(*axis, "name"),
-        fmt::format("'fov_axis' of {} has no effect here: it says what fov measures, and there is no "
-                    "fov",
+        fmt::format("'fov_axis' of {} has no effect here: it says what fov measures, and there is no fov",
                     p.title()));
 }
 
@@ -111,19 +108,17 @@ void Reader::read_film(const Element& e) {
   FilmSettings& film = scene_.film;
   if (e.get("type") == "mfilm") film = {{1, 1}, BoxFilter{}};  // the defaults of Mitsuba 0.x
   if (e.get("type") != "hdrfilm")
-    report_.warning(value_place(e, "type"),
-                    fmt::format("{} gives the size of the frame and its filter: what is written are linear "
-                                "colours, as of \"hdrfilm\"",
-                                p.title()));
+    report_.warning(value_place(e, "type"), fmt::format("{} gives the size of the frame and its filter: what "
+                                                        "is written are linear colours, as of \"hdrfilm\"",
+                                                        p.title()));
   const bool has_width = p.has("crop_width"), has_height = p.has("crop_height");
   bind(p, film);
   check_crop(e, p, has_width, has_height);
   if (std::int64_t{film.size.width} * film.size.height > kMaxFramePixels)
     report_.error(e.at, fmt::format("a frame of {} x {} is larger than {} pixels", film.size.width,
                                     film.size.height, kMaxFramePixels));
-  const auto filters = p.take_nested("rfilter");
-  if (filters.size() > 1) report_.error(filters[1].use->at, "this film has a second filter");
-  if (!filters.empty()) film.filter = read_filter(*filters[0].object);
+  if (const auto filter = p.take_only("rfilter", "this film", "filter"))
+    film.filter = read_filter(*filter->object);
   p.finish();
 }
 
@@ -138,11 +133,10 @@ void Reader::check_crop(const Element& e, Params& p, bool has_width, bool has_he
   };
   if (outside(f.crop_offset[0], f.crop_size.width, f.size.width) ||
       outside(f.crop_offset[1], f.crop_size.height, f.size.height))
-    report_.error(e.at,
-                  fmt::format("the crop of {} at ({}, {}) with {} x {} pixels is not within its frame of "
-                              "{} x {}: give crop_width and crop_height so that it is",
-                              p.title(), f.crop_offset[0], f.crop_offset[1], f.crop_size.width,
-                              f.crop_size.height, f.size.width, f.size.height));
+    report_.error(e.at, fmt::format("the crop of {} at ({}, {}) with {} x {} pixels is not within its frame "
+                                    "of {} x {}: give crop_width and crop_height so that it is",
+                                    p.title(), f.crop_offset[0], f.crop_offset[1], f.crop_size.width,
+                                    f.crop_size.height, f.size.width, f.size.height));
   if (f.crop_size == f.size) f.crop_size = {0, 0};
 }
 
@@ -170,8 +164,7 @@ void Reader::read_sampler(const Element& e) {
         value_place(e, "type"),
         fmt::format("of {} only the number of samples is used: which they are is this program's own matter",
                     p.title()));
-  if (const Element* count = p.take("sample_count"))
-    p.convert({.name = "sample_count", .doc = "", .range = {1, kMaxSpp}}, *count, scene_.sample_count);
+  p.read({.name = "sample_count", .doc = "", .range = {1, kMaxSpp}}, scene_.sample_count);
   p.finish();
 }
 
@@ -220,9 +213,9 @@ void Reader::read_integrator(const Element& e, int depth) {
   const IntegratorRow* row = integrator_row(type);
   if (!row) return unknown_plugin(e, report_);
   if (row->other_method)
-    report_.warning(value_place(e, "type"), fmt::format("{} is read as \"{}\", which gives the same picture "
-                                                        "by other means",
-                                                        p.title(), row->ours));
+    report_.warning(value_place(e, "type"),
+                    fmt::format("{} is read as \"{}\", which gives the same picture by other means",
+                                p.title(), row->ours));
   i.name = row->ours;
   OthersParameters others{p, report_, i.name};
   describe(others, i);

@@ -111,8 +111,7 @@ void Reader::read_emitter_as<GoniometricEmitter>(const Element& e) {
   p.finish();
   if (!invertible(emitter.to_world) || !is_similarity(emitter.to_world))
     report_.error(e.at,
-                  "to_world of a goniometric light may move, turn and mirror it, not stretch or "
-                  "flatten it");
+                  "to_world of a goniometric light may move, turn and mirror it, not stretch or flatten it");
   scene_.emitters.emplace_back(emitter);
 }
 

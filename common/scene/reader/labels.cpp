@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "common/base/suggest.h"
-#include "common/scene/reader/aov_names.h"
 #include "common/scene/reader/reader.h"
+#include "common/scene/schema/integrators.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene {

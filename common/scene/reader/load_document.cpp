@@ -148,17 +148,15 @@ class Loader {
     root = std::move(*tree);
     const Attribute* version = root.find("version");
     if (nori::is_nori(root)) return expand(root, false);
-    if (!version) {
-      report_.error(root.at, fmt::format("<{}> has no version: a Mitsuba file begins with <scene "
-                                         "version=\"3.0.0\">, a Nori file has a <camera>",
-                                         root.tag));
-      return false;
-    }
-    if (version->value.empty() || !std::isdigit(static_cast<unsigned char>(version->value[0]))) {
-      report_.error(version->value_at,
-                    fmt::format("'{}' is not a version; write version=\"3.0.0\"", version->value));
-      return false;
-    }
+    if (!version)
+      return report_.error(root.at, fmt::format("<{}> has no version: a Mitsuba file begins with <scene "
+                                                "version=\"3.0.0\">, a Nori file has a <camera>",
+                                                root.tag)),
+             false;
+    if (version->value.empty() || !std::isdigit(static_cast<unsigned char>(version->value[0])))
+      return report_.error(version->value_at,
+                           fmt::format("'{}' is not a version; write version=\"3.0.0\"", version->value)),
+             false;
     return expand(root, is_old_version(version->value));
   }
   void warn_of_unused_defines(const Element& root) const { parameters_.warn_of_unused(root.at); }
@@ -198,10 +196,8 @@ class Loader {
     }
     if (child.tag == "path") {
       if (!check_attributes(child, {"value"})) return false;
-      if (search_paths.size() >= kMaxSearchPaths) {
-        report_.error(child.at, fmt::format("more than {} <path> elements", kMaxSearchPaths));
-        return false;
-      }
+      if (search_paths.size() >= kMaxSearchPaths)
+        return report_.error(child.at, fmt::format("more than {} <path> elements", kMaxSearchPaths)), false;
       search_paths.insert(search_paths.begin(), join_path("", child.get("value")));
       return true;
     }
@@ -211,10 +207,8 @@ class Loader {
 
   bool check_attributes(const Element& e, std::initializer_list<std::string_view> names) {
     for (const std::string_view name : names)
-      if (!e.find(name)) {
-        report_.error(e.at, fmt::format("<{}> needs the attribute '{}'", e.tag, name));
-        return false;
-      }
+      if (!e.find(name))
+        return report_.error(e.at, fmt::format("<{}> needs the attribute '{}'", e.tag, name)), false;
     for (const Attribute& a : e.attributes)
       if (std::find(names.begin(), names.end(), a.name) == names.end()) {
         const std::vector<std::string> known(names.begin(), names.end());
@@ -231,20 +225,14 @@ class Loader {
     if (!check_attributes(e, {"filename"})) return false;
     const Span at = e.find("filename")->value_at;
     const std::string name = frame_ ? numbered(e.get("filename"), *frame_) : std::string(e.get("filename"));
-    if (static_cast<int>(including_.size()) >= kMaxIncludeDepth || ++includes_ > kMaxIncludes) {
-      report_.error(at, fmt::format("includes are limited to {} within each other and {} altogether",
-                                    kMaxIncludeDepth, kMaxIncludes));
-      return false;
-    }
+    if (static_cast<int>(including_.size()) >= kMaxIncludeDepth || ++includes_ > kMaxIncludes)
+      return report_.error(at, fmt::format("includes are limited to {} within each other and {} altogether",
+                                           kMaxIncludeDepth, kMaxIncludes)),
+             false;
     auto found = find_included(name);
-    if (!found) {
-      report_.error(at, found.error().message);
-      return false;
-    }
-    if (std::find(including_.begin(), including_.end(), found->name) != including_.end()) {
-      report_.error(at, fmt::format("\"{}\" includes itself", name));
-      return false;
-    }
+    if (!found) return report_.error(at, found.error().message), false;
+    if (std::find(including_.begin(), including_.end(), found->name) != including_.end())
+      return report_.error(at, fmt::format("\"{}\" includes itself", name)), false;
     including_.push_back(found->name);
     Element root;
     const bool ok = load(std::move(found->name), std::move(found->text), &at, root);

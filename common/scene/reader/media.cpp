@@ -27,12 +27,8 @@ void read_old_coefficients(Params& p, HomogeneousMedium& medium, Report& report)
   if (!apart) return need_both(p, "sigma_t", "albedo", report);
   need_both(p, "sigma_a", "sigma_s", report);
   Rgb absorption{}, scattering{};
-  const auto read = [&](std::string_view name, Rgb& value) {
-    if (const Element* e = p.take(name))
-      p.convert({.name = name, .doc = "", .range = kNonNegative, .constvolume = true}, *e, value);
-  };
-  read("sigma_a", absorption);
-  read("sigma_s", scattering);
+  p.read({.name = "sigma_a", .doc = "", .range = kNonNegative, .constvolume = true}, absorption);
+  p.read({.name = "sigma_s", .doc = "", .range = kNonNegative, .constvolume = true}, scattering);
   for (std::size_t i = 0; i < 3; ++i) {
     medium.sigma_t[i] = absorption[i] + scattering[i];
     medium.albedo[i] = medium.sigma_t[i] > 0 ? scattering[i] / medium.sigma_t[i] : 0;
@@ -49,8 +45,8 @@ void need_inverse(const Transform& to_world, const Element& e, Report& report) {
     report.error(e.at, "to_world flattens this volume or leaves the range of numbers: it can't be inverted");
 }
 
-// Records which of the parameters are given that have an effect only together with another one. Construct it
-// before parameters are taken.
+// Parameters that have no effect without another one: `light` needs an emission, `heat` and `of_heat` need a
+// temperature. Records which are given, and so must be constructed before parameters are taken.
 struct Factors {
   explicit Factors(const Params& p)
       : light(p.has("emission_scale")), heat(p.has("temperature_scale") || p.has("temperature_offset")) {
@@ -120,20 +116,16 @@ std::optional<VolumeIndex> Reader::read_volume(const Element& e) {
 }
 
 std::optional<PhaseIndex> Reader::read_phase(const Element& e) {
-  const std::string_view type = e.get("type");
   Params p(*this, e);
-  if (type == "isotropic") {
-    scene_.phases.emplace_back(IsotropicPhase{});
-  } else if (type == "hg") {
-    HgPhase hg;
-    bind(p, hg);
-    scene_.phases.emplace_back(hg);
-  } else {
-    unknown_plugin(e, report_);
-    return std::nullopt;
-  }
-  p.finish();
-  return PhaseIndex{static_cast<std::uint32_t>(scene_.phases.size() - 1)};
+  std::optional<PhaseIndex> read;
+  const auto read_as = [&]<class Kind>() {
+    Kind phase;
+    bind(p, phase);
+    p.finish();
+    read = added<PhaseIndex>(phase);
+  };
+  if (!with_kind_named<Phase>(e.get("type"), read_as)) unknown_plugin(e, report_);
+  return read;
 }
 
 std::optional<MediumIndex> Reader::read_medium(const Element& e) {
@@ -152,23 +144,18 @@ std::optional<MediumIndex> Reader::read_medium_as(const Element& e) {
   bind(p, medium);
   check_medium(p, given, medium, report_);
   if constexpr (std::is_same_v<T, HeterogeneousMedium>)
-    if (const Rgb* t = medium.temperature ? constant(*medium.temperature) : nullptr;
-        t && ((*t)[0] != (*t)[1] || (*t)[1] != (*t)[2]))
+    if (const Rgb* t = medium.temperature ? constant(*medium.temperature) : nullptr; t && !is_grey(*t))
       report_.error(e.at, fmt::format("'temperature' of {} is one number, not a colour", p.title()));
-  const auto phases = p.take_nested("phase");
-  if (phases.size() > 1)
-    report_.error(phases[1].use->at, fmt::format("{} has a second phase function", p.title()));
+  const auto given_phase = p.take_only("phase", p.title(), "phase function");
   p.finish();
-  if (phases.empty()) {
-    scene_.phases.emplace_back(IsotropicPhase{});
-    medium.phase = {static_cast<std::uint32_t>(scene_.phases.size() - 1)};
-  } else if (const auto index = phase(*phases[0].object, *phases[0].use)) {
+  if (!given_phase)
+    medium.phase = added<PhaseIndex>(IsotropicPhase{});
+  else if (const auto index = phase(*given_phase->object, *given_phase->use))
     medium.phase = *index;
-  }
-  scene_.media.emplace_back(medium);
+  const auto index = added<MediumIndex>(medium);
   if constexpr (std::is_same_v<T, HeterogeneousMedium>)
     if (e.old && !report_.has_errors()) unbound_constant_density(e);
-  return MediumIndex{static_cast<std::uint32_t>(scene_.media.size() - 1)};
+  return index;
 }
 
 // In Mitsuba 0.x a constant density fills all of space, not only the unit cube. So a medium with such a

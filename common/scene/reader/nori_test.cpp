@@ -17,14 +17,12 @@ namespace {
 constexpr std::size_t kMaxTested = 1000;  // largest number of scenes or bsdfs, and of numbers in a list
 constexpr double kMaxSamples = 1e9;
 
+const nori::Parameter kSignificanceLevel{
+    "significanceLevel", nori::kFloat, "0.01", "", {.min = 0, .max = 1, .open_min = true, .open_max = true}};
 const nori::Plugin kTTest{"test",
                           "ttest",
                           "",
-                          {{"significanceLevel",
-                            nori::kFloat,
-                            "0.01",
-                            "",
-                            {.min = 0, .max = 1, .open_min = true, .open_max = true}},
+                          {kSignificanceLevel,
                            {"sampleCount", nori::kInteger, "100000", "", {.min = 2, .max = kMaxSamples}},
                            {"references", nori::kString, "", ""},
                            {"angles", nori::kString, "", ""}}};
@@ -32,11 +30,7 @@ const nori::Plugin kChi2Test{
     "test",
     "chi2test",
     "",
-    {{"significanceLevel",
-      nori::kFloat,
-      "0.01",
-      "",
-      {.min = 0, .max = 1, .open_min = true, .open_max = true}},
+    {kSignificanceLevel,
      {"sampleCount", nori::kInteger, "", "", {.min = -1, .max = kMaxSamples}},
      {"resolution", nori::kInteger, "10", "", {.min = 1, .max = 1000}},
      {"minExpFrequency", nori::kFloat | nori::kInteger, "5", "", {.min = 0, .max = kMaxSamples}},
@@ -53,9 +47,9 @@ class TestReader {
     const bool chi2 = root.get("type") == "chi2test";
     if (!chi2 && root.get("type") != "ttest") {
       const std::vector<std::string> known{"ttest", "chi2test"};
-      report_.error(value_place(root, "type"), fmt::format("Nori has no test \"{}\"{}", root.get("type"),
-                                                           suggestion(root.get("type"), known)));
-      return std::nullopt;
+      return report_.refuse(
+          value_place(root, "type"),
+          fmt::format("Nori has no test \"{}\"{}", root.get("type"), suggestion(root.get("type"), known)));
     }
     test_.kind = chi2 ? NoriTestKind::chi2_test : NoriTestKind::t_test;
     nori::Object o(root, chi2 ? kChi2Test : kTTest, report_);

@@ -13,7 +13,6 @@
 #include "common/scene/xml/values.h"
 
 namespace ls::scene {
-namespace {}  // namespace
 
 Params::Params(Reader& reader, const Element& object) : reader_(reader), object_(object) {
   std::map<std::string_view, const Element*> names;
@@ -61,6 +60,13 @@ std::vector<Params::Nested> Params::take_nested(std::string_view tag, Names name
       out.push_back({c.object, c.element});
     }
   return out;
+}
+
+std::optional<Params::Nested> Params::take_only(std::string_view tag, std::string_view owner,
+                                                std::string_view kind) {
+  const auto all = take_nested(tag);
+  if (all.size() > 1) reader_.report().error(all[1].use->at, fmt::format("{} has a second {}", owner, kind));
+  return all.empty() ? std::nullopt : std::optional(all[0]);
 }
 
 void Params::finish() {
@@ -131,14 +137,6 @@ std::optional<std::string> Params::take_string(std::string_view name) {
   return e ? string_value(name, *e) : std::nullopt;
 }
 
-std::optional<double> Params::take_number(std::string_view name) {
-  const Element* e = take(name);
-  if (!e) return std::nullopt;
-  double value = std::nan("");
-  convert({.name = name, .doc = ""}, *e, value);
-  return std::isnan(value) ? std::nullopt : std::optional(value);
-}
-
 std::optional<Transform> Params::take_transform(std::string_view name) {
   const Element* e = take(name);
   if (!e) return std::nullopt;
@@ -202,11 +200,9 @@ void Params::convert(const Field& f, const Element& e, Rgb& value) {
   if (!index) return;
   const Rgb* constant = reader_.constant(*index);
   if (!constant)
-    return reader_.report().error(
-        e.at,
-        fmt::format("'{}' of {} is the same everywhere: only a constvolume will do; a grid belongs into a "
-                    "medium \"heterogeneous\"",
-                    f.name, title()));
+    return reader_.report().error(e.at, fmt::format("'{}' of {} is the same everywhere: only a constvolume "
+                                                    "will do; a grid belongs into a medium \"heterogeneous\"",
+                                                    f.name, title()));
   if (in_range(f, e, *constant)) value = *constant;
 }
 
@@ -250,10 +246,6 @@ void Params::convert(const Field& f, const Element& e, TextureIndex& value) {
   }
 }
 
-void Params::convert(const Field& f, const Element& e, std::optional<TextureIndex>& value) {
-  convert(f, e, value.emplace());
-}
-
 void Params::convert(const Field& f, const Element& e, VolumeIndex& value) {
   const Element* object = object_at(e);
   if (object && object->tag == "volume") {
@@ -267,10 +259,6 @@ void Params::convert(const Field& f, const Element& e, VolumeIndex& value) {
   } else if (const auto c = colour(f, e, "a colour or a <volume>")) {
     value = reader_.add_constant_volume(*c);
   }
-}
-
-void Params::convert(const Field& f, const Element& e, std::optional<VolumeIndex>& value) {
-  convert(f, e, value.emplace());
 }
 
 void Params::absent(const Field& f, TextureIndex& value) { value = reader_.add_constant_texture(f.fallback); }

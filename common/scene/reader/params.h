@@ -33,16 +33,27 @@ class Params {
   };
   enum class Names { any, none };  // which nested objects: all, or only those without a name
   std::vector<Nested> take_nested(std::string_view tag, Names names = Names::any);
+  // Returns the only nested object with this tag; nullopt if there is none. A second one is reported as
+  // "{owner} has a second {kind}".
+  std::optional<Nested> take_only(std::string_view tag, std::string_view owner, std::string_view kind);
   // Reports the parameters that no reader took.
   void finish();
 
   // Each returns the value of a parameter that is not an object. nullopt: the parameter is absent, or its
   // type is wrong, which is reported.
   std::optional<std::string> take_string(std::string_view name);
-  std::optional<double> take_number(std::string_view name);
   std::optional<Transform> take_transform(std::string_view name);
 
-  // Used by Binder. Each reads `value` from `e`, in the notation of the value's type, and reports errors.
+  // Reads the parameter into `value`. If it is not given, uses the field's fallback or, if it is required,
+  // reports this.
+  template <class T>
+  void read(const Field& f, T& value) {
+    if (const Element* e = take(f.name))
+      convert(f, *e, value);
+    else
+      absent(f, value);
+  }
+  // Each reads `value` from `e`, in the notation of the value's type, and reports errors.
   void convert(const Field& f, const Element& e, double& value);
   void convert(const Field& f, const Element& e, int& value);
   void convert(const Field& f, const Element& e, bool& value);
@@ -54,9 +65,13 @@ class Params {
   void convert(const Field& f, const Element& e, UvTransform& value);
   void convert(const Field& f, const Element& e, AssetIndex& value);
   void convert(const Field& f, const Element& e, TextureIndex& value);
-  void convert(const Field& f, const Element& e, std::optional<TextureIndex>& value);
   void convert(const Field& f, const Element& e, VolumeIndex& value);
-  void convert(const Field& f, const Element& e, std::optional<VolumeIndex>& value);
+  template <class Tag>
+  requires(std::is_same_v<Tag, TextureTag> ||
+           std::is_same_v<Tag, VolumeTag>) void convert(const Field& f, const Element& e,
+                                                        std::optional<Index<Tag>>& value) {
+    convert(f, e, value.emplace());
+  }
   template <class E>
   requires std::is_enum_v<E>
   void convert(const Field& f, const Element& e, E& value) {
@@ -116,12 +131,7 @@ class Binder {
   template <class T>
   void field(const Field& f, T& value) {
     if (f.derived) return;
-    if constexpr (requires(Params & p, const Element& e) { p.convert(f, e, value); }) {
-      if (const Element* e = params_.take(f.name))
-        params_.convert(f, *e, value);
-      else
-        params_.absent(f, value);
-    }
+    if constexpr (requires(Params & p, const Element& e) { p.convert(f, e, value); }) params_.read(f, value);
   }
 
  private:

@@ -49,21 +49,19 @@ Scene Reader::read() {
 // the camera's medium is the sensor's `medium` alone.
 void Reader::warn_of_media_around_camera() {
   if (!sensor_ || scene_.sensor.medium || report_.has_errors()) return;
-  const auto& m = scene_.sensor.to_world.m;
-  const Vec3 camera{m[3], m[7], m[11]};
+  const Vec3 camera = origin_of(scene_.sensor.to_world);
   for (std::size_t i = 0; i < scene_.shapes.size() && i < shape_elements_.size(); ++i) {
     const Shape& s = scene_.shapes[i];
     if (!s.interior || s.group || !invertible(s.to_world) || !holds(s, camera)) continue;
     std::string id = "...";
     for (const auto& [element, index] : media_)
       if (index == s.interior && element->find("id")) id = element->get("id");
-    return report_.warning(
-        sensor_->at,
-        fmt::format(
-            "the camera is inside of a {} that holds a medium ({}), but its sensor names none, so that "
-            "it sees none up to the first boundary, as in Mitsuba: add <ref name=\"medium\" "
-            "id=\"{}\"/> to the sensor",
-            shape_elements_[i]->get("type"), report_.refer_to(shape_elements_[i]->at, sensor_->at), id));
+    return report_.warning(sensor_->at,
+                           fmt::format("the camera is inside of a {} that holds a medium ({}), but its "
+                                       "sensor names none, so that it sees none up to the first boundary, as "
+                                       "in Mitsuba: add <ref name=\"medium\" id=\"{}\"/> to the sensor",
+                                       shape_elements_[i]->get("type"),
+                                       report_.refer_to(shape_elements_[i]->at, sensor_->at), id));
   }
 }
 
@@ -131,21 +129,15 @@ template <class I, class F>
 std::optional<I> Reader::once(Memo<I>& memo, std::string_view kind, const Element& object, const Element& use,
                               F read) {
   if (report_.full()) return std::nullopt;
-  if (object.tag != kind && !(kind == "texture" && object.tag == "spectrum")) {
-    report_.error(use.at, fmt::format("a {} is wanted here, not a {}", kind, object.tag));
-    return std::nullopt;
-  }
+  if (object.tag != kind && !(kind == "texture" && object.tag == "spectrum"))
+    return report_.refuse(use.at, fmt::format("a {} is wanted here, not a {}", kind, object.tag));
   if (const auto it = memo.find(&object); it != memo.end()) return it->second;
-  if (in_progress_.contains(&object)) {
-    report_.error(
+  if (in_progress_.contains(&object))
+    return report_.refuse(
         use.at, fmt::format("this {} contains itself: it is referred to from within (it begins in {})", kind,
                             report_.refer_to(object.at, use.at)));
-    return std::nullopt;
-  }
-  if (in_progress_.size() >= static_cast<std::size_t>(kMaxReferenceDepth)) {
-    report_.error(use.at, fmt::format("objects are nested more than {} deep", kMaxReferenceDepth));
-    return std::nullopt;
-  }
+  if (in_progress_.size() >= static_cast<std::size_t>(kMaxReferenceDepth))
+    return report_.refuse(use.at, fmt::format("objects are nested more than {} deep", kMaxReferenceDepth));
   in_progress_.insert(&object);
   const std::optional<I> index = read(object);
   in_progress_.erase(&object);
@@ -170,16 +162,6 @@ std::optional<PhaseIndex> Reader::phase(const Element& object, const Element& us
 }
 std::optional<MediumIndex> Reader::medium(const Element& object, const Element& use) {
   return once(media_, "medium", object, use, [&](const Element& e) { return read_medium(e); });
-}
-
-TextureIndex Reader::add_constant_texture(const Rgb& value) {
-  scene_.textures.push_back(ConstantTexture{value});
-  return {static_cast<std::uint32_t>(scene_.textures.size() - 1)};
-}
-
-VolumeIndex Reader::add_constant_volume(const Rgb& value) {
-  scene_.volumes.push_back(ConstVolume{value});
-  return {static_cast<std::uint32_t>(scene_.volumes.size() - 1)};
 }
 
 const std::optional<Reader::Bounds>& Reader::bounds(TextureIndex texture) {
@@ -226,10 +208,7 @@ const Rgb* Reader::constant(TextureIndex texture) const {
 std::optional<AssetIndex> Reader::asset(const std::string& written, const Span& at) {
   const std::string name = document_.frame ? numbered(written, *document_.frame) : written;
   if (const auto it = assets_by_name_.find(name); it != assets_by_name_.end()) return it->second;
-  if (name.empty()) {
-    report_.error(at, "the name of a file is wanted here");
-    return std::nullopt;
-  }
+  if (name.empty()) return report_.refuse(at, "the name of a file is wanted here");
   std::vector<std::string> places;
   for (const std::string& path : document_.search_paths) places.push_back(join_path(path, name));
   places.push_back(join_path("", name));
@@ -242,15 +221,13 @@ std::optional<AssetIndex> Reader::asset(const std::string& written, const Span& 
       continue;
     }
     found->name = place;
-    scene_.assets.push_back(std::move(*found));
-    const AssetIndex index{static_cast<std::uint32_t>(scene_.assets.size() - 1)};
+    const auto index = added<AssetIndex>(std::move(*found));
     assets_by_name_.emplace(name, index);
     return index;
   }
   if (!document_.frame && has_frame_number(name))
     last.message += "; if its # stand for the number of a frame, say which frames are wanted (--frames A-B)";
-  report_.error(at, last.message);
-  return std::nullopt;
+  return report_.refuse(at, last.message);
 }
 
 }  // namespace scene
@@ -260,15 +237,13 @@ Result<Asset> AssetSource::keep(std::string_view name, const std::string& bytes)
   if (!asset)
     return fail(
         asset.error().code,
-        fmt::format("the numbers here are a file \"{}\" of their own, which `lightshaft submit` sends "
-                    "along: {}",
-                    name, asset.error().message));
+        fmt::format(
+            "the numbers here are a file \"{}\" of their own, which `lightshaft submit` sends along: {}",
+            name, asset.error().message));
   if (asset->digest == sha256(bytes)) return asset;
-  return fail(
-      Errc::invalid_argument,
-      fmt::format("the file \"{}\" that was sent along is not the one of the numbers here: leave it to "
-                  "`lightshaft submit`",
-                  name));
+  return fail(Errc::invalid_argument, fmt::format("the file \"{}\" that was sent along is not the one of the "
+                                                  "numbers here: leave it to `lightshaft submit`",
+                                                  name));
 }
 
 ReadResult read_scene(std::string_view file_name, std::string_view text, AssetSource& assets,

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "common/scene/reader/params.h"
-#include "common/scene/schema/bsdf_traits.h"
+#include "common/scene/schema/traits.h"
 #include "common/scene/xml/grammar.h"
 #include "common/scene/xml/spectrum.h"
 
@@ -39,8 +39,8 @@ class Reader {
   std::optional<MediumIndex> medium(const Element& object, const Element& use);
 
   // A spectrum given as an object. Rgb: a colour for any use. LightColour: the colour of a light, allowed for
-  // emitters only. SpectralCurve: the use determines the colour: a curve of light is converted as it is, any
-  // other curve is multiplied by D65.
+  // emitters only. SpectralCurve: a curve whose colour depends on its use; an emitter's is converted as it
+  // is, any other is multiplied by D65 first.
   struct LightColour {
     Rgb value;
   };
@@ -48,8 +48,8 @@ class Reader {
   static bool is_spectrum(const Element& object);
   std::optional<Spectrum> spectrum(const Element& object, const Element& use);
 
-  TextureIndex add_constant_texture(const Rgb& value);
-  VolumeIndex add_constant_volume(const Rgb& value);
+  TextureIndex add_constant_texture(const Rgb& value) { return added<TextureIndex>(ConstantTexture{value}); }
+  VolumeIndex add_constant_volume(const Rgb& value) { return added<VolumeIndex>(ConstVolume{value}); }
   // Bounds of a texture's values. nullopt if they depend on an image.
   struct Bounds {
     double low, high;
@@ -65,6 +65,14 @@ class Reader {
   template <class I, class F>
   std::optional<I> once(Memo<I>& memo, std::string_view kind, const Element& object, const Element& use,
                         F read);
+
+  // Adds an object to its list in the scene, and returns its index.
+  template <class I, class T>
+  I added(T&& object) {
+    auto& list = pool(scene_, I{});
+    list.emplace_back(std::forward<T>(object));
+    return {static_cast<std::uint32_t>(list.size() - 1)};
+  }
 
   std::string hint_for(const Element& reference) const;
   void read_child(const Element& child);
@@ -85,7 +93,7 @@ class Reader {
   template <class T>
   void bind_alphas(Params& p, T& b, const Range& range);
   template <class T>
-  void bind_rough(Params& p, T& b);
+  std::optional<BsdfIndex> add_around_one(Params& p, T& b);
   TextureIndex old_number(const Element& e, TextureIndex t);
   void check_multiple_scattering(const Element& e, TextureIndex alpha_u, TextureIndex alpha_v);
   bool read_heights(Params& p, BumpMapBsdf& b);
@@ -149,9 +157,9 @@ class Reader {
   // parts_: the films, filters and samplers at the top level. used_parts_: those that a sensor refers to.
   std::vector<const Element*> parts_;
   std::unordered_set<const Element*> used_parts_;
-  // bounds of the first textures of scene_; more are added when needed
+  // texture_bounds_ and bsdf_traits_ begin with the first object of scene_, and are extended when needed.
   std::vector<std::optional<Bounds>> texture_bounds_;
-  std::vector<BsdfTraits> bsdf_traits_;  // traits of the first bsdfs of scene_; more are added when needed
+  std::vector<BsdfTraits> bsdf_traits_;
 
   bool reads_attributes_ = false;  // true if some texture read so far is a mesh attribute
   // Results of old_number() (textures with swapped colours), by the texture as it was read

@@ -91,10 +91,11 @@ void Reader::read_instance(const Element& e) {
   if (nested.size() > 1) return report_.error(nested[1].use->at, "this instance has a second shapegroup");
   const Element& object = *nested[0].object;
   if (object.get("type") != "shapegroup")
-    return report_.error(nested[0].use->at,
-                         fmt::format("an instance shows a shapegroup, not a shape \"{}\": put that into a "
-                                     "<shape type=\"shapegroup\">",
-                                     object.get("type")));
+    return report_.error(
+        nested[0].use->at,
+        fmt::format(
+            "an instance shows a shapegroup, not a shape \"{}\": put that into a <shape type=\"shapegroup\">",
+            object.get("type")));
   if (!invertible(instance.to_world))
     report_.error(e.at,
                   "to_world flattens this instance or leaves the range of numbers: it can't be inverted");
@@ -113,10 +114,11 @@ void Reader::read_geometry(const Element& e, T geometry) {
     const bool serialized = geometry.format == MeshFormat::serialized;
     const std::string_view foreign = serialized ? "flip_tex_coords" : "shape_index";
     if (const Element* given = p.take(foreign))
-      report_.error(given->at, fmt::format("{} has no parameter '{}': {}", p.title(), foreign,
-                                           serialized ? "its v is never turned"
-                                                      : "it is for \"serialized\" files, "
-                                                        "which may hold several meshes"));
+      report_.error(
+          given->at,
+          fmt::format("{} has no parameter '{}': {}", p.title(), foreign,
+                      serialized ? "its v is never turned"
+                                 : "it is for \"serialized\" files, which may hold several meshes"));
   }
   bind(p, geometry);
   Shape shape;
@@ -143,33 +145,29 @@ void Reader::read_shape_parts(Params& p, Shape& shape) {
   shape.interior = medium_of("interior");
   shape.exterior = medium_of("exterior");
 
-  const auto emitters = p.take_nested("emitter");
-  if (emitters.size() > 1)
-    report_.error(emitters[1].use->at, fmt::format("{} has a second emitter", p.title()));
-  if (!emitters.empty() && shape.group)
-    report_.error(emitters[0].use->at, fmt::format("{} in a shapegroup can't emit light, in Mitsuba neither: "
-                                                   "place it outside of the group",
-                                                   p.title()));
-  else if (!emitters.empty())
-    shape.emitter = read_area(*emitters[0].object);
+  const auto emitter = p.take_only("emitter", p.title(), "emitter");
+  if (emitter && shape.group)
+    report_.error(
+        emitter->use->at,
+        fmt::format("{} in a shapegroup can't emit light, in Mitsuba neither: place it outside of the group",
+                    p.title()));
+  else if (emitter)
+    shape.emitter = read_area(*emitter->object);
 
-  const auto bsdfs = p.take_nested("bsdf");
-  if (bsdfs.size() > 1) report_.error(bsdfs[1].use->at, fmt::format("{} has a second bsdf", p.title()));
-  material_ = bsdfs.empty() ? nullptr : bsdfs[0].object;
-  if (!bsdfs.empty()) {
-    if (const auto index = bsdf(*bsdfs[0].object, *bsdfs[0].use)) shape.bsdf = *index;
+  const auto given = p.take_only("bsdf", p.title(), "bsdf");
+  material_ = given ? given->object : nullptr;
+  if (given) {
+    if (const auto index = bsdf(*given->object, *given->use)) shape.bsdf = *index;
     return;
   }
   // In Mitsuba 0.x a shape that only bounds a medium has a null bsdf.
-  if (p.object().old && emitters.empty() && shape.is_medium_transition) {
-    scene_.bsdfs.emplace_back(NullBsdf{});
-    shape.bsdf = {static_cast<std::uint32_t>(scene_.bsdfs.size() - 1)};
+  if (p.object().old && !emitter && shape.is_medium_transition) {
+    shape.bsdf = added<BsdfIndex>(NullBsdf{});
     return;
   }
   // Mitsuba's default material: diffuse, and black for an emitter.
-  const double grey = emitters.empty() ? .5 : 0;
-  scene_.bsdfs.emplace_back(DiffuseBsdf{add_constant_texture({grey, grey, grey})});
-  shape.bsdf = {static_cast<std::uint32_t>(scene_.bsdfs.size() - 1)};
+  const double grey = emitter ? 0 : .5;
+  shape.bsdf = added<BsdfIndex>(DiffuseBsdf{add_constant_texture({grey, grey, grey})});
   if (shape.is_medium_transition && !p.object().old)
     report_.warning(p.object().at, fmt::format("{} bounds a medium but has no bsdf, so it is opaque: add "
                                                "<bsdf type=\"null\"/> to let light through",
@@ -182,11 +180,10 @@ std::optional<AreaEmitter> Reader::read_area(const Element& e) {
     unknown_plugin(e, report_);
     return std::nullopt;
   }
-  if (e.get("type") != "area") {
-    report_.error(value_place(e, "type"),
-                  fmt::format("a shape can only hold an emitter \"area\", not \"{}\"", e.get("type")));
-    return std::nullopt;
-  }
+  if (e.get("type") != "area")
+    return report_.refuse(
+        value_place(e, "type"),
+        fmt::format("a shape can only hold an emitter \"area\", not \"{}\"", e.get("type")));
   Params p(*this, e);
   AreaEmitter area;
   const bool has_beam = p.has("beam_width"), has_cutoff = p.has("cutoff_angle");
@@ -241,8 +238,7 @@ void Reader::check_attributes(const Element& e, const Shape& shape) {
   for (const AttributeUse& use : attribute_uses(scene_, shape))
     report_.error(
         e.at,
-        fmt::format("this {} has no attribute \"{}\", which its {} reads: only a \"ply\" mesh "
-                    "has attributes",
+        fmt::format("this {} has no attribute \"{}\", which its {} reads: only a \"ply\" mesh has attributes",
                     e.get("type"), std::get<MeshAttributeTexture>(scene_.textures[use.texture.value]).name,
                     use.in_light ? "emitter" : "bsdf"));
 }
@@ -261,8 +257,8 @@ void Reader::check_placement(const Element& e, const Shape& shape) {
     report_.error(e.at, "p0 and p1 of this cylinder are the same point");
   else if (c && invertible(shape.to_world) && !stays_cylinder(*c, shape.to_world))
     report_.error(e.at,
-                  "to_world stretches this cylinder across its axis or shears it: only along the axis it "
-                  "may be scaled by itself");
+                  "to_world stretches this cylinder across its axis or shears it: only along the axis it may "
+                  "be scaled by itself");
 }
 
 }  // namespace ls::scene

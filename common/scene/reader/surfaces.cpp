@@ -8,9 +8,9 @@
 #include "common/scene/limits.h"
 #include "common/scene/reader/reader.h"
 #include "common/scene/reader/unsupported.h"
-#include "common/scene/schema/bsdf_traits.h"
 #include "common/scene/schema/materials.h"
 #include "common/scene/schema/mesh_attributes.h"
+#include "common/scene/schema/traits.h"
 #include "common/scene/xml/transform_element.h"
 
 namespace ls::scene {
@@ -35,8 +35,7 @@ std::optional<TextureIndex> Reader::read_plain_texture(const Element& e) {
   T texture;
   bind(p, texture);
   p.finish();
-  scene_.textures.emplace_back(texture);
-  return TextureIndex{static_cast<std::uint32_t>(scene_.textures.size() - 1)};
+  return added<TextureIndex>(texture);
 }
 
 std::optional<TextureIndex> Reader::read_mesh_attribute(const Element& e) {
@@ -44,9 +43,9 @@ std::optional<TextureIndex> Reader::read_mesh_attribute(const Element& e) {
   reads_attributes_ = true;
   const std::string& name = std::get<MeshAttributeTexture>(scene_.textures[index->value]).name;
   if (!name.empty() && !is_attribute_name(name))
-    report_.error(e.at, fmt::format("a mesh has no attribute \"{}\": their names begin with \"vertex_\" or "
-                                    "\"face_\"",
-                                    name));
+    report_.error(
+        e.at,
+        fmt::format("a mesh has no attribute \"{}\": their names begin with \"vertex_\" or \"face_\"", name));
   return index;
 }
 
@@ -54,17 +53,17 @@ std::optional<TextureIndex> Reader::read_mesh_attribute(const Element& e) {
 void Reader::refuse_attributes(const Element& e, TextureIndex t, std::string_view parameter) {
   if (!reads_attributes_) return;
   for (const AttributeUse& use : attribute_uses(scene_, t))
-    report_.error(e.at, fmt::format("'{}' of {} \"{}\" can't be the mesh attribute \"{}\": there is no mesh "
-                                    "here that has it",
-                                    parameter, e.tag, e.get("type"),
-                                    std::get<MeshAttributeTexture>(scene_.textures[use.texture.value]).name));
+    report_.error(
+        e.at,
+        fmt::format("'{}' of {} \"{}\" can't be the mesh attribute \"{}\": there is no mesh here that has it",
+                    parameter, e.tag, e.get("type"),
+                    std::get<MeshAttributeTexture>(scene_.textures[use.texture.value]).name));
 }
 
 std::optional<TextureIndex> Reader::read_uniform_texture(const Element& e, std::string_view parameter) {
   Params p(*this, e);
   Rgb value{1, 1, 1};
-  if (const Element* given = p.take(parameter))
-    p.convert({.name = parameter, .doc = "", .range = kNonNegative}, *given, value);
+  p.read({.name = parameter, .doc = "", .range = kNonNegative}, value);
   p.finish();
   return add_constant_texture(value);
 }
@@ -89,11 +88,9 @@ std::optional<TextureIndex> Reader::read_raw_constant(const Element& e) {
 }
 
 std::optional<BsdfIndex> Reader::add_bsdf(const Element& e, const Bsdf& bsdf) {
-  scene_.bsdfs.push_back(bsdf);
-  const BsdfIndex index{static_cast<std::uint32_t>(scene_.bsdfs.size() - 1)};
+  const auto index = added<BsdfIndex>(bsdf);
   if (traits(index).depth <= kMaxBsdfNesting) return index;
-  report_.error(e.at, fmt::format("bsdfs are nested more than {} deep", kMaxBsdfNesting));
-  return std::nullopt;
+  return report_.refuse(e.at, fmt::format("bsdfs are nested more than {} deep", kMaxBsdfNesting));
 }
 
 const BsdfTraits& Reader::traits(BsdfIndex bsdf) {
@@ -101,17 +98,6 @@ const BsdfTraits& Reader::traits(BsdfIndex bsdf) {
   for (std::size_t i = bsdf_traits_.size(); i < scene_.bsdfs.size(); ++i)
     bsdf_traits_.push_back(traits_of(scene_.bsdfs[i], bsdf_traits_, scene_.textures));
   return bsdf_traits_[bsdf.value];
-}
-
-// Reads a bsdf whose parameters all have rows in describe(). Kinds of bsdfs that need more have
-// specialisations below.
-template <class Kind>
-std::optional<BsdfIndex> Reader::read_bsdf_as(const Element& e) {
-  Params p(*this, e);
-  Kind b;
-  bind(p, b);
-  p.finish();
-  return add_bsdf(e, b);
 }
 
 // Checks that the roughness is constant: the energy table of multiple scattering is for a single roughness.
@@ -125,10 +111,10 @@ void Reader::check_multiple_scattering(const Element& e, TextureIndex alpha_u, T
                                     "not a texture: give alpha a number, or leave multiple_scattering out",
                                     e.get("type")));
   else if (u->value != v->value)
-    report_.error(e.at, fmt::format("multiple_scattering of bsdf \"{}\" needs the same roughness both ways: "
-                                    "give alpha instead of alpha_u and alpha_v, or leave multiple_scattering "
-                                    "out",
-                                    e.get("type")));
+    report_.error(e.at,
+                  fmt::format("multiple_scattering of bsdf \"{}\" needs the same roughness both ways: give "
+                              "alpha instead of alpha_u and alpha_v, or leave multiple_scattering out",
+                              e.get("type")));
 }
 
 // Reads all fields that the table has for T; `alpha` sets alpha_u and alpha_v.
@@ -141,33 +127,6 @@ void Reader::bind_alphas(Params& p, T& b, const Range& range) {
     p.convert({.name = "alpha", .doc = "", .range = range}, *alpha, b.alpha_u);
     b.alpha_v = b.alpha_u;
   }
-}
-
-template <class T>
-void Reader::bind_rough(Params& p, T& b) {
-  bind_alphas(p, b, kPositive);
-  const Element& e = p.object();
-  b.alpha_u = old_number(e, b.alpha_u);
-  b.alpha_v = old_number(e, b.alpha_v);
-  if (b.multiple_scattering) check_multiple_scattering(e, b.alpha_u, b.alpha_v);
-}
-
-template <>
-std::optional<BsdfIndex> Reader::read_bsdf_as<RoughDielectricBsdf>(const Element& e) {
-  Params p(*this, e);
-  RoughDielectricBsdf b;
-  bind_rough(p, b);
-  p.finish();
-  return add_bsdf(e, b);
-}
-
-template <>
-std::optional<BsdfIndex> Reader::read_bsdf_as<RoughThinDielectricBsdf>(const Element& e) {
-  Params p(*this, e);
-  RoughThinDielectricBsdf b;
-  bind_rough(p, b);
-  p.finish();
-  return add_bsdf(e, b);
 }
 
 // Checks that a sheet with two constant colours scatters no more light than it receives.
@@ -188,25 +147,12 @@ void Reader::check_sum(const Element& e, const DiffuseTransmissionBsdf& b) {
                                     e.get("type"), most));
 }
 
-template <>
-std::optional<BsdfIndex> Reader::read_bsdf_as<DiffuseTransmissionBsdf>(const Element& e) {
-  Params p(*this, e);
-  DiffuseTransmissionBsdf b;
-  bind(p, b);
-  p.finish();
-  check_sum(e, b);
-  return add_bsdf(e, b);
-}
-
 // Reads Mitsuba 0.6's `difftrans`, which reflects nothing.
 std::optional<BsdfIndex> Reader::read_difftrans(const Element& e) {
   Params p(*this, e);
   DiffuseTransmissionBsdf b;
   const Field field{.name = "transmittance", .doc = "", .range = kUnit, .fallback = {.5, .5, .5}};
-  if (const Element* given = p.take(field.name))
-    p.convert(field, *given, b.transmittance);
-  else
-    p.absent(field, b.transmittance);
+  p.read(field, b.transmittance);
   p.finish();
   b.reflectance = add_constant_texture({0, 0, 0});
   return add_bsdf(e, b);
@@ -230,33 +176,26 @@ void Reader::read_metal_preset(Params& p, Rgb& eta, Rgb& k) {
   k = metal->k;
 }
 
-template <>
-std::optional<BsdfIndex> Reader::read_bsdf_as<ConductorBsdf>(const Element& e) {
+// Reads a bsdf whose parameters have rows in describe(), and the other notations that several kinds share: a
+// metal by its name, and one roughness for both directions. Kinds of bsdfs that need more have
+// specialisations below.
+template <class Kind>
+std::optional<BsdfIndex> Reader::read_bsdf_as(const Element& e) {
   Params p(*this, e);
-  ConductorBsdf b;
-  read_metal_preset(p, b.eta, b.k);
-  bind(p, b);
+  Kind b;
+  if constexpr (requires { b.eta, b.k; }) read_metal_preset(p, b.eta, b.k);
+  if constexpr (std::is_same_v<Kind, CoatedConductorBsdf>) {
+    bind_alphas(p, b, kNonNegative);
+  } else if constexpr (requires { b.alpha_u; }) {
+    bind_alphas(p, b, kPositive);
+    b.alpha_u = old_number(e, b.alpha_u);
+    b.alpha_v = old_number(e, b.alpha_v);
+    if (b.multiple_scattering) check_multiple_scattering(e, b.alpha_u, b.alpha_v);
+  } else {
+    bind(p, b);
+  }
   p.finish();
-  return add_bsdf(e, b);
-}
-
-template <>
-std::optional<BsdfIndex> Reader::read_bsdf_as<RoughConductorBsdf>(const Element& e) {
-  Params p(*this, e);
-  RoughConductorBsdf b;
-  read_metal_preset(p, b.eta, b.k);
-  bind_rough(p, b);
-  p.finish();
-  return add_bsdf(e, b);
-}
-
-template <>
-std::optional<BsdfIndex> Reader::read_bsdf_as<CoatedConductorBsdf>(const Element& e) {
-  Params p(*this, e);
-  CoatedConductorBsdf b;
-  read_metal_preset(p, b.eta, b.k);
-  bind_alphas(p, b, kNonNegative);
-  p.finish();
+  if constexpr (std::is_same_v<Kind, DiffuseTransmissionBsdf>) check_sum(e, b);
   return add_bsdf(e, b);
 }
 
@@ -269,8 +208,8 @@ std::optional<std::vector<BsdfIndex>> Reader::read_inner_bsdfs(Params& p, std::s
   if (nested.size() < at_least || nested.size() > at_most) {
     const auto wanted = at_least == at_most ? (at_most == 1 ? "one nested bsdf" : "two nested bsdfs")
                                             : "one or two nested bsdfs";
-    report_.error(p.object().at, fmt::format("{} needs {}, not {}", p.title(), wanted, nested.size()));
-    return std::nullopt;
+    return report_.refuse(p.object().at,
+                          fmt::format("{} needs {}, not {}", p.title(), wanted, nested.size()));
   }
   const bool blend = p.object().get("type") == "blendbsdf";
   const auto named = [](const auto& n) { return !n.use->get("name").empty(); };
@@ -282,15 +221,21 @@ std::optional<std::vector<BsdfIndex>> Reader::read_inner_bsdfs(Params& p, std::s
   for (const auto& [object, use] : nested) {
     const auto index = bsdf(*object, *use);
     if (!index) return std::nullopt;
-    if (two_sided && (traits(*index).transmits || traits(*index).two_sided)) {
-      report_.error(use->at,
-                    fmt::format("bsdf \"{}\" has two sides of its own: it can't stand in \"twosided\"",
-                                object->get("type")));
-      return std::nullopt;
-    }
+    if (two_sided && (traits(*index).transmits || traits(*index).two_sided))
+      return report_.refuse(
+          use->at, fmt::format("bsdf \"{}\" has two sides of its own: it can't stand in \"twosided\"",
+                               object->get("type")));
     inner.push_back(*index);
   }
   return inner;
+}
+
+template <class T>
+std::optional<BsdfIndex> Reader::add_around_one(Params& p, T& b) {
+  const auto inner = read_inner_bsdfs(p, 1, 1);
+  if (!inner) return std::nullopt;
+  b.bsdf = inner->front();
+  return add_bsdf(p.object(), b);
 }
 
 template <>
@@ -313,8 +258,7 @@ TextureIndex Reader::old_number(const Element& e, TextureIndex t) {
   // The depth of recursion is bounded, since nested textures were read within kMaxReferenceDepth.
   const CheckerboardTexture swapped{old_number(e, as_colour.color1), old_number(e, as_colour.color0),
                                     as_colour.to_uv};
-  scene_.textures.emplace_back(swapped);
-  return old_numbers_[t] = {static_cast<std::uint32_t>(scene_.textures.size() - 1)};
+  return old_numbers_[t] = added<TextureIndex>(swapped);
 }
 
 template <>
@@ -329,13 +273,9 @@ std::optional<BsdfIndex> Reader::read_bsdf_as<MaskBsdf>(const Element& e) {
   if (image && image->channel == Channel::all) {
     BitmapTexture opacity = *image;  // a copy, because other objects may use the image's colour
     opacity.alpha = true;
-    scene_.textures.emplace_back(opacity);
-    b.opacity = {static_cast<std::uint32_t>(scene_.textures.size() - 1)};
+    b.opacity = added<TextureIndex>(opacity);
   }
-  const auto inner = read_inner_bsdfs(p, 1, 1);
-  if (!inner) return std::nullopt;
-  b.bsdf = inner->front();
-  return add_bsdf(e, b);
+  return add_around_one(p, b);
 }
 
 template <>
@@ -356,10 +296,7 @@ std::optional<BsdfIndex> Reader::read_bsdf_as<NormalMapBsdf>(const Element& e) {
   Params p(*this, e);
   NormalMapBsdf b;
   bind(p, b);
-  const auto inner = read_inner_bsdfs(p, 1, 1);
-  if (!inner) return std::nullopt;
-  b.bsdf = inner->front();
-  return add_bsdf(e, b);
+  return add_around_one(p, b);
 }
 
 template <>
@@ -367,10 +304,7 @@ std::optional<BsdfIndex> Reader::read_bsdf_as<BumpMapBsdf>(const Element& e) {
   Params p(*this, e);
   BumpMapBsdf b;
   if (!read_heights(p, b)) return std::nullopt;
-  const auto inner = read_inner_bsdfs(p, 1, 1);
-  if (!inner) return std::nullopt;
-  b.bsdf = inner->front();
-  return add_bsdf(e, b);
+  return add_around_one(p, b);
 }
 
 // Reads the texture of a bump map. The texture may have any name, or none.

@@ -18,8 +18,8 @@ constexpr Renamed kRenamed[] = {
     {"medium", "heterogeneous", "density", "sigma_t"},
 };
 
-// Values that have new names. The old filters also handled minification, for which the new ones need more
-// samples.
+// Values that have new names. `trilinear` and `ewa` also filtered minified textures; `bilinear` does not, so
+// it needs more samples there.
 constexpr struct {
   std::string_view tag, plugin, parameter, before, now;
 } kValues[] = {
@@ -46,23 +46,17 @@ void erase_child(Element& e, std::string_view name) {
 // Makes an element for a default that old files leave out. Messages about it refer to the place of the object
 // that it belongs to.
 Element made(std::string tag, const Span& at) {
-  Element e;
-  e.tag = std::move(tag);
-  e.at = at;
+  Element e = made(std::move(tag), "", at);
   e.old = true;
   return e;
-}
-
-void set(Element& e, std::string name, std::string value) {
-  e.attributes.push_back({std::move(name), std::move(value), e.at, e.at});
 }
 
 void add_default(Element& e, std::string tag, std::string name, std::string value) {
   if (child(e, name)) return;
   Element property = made(std::move(tag), e.at);
-  set(property, "name", std::move(name));
-  set(property, "value", std::move(value));
-  e.children.push_back(std::move(property));
+  set(property, "name", std::move(name), e.at);
+  set(property, "value", std::move(value), e.at);
+  add(e, std::move(property));
 }
 
 void rename_parameters(Element& e) {
@@ -96,7 +90,7 @@ void place_texture(Element& e) {
   move_part(e, "voffset", translate, "y");
   if (scale.attributes.empty() && translate.attributes.empty()) return;
   Element transform = made("transform", e.at);
-  set(transform, "name", "to_uv");
+  set(transform, "name", "to_uv", e.at);
   for (Element* step : {&scale, &translate})
     if (!step->attributes.empty()) transform.children.push_back(std::move(*step));
   e.children.push_back(std::move(transform));

@@ -2,13 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
 #include <map>
 #include <variant>
 
-#include "common/base/check.h"
-#include "common/scene/reader/aov_names.h"
+#include "common/base/overloaded.h"
+#include "common/scene/json/serialize.h"
 #include "common/scene/schema/describe_fields.h"
 #include "common/scene/schema/integrators.h"
 
@@ -16,56 +14,10 @@ namespace ls {
 namespace scene {
 namespace {
 
-// Counts the references to each texture and volume.
-class Uses {
- public:
-  template <class T>
-  void field(const Field&, const T& value) {
-    count(value);
-  }
-  int of(TextureIndex i) const { return found(textures_, i); }
-  int of(VolumeIndex i) const { return found(volumes_, i); }
-
- private:
-  template <class I>
-  static int found(const std::map<I, int>& counts, I i) {
-    const auto it = counts.find(i);
-    return it == counts.end() ? 0 : it->second;
-  }
-  template <class T>
-  void count(const T& value) {
-    if constexpr (Described<const T>) describe(*this, value);
-  }
-  void count(TextureIndex i) { ++textures_[i]; }
-  void count(VolumeIndex i) { ++volumes_[i]; }
-  template <class T>
-  void count(const std::optional<T>& x) {
-    if (x) count(*x);
-  }
-  template <class T>
-  void count(const std::vector<T>& list) {
-    for (const T& x : list) count(x);
-  }
-  template <class... Ts>
-  void count(const std::variant<Ts...>& x) {
-    std::visit([&](const auto& alternative) { describe(*this, alternative); }, x);
-  }
-
-  std::map<TextureIndex, int> textures_;
-  std::map<VolumeIndex, int> volumes_;
-};
-
-// Returns the shortest text that reads back to the same bits. -0 is written as 0, as in the digest.
-std::string number(double x) {
-  CHECK(std::isfinite(x), "a scene with the number {} can't be written", x);
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, x == 0 ? 0.0 : x).ptr};
-}
-
 template <class List>
 std::string numbers(const List& list) {
   std::string out;
-  for (const double x : list) out += (out.empty() ? "" : " ") + number(x);
+  for (const double x : list) out += (out.empty() ? "" : " ") + shortest_number(x);
   return out;
 }
 
@@ -98,13 +50,6 @@ std::string_view plugin(const T&) {
   const TypeInfo& info = kInfo<T>;
   return info.plugins.empty() ? info.name : info.plugins.substr(0, info.plugins.find(','));
 }
-template <class E>
-std::string_view name_of(E e) {
-  for (const auto& [name, value] : NamesOf<E>::all)
-    if (value == e) return name;
-  CHECK(false, "an enumerator of value {} has no name", static_cast<int>(e));
-  return {};
-}
 std::string_view plugin(const MeshShape& mesh) { return name_of(mesh.format); }
 std::string_view plugin(const IntegratorSettings& integrator) { return integrator.name; }
 bool is_pinhole(const Sensor& s) {
@@ -117,8 +62,11 @@ std::string_view plugin(const Sensor& s) {
 
 class Writer {
  public:
-  explicit Writer(const Scene& s) : scene_(s) {
-    describe(uses_, s);
+  explicit Writer(const Scene& s)
+      : scene_(s), texture_uses_(s.textures.size()), volume_uses_(s.volumes.size()) {
+    IndexWalker(overloaded{[&](TextureIndex i) { ++texture_uses_[i.value]; },
+                           [&](VolumeIndex i) { ++volume_uses_[i.value]; }, [](const auto&) {}})
+        .walk(s);
     name_assets();
   }
 
@@ -199,20 +147,23 @@ class Writer {
   template <class List, class I>
   void pool(const List& list, I index) {
     for (const auto& one : list) {
-      if (!stands_inline(index)) std::visit([&](const auto& x) { object(x, id_of(index)); }, one);
+      if (!inline_value(index)) std::visit([&](const auto& x) { object(x, id_of(index)); }, one);
       ++index.value;
     }
   }
-  template <class I>
-  bool stands_inline(I) const {
-    return false;
+  // Returns the value of a constant that only one object uses; it is written in that object. nullptr for
+  // others.
+  const Rgb* inline_value(TextureIndex i) const {
+    const auto* c = std::get_if<ConstantTexture>(&scene_.textures[i.value]);
+    return c && texture_uses_[i.value] == 1 ? &c->value : nullptr;
   }
-  bool stands_inline(TextureIndex i) const {
-    return std::holds_alternative<ConstantTexture>(scene_.textures[i.value]) && uses_.of(i) == 1;
-  }
-  bool stands_inline(VolumeIndex i) const {
+  const Rgb* inline_value(VolumeIndex i) const {
     const auto* c = std::get_if<ConstVolume>(&scene_.volumes[i.value]);
-    return c && c->to_world == Transform{} && uses_.of(i) == 1;
+    return c && c->to_world == Transform{} && volume_uses_[i.value] == 1 ? &c->value : nullptr;
+  }
+  template <class I>
+  const Rgb* inline_value(I) const {
+    return nullptr;
   }
   static std::string id_of(TextureIndex i) { return fmt::format("texture{}", i.value); }
   static std::string id_of(BsdfIndex i) { return fmt::format("bsdf{}", i.value); }
@@ -326,7 +277,7 @@ class Writer {
   }
 
   void property(const Field& f, double x) {
-    if (x != f.unwritten) value("float", f.name, number(x));
+    if (x != f.unwritten) value("float", f.name, shortest_number(x));
   }
   void property(const Field& f, int x) {
     // The default 0 is left out: it means no crop, an offset of 0, or the first mesh of a file.
@@ -349,13 +300,13 @@ class Writer {
   }
   void property(const Field& f, const Vec3& x) {
     line(fmt::format("<{} name=\"{}\" x=\"{}\" y=\"{}\" z=\"{}\"/>",
-                     f.given_as == "vector" ? "vector" : "point", f.name, number(x[0]), number(x[1]),
-                     number(x[2])));
+                     f.given_as == "vector" ? "vector" : "point", f.name, shortest_number(x[0]),
+                     shortest_number(x[1]), shortest_number(x[2])));
   }
   void property(const Field& f, const Rgb& x) {
-    const bool grey = x[0] == x[1] && x[1] == x[2];
+    const bool grey = is_grey(x);
     if (grey && x[0] == f.unwritten) return;
-    value(grey ? "float" : "rgb", f.name, grey ? number(x[0]) : numbers(x));
+    value(grey ? "float" : "rgb", f.name, grey ? shortest_number(x[0]) : numbers(x));
   }
   void property(const Field& f, const Transform& x) {
     if (x != Transform{}) matrix(f.name, x.m);
@@ -365,17 +316,11 @@ class Writer {
       matrix(f.name, {x.m[0], x.m[1], 0, x.m[2], x.m[3], x.m[4], 0, x.m[5], 0, 0, 1, 0, 0, 0, 0, 1});
   }
   void property(const Field& f, const AssetIndex& i) { value("string", f.name, asset_names_[i.value]); }
-  void property(const Field& f, const TextureIndex& i) {
-    if (stands_inline(i))
-      property(f, std::get<ConstantTexture>(scene_.textures[i.value]).value);
-    else
-      reference(f.name, id_of(i));
-  }
-  void property(const Field& f, const VolumeIndex& i) {
-    if (stands_inline(i))
-      property(f, std::get<ConstVolume>(scene_.volumes[i.value]).value);
-    else
-      reference(f.name, id_of(i));
+  template <class Tag>
+  requires(std::is_same_v<Tag, TextureTag> ||
+           std::is_same_v<Tag, VolumeTag>) void property(const Field& f, const Index<Tag>& i) {
+    const Rgb* value = inline_value(i);
+    value ? property(f, *value) : reference(f.name, id_of(i));
   }
   void property(const Field& f, const std::optional<TextureIndex>& x) {
     if (x) property(f, *x);
@@ -385,8 +330,8 @@ class Writer {
   }
 
   const Scene& scene_;
-  Uses uses_;
-  std::vector<std::string> asset_names_;  // names of assets as written to the file
+  std::vector<int> texture_uses_, volume_uses_;  // numbers of references to each texture and volume
+  std::vector<std::string> asset_names_;         // names of assets as written to the file
   std::string out_;
   int depth_ = 1;
   std::size_t opened_ = 0;  // offset at which the text of the last opened object begins

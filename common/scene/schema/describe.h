@@ -20,6 +20,7 @@
 #include <type_traits>
 #include <variant>
 
+#include "common/base/check.h"
 #include "common/scene/limits.h"
 #include "common/scene/scene.h"
 
@@ -41,6 +42,8 @@ inline constexpr Range kAny{};
 inline constexpr Range kNonNegative{.min = 0};
 inline constexpr Range kPositive{.min = 0, .open_min = true};
 inline constexpr Range kUnit{.min = 0, .max = 1};
+inline constexpr Range kMeanCosine{.min = -1, .max = 1, .open_min = true, .open_max = true};
+inline constexpr Range kFieldOfView{.min = 0, .max = 180, .open_min = true, .open_max = true};  // degrees
 
 struct Field {
   std::string_view name;
@@ -79,6 +82,20 @@ struct Field {
     return value == T{};
   }
 };
+
+// A nested object. `given_as` as in Field.
+inline Field nested_field(std::string_view name, std::string_view doc, std::string_view given_as) {
+  return {.name = name, .doc = doc, .derived = true, .given_as = given_as};
+}
+// A texture that is read as a scalar.
+inline Field number_field(std::string_view name, std::string_view doc, const Range& range, double fallback) {
+  return {
+      .name = name, .doc = doc, .range = range, .fallback = {fallback, fallback, fallback}, .number = true};
+}
+inline Field quantity(std::string_view name, std::string_view doc, std::string_view unit,
+                      const Range& range) {
+  return {.name = name, .doc = doc, .unit = unit, .range = range};
+}
 
 struct TypeInfo {
   std::string_view kind;     // the element's tag: bsdf, shape, ...
@@ -129,72 +146,33 @@ struct Named {
 };
 template <class E>
 struct NamesOf;
-template <>
-struct NamesOf<TextureFilter> {
-  static constexpr Named<TextureFilter> all[] = {{"nearest", TextureFilter::nearest},
-                                                 {"bilinear", TextureFilter::bilinear}};
-};
-template <>
-struct NamesOf<Wrap> {
-  static constexpr Named<Wrap> all[] = {
-      {"repeat", Wrap::repeat}, {"mirror", Wrap::mirror}, {"clamp", Wrap::clamp}};
-};
-template <>
-struct NamesOf<Channel> {
-  static constexpr Named<Channel> all[] = {{"all", Channel::all},
-                                           {"red", Channel::red},
-                                           {"green", Channel::green},
-                                           {"blue", Channel::blue},
-                                           {"alpha", Channel::alpha}};
-};
-template <>
-struct NamesOf<Microfacet> {
-  static constexpr Named<Microfacet> all[] = {{"beckmann", Microfacet::beckmann}, {"ggx", Microfacet::ggx}};
-};
-template <>
-struct NamesOf<VolumeFilter> {
-  static constexpr Named<VolumeFilter> all[] = {{"nearest", VolumeFilter::nearest},
-                                                {"trilinear", VolumeFilter::trilinear}};
-};
-template <>
-struct NamesOf<GridOrder> {
-  static constexpr Named<GridOrder> all[] = {{"x_fastest", GridOrder::x_fastest},
-                                             {"z_fastest", GridOrder::z_fastest}};
-};
-template <>
-struct NamesOf<MeshFormat> {
-  static constexpr Named<MeshFormat> all[] = {
-      {"obj", MeshFormat::obj}, {"ply", MeshFormat::ply}, {"serialized", MeshFormat::serialized}};
-};
-template <>
-struct NamesOf<Projection> {
-  static constexpr Named<Projection> all[] = {{"perspective", Projection::perspective},
-                                              {"orthographic", Projection::orthographic},
-                                              {"spherical", Projection::spherical}};
-};
-template <>
-struct NamesOf<FovAxis> {
-  static constexpr Named<FovAxis> all[] = {{"x", FovAxis::x},
-                                           {"y", FovAxis::y},
-                                           {"diagonal", FovAxis::diagonal},
-                                           {"smaller", FovAxis::smaller},
-                                           {"larger", FovAxis::larger}};
-};
-template <>
-struct NamesOf<SkyMapping> {
-  static constexpr Named<SkyMapping> all[] = {{"latlong", SkyMapping::latlong},
-                                              {"equal_area", SkyMapping::equal_area}};
-};
-template <>
-struct NamesOf<DistanceSampling> {
-  static constexpr Named<DistanceSampling> all[] = {{"exponential", DistanceSampling::exponential},
-                                                    {"equiangular", DistanceSampling::equiangular},
-                                                    {"mis", DistanceSampling::mis}};
-};
-template <>
-struct NamesOf<MisHeuristic> {
-  static constexpr Named<MisHeuristic> all[] = {{"power", MisHeuristic::power},
-                                                {"balance", MisHeuristic::balance}};
-};
+#define LS_NAMES(type, ...)                             \
+  template <>                                           \
+  struct NamesOf<type> {                                \
+    static constexpr auto all = [] {                    \
+      using enum type;                                  \
+      return std::to_array<Named<type>>({__VA_ARGS__}); \
+    }();                                                \
+  };
+LS_NAMES(TextureFilter, {"nearest", nearest}, {"bilinear", bilinear})
+LS_NAMES(Wrap, {"repeat", repeat}, {"mirror", mirror}, {"clamp", clamp})
+LS_NAMES(Channel, {"all", all}, {"red", red}, {"green", green}, {"blue", blue}, {"alpha", alpha})
+LS_NAMES(Microfacet, {"beckmann", beckmann}, {"ggx", ggx})
+LS_NAMES(VolumeFilter, {"nearest", nearest}, {"trilinear", trilinear})
+LS_NAMES(GridOrder, {"x_fastest", x_fastest}, {"z_fastest", z_fastest})
+LS_NAMES(MeshFormat, {"obj", obj}, {"ply", ply}, {"serialized", serialized})
+LS_NAMES(Projection, {"perspective", perspective}, {"orthographic", orthographic}, {"spherical", spherical})
+LS_NAMES(FovAxis, {"x", x}, {"y", y}, {"diagonal", diagonal}, {"smaller", smaller}, {"larger", larger})
+LS_NAMES(SkyMapping, {"latlong", latlong}, {"equal_area", equal_area})
+LS_NAMES(DistanceSampling, {"exponential", exponential}, {"equiangular", equiangular}, {"mis", mis})
+LS_NAMES(MisHeuristic, {"power", power}, {"balance", balance})
+
+template <class E>
+std::string_view name_of(E e) {
+  for (const auto& [name, value] : NamesOf<E>::all)
+    if (value == e) return name;
+  CHECK(false, "an enumerator of value {} has no name", static_cast<int>(e));
+  return {};
+}
 
 }  // namespace ls::scene

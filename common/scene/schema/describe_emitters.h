@@ -5,11 +5,11 @@
 
 namespace ls::scene {
 
-LS_TYPE(AreaEmitter, "emitter", "area", "",
-        "light from the front of the shape that it stands in. `two_sided`, `cutoff_angle`, `beam_width` and "
-        "`falloff` are our own. The angles make each point of it a spot light, whose radiance between the "
-        "two angles is "
-        "multiplied by s^falloff, s = (cos a - cos cutoff_angle) / (cos beam_width - cos cutoff_angle)")
+LS_TYPE(
+    AreaEmitter, "emitter", "area", "",
+    "light from the front of the shape that it stands in. `two_sided`, `cutoff_angle`, `beam_width` and "
+    "`falloff` are our own. The angles make each point of it a spot light, whose radiance between the two "
+    "angles is multiplied by s^falloff, s = (cos a - cos cutoff_angle) / (cos beam_width - cos cutoff_angle)")
 template <class V, Of<AreaEmitter> T>
 void describe(V& v, T& e) {
   v.field({.name = "radiance", .doc = "emitted radiance", .range = kNonNegative}, e.radiance);
@@ -19,13 +19,14 @@ void describe(V& v, T& e) {
            .range = {0, 90, true},
            .unwritten = 90},
           e.cutoff_angle);
-  v.field({.name = "beam_width",
-           .doc = "all of the radiance within this angle from the normal; 3/4 of a given cutoff_angle if not "
-                  "given",
-           .unit = "degrees",
-           .range = {0, 90},
-           .unwritten = 90},
-          e.beam_width);
+  v.field(
+      {.name = "beam_width",
+       .doc =
+           "all of the radiance within this angle from the normal; 3/4 of a given cutoff_angle if not given",
+       .unit = "degrees",
+       .range = {0, 90},
+       .unwritten = 90},
+      e.beam_width);
   v.field({.name = "falloff", .doc = "exponent between the two", .range = {0, 1000}, .unwritten = 1},
           e.falloff);
   v.field({.name = "two_sided", .doc = "the back shines like the front", .elided = true}, e.two_sided);
@@ -61,8 +62,7 @@ template <class V, Of<PointEmitter> T>
 void describe(V& v, T& e) {
   v.field({.name = "position", .doc = "where, in the world", .unit = "length", .given_as = "point"},
           e.position);
-  v.field({.name = "intensity", .doc = "radiant intensity", .unit = "W/sr", .range = kNonNegative},
-          e.intensity);
+  v.field(quantity("intensity", "radiant intensity", "W/sr", kNonNegative), e.intensity);
 }
 
 LS_TYPE(SpotEmitter, "emitter", "spot", "",
@@ -70,20 +70,11 @@ LS_TYPE(SpotEmitter, "emitter", "spot", "",
 template <class V, Of<SpotEmitter> T>
 void describe(V& v, T& e) {
   v.field({.name = "to_world", .doc = "places and turns the light"}, e.to_world);
-  v.field({.name = "intensity",
-           .doc = "radiant intensity within the beam",
-           .unit = "W/sr",
-           .range = kNonNegative},
-          e.intensity);
-  v.field({.name = "cutoff_angle",
-           .doc = "dark beyond this angle from the axis",
-           .unit = "degrees",
-           .range = {0, 180, true, true}},
+  v.field(quantity("intensity", "radiant intensity within the beam", "W/sr", kNonNegative), e.intensity);
+  v.field(quantity("cutoff_angle", "dark beyond this angle from the axis", "degrees", {0, 180, true, true}),
           e.cutoff_angle);
-  v.field({.name = "beam_width",
-           .doc = "full intensity within this angle; 3/4 of cutoff_angle if not given",
-           .unit = "degrees",
-           .range = {0, 180}},
+  v.field(quantity("beam_width", "full intensity within this angle; 3/4 of cutoff_angle if not given",
+                   "degrees", {0, 180}),
           e.beam_width);
   v.field({.name = "texture", .doc = "an image projected by the light", .range = kNonNegative}, e.texture);
 }
@@ -98,13 +89,12 @@ void describe(V& v, T& e) {
   v.field({.name = "filename", .doc = "the image", .required = true}, e.file);
   v.field({.name = "scale", .doc = "multiplies the image's values", .range = kNonNegative}, e.scale);
   v.field({.name = "to_world", .doc = "turns or mirrors the map; moving it changes nothing"}, e.to_world);
-  v.field(
-      {.name = "mapping",
-       .doc = "`equal_area` is the square map of pbrt-v4, each of whose texels is one radiance from 4 pi / "
-              "texels steradians: before `to_world` its centre is +z, its corners -z, the middle of its "
-              "right edge +x, of its lower edge +y. Not in Mitsuba",
-       .elided = true},
-      e.mapping);
+  v.field({.name = "mapping",
+           .doc = "`equal_area` is the square map of pbrt-v4, each of whose texels is one radiance from 4 pi "
+                  "/ texels steradians: before `to_world` its centre is +z, its corners -z, the middle of "
+                  "its right edge +x, of its lower edge +y. Not in Mitsuba",
+           .elided = true},
+          e.mapping);
 }
 
 LS_TYPE(ProjectorEmitter, "emitter", "projector", "",
@@ -116,18 +106,15 @@ void describe(V& v, T& e) {
   v.field({.name = "irradiance", .doc = "the image", .range = kNonNegative}, e.irradiance);
   v.field({.name = "scale", .doc = "multiplies the image", .range = kNonNegative}, e.scale);
   v.field({.name = "to_world", .doc = "places and turns the light"}, e.to_world);
-  v.field({.name = "fov",
-           .doc = "field of view along fov_axis; or `focal_length` (\"50mm\" unless either is given)",
-           .unit = "degrees",
-           .range = {0, 180, true, true}},
+  v.field(quantity("fov", "field of view along fov_axis; or `focal_length` (\"50mm\" unless either is given)",
+                   "degrees", {0, 180, true, true}),
           e.fov);
   v.field({.name = "fov_axis", .doc = "what fov measures"}, e.fov_axis);
-  v.field(
-      {.name = "as_intensity",
-       .doc = "scale times the image is a radiant intensity in W/sr, as in pbrt, instead of that irradiance. "
-              "Not in Mitsuba",
-       .elided = true},
-      e.as_intensity);
+  v.field({.name = "as_intensity",
+           .doc = "scale times the image is a radiant intensity in W/sr, as in pbrt, instead of that "
+                  "irradiance. Not in Mitsuba",
+           .elided = true},
+          e.as_intensity);
 }
 
 LS_TYPE(GoniometricEmitter, "emitter", "goniometric", "",
@@ -139,11 +126,7 @@ template <class V, Of<GoniometricEmitter> T>
 void describe(V& v, T& e) {
   v.field({.name = "to_world", .doc = "places, turns and mirrors the light; scaling it has no effect"},
           e.to_world);
-  v.field({.name = "intensity",
-           .doc = "radiant intensity where the image is 1",
-           .unit = "W/sr",
-           .range = kNonNegative},
-          e.intensity);
+  v.field(quantity("intensity", "radiant intensity where the image is 1", "W/sr", kNonNegative), e.intensity);
   v.field({.name = "texture", .doc = "the image, which multiplies the intensity", .range = kNonNegative},
           e.texture);
 }

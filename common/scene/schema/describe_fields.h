@@ -5,7 +5,6 @@
 #include "common/scene/schema/describe_media.h"
 #include "common/scene/schema/describe_shapes.h"
 #include "common/scene/schema/describe_surfaces.h"
-#include "common/scene/schema/describe_textures.h"
 #include "common/scene/schema/integrators.h"
 
 namespace ls::scene {
@@ -31,8 +30,8 @@ void describe(V& v, T& i) {
           i.rr_depth);
   v.field({.name = "hide_emitters", .doc = "lights are invisible to the camera"}, i.hide_emitters);
   v.field({.name = "distance",
-           .doc = "where on a ray's way through a medium it looks for light: as "
-                  "light fades (`exponential`), near the light (`equiangular`), or both (`mis`)",
+           .doc = "where on a ray's way through a medium it looks for light: as light fades (`exponential`), "
+                  "near the light (`equiangular`), or both (`mis`)",
            .only_of = {kDistantMis}},
           i.distance);
   v.field({.name = "heuristic", .doc = "weighs the two against each other", .only_of = {kDistantMis}},
@@ -44,57 +43,56 @@ void describe(V& v, T& i) {
     v.field({.name = name, .doc = doc, .range = range, .elided = true, .only_of = only_of}, value);
   };
   technique("camera_points", {-1, kMaxCameraPoints}, {"volpath"},
-            "points of a camera ray's way through a medium at which it looks for light; 0: "
-            "as many as pay for the scene, perhaps none; -1: none, only where the ray is scattered",
+            "points of a camera ray's way through a medium at which it looks for light; 0: as many as pay "
+            "for the scene, perhaps none; -1: none, only where the ray is scattered",
             i.camera_points);
   v.field({.name = "phase_only",
-           .doc = "in media with point, spot or projector lights too, directions are those of "
-                  "the phase function and the material, none is aimed at such a light",
+           .doc = "in media with point, spot or projector lights too, directions are those of the phase "
+                  "function and the material, none is aimed at such a light",
            .elided = true,
            .only_of = {"volpath"}},
           i.phase_only);
   technique("light_vertices", {-1, 1}, {"volpath", "path"},
-            "whether paths are connected to points that a directional emitter lights; 0: if "
-            "that pays for the scene; -1: never; 1: always, as far as it is possible",
+            "whether paths are connected to points that a directional emitter lights; 0: if that pays for "
+            "the scene; -1: never; 1: always, as far as it is possible",
             i.light_vertices);
   technique("equiangular", {-1, 0}, {"volpath"},
-            "whether light near lamps is looked for along whole ways through a medium; 0: "
-            "if that pays for the scene; -1: only where a ray is scattered, and nothing is aimed at lamps",
+            "whether light near lamps is looked for along whole ways through a medium; 0: if that pays for "
+            "the scene; -1: only where a ray is scattered, and nothing is aimed at lamps",
             i.equiangular);
   technique("lamp_flights", {-1, 0}, {"volpath"},
-            "whether a tenth of all flights through homogeneous media end near point, "
-            "spot and projector lights; 0: if directions are aimed at these; -1: never",
+            "whether a tenth of all flights through homogeneous media end near point, spot and projector "
+            "lights; 0: if directions are aimed at these; -1: never",
             i.lamp_flights);
-  technique("light_tree", {-1, 0}, {},
-            "how one of 32 lights and more is chosen; 0: by distance, direction and power; -1: by power "
-            "alone",
-            i.light_tree);
+  technique(
+      "light_tree", {-1, 0}, {},
+      "how one of 32 lights and more is chosen; 0: by distance, direction and power; -1: by power alone",
+      i.light_tree);
   technique("path_reuse", {-1, 64}, {"volpath", "path"},
-            "how many pixels share what their paths find from the second scattering on, "
-            "where media are homogeneous; 0: 16 if that pays for the scene, else "
-            "none; -1 or 1: none",
+            "how many pixels share what their paths find from the second scattering on, where media are "
+            "homogeneous; 0: 16 if that pays for the scene, else none; -1 or 1: none",
             i.path_reuse);
   technique("shadow_roulette", {-1, 0}, {"volpath"},
-            "whether shadow rays through grids that could bring little are traced at "
-            "random; 0: where it is possible; -1: never",
+            "whether shadow rays through grids that could bring little are traced at random; 0: where it is "
+            "possible; -1: never",
             i.shadow_roulette);
   technique("sky_samples", {-1, 0}, {"volpath", "path"},
-            "whether the first surface looks for a `constant` environment in a second "
-            "direction; 0: in scenes without media, if that pays; -1: never",
+            "whether the first surface looks for a `constant` environment in a second direction; 0: in "
+            "scenes without media, if that pays; -1: never",
             i.sky_samples);
-  technique("sky_portals", {-1, 1}, {"volpath", "path"},
-            "whether directions towards the sky, an `envmap` or a `constant` environment, are also "
-            "sampled through the openings by which its light enters the scene; 0: if that pays; -1: "
-            "never; 1: where it is possible",
-            i.sky_portals);
+  technique(
+      "sky_portals", {-1, 1}, {"volpath", "path"},
+      "whether directions towards the sky, an `envmap` or a `constant` environment, are also sampled through "
+      "the openings by which its light enters the scene; 0: if that pays; -1: never; 1: where it is possible",
+      i.sky_portals);
   technique("local_lights", {-1, 1}, {"volpath", "path"},
-            "whether 2 to 64 lights are chosen by which of them reach the place that is lit, as camera "
-            "paths learned it; 0: if that pays; -1: never; 1: where it is possible",
+            "whether 2 to 64 lights are chosen by which of them reach the place that is lit, as camera paths "
+            "learned it; 0: if that pays; -1: never; 1: where it is possible",
             i.local_lights);
   technique("path_splitting", {-1, 0}, {"volpath"},
-            "in scenes with grids, whether paths split at their first scattering if it "
-            "is in a grid, and Russian roulette compares their weight with that behind the first "
-            "scattering; 0: where it is possible; -1: never",
+            "in scenes with grids, whether paths split at their first scattering if it is in a grid, and "
+            "Russian roulette compares their weight with that behind the first scattering; 0: where it is "
+            "possible; -1: never",
             i.path_splitting);
 }
 
@@ -139,6 +137,52 @@ struct AnyVisitor {
 template <class T>
 concept Described = requires(AnyVisitor& v, T& t) {
   describe(v, t);
+};
+
+// Returns the list of the scene that an index refers to.
+template <class S, class Tag>
+auto& pool(S& s, Index<Tag>) {
+  if constexpr (std::is_same_v<Tag, AssetTag>)
+    return (s.assets);
+  else if constexpr (std::is_same_v<Tag, TextureTag>)
+    return (s.textures);
+  else if constexpr (std::is_same_v<Tag, BsdfTag>)
+    return (s.bsdfs);
+  else if constexpr (std::is_same_v<Tag, VolumeTag>)
+    return (s.volumes);
+  else if constexpr (std::is_same_v<Tag, PhaseTag>)
+    return (s.phases);
+  else if constexpr (std::is_same_v<Tag, MediumTag>)
+    return (s.media);
+  else
+    return (s.groups);
+}
+
+// Calls on_index for every index within a described value.
+template <class F>
+class IndexWalker {
+ public:
+  explicit IndexWalker(F on_index) : on_index_(on_index) {}
+  template <class T>
+  void field(const Field&, T& value) {
+    walk(value);
+  }
+  template <class T>
+  void walk(T& x) {
+    if constexpr (requires(Scene & s) { pool(s, x); })
+      on_index_(x);
+    else if constexpr (requires { x.has_value(); }) {
+      if (x) walk(*x);
+    } else if constexpr (requires { x.index(); })
+      std::visit([&](auto& alternative) { describe(*this, alternative); }, x);
+    else if constexpr (Described<T>)
+      describe(*this, x);
+    else if constexpr (requires { x.begin(); })
+      for (auto& one : x) walk(one);
+  }
+
+ private:
+  F on_index_;
 };
 
 }  // namespace ls::scene

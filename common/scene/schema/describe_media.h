@@ -5,10 +5,10 @@
 
 namespace ls::scene {
 
-LS_TYPE(ConstVolume, "volume", "constvolume", "",
-        "one value: as the density of a `heterogeneous` medium in [0, 1]^3, moved by `to_world`; everywhere "
-        "as its albedo or emission, or in a `homogeneous` medium; also written as a plain `<rgb>` or "
-        "`<float>`")
+LS_TYPE(
+    ConstVolume, "volume", "constvolume", "",
+    "one value: as the density of a `heterogeneous` medium in [0, 1]^3, moved by `to_world`; everywhere as "
+    "its albedo or emission, or in a `homogeneous` medium; also written as a plain `<rgb>` or `<float>`")
 template <class V, Of<ConstVolume> T>
 void describe(V& v, T& s) {
   v.field({.name = "value", .doc = "the value", .range = kNonNegative}, s.value);
@@ -26,19 +26,17 @@ void describe(V& v, T& s) {
       {.name = "grid_name", .doc = "which grid of a `.vdb` or `.nvdb`; empty: the only one, or \"density\""},
       s.grid_name);
   v.field({.name = "filter_type", .doc = "between voxels"}, s.filter);
-  v.field(
-      {.name = "wrap_mode",
-       .doc = "what a `.vol` goes on with beyond its outermost voxels' centres, and as an albedo beyond its "
-              "box; a density ends there"},
-      s.wrap);
+  v.field({.name = "wrap_mode",
+           .doc = "what a `.vol` goes on with beyond its outermost voxels' centres, and as an albedo beyond "
+                  "its box; a density ends there"},
+          s.wrap);
   v.field(
       {.name = "use_grid_bbox", .doc = "place the grid by the bounding box in its file instead of [0, 1]^3"},
       s.use_grid_bbox);
-  v.field(
-      {.name = "node_centred",
-       .doc = "the outermost values sit on the faces of the box instead of half a voxel inside it; true in "
-              "files of version 0.x; not for `.vdb`"},
-      s.node_centred);
+  v.field({.name = "node_centred",
+           .doc = "the outermost values sit on the faces of the box instead of half a voxel inside it; true "
+                  "in files of version 0.x; not for `.vdb`"},
+          s.node_centred);
   v.field({.name = "border",
            .doc = "the box ends at the inner faces of the outermost voxels, which only take part in the "
                   "interpolation; of a `.vol` alone. Not in Mitsuba",
@@ -58,18 +56,17 @@ void describe(V&, T&) {}
 LS_TYPE(HgPhase, "phase", "hg", "", "Henyey-Greenstein")
 template <class V, Of<HgPhase> T>
 void describe(V& v, T& p) {
-  v.field({.name = "g", .doc = "mean cosine; positive: forwards", .range = {-1, 1, true, true}}, p.g);
+  v.field({.name = "g", .doc = "mean cosine; positive: forwards", .range = kMeanCosine}, p.g);
 }
 template <class V>
 void describe_priority(V& v, auto& priority) {
-  v.field(
-      {.name = "priority",
-       .doc = "where media overlap, those of the highest priority are there and the others are not; equal "
-              "ones add up. Not in Mitsuba",
-       .range = {-1000000, 1000000},
-       .unwritten = 0,
-       .elided = true},
-      priority);
+  v.field({.name = "priority",
+           .doc = "where media overlap, those of the highest priority are there and the others are not; "
+                  "equal ones add up. Not in Mitsuba",
+           .range = {-1000000, 1000000},
+           .unwritten = 0,
+           .elided = true},
+          priority);
 }
 
 LS_TYPE(HomogeneousMedium, "medium", "homogeneous", "", "the same everywhere")
@@ -87,11 +84,7 @@ void describe(V& v, T& m) {
            .constvolume = true},
           m.albedo);
   v.field({.name = "scale", .doc = "factor on sigma_t", .range = kNonNegative}, m.scale);
-  v.field({.name = "phase",
-           .doc = "how light is scattered; `isotropic` if there is none",
-           .derived = true,
-           .given_as = "<phase>"},
-          m.phase);
+  v.field(nested_field("phase", "how light is scattered; `isotropic` if there is none", "<phase>"), m.phase);
   v.field({.name = "emission",
            .doc = "light given off, whatever the extinction",
            .unit = "radiance/length",
@@ -112,7 +105,7 @@ void describe(V& v, T& m) {
 LS_TYPE(HeterogeneousMedium, "medium", "heterogeneous", "", "varies in space by volumes")
 template <class V, Of<HeterogeneousMedium> T>
 void describe(V& v, T& m) {
-  v.field({.name = "sigma_t", .doc = "extinction", .unit = "1/length", .range = kNonNegative}, m.sigma_t);
+  v.field(quantity("sigma_t", "extinction", "1/length", kNonNegative), m.sigma_t);
   v.field({.name = "albedo",
            .doc = "share of extinction that is scattering",
            .range = kUnit,
@@ -126,27 +119,20 @@ void describe(V& v, T& m) {
            .unwritten = 1,
            .elided = true},
           m.tint);
-  v.field({.name = "phase",
-           .doc = "how light is scattered; `isotropic` if there is none",
-           .derived = true,
-           .given_as = "<phase>"},
-          m.phase);
-  v.field({.name = "emission",
-           .doc = "light given off, whatever the extinction; a grid ends at its box, one value is everywhere "
-                  "in the medium",
-           .unit = "radiance/length",
-           .range = kNonNegative},
-          m.emission);
-  v.field({.name = "source_radiance",
-           .doc = "light given off per absorption: sigma_a times this",
-           .unit = "radiance",
-           .range = kNonNegative},
+  v.field(nested_field("phase", "how light is scattered; `isotropic` if there is none", "<phase>"), m.phase);
+  v.field(
+      quantity("emission",
+               "light given off, whatever the extinction; a grid ends at its box, one value is everywhere "
+               "in the medium",
+               "radiance/length", kNonNegative),
+      m.emission);
+  v.field(quantity("source_radiance", "light given off per absorption: sigma_a times this", "radiance",
+                   kNonNegative),
           m.source_radiance);
-  v.field({.name = "temperature",
-           .doc = "the medium glows as a black body: sigma_a times its radiance at temperature_offset + "
-                  "temperature_scale * this",
-           .unit = "K",
-           .range = kNonNegative},
+  v.field(quantity("temperature",
+                   "the medium glows as a black body: sigma_a times its radiance at temperature_offset + "
+                   "temperature_scale * this",
+                   "K", kNonNegative),
           m.temperature);
   v.field({.name = "emission_scale",
            .doc = "factor on the light given off",

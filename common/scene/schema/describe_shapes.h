@@ -22,7 +22,7 @@ LS_TYPE(SphereShape, "shape", "sphere", "",
 template <class V, Of<SphereShape> T>
 void describe(V& v, T& s) {
   v.field({.name = "center", .doc = "centre", .unit = "length", .given_as = "point"}, s.center);
-  v.field({.name = "radius", .doc = "radius", .unit = "length", .range = kPositive}, s.radius);
+  v.field(quantity("radius", "radius", "length", kPositive), s.radius);
 }
 
 LS_TYPE(MeshShape, "shape", "mesh", "obj, ply, serialized", "triangles from a file")
@@ -45,15 +45,14 @@ void describe(V& v, T& s) {
           s.shape_index);
 }
 
-LS_TYPE(
-    CylinderShape, "shape", "cylinder", "",
-    "an open cylinder about the line from `p0` to `p1`, normals outwards; `to_world` may stretch it along "
-    "that line only")
+LS_TYPE(CylinderShape, "shape", "cylinder", "",
+        "an open cylinder about the line from `p0` to `p1`, normals outwards; `to_world` may stretch it "
+        "along that line only")
 template <class V, Of<CylinderShape> T>
 void describe(V& v, T& s) {
   v.field({.name = "p0", .doc = "where its axis begins", .unit = "length", .given_as = "point"}, s.p0);
   v.field({.name = "p1", .doc = "where its axis ends", .unit = "length", .given_as = "point"}, s.p1);
-  v.field({.name = "radius", .doc = "radius", .unit = "length", .range = kPositive}, s.radius);
+  v.field(quantity("radius", "radius", "length", kPositive), s.radius);
 }
 
 LS_TYPE(ShapeGroup, "shape", "shapegroup", "",
@@ -67,7 +66,7 @@ LS_TYPE(Instance, "shape", "instance", "",
         "a `shapegroup` once more: a `<ref>` to it, or the group itself, stands inside")
 template <class V, Of<Instance> T>
 void describe(V& v, T& s) {
-  v.field({.name = "group", .doc = "the group", .derived = true, .given_as = "<shapegroup>"}, s.group);
+  v.field(nested_field("group", "the group", "<shapegroup>"), s.group);
   v.field({.name = "to_world", .doc = "places the group in the world"}, s.to_world);
 }
 // The fields of all shapes. Geometry, emitter, bsdf and media are nested objects.
@@ -76,26 +75,12 @@ void describe(V& v, T& s) {
   v.field({.name = "geometry", .doc = "the plugin", .derived = true}, s.geometry);
   v.field({.name = "to_world", .doc = "places the shape in the world"}, s.to_world);
   v.field({.name = "flip_normals", .doc = "turns the normals, and so inside and outside"}, s.flip_normals);
-  v.field({.name = "bsdf",
-           .doc = "`diffuse` if there is none, black if the shape emits light",
-           .derived = true,
-           .given_as = "<bsdf>"},
+  v.field(nested_field("bsdf", "`diffuse` if there is none, black if the shape emits light", "<bsdf>"),
           s.bsdf);
-  v.field({.name = "emitter",
-           .doc = "an `area`: the shape emits light",
-           .derived = true,
-           .given_as = "<emitter>"},
-          s.emitter);
-  v.field({.name = "interior",
-           .doc = "what is on the side that the normal points away from",
-           .derived = true,
-           .given_as = "medium"},
+  v.field(nested_field("emitter", "an `area`: the shape emits light", "<emitter>"), s.emitter);
+  v.field(nested_field("interior", "what is on the side that the normal points away from", "medium"),
           s.interior);
-  v.field({.name = "exterior",
-           .doc = "what is on the side that the normal points to",
-           .derived = true,
-           .given_as = "medium"},
-          s.exterior);
+  v.field(nested_field("exterior", "what is on the side that the normal points to", "medium"), s.exterior);
   v.field({.name = "is_medium_transition", .doc = "whether one of the two was given", .derived = true},
           s.is_medium_transition);
   v.field({.name = "group", .doc = "the group that it is in", .derived = true}, s.group);
@@ -105,19 +90,19 @@ void describe(V& v, T& s) {
 LS_TYPE(BoxFilter, "rfilter", "box", "", "each sample counts in its own pixel")
 template <class V, Of<BoxFilter> T>
 void describe(V& v, T& f) {
-  v.field({.name = "radius", .doc = "half width", .unit = "pixels", .range = {0, 32, true}}, f.radius);
+  v.field(quantity("radius", "half width", "pixels", {0, 32, true}), f.radius);
 }
 
 LS_TYPE(TentFilter, "rfilter", "tent", "", "falls off linearly")
 template <class V, Of<TentFilter> T>
 void describe(V& v, T& f) {
-  v.field({.name = "radius", .doc = "half width", .unit = "pixels", .range = {0, 32, true}}, f.radius);
+  v.field(quantity("radius", "half width", "pixels", {0, 32, true}), f.radius);
 }
 
 LS_TYPE(GaussianFilter, "rfilter", "gaussian", "", "Gaussian, cut at four standard deviations")
 template <class V, Of<GaussianFilter> T>
 void describe(V& v, T& f) {
-  v.field({.name = "stddev", .doc = "standard deviation", .unit = "pixels", .range = {0, 8, true}}, f.stddev);
+  v.field(quantity("stddev", "standard deviation", "pixels", {0, 8, true}), f.stddev);
 }
 
 LS_TYPE(Sensor, "sensor", "perspective", "perspective, thinlens, orthographic, spherical",
@@ -127,27 +112,20 @@ LS_TYPE(Sensor, "sensor", "perspective", "perspective, thinlens, orthographic, s
 template <class V, Of<Sensor> T>
 void describe_clips(V& v, T& s) {
   v.field({.name = "to_world", .doc = "places and turns the camera"}, s.to_world);
-  v.field({.name = "near_clip",
-           .doc = "nearest depth that is seen (not `spherical`)",
-           .unit = "length",
-           .range = kPositive},
+  v.field(quantity("near_clip", "nearest depth that is seen (not `spherical`)", "length", kPositive),
           s.near_clip);
-  v.field({.name = "far_clip",
-           .doc = "farthest depth that is seen, of surfaces and of media (not `spherical`)",
-           .unit = "length",
-           .range = kPositive},
+  v.field(quantity("far_clip", "farthest depth that is seen, of surfaces and of media (not `spherical`)",
+                   "length", kPositive),
           s.far_clip);
 }
 template <class V, Of<Sensor> T>
 void describe_perspective(V& v, T& s) {
   describe_clips(v, s);
-  v.field(
-      {.name = "fov",
-       .doc = "field of view along fov_axis; or `focal_length` (\"50mm\" unless either is given); this and "
-              "all that follows of `perspective` and `thinlens` only",
-       .unit = "degrees",
-       .range = {0, 180, true, true}},
-      s.fov);
+  v.field(quantity("fov",
+                   "field of view along fov_axis; or `focal_length` (\"50mm\" unless either is given); this "
+                   "and all that follows of `perspective` and `thinlens` only",
+                   "degrees", kFieldOfView),
+          s.fov);
   v.field({.name = "fov_axis", .doc = "what fov measures"}, s.fov_axis);
   v.field({.name = "principal_point_offset_x",
            .doc = "how far right of its place the camera looks",
@@ -160,15 +138,11 @@ void describe_perspective(V& v, T& s) {
 }
 template <class V, Of<Sensor> T>
 void describe_lens(V& v, T& s) {
-  v.field({.name = "aperture_radius",
-           .doc = "radius of the lens (`thinlens` only, and needed there); 0: pinhole",
-           .unit = "length",
-           .range = kNonNegative},
+  v.field(quantity("aperture_radius", "radius of the lens (`thinlens` only, and needed there); 0: pinhole",
+                   "length", kNonNegative),
           s.aperture_radius);
-  v.field({.name = "focus_distance",
-           .doc = "depth that is sharp (`thinlens`); far_clip if not given",
-           .unit = "length",
-           .range = kPositive},
+  v.field(quantity("focus_distance", "depth that is sharp (`thinlens`); far_clip if not given", "length",
+                   kPositive),
           s.focus_distance);
   v.field({.name = "aperture_scale",
            .doc = "over the frame, (0, 0) its upper left corner: multiplies aperture_radius (`thinlens`; not "
@@ -181,43 +155,28 @@ void describe(V& v, T& s) {
   v.field({.name = "projection", .doc = "the plugin", .derived = true}, s.projection);
   describe_perspective(v, s);
   describe_lens(v, s);
-  v.field({.name = "medium",
-           .doc = "what the camera is in; the name may be left out",
-           .derived = true,
-           .given_as = "medium"},
-          s.medium);
+  v.field(nested_field("medium", "what the camera is in; the name may be left out", "medium"), s.medium);
 }
 
 LS_TYPE(FilmSettings, "film", "hdrfilm", "", "size of the frame and its reconstruction filter")
 template <class V, Of<FilmSettings> T>
 void describe(V& v, T& f) {
-  v.field({.name = "width", .doc = "of the frame", .unit = "pixels", .range = {1, kMaxFrameSide}},
-          f.size.width);
-  v.field({.name = "height", .doc = "of the frame", .unit = "pixels", .range = {1, kMaxFrameSide}},
-          f.size.height);
-  v.field({.name = "filter",
-           .doc = "reconstruction filter; `gaussian` if there is none",
-           .derived = true,
-           .given_as = "<rfilter>"},
+  v.field(quantity("width", "of the frame", "pixels", {1, kMaxFrameSide}), f.size.width);
+  v.field(quantity("height", "of the frame", "pixels", {1, kMaxFrameSide}), f.size.height);
+  v.field(nested_field("filter", "reconstruction filter; `gaussian` if there is none", "<rfilter>"),
           f.filter);
-  v.field({.name = "crop_offset_x",
-           .doc = "of the part of the frame that is rendered",
-           .unit = "pixels",
-           .range = {0, kMaxFrameSide}},
-          f.crop_offset[0]);
-  v.field({.name = "crop_offset_y",
-           .doc = "of the part of the frame that is rendered",
-           .unit = "pixels",
-           .range = {0, kMaxFrameSide}},
-          f.crop_offset[1]);
-  v.field({.name = "crop_width",
-           .doc = "of the part that is rendered, which is the image that is written; the whole frame if it "
-                  "is not given. A size that a job asks for is that of this part",
-           .unit = "pixels",
-           .range = {0, kMaxFrameSide}},
+  v.field(
+      quantity("crop_offset_x", "of the part of the frame that is rendered", "pixels", {0, kMaxFrameSide}),
+      f.crop_offset[0]);
+  v.field(
+      quantity("crop_offset_y", "of the part of the frame that is rendered", "pixels", {0, kMaxFrameSide}),
+      f.crop_offset[1]);
+  v.field(quantity("crop_width",
+                   "of the part that is rendered, which is the image that is written; the whole frame if it "
+                   "is not given. A size that a job asks for is that of this part",
+                   "pixels", {0, kMaxFrameSide}),
           f.crop_size.width);
-  v.field({.name = "crop_height", .doc = "likewise", .unit = "pixels", .range = {0, kMaxFrameSide}},
-          f.crop_size.height);
+  v.field(quantity("crop_height", "likewise", "pixels", {0, kMaxFrameSide}), f.crop_size.height);
 }
 
 }  // namespace ls::scene

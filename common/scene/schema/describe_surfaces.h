@@ -1,9 +1,85 @@
-// The parameters of surfaces, with ranges, defaults and documentation (describe.h).
+// The parameters of textures and surfaces, with ranges, defaults and documentation (describe.h).
 #pragma once
 
 #include "common/scene/schema/describe.h"
 
 namespace ls::scene {
+
+LS_TYPE(ConstantTexture, "texture", "constant", "uniform, srgb",
+        "one colour; also written as a plain `<rgb>`, `<float>` or `<spectrum>`")
+template <class V, Of<ConstantTexture> T>
+void describe(V& v, T& t) {
+  v.field({.name = "value", .doc = "the colour"}, t.value);
+}
+
+LS_TYPE(BitmapTexture, "texture", "bitmap", "",
+        "an image: PNG, JPEG, BMP, TGA, QOI, EXR, HDR or PFM; (u, v) = (0, 0) is its upper left corner")
+template <class V, Of<BitmapTexture> T>
+void describe(V& v, T& t) {
+  v.field({.name = "filename", .doc = "the image", .required = true}, t.file);
+  v.field({.name = "filter_type", .doc = "between texels"}, t.filter);
+  v.field({.name = "wrap_mode", .doc = "outside [0, 1]"}, t.wrap);
+  v.field({.name = "raw", .doc = "values are not colours: no sRGB decoding of 8- and 16-bit files"}, t.raw);
+  v.field({.name = "to_uv",
+           .doc = "moves (u, v) before the look-up: of a 4 x 4 matrix its x and y rows and its translation"},
+          t.to_uv);
+  v.field({.name = "alpha", .doc = "it is an opacity", .derived = true}, t.alpha);
+  v.field(
+      {.name = "channel",
+       .doc = "one channel as a number, without sRGB decoding; 1 where the image lacks it. Not in Mitsuba",
+       .elided = true},
+      t.channel);
+}
+
+LS_TYPE(CheckerboardTexture, "texture", "checkerboard", "", "two colours in alternation")
+template <class V, Of<CheckerboardTexture> T>
+void describe(V& v, T& t) {
+  v.field(
+      {.name = "color0", .doc = "first colour or texture", .range = kNonNegative, .fallback = {.4, .4, .4}},
+      t.color0);
+  v.field(
+      {.name = "color1", .doc = "second colour or texture", .range = kNonNegative, .fallback = {.2, .2, .2}},
+      t.color1);
+  v.field({.name = "to_uv", .doc = "moves (u, v) before the look-up"}, t.to_uv);
+}
+
+LS_TYPE(PeakTexture, "texture", "peak", "",
+        "the largest channel of another texture, or its colour divided by that; not in Mitsuba: Nori's "
+        "`microfacet_tex` is made of it")
+template <class V, Of<PeakTexture> T>
+void describe(V& v, T& t) {
+  v.field({.name = "texture", .doc = "the texture", .range = kNonNegative}, t.texture);
+  v.field({.name = "hue", .doc = "the colour divided by its largest channel, white where it is black"},
+          t.hue);
+}
+
+LS_TYPE(ProductTexture, "texture", "product", "",
+        "the product of two textures, or where that is large enough; not in Mitsuba: factors and cut-outs of "
+        "glTF are made of it")
+template <class V, Of<ProductTexture> T>
+void describe(V& v, T& t) {
+  v.field({.name = "first", .doc = "a colour or texture", .range = kNonNegative}, t.first);
+  v.field({.name = "second", .doc = "a colour or texture", .range = kNonNegative}, t.second);
+  v.field({.name = "threshold",
+           .doc = "above 0: the value is 1 where the product's luminance is at least this, else 0",
+           .range = kNonNegative,
+           .unwritten = 0,
+           .elided = true},
+          t.threshold);
+}
+
+LS_TYPE(MeshAttributeTexture, "texture", "mesh_attribute", "",
+        "what a `ply` mesh carries at its vertices, interpolated over each triangle, or at its faces: one "
+        "number or three. Its properties `r g b` or `red green blue` (maybe with an `alpha`, left out) are "
+        "the attribute `color`; one or three of a kind like `foo_x foo_y foo_z`, `foo_0 foo_1 foo_2` or "
+        "`foo_1 foo_2 foo_3` are `foo`; `foo_r foo_g foo_b` are `foo_color`. As in Mitsuba 3.9, floats count "
+        "as they are, `uchar` from 0 to 255 (so give `scale` = 1/255), and other whole numbers as sRGB codes")
+template <class V, Of<MeshAttributeTexture> T>
+void describe(V& v, T& t) {
+  v.field({.name = "name", .doc = "of the attribute, with `vertex_` or `face_` in front", .required = true},
+          t.name);
+  v.field({.name = "scale", .doc = "multiplies it", .range = kNonNegative}, t.scale);
+}
 
 // Describes the parameter multiple_scattering, which several rough surfaces have.
 template <class V, class T>
@@ -19,18 +95,8 @@ void describe_multiple_scattering(V& v, T& b) {
 template <class V, class T>
 void describe_roughness(V& v, T& b) {
   v.field({.name = "distribution", .doc = "of the microfacets' normals"}, b.distribution);
-  v.field({.name = "alpha_u",
-           .doc = "roughness along u",
-           .range = kPositive,
-           .fallback = {.1, .1, .1},
-           .number = true},
-          b.alpha_u);
-  v.field({.name = "alpha_v",
-           .doc = "roughness along v",
-           .range = kPositive,
-           .fallback = {.1, .1, .1},
-           .number = true},
-          b.alpha_v);
+  v.field(number_field("alpha_u", "roughness along u", kPositive, .1), b.alpha_u);
+  v.field(number_field("alpha_v", "roughness along v", kPositive, .1), b.alpha_v);
 }
 
 template <class V, class T>
@@ -160,11 +226,10 @@ void describe(V& v, T& b) {
   describe_multiple_scattering(v, b);
 }
 
-LS_TYPE(
-    CoatedConductorBsdf, "bsdf", "coatedconductor", "",
-    "metal under a dielectric coat, GGX facets on both (docs/design/coated-metal.md); `alpha` sets both "
-    "alpha_u and alpha_v. A roughness below a thousandth is smooth, and without a contrast of indices it is "
-    "the metal alone. Our own: Mitsuba has no such plugin")
+LS_TYPE(CoatedConductorBsdf, "bsdf", "coatedconductor", "",
+        "metal under a dielectric coat, GGX facets on both (docs/design/coated-metal.md); `alpha` sets both "
+        "alpha_u and alpha_v. A roughness below a thousandth is smooth, and without a contrast of indices it "
+        "is the metal alone. Our own: Mitsuba has no such plugin")
 template <class V, Of<CoatedConductorBsdf> T>
 void describe(V& v, T& b) {
   v.field(
@@ -177,11 +242,11 @@ void describe(V& v, T& b) {
   v.field({.name = "alpha_u", .doc = "roughness of the metal along u; 0 is smooth", .range = kNonNegative},
           b.alpha_u);
   v.field({.name = "alpha_v", .doc = "roughness of the metal along v", .range = kNonNegative}, b.alpha_v);
-  v.field({.name = "eta",
-           .doc = "real part of the metal's index of refraction, of which int_ior is divided out; or "
-                  "`material`",
-           .range = kNonNegative},
-          b.eta);
+  v.field(
+      {.name = "eta",
+       .doc = "real part of the metal's index of refraction, of which int_ior is divided out; or `material`",
+       .range = kNonNegative},
+      b.eta);
   v.field({.name = "k", .doc = "imaginary part, likewise; or `material`", .range = kNonNegative}, b.k);
   v.field({.name = "specular_reflectance", .doc = "factor on the metal's reflection", .range = kUnit},
           b.specular_reflectance);
@@ -195,12 +260,8 @@ LS_TYPE(TwoSidedBsdf, "bsdf", "twosided", "",
         "gives each side of a surface a bsdf; one nested bsdf serves both")
 template <class V, Of<TwoSidedBsdf> T>
 void describe(V& v, T& b) {
-  v.field({.name = "front", .doc = "of the front", .derived = true, .given_as = "<bsdf>"}, b.front);
-  v.field({.name = "back",
-           .doc = "of the back; the first again if there is no second",
-           .derived = true,
-           .given_as = "<bsdf>"},
-          b.back);
+  v.field(nested_field("front", "of the front", "<bsdf>"), b.front);
+  v.field(nested_field("back", "of the back; the first again if there is no second", "<bsdf>"), b.back);
 }
 
 LS_TYPE(MaskBsdf, "bsdf", "mask", "",
@@ -208,28 +269,21 @@ LS_TYPE(MaskBsdf, "bsdf", "mask", "",
         "emitter on the surface is not masked")
 template <class V, Of<MaskBsdf> T>
 void describe(V& v, T& b) {
-  v.field({.name = "opacity",
-           .doc = "1: nothing passes. Of an image its alpha channel, if that falls below 1/2 somewhere; "
-                  "else the luminance",
-           .range = kUnit,
-           .fallback = {.5, .5, .5},
-           .number = true},
+  v.field(number_field(
+              "opacity",
+              "1: nothing passes. Of an image its alpha channel, if that falls below 1/2 somewhere; else "
+              "the luminance",
+              kUnit, .5),
           b.opacity);
-  v.field({.name = "bsdf", .doc = "of the opaque share", .derived = true, .given_as = "<bsdf>"}, b.bsdf);
+  v.field(nested_field("bsdf", "of the opaque share", "<bsdf>"), b.bsdf);
 }
 
 LS_TYPE(BlendBsdf, "bsdf", "blendbsdf", "", "a mixture of two bsdfs")
 template <class V, Of<BlendBsdf> T>
 void describe(V& v, T& b) {
-  v.field({.name = "weight",
-           .doc = "share of the second bsdf; the luminance of a colour",
-           .range = kUnit,
-           .fallback = {.5, .5, .5},
-           .number = true},
-          b.weight);
-  v.field({.name = "first", .doc = "where the weight is 0", .derived = true, .given_as = "<bsdf>"}, b.first);
-  v.field({.name = "second", .doc = "where the weight is 1", .derived = true, .given_as = "<bsdf>"},
-          b.second);
+  v.field(number_field("weight", "share of the second bsdf; the luminance of a colour", kUnit, .5), b.weight);
+  v.field(nested_field("first", "where the weight is 0", "<bsdf>"), b.first);
+  v.field(nested_field("second", "where the weight is 1", "<bsdf>"), b.second);
 }
 
 template <class V, class T>
@@ -253,7 +307,7 @@ void describe(V& v, T& b) {
            .range = kUnit,
            .fallback = {.5, .5, 1}},
           b.normalmap);
-  v.field({.name = "bsdf", .doc = "that sees them", .derived = true, .given_as = "<bsdf>"}, b.bsdf);
+  v.field(nested_field("bsdf", "that sees them", "<bsdf>"), b.bsdf);
   describe_map(v, b);
 }
 
@@ -265,28 +319,23 @@ template <class V, Of<BumpMapBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "texture", .doc = "heights, a `bitmap`", .fallback = {0, 0, 0}}, b.texture);
   v.field({.name = "scale", .doc = "multiplies the heights", .unit = "length"}, b.scale);
-  v.field({.name = "bsdf", .doc = "that sees the slopes", .derived = true, .given_as = "<bsdf>"}, b.bsdf);
+  v.field(nested_field("bsdf", "that sees the slopes", "<bsdf>"), b.bsdf);
   describe_map(v, b);
 }
 
 // A parameter from 0 to 1 that is 0 if it is not given.
 inline Field share_field(std::string_view name, std::string_view doc) {
-  return {.name = name, .doc = doc, .range = kUnit, .fallback = {0, 0, 0}, .number = true};
+  return number_field(name, doc, kUnit, 0);
 }
 
 LS_TYPE(PrincipledBsdf, "bsdf", "principled", "",
-        "Burley's model of metals, coated dielectrics and glass. `specular` instead of `eta` means "
-        "eta = 2 / (1 - sqrt(0.08 specular)) - 1")
+        "Burley's model of metals, coated dielectrics and glass. `specular` instead of `eta` means eta = 2 / "
+        "(1 - sqrt(0.08 specular)) - 1")
 template <class V, Of<PrincipledBsdf> T>
 void describe(V& v, T& b) {
   v.field({.name = "base_color", .doc = "the colour", .range = kUnit, .fallback = {.5, .5, .5}},
           b.base_color);
-  v.field({.name = "roughness",
-           .doc = "its square is GGX's alpha",
-           .range = kUnit,
-           .fallback = {.5, .5, .5},
-           .number = true},
-          b.roughness);
+  v.field(number_field("roughness", "its square is GGX's alpha", kUnit, .5), b.roughness);
   v.field(share_field("anisotropic", "stretches highlights along u"), b.anisotropic);
   v.field(share_field("metallic", "share of metal"), b.metallic);
   v.field({.name = "spec_trans",

@@ -1,8 +1,10 @@
-// The integrators by their names in all versions of Mitsuba's format, for scenes and for --integrator.
+// The integrators by their names in all versions of Mitsuba's format, for scenes and for --integrator, and
+// the channels of the integrator "aov".
 #pragma once
 
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 
 namespace ls::scene {
@@ -36,5 +38,16 @@ struct WrapperRow {
 };
 std::span<const WrapperRow> integrator_wrappers();
 const WrapperRow* wrapper_row(std::string_view name);
+
+// A channel of Mitsuba's integrator "aov", and our AOV name (common/image/aov/aov.h).
+struct ChannelRow {
+  std::string_view theirs, ours;  // `ours` is empty if the channel is not supported
+  bool mitsuba = true;            // false: Mitsuba has no such channel, and `convert` writes our name
+};
+std::span<const ChannelRow> channels();
+const ChannelRow* channel_row(std::string_view theirs);  // returns nullptr for an unknown name
+
+// Converts a list of our names to channels of Mitsuba: "depth,normal" becomes "depth:depth,normal:sh_normal".
+std::string mitsuba_channels(std::string_view aovs);
 
 }  // namespace ls::scene

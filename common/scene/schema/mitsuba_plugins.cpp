@@ -132,8 +132,7 @@ constexpr PluginRow kPlugins[] = {
     {"emitter", "directional", kRead, ""},
     {"emitter", "directionalarea", kRefused,
      "no beam of one direction alone leaves a surface here; give an \"area\" a small `cutoff_angle`, or use "
-     "a "
-     "\"directional\""},
+     "a \"directional\""},
     {"emitter", "envmap", kInPart, "from files; arrays of Python by the package `lightshaft`"},
     {"emitter", "point", kRead, ""},
     {"emitter", "projector", kRead, ""},

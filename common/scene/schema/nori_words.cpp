@@ -10,6 +10,7 @@ namespace {
 constexpr unsigned kNumber = kFloat | kInteger;
 constexpr unsigned kAnyColor = kColor | kFloat;
 constexpr unsigned kTriple = kPoint | kVector;
+constexpr Range kRightAngle{.min = 0, .max = 90};  // degrees
 constexpr std::string_view kSampling = "it only steers sampling, which is chosen here";
 
 const Parameter kToWorld{"toWorld", kTransform, "identity", "places it"};
@@ -24,11 +25,7 @@ std::vector<Parameter> camera_parameters() {
   return {
       {"width", kInteger, "1280", "pixels", {.min = 1, .max = kMaxFrameSide}},
       {"height", kInteger, "720", "pixels", {.min = 1, .max = kMaxFrameSide}},
-      {"fov",
-       kNumber,
-       "30",
-       "degrees, over the width",
-       {.min = 0, .max = 180, .open_min = true, .open_max = true}},
+      {"fov", kNumber, "30", "degrees, over the width", kFieldOfView},
       {"nearClip", kNumber, "0.0001", "nearest depth seen", kPositive},
       {"farClip", kNumber, "10000", "farthest depth seen", kPositive},
       {"apertureRadius", kNumber, "0", "radius of the lens; 0 is a pinhole", kNonNegative},
@@ -61,11 +58,7 @@ std::vector<Parameter> medium_parameters(bool grid) {
       {"sigma_s", kAnyColor, "0", "scattering per scene unit", kNonNegative},
       {"absorption", kAnyColor, "0", "another name of sigma_a", kNonNegative},
       {"scattering", kAnyColor, "0", "another name of sigma_s", kNonNegative},
-      {"phase_g",
-       kNumber,
-       "0",
-       "mean cosine of Henyey-Greenstein, instead of a `<phase>`",
-       {.min = -1, .max = 1, .open_min = true, .open_max = true}},
+      {"phase_g", kNumber, "0", "mean cosine of Henyey-Greenstein, instead of a `<phase>`", kMeanCosine},
       {"emission", kAnyColor, "0", "radiance per scene unit, whatever the extinction", kNonNegative},
       {"source_radiance", kAnyColor, "0", "radiance given off per absorption: sigma_a times this",
        kNonNegative},
@@ -94,11 +87,7 @@ std::vector<Parameter> parallel_light_parameters() {
           {"toWorld", kTransform, "", "instead of direction: turns +z"},
           {"irradiance", kAnyColor, "needed, or radiance", "on a plane that faces the light", kNonNegative},
           {"radiance", kAnyColor, "", "another name of irradiance", kNonNegative},
-          {"angularRadius",
-           kNumber,
-           "0",
-           "degrees, of the disk that the light comes from",
-           {.min = 0, .max = 90}}};
+          {"angularRadius", kNumber, "0", "degrees, of the disk that the light comes from", kRightAngle}};
 }
 
 // The parameters of Kombu's `principled`, which equals Mitsuba's.
@@ -205,16 +194,13 @@ std::vector<Plugin> lights_and_media() {
          "20",
          "degrees from the axis or the normal: dark beyond",
          {.min = 0, .max = 90, .open_min = true}},
-        {"beam_width", kNumber, "3/4 of cutoff", "degrees: full intensity within", {.min = 0, .max = 90}},
+        {"beam_width", kNumber, "3/4 of cutoff", "degrees: full intensity within", kRightAngle},
         {"falloff", kNumber, "1", "exponent between the two; in a mesh alone", {.min = 0, .max = 1000}}}},
       {"medium", "homogeneous", "`homogeneous`", medium_parameters(false)},
       {"medium", "heterogeneous", "`heterogeneous`; `homogeneous` if its volumes are constant",
        medium_parameters(true)},
       {"phase", "isotropic", "`isotropic`", {}},
-      {"phase",
-       "hg",
-       "`hg`",
-       {{"g", kNumber, "0", "mean cosine", {.min = -1, .max = 1, .open_min = true, .open_max = true}}}},
+      {"phase", "hg", "`hg`", {{"g", kNumber, "0", "mean cosine", kMeanCosine}}},
       {"volume", "constvolume", "a constant", {{"value", kAnyColor, "0", "the value", kNonNegative}}},
       {"volume",
        "gridvolume",

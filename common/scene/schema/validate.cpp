@@ -9,83 +9,11 @@
 #include <vector>
 
 #include "common/scene/limits.h"
-#include "common/scene/schema/bsdf_traits.h"
 #include "common/scene/schema/describe_fields.h"
+#include "common/scene/schema/traits.h"
 
 namespace ls::scene {
 namespace {
-
-// Returns the list that an index refers to.
-template <class S>
-auto& pool(S& s, AssetIndex) {
-  return s.assets;
-}
-template <class S>
-auto& pool(S& s, TextureIndex) {
-  return s.textures;
-}
-template <class S>
-auto& pool(S& s, BsdfIndex) {
-  return s.bsdfs;
-}
-template <class S>
-auto& pool(S& s, VolumeIndex) {
-  return s.volumes;
-}
-template <class S>
-auto& pool(S& s, PhaseIndex) {
-  return s.phases;
-}
-template <class S>
-auto& pool(S& s, MediumIndex) {
-  return s.media;
-}
-template <class S>
-auto& pool(S& s, GroupIndex) {
-  return s.groups;
-}
-
-// Calls on_index for every index within a described value.
-template <class F>
-class IndexWalker {
- public:
-  explicit IndexWalker(F on_index) : on_index_(on_index) {}
-  template <class T>
-  void field(const Field&, T& value) {
-    walk(value);
-  }
-  template <class T>
-  void walk(T& value) {
-    if constexpr (Described<T>) describe(*this, value);
-  }
-  template <class Tag>
-  void walk(Index<Tag>& i) {
-    on_index_(i);
-  }
-  template <class Tag>
-  void walk(const Index<Tag>& i) {
-    on_index_(i);
-  }
-  template <class T>
-  void walk(std::optional<T>& x) {
-    if (x) walk(*x);
-  }
-  template <class T>
-  void walk(const std::optional<T>& x) {
-    if (x) walk(*x);
-  }
-  template <class... Ts>
-  void walk(std::variant<Ts...>& x) {
-    std::visit([&](auto& alternative) { describe(*this, alternative); }, x);
-  }
-  template <class... Ts>
-  void walk(const std::variant<Ts...>& x) {
-    std::visit([&](const auto& alternative) { describe(*this, alternative); }, x);
-  }
-
- private:
-  F on_index_;
-};
 
 class ValueChecker {
  public:
@@ -173,7 +101,8 @@ class ValueChecker {
                   outside(f.crop_offset[1], f.crop_size.height, f.size.height)))
       wrong_ = "scene.film: the crop is not within the frame";
   }
-  // Checks the nesting depth of textures by repeated passes over the list: as many as textures may nest.
+  // Computes the nesting depths of textures by repeated passes over the list, until none changes. Allowed
+  // scenes take at most kMaxReferenceDepth + 1 passes.
   void check_texture_nesting() {
     std::vector<int> depth(s_.textures.size(), 0);
     for (int round = 0; round <= kMaxReferenceDepth; ++round) {

@@ -10,16 +10,10 @@
 namespace ls::scene {
 namespace {
 
-struct TagRow {
-  std::string_view tag;
-  TagKind kind;
-  std::vector<std::string> required, optional;
-};
-
 const std::vector<TagRow>& tags() {
   static const std::vector<TagRow> rows = [] {
     std::vector<TagRow> r;
-    r.push_back({"scene", TagKind::object, {"version"}, {"type", "id", "name"}});
+    r.push_back({"scene", TagKind::object, {}, {"version", "type", "id", "name"}});
     for (const char* tag : {"integrator", "sensor", "film", "rfilter", "sampler", "shape", "bsdf", "emitter",
                             "texture", "volume", "medium", "phase"})
       r.push_back({tag, TagKind::object, {"type"}, {"id", "name"}});
@@ -80,20 +74,8 @@ class StructureChecker {
   }
 
   void check_attributes(const Element& e, const TagRow& row) {
-    for (const Attribute& a : e.attributes) {
-      if (report_.full()) return;
-      const auto is = [&](const std::string& name) { return name == a.name; };
-      if (std::any_of(row.required.begin(), row.required.end(), is) ||
-          std::any_of(row.optional.begin(), row.optional.end(), is))
-        continue;
-      std::vector<std::string> known = row.required;
-      known.insert(known.end(), row.optional.begin(), row.optional.end());
-      report_.error(a.name_at,
-                    fmt::format("<{}> has no attribute '{}'{}", e.tag, a.name, suggestion(a.name, known)));
-    }
-    for (const std::string& name : row.required)
-      if (!e.find(name) && !(name == "version"))
-        report_.error(e.at, fmt::format("<{}> needs the attribute '{}'", e.tag, name));
+    scene::check_attributes(e, row, report_);
+    if (report_.full()) return;
     const bool triple = e.tag == "vector" || e.tag == "point";
     if (triple && !e.find("value") && !(e.find("x") && e.find("y") && e.find("z")))
       report_.error(e.at, fmt::format("<{}> needs x, y and z, or value", e.tag));
@@ -145,6 +127,22 @@ class StructureChecker {
 };
 
 }  // namespace
+
+void check_attributes(const Element& e, const TagRow& row, Report& report) {
+  for (const Attribute& a : e.attributes) {
+    if (report.full()) return;
+    const auto is = [&](const std::string& name) { return name == a.name; };
+    if (std::any_of(row.required.begin(), row.required.end(), is) ||
+        std::any_of(row.optional.begin(), row.optional.end(), is))
+      continue;
+    std::vector<std::string> known = row.required;
+    known.insert(known.end(), row.optional.begin(), row.optional.end());
+    report.error(a.name_at,
+                 fmt::format("<{}> has no attribute '{}'{}", e.tag, a.name, suggestion(a.name, known)));
+  }
+  for (const std::string& name : row.required)
+    if (!e.find(name)) report.error(e.at, fmt::format("<{}> needs the attribute '{}'", e.tag, name));
+}
 
 TagKind kind_of(const Element& e) {
   const TagRow* row = row_of(e);

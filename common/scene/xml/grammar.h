@@ -4,12 +4,22 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "common/scene/xml/document.h"
 
 namespace ls::scene {
 
 enum class TagKind { object, property, transform, step, reference, alias, unknown };
+
+// An element of a format, its kind and its attributes.
+struct TagRow {
+  std::string_view tag;
+  TagKind kind;
+  std::vector<std::string> required, optional;
+};
+// Reports attributes that the row does not have, and required ones that are missing.
+void check_attributes(const Element& e, const TagRow& row, Report& report);
 
 TagKind kind_of(const Element& e);  // for example, a <spectrum type="..."> is an object
 

@@ -1,11 +1,17 @@
 #include "common/scene/xml/source_text.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <string_view>
 #include <utility>
 
+#include "common/base/safe_text.h"
+#include "common/scene/diagnostic.h"
 #include "common/scene/limits.h"
 
-namespace ls::scene {
+namespace ls {
+namespace scene {
 namespace {
 
 constexpr std::size_t kBlock = 4096;
@@ -38,6 +44,34 @@ std::size_t sequence_length(std::string_view text) {
   const bool overlong = (lead == 0xE0 && at(1) < 0xA0) || (lead == 0xF0 && at(1) < 0x90);
   const bool out_of_range = (lead == 0xED && at(1) > 0x9F) || (lead == 0xF4 && at(1) > 0x8F);
   return overlong || out_of_range ? 0 : n;
+}
+
+// Returns the bytes of the characters [first, last).
+std::string_view characters(std::string_view text, std::size_t first, std::size_t last) {
+  std::size_t begin = text.size(), end = text.size(), n = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (is_continuation(text[i])) continue;
+    if (n == first) begin = i;
+    if (n == last) {
+      end = i;
+      break;
+    }
+    ++n;
+  }
+  return begin < end ? text.substr(begin, end - begin) : std::string_view{};
+}
+
+// Returns the line with a caret under the error's position. Only the relevant part of a long line is shown.
+std::string excerpt(const Diagnostic& d) {
+  const std::size_t column = static_cast<std::size_t>(std::max(1, d.place.column)) - 1;
+  const std::size_t first = column > kMaxExcerptBytes / 2 ? column - kMaxExcerptBytes / 2 : 0;
+  // plain_text() does not change columns, so the caret's position is right.
+  const std::string line = plain_text(characters(d.source_line, first, first + kMaxExcerptBytes));
+  const std::string number = std::to_string(d.place.line);
+  const std::size_t room = first + kMaxExcerptBytes - column;
+  const std::size_t length = std::min<std::size_t>(static_cast<std::size_t>(std::max(1, d.length)), room);
+  return fmt::format("  {} | {}\n  {} | {}^{}\n", number, line, std::string(number.size(), ' '),
+                     std::string(column - first, ' '), std::string(length - 1, '~'));
 }
 
 }  // namespace
@@ -109,4 +143,62 @@ std::size_t find_invalid_utf8(std::string_view text) {
   return std::string_view::npos;
 }
 
-}  // namespace ls::scene
+const std::size_t Report::kMax = kMaxDiagnostics;
+
+std::uint32_t Report::add_file(SourceText file) {
+  files_.push_back(std::move(file));
+  return static_cast<std::uint32_t>(files_.size() - 1);
+}
+
+void Report::error(const Span& at, std::string text) {
+  add(Diagnostic::Severity::error, at, std::move(text));
+}
+
+void Report::warning(const Span& at, std::string text) {
+  add(strict_ ? Diagnostic::Severity::error : Diagnostic::Severity::warning, at, std::move(text));
+}
+
+void Report::add(Diagnostic::Severity severity, const Span& at, std::string text) {
+  // Errors and warnings are counted separately, so that warnings never displace an error. take() applies the
+  // common limit.
+  std::size_t& count = severity == Diagnostic::Severity::error ? errors_ : warnings_;
+  if (count++ >= kMax) return;
+  Diagnostic d = files_[at.file].diagnose(severity, at.offset, at.length, std::move(text));
+  if (std::find(found_.begin(), found_.end(), d) == found_.end()) found_.push_back(std::move(d));
+}
+
+std::string Report::refer_to(const Span& there, const Span& here) const {
+  const SourceText& file = files_[there.file];
+  const int line = file.line(there.offset);
+  return there.file == here.file ? fmt::format("line {}", line)
+                                 : fmt::format("{}, line {}", file.name(), line);
+}
+
+std::vector<Diagnostic> Report::take() {
+  if (found_.size() > kMax) {
+    std::stable_partition(found_.begin(), found_.end(),
+                          [](const Diagnostic& d) { return d.severity == Diagnostic::Severity::error; });
+    found_.resize(kMax);
+  }
+  return std::exchange(found_, {});
+}
+
+}  // namespace scene
+
+std::string format_diagnostic(const Diagnostic& d) {
+  const char* severity = d.severity == Diagnostic::Severity::error ? "error" : "warning";
+  const std::string file = plain_text(d.place.file), what = plain_text(d.text);
+  std::string text =
+      d.place.line > 0 ? fmt::format("{}:{}:{}: {}: {}\n", file, d.place.line, d.place.column, severity, what)
+                       : fmt::format("{}: {}: {}\n", file, severity, what);
+  if (!d.source_line.empty() && d.place.line > 0) text += scene::excerpt(d);
+  return text;
+}
+
+std::string format_diagnostics(const std::vector<Diagnostic>& all) {
+  std::string text;
+  for (const Diagnostic& d : all) text += format_diagnostic(d);
+  return text;
+}
+
+}  // namespace ls

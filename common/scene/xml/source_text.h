@@ -1,9 +1,11 @@
-// The text of a scene file, and positions in it.
+// The texts of scene files, positions in them, and a report of diagnostics about them.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,8 +25,8 @@ struct Span {
 
 class SourceText {
  public:
-  // A function that returns the path in the document of the value at an offset. Messages about that place
-  // begin with the path. An empty function: the text has no paths.
+  // Returns the path of the value at an offset in a JSON document. Messages about this place begin with the
+  // path. An empty function: the text is not JSON.
   using PathOf = std::function<std::string(std::size_t)>;
   SourceText(std::string name, std::string text, PathOf path_of = {});
 
@@ -54,5 +56,42 @@ std::size_t find_invalid_utf8(std::string_view text);
 // Returns the offset of the first control character in well-formed UTF-8 (below U+0020 except tabs and line
 // ends, U+007F to U+009F); npos if there is none.
 std::size_t find_control(std::string_view text);
+
+// Collects the diagnostics while a scene is read, up to kMaxDiagnostics.
+class Report {
+ public:
+  explicit Report(bool strict) : strict_(strict) {}
+
+  // Adds a file, which is kept as long as the report. Returns its index for Span::file.
+  std::uint32_t add_file(SourceText file);
+  const SourceText& file(std::uint32_t index) const { return files_[index]; }
+
+  void error(const Span& at, std::string text);
+  std::nullopt_t refuse(const Span& at, std::string text) {  // reports an error, returns nullopt
+    error(at, std::move(text));
+    return std::nullopt;
+  }
+  void warning(const Span& at, std::string text);  // becomes an error under --strict
+
+  bool has_errors() const { return errors_ > 0; }
+  // True if further errors would not be shown, so that reading may stop
+  bool full() const { return errors_ >= kMax; }
+  // True if a further warning would be shown; check this before composing a warning that costs much time.
+  bool takes_warnings() const { return (strict_ ? errors_ : warnings_) < kMax; }
+  // Returns text that refers to the place `there` in a message about `here`: "line 9", with the file's name
+  // if the two are in different files.
+  std::string refer_to(const Span& there, const Span& here) const;
+  // Returns the diagnostics in the order found; if there are too many, errors are kept before warnings
+  std::vector<Diagnostic> take();
+
+ private:
+  static const std::size_t kMax;
+  void add(Diagnostic::Severity severity, const Span& at, std::string text);
+
+  bool strict_;
+  std::deque<SourceText> files_;
+  std::vector<Diagnostic> found_;
+  std::size_t errors_ = 0, warnings_ = 0;
+};
 
 }  // namespace ls::scene

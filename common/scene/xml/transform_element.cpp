@@ -21,6 +21,11 @@ std::optional<Vec3> unit(const Vec3& v) {
   return Vec3{{v[0] / length, v[1] / length, v[2] / length}};
 }
 
+Transform of_columns(const Vec3& x, const Vec3& y, const Vec3& z, const Vec3& origin) {
+  return {
+      {x[0], y[0], z[0], origin[0], x[1], y[1], z[1], origin[1], x[2], y[2], z[2], origin[2], 0, 0, 0, 1}};
+}
+
 namespace {
 
 constexpr double kUnitSlack = 1e-3;  // tolerance for an axis written with three digits
@@ -56,23 +61,21 @@ Vec3 some_up(const Vec3& n) {
 
 // Returns the matrix from camera space to world: +z points from origin to target, +x to the left.
 std::optional<Transform> look_at(const Vec3& origin, const Vec3& target, Vec3 up) {
-  const Vec3 way{target[0] - origin[0], target[1] - origin[1], target[2] - origin[2]};
+  const Vec3 way = minus(target, origin);
   if (is_zero(way)) return std::nullopt;
   const Vec3 dir = normalized(way);
   if (is_zero(up)) up = some_up(dir);
   const Vec3 across = cross(up, dir);
   if (is_zero(across)) return std::nullopt;
-  const Vec3 left = normalized(across), true_up = cross(dir, left);
-  return Transform{{left[0], true_up[0], dir[0], origin[0], left[1], true_up[1], dir[1], origin[1], left[2],
-                    true_up[2], dir[2], origin[2], 0, 0, 0, 1}};
+  const Vec3 left = normalized(across);
+  return of_columns(left, cross(dir, left), dir, origin);
 }
 
 std::optional<Vec3> read_triple(const Element& e, std::string_view attribute, Report& report) {
   const auto numbers = parse_numbers(e.get(attribute), 3);
   if (numbers && numbers->size() == 3) return Vec3{(*numbers)[0], (*numbers)[1], (*numbers)[2]};
-  report.error(value_place(e, attribute), fmt::format("'{}' of <{}> wants three numbers, not \"{}\"",
-                                                      attribute, e.tag, e.get(attribute)));
-  return std::nullopt;
+  return report.refuse(value_place(e, attribute), fmt::format("'{}' of <{}> wants three numbers, not \"{}\"",
+                                                              attribute, e.tag, e.get(attribute)));
 }
 
 std::optional<Transform> read_lookat(const Element& e, Report& report) {
@@ -88,19 +91,15 @@ std::optional<Transform> read_lookat(const Element& e, Report& report) {
 
 std::optional<Transform> read_matrix(const Element& e, Report& report) {
   const auto numbers = parse_numbers(e.get("value"), 16);
-  if (!numbers || (numbers->size() != 9 && numbers->size() != 16)) {
-    report.error(value_place(e, "value"), "<matrix> wants 9 or 16 numbers, row by row");
-    return std::nullopt;
-  }
+  if (!numbers || (numbers->size() != 9 && numbers->size() != 16))
+    return report.refuse(value_place(e, "value"), "<matrix> wants 9 or 16 numbers, row by row");
   Transform t;
   const std::size_t n = numbers->size() == 16 ? 4 : 3;
   for (std::size_t i = 0; i < n; ++i)
     for (std::size_t j = 0; j < n; ++j) t.m[4 * i + j] = (*numbers)[n * i + j];
-  if (t.m[12] != 0 || t.m[13] != 0 || t.m[14] != 0 || t.m[15] != 1) {
-    report.error(value_place(e, "value"),
-                 "the last row of a <matrix> must be 0 0 0 1: perspective is no placement");
-    return std::nullopt;
-  }
+  if (t.m[12] != 0 || t.m[13] != 0 || t.m[14] != 0 || t.m[15] != 1)
+    return report.refuse(value_place(e, "value"),
+                         "the last row of a <matrix> must be 0 0 0 1: perspective is no placement");
   return t;
 }
 
@@ -111,10 +110,8 @@ std::optional<Transform> read_rotate(const Element& e, Report& report) {
     report.error(value_place(e, "angle"),
                  fmt::format("'angle' of <rotate> wants a number of degrees, not \"{}\"", e.get("angle")));
   if (!axis || !angle) return std::nullopt;
-  if (is_zero(*axis)) {
-    report.error(e.at, "<rotate> needs an axis: x=\"1\", y=\"1\", z=\"1\" or a mixture");
-    return std::nullopt;
-  }
+  if (is_zero(*axis))
+    return report.refuse(e.at, "<rotate> needs an axis: x=\"1\", y=\"1\", z=\"1\" or a mixture");
   // Mitsuba 3 uses the numbers unnormalised, which makes the step a shear; this is never intended.
   const double length = std::sqrt(dot(*axis, *axis));
   if (std::abs(length - 1) > kUnitSlack)
@@ -159,10 +156,7 @@ Vec3 transform_point(const Transform& t, const Vec3& p) {
   return {v[0] + t.m[3], v[1] + t.m[7], v[2] + t.m[11]};
 }
 
-double determinant3(const Transform& t) {
-  const Vec3 a{t.m[0], t.m[4], t.m[8]}, b{t.m[1], t.m[5], t.m[9]}, c{t.m[2], t.m[6], t.m[10]};
-  return dot(a, cross(b, c));
-}
+double determinant3(const Transform& t) { return dot(column(t, 0), cross(column(t, 1), column(t, 2))); }
 
 bool invertible(const Transform& t) {
   const auto finite = [](double x) { return std::isfinite(x); };
@@ -171,8 +165,7 @@ bool invertible(const Transform& t) {
   if (!std::all_of(t.m.begin(), t.m.end(), finite) || !std::isnormal(d)) return false;
   // The inverse may overflow although the determinant is normal: the renderer, which computes it by these
   // products too, would refuse the matrix only when it builds the world.
-  const Vec3 a{t.m[0], t.m[4], t.m[8]}, b{t.m[1], t.m[5], t.m[9]}, c{t.m[2], t.m[6], t.m[10]},
-      moved{t.m[3], t.m[7], t.m[11]};
+  const Vec3 a = column(t, 0), b = column(t, 1), c = column(t, 2), moved = origin_of(t);
   for (const Vec3& cofactors : {cross(b, c), cross(c, a), cross(a, b)}) {
     const Vec3 row{cofactors[0] * (1 / d), cofactors[1] * (1 / d), cofactors[2] * (1 / d)};
     if (!std::all_of(row.begin(), row.end(), finite) || !finite(dot(row, moved))) return false;
@@ -192,7 +185,7 @@ bool is_rigid(const Transform& t) {
 }
 
 bool is_similarity(const Transform& t) {
-  const Vec3 columns[3] = {{t.m[0], t.m[4], t.m[8]}, {t.m[1], t.m[5], t.m[9]}, {t.m[2], t.m[6], t.m[10]}};
+  const Vec3 columns[3] = {column(t, 0), column(t, 1), column(t, 2)};
   const double size = dot(columns[0], columns[0]);
   // Files often have six digits, so that squares differ by a few 1e-6.
   const double slack = 1e-5 * size;
@@ -223,26 +216,21 @@ Transform read_transform(const Element& e, Report& report) {
 std::optional<Vec3> read_xyz(const Element& e, double missing, Report& report) {
   static constexpr std::string_view kAxes[] = {"x", "y", "z"};
   if (e.find("value")) {
-    if (e.find("x") || e.find("y") || e.find("z")) {
-      report.error(e.at, fmt::format("<{}> gives both value and x, y, z", e.tag));
-      return std::nullopt;
-    }
+    if (e.find("x") || e.find("y") || e.find("z"))
+      return report.refuse(e.at, fmt::format("<{}> gives both value and x, y, z", e.tag));
     const auto numbers = parse_numbers(e.get("value"), 3);
     if (numbers && numbers->size() == 1) return Vec3{(*numbers)[0], (*numbers)[0], (*numbers)[0]};
     if (numbers && numbers->size() == 3) return Vec3{(*numbers)[0], (*numbers)[1], (*numbers)[2]};
-    report.error(value_place(e, "value"),
-                 fmt::format("<{}> wants one or three numbers, not \"{}\"", e.tag, e.get("value")));
-    return std::nullopt;
+    return report.refuse(value_place(e, "value"),
+                         fmt::format("<{}> wants one or three numbers, not \"{}\"", e.tag, e.get("value")));
   }
   Vec3 v{missing, missing, missing};
   for (std::size_t i = 0; i < 3; ++i) {
     if (!e.find(kAxes[i])) continue;
     const auto x = parse_number(e.get(kAxes[i]));
-    if (!x) {
-      report.error(value_place(e, kAxes[i]),
-                   fmt::format("'{}' of <{}> wants a number, not \"{}\"", kAxes[i], e.tag, e.get(kAxes[i])));
-      return std::nullopt;
-    }
+    if (!x)
+      return report.refuse(value_place(e, kAxes[i]), fmt::format("'{}' of <{}> wants a number, not \"{}\"",
+                                                                 kAxes[i], e.tag, e.get(kAxes[i])));
     v[i] = *x;
   }
   return v;

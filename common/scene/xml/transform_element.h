@@ -8,8 +8,12 @@ namespace ls::scene {
 
 double dot(const Vec3& a, const Vec3& b);
 Vec3 cross(const Vec3& a, const Vec3& b);
+inline Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 std::optional<Vec3> unit(const Vec3& v);  // nullopt: v has no length, or one that is not finite
 
+// Returns a column of the matrix: 0 to 2 are the images of the axes, 3 is that of the origin.
+inline Vec3 column(const Transform& t, std::size_t i) { return {t.m[i], t.m[4 + i], t.m[8 + i]}; }
+Transform of_columns(const Vec3& x, const Vec3& y, const Vec3& z, const Vec3& origin);
 Transform multiply(const Transform& a, const Transform& b);
 Vec3 transform_point(const Transform& t, const Vec3& p);  // uses the affine part only
 Vec3 transform_vector(const Transform& t, const Vec3& v);

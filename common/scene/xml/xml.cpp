@@ -70,17 +70,14 @@ class TreeBuilder {
     out.tag = node.name();
     out.at = {file_, static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, node.offset_debug())),
               out.tag.size()};
-    if (depth > kMaxNesting) {
-      report_.error(out.at, fmt::format("elements are nested more than {} deep", kMaxNesting));
-      return false;
-    }
+    if (depth > kMaxNesting)
+      return report_.error(out.at, fmt::format("elements are nested more than {} deep", kMaxNesting)), false;
     if (!read_attributes(node, out)) return false;
     for (const pugi::xml_node child : node.children()) {
-      if (child.type() == pugi::node_pcdata || child.type() == pugi::node_cdata) {
-        report_.error(out.at,
-                      fmt::format("text inside <{}>: a scene says everything in attributes", out.tag));
-        return false;
-      }
+      if (child.type() == pugi::node_pcdata || child.type() == pugi::node_cdata)
+        return report_.error(out.at,
+                             fmt::format("text inside <{}>: a scene says everything in attributes", out.tag)),
+               false;
       if (child.type() != pugi::node_element) continue;
       out.children.emplace_back();
       if (!build(child, out.children.back(), depth + 1)) return false;
@@ -93,27 +90,22 @@ class TreeBuilder {
     AttributePlaces places(file_, text_, out.at.offset);
     for (const pugi::xml_attribute attribute : node.attributes()) {
       // This limit also keeps the search for duplicate names short.
-      if (out.attributes.size() == kMaxElementAttributes) {
-        report_.error(out.at,
-                      fmt::format("<{}> has more than {} attributes", out.tag, kMaxElementAttributes));
-        return false;
-      }
+      if (out.attributes.size() == kMaxElementAttributes)
+        return report_.error(out.at,
+                             fmt::format("<{}> has more than {} attributes", out.tag, kMaxElementAttributes)),
+               false;
       Attribute a{attribute.name(), attribute.value(), {}, {}};
       places.next(a);
-      if (out.find(a.name)) {
-        report_.error(a.name_at, fmt::format("<{}> has the attribute '{}' twice", out.tag, a.name));
-        return false;
-      }
+      if (out.find(a.name))
+        return report_.error(a.name_at, fmt::format("<{}> has the attribute '{}' twice", out.tag, a.name)),
+               false;
       if (const auto wrong = unprintable(a, text_.substr(a.value_at.offset, a.value_at.length));
-          !wrong.empty()) {
-        report_.error(a.value_at, fmt::format("the value of '{}' has {} in it", a.name, wrong));
-        return false;
-      }
-      if (a.value.size() > kMaxValueBytes) {
-        report_.error(a.name_at,
-                      fmt::format("the value of '{}' is longer than {} bytes", a.name, kMaxValueBytes));
-        return false;
-      }
+          !wrong.empty())
+        return report_.error(a.value_at, fmt::format("the value of '{}' has {} in it", a.name, wrong)), false;
+      if (a.value.size() > kMaxValueBytes)
+        return report_.error(a.name_at, fmt::format("the value of '{}' is longer than {} bytes", a.name,
+                                                    kMaxValueBytes)),
+               false;
       out.attributes.push_back(std::move(a));
     }
     return true;
@@ -158,11 +150,10 @@ std::size_t find_open_quote(std::string_view text) {
 void malformed(std::uint32_t file, const pugi::xml_parse_result& result, Report& report) {
   const std::string& text = report.file(file).text();
   if (const std::size_t quote = find_open_quote(text); quote != std::string_view::npos)
-    return report.error(
-        {file, quote, 1},
-        fmt::format("malformed XML: the quote {} that opens here is not closed before the next "
-                    "element (a '<' in a value is written &lt;)",
-                    text[quote]));
+    return report.error({file, quote, 1},
+                        fmt::format("malformed XML: the quote {} that opens here is not closed before the "
+                                    "next element (a '<' in a value is written &lt;)",
+                                    text[quote]));
   const auto offset = static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, result.offset));
   report.error({file, offset, 1}, fmt::format("malformed XML: {}", result.description()));
 }
@@ -184,27 +175,12 @@ bool small_enough(std::uint32_t file, std::string_view text, Report& report, std
 
 }  // namespace
 
-const Attribute* Element::find(std::string_view attribute) const {
-  const auto it = std::find_if(attributes.begin(), attributes.end(),
-                               [&](const Attribute& a) { return a.name == attribute; });
-  return it == attributes.end() ? nullptr : &*it;
-}
-
-std::string_view Element::get(std::string_view attribute) const {
-  const Attribute* a = find(attribute);
-  return a ? std::string_view(a->value) : std::string_view{};
-}
-
 std::optional<Element> parse_xml(std::uint32_t file, Report& report, std::size_t& elements_left) {
   const std::string& text = report.file(file).text();
-  if (const std::size_t bad = find_invalid_utf8(text); bad != std::string_view::npos) {
-    report.error({file, bad, 1}, "this is not UTF-8 text");
-    return std::nullopt;
-  }
-  if (const std::size_t nul = text.find('\0'); nul != std::string::npos) {
-    report.error({file, nul, 1}, "a zero byte in the text");
-    return std::nullopt;
-  }
+  if (const std::size_t bad = find_invalid_utf8(text); bad != std::string_view::npos)
+    return report.refuse({file, bad, 1}, "this is not UTF-8 text");
+  if (const std::size_t nul = text.find('\0'); nul != std::string::npos)
+    return report.refuse({file, nul, 1}, "a zero byte in the text");
   if (!small_enough(file, text, report, elements_left)) return std::nullopt;
 
   pugi::xml_document xml;
@@ -216,15 +192,12 @@ std::optional<Element> parse_xml(std::uint32_t file, Report& report, std::size_t
     return std::nullopt;
   }
   const pugi::xml_node root = xml.document_element();
-  if (!root) {
-    report.error({file, 0, 1}, "no XML element in this file: it is empty or not XML");
-    return std::nullopt;
-  }
+  if (!root) return report.refuse({file, 0, 1}, "no XML element in this file: it is empty or not XML");
   for (pugi::xml_node other = root.next_sibling(); other; other = other.next_sibling()) {
     if (other.type() != pugi::node_element) continue;
-    report.error({file, static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, other.offset_debug())), 1},
-                 "a second root element: everything belongs into one <scene>");
-    return std::nullopt;
+    return report.refuse(
+        {file, static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, other.offset_debug())), 1},
+        "a second root element: everything belongs into one <scene>");
   }
   Element tree;
   if (!TreeBuilder(file, report).build(root, tree, 1)) return std::nullopt;

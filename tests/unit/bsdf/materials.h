@@ -8,7 +8,7 @@
 #include <string>
 
 #include "common/base/clock.h"
-#include "common/scene/schema/bsdf_traits.h"
+#include "common/scene/schema/traits.h"
 #include "worker/render/bsdf/bsdf.h"
 
 namespace ls::render::test {

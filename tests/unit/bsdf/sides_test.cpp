@@ -4,8 +4,8 @@
 
 #include <random>
 
-#include "common/scene/schema/bsdf_traits.h"
 #include "common/scene/schema/describe_fields.h"
+#include "common/scene/schema/traits.h"
 #include "tests/unit/bsdf/materials.h"
 
 namespace ls::render::test {

@@ -1,4 +1,4 @@
-// One of everything that Nori's files can say, on lines of their own.
+// A Nori scene with one object of each kind, each on a line of its own.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@ namespace ls {
 inline const std::string kNoriCamera =
     R"(<integrator type="path_mis"/><camera type="perspective"><integer name="width" value="8"/><integer name="height" value="8"/></camera>)";
 
-// A Nori scene of these objects and a camera; the objects begin in line 2, column 1.
+// Returns a Nori scene of these objects and a camera. The objects begin in line 2, column 1.
 inline std::string nori_scene(std::string_view objects) {
   return fmt::format("<scene>\n{}\n{}</scene>\n", objects, kNoriCamera);
 }

@@ -1,4 +1,4 @@
-// What the tests of scene reading share: files in memory, and scenes that name them.
+// Shared by the tests of scene reading: files in memory, and scenes that name them.
 #pragma once
 
 #include <fmt/format.h>
@@ -39,15 +39,15 @@ class MemoryAssets final : public AssetSource {
 inline const std::string kSensor =
     R"(<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film></sensor>)";
 
-// Read without a word, but that the camera, which stands at the origin where nothing else is said, is inside
-// of the medium that the test is about.
+// True if there is no diagnostic, except the warning that the camera is inside a medium. Many tests get this
+// warning, since their camera is at the origin by default.
 inline bool quiet(const ReadResult& r) {
   return std::all_of(r.diagnostics.begin(), r.diagnostics.end(), [](const Diagnostic& d) {
     return d.severity == Diagnostic::Severity::warning && d.text.starts_with("the camera is inside");
   });
 }
 
-// A scene of these objects and a camera; the objects begin in line 2, column 1.
+// Returns a scene of these objects and a camera. The objects begin in line 2, column 1.
 inline std::string with_sensor(std::string_view objects) {
   return fmt::format("<scene version=\"3.0.0\">\n{}\n{}</scene>\n", objects, kSensor);
 }
@@ -66,7 +66,7 @@ inline Scene must_read(std::string_view text, const ReadOptions& options = {}) {
   return std::move(*r.scene);
 }
 
-// One of everything that can be read; on lines of their own, so that places are telling.
+// A scene with one object of each kind, each on a line of its own, so that a diagnostic's line identifies it.
 inline const std::string kExample = R"(<scene version="3.0.0">
   <default name="spp" value="16"/>
   <integrator type="volpathmis">

@@ -12,7 +12,7 @@
 #include <tuple>
 #include <vector>
 
-#include "common/scene/schema/bsdf_traits.h"
+#include "common/scene/schema/traits.h"
 #include "worker/render/bsdf/lobes.h"
 #include "worker/render/bsdf/microfacet_energy.h"
 #include "worker/render/bsdf/rough_plastic_table.h"

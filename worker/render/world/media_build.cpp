@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "common/base/overloaded.h"
-#include "common/scene/schema/medium_traits.h"
+#include "common/scene/schema/traits.h"
 #include "worker/render/math/blackbody.h"
 #include "worker/render/math/color.h"
 #include "worker/render/media/grid_load.h"

@@ -1,5 +1,5 @@
-// Media that no path of light gets into are taken out of the scene, and those that one may get into stay; and
-// of media that scatter nothing the phase function.
+// Pruning removes media that no camera path enters, and the phase functions of media that do not scatter. All
+// other media stay.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ Pruned pruned(const Scene& s) {
 }
 Pruned pruned(std::string_view objects) { return pruned(must_read(with_sensor(objects))); }
 
-// The camera stands at the origin and looks along +z.
+// The camera is at the origin and looks along +z.
 const std::string kAhead = R"(<transform name="to_world"><translate z="5"/></transform>)";
 const std::string kGrid =
     R"(<medium type="heterogeneous" name="interior"><volume type="gridvolume" name="sigma_t"><string name="filename" value="cloud.vol"/></volume></medium>)";
@@ -120,7 +120,7 @@ TEST(PruneInteriors, StayAroundTheCamera) {
   }
 }
 
-// There rays begin.
+// Camera rays begin on the near plane.
 TEST(PruneInteriors, StayWhereTheCamerasNearPlaneMayBe) {
   Scene s = must_read(with_sensor(cube(kWhole + kFog)));
   EXPECT_EQ(pruned(s).scene.media.size(), 0u);
@@ -128,7 +128,7 @@ TEST(PruneInteriors, StayWhereTheCamerasNearPlaneMayBe) {
   EXPECT_EQ(pruned(s).scene.media.size(), 1u);
   s.sensor.projection = Projection::orthographic;
   EXPECT_EQ(pruned(s).scene.media.size(), 1u);
-  s.sensor.projection = Projection::spherical;  // has none
+  s.sensor.projection = Projection::spherical;  // has no near plane
   EXPECT_EQ(pruned(s).scene.media.size(), 0u);
 }
 
@@ -146,31 +146,31 @@ TEST(PruneInteriors, StayAroundLights) {
   EXPECT_EQ(media(body + shape("sphere", at(0, 0, 5, .5) + kGrey + kArea)), 1u);
   EXPECT_EQ(media(body + shape("rectangle", at(0, 0, 4, 3) + kGrey + kArea)), 1u);
   EXPECT_EQ(media(body + shape("rectangle", at(0, 0, 3, 3) + kGrey + kArea)), 0u);
-  EXPECT_EQ(media(body + shape("sphere", at(0, 0, 0, 50) + kGrey + kArea)), 0u);  // the sky
+  EXPECT_EQ(media(body + shape("sphere", at(0, 0, 0, 50) + kGrey + kArea)), 0u);  // encloses the cube
   EXPECT_EQ(media(cube(kWhole + kFog + kArea)), 1u);
   EXPECT_EQ(media(cube(kWhole + kFire)), 1u);
   EXPECT_EQ(media(body + shape("sphere", at(0, 1, 5) + kWhole + kFire)), 2u);
 }
 
-// Two surfaces in one place are one: a path may go through the one that lets it.
+// Where two surfaces coincide, a path may pass through the one that transmits.
 TEST(PruneInteriors, StayWhereASurfaceThatLightPassesTouchesTheBody) {
   const std::string body = cube(kWhole + kFog);
   EXPECT_EQ(media(body + cube(kGlassWithInterior)), 1u);
   EXPECT_EQ(media(body + shape("cube", at(2, 0, 5) + kGlassWithInterior)), 1u);
   EXPECT_EQ(media(body + shape("cube", at(2.1, 0, 5) + kGlassWithInterior)), 0u);
   EXPECT_EQ(media(body + shape("cylinder", at(0, 0, 5) + kGlassWithInterior)), 1u);
-  EXPECT_EQ(media(body + shape("sphere", at(0, 0, 5, 9) + kGlassWithInterior)), 0u);  // around it
+  EXPECT_EQ(media(body + shape("sphere", at(0, 0, 5, 9) + kGlassWithInterior)), 0u);  // encloses the cube
   EXPECT_EQ(media(body + shape("obj", R"(<string name="filename" value="mesh.obj"/>)" + kGlassWithInterior)),
             1u);
   EXPECT_EQ(media(body + shape("obj", R"(<string name="filename" value="mesh.obj"/>)" + kGrey)), 0u);
-  EXPECT_EQ(media(body + cube(bsdf("null"))), 0u);  // is no surface
+  EXPECT_EQ(media(body + cube(bsdf("null"))), 0u);  // prune.cpp removes this surface
   const std::string group =
       "<shape type=\"shapegroup\" id=\"g\">" + shape("disk", kGlassWithInterior) + "</shape>";
-  EXPECT_EQ(media(body + group), 0u);  // stands nowhere
+  EXPECT_EQ(media(body + group), 0u);  // has no instance
   EXPECT_EQ(media(body + group + R"(<shape type="instance"><ref id="g"/></shape>)"), 1u);
 }
 
-// Of which sides a material is black behind, whatever is there: no path leaves the surface to that side.
+// If the back of a surface is black, no path leaves the surface to that side, whatever is there.
 TEST(PruneInteriors, BehindABlackBackGoWhateverLiesAbout) {
   const std::string mesh = R"(<string name="filename" value="mesh.obj"/>)",
                     flat = R"(<boolean name="face_normals" value="true"/>)";
@@ -181,10 +181,10 @@ TEST(PruneInteriors, BehindABlackBackGoWhateverLiesAbout) {
   EXPECT_EQ(media(shape("rectangle", kAhead + kWhole + kFog)), 1u);
   EXPECT_EQ(media(shape("obj", mesh + flat + kGrey + kFog)), 0u);
   EXPECT_EQ(media(shape("obj", mesh + flat + kWhole + kFog)), 1u);
-  EXPECT_EQ(media(shape("obj", mesh + kGrey + kFog)), 1u);  // its file may turn the sides round
+  EXPECT_EQ(media(shape("obj", mesh + kGrey + kFog)), 1u);  // normals in its file may swap its sides
 }
 
-// A flipped body has its interior outside, and that of a mirrored one may be before its front.
+// Flipped normals put the interior medium on the outside of a shape, and mirroring may put it in front.
 TEST(PruneInteriors, OfBodiesTurnedRoundStay) {
   const std::string flip = R"(<boolean name="flip_normals" value="true"/>)";
   EXPECT_EQ(media(cube(flip + kWhole + kFog)), 1u);
@@ -199,7 +199,8 @@ TEST(PruneInteriors, OfBodiesInGroupsStay) {
   EXPECT_EQ(media(group + R"(<shape type="instance"><ref id="g"/></shape>)"), 1u);
 }
 
-// A medium that does nothing but keep others out has nobody left to keep out.
+// A medium without effect is kept only if it displaces other media. After these are removed, it is removed
+// too.
 TEST(PruneInteriors, TakeThoseAlongThatOnlyMatterToThem) {
   const std::string gap =
       R"(<medium type="homogeneous" name="interior"><float name="scale" value="0"/><integer name="priority" value="1"/></medium>)";

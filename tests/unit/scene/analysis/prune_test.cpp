@@ -1,5 +1,5 @@
-// What is taken out of a scene because no pixel depends on it, and what must stay; and what of the rest the
-// renderer needs.
+// Pruning removes the parts of a scene that no pixel depends on, and keeps all others. Also tests the needs
+// of the pruned scenes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

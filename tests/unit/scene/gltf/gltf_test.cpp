@@ -1,4 +1,4 @@
-// glTF's files: nodes, meshes, cameras and lights, and what they become.
+// Translation of glTF's nodes, meshes, cameras and lights.
 #include "tests/unit/scene/gltf/gltf_testing.h"
 
 #include <cmath>
@@ -9,7 +9,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// The floats behind the header of the only .ply that was made, and the corners of its triangles.
+// The only .ply file that was made. `numbers` are the floats of its corners, `corners` those of its
+// triangles.
 struct Ply {
   std::string header;
   std::vector<float> numbers;
@@ -132,7 +133,7 @@ TEST(Gltf, IndicesAreOfThreeKinds) {
 
 TEST(Gltf, NumbersMayBeInterleavedAndSparse) {
   GltfFile file;
-  // Two corners' places with a number between, and a third that the sparse part gives.
+  // The positions of two corners, each followed by a number to skip; the third comes from the sparse part.
   file.add(Floats{1, 2, 3, -1, 4, 5, 6, -1, 0, 0, 0, -1}, "SCALAR");
   file.j["bufferViews"][1]["byteStride"] = 16;
   file.j["accessors"][1]["type"] = "VEC3";
@@ -182,7 +183,7 @@ TEST(Gltf, ColoursOfCornersMultiplyTheBaseColour) {
 TEST(Gltf, NodesCarryTheirChildren) {
   GltfFile file;
   file.j["scenes"][0]["nodes"] = {3, 1, 2};
-  // A quarter turn about z after a scale, then a move; and the same as a matrix.
+  // A scale, a quarter turn about z and a translation; the inner node has a matrix.
   file.j["nodes"].push_back({{"translation", {1, 2, 3}},
                              {"rotation", {0, 0, std::sin(kPi / 4), std::cos(kPi / 4)}},
                              {"scale", {2, 3, 4}},
@@ -193,7 +194,7 @@ TEST(Gltf, NodesCarryTheirChildren) {
 
   const double want[16] = {0, -3, 0, 1 - 18, 2, 0, 0, 2 + 10, 0, 0, 4, 3 + 28, 0, 0, 0, 1};
   for (std::size_t i = 0; i < 16; ++i)
-    EXPECT_NEAR(t.m[i], want[i], 1e-13) << i;  // some roundings of numbers below 32
+    EXPECT_NEAR(t.m[i], want[i], 1e-13) << i;  // a few roundings of numbers below 32
 }
 
 TEST(Gltf, MirrorsKeepTheFrontInFront) {
@@ -315,8 +316,8 @@ TEST(Gltf, WithoutACameraAllIsSeen) {
     along += (middle[i] - m[4 * i + 3]) * m[4 * i + 2];
     far2 += (middle[i] - m[4 * i + 3]) * (middle[i] - m[4 * i + 3]);
   }
-  EXPECT_NEAR(along * along, far2, 1e-9);                                    // it looks at the middle
-  EXPECT_GT(along * std::sin(r.scene->sensor.fov / 2 * kPi / 180), radius);  // and the ball fits
+  EXPECT_NEAR(along * along, far2, 1e-9);                                    // looks at the middle
+  EXPECT_GT(along * std::sin(r.scene->sensor.fov / 2 * kPi / 180), radius);  // the bounding sphere fits
 }
 
 TEST(Gltf, WithoutLightThereIsAWarningAndASkyByChoice) {

@@ -1,4 +1,4 @@
-// What the tests of glTF's files share: a file that is built piece by piece, and reading it.
+// Shared by the tests of glTF's files: builds files piece by piece, and reads them.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 
 namespace ls {
 
-// A triangle in z = 0 seen by a camera under a sun, to be changed by the tests.
+// A glTF file with a triangle in z = 0, a camera that sees it and a directional light. Tests change it.
 class GltfFile {
  public:
   nlohmann::json j = nlohmann::json::parse(R"({
@@ -85,7 +85,7 @@ inline ReadResult read_gltf(const GltfFile& file, const ReadOptions& options = {
   KeepingAssets assets;
   return read_gltf(file.glb(), assets, options);
 }
-// The scene of this file, without errors.
+// Reads a file that must have no errors.
 inline Scene gltf(const GltfFile& file, const ReadOptions& options = {}) {
   ReadResult r = read_gltf(file, options);
   EXPECT_TRUE(r.scene) << messages(r);

@@ -1,4 +1,4 @@
-// Materials of glTF's files: which bsdfs they become.
+// Translation of glTF's materials to bsdfs.
 #include "tests/unit/scene/gltf/gltf_testing.h"
 
 #include <cmath>
@@ -87,7 +87,7 @@ TEST(GltfMaterials, ColourOfAnImageIsMultipliedAndTransformed) {
   EXPECT_FALSE(image.raw);
   EXPECT_EQ(image.wrap, Wrap::mirror);
   EXPECT_EQ(image.filter, TextureFilter::nearest);
-  // The example of the extension: the lower left quarter of the image, that is u' = v / 2, v' = 1 - u / 2.
+  // The example in the specification of the extension: u' = v / 2, v' = 1 - u / 2.
   const double want[9] = {0, .5, 0, -.5, 0, 1, 0, 0, 1};
   for (std::size_t i = 0; i < 9; ++i) EXPECT_NEAR(image.to_uv.m[i], want[i], 1e-15) << i;
 }
@@ -153,8 +153,7 @@ TEST(GltfMaterials, BodiesOfGlassHoldWhatAbsorbs) {
 
   const auto* glass = only<DielectricBsdf>(s);
   EXPECT_EQ(glass->int_ior, 1.33);
-  EXPECT_EQ(constant(s, glass->specular_transmittance),
-            (Rgb{.5, 1, 1}));  // twice passed, it is the base colour
+  EXPECT_EQ(constant(s, glass->specular_transmittance), (Rgb{.5, 1, 1}));  // its square is the base colour
   ASSERT_TRUE(s.shapes.at(0).interior);
   const auto& medium = std::get<HomogeneousMedium>(s.media.at(s.shapes[0].interior->value));
   EXPECT_EQ(medium.albedo, (Rgb{0, 0, 0}));
@@ -197,7 +196,7 @@ TEST(GltfMaterials, RoughSheetsBlurWhatIsBehindThem) {
   EXPECT_TRUE(sheet->multiple_scattering);
   const auto* by_image = only<RoughThinDielectricBsdf>(textured);
   EXPECT_FALSE(by_image->multiple_scattering);
-  // The square of what the image says, times the square of the factor.
+  // alpha is the square of the roughness, which is a factor times an image.
   const auto& alpha = product(textured, by_image->alpha_u);
   EXPECT_EQ(constant(textured, alpha.first), (Rgb{.25, .25, .25}));
   const auto& square = product(textured, alpha.second);

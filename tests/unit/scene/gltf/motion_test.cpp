@@ -1,4 +1,4 @@
-// Skins, morph targets and animations of glTF: the corners and the transforms that they give.
+// glTF's skins, morph targets and animations: the corners and transforms that result from them.
 #include <cmath>
 
 #include "common/scene/gltf/translation.h"
@@ -10,7 +10,7 @@ namespace {
 using nlohmann::json;
 using Floats = std::vector<float>;
 
-// The only mesh that was made, a triangle, which has positions alone, or positions and normals.
+// The only mesh that was made, a triangle. `corners`: its positions, or its positions and normals.
 struct Triangle {
   Floats corners;
   std::array<std::int32_t, 3> order{};
@@ -26,7 +26,7 @@ Triangle triangle_of(const GltfFile& file, const ReadOptions& options = {}) {
     Triangle out{Floats(3 * (has_normals ? 6 : 3))};
     const char* numbers = bytes.data() + bytes.find(end) + end.size();
     std::memcpy(out.corners.data(), numbers, 4 * out.corners.size());
-    // A byte says how many corners the triangle has.
+    // The first byte of the triangle is its number of corners.
     std::memcpy(out.order.data(), numbers + 4 * out.corners.size() + 1, sizeof out.order);
     return out;
   }
@@ -44,8 +44,8 @@ std::string said(const GltfFile& file, const ReadOptions& options = {}) {
 }
 ReadOptions at_second(const std::string& time) { return {.defines = {{"time", time}}}; }
 
-// A triangle whose first corner is held by joint 0, the second by joint 1, and the third by both alike. The
-// joints are nodes 3 and 4.
+// A triangle whose first corner follows joint 0, the second joint 1, and the third both with equal weights.
+// The joints are nodes 3 and 4.
 GltfFile skinned() {
   GltfFile file;
   file.attributes()["JOINTS_0"] =
@@ -55,7 +55,7 @@ GltfFile skinned() {
   file.j["nodes"].push_back({{"children", {4}}, {"translation", {10, 0, 0}}});
   file.j["nodes"].push_back({{"translation", {0, 20, 0}}, {"scale", {2, 2, 2}}});
   file.j["nodes"][0]["skin"] = 0;
-  file.j["nodes"][0]["translation"] = {7, 7, 7};  // has no effect
+  file.j["nodes"][0]["translation"] = {7, 7, 7};  // no effect, since the node has a skin
   file.j["skins"] = {{{"joints", {3, 4}}}};
   return file;
 }
@@ -65,7 +65,7 @@ TEST(GltfMotion, ASkinCarriesCornersWithTheirJoints) {
   EXPECT_EQ(corners_of(file), (Floats{10, 0, 0, 12, 20, 0, 10, 11.5f, 0}));
   EXPECT_EQ(stands(file, {}), Transform{}.m);
 
-  // The bind pose had joint 0 at (10, 0, 0), so that it leaves its corners where they are.
+  // The bind pose has joint 0 at (10, 0, 0), where it still is, so it does not move its corners.
   Floats bind(32, 0);
   for (const std::size_t i : {0, 5, 10, 15, 16, 21, 26, 31}) bind[i] = 1;
   bind[12] = -10;
@@ -82,7 +82,7 @@ TEST(GltfMotion, ASkinTurnsNormalsAcrossItsStretching) {
 
   const Floats all = corners_of(file);
 
-  // (.6 / 2, .8 / 1) of length 1
+  // The normal (.6, .8) becomes (.6 / 2, .8 / 1), normalised.
   const float length = std::hypot(.3f, .8f);
   const Floats expected{.6f, .8f, 0, .3f / length, .8f / length, 0, 0, 0, 1};
   for (std::size_t i = 0; i < 9; ++i) EXPECT_NEAR(all[6 * (i / 3) + 3 + i % 3], expected[i], 1e-6f) << i;
@@ -104,13 +104,13 @@ TEST(GltfMotion, AMirroredJointKeepsTheFrontInFront) {
   using Order = std::array<std::int32_t, 3>;
   GltfFile file = skinned();
   EXPECT_EQ(triangle_of(file).order, (Order{0, 1, 2}));
-  file.j["nodes"][3]["scale"] = {-1, 1, 1};  // joint 1 hangs on it
+  file.j["nodes"][3]["scale"] = {-1, 1, 1};  // joint 0; joint 1 is its child
   EXPECT_EQ(triangle_of(file).order, (Order{0, 2, 1}));
-  file.j["nodes"][3]["scale"] = {-1, -1, 1};  // half a turn
+  file.j["nodes"][3]["scale"] = {-1, -1, 1};  // half a turn, no mirror
   EXPECT_EQ(triangle_of(file).order, (Order{0, 1, 2}));
 
-  // Joint 1 alone, (-2, 2, 2), holds one corner whole, and half of another, whose blend (-0.5, 1.5, 1.5) is
-  // mirrored: these two outvote the third.
+  // Joint 1, scaled by (-2, 2, 2), mirrors the corner that follows it alone, and also the one that follows
+  // both joints, whose mean scale is (-0.5, 1.5, 1.5). Two of three corners are a majority.
   file.j["nodes"][3]["scale"] = {1, 1, 1};
   file.j["nodes"][4]["scale"] = {-2, 2, 2};
   EXPECT_EQ(triangle_of(file).order, (Order{0, 2, 1}));
@@ -121,12 +121,12 @@ TEST(GltfMotion, NormalsOfAnyLengthBecomeUnits) {
   file.attributes()["NORMAL"] = file.add(Floats{0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3");
   file.primitive()["targets"] = {{{"NORMAL", file.add(Floats{3e38f, 3e38f, 0, 0, 0, 0, 0, 0, 0}, "VEC3")}}};
   file.j["meshes"][0]["weights"] = {1};
-  // Numbers of float within half a step of it, 3e-8 below 1
+  // Tolerance: half the distance of two floats below 1.
   const Floats morphed = corners_of(file);
   EXPECT_NEAR(morphed[3], std::sqrt(.5), 3e-8);
   EXPECT_NEAR(morphed[4], std::sqrt(.5), 3e-8);
 
-  // Areas grow by 1e60, beyond the range of float, and corners do not.
+  // Lengths grow by 1e30, and areas by 1e60, which is beyond the range of float.
   file = skinned();
   file.attributes()["NORMAL"] = file.add(Floats{0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3");
   file.j["nodes"][3]["scale"] = {1e30, 1e30, 1e30};
@@ -140,7 +140,7 @@ TEST(GltfMotion, MorphTargetsAreAddedByTheirWeights) {
   EXPECT_EQ(corners_of(file), (Floats{0, 0, 0, 1, 0, 0, 0, 1, 0}));
   file.j["meshes"][0]["weights"] = {.5, 0};
   EXPECT_EQ(corners_of(file), (Floats{.5f, 0, 0, 1, 0, 0, 0, 1, 1}));
-  file.j["nodes"][0]["weights"] = {0, .25};  // goes before the mesh's
+  file.j["nodes"][0]["weights"] = {0, .25};  // replaces the mesh's weights
   EXPECT_EQ(corners_of(file), (Floats{0, 0, 0, 1, 1, 0, 0, 1, 0}));
 }
 
@@ -154,11 +154,11 @@ TEST(GltfMotion, AMeshInTwoFormsIsTwoMeshes) {
   const Scene s = gltf(file);
 
   EXPECT_EQ(s.assets.size(), 2u);
-  EXPECT_EQ(s.instances.size(), 2u);  // of the form that stands twice
+  EXPECT_EQ(s.instances.size(), 2u);  // of the form that two nodes show
   EXPECT_EQ(s.shapes.size(), 2u);
 }
 
-// A list of weights may be long, and a scene shows a mesh many times.
+// A list of weights may be long, and many nodes may use it.
 TEST(GltfMotion, EqualWeightsTakeMemoryOnce) {
   GltfFile file;
   file.primitive()["targets"] = {json::object()};
@@ -192,7 +192,7 @@ TEST(GltfMotion, EqualWeightsTakeMemoryOnce) {
   EXPECT_EQ(stage.meshes[3].weights, nullptr) << "it has its base form";
 }
 
-// Node 0 moves by one channel.
+// Returns a file in which an animation of one channel moves node 0.
 GltfFile moving(const std::string& path, const Floats& times, const Floats& values, const std::string& type,
                 const std::string& interpolation) {
   GltfFile file;
@@ -220,8 +220,8 @@ TEST(GltfMotion, IsSampledAtASecondOrAFrame) {
   EXPECT_EQ(stands(step, at_second("3"))[3], 8);
 }
 
-// Hermite's spline from 0 to 8 within 2 s, leaving at 4 per second and arriving at 0: at half the time
-// 8 / 2 + 2 * 4 / 8.
+// A Hermite spline from 0 to 8 in 2 s, with the slopes 4 per second at its start and 0 at its end. In the
+// middle it is 8 / 2 + 2 * 4 / 8.
 TEST(GltfMotion, CubicSplinesHaveTangentsPerSecond) {
   const GltfFile file = moving("translation", {1, 3}, {9, 9, 9, 0, 0, 0, 4, 0, 0, 0, 0, 0, 8, 0, 0, 9, 9, 9},
                                "VEC3", "CUBICSPLINE");
@@ -230,8 +230,8 @@ TEST(GltfMotion, CubicSplinesHaveTangentsPerSecond) {
   EXPECT_EQ(stands(file, at_second("5"))[3], 8);
 }
 
-// From no turn to one by 90 degrees about z, whose quaternion is written with the other sign: at a third of
-// the time it is turned by 30 degrees.
+// From no rotation to one by 90 degrees about z, whose quaternion has the opposite sign. After a third of the
+// time the rotation is 30 degrees.
 TEST(GltfMotion, RotationsTakeTheShortWayAtAnEvenPace) {
   const float h = std::sqrt(.5f);
   const GltfFile file = moving("rotation", {0, 3}, {0, 0, 0, 1, 0, 0, -h, -h}, "VEC4", "LINEAR");

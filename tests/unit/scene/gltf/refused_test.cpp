@@ -1,4 +1,4 @@
-// glTF's files: what is refused, where, and with what advice; and what no file may do.
+// Errors in glTF files: their places and messages. No file causes a crash or a long run.
 #include <functional>
 
 #include "common/scene/gltf/support_table.h"

@@ -1,4 +1,4 @@
-// What is wrong with a scene of Nori is told in Nori's words, at its place.
+// Errors in Nori scenes are reported at their place, in the words of Nori's format.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -110,7 +110,7 @@ TEST(NoriDiagnostics, TellThatMitsubaFilesNeedAVersion) {
               HasSubstr("the scene has no <camera>"));
 }
 
-// The law against silent typos: wherever a name stands in the example, a slip in it is told in that line.
+// No misspelt name is ignored: a letter added to any name of the example gives an error in that line.
 TEST(NoriDiagnostics, AMisspeltNameAnywhereIsAnErrorInItsLine) {
   int tried = 0;
   for (const std::string key : {"name=\"", "type=\"", "<"})

@@ -1,4 +1,4 @@
-// Scenes written in both languages are one scene.
+// A Nori scene and its equivalent in Mitsuba's format read to equal scenes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 namespace ls {
 namespace {
 
-// Told without a word, and what `convert` writes is the same scene again.
+// Reads a scene that causes no diagnostics. Checks that the XML written of it reads back to an equal scene.
 Scene must_read_quietly(const std::string& text) {
   const ReadResult r = read(text);
   EXPECT_TRUE(quiet(r)) << messages(r);
@@ -26,7 +26,7 @@ void expect_same(const std::string& nori, const std::string& mitsuba) {
   EXPECT_EQ(digest_of(a), digest_of(b));
 }
 
-// The camera of kNoriCamera, without and with its defaults written.
+// kNoriCamera in Mitsuba's format, with its defaults written out.
 const std::string kSameCamera = R"(<integrator type="path"/>
   <sensor type="perspective">
     <float name="fov" value="30"/>
@@ -105,7 +105,7 @@ TEST(NoriScene, OfOneOfEverythingIsTheSameInMitsuba) {
 TEST(NoriScene, WithoutItsMirrorShowsTheWorldMirrored) {
   const Scene s = must_read_quietly(R"(<scene><integrator type="path"/><camera type="perspective">
     <transform name="toWorld"><lookat origin="0 0 0" target="0 0 1" up="0 1 0"/></transform></camera></scene>)");
-  EXPECT_EQ(s.sensor.to_world.m[0], -1);  // +x of the world is on the right: Mitsuba has it on the left
+  EXPECT_EQ(s.sensor.to_world.m[0], -1);  // +x of the world is on the right of the image, unlike in Mitsuba
   EXPECT_EQ(s.sensor.fov_axis, FovAxis::x);
   EXPECT_EQ(s.film.size, (FrameSize{1280, 720}));
 }
@@ -229,7 +229,7 @@ TEST(NoriScene, ImagesAreUprightOnMeshesOfBothLanguages) {
             (Matrix{1, 0, 0, 0, 1, 0, 0, 0, 1}));
   EXPECT_EQ(to_uv(scene("sphere", R"(<string name="filename" value="wood.png"/>)")),
             (Matrix{1, 0, .5, 0, 1, 0, 0, 0, 1}));
-  // Kombu's: to the left, and v from above; Mitsuba's v of a mesh is 1 - v.
+  // Kombu's u goes to the left and its v down; v of a mesh is 1 - v in Mitsuba.
   EXPECT_EQ(
       to_uv(scene("obj", R"(<string name="fileName" value="wood.png"/><vector name="scale" value="2,4"/>)")),
       (Matrix{-.5, 0, .5, 0, -.25, .25, 0, 0, 1}));
@@ -262,7 +262,7 @@ TEST(NoriScene, ADiskOfLightAllAroundIsAConstantOne) {
       R"(<emitter type="distantdisk"><color name="radiance" value="5 5 5"/><float name="thetaA" value="30"/></emitter>)"));
   const auto& sun = std::get<DirectionalEmitter>(s.emitters[0]);
   EXPECT_EQ(sun.direction, (Vec3{{0, 0, -1}}));
-  // The integral of cos theta over the cap: pi sin^2 30 degrees.
+  // The integral of cos theta over a cap of 30 degrees is pi sin^2 (30 degrees) = pi / 4.
   EXPECT_DOUBLE_EQ(sun.irradiance[0], 5 * std::numbers::pi / 4);
 }
 

@@ -4,7 +4,6 @@
 #include <cctype>
 #include <cmath>
 
-#include "common/scene/reader/aov_names.h"
 #include "common/scene/reader/unsupported.h"
 #include "common/scene/reader/upgrade.h"
 #include "common/scene/schema/describe_fields.h"
@@ -19,7 +18,7 @@ std::string text_of(const std::array<double, 3>& v) {
   return v[0] == v[1] && v[1] == v[2] ? fmt::format("{}", v[0]) : fmt::format("{}, {}, {}", v[0], v[1], v[2]);
 }
 
-// The texts for a parameter's columns: its element type in a file, and its default.
+// The texts of two columns for a parameter: the type of its element in a file, and its default.
 struct Column {
   std::string_view type;
   std::string value;
@@ -47,7 +46,7 @@ requires std::is_enum_v<E> Column column(const Field&, E x) {
                        value == x ? fmt::format("**{}**", name) : std::string(name));
   return {"string", all};
 }
-// Used for nested objects and derived fields.
+// For nested objects and derived fields.
 template <class T>
 requires(!std::is_enum_v<T>) Column column(const Field&, const T&) { return {"", ""}; }
 

@@ -1,4 +1,4 @@
-// Noise and the clouds that are made of it.
+// Perlin noise, and pbrt's clouds, which are made of it.
 #include "common/scene/pbrt/cloud.h"
 
 #include <gtest/gtest.h>
@@ -12,9 +12,9 @@ namespace {
 
 Vec3 vec(double x, double y, double z) { return Vec3{{x, y, z}}; }
 
-// The first value is that of Perlin's own program, published with it (improved noise, 2002) and often used to
-// test others: at this point no gradient matters that pbrt has changed. The others were computed by a program
-// of its own that follows Perlin's, with the 16 gradients of pbrt.
+// The first value is that of Perlin's own program (improved noise, 2002), which others often use as a test;
+// the gradients that pbrt has changed do not matter at this point. The other values are those of a separate
+// program that follows Perlin's with pbrt's 16 gradients.
 TEST(Noise, HasKnownValues) {
   EXPECT_NEAR(noise(vec(3.14, 42, 7)), 0.13691995878400012, 1e-14);
   EXPECT_NEAR(noise(vec(.5, .5, .5)), -0.125, 1e-14);
@@ -46,17 +46,18 @@ TEST(Noise, OfPlacesThatAreNoneIsZero) {
   }
 }
 
-// Bounds of noise along one axis. There it is (1 - w) a + w b, where w is Perlin's weight, and a and b are
-// means of g . d for gradients g with two elements of +-1, d being within [-1, 1]^3: |a|, |b| <= 2, |a'|,
-// |b'| <= 1. |w'| <= 15/8 and |w''| <= 10 / sqrt 3 < 5.78. So the first derivative is at most 15/8 * 4 + 1
-// and the second at most 5.78 * 4 + 2 * 15/8 * 2.
+// Bounds of the first and second derivative of noise along an axis. Along an axis noise is (1 - w) a + w b
+// with Perlin's weight w. a and b are means of g . d, where the gradient g has two elements of +-1 and d is
+// within [-1, 1]^3. So |a|, |b| <= 2 and |a'|, |b'| <= 1. Perlin's weight has |w'| <= 15/8 and |w''| <= 10 /
+// sqrt 3 < 5.78. So the first derivative is at most 15/8 * 4 + 1, and the second at most 5.78 * 4 + 2 * 15/8
+// * 2.
 constexpr double kSlope = 8.5, kBend = 30.7;
 
-// Interpolation between nodes h apart errs by at most h^2 / 8 times the second derivative, along each axis in
-// turn. Without movement of points, the density before it is clamped is (1 - y) 4.5 density f(p) + max(0, 1 -
-// 2 y), where f is the sum of octaves: its second derivatives follow from those of noise. Above height 1/2
-// the second term is 0. Where all nodes around a point are within (0, 1), clamping changes neither side by
-// more.
+// Linear interpolation between nodes at the distance h errs, along each axis, by at most h^2 / 8 times the
+// second derivative. With wispiness 0 the density before clamping is (1 - y) 4.5 density f(p) + max(0, 1 - 2
+// y), where f is the sum of octaves of noise, so its second derivatives follow from the bounds above. The
+// cloud's box begins at the height 1/2, above which the second term is 0. Only points are tested around which
+// all nodes are within (0, 1), where the density is not clamped.
 TEST(Cloud, GridIsTheFormulaWithinTheErrorOfInterpolation) {
   Cloud cloud;
   cloud.density = .7;
@@ -82,7 +83,7 @@ TEST(Cloud, GridIsTheFormulaWithinTheErrorOfInterpolation) {
     const double h = (cloud.high[k] - cloud.low[k]) / (grid.sides[k] - 1);
     bound += h * h / 8 * bends[k];
   }
-  ASSERT_LT(bound, .5);  // or the test would say nothing
+  ASSERT_LT(bound, .5);  // a larger bound would make the test meaningless
 
   std::mt19937 rng(7);
   std::uniform_real_distribution<double> random(0, 1);
@@ -124,11 +125,11 @@ TEST(Cloud, IsDenseBelowAndGoneAtHeightOne) {
     EXPECT_EQ(density_at(cloud, vec(x, -3, x)), 1);
     EXPECT_EQ(density_at(cloud, vec(x, 1, x)), 0);
   }
-  // As in pbrt the formula goes on above height 1, where the cloud is dense if the noise is below 0.
+  // As in pbrt the formula is not cut off at height 1. Above it the cloud is dense where noise is negative.
   double above = 0;
   for (const double x : {.1, .37, 5.5}) above = std::max(above, density_at(cloud, vec(x, 7, x)));
   EXPECT_GT(above, 0);
-  // Noise of no density leaves what falls with height: 2 (1/2 - y).
+  // With density 0, only the second term of the formula remains: 1 - 2 y, at least 0.
   cloud.density = 0;
   EXPECT_DOUBLE_EQ(density_at(cloud, vec(.3, .2, .4)), .6);
   EXPECT_EQ(density_at(cloud, vec(.3, .6, .4)), 0);
@@ -143,7 +144,7 @@ TEST(Cloud, WispinessMovesPointsByTheSlopeOfNoise) {
   for (int i = 1; i < 200; ++i) {
     const Vec3 p = vec(.013 * i, .55, .029 * i);
     differ += density_at(plain, p) != density_at(wispy, p);
-    // The formula once more, for one point each, with its numbers written out.
+    // The same formula, written out for one point.
     Vec3 q = vec(5 * p[0], 5 * p[1], 5 * p[2]);
     for (const auto& [strength, frequency] : {std::pair{.025, 10.}, {.0125, 19.9}}) {
       const Vec3 s = noise_slope(vec(frequency * q[0], frequency * q[1], frequency * q[2]));
@@ -161,8 +162,8 @@ TEST(Cloud, WispinessMovesPointsByTheSlopeOfNoise) {
   }
   EXPECT_GT(differ, 50);
   EXPECT_GT(moved, 0);
-  // Both compute in double, up to the order of products: 1e-16 times frequencies of some 1e2 and slopes
-  // of 8.5.
+  // The two differ only in the order of products. The rounding of 1e-16 grows by frequencies of about 1e2 and
+  // slopes of up to 8.5.
   EXPECT_LT(same, 1e-12);
 }
 
@@ -171,7 +172,7 @@ TEST(Cloud, NodesAreBoundedAndAsManyAsThatAllows) {
   const auto wanted = nodes_for(cloud, std::size_t{1} << 30);
   ASSERT_TRUE(wanted);
   EXPECT_EQ(wanted->per_cell, kWantedPerCell);
-  EXPECT_EQ(wanted->sides[0], 399);  // 99.5 cells along the box, and 4 nodes a cell
+  EXPECT_EQ(wanted->sides[0], 399);  // 99.5 noise cells along the box, 4 nodes per cell
   const auto fewer = nodes_for(cloud, std::size_t{1} << 24);
   ASSERT_TRUE(fewer);
   EXPECT_LE(fewer->count(), std::size_t{1} << 24);

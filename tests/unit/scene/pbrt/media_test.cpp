@@ -1,10 +1,10 @@
-// Media of pbrt's files: what each becomes, and what is refused.
+// Translation of pbrt's media, and errors in them.
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <cstring>
 
-#include "common/scene/pbrt/substances.h"
+#include "common/scene/pbrt/media_parts.h"
 #include "tests/unit/scene/pbrt/pbrt_testing.h"
 
 namespace ls {
@@ -13,10 +13,10 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-// Three decimal places of 106.856895, the integral of the CIE observer's y that pbrt-v4 has.
+// pbrt-v4's integral of the CIE observer's y, 106.856895, rounded to three decimal places.
 constexpr double kIntegralOfY = 106.857;
 
-// A scene of one medium in a sphere, and the files that were made of it.
+// A scene of one medium in a sphere, and the files that the reader made.
 struct Read {
   Scene scene;
   KeepingAssets assets;
@@ -25,7 +25,7 @@ struct Read {
   const HeterogeneousMedium& medium() const { return std::get<HeterogeneousMedium>(scene.media.at(0)); }
   const GridVolume& grid(VolumeIndex i) const { return std::get<GridVolume>(scene.volumes.at(i.value)); }
   const Rgb& constant(VolumeIndex i) const { return std::get<ConstVolume>(scene.volumes.at(i.value)).value; }
-  // The values of the `.vol` of a volume.
+  // Returns the values in the `.vol` file of a volume.
   std::vector<float> values(VolumeIndex i) const {
     const std::string& bytes = assets.memory.files.at(scene.assets.at(grid(i).file.value).name);
     std::vector<float> all((bytes.size() - 48) / 4);
@@ -90,7 +90,8 @@ TEST(PbrtMedia, LightOfAUniformGridIsLeTimesItsScales) {
               ElementsAre(5, 10, 15, 7, 14, 21));
 }
 
-// Without Lescale pbrt's grid of it has one voxel, which fades towards the faces of the box.
+// Without Lescale pbrt scales the emission by a grid of one voxel, which falls off towards the faces of the
+// box.
 TEST(PbrtMedia, LightWithoutScalesFadesFromTheMiddleOfTheBox) {
   const Read r = medium_of(
       R"("uniformgrid" "integer nx" 2 "float density" [ 1 1 ] "rgb Le" [ 1 1 1 ] "point3 p1" [ 2 1 1 ])");
@@ -170,7 +171,7 @@ TEST(PbrtMedia, LightOfAnRgbGridIsNotScaledToTheWhite) {
   EXPECT_NEAR(r.medium().emission_scale, 2 * kIntegralOfY, 2 * 5e-4);
   const auto values = r.values(*r.medium().source_radiance);
   EXPECT_THAT(std::vector(values.begin() + 39, values.begin() + 42), ElementsAre(3, 4, 5));
-  // The albedo is the same everywhere, so that the medium is pbrt's, and nothing is said.
+  // The albedo is constant, so the medium equals pbrt's and there is no warning.
   EXPECT_EQ(r.constant(r.medium().albedo), (Rgb{.5, .5, .5}));
   EXPECT_THAT(r.said, testing::Not(HasSubstr("interpolated")));
 }
@@ -183,13 +184,13 @@ TEST(PbrtMedia, AnAlbedoThatDiffersIsAGridThatGoesOnWhereNothingIs) {
   ASSERT_EQ(albedo.size(), 3u * 5 * 3 * 3);
   const std::size_t first = 3 * (5 * 4 + 1);
   EXPECT_EQ(albedo[first], .5f);
-  EXPECT_EQ(albedo[first + 3], 4 / 6.f);  // the mean of both sides, by their extinction of 2 and 4
+  EXPECT_EQ(albedo[first + 3], 4 / 6.f);  // mean of .5 and .75 with the weights 2 and 4, the extinctions
   EXPECT_EQ(albedo[first + 6], .75f);
   EXPECT_EQ(albedo[first - 3], .5f);
   EXPECT_THAT(r.said, HasSubstr("extinction and albedo are interpolated"));
 }
 
-// A coefficient that is not given is 1 in pbrt, also where the other fades.
+// In pbrt a missing coefficient is 1 everywhere, also outside the grid of the other.
 TEST(PbrtMedia, AMissingCoefficientDoesNotFade) {
   const Read r = medium_of(R"("rgbgrid" "rgb sigma_a" [ 2 2 2 ])");
 
@@ -239,7 +240,8 @@ TEST(PbrtMedia, CloudsAreGridsFromFaceToFace) {
   EXPECT_EQ(r.medium().scale, 4);
   EXPECT_EQ(r.constant(r.medium().albedo), (Rgb{.75, .75, .75}));
   EXPECT_EQ(std::get<HgPhase>(r.scene.phases.at(r.medium().phase.value)).g, .5);
-  // 15.68 / 2 cells per unit and 4 nodes a cell: 63 steps along 2 units, and 64 a unit of height.
+  // 15.68 / 2 noise cells per unit and 4 nodes per cell give 63 steps along 2 units. Along y there are 64
+  // steps per unit of height.
   EXPECT_EQ(r.values(r.medium().sigma_t).size(), 64u * 65 * 64);
   EXPECT_THAT(r.said, testing::Not(HasSubstr("cloud")));
 }
@@ -295,7 +297,7 @@ MediumInterface "" "{0}" Shape "sphere" "float radius" 2)",
     EXPECT_EQ(s.shapes.at(1).exterior, s.sensor.medium);
     const auto* m = std::get_if<HeterogeneousMedium>(&s.media.at(s.sensor.medium->value));
     EXPECT_EQ(m == nullptr, std::string_view(name) == "fog");
-    // The place of its grids is that of the named coordinate system.
+    // Its grids are placed by the named coordinate system.
     if (m) {
       EXPECT_EQ(std::get<GridVolume>(s.volumes.at(m->sigma_t.value)).to_world.m[3], 5);
       const auto& light = m->temperature ? m->temperature : m->source_radiance;

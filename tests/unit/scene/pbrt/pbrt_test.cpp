@@ -1,4 +1,4 @@
-// pbrt's files: what each directive becomes.
+// Translation of pbrt's directives.
 #include <cmath>
 #include <cstring>
 #include <numbers>
@@ -62,7 +62,7 @@ TEST(Pbrt, TurnsAsTheXmlTurns) {
       R"(<shape type="ply"><string name="filename" value="mesh.ply"/><boolean name="flat_without_normals" value="true"/><transform name="to_world"><scale x="2" y="3" z="4"/><rotate y="1" angle="90"/></transform></shape>)"));
 
   ASSERT_TRUE(other.scene);
-  for (std::size_t i = 0; i < 16; ++i)  // a few roundings of double of numbers up to 4
+  for (std::size_t i = 0; i < 16; ++i)  // a few roundings of doubles up to 4
     EXPECT_NEAR(s.shapes.at(0).to_world.m[i], other.scene->shapes.at(0).to_world.m[i], 16 * 2.3e-16);
 }
 
@@ -136,7 +136,7 @@ AreaLightSource "diffuse" "rgb L" [ 1 1 1 ] Shape "sphere")");
   EXPECT_EQ(std::get<ConstantTexture>(r.scene->textures.at(area->radiance.value)).value, (Rgb{6, 6, 6}));
 }
 
-// A source that keeps no files, as a coordinator's, is not made to compute a grid that was not sent.
+// A source that keeps no files (the coordinator's) needs the grid from the sender. It is not computed for it.
 TEST(Pbrt, ACloudIsNotComputedForASourceThatKeepsNothing) {
   const std::string scene = pbrt_scene(
       R"(MakeNamedMedium "c" "string type" "cloud" MediumInterface "c" "" Material "interface" Shape "sphere")");
@@ -148,7 +148,7 @@ TEST(Pbrt, ACloudIsNotComputedForASourceThatKeepsNothing) {
   EXPECT_NE(messages(r).find("which `lightshaft submit` sends along"), std::string::npos) << messages(r);
 }
 
-// pbrt multiplies by the time that the shutter is open: half of it here.
+// pbrt multiplies light by the time for which the shutter is open, here 1/2.
 TEST(Pbrt, AShorterShutterDarkensAllLight) {
   const ReadResult r = read_pbrt(
       R"(Camera "perspective" "float shutteropen" 0.25 "float shutterclose" 0.75 Film "rgb" "float iso" 400
@@ -184,7 +184,7 @@ TEST(Pbrt, BlackBodiesHaveLuminanceOne) {
   const Scene s = pbrt("LightSource \"infinite\" \"blackbody L\" 3000 Shape \"sphere\"");
 
   const Rgb c = std::get<ConstantEmitter>(s.emitters.at(0)).radiance;
-  // The weights of ITU-R BT.709 and those of the observer's table differ by less than 1e-4 of each.
+  // The luminance weights of ITU-R BT.709 differ from those of the observer's table by less than 1e-4.
   EXPECT_NEAR(.2126 * c[0] + .7152 * c[1] + .0722 * c[2], 1, 1e-4 * (c[0] + c[1] + c[2]));
   EXPECT_GT(c[0], c[1]);
   EXPECT_GT(c[1], c[2]);
@@ -199,8 +199,8 @@ TEST(Pbrt, PowerOfAPointIsFourPiTimesItsIntensity) {
   EXPECT_DOUBLE_EQ(point.intensity[0], 8 / (4 * std::numbers::pi));
 }
 
-// The radiance is power / (pi area): of a quadric in its own space, of a mesh in the world, of each of its
-// triangles.
+// The radiance is power / (pi area). The area is that of a quadric in its own space, or that of one triangle
+// of a mesh in the world.
 TEST(Pbrt, PowerOfAnAreaIsSpreadOverIt) {
   const auto radiance = [](std::string_view world) {
     KeepingAssets assets;
@@ -302,7 +302,7 @@ TEST(Pbrt, IntegratorsOfTheSameLightAreRead) {
   }
 }
 
-// pbrt multiplies by these only if they are above 0, and exporters write 0 or -1 for "not given".
+// pbrt ignores power and illuminance unless they are above 0. Exporters write 0 or -1 for "not given".
 TEST(Pbrt, PowerAndIlluminanceOfZeroOrLessAreNotGiven) {
   const Scene s = pbrt(R"(LightSource "point" "rgb I" [ 1 2 3 ] "float power" 0
 LightSource "distant" "rgb L" [ 1 2 3 ] "float illuminance" -1
@@ -336,7 +336,7 @@ TEST(Pbrt, InterfacesGiveNoLight) {
   EXPECT_TRUE(says(messages(r), "give no light"));
 }
 
-// pbrt takes the encoding of PNG files alone from the scene.
+// In pbrt `encoding` applies to PNG files only.
 TEST(Pbrt, TakesTheEncodingOfPngFilesAlone) {
   const auto is_raw = [](std::string_view file) {
     KeepingAssets assets;
@@ -358,7 +358,7 @@ TEST(Pbrt, TakesTheEncodingOfPngFilesAlone) {
   EXPECT_FALSE(is_raw("wood.jpg"));
 }
 
-// A texture mirrors the sphere for its uv, which must not move the media.
+// A sphere with a texture is mirrored to get pbrt's uv. This must not exchange its media.
 TEST(Pbrt, ASphereKeepsItsMediaWithATexture) {
   for (const std::string_view reversed : {"", "ReverseOrientation "}) {
     const auto media = [&](std::string_view alpha) {
@@ -367,8 +367,7 @@ TEST(Pbrt, ASphereKeepsItsMediaWithATexture) {
 Shape "sphere" {})",
           reversed, alpha));
       const Shape& shape = s.shapes.at(0);
-      // The renderer keeps the interior of a mirrored sphere inside, and swaps that of one with flipped
-      // normals.
+      // In the renderer flip_normals exchanges interior and exterior, except on a mirrored sphere.
       const bool mirrored = scene::determinant3(shape.to_world) < 0;
       const bool swapped = !mirrored && shape.flip_normals;
       return std::pair{(swapped ? shape.exterior : shape.interior).has_value(),
@@ -458,7 +457,7 @@ Material "conductor" Shape "sphere")");
   EXPECT_EQ(copper.eta[0], .20101);
 }
 
-// Fresnel at right angles of eta = 1 and k: k^2 / (4 + k^2).
+// The reflectance at normal incidence for eta = 1 and k is k^2 / (4 + k^2).
 TEST(Pbrt, ReflectanceOfAConductorIsThatAtRightAngles) {
   const Scene s = pbrt("Material \"conductor\" \"rgb reflectance\" [ 0.2 0.5 0.8 ] Shape \"sphere\"");
 
@@ -534,7 +533,8 @@ Scale -1 1 1 Shape "sphere")");
   EXPECT_FALSE(s.shapes.at(1).emitter->two_sided);
   EXPECT_TRUE(s.shapes.at(2).emitter->two_sided);
   EXPECT_EQ(value(0), value(1));
-  // power / (pi area) / 2 of the disk of area 4 pi, whose white has the luminance 1
+  // Radiance is power / (pi area) / 2 for a disk of the area 4 pi that emits white of luminance 1 on both
+  // sides.
   EXPECT_NEAR(value(2), 12 / (8 * std::numbers::pi * std::numbers::pi), 1e-5);
   EXPECT_TRUE(s.shapes.at(3).emitter->two_sided) << "a mirrored one is read, as its sides do not matter";
 }
@@ -560,8 +560,8 @@ Material "diffuse" "texture reflectance" "t" Shape "sphere")");
   EXPECT_FALSE(std::get<BitmapTexture>(*found).raw);
 }
 
-// In pbrt v of a sphere is 1 at its north pole, which is +z; in Mitsuba's format v is 0 there. Image rows are
-// turned already (ImagesStandUpright), so a mirror along z is left.
+// At the north pole of a sphere, +z, v is 1 in pbrt and 0 in Mitsuba's format. The reader mirrors the sphere
+// along z.
 TEST(Pbrt, ImagesStandUprightOnSpheres) {
   const std::string image = R"(Texture "t" "spectrum" "imagemap" "string filename" "wood.png"
 Material "diffuse" "texture reflectance" "t" Scale 2 2 2 Shape "sphere" ReverseOrientation Shape "sphere"
@@ -573,7 +573,7 @@ Material "mix" "string materials" [ "grey" "image" ] Shape "sphere" NamedMateria
 
   const Transform mirrored{{2, 0, 0, 0, 0, 2, 0, 0, 0, 0, -2, 0, 0, 0, 0, 1}};
   EXPECT_EQ(s.shapes.at(0).to_world, mirrored);
-  EXPECT_TRUE(s.shapes.at(0).flip_normals);  // a mirrored sphere is inside out
+  EXPECT_TRUE(s.shapes.at(0).flip_normals);  // since its to_world mirrors it
   EXPECT_EQ(s.shapes.at(1).to_world, mirrored);
   EXPECT_FALSE(s.shapes.at(1).flip_normals);
   EXPECT_EQ(s.shapes.at(2).to_world, mirrored);
@@ -601,7 +601,7 @@ TransformBegin Translate 0 1 0 Shape "sphere" TransformEnd Shape "sphere" Attrib
   EXPECT_FALSE(s.shapes.at(2).flip_normals);
 }
 
-// pbrt-v4 takes TransformBegin for AttributeBegin, and each of the two ends for the other's.
+// pbrt-v4 reads TransformBegin as AttributeBegin, and TransformEnd as AttributeEnd.
 TEST(Pbrt, TransformEndEndsAttributesToo) {
   const Scene s = pbrt(R"(TransformBegin Translate 1 0 0 ReverseOrientation TransformBegin AttributeEnd
 Shape "sphere" TransformEnd Shape "sphere")");
@@ -667,7 +667,7 @@ Shape "trianglemesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 ] "integer indices" [ 0 1 2 
                                   assets);
 
   ASSERT_TRUE(r.scene) << messages(r);
-  EXPECT_TRUE(r.scene->shapes.at(0).flip_normals);  // a mirror reverses its corners, and pbrt turns it back
+  EXPECT_TRUE(r.scene->shapes.at(0).flip_normals);  // mirroring reverses the normal, unlike in pbrt
   const std::string bytes = assets.memory.files.at(r.scene->assets.at(0).name);
   EXPECT_TRUE(bytes.starts_with("ply\nformat binary_little_endian 1.0\nelement vertex 3\n"));
   EXPECT_TRUE(bytes.ends_with(std::string("\3\0\0\0\0\1\0\0\0\2\0\0\0", 13)));
@@ -679,7 +679,7 @@ TEST(Pbrt, FlatPatchesAreTriangles) {
   EXPECT_TRUE(says(refusal(R"(Shape "bilinearmesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 1 1 1 ])"), "is bent"));
 }
 
-// The corners are (0, 0), (1, 0), (0, 1) and (1, 1) of each patch, also where two patches share them.
+// The corners of each patch have the uv (0, 0), (1, 0), (0, 1) and (1, 1), even if two patches share corners.
 TEST(Pbrt, PatchesHaveTheirOwnUv) {
   KeepingAssets assets;
   const ReadResult r =
@@ -699,8 +699,8 @@ TEST(Pbrt, PatchesHaveTheirOwnUv) {
   }
 }
 
-// In pbrt the corners of a triangle without uv have (0, 0), (1, 0) and (1, 1), which matters to a texture
-// alone.
+// In pbrt the corners of a triangle without uv have (0, 0), (1, 0) and (1, 1). Only a textured mesh needs
+// them.
 TEST(Pbrt, TrianglesWithoutUvHaveThoseOfPbrt) {
   const auto corners = [](std::string_view material) {
     KeepingAssets assets;

@@ -1,4 +1,4 @@
-// What the tests of pbrt's files share: a scene around some statements, read or refused.
+// Shared by the tests of pbrt's files: reads scenes that consist of given statements.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,12 +11,12 @@ namespace ls {
 
 inline const std::string kPbrtFilm = R"(Film "rgb" "integer xresolution" 8 "integer yresolution" 8 )";
 
-// A pbrt scene of these statements, which begin in line 3, column 1.
+// Returns a pbrt scene of these statements, which begin in line 3, column 1.
 inline std::string pbrt_scene(std::string_view world, std::string_view before = R"(Camera "perspective")") {
   return fmt::format("{}{}\nWorldBegin\n{}\n", kPbrtFilm, before, world);
 }
 
-// Files in memory that also keep what the reader makes of numbers.
+// Files in memory, including those that the reader makes from numbers in the scene's text.
 class KeepingAssets final : public AssetSource {
  public:
   MemoryAssets memory;
@@ -34,7 +34,7 @@ inline ReadResult read_pbrt(std::string_view text, KeepingAssets assets = {},
   return read_scene("test.pbrt", text, assets, options);
 }
 
-// The scene of these statements, without errors.
+// Reads these statements, which must have no errors.
 inline Scene pbrt(std::string_view world, std::string_view before = R"(Camera "perspective")") {
   ReadResult r = read_pbrt(pbrt_scene(world, before));
   EXPECT_TRUE(r.scene) << messages(r);

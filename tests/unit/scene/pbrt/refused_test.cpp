@@ -1,4 +1,4 @@
-// pbrt's files: what is refused, where, and with what advice.
+// Errors in pbrt files: their places and messages.
 #include "common/scene/limits.h"
 #include "common/scene/pbrt/vocabulary.h"
 #include "tests/unit/scene/pbrt/pbrt_testing.h"

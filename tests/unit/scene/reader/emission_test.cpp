@@ -1,4 +1,4 @@
-// Light given off by media, as files say it.
+// Reading the emission of media.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// What a scene says of its integrator beyond its name, there and back.
+// Reading and writing of the integrator's parameters.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -49,7 +49,7 @@ TEST(Integrator, OfVolpathSaysWhereItLooksForLightThereAndBack) {
   const Scene plain = must_read(integrator("volpath", ""));
   EXPECT_EQ(plain.integrator.camera_points, 0);
   EXPECT_FALSE(plain.integrator.phase_only);
-  // Digests of scenes that do not use the parameters are those of before they existed
+  // Scenes that do not use these parameters must keep the digests that they had without them.
   EXPECT_THAT(serialize(plain), ::testing::Not(HasSubstr("camera_points")));
   const Scene s = must_read(integrator(
       "volpath",

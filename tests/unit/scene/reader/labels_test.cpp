@@ -1,4 +1,4 @@
-// What a scene calls its shapes, and the outputs that it asks for.
+// The names of shapes and materials, and the AOVs that a scene requests.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

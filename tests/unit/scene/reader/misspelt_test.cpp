@@ -13,14 +13,14 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// The law against silent typos: wherever a name stands in the example, a slip in it is told in that line.
+// No misspelt name is ignored: a letter added to any name of the example gives an error in that line.
 TEST(Misspelt, AMisspeltNameAnywhereIsAnErrorInItsLine) {
   int tried = 0;
   for (const std::string key : {"name=\"", "type=\"", "<", " id=\""}) {
     for (std::size_t at = kExample.find(key); at != std::string::npos; at = kExample.find(key, at + 1)) {
       const std::size_t name = at + key.size();
       if (kExample[name] == '/') continue;
-      // ids that are defined and the names of parameters may be anything: it is their use that fails.
+      // Definitions of ids and of parameters are skipped: any name is valid there, and only their use fails.
       if (key == " id=\"" && kExample.rfind("<ref", at) != kExample.rfind('<', at)) continue;
       if (kExample.compare(kExample.rfind('<', at), 8, "<default") == 0 && key == "name=\"") continue;
       std::string text = kExample;
@@ -33,7 +33,7 @@ TEST(Misspelt, AMisspeltNameAnywhereIsAnErrorInItsLine) {
       const auto r = read(text);
       ++tried;
       EXPECT_FALSE(r.scene) << text.substr(at, 30);
-      // A misspelt start tag is malformed XML: it is found at its end tag.
+      // A misspelt start tag makes the XML malformed, which is reported at the end tag.
       if (key != "<") {
         EXPECT_TRUE(std::any_of(r.diagnostics.begin(), r.diagnostics.end(),
                                 [&](const Diagnostic& d) { return d.place.line == line; }))
@@ -46,7 +46,7 @@ TEST(Misspelt, AMisspeltNameAnywhereIsAnErrorInItsLine) {
   EXPECT_GT(tried, 200);
 }
 
-// An unknown parameter put into any object of the example.
+// Adds an unknown parameter to each object of the example in turn.
 TEST(Misspelt, AnUnknownParameterInAnyObjectIsAnErrorInItsLine) {
   int tried = 0;
   for (std::size_t at = kExample.find("type=\""); at != std::string::npos;

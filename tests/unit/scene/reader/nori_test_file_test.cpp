@@ -1,4 +1,4 @@
-// Files of Nori that hold tests.
+// Nori files whose root is a <test>.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// Files of Mitsuba 0.5 and 0.6: other names, other defaults, other meanings.
+// Files of Mitsuba 0.5 and 0.6, with their names, defaults and meanings.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// A scene of 0.x of these objects and a camera; the objects begin in line 2, column 1.
+// Returns a scene of version 0.x of these objects and a camera. The objects begin in line 2, column 1.
 std::string old(std::string_view objects) {
   return fmt::format("<scene version=\"0.6.0\">\n{}\n{}</scene>\n", objects, kSensor);
 }
@@ -240,7 +240,8 @@ TEST(OldFiles, TexturesAreScaledAndThenMoved) {
       Wrap::clamp);
 }
 
-// There a board shows the same squares as a number: here it is another one, the colours the other way round.
+// In version 0.x a checkerboard shows the same squares as a number and as a colour. In version 3 a number
+// needs another checkerboard, with the colours swapped.
 TEST(OldFiles, CheckerboardsAreNumbersAndColoursAlike) {
   const auto objects = [](std::string_view rough, std::string_view other) {
     return fmt::format(R"(
@@ -274,7 +275,7 @@ TEST(OldFiles, CheckerboardsAreNumbersAndColoursAlike) {
     EXPECT_EQ(std::get<BlendBsdf>(bsdf_of(*s, 2)).weight, metal.alpha_u);
     EXPECT_EQ(mask.opacity, metal.alpha_u);
   }
-  // What is written of it is of the new version, and means the same.
+  // The scene is written in the format of version 3, and reads back to an equal one.
   const Scene again = must_read(write_xml(before));
   EXPECT_EQ(serialize(again), serialize(before));
 }

@@ -1,4 +1,4 @@
-// What Mitsuba scenes mean once they are read.
+// The scenes that files of Mitsuba become.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -263,7 +263,7 @@ TEST(Reading, OtherIntegratorsOfTheDialectMapToOurs) {
     return must_read(with_sensor("<integrator type=\"" + type + "\"/>")).integrator;
   };
   for (const char* type : {"volpath", "volpathmis", "volpath_simple"}) EXPECT_EQ(name(type).name, "volpath");
-  // Whatever the table names, a scene may say.
+  // Every name of the table is accepted in a scene.
   for (const auto& row : scene::integrators()) EXPECT_EQ(name(std::string(row.name)).name, row.ours);
   EXPECT_EQ(name("path").name, "path");
   EXPECT_EQ(name("volpath_distant_mis").name, "volpath_distant_mis");

@@ -1,5 +1,5 @@
-// Shapes beyond the simplest, groups and instances, cameras and crops: what is read of them, what is refused
-// and how, and that they keep their digest when written.
+// Reading of shapes, groups, instances, cameras and crops, errors in them, and that scenes of them keep their
+// digests when they are written and read.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// What is wrong with these objects, all in one text; "" if nothing is.
+// Returns all messages about these objects in one text; "" if they are read.
 std::string wrong_with(std::string_view objects) {
   const ReadResult r = read(with_sensor(objects));
   return r.scene ? "" : messages(r);
@@ -140,7 +140,7 @@ TEST(ReadInstance, RefusesWhatMitsubaRefuses) {
               HasSubstr("no parameter 'radius'"));
 }
 
-// Canonical JSON that nobody wrote by reading a scene.
+// The JSON is one that serialising a scene from the reader never gives.
 TEST(SceneJsonOfGroups, IsRefusedWhereItContradictsItself) {
   const Scene s =
       must_read(with_sensor(std::string(kGroup) + R"(<shape type="instance"><ref id="trees"/></shape>)"));
@@ -258,7 +258,7 @@ TEST(ReadFilm, CropsToAPartOfTheFrame) {
   EXPECT_EQ(s.film.crop_offset, (std::array{3, 2}));
   EXPECT_EQ(s.film.image_size(), (FrameSize{10, 5}));
   expect_kept(s);
-  // A side that is not given is the frame's.
+  // A missing width or height is that of the frame.
   EXPECT_EQ(must_read(sensor("perspective", "", crop(-1, -1, 7, -1))).film.image_size(), (FrameSize{7, 10}));
 }
 

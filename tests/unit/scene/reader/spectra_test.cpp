@@ -1,4 +1,4 @@
-// Spectra that are objects, and shapes "merge".
+// Spectra given as objects, and shapes of the type "merge".
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -61,7 +61,7 @@ TEST(Spectrum, D65IsWhite) {
             (Rgb{2, 4, 6}));
 }
 
-// At 6500 K a black body is nearly white: its linear sRGB is that of its X, Y, Z. At 1500 K blue is none.
+// At 1500 K the blue channel would be negative, and is clamped to 0.
 TEST(Spectrum, BlackbodyIsLightInTheUnitsOfAMedium) {
   const auto light = [](const char* kelvin) {
     return intensity(

@@ -1,4 +1,4 @@
-// Surfaces as they are read: defaults, nesting, what is refused.
+// Reading of bsdfs: defaults, nesting, and errors.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include "common/scene/limits.h"
 #include "common/scene/reader/xml_write.h"
-#include "common/scene/schema/bsdf_traits.h"
+#include "common/scene/schema/traits.h"
 #include "tests/unit/scene/scene_testing.h"
 
 namespace ls {
@@ -36,7 +36,7 @@ Rgb surface_colour(const Scene& s, TextureIndex i) {
 
 constexpr char kDiffuse[] = "<bsdf type=\"diffuse\"/>", kGlass[] = "<bsdf type=\"thindielectric\"/>";
 
-// Mitsuba 3.9.1's, as its plugins print them.
+// The expected defaults are those that the plugins of Mitsuba 3.9.1 print.
 TEST(Surfaces, WhatIsNotGivenIsMitsubasDefault) {
   const Scene plastic = scene_with_bsdf("<bsdf type=\"plastic\"/>");
   const auto& p = surface_bsdf<PlasticBsdf>(plastic);
@@ -132,7 +132,6 @@ TEST(Surfaces, ARoughSheetTakesOneRoughnessOrTwo) {
               HasSubstr("needs the same roughness both ways"));
 }
 
-// Light passes straight through a rough sheet only where it may be smooth.
 TEST(Surfaces, ASheetPassesLightStraightOnIfItMayBeSmooth) {
   const auto traits = [](const std::string& alpha) {
     const Scene s = scene_with_bsdf("<bsdf type=\"roughthindielectric\">" + alpha + "</bsdf>");
@@ -231,7 +230,7 @@ std::string masks(int count) {
 TEST(Surfaces, NestOnlySoDeep) {
   EXPECT_EQ(surface_error(masks(scene::kMaxBsdfNesting - 1)), "");
   EXPECT_THAT(surface_error(masks(scene::kMaxBsdfNesting)), HasSubstr("bsdfs are nested more than 8 deep"));
-  // The same in the form that travels.
+  // The limit also holds for canonical JSON.
   Scene s = scene_with_bsdf(masks(scene::kMaxBsdfNesting - 1));
   s.bsdfs.push_back(MaskBsdf{{0}, s.shapes[0].bsdf});
   EXPECT_THAT(deserialize_scene(serialize(s)).error().message, HasSubstr("more than 8 deep"));
@@ -255,7 +254,7 @@ TEST(Surfaces, TraitsFollowFromWhatIsContained) {
   EXPECT_EQ((*traits)[5], (scene::BsdfTraits{1, true, true, false, false}));
 }
 
-// Mitsuba 3's defaults, and its relation of specular and eta.
+// The expected values are Mitsuba 3's, also for eta as a function of specular.
 TEST(Surfaces, PrincipledHasMitsubasDefaults) {
   const Scene plain = scene_with_bsdf("<bsdf type=\"principled\"/>");
   const auto& p = surface_bsdf<PrincipledBsdf>(plain);

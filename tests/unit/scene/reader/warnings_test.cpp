@@ -1,4 +1,4 @@
-// What is read and means nothing here: warnings, and errors with --strict.
+// Parts of a scene that have no effect here give warnings, or errors with --strict.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -45,7 +45,7 @@ TEST(Warnings, FieldsWithoutEffectAreToldOf) {
     ASSERT_EQ(r.diagnostics.size(), 1u) << row.said;
     EXPECT_THAT(r.diagnostics[0].text, HasSubstr(row.said));
   }
-  // With a fov, its axis does mean something.
+  // With a fov, fov_axis has an effect.
   EXPECT_TRUE(read("<scene version=\"3.0.0\"><sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/>"
                    "<string name=\"fov_axis\" value=\"y\"/></sensor></scene>")
                   .diagnostics.empty());
@@ -78,7 +78,7 @@ TEST(Warnings, DefinesThatNothingAsksForAreWarnedAbout) {
   EXPECT_FALSE(read(with_sensor(used), {.defines = {{"radus", "2"}}, .strict = true}).scene);
   EXPECT_THAT(messages(read(with_sensor(used), {.defines = {{"z", "2"}}})), HasSubstr("known here: radius"));
   EXPECT_THAT(messages(read(with_sensor(""), {.defines = {{"z", "2"}}})), HasSubstr("it has no parameters"));
-  // Declared, but in no value: it would change nothing.
+  // The parameter has a <default>, but no value uses it.
   EXPECT_THAT(messages(read(with_sensor("<default name=\"n\" value=\"1\"/>"), {.defines = {{"n", "2"}}})),
               HasSubstr("asks for $n"));
 }

@@ -1,4 +1,4 @@
-// What is written reads back to the same scene.
+// Written XML reads back to an equal scene.
 #include "common/scene/reader/xml_write.h"
 
 #include <gmock/gmock.h>
@@ -17,7 +17,7 @@ namespace {
 using scene::describe;
 using ::testing::HasSubstr;
 
-// The text of `s`, after it has been read back.
+// Writes `s` and checks that the text reads back to an equal scene. Returns the text.
 std::string proven(const Scene& s) {
   const std::string text = write_xml(s);
   const ReadResult again = read(text);
@@ -77,7 +77,7 @@ TEST(XmlWrite, KeepsAFileThatIsNamedInTwoWays) {
   proven(s);
 }
 
-// Sets every number, colour, switch and choice to something possible.
+// Sets every number, colour, boolean and enumeration to a random value in its range.
 class Shaker {
  public:
   explicit Shaker(unsigned seed) : random_(seed) {}
@@ -90,7 +90,7 @@ class Shaker {
   double any(const scene::Range& range) {
     const double low = std::max(range.min, -1e9), high = std::min(range.max, 1e9);
     std::uniform_real_distribution<double> uniform(0, 1);
-    // Over all magnitudes where the range is wide; never on an open end.
+    // In a wide range all magnitudes are equally likely. The ends, which may be excluded, never occur.
     const double u = .01 + .98 * uniform(random_);
     if (high - low < 1e6) return low + (high - low) * u;
     return std::max(low, 0.0) + std::pow(10, 30 * uniform(random_) - 24);
@@ -137,11 +137,11 @@ TEST(XmlWrite, KeepsEveryBitOfEveryValue) {
       describe(shaker, shape);
       std::visit([&](auto& g) { describe(shaker, g); }, shape.geometry);
     }
-    // What must hold between values.
+    // Some values must be consistent with each other.
     s.sensor.far_clip = s.sensor.near_clip * 2;
     for (Emitter& e : s.emitters)
       if (auto* spot = std::get_if<SpotEmitter>(&e)) spot->beam_width = spot->cutoff_angle / 3;
-    for (Bsdf& b : s.bsdfs)  // its metal is rougher along v
+    for (Bsdf& b : s.bsdfs)  // needs equal roughnesses
       if (auto* metal = std::get_if<RoughConductorBsdf>(&b)) metal->multiple_scattering = false;
     const ReadResult again = read(write_xml(s));
     ASSERT_TRUE(again.scene) << messages(again) << write_xml(s);

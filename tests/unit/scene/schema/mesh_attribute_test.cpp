@@ -1,4 +1,4 @@
-// `mesh_attribute` textures and `multiple_scattering` as they are read and written.
+// Reading and writing of `mesh_attribute` textures and of `multiple_scattering`.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -88,7 +88,7 @@ TEST(MeshAttribute, NeedsANameOfAVertexOrFace) {
               HasSubstr("'name'"));
 }
 
-// A circle of textures, as only hostile JSON has one: it ends.
+// Textures that contain each other occur only in hostile JSON. The search ends nevertheless.
 TEST(MeshAttribute, IsFoundInCirclesToo) {
   Scene s;
   s.textures = {CheckerboardTexture{{1}, {2}, {}}, CheckerboardTexture{{0}, {7}, {}},
@@ -119,7 +119,7 @@ TEST(MultipleScattering, ChangesTheDigestOfASceneOnlyWhereItIsOn) {
   }
 }
 
-// One scene has one JSON: what is left out of it may not stand there.
+// A scene has only one JSON text, so a default that the writer leaves out must not be present.
 TEST(MultipleScattering, IsNotWrittenTwoWays) {
   std::string json = serialize(must_read(rough("roughplastic", kOn)));
   const std::size_t at = json.find("\"multiple_scattering\":true");
@@ -133,7 +133,7 @@ TEST(MultipleScattering, IsNotWrittenTwoWays) {
 TEST(MultipleScattering, NeedsOneRoughnessThatIsANumber) {
   EXPECT_THAT(
       attribute_error(rough("roughconductor", std::string(kOn) + R"(<float name="alpha_u" value=".1"/>)")),
-      ::testing::IsEmpty());  // as alpha_v is by default
+      ::testing::IsEmpty());  // .1 is also the default of alpha_v
   EXPECT_THAT(
       attribute_error(rough("roughconductor", std::string(kOn) + R"(<float name="alpha_u" value=".2"/>)")),
       HasSubstr("the same roughness both ways: give alpha"));

@@ -1,4 +1,4 @@
-// The table of Mitsuba's plugins against what the reader does with each of them.
+// Compares the table of Mitsuba's plugins with the result of reading each plugin.
 #include "common/scene/schema/mitsuba_plugins.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 namespace ls::scene {
 namespace {
 
-// A scene with the plugin in a place of its kind.
+// Returns a scene with the plugin in an element that may contain it.
 std::string scene_with(const PluginRow& row) {
   const std::string object = fmt::format("<{} type=\"{}\"/>", row.tag, row.name);
   const auto sensor = [](std::string_view inside) {
@@ -59,12 +59,12 @@ void expect_all_read(std::string_view tag, std::set<std::string_view> internal =
 
 TEST(MitsubaPlugins, ListAllThatTheReaderKnows) {
   expect_all_read<Bsdf>("bsdf");
-  expect_all_read<Texture>("texture", {"constant"});  // written as a colour
+  expect_all_read<Texture>("texture", {"constant"});  // in files it is a colour
   expect_all_read<Emitter>("emitter");
   expect_all_read<Medium>("medium");
   expect_all_read<Phase>("phase");
   expect_all_read<Volume>("volume");
-  expect_all_read<Geometry>("shape", {"mesh"});  // by the format of its file
+  expect_all_read<Geometry>("shape", {"mesh"});  // in files it is named by its format
   expect_all_read<ReconstructionFilter>("rfilter");
   for (const IntegratorRow& row : integrators())
     EXPECT_TRUE(is_read_plugin("integrator", row.name)) << row.name;
@@ -72,7 +72,7 @@ TEST(MitsubaPlugins, ListAllThatTheReaderKnows) {
     EXPECT_TRUE(is_read_plugin("integrator", row.name)) << row.name;
 }
 
-// Differentiable integrators of Mitsuba 3 follow paths of 6 segments unless they are told otherwise.
+// The default max_depth of Mitsuba 3's differentiable integrators is 6.
 TEST(MitsubaPlugins, HaveMitsubasDefaultDepth) {
   const auto depth = [](const std::string& integrator) {
     return must_read(with_sensor(integrator)).integrator.max_depth;

@@ -1,8 +1,7 @@
 // Properties of media and emitters that follow from their parameters.
 #include <gtest/gtest.h>
 
-#include "common/scene/schema/emitter_traits.h"
-#include "common/scene/schema/medium_traits.h"
+#include "common/scene/schema/traits.h"
 
 namespace ls::scene {
 namespace {

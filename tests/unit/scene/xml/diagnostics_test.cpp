@@ -1,4 +1,4 @@
-// Everything that can be wrong with a scene file is told with its place, and with what to do.
+// Every kind of error in a scene file gives a message with its place, and with what to do about it.
 #include "common/scene/diagnostic.h"
 
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@ struct Case {
   const char* name;
   std::string objects;  // line 2 of the file, from column 1
   int column;           // of the first diagnostic, in line 2
-  std::string text;     // what it says
+  std::string text;     // part of its text
 };
 
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
@@ -323,7 +323,7 @@ TEST(Diagnostics, PlacesAreRightWhereverTheLinesEnd) {
     int line = 1, column = 1;
     for (std::size_t i = 0; i <= text.size(); ++i) {
       ASSERT_EQ(source.line(i), line) << i;
-      // Columns are counted out: not at every place.
+      // Finding a column takes time proportional to the line's length, so only some are tested.
       if (i % 61 == 0 || i == text.size()) {
         ASSERT_EQ(source.place(i), (SourcePlace{"t", line, column})) << i;
       }

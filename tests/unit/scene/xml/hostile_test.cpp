@@ -1,4 +1,4 @@
-// Scene text from strangers: bounded work, bounded memory, always an answer.
+// Hostile scene texts: reading takes bounded time and memory, and ends with a scene or with messages.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -119,8 +119,8 @@ TEST(HostileScenes, ManyPropertiesOfOneObjectTakeNoSquareTime) {
   EXPECT_EQ(read(with_sensor(text + "</bsdf>")).diagnostics.size(), scene::kMaxDiagnostics);
 }
 
-// Random damage to a good scene: it still reads, or says where it does not. What reads survives its own
-// serialisation.
+// Damages a good scene at random. It is still read, or refused with a place. A scene that is read is equal
+// after serialisation and reading.
 TEST(HostileScenes, RandomDamageIsAnsweredNeverACrash) {
   std::mt19937 random(7);
   const auto below = [&](std::size_t n) {

@@ -1,4 +1,4 @@
-// Curves over wavelengths against published colours.
+// Compares the colours of spectral curves with published ones.
 #include "common/scene/xml/spectrum.h"
 
 #include <gmock/gmock.h>
@@ -21,7 +21,8 @@ using ::testing::HasSubstr;
 struct Xyy {
   double x, y, luminance;
 };
-// The matrix of BT.709 (six digits) takes back what its inverse gave, up to 2e-6.
+// Converts linear sRGB to x, y and Y by the matrix of BT.709. It has six digits, so converting XYZ to sRGB
+// and back changes a value by up to 2e-6.
 Xyy xyy(const Rgb& c) {
   const double x = .412453 * c[0] + .357580 * c[1] + .180423 * c[2],
                y = .212671 * c[0] + .715160 * c[1] + .072169 * c[2],
@@ -49,7 +50,7 @@ void expect_near(const Rgb& got, const Rgb& want, double relative) {
     EXPECT_NEAR(got[i], want[i], relative * std::abs(want[i])) << "part " << i;
 }
 
-// The tables are given to four or more digits, and so are the chromaticities.
+// Tolerance: the CIE tables and the published chromaticities have at least four digits.
 constexpr double kPublished = 1e-4;
 
 TEST(Spectra, EqualEnergyIsAThirdOfEach) {
@@ -60,7 +61,8 @@ TEST(Spectra, EqualEnergyIsAThirdOfEach) {
   expect_near(scene::equal_energy_srgb(), linear_srgb({{300, 900}, {1, 1}}, Illuminant::equal_energy), 1e-3);
 }
 
-// CIE 15: illuminant A is Planck's law at 2848 K with c2 = 1.435e-2, and (x, y) = (0.44758, 0.40745).
+// By CIE 15, illuminant A is a black body at 2848 K, with c2 = 1.435e-2 m K in Planck's law, and has the
+// chromaticity (x, y) = (0.44758, 0.40745).
 TEST(Spectra, IlluminantAHasItsPublishedColour) {
   SpectralCurve a;
   for (int nm = 360; nm <= 830; ++nm) {
@@ -73,7 +75,7 @@ TEST(Spectra, IlluminantAHasItsPublishedColour) {
   EXPECT_NEAR(c.y, .40745, kPublished);
 }
 
-// Of the spectral locus, CIE 15 gives for 460, 520 and 600 nm:
+// The expected values are (x, y) of the spectral locus at 460, 520 and 600 nm by CIE 15.
 TEST(Spectra, NarrowLinesLieOnTheSpectralLocus) {
   const double published[][3] = {{460, .14396, .02970}, {520, .07430, .83380}, {600, .62704, .37249}};
   for (const auto& [nm, x, y] : published) {
@@ -85,11 +87,12 @@ TEST(Spectra, NarrowLinesLieOnTheSpectralLocus) {
 
 TEST(Spectra, WhatReflectsAllIsWhiteUnderD65) {
   const Rgb white = linear_srgb({{360, 830}, {1, 1}}, Illuminant::d65);
-  // x and y of the primaries' white are D65's to four digits.
+  // The white of BT.709 agrees with D65 in four digits of x and y.
   for (const double part : white) EXPECT_NEAR(part, 1, 1e-3);
 }
 
-// The triangle of height 1 over 550 +- 20 nm, by hand: the table's y is a straight line between its points.
+// Integrates the observer's y, which is linear between the points of its table, times a triangle of height 1
+// over 550 +- 20 nm, and compares with a fine sum.
 TEST(Spectra, IntegralsAreExactBetweenTheSamples) {
   const auto y_at = [](double nm) {
     const double t = (nm - scene::kCieFirst) / scene::kCieStep;
@@ -97,9 +100,9 @@ TEST(Spectra, IntegralsAreExactBetweenTheSamples) {
     const double f = t - static_cast<double>(i);
     return scene::kCieRows[i].observer[1] * (1 - f) + scene::kCieRows[i + 1].observer[1] * f;
   };
-  // A fine midpoint sum errs by h^2 / 24 times the integral of the second derivative, which is the sum of the
-  // kinks: of the triangle's three (1/20, 1/10, 1/20 per nm) and, below a unit, the table's: less than 1 in
-  // all.
+  // The midpoint rule with steps h errs by at most h^2 / 24 times the integral of the absolute second
+  // derivative. Most of this integral is the sum of the changes of slope: 1/20, 1/10 and 1/20 per nm at the
+  // triangle's corners, and smaller ones at the table's points. It is less than 1 per nm.
   const int n = 40'000;
   double sum = 0, all = 0;
   for (int i = 0; i < n; ++i) {
@@ -108,7 +111,7 @@ TEST(Spectra, IntegralsAreExactBetweenTheSamples) {
   }
   for (std::size_t i = 0; i + 1 < scene::kCieRows.size(); ++i)
     all += (scene::kCieRows[i].observer[1] + scene::kCieRows[i + 1].observer[1]) / 2 * scene::kCieStep;
-  const double slack = std::pow(40. / n, 2) / 24 / all + 4e-6;  // and the matrices, to six digits
+  const double slack = std::pow(40. / n, 2) / 24 / all + 4e-6;  // 4e-6: six digits of the matrices
   EXPECT_NEAR(xyy(linear_srgb({{530, 550, 570}, {0, 1, 0}}, Illuminant::equal_energy)).luminance, sum / all,
               slack);
 }
@@ -123,9 +126,10 @@ TEST(Spectra, BeyondItsEndsACurveIsNothing) {
   EXPECT_EQ(linear_srgb({{900, 1000}, {1, 1}}, Illuminant::d65), (Rgb{0, 0, 0}));
 }
 
-// What Mitsuba 3.9.1 (scalar_rgb) makes of the same texts. It sums 1000 samples that are 470 / 999 nm apart
-// as if it were 470 / 1000, which for reflectances makes 0.1 % less; and it misses up to half a nanometre at
-// the ends of a curve, less than 0.05 % of the integrals at 400 and 700 nm.
+// The expected values are those of Mitsuba 3.9.1 (scalar_rgb) for the same texts, and the tolerance allows
+// for its integration. It sums 1000 samples that are 470 / 999 nm apart, but takes the distance as 470 /
+// 1000, so its reflectances are 0.1 % too small. It also misses up to half a nanometre at the ends of a
+// curve, which is less than 0.05 % of the integral for ends at 400 and 700 nm.
 constexpr double kMitsubaSum = 1.5e-3;
 TEST(Spectra, AreWhatMitsuba3MakesOfThem) {
   expect_near(radiance("400:0, 500:8, 600:15.6, 700:18.4"), {20.7108, 10.8546, 2.77115}, kMitsubaSum);
@@ -142,7 +146,7 @@ TEST(Spectra, OfLightThatIsEvenAreNotWhiteInMitsuba3) {
   EXPECT_EQ(reflectance(".5"), (Rgb{.5, .5, .5}));
 }
 
-// Mitsuba 0.x sees reflectances as they are, too.
+// In files of Mitsuba 0.x, curves of reflectances are not multiplied by D65 either.
 TEST(Spectra, OfOldFilesAreSeenWithoutAnIlluminant) {
   const std::string curve = "400:0.1, 500:0.2, 600:0.3, 700:0.4";
   expect_near(reflectance(curve, "0.6.0"),

@@ -17,7 +17,7 @@ Transform of(const std::string& steps) {
       .to_world;
 }
 
-// Each entry is a sum of at most 8 products of numbers below 8, each rounded: 8 * 8 * 8 * epsilon.
+// Tolerance: an entry is a sum of at most 8 products of two numbers below 8, each rounded by epsilon.
 constexpr double kRounding = 512 * std::numeric_limits<double>::epsilon();
 
 void expect_matrix(const Transform& t, const std::array<double, 16>& want) {
@@ -39,7 +39,7 @@ TEST(Transforms, MissingPartsAreOneForScaleAndZeroForTranslate) {
 
 TEST(Transforms, RotationIsRightHandedAndInDegrees) {
   expect_matrix(of("<rotate z=\"1\" angle=\"90\"/>"), {0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});
-  // A third of a turn about the space diagonal permutes the axes. Its length does not matter.
+  // A third of a turn about (1, 1, 1) permutes the axes. The length of the axis does not matter.
   expect_matrix(of("<rotate value=\"2 2 2\" angle=\"120\"/>"),
                 {0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1});
 }
@@ -85,8 +85,8 @@ TEST(Transforms, AnAxisThatMitsubaWouldShearByIsWarnedAbout) {
   EXPECT_NE(of_two[0].text.find("length 2"), std::string::npos) << of_two[0].text;
 }
 
-// The matrix that Mitsuba 3.9.1 (scalar_rgb: single precision) gives for the same steps; the axis has the
-// length 1. Its four products of terms up to 4 round by at most 4 x 4 x 4 x 2^-24 = 4e-6.
+// The expected matrix is that of Mitsuba 3.9.1 for the same steps (scalar_rgb, in single precision; the axis
+// has length 1). The rounding of its four products of terms up to 4 is at most 4 x 4 x 4 x 2^-24 = 4e-6.
 TEST(Transforms, AgreeWithMitsubaOnAMixture) {
   const Transform t =
       of("<scale x=\"2\" y=\"3\" z=\".5\"/><rotate x=\".48\" y=\".6\" z=\"-.64\" angle=\"33\"/><translate "

@@ -1,11 +1,23 @@
-#include "common/scene/xml/make_element.h"
+#include "common/scene/xml/document.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <utility>
 
 namespace ls::scene {
+
+const Attribute* Element::find(std::string_view attribute) const {
+  const auto it = std::find_if(attributes.begin(), attributes.end(),
+                               [&](const Attribute& a) { return a.name == attribute; });
+  return it == attributes.end() ? nullptr : &*it;
+}
+
+std::string_view Element::get(std::string_view attribute) const {
+  const Attribute* a = find(attribute);
+  return a ? std::string_view(a->value) : std::string_view{};
+}
 
 Element made(std::string tag, std::string_view type, const Span& at) {
   Element e;
@@ -28,12 +40,16 @@ void add(Element& parent, std::string tag, std::string name, std::string value, 
   add(parent, std::move(property));
 }
 
+void add(Element& parent, std::string tag, std::string name, const Vec3& value, const Span& at) {
+  add(parent, std::move(tag), std::move(name), fmt::format("{}", fmt::join(value, " ")), at);
+}
+
 void add(Element& parent, std::string name, double value, const Span& at) {
   add(parent, "float", std::move(name), fmt::format("{}", value), at);
 }
 
 void add(Element& parent, std::string name, const Rgb& value, const Span& at) {
-  add(parent, "rgb", std::move(name), fmt::format("{} {} {}", value[0], value[1], value[2]), at);
+  add(parent, "rgb", std::move(name), fmt::format("{}", fmt::join(value, " ")), at);
 }
 
 void add_as(Element& parent, const Element* property, std::string name) {
@@ -61,10 +77,8 @@ void add_transform(Element& parent, const Element* transform, std::string name, 
 }
 
 Element matrix_step(const std::array<double, 16>& m, const Span& at) {
-  std::string text;
-  for (const double x : m) text += fmt::format("{}{}", text.empty() ? "" : " ", x);
   Element step = made("matrix", "", at);
-  set(step, "value", std::move(text), at);
+  set(step, "value", fmt::format("{}", fmt::join(m, " ")), at);
   return step;
 }
 
