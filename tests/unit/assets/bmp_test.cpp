@@ -12,7 +12,8 @@ using test::bytes_of;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-// 2 x 2 pixels, rows as they stand in the file; two bytes fill up each row of 24 bits.
+// Returns a bitmap of 2 x 2 pixels, with the rows in the order of the file. Two zero bytes pad each 24-bit
+// row to a multiple of four.
 std::string bmp(std::uint16_t bits, std::int32_t height, std::uint32_t compression = 0,
                 std::int32_t width = 2) {
   std::string s = "BM";

@@ -20,7 +20,7 @@ using testing::ElementsAre;
 using testing::FloatEq;
 using testing::HasSubstr;
 
-// The decoders without their default argument, which pointers to functions lose.
+// The decoders with their default argument. A pointer to the function itself would lose it.
 constexpr auto kPng = [](std::string_view name, std::span<const std::byte> file) {
   return decode_png(name, file);
 };
@@ -31,7 +31,8 @@ constexpr auto kHdr = [](std::string_view name, std::span<const std::byte> file)
   return decode_hdr(name, file);
 };
 
-// `format`: PNG_FORMAT_... of libpng's simple interface; `pixels` as that wants them.
+// Encodes a PNG by libpng's simple interface. `format` is one of its PNG_FORMAT_... constants; `pixels` are
+// in this format.
 std::string png(std::uint32_t width, std::uint32_t height, std::uint32_t format, const void* pixels) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
@@ -73,14 +74,14 @@ std::string jpeg(int width, int height, int channels, std::uint8_t value) {
   return out;
 }
 
-// 8 x 2: the first row in runs, the second plain.
+// Returns an image of 8 x 2 pixels. The first row is run-length coded, the second plain.
 std::string hdr() {
   std::string s = "#?RADIANCE\n# made by hand\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 8\n";
   s += std::string("\x02\x02\x00\x08", 4);
   s += std::string("\x88\x80", 2);                              // red: a run of 8 x 128
-  s += std::string("\x08\x00\x20\x40\x60\x80\xa0\xc0\xe0", 9);  // green: 8 as they are
-  s += std::string("\x84\x10\x84\x20", 4) +
-       std::string("\x88\x81", 2);  // blue: two runs; exponent 129: times 2 / 256
+  s += std::string("\x08\x00\x20\x40\x60\x80\xa0\xc0\xe0", 9);  // green: 8 plain values
+  // Blue: two runs; exponent: 129, which is a factor of 2 / 256.
+  s += std::string("\x84\x10\x84\x20", 4) + std::string("\x88\x81", 2);
   for (int x = 0; x < 8; ++x) s += std::string("\x80\x40\x20\x80", 4);
   return s;
 }
@@ -109,7 +110,8 @@ TEST(Png, ReadsColourGreyAndAlpha) {
   EXPECT_THAT(grey->u8, ElementsAre(0, 128, 255));
 }
 
-// 16 bits: raw chunks are written with the full interface, since the simple one would convert.
+// Returns a PNG with 16 bits per channel. It is written with libpng's full interface, since the simple one
+// would convert the values.
 std::string png16(const std::vector<std::uint16_t>& grey) {
   std::string out;
   png_structp p = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
@@ -148,7 +150,7 @@ TEST(Jpeg, ReadsColourAndGrey) {
   const auto rgb = decode_image("a.jpg", bytes_of(jpeg(16, 8, 3, 200)));
   ASSERT_TRUE(rgb) << rgb.error().message;
   EXPECT_EQ(rgb->channels, 3u);
-  EXPECT_THAT(rgb->u8, Each(200));  // a flat image survives its discrete cosine transform
+  EXPECT_THAT(rgb->u8, Each(200));  // a flat image survives the cosine transform of JPEG unchanged
   const auto grey = decode_jpeg("a.jpg", bytes_of(jpeg(9, 9, 1, 100)));
   ASSERT_TRUE(grey) << grey.error().message;
   EXPECT_EQ(grey->channels, 1u);
@@ -157,8 +159,8 @@ TEST(Jpeg, ReadsColourAndGrey) {
 
 TEST(Jpeg, RefusesTruncatedFilesInsteadOfPaddingThemAndSurvivesMutations) {
   const std::string file = jpeg(32, 32, 3, 77);
-  EXPECT_LE(test::accepted_truncations(file, kJpeg),
-            2);  // all pixels are there when only the end marker is cut
+  // If only the end marker is cut off, all pixels are there.
+  EXPECT_LE(test::accepted_truncations(file, kJpeg), 2);
   test::survive_mutations(file, kJpeg, expect_sound);
 }
 
@@ -189,7 +191,7 @@ TEST(Hdr, ReadsRunsAndPlainRows) {
   EXPECT_EQ(i->f32[0], 1);         // 128 x 2^(129 - 136)
   EXPECT_EQ(i->f32[3 + 1], .25f);  // 32 / 128
   EXPECT_EQ(i->f32[2], .125f);
-  EXPECT_EQ(i->f32[24], .5f);  // second row
+  EXPECT_EQ(i->f32[24], .5f);  // the second row
   EXPECT_EQ(i->f32[26], .125f);
 }
 

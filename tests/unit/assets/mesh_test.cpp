@@ -35,7 +35,8 @@ std::string obj_error(const std::string& text) {
   return m ? "" : m.error().message;
 }
 
-// Corners that a file chose to share one place of the table: with a secret that it does not know they do not.
+// A file can choose corners whose hashes collide if the hash has no secret. With a secret that the file does
+// not know, the same corners are spread over the table.
 TEST(Obj, CornersThatShareAPlaceWithoutASecretAreSpreadWithOne) {
   constexpr std::size_t kPlaces = 10273, kCorners = 500;
   std::vector<Corner> chosen;
@@ -46,7 +47,7 @@ TEST(Obj, CornersThatShareAPlaceWithoutASecretAreSpreadWithOne) {
   for (const std::uint64_t secret : {1ull, 2ull, 0x243f6a8885a308d3ull}) {
     std::map<std::size_t, std::size_t> places;
     for (const Corner& c : chosen) ++places[CornerHash{secret}(c) % kPlaces];
-    // Of 500 thrown into 10273 places some two meet; five in one place are a matter of 1e-6.
+    // 500 random places out of 10273: some two are equal, but five equal ones have a probability of 2e-5.
     EXPECT_LT(std::max_element(places.begin(), places.end(),
                                [](const auto& a, const auto& b) { return a.second < b.second; })
                   ->second,
@@ -185,7 +186,7 @@ TEST(Ply, RefusesIndicesOutOfRangeAndBrokenHeaders) {
 TEST(Ply, NeverAcceptsATruncatedFile) {
   EXPECT_EQ(test::accepted_truncations(ply_binary(false), decode_ply), 0);
   EXPECT_EQ(test::accepted_truncations(ply_binary(true), decode_ply), 0);
-  // The last number of a text may lose its last digits without trace.
+  // In a text file, a cut within the last number cannot be detected.
   EXPECT_LE(test::accepted_truncations(kPlyAscii, decode_ply), 5);
 }
 

@@ -47,7 +47,7 @@ TEST(Pfm, TheScaleIsAFactor) {
   EXPECT_THAT(decode_pfm_file(pfm("Pf\n1 2\n-0.5\n", {3, 4}))->f32, ElementsAre(2, 1.5f));
 }
 
-// The first value may begin with a byte that looks like a blank.
+// The byte after this blank belongs to the first value, even if it looks like another blank.
 TEST(Pfm, OneBlankEndsTheHeader) {
   const auto i = decode_pfm_file(std::string("Pf\n1 1\n-1\n\x20\x0a\x80\x3f", 14));
   ASSERT_TRUE(i) << i.error().message;

@@ -1,4 +1,4 @@
-// Attributes of PLY meshes as Mitsuba 3.9.1 reads them: every expectation here is what it showed.
+// Attributes of PLY meshes. All expected values are those of Mitsuba 3.9.1.
 #include "common/assets/ply_attributes.h"
 
 #include <gmock/gmock.h>
@@ -51,7 +51,7 @@ const MeshAttribute* find(const MeshData& m, std::string_view name) {
   return nullptr;
 }
 
-// Two squares, of two triangles each, and a face without area between them.
+// Two squares of two triangles each; between them in the file, a face without area.
 const char kSquares[] =
     "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n"
     "property float r\nproperty float g\nproperty float b\nproperty float alpha\nproperty float heat_x\n"
@@ -107,7 +107,7 @@ TEST(PlyAttributes, OfBytesCountFromZeroTo255AndOtherWholeNumbersAreSrgbCodes) {
   EXPECT_THAT(
       std::vector(find(*m, "vertex_color")->values.begin(), find(*m, "vertex_color")->values.begin() + 3),
       ElementsAre(0, 128, 255));
-  // Its power function is good to 1e-6.
+  // Mitsuba's expected values are from its own power function, which has errors of up to 1e-6.
   EXPECT_NEAR(find(*m, "vertex_u")->values[0], .21404809f, 3e-7f);
   EXPECT_NEAR(find(*m, "vertex_i")->values[0], .21770316f, 3e-7f);
   EXPECT_FLOAT_EQ(find(*m, "vertex_d")->values[0], 64);
@@ -129,7 +129,8 @@ void expect_whole(const MeshData& m) {
         << a.name;
 }
 
-// However a file is cut or changed: no attribute has fewer values than the mesh has places for them.
+// A file that is cut or changed must not give an attribute with fewer values than the mesh has vertices or
+// triangles.
 TEST(PlyAttributes, OfDamagedFilesAreWholeOrRefused) {
   const std::string file = kSquares;
   const auto decode = [](std::string_view name, std::span<const std::byte> bytes) {

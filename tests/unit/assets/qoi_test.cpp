@@ -28,8 +28,9 @@ std::string qoi_error(const std::string& file) {
 }
 
 TEST(Qoi, EveryKindOfChunkIsRead) {
-  // rgb 10 20 30; diff +1 -2 0; luma green +10, red +10 - 8, blue +10 + 7; a run of 2; rgba; by place: the
-  // hash of the first, (10 * 3 + 20 * 5 + 30 * 7 + 255 * 11) mod 64 = 9.
+  // The chunks: rgb 10 20 30; differences +1 -2 0; luma: green +10, red +10 - 8, blue +10 + 7; a run of 2;
+  // rgba 1 2 3 4; the index of an earlier pixel. This is the first pixel's hash, (10 * 3 + 20 * 5 + 30 * 7 +
+  // 255 * 11) mod 64 = 9.
   const auto i = decode_qoi_file(qoi(
       7, 1, 4,
       {0xfe, 10, 20, 30, 0x40 | 3 << 4 | 0 << 2 | 2, 0x80 | 42, 0x0f, 0xc0 | 1, 0xff, 1, 2, 3, 4, 0x00 | 9}));
@@ -57,7 +58,7 @@ TEST(Qoi, WhatIsWrongIsTold) {
   EXPECT_THAT(qoi_error(qoi(1, 1u << 31, 3, {0xc0})), HasSubstr("its size is 1 x 2147483648"));
   EXPECT_THAT(qoi_error(qoi(2, 1, 3, {0xc0})), HasSubstr("too short"));
   EXPECT_THAT(qoi_error(qoi(1, 1, 3, {0xfe, 1, 2})), HasSubstr("too short"));
-  // A header is believed only as far as the file may hold what it claims: 62 pixels a byte.
+  // The header claims more pixels than the file can contain at 62 pixels per byte, the longest run.
   EXPECT_THAT(qoi_error(qoi(16384, 16384, 3, {0xfd})), HasSubstr("too short"));
   EXPECT_EQ(decode_qoi("a.qoi", bytes_of(qoi(2, 2, 3, {0xc3})), 3).error().code, Errc::resource_exhausted);
 }

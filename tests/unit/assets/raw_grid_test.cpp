@@ -47,7 +47,7 @@ TEST(RawGrid, IsReadInEitherOrder) {
   EXPECT_EQ(x->nz, 2u);
   EXPECT_EQ(x->channels, 1u);
   EXPECT_THAT(x->values, ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11));
-  // Value 2 (3 x + y) + z lies at (x, y, z).
+  // The file's value number 2 (3 x + y) + z belongs to the node (x, y, z). Value number i is i.
   EXPECT_THAT(z->values, ElementsAre(0, 6, 2, 8, 4, 10, 1, 7, 3, 9, 5, 11));
   EXPECT_THAT(x->bbox_min, ElementsAre(-1, -2, -3));
   EXPECT_THAT(x->bbox_max, ElementsAre(1, 2, 3));

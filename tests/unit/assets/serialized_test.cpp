@@ -1,4 +1,5 @@
-// Mitsuba's `.serialized` meshes: both versions and precisions, several in a file, and files that lie.
+// Mitsuba's `.serialized` meshes: both versions, both precisions, several meshes in a file, and files with
+// wrong sizes and offsets.
 #include <gmock/gmock.h>
 #include <zlib.h>
 
@@ -29,7 +30,7 @@ struct Parts {
   std::uint16_t version = 4;
   std::uint32_t flags = 0x1 | 0x2 | 0x8;  // normals, uvs, colours
   bool wide = false;
-  float x = 0;  // of the first vertex
+  float x = 0;  // x coordinate of the first vertex
   std::uint64_t vertices = 3, triangles = 1;
   std::vector<std::uint32_t> indices = {0, 1, 2};
 };
@@ -141,7 +142,7 @@ TEST(Serialized, RefusesIndicesOutOfRange) {
   EXPECT_THAT(error_of(mesh({.triangles = 0, .indices = {}})), HasSubstr("has no faces"));
 }
 
-// Sizes are told before memory is spent on them.
+// Impossible counts are rejected before memory is allocated.
 TEST(Serialized, RefusesCountsThatCannotBe) {
   EXPECT_THAT(error_of(mesh({.vertices = 0xffffffffffffffffu})), HasSubstr("the limits are"));
   EXPECT_THAT(error_of(mesh({.triangles = 1u << 29})), HasSubstr("the limits are"));
@@ -164,7 +165,8 @@ TEST(Serialized, SurvivesTruncationAndMutation) {
     return decode_serialized(name, bytes, 1);
   };
   EXPECT_EQ(test::accepted_truncations(file, decode_second), 0);
-  // The first mesh is whole long before the file ends, whose table it does not need.
+  // The first mesh can be read from a truncated file: it ends long before the file does, and reading it does
+  // not need the table at the file's end.
   const int first =
       test::accepted_truncations(file, [](std::string_view name, std::span<const std::byte> bytes) {
         return decode_serialized(name, bytes, 0);

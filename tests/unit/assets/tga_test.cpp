@@ -15,7 +15,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 struct TgaFields {
-  std::uint8_t type = 2, bits = 24, order = 0x20;  // from the top
+  std::uint8_t type = 2, bits = 24, order = 0x20;  // order: rows from the top
   std::uint16_t width = 2, height = 2;
   std::uint16_t map_first = 0, map_count = 0;
   std::uint8_t map_bits = 0;
@@ -70,7 +70,7 @@ TEST(Tga, FourBytesHaveAlphaIfTheHeaderSaysSo) {
 }
 
 TEST(Tga, TwoBytesHaveFiveBitsAColour) {
-  // Red 31, green 16, blue 1; of 31 the codes are 255, 16 * 255 / 31 = 131.6 and 8.2.
+  // Red is 31 of 31, green 16, blue 1. In 8 bits these are 255, 16 * 255 / 31 = 131.6 and 8.2.
   const int low = (16 & 7) << 5 | 1, high = 31 << 2 | 16 >> 3;
   for (const std::uint8_t bits : {15, 16})
     EXPECT_THAT(decode_tga_file(tga({.bits = bits, .width = 1, .height = 1}, {low, high}))->u8,
@@ -101,7 +101,7 @@ TEST(Tga, AMapOfATrueColourImageIsPassedOver) {
 }
 
 TEST(Tga, RunsGoOnInTheNextRow) {
-  // Three of one colour, then one by itself.
+  // A run of three pixels of one colour, then a packet of one plain pixel.
   EXPECT_THAT(decode_tga_file(tga({.type = 10}, {0x82, 1, 2, 3, 0x00, 4, 5, 6}))->u8,
               ElementsAre(3, 2, 1, 3, 2, 1, 3, 2, 1, 6, 5, 4));
   EXPECT_THAT(decode_tga_file(tga({.type = 11, .bits = 8}, {0x01, 1, 2, 0x81, 7}))->u8,
@@ -110,7 +110,7 @@ TEST(Tga, RunsGoOnInTheNextRow) {
       decode_tga_file(tga({.type = 9, .bits = 8, .map_count = 1, .map_bits = 24}, {1, 2, 3, 0x83, 0}))->u8,
       ElementsAre(3, 2, 1, 3, 2, 1, 3, 2, 1, 3, 2, 1));
   EXPECT_THAT(tga_error(tga({.type = 11, .bits = 8}, {0x01, 1, 2, 0x81})), HasSubstr("too short"));
-  // A run may be longer than the image: what is too much is not looked at.
+  // A run may be longer than the image. Its excess is ignored.
   EXPECT_THAT(decode_tga_file(tga({.type = 11, .bits = 8}, {0xff, 7}))->u8, ElementsAre(7, 7, 7, 7));
 }
 
@@ -132,7 +132,7 @@ TEST(Tga, IsToldByItsNameAlone) {
   EXPECT_THAT(decode_image("b.dat", bytes_of(file)).error().message, HasSubstr("does not end in .tga"));
 }
 
-// A header is believed only as far as the file may hold what it claims: 128 pixels a packet.
+// The header claims more pixels than the file can contain at 128 pixels per packet, the longest run.
 TEST(Tga, HugeClaimsCostNoMemory) {
   for (const std::uint8_t type : {2, 10})
     EXPECT_THAT(tga_error(tga({.type = type, .width = 16384, .height = 16384}, {1, 2, 3})),

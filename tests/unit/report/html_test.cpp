@@ -19,7 +19,7 @@ TEST(EscapeHtml, LeavesNothingThatForgesOrTurnsLettersRound) {
 
 TEST(EscapeHtml, KeepsLines) { EXPECT_EQ(escape_html("a\n<b\n"), "a\n&lt;b\n"); }
 
-// RFC 4648, section 10.
+// The examples of RFC 4648, section 10.
 TEST(Base64, IsThatOfTheStandard) {
   EXPECT_EQ(base64(bytes("")), "");
   EXPECT_EQ(base64(bytes("f")), "Zg==");
@@ -34,7 +34,7 @@ TEST(Base64, IsThatOfTheStandard) {
 TEST(Document, ForbidsScriptsAndAddressesAndAllowsItsOwnStyleByDigest) {
   const std::string page = document("a <b>", "p{color:red}", "<p>x</p>");
 
-  // printf 'p{color:red}' | openssl dgst -sha256 -binary | base64
+  // The digest is from: printf 'p{color:red}' | openssl dgst -sha256 -binary | base64
   EXPECT_NE(page.find("default-src 'none'; img-src data:; style-src "
                       "'sha256-p0bF+un5yUb9MBO6xRb8kPHlY2BdpHVtLiFkDrZPF64='"),
             std::string::npos)

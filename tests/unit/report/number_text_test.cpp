@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-// The dashboard's are held to the same table by tests/web/test_modules.py.
+// The table is shared with the dashboard, whose texts tests/web/test_modules.py compares with it.
 TEST(Words, AreThoseOfTheTable) {
   const std::pair<const char*, std::string (*)(double)> all[] = {
       {"figure", figure},        {"given", given},     {"duration", duration}, {"count", count},
