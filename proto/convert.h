@@ -20,8 +20,8 @@ namespace pb = ::lightshaft::farm::v1;
 pb::FromWorker to_wire(const FromWorker& message);
 pb::ToWorker to_wire(const ToWorker& message);
 
-// True if this version supports this kind of message. A newer peer may send others; the caller should ignore
-// them.
+// True if this version supports the kind of the message. A newer peer may send others, which the caller
+// should ignore.
 bool known(const pb::FromWorker& message);
 bool known(const pb::ToWorker& message);
 

@@ -20,8 +20,8 @@ Result<std::string> id_from(const std::string& text, const char* field);
 Result<std::string> text_from(const std::string& text, std::size_t limit, const char* field);
 // Returns the number of seconds, which must be finite and not negative.
 Result<double> seconds_from(double value, const char* field);
-// Returns the rectangle, which must not be empty and must lie inside the largest frame. Its partial (the
-// pixel sums of one unit) must fit into one message.
+// Returns the rectangle, which must not be empty and must lie inside the largest frame. It must be so small
+// that its partial (the pixel sums of one unit) fits into one message.
 Result<PixelRect> rect_from(const pb::Rect& rect, const char* field);
 // Returns the range of samples from s0 to s1, which must not be empty or exceed the largest index; s0 and s1
 // must be even.

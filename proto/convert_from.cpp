@@ -125,8 +125,8 @@ Result<Health> health_from(const pb::UnitResult& in) {
     return Health{};
   auto health = parse_health(in.health().empty() ? "{}" : in.health());
   if (!health) return wrong("result.health", health.error().message);
-  // A sender that reports no causes sends only the counts nonfinite, negative and majorant_violations. The
-  // part of a count that the causes in `health` do not explain is added to the cause unnamed, negative or
+  // If a sender does not know a cause, only the counts nonfinite, negative and majorant_violations include
+  // it. The part of a count that is not in `health` is added to the cause unnamed, negative or
   // majorant_violation.
   const auto rest = [](std::uint64_t stated, std::uint64_t named) {
     return stated > named ? stated - named : 0;

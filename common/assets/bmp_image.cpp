@@ -1,5 +1,5 @@
-// Decodes Windows bitmaps as written by painting programs: 24 or 32 bits per pixel, uncompressed, without a
-// palette.
+// Decodes Windows bitmaps of the form that painting programs write: 24 or 32 bits per pixel, uncompressed,
+// without a palette.
 #include <fmt/format.h>
 
 #include "common/assets/bytes.h"
@@ -8,21 +8,23 @@
 namespace ls {
 namespace {
 
-// The relevant fields of the two headers, in order.
+// The fields of the two headers that are used, in the order of the file.
 struct BmpHeader {
   std::uint32_t pixels_at = 0;
-  std::int32_t width = 0, height = 0;  // rows from the bottom up; from the top down if the height is negative
+  // A positive height means rows from the bottom up, a negative one rows from the top down.
+  std::int32_t width = 0, height = 0;
   std::uint16_t bits = 0;
   std::uint32_t compression = 0;
 };
 
 std::optional<BmpHeader> read_header(ByteReader& r) {
   BmpHeader h;
-  if (!r.skip(10)) return std::nullopt;  // "BM", size of the file, reserved
+  // Skipped: "BM", size of the file, reserved.
+  if (!r.skip(10)) return std::nullopt;
   const auto at = r.take<std::uint32_t>(), header = r.take<std::uint32_t>();
   if (!at || !header || *header < 40) return std::nullopt;
   const auto width = r.take<std::int32_t>(), height = r.take<std::int32_t>();
-  if (!r.skip(2)) return std::nullopt;  // planes
+  if (!r.skip(2)) return std::nullopt;  // skipped: number of planes
   const auto bits = r.take<std::uint16_t>();
   const auto compression = r.take<std::uint32_t>();
   if (!width || !height || !bits || !compression) return std::nullopt;

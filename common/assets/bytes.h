@@ -1,4 +1,4 @@
-// Reads numbers from untrusted bytes.
+// Reads numbers and words from untrusted bytes.
 #pragma once
 
 #include <algorithm>
@@ -47,8 +47,8 @@ class ByteReader {
   std::size_t position_ = 0;
 };
 
-// Removes the next word (non-blank characters) from the front of `line` and returns it; an empty word means
-// that `line` has no more.
+// Removes the next word (a run of non-blank characters) from the front of `line` and returns it; returns an
+// empty word at the end of the line.
 inline std::string_view next_word(std::string_view& line) {
   const std::size_t a = line.find_first_not_of(" \t\r\v\f");
   if (a == line.npos) return line = {};

@@ -19,7 +19,7 @@ struct HdrSize {
   std::uint32_t width = 0, height = 0;
 };
 
-// Parses "-Y height +X width", which means rows from the top. Other orientations are not in use.
+// Parses "-Y height +X width", which means rows from the top. Programs do not write other orientations.
 std::optional<HdrSize> resolution(std::string_view line) {
   const auto count = [](std::string_view w) -> std::uint32_t {
     const auto n = parse_number<std::uint32_t>(w);
@@ -35,8 +35,8 @@ std::optional<HdrSize> resolution(std::string_view line) {
   return s;
 }
 
-// Reads a row as four planes (red, green, blue, exponent), each run-length coded. A length byte above 128 is
-// followed by one byte, which is repeated length - 128 times; a length byte up to 128 is followed by that
+// Reads a row as four planes (red, green, blue, exponent), each run-length coded. A length byte above 128
+// starts a run: the next byte is repeated length - 128 times. A length byte of up to 128 is followed by that
 // number of plain bytes.
 bool read_planes(ByteReader& r, std::vector<Rgbe>& row) {
   for (std::size_t plane = 0; plane < 4; ++plane)
@@ -92,8 +92,8 @@ Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> f
   if (std::uint64_t{size->width} * size->height > max_pixels)
     return too_many_pixels(name, size->width, size->height, max_pixels);
   ByteReader r(file.subspan(file.size() - text.size()));
-  // Run-length codes pack at most 127 values of a plane into two bytes, so a pixel of four planes takes more
-  // than 1/16 byte. A file that is too short for the claimed size is rejected before memory is allocated.
+  // A run packs at most 127 values of a plane into two bytes, so a pixel of four planes takes more than 1/16
+  // byte. A file that is too short for the claimed size is rejected before memory is allocated.
   if (std::uint64_t{size->width} * size->height / 16 > r.left() || r.left() < std::uint64_t{size->height} * 4)
     return bad("it is too short for its size");
   ImageData image{size->width, size->height, 3, {}, {}, false};

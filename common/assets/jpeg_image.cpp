@@ -22,8 +22,7 @@ void on_error(j_common_ptr info) {
   f->base.format_message(info, f->message);
   std::longjmp(f->escape, 1);
 }
-// Treats the library's warnings as errors. The library replaces missing data by grey, but a broken file must
-// be an error.
+// Treats the library's warnings as errors. For missing data the library would only warn and fill in grey.
 void on_message(j_common_ptr info, int level) {
   if (level < 0) on_error(info);
 }
@@ -41,7 +40,7 @@ struct Decoder {
   ~Decoder() { jpeg_destroy_decompress(&info); }
 };
 
-// read_header() and the next function must not have objects with destructors, which longjmp would skip.
+// read_header() and read_rows() must not have objects with destructors, because longjmp would skip them.
 bool read_header(Decoder& d, const unsigned char* data, unsigned long size) {
   if (setjmp(d.failure.escape)) return false;
   jpeg_create_decompress(&d.info);
@@ -81,9 +80,9 @@ Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> 
   if (pixels == 0 || image.width > kMaxImageSide || image.height > kMaxImageSide || pixels > kMaxImagePixels)
     return bad("its size is not believable");
   if (pixels > max_pixels) return too_many_pixels(name, image.width, image.height, max_pixels);
-  if (pixels / 64 / 64 >
-      file.size())  // a lenient limit: an 8 x 8 block takes at least two bits (up to 4 share their chroma)
-    return bad("it is too short for its size");
+  // A block of 8 x 8 values takes at least two bits, and chroma may have a lower resolution, so this limit of
+  // one bit per 512 pixels is lenient.
+  if (pixels / 64 / 64 > file.size()) return bad("it is too short for its size");
   image.u8.resize(pixels * image.channels);
   if (!read_rows(d, image.u8.data(), std::size_t{image.width} * image.channels))
     return bad(d.failure.message);

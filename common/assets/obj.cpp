@@ -69,8 +69,8 @@ class ObjReader {
       if (w.empty() && i >= needed) break;
       if (!w.empty() && w[0] == '+') w.remove_prefix(1);
       const auto [end, ec] = std::from_chars(w.data(), w.data() + w.size(), a[i]);
-      // On underflow the number becomes 0 or denormal, on overflow infinite. Triangles with an infinite
-      // vertex position are left out (add_polygon).
+      // A number that is too small becomes 0 or denormal, one that is too large infinite. add_polygon()
+      // leaves out triangles with an infinite vertex position.
       if (ec == std::errc::result_out_of_range)
         a[i] = static_cast<float>(std::strtod(std::string(w.substr(0, 64)).c_str(), nullptr));
       else if (ec != std::errc{} || end != w.data() + w.size())

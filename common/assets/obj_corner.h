@@ -1,4 +1,4 @@
-// A corner of a face of an OBJ file, and its hash.
+// A corner of a face of an OBJ file, and a hash of it.
 #pragma once
 
 #include <cstddef>
@@ -6,14 +6,15 @@
 
 namespace ls {
 
-// A corner of a face: the indices of its position (v), uv (vt) and normal (vn), counted from 0; -1: none.
+// A corner of a face: the indices of its position (v), uv (vt) and normal (vn), counted from 0. -1 means
+// none.
 struct Corner {
   std::int64_t v = -1, vt = -1, vn = -1;
   bool operator==(const Corner&) const = default;
 };
 
-// The hash of a corner. It is keyed by a secret, so that a file cannot choose corners whose hashes collide.
-// The resulting mesh does not depend on the secret: vertices are numbered in order of appearance.
+// The hash is keyed by a secret, so that a file cannot contain corners that were chosen to collide. The
+// resulting mesh does not depend on the secret: vertices are numbered in order of appearance.
 struct CornerHash {
   std::uint64_t secret = 0;
 

@@ -1,6 +1,6 @@
 // Decodes Portable Float Maps: "PF" (colour) or "Pf" (grey), width, height and a scale, each followed by one
-// blank, and then float32, row by row from the bottom. The sign of the scale is the byte order (negative:
-// little endian), and its magnitude a factor on all values.
+// blank, and then float32 values, row by row from the bottom. A negative scale means little endian, a
+// positive one big endian; its magnitude is a factor on all values.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kMaxWord = 40;  // longest number in a header
 
-// Removes the next word and the one blank that follows it from the front of `text`.
+// Removes the next word and the one blank after it from the front of `text`, and returns the word.
 std::string_view next_field(std::string_view& text) {
   const std::size_t end = text.substr(0, kMaxWord).find_first_of(" \t\r\n");
   if (end == text.npos) return {};

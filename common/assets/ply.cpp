@@ -47,7 +47,7 @@ struct Element {
   std::uint64_t count = 0;
   std::vector<Property> properties;
 
-  // Returns the least number of bytes of one element.
+  // Returns the smallest possible number of bytes of one element.
   std::uint64_t least_bytes(Coding c) const {
     if (c == Coding::ascii) return properties.size();
     std::uint64_t n = 0;
@@ -56,8 +56,8 @@ struct Element {
   }
 };
 
-// Returns the index of a vertex property: 0-2 for the position, 3-5 for the normal, 6-7 for uv; -1: it is
-// none of these.
+// Returns the slot of a vertex property: 0-2 for the position, 3-5 for the normal, 6-7 for uv; -1 for other
+// properties.
 int vertex_slot(std::string_view name) {
   constexpr std::pair<std::string_view, int> kSlots[] = {
       {"x", 0}, {"y", 1}, {"z", 2}, {"nx", 3},        {"ny", 4},        {"nz", 5},        {"u", 6},
@@ -160,8 +160,8 @@ class PlyReader {
       if (!ok) return false;
     }
     if (mesh_.indices.empty() && mesh_.dropped_triangles == 0) return complain("has no faces");
-    // Checked because a file may have several elements of one name, such as two elements 'face', of which
-    // only one has the attribute
+    // A file may have several elements of one name. If only one of two elements 'face' has the attribute, the
+    // attribute has too few values, which is an error.
     for (const MeshAttribute& a : mesh_.attributes)
       if (a.values.size() !=
           a.components * (a.name.starts_with("face_") ? mesh_.triangle_count() : mesh_.vertex_count()))
@@ -169,7 +169,8 @@ class PlyReader {
     return true;
   }
 
-  // Returns the next number of the file's body; nullopt at its end, or if it is not a number.
+  // Returns the next number of the file's body; nullopt at the end of the body, or if the text is not a
+  // number.
   std::optional<double> number(const TypeName& t) {
     if (coding_ == Coding::ascii) {
       std::size_t a = rest_.find_first_not_of(" \t\r\n\v\f");
@@ -307,7 +308,7 @@ class PlyReader {
     return true;
   }
 
-  // The place in the mesh where the values of a property are stored: a component of a requested attribute.
+  // The place of a property's values: a component of one of the requested attributes.
   struct Place {
     int attribute = -1;  // index in mesh_.attributes; -1: none
     std::size_t component = 0;

@@ -11,7 +11,7 @@ namespace {
 
 using Rgba = std::array<std::uint8_t, 4>;  // red, green, blue, alpha
 
-constexpr std::uint64_t kLongestRun = 62;  // pixels that one byte may stand for
+constexpr std::uint64_t kLongestRun = 62;  // largest number of pixels in a run, which is stored in one byte
 
 class QoiDecoder {
  public:
@@ -47,7 +47,7 @@ class QoiDecoder {
         return more.has_value();
       }
       default:
-        run_ = low;  // the current pixel, and `low` more like it
+        run_ = low;  // `low` further pixels are equal to the current one
         return true;
     }
   }
@@ -59,7 +59,7 @@ class QoiDecoder {
     }
     return true;
   }
-  void change(int red, int green, int blue) {  // modulo 256
+  void change(int red, int green, int blue) {  // the sums wrap around, modulo 256
     now_[0] = static_cast<std::uint8_t>(now_[0] + red);
     now_[1] = static_cast<std::uint8_t>(now_[1] + green);
     now_[2] = static_cast<std::uint8_t>(now_[2] + blue);

@@ -1,5 +1,5 @@
-// Decodes Truevision TGA: true colour, grey or by a colour map, plain or run-length coded, rows and columns
-// in either order.
+// Decodes Truevision TGA: true colour, grey or colours of a map, plain or run-length coded, with rows and
+// columns in either order.
 #include <fmt/format.h>
 
 #include <array>
@@ -24,10 +24,10 @@ std::optional<TgaHeader> read_tga_header(ByteReader& r) {
   const auto id = r.take<std::uint8_t>(), map = r.take<std::uint8_t>(), type = r.take<std::uint8_t>();
   const auto map_first = r.take<std::uint16_t>(), map_count = r.take<std::uint16_t>();
   const auto map_bits = r.take<std::uint8_t>();
-  if (!map_bits || !r.skip(4)) return std::nullopt;  // position of the image on a screen
+  if (!map_bits || !r.skip(4)) return std::nullopt;  // skipped: position of the image on a screen
   const auto width = r.take<std::uint16_t>(), height = r.take<std::uint16_t>();
   const auto bits = r.take<std::uint8_t>(), order = r.take<std::uint8_t>();
-  if (!order || *map > 1 || (*order & 0xc0) != 0) return std::nullopt;  // no interleaved rows
+  if (!order || *map > 1 || (*order & 0xc0) != 0) return std::nullopt;  // interleaved rows are rejected
   if (!r.skip(*id)) return std::nullopt;
   TgaHeader h;
   h.kind = *type & 7;
@@ -68,8 +68,8 @@ class PixelBytes {
   PixelBytes(std::span<const std::byte> data, std::size_t size, bool packed)
       : data_(data), size_(size), packed_(packed) {}
 
-  // Returns false if the data are certainly too short for `pixels`. This compares only the least possible
-  // size: a packet has at least 1 + size bytes and at most 128 pixels.
+  // Returns false if the data are certainly too short for `pixels`: a run-length packet has at least 1 + size
+  // bytes and at most 128 pixels.
   bool may_suffice(std::uint64_t pixels) const {
     return data_.size() >= (packed_ ? (pixels + 127) / 128 * (1 + size_) : pixels * size_);
   }

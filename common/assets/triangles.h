@@ -18,7 +18,8 @@ inline bool is_drawable(const MeshData& m, std::uint32_t a, std::uint32_t b, std
       if (!std::isfinite(p[i][k])) return false;
     }
   double area2 = 0;
-  for (int k = 0; k < 3; ++k) {  // in double the products of differences of floats cannot underflow
+  // In double, products of differences of floats cannot underflow.
+  for (int k = 0; k < 3; ++k) {
     const int u = (k + 1) % 3, v = (k + 2) % 3;
     const double n = (p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) - (p[1][v] - p[0][v]) * (p[2][u] - p[0][u]);
     area2 += n * n;
@@ -26,8 +27,8 @@ inline bool is_drawable(const MeshData& m, std::uint32_t a, std::uint32_t b, std
   return area2 > 0;
 }
 
-// Adds a polygon to `m` as triangles of its corners (0, i, i + 1). Triangles without area or with a
-// non-finite vertex are left out and counted in m.dropped_triangles. The indices in `corners` must be in
+// Adds a polygon to `m` as a fan of triangles, from the corners (0, i, i + 1). Triangles without area or with
+// a non-finite vertex are left out and counted in m.dropped_triangles. The indices in `corners` must be in
 // range.
 inline void add_polygon(MeshData& m, std::span<const std::uint32_t> corners) {
   for (std::size_t i = 1; i + 1 < corners.size(); ++i) {

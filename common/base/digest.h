@@ -1,4 +1,5 @@
-// SHA-256 digests: they identify blobs, scenes, settings, units (ranges of samples of one tile) and pixels.
+// SHA-256 digests. They identify blobs (files that jobs use), scenes, settings, units (one range of samples
+// of one tile) and pixels.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
-// Errors as values. Every fallible function returns Result<T>; exceptions do not cross a folder boundary. The
-// message is for the person who must act: what happened, where, and what to do.
+// Errors as values. Every function that can fail returns Result<T>; exceptions do not cross a folder
+// boundary. The message is for the person who must act: what happened, where, and what to do.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
-// Runs the programs that are installed beside ours. They do work in third-party libraries that may crash,
-// hang or take too much memory: reading OpenVDB files, denoising. They share memory with us through one file
-// that they inherit.
+// Runs helper programs, which are installed beside this one. They use third-party libraries that may crash,
+// hang or take too much memory: reading OpenVDB files, denoising. They share memory with this program through
+// one inherited file.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@
 
 namespace ls {
 
-// The number of the file descriptor that a helper shares with us.
+// The file descriptor of the shared file in the helper program.
 inline constexpr int kHelperFd = 3;
 
 // Returns the path of a program in the folder of the running executable.

@@ -34,8 +34,8 @@ bool is_shown(std::uint32_t code) {
   const auto within = [code](std::uint32_t first, std::uint32_t last) {
     return code >= first && code <= last;
   };
-  // Excluded ranges: control characters; line and paragraph separator with the directional embeddings and
-  // overrides; the directional isolates.
+  // Excluded are control characters, line and paragraph separators with the directional embeddings and
+  // overrides, and the directional isolates.
   return !within(0, 0x1F) && !within(0x7F, 0x9F) && !within(0x2028, 0x202E) && !within(0x2066, 0x2069);
 }
 

@@ -6,9 +6,9 @@
 
 namespace ls {
 
-// Replaces characters that could move the cursor, colour the terminal, forge lines or reorder letters. Each
-// control character (C0, DEL, C1, also single bytes that are not UTF-8), line and paragraph separator and
-// directional override becomes one space, so that columns are kept.
+// Replaces each character that could move the cursor, colour the terminal, forge lines or reorder letters by
+// one space, so that columns stay aligned. These are control characters (C0, DEL, C1, also single bytes that
+// are not UTF-8), line and paragraph separators, and directional overrides.
 std::string plain_text(std::string_view text);
 
 // Quotes `text` as one word of a shell command, which a person can copy: returns it unchanged if none of its

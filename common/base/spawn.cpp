@@ -15,8 +15,8 @@ extern char** environ;
 namespace ls {
 namespace {
 
-// Duplicates of the files to be inherited, with numbers above all numbers that the files get in the program.
-// So dup2 of one file to its final number cannot overwrite another file that is not yet moved.
+// Duplicates of the files to be inherited, with higher numbers than the program will use. So dup2() of one
+// file to its final number cannot overwrite another file that is still to be moved.
 class HighFiles {
  public:
   ~HighFiles() {

@@ -30,10 +30,10 @@ struct Program {
 // there is no such program, else internal; the text names the program and the system's reason.
 Result<pid_t> spawn(Program program);
 
-// Waits until the process has ended, and returns its wait status as waitpid() gives it.
+// Waits until the process ends, and returns its wait status as waitpid() gives it.
 int wait_for_end(pid_t pid);
 
-// As wait_for_end(), but returns at once: nullopt while the process runs.
+// As wait_for_end(), but returns at once; nullopt if the process still runs.
 std::optional<int> poll_end(pid_t pid);
 
 }  // namespace ls

@@ -154,8 +154,8 @@ std::string zsh_completion(const Command& program) {
   std::string script = fmt::format("#compdef {0}\n# written by `{0} completion zsh`\n", program.name);
   walk(program.name, program,
        [&](const std::string& path, const Command& command) { script += zsh_function(path, command); });
-  // If zsh autoloads the file, the file is the function's body and must call the function defined in it; if
-  // the file is sourced, it registers the function.
+  // zsh may autoload this file as the body of the function, which must then call the function that it
+  // defines. If the file is sourced, it registers the function.
   return script +
          fmt::format("if [[ $funcstack[1] == {0} ]]; then\n  {0} \"$@\"\nelse\n  compdef {0} {1}\nfi\n",
                      function_of(program.name), program.name);

@@ -9,8 +9,8 @@
 namespace ls {
 namespace {
 
-// Escapes text for troff. A backslash begins an escape. troff prints a plain hyphen as a dash, which cannot
-// be copied into a shell, and treats a line that begins with a dot or an apostrophe as a request.
+// Escapes text for troff. In troff a backslash begins an escape, a plain hyphen prints as a dash, which
+// cannot be copied into a shell, and a line that begins with a dot or an apostrophe is a request.
 std::string escaped(const std::string& text) {
   std::string out;
   for (std::size_t i = 0; i < text.size(); ++i) {

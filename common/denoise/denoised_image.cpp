@@ -13,10 +13,10 @@ namespace {
 
 constexpr double kInterval = 1.96;  // half the width of a 95 % interval, in standard errors
 
-// An interval is given only if at least this many pixels carry the noise: (sum n^2)^2 / sum n^4
-// (denoised_image.h)
+// An interval is given only if at least this many pixels carry the noise, measured as (sum n^2)^2 / sum n^4
+// (denoised_image.h).
 constexpr double kFewestPixels = 4;
-// E (a - b)^4 / Var^2 for two independent Gaussian variables a and b of variance Var
+// E (a - b)^4 / Var^2, where a and b are independent Gaussian variables of variance Var.
 constexpr double kFourthMoment = 12;
 
 struct Noisy {
@@ -70,7 +70,7 @@ Noisy gather(const Film& film) {
   return out;
 }
 
-// Sums over pixels: of the estimated squared error, and of the second and fourth powers of n, the noise of
+// Sums over pixels of the estimated squared error, and of the second and fourth powers of n, the noise of
 // that estimate (denoised_image.h).
 struct Sums {
   double estimate = 0, squares = 0, fourths = 0;

@@ -77,7 +77,7 @@ Result<HttpAnswer> post(const HttpPost& request) {
     curl_easy_setopt(c, CURLOPT_NOPROGRESS, 0L);
     curl_easy_setopt(c, CURLOPT_XFERINFOFUNCTION, &look_up);
     curl_easy_setopt(c, CURLOPT_XFERINFODATA, &request);
-    // After give_up() has returned true, do not wait for a name server that hangs, either.
+    // After give_up() has returned true, do not wait for a name server that hangs.
     curl_easy_setopt(c, CURLOPT_QUICK_EXIT, 1L);
   }
   if (const CURLcode code = curl_easy_perform(c); code != CURLE_OK)

@@ -1,5 +1,5 @@
 // The health of a job for users and programs: for each cause a sentence, its first location, and the command
-// that reproduces it.
+// that renders this location again.
 #pragma once
 
 #include <optional>
@@ -23,7 +23,7 @@ struct HealthNote {
 
 // Returns a note for each cause in `health`. `command` is replay_command() of the job.
 std::vector<HealthNote> health_notes(const Health& health, const std::string& command);
-// Adds `more`, the notes of frame number `frame`, to `notes`, those of earlier frames.
+// Adds `more`, the notes of frame number `frame`, to `notes`, those of the frames before it.
 void add_notes(std::vector<HealthNote>& notes, std::span<const HealthNote> more, std::uint32_t frame);
 
 // Returns {"clean", "nonfinite", "negative", "majorant_violations", "causes": [{"cause", "effect": "rejected"

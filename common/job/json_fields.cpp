@@ -58,7 +58,8 @@ Result<Json> parse_object(std::string_view text, std::string_view what) {
   bool too_deep = false;
   const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
     too_deep |= depth > kMaxNesting;
-    if (too_deep) return false;  // deep values are not kept, since destroying and printing them is recursive
+    if (too_deep)
+      return false;  // deep values are not kept, since code that destroys or prints them is recursive
     if (event == Json::parse_event_t::key && depth <= 2) {
       const auto& key = parsed.get_ref<const std::string&>();
       if (!keys.emplace(depth, key).second && !twice) twice = key;

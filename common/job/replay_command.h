@@ -10,11 +10,11 @@
 namespace ls {
 
 // Returns "lightshaft render SCENE" with all options that determine the value of a sample; each word is
-// quoted for a shell. `scene` is the name by which the job refers to its scene. `frame` is the frame number,
-// for jobs with frames.
+// quoted for a shell. `scene` is the scene's name in the job. `frame` is the frame number, for jobs with
+// frames.
 std::string replay_command(const std::string& scene, const JobSpec& spec,
                            std::optional<std::uint32_t> frame = {});
-// Returns the command for one sample of the pixel (x, y). `command` is a result of the function above.
+// Returns the command for one sample of the pixel (x, y). `command` is from the function above.
 std::string replay_command(const std::string& command, int x, int y, std::uint64_t sample);
 
 }  // namespace ls

@@ -15,8 +15,7 @@ namespace {
 using job::Fields;
 using job::Json;
 
-// Returns canonical JSON: nlohmann's objects are sorted by key, and dump() without indentation writes no
-// spaces.
+// Returns canonical JSON: nlohmann's objects are sorted by key, and dump(-1) writes no spaces.
 std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 Json size_json(FrameSize size) { return Json::array({size.width, size.height}); }
@@ -55,8 +54,8 @@ void read_frames(Fields& fields, JobSpec& spec) {
     fields.wrong("defines", "gives $frame, which in a job with 'frames' is the number of the frame");
 }
 
-// Reads `target_layer` and `denoise`. A target error of the denoised layers implies `denoise`, which may then
-// be left out.
+// Reads `target_layer` and `denoise`. If the target error is that of the denoised layers, `denoise` is true
+// even if it is left out.
 void read_denoise(Fields& fields, JobSpec& spec) {
   const auto layer = fields.name("target_layer");
   if (layer) {

@@ -44,7 +44,7 @@ std::string feature_list(const Json& report, bool used) {
                      used ? "" : " out", items);
 }
 
-// Lists the parts of the scene that affect no pixel, and were therefore not stored or sent.
+// Lists the parts of the scene that affect no pixel. They were not stored or sent.
 std::string pruned(const Json& report) {
   std::string items;
   for (const Json& one : objects(member(report, "analysis"), "left_out")) {
@@ -65,7 +65,7 @@ std::string row(const char* name, const std::string& value, bool code = false) {
 
 std::string whole(double n) { return std::isfinite(n) ? fmt::format("{:.0f}", n) : std::string(); }
 
-// Returns the target error, with a note if it is that of the denoised layers instead of the image.
+// Returns the target error. If it is that of the denoised layers, a note says so.
 std::string target_of(const Json& report) {
   const double target = number(report, "target_error");
   if (!(target > 0)) return "";

@@ -1,5 +1,5 @@
-// The names of traces and spans, and their text form between processes: the header `traceparent` of W3C Trace
-// Context (https://www.w3.org/TR/trace-context/, version 00).
+// The identifiers of traces and spans, and their text in messages between processes: the header `traceparent`
+// of W3C Trace Context (https://www.w3.org/TR/trace-context/, version 00).
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace ls::trace {
 
-// If all bytes of an id are 0, there is no id; `traceparent` does not allow such ids.
+// An id whose bytes are all 0 means no id; `traceparent` does not allow it.
 struct TraceId {
   std::array<std::uint8_t, 16> bytes{};
   auto operator<=>(const TraceId&) const = default;
@@ -23,7 +23,7 @@ struct SpanId {
 std::string hex(const TraceId& id);  // 32 lower-case digits
 std::string hex(const SpanId& id);   // 16 lower-case digits
 
-// Names a span to other processes, so that they can record its children. Plain data without allocations.
+// Identifies a span to other processes, which record its children. Plain data without allocations.
 struct SpanContext {
   TraceId trace;
   SpanId span;
@@ -33,11 +33,12 @@ struct SpanContext {
 
 // Returns the text "00-TRACE-SPAN-FLAGS", 55 characters.
 std::string to_traceparent(const SpanContext& context);
-// nullopt: the text is no valid traceparent. Texts of later versions are read as far as version 00 goes.
+// Parses such a text; nullopt: it is not valid. Of the texts of later versions only the fields of version 00
+// are read.
 std::optional<SpanContext> parse_traceparent(std::string_view text);
 
-// The same text always gives the same id, so that a process that starts again continues its trace. The texts
-// must be unique: the ids are parts of their SHA-256.
+// The same text always gives the same id, so that a process continues its trace after a restart. Texts must
+// be unique: the ids are parts of their SHA-256.
 TraceId trace_id_of(std::string_view text);
 SpanId span_id_of(const TraceId& trace, std::string_view text);
 

@@ -12,7 +12,7 @@
 
 namespace ls::trace {
 
-// Keys are literals. Values never hold tokens or users' file paths.
+// Keys are literals. Values must not contain tokens or users' file paths.
 using Value = std::variant<std::string, std::int64_t, double, bool>;
 using Attributes = std::vector<std::pair<const char*, Value>>;
 

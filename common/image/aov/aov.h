@@ -42,7 +42,7 @@ enum class Aov : std::uint8_t {
 };
 inline constexpr std::size_t kAovs = 18;
 
-// The type of an AOV's values, and the number of samples by which its sums are divided.
+// The type of an AOV's values, and by what number of samples its sums are divided.
 enum class AovKind {
   of_hits,  // sums over the samples that hit a surface, divided by the number of these samples
   // Sums over the samples that hit a surface, divided by the number of all samples: a miss counts as 0
@@ -103,9 +103,10 @@ struct AovPlanes {
 };
 AovPlanes planes_of(AovSet set);
 
-// Bytes per pixel: of a partial or of a tail (the last round of a tile in the film, if it is truncated), and
-// of the film's sums.
+// Returns the bytes per pixel of a partial. The film stores the last round of a tile in the same form if it
+// is truncated.
 std::size_t partial_bytes_per_pixel(AovSet set);
+// Returns the bytes per pixel of the sums in a film.
 std::size_t film_bytes_per_pixel(AovSet set);
 
 }  // namespace ls

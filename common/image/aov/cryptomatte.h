@@ -14,8 +14,8 @@ namespace ls {
 // Returns the hash MurmurHash3_x86_32 (A. Appleby, public domain) with seed 0.
 std::uint32_t murmur3_32(std::string_view text);
 
-// Returns the identifier of a name: its hash, taken as the bits of a float. Some programs would change floats
-// that are 0, denormal, infinite or NaN; for these one exponent bit is flipped.
+// Returns the identifier of a name: its hash, whose bits are taken as a float. If this float were 0,
+// denormal, infinite or NaN, one exponent bit is flipped, since some programs would change such floats.
 float cryptomatte_id(std::string_view name);
 
 // Returns {"name":"8 hexadecimal digits of its id", ...}, sorted by name, without duplicates.

@@ -1,11 +1,11 @@
-// IdSlots has the objects that a pixel shows, with their numbers of samples: a fixed number of slots
-// (identifier, count), and the number of samples that found no slot. An identifier is a float made from a
-// name as in Cryptomatte: normal, never 0. Slots have one canonical order: by count, largest first, then by
-// the bits of the identifier; unused slots are 0, 0.
+// IdSlots has the identifiers of the objects that are visible in a pixel, with their numbers of samples: a
+// fixed number of slots (identifier, count), and the number of samples that found no slot. An identifier is a
+// float made from a name as in Cryptomatte: normal, never 0. Slots have one canonical order: by count,
+// largest first, then by the bits of the identifier; unused slots are 0, 0.
 //
-// Adding two sets keeps the largest slots of both; the others are counted in `more`. While the samples of a
-// pixel show no more than kIdSlots objects in total, every count is exact for any order of additions; beyond
-// that a count may be too low by at most `more`.
+// Adding two IdSlots keeps the slots with the largest counts; the other counts are added to `more`. If the
+// samples of a pixel hit at most kIdSlots objects, every count is exact, whatever the order of additions.
+// Otherwise a count may be too low by at most `more`.
 #pragma once
 
 #include <array>
@@ -32,12 +32,12 @@ struct IdSlots {
 
 bool is_identifier(float id);
 
-// Makes slots from the objects that one unit (a tile and a range of samples) saw in a pixel. `seen` has each
-// object once, in any order.
+// Makes slots from the objects that one unit (one tile and one range of samples) found in a pixel. `seen` has
+// each object once, in any order.
 IdSlots ranked(std::vector<IdSlot> seen);
 IdSlots operator+(const IdSlots& a, const IdSlots& b);
 
-// Checks slots against the number of samples; returns a description of the fault, empty if there is none.
+// Checks slots against the number of samples; returns a description of the fault, or an empty text.
 std::string wrong_with(const IdSlots& slots, std::uint64_t samples);
 
 // Convert between slots and the kIdPlanes planes of one pixel; `stride` is the distance between planes in

@@ -21,8 +21,8 @@ void Checkpoints::change(TileIndex index, const std::function<void(Tile&)>& edit
 void Checkpoints::folded(TileIndex index, RoundIndex round, const TileError& error) {
   change(index, [&](Tile& tile) {
     if (round >= complete()) {
-      // Replaces the tile's figures from this round on. Rounds that the tile skipped while it had stopped get
-      // the figures of its previous round.
+      // Replaces the figures of the tile from this round on. If the tile had stopped and skipped rounds,
+      // these get the figures of its previous round.
       tile.pending.resize(round - complete(), tile.last);
       tile.pending.push_back(error);
     } else {

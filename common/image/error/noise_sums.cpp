@@ -1,5 +1,5 @@
-// Sums over the pixels of a tile. They are accumulated per column, row by row, so that the loops are
-// vectorised, and the columns are added up at the end.
+// Sums over the pixels of a tile. They are accumulated per column, row by row, so that the compiler
+// vectorises the loops; at the end the columns are added up.
 #include <algorithm>
 #include <cstddef>
 #include <numeric>
@@ -72,9 +72,9 @@ struct Columns {
     }
   }
 
-  // Adds, for each pixel, (D(p) . D(q))^2 for its neighbours q. `beside` contains these values for neighbours
-  // in the row (beside[x]: with the previous pixel, beside[x + 1]: with the next), `above` and `below` for
-  // the rows above and below. They are 0 where there is no neighbour.
+  // Adds, for each pixel p, the mean of (D(p) . D(q))^2 over its neighbours q, times 1 - g^2. `beside` has
+  // these squares for neighbours in the row (beside[x]: with the previous pixel, beside[x + 1]: with the
+  // next), `above` and `below` for the rows above and below. They are 0 where there is no neighbour.
   void add_flat(const double* edges, const Scanline& beside, const Scanline& above, const Scanline& below,
                 bool first, bool last) {
     const std::size_t width = squares.size();
@@ -92,7 +92,7 @@ struct Columns {
   }
 };
 
-// Computes (D(p) . D(q))^2 for `count` pixels and their neighbours.
+// Computes (D(p) . D(q))^2 for `count` pairs of neighbours.
 void square_dots(const Values& p, const Values& q, std::size_t count, double* out) {
   for (std::size_t x = 0; x < count; ++x) {
     const double dot = p.r[x] * q.r[x] + p.g[x] * q.g[x] + p.b[x] * q.b[x];

@@ -11,8 +11,8 @@ namespace {
 constexpr std::size_t kWindowReach = 2;  // radius of the 5 x 5 window
 constexpr double kSignificant = 9;       // square of three standard deviations
 
-// Uninitialised memory. Its initial values are never read, and initialising it would take as long as
-// computing the sums.
+// Uninitialised memory. It is written before it is read, and initialising it would take as long as computing
+// the sums.
 class Room {
  public:
   explicit Room(std::size_t size) : values_(std::make_unique_for_overwrite<double[]>(size)) {}
@@ -23,12 +23,12 @@ class Room {
   std::unique_ptr<double[]> values_;
 };
 
-// The parameters are values, not references, so that the calls compile to vector instructions.
+// The parameters are values, not references, so that the compiler turns the calls into vector instructions.
 inline double larger(double a, double b) { return a < b ? b : a; }
 inline double smaller(double a, double b) { return b < a ? b : a; }
 
-// Sums over 5 x 5 windows, clipped to the tile. They are computed first along rows, then along columns;
-// memory access is sequential in both.
+// Sums over 5 x 5 windows, clipped to the tile, first along rows and then along columns. Both passes access
+// memory sequentially.
 class Windows {
  public:
   Windows(std::size_t width, std::size_t height)

@@ -21,7 +21,7 @@ class Layers {
       : film_(film), frame_(film.grid().frame), planes_(planes_of(film.aovs())) {
     sums_.assign(planes_.sums.size(), {});
     // Two kinds of planes have no layer of their own: the number of hits, and half B of a guide (an AOV for
-    // the denoiser), which is added to half A.
+    // the denoiser), whose planes follow those of half A. The layer of a guide is the sum of both halves.
     for (std::size_t p = 0; p < sums_.size(); ++p)
       if (p != planes_.hits && planes_.sums[p].half == 0) sums_[p].resize(pixels_of(frame_));
     ids_.assign(planes_.ids.size() * 2 * kCryptomatteRanks, std::vector<float>(pixels_of(frame_)));
@@ -69,8 +69,6 @@ class Layers {
       if (sums_[p].empty()) continue;
       const AovRow& row = row_of(planes_.sums[p].aov);
       const bool by_hits = row.kind == AovKind::of_hits;
-      // A guide (an AOV for the denoiser) has planes for half A of the samples, then for half B. They are
-      // added.
       const double* other =
           row.kind == AovKind::guide ? &tile.sums[(p + row.components.size()) * n] : nullptr;
       each_pixel(tile.rect, frame_, [&](std::size_t to, std::size_t from) {

@@ -14,8 +14,8 @@ struct CryptomatteManifests {
   std::string shapes, materials;
 };
 
-inline constexpr int kCryptomatteRanks =
-    6;  // identifiers per pixel, largest coverage first: three layers of four channels
+// Number of identifiers per pixel, those with the largest coverage: three layers of four channels.
+inline constexpr int kCryptomatteRanks = 6;
 
 // Returns the name of a layer: that of the AOV, or "crypto_object", "crypto_material".
 std::string layer_of(Aov aov);

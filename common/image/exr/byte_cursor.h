@@ -1,4 +1,4 @@
-// Reads little-endian bytes in order, never past the end.
+// Reads little-endian values from bytes in order, never past the end.
 #pragma once
 
 #include <algorithm>

@@ -53,8 +53,7 @@ FrameSize size_of(const Imath::Box2i& window) {
   return {window.max.x - window.min.x + 1, window.max.y - window.min.y + 1};
 }
 
-// Rows are appended in bands as they are read, so that a small file that claims a large size costs little
-// memory.
+// The rows are read and appended in bands, so that a small file that claims a large size costs little memory.
 Result<RgbImage> read_part(Imf::MultiPartInputFile& file, const Source& source) {
   const Imath::Box2i window = file.header(source.part).dataWindow();
   const FrameSize size = size_of(window);

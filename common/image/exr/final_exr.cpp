@@ -86,7 +86,7 @@ void append(const ExrPicture& band, FinalPicture& image) {
         channel);
 }
 
-// Reads one band of rows at a time, so that a small file that claims a large size costs little memory.
+// Reads one band of rows after the other, so that a small file that claims a large size costs little memory.
 void read_pixels(Imf::InputFile& file, FinalPicture& image) {
   constexpr int kBand = 64;
   exr::Seal seal;

@@ -12,7 +12,7 @@
 namespace ls {
 namespace {
 
-// The addition maps -0 to +0 (when rounding to nearest); all other values stay the same.
+// The addition turns -0 into +0 and changes no other value (in the rounding mode to nearest).
 float pixel_value(double mean) { return static_cast<float>(mean) + 0.0f; }
 
 struct Gathered {
@@ -141,7 +141,7 @@ std::map<std::string, std::string> strings_of(const Film& film, const Provenance
                                                 {"lightshaft:class", from.numeric_class.hex()},
                                                 {"lightshaft:tiles", tile_digests(film)}};
   strings.merge(error_strings(film.error(), film.pixels_without_samples()));
-  // The convergence curve may show problems that the film alone does not show.
+  // The convergence of the error over time may show problems that the film alone does not show.
   if (auto verdict = strings.find("lightshaft:verdict");
       verdict != strings.end() && verdict->second == "trusted" && from.convergence_status &&
       !from.convergence_status->trusted)

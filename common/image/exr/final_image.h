@@ -18,12 +18,13 @@
 
 namespace ls {
 
-// Returns the SHA-256 over the pixels as float32((sumA + sumB) / (nA + nB)), where sums and counts are those
-// of the two halves of the samples. The division is in double, and -0 is replaced by +0. The order is R, G, B
-// of each pixel, row by row, little endian. Pixels without samples are zero.
+// Returns the SHA-256 of the pixels: float32((sumA + sumB) / (nA + nB)), where sums and counts are those of
+// the two halves of the samples. The division is in double, and -0 is replaced by +0. The order is R, G, B of
+// each pixel, row by row, little endian. Pixels without samples are zero.
 Digest pixels_sha256(const Film& film);
 
-// The text of the note (Provenance::notes) called `fake`, for an image that contains results of fake workers.
+// A fake worker (--fake, for tests) sends generated pixels. This is the text of the note `fake`
+// (Provenance::notes) in an image that contains such pixels.
 inline constexpr const char* kFakePixels = "the pixels are made up by fake workers (--fake), not rendered";
 
 // The values of the header strings `lightshaft:...` of the final EXR that do not come from the film.
@@ -36,7 +37,7 @@ struct Provenance {
   std::string settings_json;  // canonical RenderSettings
   std::string build;
   Digest numeric_class;
-  // from here on, nullopt means unknown; unknown values are not written
+  // In the following, nullopt means unknown. Unknown values are not written.
   std::optional<std::uint64_t> seed = {};
   std::optional<double> seconds = {};  // render time
   // "clean", or canonical_json() of the Health; empty: unknown, and not written.
@@ -45,8 +46,9 @@ struct Provenance {
   double core_seconds = 0;  // CPU seconds of all units; 0: unknown, and not written
   // Why sampling stopped before the requested samples, and the consequences; empty: not written
   std::string stopped = {};
-  std::optional<ConvergenceStatus> convergence_status =
-      {};  // judged by the convergence curve, which the film does not have; used for `:verdict`
+  // A judgement from the error over time, which the film does not have. If it says not to trust the figures,
+  // `:verdict` does, too.
+  std::optional<ConvergenceStatus> convergence_status = {};
   std::map<std::string, double> figures = {};     // further numbers, by the name after "lightshaft:"
   std::map<std::string, std::string> notes = {};  // further texts, by the name after "lightshaft:"
 };
@@ -64,13 +66,13 @@ ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests,
 // sealed in `lightshaft:seal` (seal.h).
 Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output,
                              std::span<const float> denoised = {});
-// Writes the bytes of final_exr() to `sink`, one row of tiles at a time, so that a large image is never in
-// memory as a whole. Returns the number of clamped values.
+// Writes the bytes that final_exr() returns to `sink`, one row of tiles at a time, so that a large image is
+// never in memory as a whole. Returns the number of clamped values.
 Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& provenance, bool float_output,
                                       ByteSink& sink, std::span<const float> denoised = {});
 
-// Returns the header strings about the error, by full name, of an image whose tiles have the sums `sums`;
-// `lightshaft:verdict` is based on the pixels only. Without samples there are no such strings.
+// Returns the header strings about the error of an image, by full name. `sums` are those of its tiles.
+// `lightshaft:verdict` is based on the pixels only. If there are no samples, there are no such strings.
 std::map<std::string, std::string> error_strings(const TileError& sums, std::uint64_t pixels_without_samples);
 
 // Returns the number of values of R, G and B that a half image would clamp.

@@ -15,12 +15,12 @@ namespace {
 
 constexpr std::uint32_t kMagic = 20000630, kTiledFlag = 0x200, kMultiPartFlag = 0x1000;
 constexpr std::size_t kMaxNameBytes = 255;
-// The library allocates a chunk's buffers before it reads the chunk. For chunks above this size the file must
-// be long enough to contain them: the best compression in the format is a few thousand to one (deflate:
-// 1032).
+// The library allocates a chunk's buffers before it reads the chunk. For chunks above kFreeChunkBytes the
+// file must therefore be long enough to contain them if they are compressed by kMostPacking. The best
+// compression in the format is a few thousand to one (deflate: 1032).
 constexpr std::uint64_t kFreeChunkBytes = std::uint64_t{64} << 20;
 constexpr double kMostPacking = 4096;
-// Smallest entry of a channel list: a name of one letter, the terminating zero, four int32
+// Size of the smallest entry of a channel list: a name of one letter, the terminating zero, four int32.
 constexpr std::size_t kLeastChannelBytes = 18;
 
 struct Part {
@@ -109,10 +109,10 @@ bool preview(ByteCursor in) {
          std::uint64_t{*width} * *height * 4 == in.left();
 }
 
-// Checks the size of an attribute's value against its type. The library reads most types by their contents
-// instead of the size in the header; if the two disagree, it continues at a wrong position, where any four
-// bytes may become the size of a buffer to allocate. Always true for unknown types, whose bytes the library
-// just keeps.
+// Checks the size of an attribute's value against its type. For most types the library ignores the size in
+// the header and reads as many bytes as the type or the contents require. If the two disagree, it continues
+// at a wrong position, where any four bytes may become the size of a buffer to allocate. Unknown types are
+// always accepted, since the library keeps their bytes as they are.
 bool fills_its_size(std::string_view type, std::span<const std::byte> value) {
   const auto* fixed =
       std::find_if(std::begin(kFixed), std::end(kFixed), [&](const Fixed& f) { return f.type == type; });
@@ -185,7 +185,7 @@ class Scan {
     };
     const std::uint64_t chunks =
         tiles ? up(w, part.tile_width) * up(h, part.tile_height) : up(h, part.lines_per_chunk);
-    // The table of chunks has 8 bytes per chunk; further mip levels make it longer, not shorter.
+    // The chunk table has 8 bytes per chunk. Further mip levels make it longer, not shorter.
     if (chunks > in_.left() / 8 || part.chunk_count < 0 ||
         static_cast<std::uint64_t>(part.chunk_count) > in_.left() / 8)
       return refuse(fmt::format("the file ends too early for {} x {} pixels", w, h));

@@ -11,9 +11,9 @@
 
 namespace ls::exr {
 
-// Checks that every part's size is within `limits`, every attribute lies inside the file and is as long as
-// its type requires, every chunk table is no longer than the file, and the buffer of one chunk is at most
-// kMaxChunkBytes. Everything else is checked by the library.
+// Checks that every part's size is within `limits`, that every attribute lies inside the file and is as long
+// as its type requires, that every chunk table fits into the file, and that the buffer of one chunk has at
+// most kMaxChunkBytes. The library checks everything else.
 inline constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 30;
 inline constexpr int kMaxParts = 256;
 Result<void> check_headers(std::span<const std::byte> file, const std::string& name, const ExrLimits& limits);

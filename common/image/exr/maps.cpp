@@ -70,7 +70,7 @@ double averaged(const std::vector<double>& values, const PixelRect& rect, std::s
 }  // namespace
 
 Colour map_colour(double t) {
-  // Dark blue, blue, green, yellow: lightness increases evenly, so the order is visible in grey too.
+  // Dark blue, blue, green, yellow. Lightness increases evenly, so the order is visible without colour, too.
   constexpr std::array<Colour, 5> kStops = {
       {{13, 8, 70}, {45, 60, 142}, {33, 120, 140}, {70, 180, 105}, {250, 230, 50}}};
   const double at = std::clamp(std::isnan(t) ? 1.0 : t, 0.0, 1.0) * (kStops.size() - 1);

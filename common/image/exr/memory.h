@@ -72,8 +72,8 @@ inline void set_up_library() {
   std::call_once(once, [] { Imf::setGlobalThreadCount(0); });
 }
 
-// Calls f, which returns a Result<T>. An exception of the library becomes an error with this code and the
-// message `what: reason`.
+// Calls f, which returns a Result<T>. An exception of the library becomes an error with the given code and
+// the message `what: reason`.
 template <class F>
 auto guarded(Errc code, const std::string& what, F&& f) -> decltype(f()) {
   try {

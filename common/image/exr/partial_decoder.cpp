@@ -1,7 +1,7 @@
-// Decodes partials (files with the pixel sums of one tile and range of samples), which are untrusted input. A
-// partial has exactly one form (uncompressed scanlines of known float channels under a known header). So it
-// is parsed byte by byte against that form, instead of by a library that accepts every EXR. Memory is
-// allocated only after the sizes are found to be the tile's.
+// Decodes partials (files with the pixel sums of one tile and range of samples), which are untrusted. A
+// partial has exactly one form: uncompressed scanlines of known float channels under a known header. So it is
+// parsed byte by byte against that form, instead of by a library that accepts every EXR. Memory is allocated
+// only after the sizes in the file have been compared with those of the tile.
 #include "common/image/exr/partial_decoder.h"
 
 #include <fmt/format.h>
@@ -32,7 +32,7 @@ tl::unexpected<Error> refuse_partial(std::string what) {
 struct Shape {
   std::optional<PixelRect> data, display;
   std::optional<std::string_view> unit;
-  std::size_t pixels_at = 0;  // byte offset of the line table
+  std::size_t pixels_at = 0;  // AOVs of which the file has at least one channel
   AovSet aovs;                // AOVs with at least one channel
 };
 
@@ -216,7 +216,8 @@ Result<std::vector<float>> read_pixels(std::span<const std::byte> exr, const Sha
       return refuse_partial(fmt::format("line {}: wrong number or size", y));
     for (std::size_t c = 0; c < channels; ++c) {
       const std::size_t plane = c < kFileOrder.size() ? static_cast<std::size_t>(kFileOrder[c]) : c;
-      const auto row = lines.take(width * sizeof(float));  // the bytes are there, since the size was checked
+      // The size of the file was checked, so the bytes exist.
+      const auto row = lines.take(width * sizeof(float));
       std::memcpy(sums.data() + (plane * height + y) * width, row->data(), row->size());
     }
   }

@@ -1,5 +1,5 @@
-// Encodes partials (files with the pixel sums of one tile and range of samples) with OpenEXR. Partials are
-// decoded without that library, since they are untrusted input of one fixed form (partial_decoder.cpp).
+// Encodes partials (files with the pixel sums of one tile and range of samples) with OpenEXR.
+// partial_decoder.cpp decodes them without the library, since they are untrusted input of one fixed form.
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>

@@ -26,7 +26,7 @@ PixelLayer layer_of_aov(Aov aov) {
   PixelLayer layer{.name = layer_of(aov), .channels = {}, .rule = BlockRule::mean, .half = true, .aov = aov};
   if (row.kind == AovKind::ids) {
     layer.rule = BlockRule::first;
-    layer.half = false;  // half floats cannot represent identifiers, which are the bits of a float
+    layer.half = false;  // a half float cannot represent the bits of an identifier
     for (std::size_t rank = 0; rank < kShownRanks; ++rank)
       for (const char* of : {"id", "coverage"}) layer.channels.push_back(fmt::format("{}{}", of, rank));
   } else {
@@ -55,8 +55,8 @@ std::vector<float> means(const TileAovs& tile, const AovPlanes& planes, const Ao
   for (std::size_t plane = 0; plane < planes.sums.size(); ++plane) {
     const AovPlane& p = planes.sums[plane];
     if (p.hits || p.aov != row.aov || p.half != 0) continue;
-    // A guide (an AOV for the denoiser) has planes for half A of the samples, then for half B. They are
-    // added.
+    // A guide (an AOV for the denoiser) has planes for half A of the samples, then planes for half B. The two
+    // are added.
     const double* other = row.kind == AovKind::guide ? &tile.sums[(plane + channels) * n] : nullptr;
     for (std::size_t i = 0; i < n; ++i) {
       const double count = row.kind == AovKind::of_hits ? hits[i] : static_cast<double>(tile.spp);

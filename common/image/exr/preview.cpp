@@ -14,8 +14,8 @@ constexpr double kMaxStops = 60;
 constexpr int kChecker = 8;  // side of a square of the checkerboard, in pixels
 constexpr std::array<png_byte, 3> kEmpty[2] = {{24, 24, 27}, {31, 31, 35}};
 
-// Returns the thresholds between sRGB codes: the i-th is the linear value from which the code is i + 1 (IEC
-// 61966-2-1, rounded to nearest).
+// Returns the thresholds between 8-bit sRGB codes: the i-th is the smallest linear value that is rounded to
+// the code i + 1 (IEC 61966-2-1).
 std::array<double, 255> srgb_steps() {
   std::array<double, 255> out;
   for (std::size_t i = 0; i < out.size(); ++i) {

@@ -15,7 +15,7 @@
 namespace ls {
 namespace {
 
-// A fast level: higher levels hardly compress noise better, and users wait for images
+// A low level: higher levels hardly compress noise better, and users wait for the image.
 constexpr int kZipLevel = 2;
 
 std::vector<half> to_half(const std::vector<float>& values) {
@@ -42,11 +42,11 @@ Result<void> check(const ExrPicture& picture) {
   return {};
 }
 
-// Writes rows, the first of which is row y0 of the file.
+// Writes rows to the file; the first of them is the file's row y0.
 void write_rows(Imf::OutputFile& file, const ExrPicture& rows, int y0) {
   Imf::FrameBuffer buffer;
-  // when the outer vector grows, it moves the inner ones without copying their values, so the slices stay
-  // valid
+  // If the outer vector grows, it moves the inner ones without copying their values. So the pointers in the
+  // slices stay valid.
   std::vector<std::vector<half>> halves;
   const auto add = [&](const std::string& name, Imf::PixelType type, const void* data) {
     buffer.insert(name, Imf::Slice::Make(type, data, {0, y0}, rows.size.width, rows.size.height));
@@ -88,7 +88,8 @@ Result<void> each_band(const ExrBands& bands, Take take) {
   return {};
 }
 
-// The seal is in the header, which precedes the data that it covers, so the bands are generated twice.
+// The seal is in the header, which the file has before the data that the seal covers. So the bands are
+// generated twice: for the seal, and for the file.
 Result<void> write_bands(Imf::OStream& out, const ExrBands& bands) {
   if (bands.size.width < 1 || bands.size.height < 1)
     return fail(Errc::invalid_argument, "writing an EXR: the image is empty");

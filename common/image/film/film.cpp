@@ -20,8 +20,8 @@ Digest chained(const Digest& chain, const Digest& unit) {
   return hash.finish();
 }
 
-// Adds the identifiers of `from` to those in `to`. Each has kIdPlanes planes of `pixels` values for every AOV
-// of identifiers.
+// Adds the identifiers of `from` to those of `to`. Both have kIdPlanes planes of `pixels` values for every
+// AOV of identifiers.
 void add_ids(std::vector<float>& to, std::span<const float> from, std::size_t pixels) {
   for (std::size_t first = 0; first < to.size(); first += kIdPlanes * pixels)
     for (std::size_t i = first; i < first + pixels; ++i)
@@ -117,9 +117,8 @@ std::array<std::vector<double>, 2> Film::halves(const Tile& tile, std::size_t pi
 
 std::array<std::vector<double>, 2> Film::means(const Tile& tile, std::size_t pixels, bool with_tail) {
   auto out = halves(tile, pixels, with_tail);
-  const double samples =
-      // Samples of each half; the number of all samples is even
-      static_cast<double>((with_tail ? tile.spp() : tile.full_spp()) / 2);
+  // Samples of each half; the number of all samples is even.
+  const double samples = static_cast<double>((with_tail ? tile.spp() : tile.full_spp()) / 2);
   for (auto& half : out) {
     double* values = half.data();
     const std::size_t count = half.size();

@@ -2,8 +2,8 @@
 // full rounds; 32 bytes digest chain; u64 s0, s1 of the tail (0, 0: no tail); 32 bytes digest of the tail;
 // f64 TileError::skew; 2 f64 plain.changes; 2 f64 relative.changes; the full rounds: 6 colour planes and the
 // planes of AOV sums as doubles, then the planes of identifiers as floats; the tail, if there is one: the
-// same planes, all as floats; SHA-256 of all bytes before it. The error figures that need the tile before
-// its last round are stored; the others are recomputed.
+// same planes, all as floats; SHA-256 of all bytes before it. The stored figures of TileError are those that
+// depend on the tile before its last round; the others are computed again.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -56,7 +56,7 @@ class Reader {
     return Reader(body.subspan(magic.size()));
   }
   std::size_t left() const { return bytes_.size(); }
-  // Reads a number. Past the end it returns zero, so callers must check ok() or left().
+  // Reads a number. At the end of the bytes it returns zero, so callers must check ok() or left().
   template <class T>
   T value() {
     T v{};

@@ -77,7 +77,7 @@ HealthCause cause_named(std::string_view word) {
   return HealthCause::unnamed;
 }
 
-// Returns the sum, or the largest number if it overflows: another process may send any count.
+// Returns the sum, or the largest number if the sum overflows, since another process may send any counts.
 std::uint64_t sum(std::uint64_t a, std::uint64_t b) {
   return a > std::numeric_limits<std::uint64_t>::max() - b ? std::numeric_limits<std::uint64_t>::max()
                                                            : a + b;
@@ -161,7 +161,7 @@ std::string canonical_json(const Health& health) {
 Result<Health> parse_health(std::string_view text) {
   constexpr std::size_t kMostBytes = 64 << 10, kMostCauses = 64;
   if (text.size() > kMostBytes) return tl::unexpected(bad_health("the text is too long"));
-  // Texts of this program are nested four levels deep. The callback drops deeper levels before they take
+  // The texts of canonical_json() have four nested levels. The callback drops deeper ones before they need
   // stack or memory.
   bool deep = false;
   const auto shallow = [&](int depth, json::parse_event_t, json&) {

@@ -77,7 +77,7 @@ Result<UnitHeader> parse_unit_header(std::string_view text) {
   if (!tile) return tl::unexpected(tile.error());
 
   const UnitHeader header{*scene, *settings, *numeric, *tile, {*s0, *s1}};
-  // The unit digest covers these bytes, so their form must be unique.
+  // The unit digest covers these bytes, so the same header must always have the same bytes.
   if (canonical_json(header) != text)
     return tl::unexpected(bad(
         "not in canonical form (sorted keys class, s0, s1, scene, settings, tile; no spaces; nothing else)"));

@@ -1,4 +1,4 @@
-// Visits the pixels of a tile, with their positions in the frame and in the tile.
+// Visits the pixels of a tile with their indices in the frame and in the tile.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,8 @@
 
 namespace ls {
 
-// Calls put(to, from) with the index of each of the tile's pixels in the frame and in the tile, row by row.
+// Calls put(to, from) for each pixel of the tile, row by row. `to` is its index in the frame, `from` its
+// index in the tile.
 template <class Put>
 void each_pixel(const PixelRect& rect, FrameSize frame, Put put) {
   std::size_t from = 0;

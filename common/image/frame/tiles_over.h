@@ -1,4 +1,4 @@
-// Which tiles of a frame a rectangle of pixels touches.
+// Tiles of a frame that a rectangle of pixels overlaps.
 #pragma once
 
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace ls {
 
-// True if the rectangle has pixels, and all of them are in the frame.
+// True if the rectangle is not empty and lies inside the frame.
 inline bool lies_in(FrameSize frame, const PixelRect& rect) {
   return 0 <= rect.x0 && rect.x0 < rect.x1 && rect.x1 <= frame.width && 0 <= rect.y0 && rect.y0 < rect.y1 &&
          rect.y1 <= frame.height;

@@ -13,7 +13,7 @@ namespace {
 
 using flip::Planes;
 
-// Conversions from linear RGB (Rec. 709 primaries, D65 white) to CIE XYZ and back, and this white in XYZ.
+// Conversions between linear RGB (Rec. 709 primaries, D65 white) and CIE XYZ, and this white in XYZ.
 constexpr float kToXyz[3][3] = {{10135552.F / 24577794.F, 8788810.F / 24577794.F, 4435075.F / 24577794.F},
                                 {2613072.F / 12288897.F, 8788810.F / 12288897.F, 887015.F / 12288897.F},
                                 {1425312.F / 73733382.F, 8788810.F / 73733382.F, 70074185.F / 73733382.F}};
@@ -35,7 +35,8 @@ Triple times(const float (&m)[3][3], const Triple& v) {
 
 float shown(float v) { return v > 0 ? std::min(v, 1.F) : 0.F; }  // NaN becomes 0, too
 
-// Linearised CIELAB, in which contrast sensitivity is defined ([LDR] equation (2)).
+// Returns the colour in linearised CIELAB, the space in which contrast sensitivity is defined ([LDR] equation
+// (2)).
 Triple opponent(const Triple& rgb) {
   Triple n = times(kToXyz, rgb);
   for (std::size_t i = 0; i < 3; ++i) n[i] /= kWhite[i];
@@ -85,7 +86,7 @@ Planes opponents(const FlipImage& image) {
   return out;
 }
 
-// Returns the colour of a pixel as seen at the viewing distance, in CIELAB adjusted by hunt().
+// Returns the colour of a pixel as it appears at the viewing distance, in CIELAB adjusted by hunt().
 Triple seen(const Planes& filtered, std::size_t i) {
   Triple rgb = rgb_of({filtered[0][i], filtered[1][i], filtered[2][i]});
   for (float& v : rgb) v = shown(v);
@@ -99,8 +100,8 @@ constexpr float kTone[6] = {.6F * .6F * 2.51F, .6F * .03F, 0, .6F * .6F * 2.43F,
 float tone_mapped(float v) {
   if (!(v > 0)) return 0;
   if (!std::isfinite(v)) return 1;
-  // Limits v, since larger values would overflow when squared. For such values the curve is constant, above
-  // 1.
+  // Larger values would overflow when they are squared. The curve is constant there, above 1, so they are
+  // limited.
   v = std::min(v, 1e15F);
   return shown((kTone[0] * v * v + kTone[1] * v + kTone[2]) / (kTone[3] * v * v + kTone[4] * v + kTone[5]));
 }

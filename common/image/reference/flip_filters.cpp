@@ -43,8 +43,8 @@ Plane along_columns(const Plane& in, FrameSize size, const Kernel& kernel) {
   return out;
 }
 
-// A term of the contrast sensitivity filter: a sqrt(pi / b) exp(-pi^2 x^2 / b), x in degrees, applied along
-// both axes.
+// A term of the contrast sensitivity filter, a sqrt(pi / b) exp(-pi^2 x^2 / b) with x in degrees; it is
+// applied along both axes.
 struct Sensitivity {
   double a, b;
 };
@@ -85,10 +85,10 @@ Plane filtered(const Plane& in, FrameSize size, const std::array<Sensitivity, 2>
   return sum;
 }
 
-// A Gaussian of a feature's width and its derivatives ([LDR] section 4.2). Each is normalised so that its
-// positive weights sum to 1 and its negative ones to -1 over the window.
+// Filters for features: a Gaussian of a feature's width, and its derivatives ([LDR] section 4.2). The
+// derivatives are normalised over the window, so that positive weights sum to 1 and negative ones to -1.
 struct FeatureKernels {
-  Kernel across;       // the Gaussian, for the other axis; sums to 1
+  Kernel across;       // the Gaussian, for the axis across the derivative; sums to 1
   Kernel edge, point;  // first and second derivative
 };
 

@@ -1,4 +1,4 @@
-// The spatial filters of FLIP (flip.h), all of them sums of separable filters. Used by flip.cpp only.
+// The spatial filters of FLIP (flip.h), each a sum of separable filters. Used by flip.cpp only.
 #pragma once
 
 #include <array>
@@ -26,8 +26,8 @@ class Planes {  // three planes: Y, Cx, Cz
   std::array<std::vector<float>, 3> planes_;
 };
 
-// Returns the image with every channel filtered by the contrast sensitivity function ([LDR] equations (3),
-// (4), table 1).
+// Returns the image with every plane filtered by the contrast sensitivity function ([LDR] equations (3), (4),
+// table 1).
 Planes contrast_filtered(const Planes& image, float pixels_per_degree);
 
 // Returns max(|edge_r - edge_t|, |point_r - point_t|) of each pixel, from the first plane of the reference
