@@ -28,8 +28,8 @@ inline constexpr std::uint64_t kMaxGridValues = std::uint64_t{1} << 31;
 struct MeshAttribute {
   std::string name;  // "vertex_..." or "face_..."
   std::uint32_t components = 1;
-  bool bytes = false;         // `components` values per vertex or triangle, adjacent in memory
-  std::vector<float> values;  // one or three components per vertex or triangle, adjacent in memory
+  bool bytes = false;         // true: the values are 0 to 255, as in the file
+  std::vector<float> values;  // `components` values per vertex or triangle, adjacent in memory
 };
 
 // A triangle mesh. `positions` and (if the file has any) `normals` have three floats per vertex, `uvs` two;

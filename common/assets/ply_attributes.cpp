@@ -61,8 +61,7 @@ std::vector<PlyAttribute> ply_attributes(std::span<const std::string_view> names
       run = {prefix, *kind, {i}};
     } else if (run.properties.size() < 4 && run.kind[run.properties.size()] == name.back()) {
       run.properties.push_back(i);
-      // The property does not continue the sequence, so this prefix has no attribute.
-    } else {
+    } else {  // the property does not continue the sequence, so this prefix has no attribute
       done.insert(prefix);
       run = {};
     }

@@ -15,8 +15,8 @@ namespace ls::trace {
 
 // Decides which traces are recorded. The same trace id always gets the same decision, in every process.
 struct Sampler {
-  double ratio = 1;            // true: if another program began the trace, its decision is kept
-  bool parent_decides = true;  // for a trace that another program began, that program decides instead
+  double ratio = 1;            // fraction of the traces that are recorded, 0 to 1
+  bool parent_decides = true;  // true: if another program began the trace, its decision is kept
 
   bool takes(const TraceId& trace, std::optional<bool> parent_sampled) const;
 };

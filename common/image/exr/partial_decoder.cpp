@@ -32,8 +32,8 @@ tl::unexpected<Error> refuse_partial(std::string what) {
 struct Shape {
   std::optional<PixelRect> data, display;
   std::optional<std::string_view> unit;
-  std::size_t pixels_at = 0;  // AOVs of which the file has at least one channel
-  AovSet aovs;                // AOVs with at least one channel
+  std::size_t pixels_at = 0;  // byte offset of the line table
+  AovSet aovs;                // AOVs of which the file has at least one channel
 };
 
 struct Attribute {

@@ -229,7 +229,7 @@ TEST(FakePixels, ShowWhenTwoRoundsAreFoldedInReversedOrder) {
     for (std::size_t k = i + 1; k < order.size(); ++k) {
       std::swap(order[i], order[k]);
       if (k > 1) EXPECT_NE(folded_in(order), right) << "rounds " << i << " and " << k;
-      // A + b = b + a, so swapping the first two rounds changes no pixel.
+      // Since a + b = b + a, swapping the first two rounds changes no pixel.
       else
         EXPECT_EQ(folded_in(order), right);
       std::swap(order[i], order[k]);
