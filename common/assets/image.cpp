@@ -41,6 +41,10 @@ Result<ImageData> load_image(const std::filesystem::path& path, std::string_view
   return decode_image(name, *bytes, max_pixels);
 }
 
+tl::unexpected<Error> BrokenImage::operator()(std::string_view problem) const {
+  return fail(Errc::invalid_argument, fmt::format("'{}': broken {}: {}", name, format, problem));
+}
+
 tl::unexpected<Error> too_many_pixels(std::string_view name, std::uint64_t width, std::uint64_t height,
                                       std::uint64_t max_pixels) {
   return fail(Errc::resource_exhausted, fmt::format("'{}': {} x {} pixels; at most {} may be read here", name,

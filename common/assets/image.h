@@ -44,6 +44,11 @@ Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> f
 Result<ImageData> decode_pfm(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
 
+// Returns the error of one decoder, "'NAME': broken FORMAT: PROBLEM".
+struct BrokenImage {
+  std::string_view name, format;
+  tl::unexpected<Error> operator()(std::string_view problem) const;
+};
 // Returns the error of all these decoders for an image of more than max_pixels.
 tl::unexpected<Error> too_many_pixels(std::string_view name, std::uint64_t width, std::uint64_t height,
                                       std::uint64_t max_pixels);

@@ -9,8 +9,7 @@
 
 #include "common/assets/bytes.h"
 #include "common/assets/mesh.h"
-#include "common/assets/obj_corner.h"
-#include "common/assets/triangles.h"
+#include "common/assets/mesh_parts.h"
 
 namespace ls {
 

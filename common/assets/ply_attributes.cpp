@@ -1,4 +1,4 @@
-#include "common/assets/ply_attributes.h"
+#include "common/assets/mesh_parts.h"
 
 #include <algorithm>
 #include <array>

@@ -10,7 +10,7 @@
 
 #include "common/assets/bytes.h"
 #include "common/assets/mesh.h"
-#include "common/assets/triangles.h"
+#include "common/assets/mesh_parts.h"
 
 namespace ls {
 

@@ -1,5 +1,5 @@
 // Attributes of PLY meshes. All expected values are those of Mitsuba 3.9.1.
-#include "common/assets/ply_attributes.h"
+#include "common/assets/mesh_parts.h"
 
 #include <gmock/gmock.h>
 
