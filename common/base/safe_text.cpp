@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
+#include <charconv>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -78,6 +80,29 @@ std::string shell_word(std::string_view text) {
       word += c;
   }
   return word + "'";
+}
+
+std::string percent_encode(std::string_view text) {
+  std::string out;
+  for (const unsigned char c : text)
+    if (std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.' || c == '~')
+      out += static_cast<char>(c);
+    else
+      out += fmt::format("%{:02X}", c);
+  return out;
+}
+
+std::optional<std::string> percent_decode(std::string_view text) {
+  std::string out;
+  while (!text.empty()) {
+    const char* const code = text.data() + 1;
+    const bool coded = text.front() == '%';
+    unsigned char byte = static_cast<unsigned char>(text.front());
+    if (coded && (text.size() < 3 || std::from_chars(code, code + 2, byte, 16).ptr != code + 2)) return {};
+    out += static_cast<char>(byte);
+    text.remove_prefix(coded ? 3 : 1);
+  }
+  return out;
 }
 
 }  // namespace ls

@@ -1,6 +1,7 @@
-// Makes external text (a scene, a farm's answer) safe for a terminal or a shell.
+// Makes external text (a scene, a farm's answer) safe for a terminal, a shell or a URL.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -15,5 +16,10 @@ std::string plain_text(std::string_view text);
 // characters has a special meaning in a shell, otherwise quoted. Control characters are written as escapes
 // ($'...', as bash, zsh and ksh read them), so the word can be shown on a terminal and in a log line.
 std::string shell_word(std::string_view text);
+
+// "a b" -> "a%20b": codes all but the unreserved characters of URLs.
+std::string percent_encode(std::string_view text);
+// "a%20b" -> "a b" (RFC 3986, section 2.1); nullopt if a '%' is not followed by two hexadecimal digits.
+std::optional<std::string> percent_decode(std::string_view text);
 
 }  // namespace ls

@@ -13,7 +13,7 @@
 #include <fstream>
 #include <iomanip>
 
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 
 namespace ls {
 

@@ -9,7 +9,7 @@
 
 #include "common/base/log.h"
 #include "common/base/parse_number.h"
-#include "common/base/percent_code.h"
+#include "common/base/safe_text.h"
 #include "common/http/post.h"
 
 namespace ls::trace {

@@ -9,8 +9,8 @@
 #include <cerrno>
 #include <cstring>
 
-#include "common/base/helper_program.h"
 #include "common/base/secret.h"
+#include "common/base/spawn.h"
 #include "coordinator/tls/certificates.h"
 
 namespace ls::tls {

@@ -16,7 +16,7 @@
 #include <cstring>
 #include <vector>
 
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 #include "common/denoise/exchange.h"
 
 namespace {

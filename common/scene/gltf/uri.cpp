@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 
-#include "common/base/percent_code.h"
+#include "common/base/safe_text.h"
 
 namespace ls::scene::gltf {
 namespace {

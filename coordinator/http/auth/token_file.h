@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "common/base/error.h"
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 
 namespace ls::http {
 

@@ -14,7 +14,7 @@
 #include <iterator>
 
 #include "common/base/overloaded.h"
-#include "common/base/percent_code.h"
+#include "common/base/safe_text.h"
 #include "coordinator/http/message/limits.h"
 
 namespace ls::http {

@@ -11,7 +11,7 @@
 #include <mutex>
 
 #include "common/base/log.h"
-#include "common/base/percent_code.h"
+#include "common/base/safe_text.h"
 
 namespace ls::coordinator {
 namespace {

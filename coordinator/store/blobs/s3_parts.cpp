@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "common/base/log.h"
-#include "common/base/percent_code.h"
+#include "common/base/safe_text.h"
 #include "coordinator/store/blobs/s3_request.h"
 #include "coordinator/store/files.h"
 

@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include "common/base/parse_number.h"
-#include "common/base/percent_code.h"
+#include "common/base/safe_text.h"
 #include "coordinator/store/redis/redis_link.h"
 
 namespace ls::coordinator {

@@ -12,7 +12,7 @@
 #include <cstring>
 #include <utility>
 
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 #include "worker/render/media/vdb_reply.h"
 #include "worker/render/media/vdb_validate.h"
 

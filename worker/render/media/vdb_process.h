@@ -10,7 +10,7 @@
 #include <string>
 
 #include "common/base/error.h"
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 #include "worker/render/media/vdb_limit.h"
 #include "worker/render/media/vdb_module.h"
 
