@@ -99,15 +99,17 @@ std::string bash_completion(const Command& program) {
 
 namespace {
 
-// Escapes brackets and colons, which separate the parts of a specification for zsh's _arguments.
-std::string zsh_text(const std::string& text) {
+std::string with_backslashes(const std::string& text, std::string_view before) {
   std::string out;
   for (const char c : text) {
-    if (c == '[' || c == ']' || c == ':' || c == '\\') out += '\\';
+    if (before.find(c) != before.npos) out += '\\';
     out += c;
   }
   return out;
 }
+
+// Escapes brackets and colons, which separate the parts of a specification for zsh's _arguments.
+std::string zsh_text(const std::string& text) { return with_backslashes(text, "[]:\\"); }
 
 std::string zsh_value(const CommandOption& option) {
   const std::string action = !option.choices.empty() ? fmt::format("({})", fmt::join(option.choices, " "))
@@ -178,14 +180,7 @@ std::string fish_condition(const std::string& path, const Command& command) {
   return fmt::format("{}", fmt::join(seen, "; and "));
 }
 
-std::string fish_text(const std::string& text) {
-  std::string out = "'";
-  for (const char c : text) {
-    if (c == '\'' || c == '\\') out += '\\';
-    out += c;
-  }
-  return out + "'";
-}
+std::string fish_text(const std::string& text) { return "'" + with_backslashes(text, "'\\") + "'"; }
 
 }  // namespace
 
