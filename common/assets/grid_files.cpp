@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "common/assets/bytes.h"
+#include "common/base/bytes.h"
 
 namespace ls {
 namespace {

@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "common/assets/bytes.h"
 #include "common/assets/image.h"
+#include "common/base/bytes.h"
 #include "common/base/parse_number.h"
 
 namespace ls {

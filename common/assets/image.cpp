@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <strings.h>
 
-#include "common/assets/bytes.h"
+#include "common/base/bytes.h"
 #include "common/image/exr/exr_file.h"
 
 namespace ls {

@@ -3,8 +3,8 @@
 
 #include <array>
 
-#include "common/assets/bytes.h"
 #include "common/assets/image.h"
+#include "common/base/bytes.h"
 
 namespace ls {
 namespace {

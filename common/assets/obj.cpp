@@ -7,9 +7,9 @@
 #include <random>
 #include <unordered_map>
 
-#include "common/assets/bytes.h"
 #include "common/assets/mesh.h"
 #include "common/assets/mesh_parts.h"
+#include "common/base/bytes.h"
 
 namespace ls {
 

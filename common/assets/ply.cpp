@@ -9,9 +9,9 @@
 #include <string>
 #include <type_traits>
 
-#include "common/assets/bytes.h"
 #include "common/assets/mesh.h"
 #include "common/assets/mesh_parts.h"
+#include "common/base/bytes.h"
 
 namespace ls {
 

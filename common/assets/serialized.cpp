@@ -8,9 +8,9 @@
 #include <cstring>
 #include <optional>
 
-#include "common/assets/bytes.h"
 #include "common/assets/mesh.h"
 #include "common/assets/mesh_parts.h"
+#include "common/base/bytes.h"
 
 namespace ls {
 

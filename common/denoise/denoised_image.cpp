@@ -6,7 +6,7 @@
 
 #include "common/base/check.h"
 #include "common/image/error/error_estimate.h"
-#include "common/image/frame/each_pixel.h"
+#include "common/image/frame/frame.h"
 
 namespace ls {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "common/image/exr/maps.h"
+#include "common/image/exr/final_image.h"
 #include "common/report/html.h"
 #include "common/report/job_sections.h"
 #include "common/report/log_plot.h"

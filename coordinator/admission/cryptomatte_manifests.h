@@ -2,7 +2,7 @@
 #pragma once
 
 #include "common/image/aov/cryptomatte.h"
-#include "common/image/exr/aov_layers.h"
+#include "common/image/exr/final_image.h"
 #include "common/job/settings.h"
 #include "common/scene/scene.h"
 

@@ -1,6 +1,5 @@
 // The interface to OpenEXR: reads external images and writes our own. Partials have their own functions
-// (partial_exr.cpp, partial_decoder.h). No type of the library appears here, and none of its exceptions
-// escapes.
+// (partial_exr.cpp). No type of the library appears here, and none of its exceptions escapes.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// The outputs of a film: the final EXR, its pixel digest, and a preview PNG.
+// The outputs of a film: the final EXR, its pixel digest, a preview and maps as PNG.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 #include "common/base/digest.h"
 #include "common/base/error.h"
 #include "common/image/error/convergence.h"
-#include "common/image/exr/aov_layers.h"
+#include "common/image/exr/exr_file.h"
 #include "common/image/film/film.h"
 
 namespace ls {
@@ -22,6 +22,11 @@ namespace ls {
 // the two halves of the samples. The division is in double, and -0 is replaced by +0. The order is R, G, B of
 // each pixel, row by row, little endian. Pixels without samples are zero.
 Digest pixels_sha256(const Film& film);
+
+// Cryptomatte manifests of the identifier layers (cryptomatte.h); empty: no manifest.
+struct CryptomatteManifests {
+  std::string shapes, materials;
+};
 
 // A fake worker (--fake, for tests) sends generated pixels. This is the text of the note `fake`
 // (Provenance::notes) in an image that contains such pixels.
@@ -60,6 +65,15 @@ struct FinalImage {
 // the number of clamped values to `clamped`.
 ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
                         std::uint64_t* clamped = nullptr);
+// Returns the name of a layer: that of the AOV, or "crypto_object", "crypto_material".
+std::string layer_of(Aov aov);
+
+// Adds the film's AOVs to `picture`: channels NAME.R, NAME.X, ... and, for identifiers, NAME00.R to NAME02.A
+// with their header strings. Pixels without a surface are 0 in the AOVs of surfaces (AovKind::of_hits,
+// of_all and ids). Returns the number of values whose magnitude exceeded 65504, the largest half.
+std::uint64_t add_aov_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
+                             ExrPicture& picture);
+
 // Makes the final EXR; the film may be unfinished. Its layers are half (or with `float_output` float) R, G,
 // B, FLOAT stderr.R, stderr.G, stderr.B, UINT spp, the film's AOVs, and denoised.R, denoised.G, denoised.B if
 // `denoised` is not empty: the denoised image, R, G, B of each pixel of the whole frame, row by row. All are
@@ -103,5 +117,26 @@ Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::ui
 // instead of the film's.
 Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops,
                                            std::span<const float> denoised = {});
+
+// False-colour maps of an image's error and of its sample counts.
+//
+// Both use the same ramp from dark blue over green to yellow, on a logarithmic scale:
+//   error: each pixel's relative standard error. Its square is the mean over channels of D^2 / (S^2 + 0.01),
+//     with D the standard error and S the value of the pixel. The square is averaged over 3 x 3 pixels of the
+//     tile, because a single pixel's difference of two halves is unreliable.
+//     An error of 10^-3 or less has the lowest colour, 1 or more the highest: three decades.
+//   samples: 2 samples per pixel have the lowest colour, 2^14 the highest: thirteen doublings.
+// Magenta in the error map: pixels with too few hits (error_estimate.h). Tiles without samples are grey. The
+// maps have the image's size, so that they can be overlaid on it.
+inline constexpr double kMapLeastError = 1e-3, kMapMostError = 1;       // relative standard error
+inline constexpr double kMapLeastSamples = 2, kMapMostSamples = 16384;  // per pixel
+
+// Maps t from 0 to 1 to a colour. Lightness increases with t, so that the map can be read without seeing
+// hues.
+std::array<std::uint8_t, 3> map_colour(double t);
+inline constexpr std::array<std::uint8_t, 3> kFewHitsColour = {255, 0, 255}, kNoSampleColour = {96, 96, 96};
+
+Result<std::vector<std::byte>> error_map_png(const Film& film);
+Result<std::vector<std::byte>> samples_map_png(const Film& film);
 
 }  // namespace ls

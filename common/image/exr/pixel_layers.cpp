@@ -11,7 +11,7 @@
 
 #include "common/image/aov/id_slots.h"
 #include "common/image/error/relative_weights.h"
-#include "common/image/exr/aov_layers.h"
+#include "common/image/exr/final_image.h"
 
 namespace ls {
 namespace {

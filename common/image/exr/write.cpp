@@ -35,9 +35,8 @@ Result<void> check(const ExrPicture& picture) {
   const FrameSize size = picture.size;
   if (size.width < 1 || size.height < 1)
     return fail(Errc::invalid_argument, "writing an EXR: the image is empty");
-  const auto pixels = static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
   for (const auto& [name, channel] : picture.channels)
-    if (std::visit([](const auto& c) { return c.values.size(); }, channel) != pixels)
+    if (std::visit([](const auto& c) { return c.values.size(); }, channel) != size.pixels())
       return fail(Errc::internal, fmt::format("writing an EXR: channel {} has the wrong size", name));
   return {};
 }

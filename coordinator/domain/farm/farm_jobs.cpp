@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <set>
 
-#include "common/image/frame/tiles_over.h"
+#include "common/image/frame/frame.h"
 #include "coordinator/domain/farm/farm_state.h"
 
 namespace ls::coordinator {

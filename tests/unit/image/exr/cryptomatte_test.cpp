@@ -7,7 +7,6 @@
 
 #include "common/image/aov/cryptomatte.h"
 #include "common/image/aov/id_slots.h"
-#include "common/image/exr/aov_layers.h"
 #include "common/image/exr/final_image.h"
 #include "tests/unit/image/support.h"
 #include "worker/fake/fake_pixels.h"

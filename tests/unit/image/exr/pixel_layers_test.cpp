@@ -1,5 +1,5 @@
 #include "common/image/exr/pixel_layers.h"
-#include "common/image/frame/tiles_over.h"
+#include "common/image/frame/frame.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,6 @@
 
 #include "common/image/error/error_estimate.h"
 #include "common/image/exr/final_image.h"
-#include "common/image/exr/maps.h"
 #include "tests/support/significance.h"
 #include "tests/unit/image/support.h"
 
