@@ -1,10 +1,10 @@
 // Converts received messages to plain values. Every field is checked, because senders are not trusted.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "proto/convert.h"
-#include "proto/convert_check.h"
 
 // Defines `name` as the value of `expression`, a Result; if that is an error, the enclosing function returns
 // the error.
@@ -15,6 +15,58 @@
 
 namespace ls::wire {
 namespace {
+
+// ---- checks: each returns an error that names `field` if the value is wrong ----
+
+tl::unexpected<Error> wrong(const std::string& field, const std::string& what) {
+  return bad_argument(fmt::format("bad message: {} {}", field, what));
+}
+
+// Returns the id, which must be 1 to kIdBytes printable ASCII characters without spaces.
+Result<std::string> id_from(const std::string& text, const char* field) {
+  if (text.empty()) return wrong(field, "is missing");
+  if (text.size() > limits::kIdBytes)
+    return wrong(field, fmt::format("has {} bytes; at most {} are allowed", text.size(), limits::kIdBytes));
+  for (const char c : text)
+    if (c <= ' ' || c > '~') return wrong(field, "has a character that is not printable ASCII");
+  return text;
+}
+
+// Returns the text, which must have at most `limit` bytes. Control characters are replaced by spaces, so that
+// a worker cannot forge log lines or control a terminal.
+Result<std::string> text_from(const std::string& text, std::size_t limit, const char* field) {
+  if (text.size() > limit)
+    return wrong(field, fmt::format("has {} bytes; at most {} are allowed", text.size(), limit));
+  std::string clean = text;
+  for (char& c : clean)
+    if (static_cast<unsigned char>(c) < 0x20 && c != '\n') c = ' ';
+  return clean;
+}
+
+Result<double> seconds_from(double value, const char* field) {
+  if (!(value >= 0 && value <= limits::kSeconds))
+    return wrong(field,
+                 fmt::format("is {}; it must be a time in seconds, at most {}", value, limits::kSeconds));
+  return value;
+}
+
+Result<PixelRect> rect_from(const pb::Rect& rect, const char* field) {
+  const PixelRect r{rect.x0(), rect.y0(), rect.x1(), rect.y1()};
+  const bool inside = r.x0 >= 0 && r.y0 >= 0 && r.x1 <= limits::kFrameSide && r.y1 <= limits::kFrameSide;
+  if (!inside || r.x0 >= r.x1 || r.y0 >= r.y1)
+    return wrong(field,
+                 fmt::format("[{}, {}) x [{}, {}) is empty or outside any frame", r.x0, r.x1, r.y0, r.y1));
+  return r;
+}
+
+Result<SampleRange> range_from(std::uint64_t s0, std::uint64_t s1, const char* field) {
+  if (s0 % 2 != 0 || s1 % 2 != 0 || s0 >= s1 || s1 > limits::kSampleIndex)
+    return wrong(field, fmt::format("[{}, {}) must be a non-empty range with even ends up to {}", s0, s1,
+                                    limits::kSampleIndex));
+  return SampleRange{s0, s1};
+}
+
+// ---- values ----
 
 Result<void> bounded(int count, std::size_t limit, const char* field) {
   if (static_cast<std::size_t>(count) > limit)
@@ -29,11 +81,9 @@ Result<UnitKey> key_from(const pb::UnitKey& in) {
 
 Result<Error> problem_from(const pb::Problem& in) {
   LS_TRY(text, text_from(in.message(), limits::kTextBytes, "problem.message"));
-  for (const Errc code :
-       {Errc::invalid_argument, Errc::not_found, Errc::already_exists, Errc::failed_precondition,
-        Errc::resource_exhausted, Errc::permission_denied, Errc::unauthenticated, Errc::unavailable})
-    if (in.code() == to_string(code)) return Error{code, text};
-  return Error{Errc::internal, text};
+  const auto* code = std::ranges::find(kErrcNames, in.code());
+  return Error{code == kErrcNames.end() ? Errc::internal : static_cast<Errc>(code - kErrcNames.begin()),
+               text};
 }
 
 Result<LeaseUnit> lease_unit_from(const pb::LeaseUnit& in) {

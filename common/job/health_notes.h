@@ -2,12 +2,14 @@
 // that renders this location again.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "common/image/film/health.h"
+#include "common/job/settings.h"
 
 namespace ls {
 
@@ -15,8 +17,8 @@ struct HealthNote {
   HealthCause cause{};
   std::uint64_t count = 0;
   std::vector<HealthLocation> first;
-  std::optional<std::uint32_t>
-      frame;           // for sequences: the first frame with this cause, to which `first` and `replay` refer
+  // For sequences: the first frame with this cause, to which `first` and `replay` refer.
+  std::optional<std::uint32_t> frame;
   std::string replay;  // command that reproduces the first location; empty: there is no location
   bool operator==(const HealthNote&) const = default;
 };
@@ -29,5 +31,13 @@ void add_notes(std::vector<HealthNote>& notes, std::span<const HealthNote> more,
 // Returns {"clean", "nonfinite", "negative", "majorant_violations", "causes": [{"cause", "effect": "rejected"
 // | "kept" | "input", "count", "text", "frame", "first": [{"pixel": [x, y], "sample"}], "replay"}]}.
 std::string health_json(const Health& totals, std::span<const HealthNote> notes);
+
+// Returns "lightshaft render SCENE" with all options that determine the value of a sample; each word is
+// quoted for a shell. `scene` is the scene's name in the job. `frame` is the frame number, for jobs with
+// frames.
+std::string replay_command(const std::string& scene, const JobSpec& spec,
+                           std::optional<std::uint32_t> frame = {});
+// Returns the command for one sample of the pixel (x, y). `command` is from the function above.
+std::string replay_command(const std::string& command, int x, int y, std::uint64_t sample);
 
 }  // namespace ls

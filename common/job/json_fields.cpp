@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
+#include <algorithm>
 #include <set>
 
+#include "common/base/parse_number.h"
 #include "common/base/suggest.h"
 #include "common/job/limits.h"
 
@@ -14,29 +14,21 @@ namespace {
 
 // True if the text has only letters, digits and "_-.:", which are safe for file names, labels and layers.
 bool is_name(const std::string& s) {
-  if (s.empty() || s.size() > kMaxNameBytes) return false;
-  for (const char c : s) {
-    const bool fine = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                      c == '_' || c == '-' || c == '.' || c == ':';
-    if (!fine) return false;
-  }
-  return true;
+  return !s.empty() && s.size() <= kMaxNameBytes && std::ranges::all_of(s, [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '-' || c == '.' || c == ':';
+  });
 }
 
 constexpr int kMaxNesting = 8;
 constexpr std::string_view kNameRule = "a name of up to 64 letters, digits and _-.:";
 
 std::optional<std::pair<std::int64_t, std::int64_t>> parse_wxh(std::string_view text) {
-  std::int64_t v[2];
-  const char *at = text.data(), *end = at + text.size();
-  for (int i = 0; i < 2; ++i) {
-    const auto [next, ec] = std::from_chars(at, end, v[i]);
-    if (ec != std::errc{} || next == at) return std::nullopt;
-    at = next;
-    if (i == 0 && (at == end || *at++ != 'x')) return std::nullopt;
-  }
-  if (at != end) return std::nullopt;
-  return std::pair{v[0], v[1]};
+  const std::size_t x = text.find('x');
+  if (x == text.npos) return std::nullopt;
+  const auto width = parse_number<std::int64_t>(text.substr(0, x)),
+             height = parse_number<std::int64_t>(text.substr(x + 1));
+  return width && height ? std::optional(std::pair{*width, *height}) : std::nullopt;
 }
 
 }  // namespace
@@ -58,8 +50,8 @@ Result<Json> parse_object(std::string_view text, std::string_view what) {
   bool too_deep = false;
   const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
     too_deep |= depth > kMaxNesting;
-    if (too_deep)
-      return false;  // deep values are not kept, since code that destroys or prints them is recursive
+    // Deep values are not kept, since code that destroys or prints them is recursive.
+    if (too_deep) return false;
     if (event == Json::parse_event_t::key && depth <= 2) {
       const auto& key = parsed.get_ref<const std::string&>();
       if (!keys.emplace(depth, key).second && !twice) twice = key;
@@ -87,10 +79,9 @@ Result<Json> parse_object(std::string_view text, std::string_view what) {
 Fields::Fields(const Json& object, std::string_view what, std::vector<std::string> known)
     : object_(object), what_(what) {
   for (const auto& item : object.items()) {
-    bool found = false;
-    for (const auto& k : known) found |= k == item.key();
+    if (std::ranges::find(known, item.key()) != known.end()) continue;
     const std::string name = printable(item.key(), kMaxNameBytes);
-    if (!found) wrong(name, "is not known" + suggestion(name, known));
+    wrong(name, "is not known" + suggestion(name, known));
   }
 }
 

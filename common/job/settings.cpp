@@ -127,28 +127,28 @@ Result<RenderSettings> parse_render_settings(std::string_view text) {
 }
 
 Result<void> check_job_size(const RenderSettings& s, std::uint64_t spp) {
-  const auto refuse = [](std::string text) { return fail(Errc::invalid_argument, std::move(text)); };
   const auto pixels = static_cast<std::int64_t>(s.size.width) * s.size.height;
   if (s.size.width < 1 || s.size.height < 1 || s.size.width > kMaxFrameSide ||
       s.size.height > kMaxFrameSide || pixels > kMaxFramePixels)
-    return refuse(
+    return bad_argument(
         fmt::format("the frame is {} x {} pixels; each side must be 1 to {}, and all together at most {}",
                     s.size.width, s.size.height, kMaxFrameSide, kMaxFramePixels));
   if (s.tile < kMinTile || s.tile > kMaxTile)
-    return refuse(fmt::format("tiles of {} pixels; from {} to {} are possible", s.tile, kMinTile, kMaxTile));
+    return bad_argument(
+        fmt::format("tiles of {} pixels; from {} to {} are possible", s.tile, kMinTile, kMaxTile));
   const AovSet aovs = aovs_of(s);
   const std::uint64_t film = film_bytes_per_pixel(aovs) * static_cast<std::uint64_t>(pixels);
   if (film > kMaxFilmBytes)
-    return refuse(
+    return bad_argument(
         fmt::format("{} x {} pixels with the AOVs {} take {} bytes each, {} in all; the limit is {}: ask for "
                     "fewer AOVs or a smaller frame",
                     s.size.width, s.size.height, fmt::join(s.aov, ", "), film_bytes_per_pixel(aovs), film,
                     kMaxFilmBytes));
   if (spp < 1 || spp > kMaxSpp)
-    return refuse(fmt::format("{} samples per pixel; from 1 to {} are possible", spp, kMaxSpp));
+    return bad_argument(fmt::format("{} samples per pixel; from 1 to {} are possible", spp, kMaxSpp));
   const std::uint64_t tiles = TileGrid{s.size, s.tile}.count(), units = tiles * round_count(spp);
   if (tiles > kMaxTiles || units > kMaxUnits)
-    return refuse(
+    return bad_argument(
         fmt::format("{} x {} pixels in tiles of {} at {} samples are {} tiles and {} units of work; the "
                     "limits are {} and {}: "
                     "ask for fewer samples, a smaller frame or larger tiles",

@@ -18,7 +18,7 @@
 #include "common/image/frame/rounds.h"
 #include "common/job/settings.h"
 #include "common/job/techniques.h"
-#include "common/trace/context.h"
+#include "common/trace/span.h"
 
 namespace ls {
 

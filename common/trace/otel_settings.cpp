@@ -115,14 +115,10 @@ Result<void> check_protocol(const Setting& protocol) {
 }
 
 Result<std::string> read_url(const Environment& environment) {
-  const std::string own = plain(environment, "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT");
-  std::string url = own.empty() ? plain(environment, "OTEL_EXPORTER_OTLP_ENDPOINT") : own;
+  auto [name, url] = setting(environment, "ENDPOINT");
   if (url.empty()) return url;
-  if (auto fine = check_http_url(
-          url, own.empty() ? "OTEL_EXPORTER_OTLP_ENDPOINT" : "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT");
-      !fine)
-    return tl::unexpected(fine.error());
-  if (!own.empty()) return url;
+  if (auto fine = check_http_url(url, name); !fine) return tl::unexpected(fine.error());
+  if (name == "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT") return url;
   while (url.ends_with('/')) url.pop_back();
   return url + kTracesPath;
 }

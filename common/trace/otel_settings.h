@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "common/base/error.h"
-#include "common/trace/context.h"
+#include "common/trace/span.h"
 
 namespace ls::trace {
 

@@ -8,8 +8,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "common/job/health_notes.h"
 #include "common/job/limits.h"
-#include "common/job/replay_command.h"
 #include "common/protocol/limits.h"
 #include "common/scene/analysis/needs.h"
 #include "common/scene/analysis/prune.h"

@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "common/job/replay_command.h"
+#include "common/job/health_notes.h"
 
 namespace ls::coordinator {
 namespace {

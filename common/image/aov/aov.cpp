@@ -7,7 +7,7 @@
 #include <array>
 #include <cctype>
 
-#include "common/image/aov/id_slots.h"
+#include "common/image/aov/identifiers.h"
 
 namespace ls {
 namespace {

@@ -2,7 +2,7 @@
 // tile and range of samples). docs/reference/aovs.md defines each.
 //
 // After its six colour planes (A.R A.G A.B B.R B.G B.B) a partial has the planes of sums of the requested
-// AOVs, sorted by channel name, then the planes of identifiers (id_slots.h), sorted by the AOV's name. The
+// AOVs, sorted by channel name, then the planes of identifiers (identifiers.h), sorted by the AOV's name. The
 // partial's EXR file has these planes in the same order; only the colours differ (B before G before R).
 #pragma once
 

@@ -7,8 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "common/image/aov/cryptomatte.h"
-#include "common/image/aov/id_slots.h"
+#include "common/image/aov/identifiers.h"
 #include "common/image/exr/exr_file.h"
 
 namespace ls {

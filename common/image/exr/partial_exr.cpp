@@ -19,7 +19,7 @@
 #include <string_view>
 
 #include "common/base/bytes.h"
-#include "common/image/aov/id_slots.h"
+#include "common/image/aov/identifiers.h"
 #include "common/image/exr/memory.h"
 #include "common/image/film/partial.h"
 #include "common/image/frame/render_limits.h"

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <limits>
 
-#include "common/image/aov/id_slots.h"
+#include "common/image/aov/identifiers.h"
 #include "common/image/error/relative_weights.h"
 #include "common/image/exr/final_image.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "common/base/check.h"
-#include "common/image/aov/id_slots.h"
+#include "common/image/aov/identifiers.h"
 
 namespace ls {
 namespace {

@@ -8,7 +8,7 @@
 // it replaces the tail. So an N-sample film that is later continued to 2N samples has the same bits as a film
 // rendered with 2N samples from the start.
 //
-// AOVs are folded likewise: sums in double, identifiers by the rule of id_slots.h.
+// AOVs are folded likewise: sums in double, identifiers by the rule of identifiers.h.
 //
 // Not thread-safe: the caller locks. Copies are cheap, since they share the tiles; a tile never changes, and
 // a fold makes a new one. So copy the film under the lock, and read or write files outside it.

@@ -1,5 +1,5 @@
 // A command that is copied into a shell must give the program exactly the words that were quoted.
-#include "common/job/replay_command.h"
+#include "common/job/health_notes.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,6 @@
 #include <cstdio>
 
 #include "common/base/safe_text.h"
-#include "common/job/health_notes.h"
 
 namespace ls {
 namespace {

@@ -7,8 +7,6 @@
 #include <limits>
 #include <random>
 
-#include "proto/convert_check.h"
-
 namespace ls::wire {
 namespace {
 
@@ -292,7 +290,9 @@ TEST(FromWire, AKindOfMessageThatThisVersionLacksIsKnownAsSuch) {
 }
 
 TEST(Convert, TakesControlCharactersOutOfReceivedTexts) {
-  EXPECT_EQ(text_from("a\x1b[31mb", 100, "f").value(), "a [31mb");
+  pb::FromWorker wire = to_wire(FromWorker(kFromWorker[4]));
+  wire.mutable_failure()->set_reason("a\x1b[31mb");
+  EXPECT_EQ(std::get<UnitFailure>(from_wire(wire).value()).reason, "a [31mb");
 }
 
 }  // namespace

@@ -5,8 +5,7 @@
 #include <bit>
 #include <random>
 
-#include "common/image/aov/cryptomatte.h"
-#include "common/image/aov/id_slots.h"
+#include "common/image/aov/identifiers.h"
 #include "common/image/exr/final_image.h"
 #include "tests/unit/image/support.h"
 #include "worker/fake/fake_pixels.h"

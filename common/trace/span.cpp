@@ -1,4 +1,4 @@
-#include "common/trace/context.h"
+#include "common/trace/span.h"
 
 #include <fmt/format.h>
 
