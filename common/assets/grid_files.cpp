@@ -25,7 +25,7 @@ float value(ByteReader& r, std::int32_t type) {  // the caller has checked that 
 }
 
 tl::unexpected<Error> bad_grid(std::string_view name, const std::string& text) {
-  return fail(Errc::invalid_argument, fmt::format("'{}': {}", name, text));
+  return bad_argument(fmt::format("'{}': {}", name, text));
 }
 
 Result<void> read_box(std::string_view name, ByteReader& r, GridData& g) {

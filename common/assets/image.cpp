@@ -27,8 +27,7 @@ Result<ImageData> decode_image(std::string_view name, std::span<const std::byte>
   for (const std::string_view pfm : {"PF ", "PF\n", "PF\r", "Pf ", "Pf\n", "Pf\r"})
     if (head.starts_with(pfm)) return decode_pfm(name, file, max_pixels);
   if (ends_in_tga(name)) return decode_tga(name, file, max_pixels);
-  return fail(
-      Errc::invalid_argument,
+  return bad_argument(
       fmt::format("'{}': by its first bytes this is not a PNG, JPEG, BMP, QOI, OpenEXR, Radiance HDR or "
                   "PFM image, and its name does not end in .tga",
                   name));
@@ -42,7 +41,7 @@ Result<ImageData> load_image(const std::filesystem::path& path, std::string_view
 }
 
 tl::unexpected<Error> BrokenImage::operator()(std::string_view problem) const {
-  return fail(Errc::invalid_argument, fmt::format("'{}': broken {}: {}", name, format, problem));
+  return bad_argument(fmt::format("'{}': broken {}: {}", name, format, problem));
 }
 
 tl::unexpected<Error> too_many_pixels(std::string_view name, std::uint64_t width, std::uint64_t height,

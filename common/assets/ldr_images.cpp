@@ -50,10 +50,10 @@ Result<ImageData> decode_bmp(std::string_view name, std::span<const std::byte> f
   const auto h = read_header(r);
   if (!h) return broken("its headers are cut off, or older than Windows 3");
   if ((h->bits != 24 && h->bits != 32) || h->compression != 0)
-    return fail(Errc::invalid_argument,
-                fmt::format("'{}': a BMP image of {} bits a pixel and compression {}; only plain 24 and 32 "
-                            "bits are understood: save it as PNG",
-                            name, h->bits, h->compression));
+    return bad_argument(
+        fmt::format("'{}': a BMP image of {} bits a pixel and compression {}; only plain 24 and 32 "
+                    "bits are understood: save it as PNG",
+                    name, h->bits, h->compression));
   const std::int64_t width = h->width, height = h->height < 0 ? -std::int64_t{h->height} : h->height;
   if (const auto ok = check_size(broken, width, height, max_pixels); !ok) return tl::unexpected(ok.error());
   ImageData image{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height), 3, {}, {}, true};
@@ -264,8 +264,7 @@ Result<ImageData> decode_tga(std::string_view name, std::span<const std::byte> f
   const auto h = read_tga_header(r);
   if (!h) return broken("its header is cut off or says what no TGA image does");
   if (!is_known(*h))
-    return fail(
-        Errc::invalid_argument,
+    return bad_argument(
         fmt::format("'{}': a TGA image of type {} with {} bits a pixel, which is not understood: save "
                     "it as PNG",
                     name, h->kind + (h->packed ? 8 : 0), h->bits));

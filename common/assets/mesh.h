@@ -20,12 +20,11 @@ Result<MeshData> decode_obj(std::string_view name, std::span<const std::byte> fi
 
 // Reads a PLY file: ascii, binary_little_endian or binary_big_endian, version 1.0. It must have an element
 // `vertex` with x y z, optionally nx ny nz and (u v | s t | texture_u texture_v | texture_s texture_t), and
-// an element `face` with the list vertex_indices or vertex_index. decode_ply_with() also reads the
-// `attributes` (mesh_parts.h), as far as the file has them. Everything else is skipped. Each triangle of
-// a polygon gets the attributes of the polygon.
-Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file);
-Result<MeshData> decode_ply_with(std::span<const std::string> attributes, std::string_view name,
-                                 std::span<const std::byte> file);
+// an element `face` with the list vertex_indices or vertex_index. The `attributes` (mesh_parts.h) are read as
+// far as the file has them. Everything else is skipped. Each triangle of a polygon gets the attributes of the
+// polygon.
+Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file,
+                            std::span<const std::string> attributes = {});
 
 // Mitsuba's `.serialized` format, version 3 or 4. is_serialized() recognises it by the first bytes;
 // decode_serialized() reads mesh number `index` of the file and skips vertex colours.

@@ -35,7 +35,7 @@ class ObjReader {
       if (!statement(line)) return bad();
     }
     if (mesh_.indices.empty() && mesh_.dropped_triangles == 0)
-      return fail(Errc::invalid_argument, fmt::format("'{}': has no faces", name_));
+      return bad_argument(fmt::format("'{}': has no faces", name_));
     if (!any_uv_) mesh_.uvs = {};
     if (!any_normal_) mesh_.normals = {};
     return std::move(mesh_);
@@ -146,7 +146,7 @@ class ObjReader {
     return false;
   }
   tl::unexpected<Error> bad() const {
-    return fail(Errc::invalid_argument, fmt::format("'{}', line {}: {}", name_, line_, problem_));
+    return bad_argument(fmt::format("'{}', line {}: {}", name_, line_, problem_));
   }
 
   std::string_view name_;
@@ -171,8 +171,7 @@ Result<MeshData> load_mesh(const std::filesystem::path& path, std::string_view n
   const auto bytes = read_asset(path, name);
   if (!bytes) return tl::unexpected(bytes.error());
   if (is_serialized(*bytes)) return decode_serialized(name, *bytes, index);
-  return as_text(*bytes).starts_with("ply") ? decode_ply_with(attributes, name, *bytes)
-                                            : decode_obj(name, *bytes);
+  return as_text(*bytes).starts_with("ply") ? decode_ply(name, *bytes, attributes) : decode_obj(name, *bytes);
 }
 
 }  // namespace ls

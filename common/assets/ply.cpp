@@ -84,8 +84,7 @@ class PlyReader {
       : name_(name), file_(file), wanted_(wanted), body_(file) {}
 
   Result<MeshData> read() {
-    if (!header() || !elements())
-      return fail(Errc::invalid_argument, fmt::format("'{}': {}", name_, problem_));
+    if (!header() || !elements()) return bad_argument(fmt::format("'{}': {}", name_, problem_));
     return std::move(mesh_);
   }
 
@@ -368,12 +367,8 @@ class PlyReader {
 
 }  // namespace
 
-Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file) {
-  return decode_ply_with({}, name, file);
-}
-
-Result<MeshData> decode_ply_with(std::span<const std::string> attributes, std::string_view name,
-                                 std::span<const std::byte> file) {
+Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file,
+                            std::span<const std::string> attributes) {
   return PlyReader(name, file, attributes).read();
 }
 

@@ -80,8 +80,7 @@ class SerializedReader {
 
   Result<MeshData> read(int index) {
     const auto mesh = find(index);
-    if (!mesh || !unpack(*mesh))
-      return fail(Errc::invalid_argument, fmt::format("'{}': {}", name_, problem_));
+    if (!mesh || !unpack(*mesh)) return bad_argument(fmt::format("'{}': {}", name_, problem_));
     return std::move(mesh_);
   }
 

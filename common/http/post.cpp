@@ -45,9 +45,8 @@ Result<void> check_http_url(const std::string& url, std::string_view setting) {
   const bool clean =
       std::none_of(url.begin(), url.end(), [](unsigned char c) { return c <= ' ' || c == 0x7f; });
   if (http && clean && url.size() <= 2000) return {};
-  return fail(Errc::invalid_argument,
-              fmt::format("{} '{}' is no address: http://HOST/PATH or https://HOST/PATH, without spaces",
-                          setting, url));
+  return bad_argument(fmt::format(
+      "{} '{}' is no address: http://HOST/PATH or https://HOST/PATH, without spaces", setting, url));
 }
 
 Result<HttpAnswer> post(const HttpPost& request) {

@@ -43,8 +43,7 @@ std::string printable(std::string_view text, std::size_t most) {
 
 Result<Json> parse_object(std::string_view text, std::string_view what) {
   if (text.size() > kMaxSpecBytes)
-    return fail(Errc::invalid_argument,
-                fmt::format("{}: {} bytes, the limit is {}", what, text.size(), kMaxSpecBytes));
+    return bad_argument(fmt::format("{}: {} bytes, the limit is {}", what, text.size(), kMaxSpecBytes));
   std::set<std::pair<int, std::string>> keys;
   std::optional<std::string> twice;
   bool too_deep = false;
@@ -62,17 +61,13 @@ Result<Json> parse_object(std::string_view text, std::string_view what) {
   };
   try {
     auto json = Json::parse(text, watch);
-    if (too_deep)
-      return fail(Errc::invalid_argument, fmt::format("{}: nested deeper than {} levels", what, kMaxNesting));
-    if (!json.is_object())
-      return fail(Errc::invalid_argument, fmt::format("{}: must be a JSON object {{...}}", what));
+    if (too_deep) return bad_argument(fmt::format("{}: nested deeper than {} levels", what, kMaxNesting));
+    if (!json.is_object()) return bad_argument(fmt::format("{}: must be a JSON object {{...}}", what));
     if (twice)
-      return fail(Errc::invalid_argument,
-                  fmt::format("{}: key '{}' is given twice", what, printable(*twice, kMaxNameBytes)));
+      return bad_argument(fmt::format("{}: key '{}' is given twice", what, printable(*twice, kMaxNameBytes)));
     return json;
   } catch (const Json::exception& e) {
-    return fail(Errc::invalid_argument,
-                fmt::format("{}: not valid JSON: {}", what, printable(e.what(), 300)));
+    return bad_argument(fmt::format("{}: not valid JSON: {}", what, printable(e.what(), 300)));
   }
 }
 

@@ -187,7 +187,7 @@ Result<JobSpec> parse_job_spec(std::string_view text) {
 }
 
 Result<JobSpec> job_spec_of(const nlohmann::json& object) {
-  if (!object.is_object()) return fail(Errc::invalid_argument, "spec: must be a JSON object {...}");
+  if (!object.is_object()) return bad_argument("spec: must be a JSON object {...}");
   Fields fields(object, "spec",
                 {"spp", "target_error", "target_layer", "time", "seed", "size", "integrator", "aov",
                  "defines", "priority", "float", "denoise", "tags", "frames", "max_workers", "max_units",

@@ -99,8 +99,7 @@ std::string pictures(const JobPage& page, const Json& report) {
 
 Result<std::string> job_page(const JobPage& page) {
   const Json report = Json::parse(page.report, nullptr, false);
-  if (!report.is_object())
-    return fail(Errc::invalid_argument, "the report is no JSON object, so no page can be made of it");
+  if (!report.is_object()) return bad_argument("the report is no JSON object, so no page can be made of it");
   const std::string body = "<main>\n" + header(report) + failure(report) + pictures(page, report) +
                            figures(report) + verdict(report) + curves(report) + time_split(report) +
                            health(report) + techniques(report) + features(report) + provenance(report) +

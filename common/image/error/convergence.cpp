@@ -234,20 +234,8 @@ std::optional<Trend> trend_of(std::span<const ErrorPoint> points) {
 }
 
 const char* to_string(ConvergenceStatus::Kind kind) {
-  using Kind = ConvergenceStatus::Kind;
-  switch (kind) {
-    case Kind::early:
-      return "early";
-    case Kind::converging:
-      return "converging";
-    case Kind::fast:
-      return "fast";
-    case Kind::heavy_tail:
-      return "heavy_tail";
-    case Kind::bias_floor:
-      return "bias_floor";
-  }
-  return "";
+  static constexpr const char* kNames[] = {"early", "converging", "fast", "heavy_tail", "bias_floor"};
+  return kNames[static_cast<std::size_t>(kind)];
 }
 
 ConvergenceStatus judge(std::span<const ErrorPoint> points, const std::string& doubt) {

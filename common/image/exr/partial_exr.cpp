@@ -42,7 +42,7 @@ constexpr std::int32_t kMaxChannelList = 8192;
 constexpr std::size_t kMaxNameBytes = 31;  // longest name in the format without the long-names flag
 
 tl::unexpected<Error> refuse_partial(std::string what) {
-  return fail(Errc::invalid_argument, "partial EXR: " + std::move(what));
+  return bad_argument("partial EXR: " + std::move(what));
 }
 
 struct Shape {

@@ -92,17 +92,8 @@ std::vector<float> narrowed(const std::vector<double>& values) {
 }  // namespace
 
 std::string_view to_string(BlockRule rule) {
-  switch (rule) {
-    case BlockRule::mean:
-      return "mean";
-    case BlockRule::error_of_mean:
-      return "error_of_mean";
-    case BlockRule::root_mean_square:
-      return "root_mean_square";
-    case BlockRule::first:
-      return "first";
-  }
-  return "";
+  static constexpr std::string_view kNames[] = {"mean", "error_of_mean", "root_mean_square", "first"};
+  return kNames[static_cast<std::size_t>(rule)];
 }
 
 std::vector<PixelLayer> pixel_layers(AovSet aovs) {
@@ -122,7 +113,7 @@ Result<PixelLayer> pixel_layer(AovSet aovs, std::string_view name) {
     if (layer.name == name) return std::move(layer);
     known += (known.empty() ? "" : ", ") + layer.name;
   }
-  return fail(Errc::invalid_argument, fmt::format("'layer' must be one of this image's: {}", known));
+  return bad_argument(fmt::format("'layer' must be one of this image's: {}", known));
 }
 
 FrameSize level_size(FrameSize frame, int level) {
@@ -137,17 +128,14 @@ PixelRect rect_in_image(FrameSize frame, int level, const PixelRect& rect) {
 
 Result<void> check_layer_rect(FrameSize frame, int level, const PixelRect& rect) {
   if (level < 0 || level > kMaxLayerLevel)
-    return fail(Errc::invalid_argument, fmt::format("'level' must be from 0 to {}", kMaxLayerLevel));
+    return bad_argument(fmt::format("'level' must be from 0 to {}", kMaxLayerLevel));
   const FrameSize size = level_size(frame, level);
-  if (rect.x0 < 0 || rect.y0 < 0 || rect.x1 > size.width || rect.y1 > size.height || rect.x0 >= rect.x1 ||
-      rect.y0 >= rect.y1)
-    return fail(Errc::invalid_argument,
-                fmt::format("'rect' must be x0,y0,x1,y1 within 0,0,{},{}, the size of level {}", size.width,
-                            size.height, level));
+  if (!lies_in(size, rect))
+    return bad_argument(fmt::format("'rect' must be x0,y0,x1,y1 within 0,0,{},{}, the size of level {}",
+                                    size.width, size.height, level));
   if (rect.width() > kMaxLayerSide || rect.height() > kMaxLayerSide ||
       rect.pixels() << (2 * level) > kMaxLayerPixels)
-    return fail(
-        Errc::invalid_argument,
+    return bad_argument(
         fmt::format("'rect' may have at most {0} pixels on a side and {1} pixels in all, at level {2}; "
                     "ask for parts of it",
                     kMaxLayerSide, kMaxLayerPixels >> (2 * level), level));

@@ -81,8 +81,8 @@ Result<std::vector<std::byte>> drawn(const Film& film, const DrawTile& draw) {
 Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops,
                                            std::span<const float> denoised) {
   if (!(std::abs(exposure_stops) <= kMaxStops))
-    return fail(Errc::invalid_argument, fmt::format("exposure: {} stops; from -{} to {} are possible",
-                                                    exposure_stops, kMaxStops, kMaxStops));
+    return bad_argument(
+        fmt::format("exposure: {} stops; from -{} to {} are possible", exposure_stops, kMaxStops, kMaxStops));
   const FrameSize frame = film.grid().frame;
   const auto width = static_cast<std::size_t>(frame.width);
   const double scale = std::exp2(exposure_stops);

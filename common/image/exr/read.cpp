@@ -41,19 +41,15 @@ Result<Source> find_colour(const Imf::MultiPartInputFile& file, const std::strin
     for (const char* c : source.channels) {
       const Imf::Channel& channel = list[c];
       if (channel.xSampling != 1 || channel.ySampling != 1)
-        return fail(Errc::invalid_argument,
-                    fmt::format("{}: channel {} is subsampled; store it at full resolution", name, c));
+        return bad_argument(
+            fmt::format("{}: channel {} is subsampled; store it at full resolution", name, c));
       if (channel.type == Imf::UINT)
-        return fail(Errc::invalid_argument,
-                    fmt::format("{}: channel {} holds integers; half or float is needed", name, c));
+        return bad_argument(fmt::format("{}: channel {} holds integers; half or float is needed", name, c));
     }
     return source;
   }
-  return fail(
-      Errc::invalid_argument,
-      fmt::format(
-          "{}: no flat part with channels R, G, B or Y (deep and luminance/chroma images are not read)",
-          name));
+  return bad_argument(fmt::format(
+      "{}: no flat part with channels R, G, B or Y (deep and luminance/chroma images are not read)", name));
 }
 
 FrameSize size_of(const Imath::Box2i& window) {
@@ -178,7 +174,7 @@ constexpr const char* kColours[3] = {"R", "G", "B"};
 constexpr std::size_t kMaxLayers = 128;  // all AOVs together have 74 layers, denoising adds 3
 
 tl::unexpected<Error> bad(const std::string& name, const std::string& what) {
-  return fail(Errc::invalid_argument, fmt::format("{}: {}", name, what));
+  return bad_argument(fmt::format("{}: {}", name, what));
 }
 
 Result<void> check_layers(const Imf::ChannelList& list, const std::string& name, FinalPicture& image) {

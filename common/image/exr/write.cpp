@@ -33,8 +33,7 @@ Imf::PixelType type_of(const std::variant<ExrHalf, ExrFloat, ExrUint>& channel) 
 
 Result<void> check(const ExrPicture& picture) {
   const FrameSize size = picture.size;
-  if (size.width < 1 || size.height < 1)
-    return fail(Errc::invalid_argument, "writing an EXR: the image is empty");
+  if (size.width < 1 || size.height < 1) return bad_argument("writing an EXR: the image is empty");
   for (const auto& [name, channel] : picture.channels)
     if (std::visit([](const auto& c) { return c.values.size(); }, channel) != size.pixels())
       return fail(Errc::internal, fmt::format("writing an EXR: channel {} has the wrong size", name));
@@ -91,7 +90,7 @@ Result<void> each_band(const ExrBands& bands, Take take) {
 // generated twice: for the seal, and for the file.
 Result<void> write_bands(Imf::OStream& out, const ExrBands& bands) {
   if (bands.size.width < 1 || bands.size.height < 1)
-    return fail(Errc::invalid_argument, "writing an EXR: the image is empty");
+    return bad_argument("writing an EXR: the image is empty");
   std::optional<Imf::Header> header;
   exr::Seal seal;
   const auto read = each_band(bands, [&](const ExrPicture& rows, int) {

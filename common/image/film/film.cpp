@@ -44,20 +44,17 @@ std::uint64_t Film::Tile::spp() const { return tail ? tail->samples.s1 : full_sp
 
 Result<void> Film::accepts(TileIndex index, RoundIndex round, const Partial& partial) const {
   if (index >= tiles_.size())
-    return fail(Errc::invalid_argument,
-                fmt::format("tile {} does not exist; the film has {}", index, tiles_.size()));
+    return bad_argument(fmt::format("tile {} does not exist; the film has {}", index, tiles_.size()));
   const PixelRect rect = grid_.rect(index);
   const SampleRange full = round_range(round), got = partial.header.samples;
   if (partial.aovs != aovs_)
-    return fail(Errc::invalid_argument,
-                fmt::format("the partial of tile {} has other AOVs than the film", index));
+    return bad_argument(fmt::format("the partial of tile {} has other AOVs than the film", index));
   if (partial.header.tile != rect ||
       partial.sums.size() != static_cast<std::size_t>(rect.pixels()) * (planes_.sums + planes_.ids))
-    return fail(Errc::invalid_argument,
-                fmt::format("the partial's rectangle or size is not that of tile {}", index));
+    return bad_argument(fmt::format("the partial's rectangle or size is not that of tile {}", index));
   if (got.s0 != full.s0 || got.s1 <= got.s0 || got.s1 > full.s1 || got.s1 % 2 != 0)
-    return fail(Errc::invalid_argument, fmt::format("tile {}: samples {} are not of round {}, which has {}",
-                                                    index, show(got), round, show(full)));
+    return bad_argument(fmt::format("tile {}: samples {} are not of round {}, which has {}", index, show(got),
+                                    round, show(full)));
   const RoundIndex next = full_rounds(index);
   if (round > next)
     return fail(Errc::failed_precondition,

@@ -38,7 +38,7 @@ class Writer {
 };
 
 tl::unexpected<Error> damaged(std::string_view what) {
-  return fail(Errc::invalid_argument, fmt::format("saved film: {}; render again from the partials", what));
+  return bad_argument(fmt::format("saved film: {}; render again from the partials", what));
 }
 
 // Checks the magic and the checksum, and returns a reader of the bytes in between.
@@ -125,8 +125,7 @@ std::function<std::vector<std::byte>()> Film::saver(TileIndex index) const {
 
 Result<void> Film::load_tile(TileIndex index, std::span<const std::byte> bytes) {
   if (index >= tiles_.size())
-    return fail(Errc::invalid_argument,
-                fmt::format("tile {} does not exist; the film has {}", index, tiles_.size()));
+    return bad_argument(fmt::format("tile {} does not exist; the film has {}", index, tiles_.size()));
   if (bytes.empty()) {
     discard(index);
     return {};

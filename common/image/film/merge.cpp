@@ -25,9 +25,7 @@ struct ByPlace {
 };
 using Tiles = std::map<PixelRect, std::vector<Entry>, ByPlace>;
 
-tl::unexpected<Error> refuse(std::string text) {
-  return fail(Errc::invalid_argument, "merge: " + std::move(text));
-}
+tl::unexpected<Error> refuse(std::string text) { return bad_argument("merge: " + std::move(text)); }
 
 class Merger {
  public:

@@ -12,7 +12,7 @@ namespace ls {
 namespace {
 
 tl::unexpected<Error> refuse(const std::string& name, std::string why) {
-  return fail(Errc::invalid_argument, fmt::format("{}: {}", name, why));
+  return bad_argument(fmt::format("{}: {}", name, why));
 }
 
 // Returns the mean of s^2 (the squared standard error of the reference) over the eight neighbours of value i.

@@ -64,7 +64,7 @@ const char kSquares[] =
 
 TEST(PlyAttributes, OfAFaceAreThoseOfItsTriangles) {
   const std::vector<std::string> wanted{"vertex_color", "face_stamp", "face_c", "vertex_nothing"};
-  const auto m = decode_ply_with(wanted, "m.ply", bytes_of(kSquares));
+  const auto m = decode_ply("m.ply", bytes_of(kSquares), wanted);
 
   ASSERT_TRUE(m) << m.error().message;
   ASSERT_EQ(m->triangle_count(), 4u);
@@ -100,7 +100,7 @@ TEST(PlyAttributes, OfBytesCountFromZeroTo255AndOtherWholeNumbersAreSrgbCodes) {
   append(file, std::uint8_t{3});
   for (const std::int32_t i : {0, 1, 2}) append(file, i);
   const std::vector<std::string> wanted{"vertex_color", "vertex_u", "vertex_i", "vertex_d"};
-  const auto m = decode_ply_with(wanted, "m.ply", bytes_of(file));
+  const auto m = decode_ply("m.ply", bytes_of(file), wanted);
 
   ASSERT_TRUE(m) << m.error().message;
   EXPECT_TRUE(find(*m, "vertex_color")->bytes);
@@ -134,7 +134,7 @@ void expect_whole(const MeshData& m) {
 TEST(PlyAttributes, OfDamagedFilesAreWholeOrRefused) {
   const std::string file = kSquares;
   const auto decode = [](std::string_view name, std::span<const std::byte> bytes) {
-    return decode_ply_with(kWanted, name, bytes);
+    return decode_ply(name, bytes, kWanted);
   };
   test::accepted_truncations(file, decode);
   test::survive_mutations(file, decode, expect_whole);
@@ -145,7 +145,7 @@ TEST(PlyAttributes, OfOneOfTwoListsOfFacesAreRefused) {
   file.insert(file.find("end_header"), "element face 1\nproperty list uchar int vertex_indices\n");
   file += "3 0 1 2\n";
   EXPECT_TRUE(decode_ply("m.ply", bytes_of(file)));
-  const auto m = decode_ply_with(kWanted, "m.ply", bytes_of(file));
+  const auto m = decode_ply("m.ply", bytes_of(file), kWanted);
   ASSERT_FALSE(m);
   EXPECT_EQ(m.error().message, "'m.ply': not all of it has the attribute 'face_stamp'");
 }
