@@ -39,7 +39,7 @@ GuidePlanes planes_of_guide(const AovPlanes& planes, Aov aov, int half) {
 
 Noisy gather(const Film& film) {
   const FrameSize frame = film.grid().frame;
-  const auto pixels = static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
+  const std::size_t pixels = frame.pixels();
   Noisy out;
   out.counts.assign(pixels, false);
   for (NoisyImage& half : out.halves)

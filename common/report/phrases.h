@@ -1,5 +1,5 @@
 // Phrases that the report of a job, the terminal and the dashboard have in common. The dashboard reads them
-// from web/static/js/phrases.js, which phrases_test.cpp writes from this table.
+// from web/static/js/phrases.js, which texts_test.cpp writes from this table.
 #pragma once
 
 #include <array>

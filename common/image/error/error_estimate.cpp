@@ -146,7 +146,7 @@ double light(std::span<const double> half, std::size_t pixel, std::size_t pixels
 }  // namespace
 
 bool has_few_hits(const HalfMeans& h, int x, int y) {
-  const auto pixels = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
+  const std::size_t pixels = h.pixels();
   const auto at = [&](int i, int j) {
     return static_cast<std::size_t>(j) * static_cast<std::size_t>(h.width) + static_cast<std::size_t>(i);
   };
@@ -195,7 +195,7 @@ namespace {
 // Counts the pixels with light and those with few hits. Nearly all pixels have light in both halves and are
 // counted by a vectorised loop; only black pixels need their neighbours.
 void count_hits(const HalfMeans& h, TileError& out) {
-  const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
+  const std::size_t n = h.pixels();
   const double *a = h.a.data(), *b = h.b.data();
   std::uint64_t lit = 0, one_sided = 0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -234,7 +234,7 @@ void send_changes(const HalfMeans& h, std::uint64_t spp, const EarlierMeans& ear
 }  // namespace
 
 TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMeans* earlier) {
-  const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
+  const std::size_t n = h.pixels();
   CHECK(h.a.size() == 3 * n && h.b.size() == 3 * n, "{} and {} values for {} x {} pixels", h.a.size(),
         h.b.size(), h.width, h.height);
   TileError out{.pixels = n, .samples = spp * n};

@@ -130,6 +130,7 @@ struct TileError {
 struct HalfMeans {
   int width = 0, height = 0;
   std::span<const double> a, b;
+  std::size_t pixels() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
 };
 // The half means of the same tile after an earlier round, from a part of the same samples.
 struct EarlierMeans {
