@@ -20,8 +20,13 @@ namespace pb = ::lightshaft::farm::v1;
 pb::FromWorker to_wire(const FromWorker& message);
 pb::ToWorker to_wire(const ToWorker& message);
 
-// True if this version supports this kind of message. A newer peer may send others; the caller should ignore
-// them.
+// Returns the text in a form that may be sent: bytes that are not UTF-8 are replaced by '?', because a peer
+// drops the whole message if one of its strings is not valid UTF-8. The text is cut to at most `limit` bytes,
+// between two characters.
+std::string sendable(const std::string& text, std::size_t limit);
+
+// True if this version supports the kind of the message. A newer peer may send others, which the caller
+// should ignore.
 bool known(const pb::FromWorker& message);
 bool known(const pb::ToWorker& message);
 

@@ -1,10 +1,10 @@
 // Converts received messages to plain values. Every field is checked, because senders are not trusted.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "proto/convert.h"
-#include "proto/convert_check.h"
 
 // Defines `name` as the value of `expression`, a Result; if that is an error, the enclosing function returns
 // the error.
@@ -16,10 +16,70 @@
 namespace ls::wire {
 namespace {
 
-Result<void> bounded(int count, std::size_t limit, const char* field) {
-  if (static_cast<std::size_t>(count) > limit)
-    return wrong(field, fmt::format("has {} entries; at most {} are allowed", count, limit));
-  return {};
+// ---- checks: each returns an error that names `field` if the value is wrong ----
+
+tl::unexpected<Error> wrong(const std::string& field, const std::string& what) {
+  return bad_argument(fmt::format("bad message: {} {}", field, what));
+}
+
+// Returns the id, which must be 1 to kIdBytes printable ASCII characters without spaces.
+Result<std::string> id_from(const std::string& text, const char* field) {
+  if (text.empty()) return wrong(field, "is missing");
+  if (text.size() > limits::kIdBytes)
+    return wrong(field, fmt::format("has {} bytes; at most {} are allowed", text.size(), limits::kIdBytes));
+  for (const char c : text)
+    if (c <= ' ' || c > '~') return wrong(field, "has a character that is not printable ASCII");
+  return text;
+}
+
+// Returns the text, which must have at most `limit` bytes. Control characters are replaced by spaces, so that
+// a worker cannot forge log lines or control a terminal.
+Result<std::string> text_from(const std::string& text, std::size_t limit, const char* field) {
+  if (text.size() > limit)
+    return wrong(field, fmt::format("has {} bytes; at most {} are allowed", text.size(), limit));
+  std::string clean = text;
+  for (char& c : clean)
+    if (static_cast<unsigned char>(c) < 0x20 && c != '\n') c = ' ';
+  return clean;
+}
+
+Result<double> seconds_from(double value, const char* field) {
+  if (!(value >= 0 && value <= limits::kSeconds))
+    return wrong(field,
+                 fmt::format("is {}; it must be a time in seconds, at most {}", value, limits::kSeconds));
+  return value;
+}
+
+Result<PixelRect> rect_from(const pb::Rect& rect, const char* field) {
+  const PixelRect r{rect.x0(), rect.y0(), rect.x1(), rect.y1()};
+  const bool inside = r.x0 >= 0 && r.y0 >= 0 && r.x1 <= limits::kFrameSide && r.y1 <= limits::kFrameSide;
+  if (!inside || r.x0 >= r.x1 || r.y0 >= r.y1)
+    return wrong(field,
+                 fmt::format("[{}, {}) x [{}, {}) is empty or outside any frame", r.x0, r.x1, r.y0, r.y1));
+  return r;
+}
+
+Result<SampleRange> range_from(std::uint64_t s0, std::uint64_t s1, const char* field) {
+  if (s0 % 2 != 0 || s1 % 2 != 0 || s0 >= s1 || s1 > limits::kSampleIndex)
+    return wrong(field, fmt::format("[{}, {}) must be a non-empty range with even ends up to {}", s0, s1,
+                                    limits::kSampleIndex));
+  return SampleRange{s0, s1};
+}
+
+// ---- values ----
+
+// Returns the entries of a list, which must be at most `limit`, converted by `entry_from`.
+template <class List, class From>
+auto list_from(const List& in, std::size_t limit, const char* field, const From& entry_from)
+    -> Result<std::vector<typename decltype(entry_from(*in.begin()))::value_type>> {
+  if (static_cast<std::size_t>(in.size()) > limit)
+    return wrong(field, fmt::format("has {} entries; at most {} are allowed", in.size(), limit));
+  std::vector<typename decltype(entry_from(*in.begin()))::value_type> out;
+  for (const auto& each : in) {
+    LS_TRY(entry, entry_from(each));
+    out.push_back(std::move(entry));
+  }
+  return out;
 }
 
 Result<UnitKey> key_from(const pb::UnitKey& in) {
@@ -29,11 +89,9 @@ Result<UnitKey> key_from(const pb::UnitKey& in) {
 
 Result<Error> problem_from(const pb::Problem& in) {
   LS_TRY(text, text_from(in.message(), limits::kTextBytes, "problem.message"));
-  for (const Errc code :
-       {Errc::invalid_argument, Errc::not_found, Errc::already_exists, Errc::failed_precondition,
-        Errc::resource_exhausted, Errc::permission_denied, Errc::unauthenticated, Errc::unavailable})
-    if (in.code() == to_string(code)) return Error{code, text};
-  return Error{Errc::internal, text};
+  const auto* code = std::ranges::find(kErrcNames, in.code());
+  return Error{code == kErrcNames.end() ? Errc::internal : static_cast<Errc>(code - kErrcNames.begin()),
+               text};
 }
 
 Result<LeaseUnit> lease_unit_from(const pb::LeaseUnit& in) {
@@ -42,26 +100,20 @@ Result<LeaseUnit> lease_unit_from(const pb::LeaseUnit& in) {
   return LeaseUnit{in.tile(), in.round(), rect, samples};
 }
 
+Result<BlobRef> asset_from(const pb::Blob& in) {
+  LS_TRY(digest, digest_from(in.digest(), "brief.assets.digest"));
+  LS_TRY(name, text_from(in.name(), limits::kNameBytes, "brief.assets.name"));
+  return BlobRef{digest, in.bytes(), name};
+}
+
 Result<JobBrief> brief_from(const pb::JobBrief& in) {
-  JobBrief brief;
   LS_TRY(job, id_from(in.job(), "brief.job"));
   LS_TRY(scene, digest_from(in.scene(), "brief.scene"));
   if (in.settings().size() > limits::kSettingsBytes) return wrong("brief.settings", "is too long");
   LS_TRY(settings, parse_render_settings(in.settings()));
-  if (auto ok = bounded(in.assets_size(), limits::kAssetsPerJob, "brief.assets"); !ok)
-    return tl::unexpected<Error>(ok.error());
-  for (const pb::Blob& blob : in.assets()) {
-    LS_TRY(digest, digest_from(blob.digest(), "brief.assets.digest"));
-    LS_TRY(name, text_from(blob.name(), limits::kNameBytes, "brief.assets.name"));
-    brief.assets.push_back({digest, blob.bytes(), name});
-  }
+  LS_TRY(assets, list_from(in.assets(), limits::kAssetsPerJob, "brief.assets", asset_from));
   LS_TRY(needs, text_from(in.needs(), limits::kNeedsBytes, "brief.needs"));
-  brief.needs = needs;
-  brief.job = JobId{job};
-  brief.scene = scene;
-  brief.settings = settings;
-  brief.settings_digest = digest_of(settings);
-  return brief;
+  return JobBrief{JobId{job}, scene, settings, digest_of(settings), std::move(assets), needs};
 }
 
 Result<FromWorker> hello_from(const pb::Hello& in) {
@@ -74,18 +126,14 @@ Result<FromWorker> hello_from(const pb::Hello& in) {
   if (in.threads() < 1 || in.threads() > limits::kThreads)
     return wrong("hello.threads", fmt::format("is {}; it must be 1 to {}", in.threads(), limits::kThreads));
   if (in.join_token().size() > limits::kTokenBytes) return wrong("hello.join_token", "is too long");
-  if (auto ok = bounded(in.tags_size(), limits::kTags, "hello.tags"); !ok)
-    return tl::unexpected<Error>(ok.error());
-  if (auto ok = bounded(in.blobs_held_size(), limits::kBlobsHeld, "hello.blobs_held"); !ok)
-    return tl::unexpected<Error>(ok.error());
-  for (const std::string& t : in.tags()) {
-    LS_TRY(tag, text_from(t, limits::kNameBytes, "hello.tags"));
-    hello.tags.push_back(tag);
-  }
-  for (const std::string& b : in.blobs_held()) {
-    LS_TRY(blob, digest_from(b, "hello.blobs_held"));
-    hello.blobs_held.push_back(blob);
-  }
+  const auto tag_from = [](const std::string& tag) {
+    return text_from(tag, limits::kNameBytes, "hello.tags");
+  };
+  LS_TRY(tags, list_from(in.tags(), limits::kTags, "hello.tags", tag_from));
+  const auto blob_from = [](const std::string& blob) { return digest_from(blob, "hello.blobs_held"); };
+  LS_TRY(blobs, list_from(in.blobs_held(), limits::kBlobsHeld, "hello.blobs_held", blob_from));
+  hello.tags = std::move(tags);
+  hello.blobs_held = std::move(blobs);
   if (!in.previous_id().empty()) {
     LS_TRY(previous, id_from(in.previous_id(), "hello.previous_id"));
     hello.previous_id = WorkerId{previous};
@@ -102,22 +150,17 @@ Result<FromWorker> hello_from(const pb::Hello& in) {
   return hello;
 }
 
+Result<WorkerProgress::Entry> entry_from(const pb::Progress::Entry& in) {
+  LS_TRY(lease, id_from(in.lease(), "progress.leases.lease"));
+  return WorkerProgress::Entry{LeaseId{lease}, in.units_done()};
+}
+
 Result<FromWorker> progress_from(const pb::Progress& in) {
-  WorkerProgress progress;
-  if (auto ok = bounded(in.leases_size(), limits::kLeasesPerWorker, "progress.leases"); !ok)
-    return tl::unexpected<Error>(ok.error());
-  for (const pb::Progress::Entry& e : in.leases()) {
-    LS_TRY(lease, id_from(e.lease(), "progress.leases.lease"));
-    progress.leases.push_back({LeaseId{lease}, e.units_done()});
-  }
+  LS_TRY(leases, list_from(in.leases(), limits::kLeasesPerWorker, "progress.leases", entry_from));
   LS_TRY(activity, text_from(in.activity(), limits::kNameBytes, "progress.activity"));
   LS_TRY(cpu, seconds_from(in.cpu_seconds_total(), "progress.cpu_seconds_total"));
   LS_TRY(load, seconds_from(in.load_seconds(), "progress.load_seconds"));
-  progress.activity = activity;
-  progress.cpu_seconds_total = cpu;
-  progress.rss_bytes = in.rss_bytes();
-  progress.load_seconds = load;
-  return progress;
+  return WorkerProgress{std::move(leases), activity, cpu, in.rss_bytes(), load};
 }
 
 Result<Health> health_from(const pb::UnitResult& in) {
@@ -125,8 +168,8 @@ Result<Health> health_from(const pb::UnitResult& in) {
     return Health{};
   auto health = parse_health(in.health().empty() ? "{}" : in.health());
   if (!health) return wrong("result.health", health.error().message);
-  // A sender that reports no causes sends only the counts nonfinite, negative and majorant_violations. The
-  // part of a count that the causes in `health` do not explain is added to the cause unnamed, negative or
+  // If a sender does not know a cause, only the counts nonfinite, negative and majorant_violations include
+  // it. The part of a count that is not in `health` is added to the cause unnamed, negative or
   // majorant_violation.
   const auto rest = [](std::uint64_t stated, std::uint64_t named) {
     return stated > named ? stated - named : 0;
@@ -184,29 +227,17 @@ Result<FromWorker> failure_from(const pb::UnitFailure& in) {
 }
 
 Result<FromWorker> returned_from(const pb::LeaseReturned& in) {
-  LeaseReturned returned;
   LS_TRY(lease, id_from(in.lease(), "returned.lease"));
-  returned.lease = LeaseId{lease};
-  if (auto ok = bounded(in.units_size(), limits::kUnitsPerLease, "returned.units"); !ok)
-    return tl::unexpected<Error>(ok.error());
-  for (const pb::UnitKey& k : in.units()) {
-    LS_TRY(key, key_from(k));
-    returned.unrendered.push_back(key);
-  }
-  return returned;
+  LS_TRY(units, list_from(in.units(), limits::kUnitsPerLease, "returned.units", key_from));
+  return LeaseReturned{LeaseId{lease}, std::move(units)};
 }
 
 Result<ToWorker> assign_from(const pb::AssignLease& in) {
   AssignLease assign;
   LS_TRY(lease, id_from(in.lease(), "assign.lease"));
   LS_TRY(job, id_from(in.job(), "assign.job"));
-  if (auto ok = bounded(in.units_size(), limits::kUnitsPerLease, "assign.units"); !ok)
-    return tl::unexpected<Error>(ok.error());
-  assign.lease = {LeaseId{lease}, JobId{job}, {}};
-  for (const pb::LeaseUnit& u : in.units()) {
-    LS_TRY(unit, lease_unit_from(u));
-    assign.lease.units.push_back(unit);
-  }
+  LS_TRY(units, list_from(in.units(), limits::kUnitsPerLease, "assign.units", lease_unit_from));
+  assign.lease = {LeaseId{lease}, JobId{job}, std::move(units)};
   if (in.has_brief()) {
     LS_TRY(brief, brief_from(in.brief()));
     if (brief.job != assign.lease.job) return wrong("assign.brief", "is of another job");

@@ -1,11 +1,49 @@
 // Converts plain values to messages.
+#include <algorithm>
 #include <utility>
 
 #include "common/base/overloaded.h"
 #include "proto/convert.h"
-#include "proto/convert_check.h"
 
 namespace ls::wire {
+namespace {
+
+// Returns the number of bytes of the UTF-8 character at `i` (RFC 3629: shortest forms, no surrogates, up to
+// U+10FFFF); 0 if there is no such character at `i`.
+std::size_t character_length(const std::string& text, std::size_t i) {
+  const auto byte = [&](std::size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0U; };
+  const unsigned first = byte(i);
+  if (first < 0x80) return 1;
+  const std::size_t length = first >= 0xC2 && first < 0xE0   ? 2
+                             : first >= 0xE0 && first < 0xF0 ? 3
+                             : first >= 0xF0 && first < 0xF5 ? 4
+                                                             : 0;
+  for (std::size_t k = 1; k < length; ++k)
+    if ((byte(i + k) & 0xC0) != 0x80) return 0;
+  const unsigned second = byte(i + 1);
+  const bool wrong = (first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) ||
+                     (first == 0xF0 && second < 0x90) || (first == 0xF4 && second > 0x8F);
+  return wrong ? 0 : length;
+}
+
+}  // namespace
+
+std::string sendable(const std::string& text, std::size_t limit) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t length = character_length(text, i);
+    if (out.size() + std::max<std::size_t>(length, 1) > limit) break;
+    if (length == 0) {
+      out += '?';
+      ++i;
+    } else {
+      out.append(text, i, length);
+      i += length;
+    }
+  }
+  return out;
+}
+
 namespace {
 
 void put(const UnitKey& key, pb::UnitKey* out) {

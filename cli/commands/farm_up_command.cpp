@@ -15,8 +15,8 @@
 #include "cli/scale/slurm_engine.h"
 #include "cli/scale/ssh_engine.h"
 #include "common/base/clock.h"
-#include "common/base/helper_program.h"
 #include "common/base/secret.h"
+#include "common/base/spawn.h"
 
 namespace ls::cli {
 namespace {

@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <fstream>
 
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 #include "common/denoise/denoiser.h"
 #include "worker/machine.h"
 #include "worker/render/render.h"

@@ -10,7 +10,7 @@
 
 #include "cli/farm/http_client.h"
 #include "cli/output/reply_fields.h"
-#include "common/base/percent_code.h"
+#include "common/base/safe_text.h"
 #include "common/base/secret.h"
 
 namespace ls::cli {

@@ -1,6 +1,6 @@
-// The data that decoders of meshes, images and grids return, and size limits of the files that a scene names.
-// A decoder checks the sizes in a file against these limits and against the number of available bytes before
-// it allocates memory.
+// The data that decoders of meshes, images and grids return, and limits of the sizes of files and of their
+// content. Before a decoder allocates memory, it checks the sizes in a file against these limits and against
+// the number of available bytes.
 #pragma once
 
 #include <array>
@@ -29,18 +29,18 @@ struct MeshAttribute {
   std::string name;  // "vertex_..." or "face_..."
   std::uint32_t components = 1;
   bool bytes = false;         // true: the values are 0 to 255, as in the file
-  std::vector<float> values;  // one or three components per vertex or triangle, adjacent in memory
+  std::vector<float> values;  // `components` values per vertex or triangle, adjacent in memory
 };
 
 // A triangle mesh. `positions` and (if the file has any) `normals` have three floats per vertex, `uvs` two;
-// `indices` has three indices per triangle, all below vertex_count(). The uvs are those of the file: v is
+// `indices` has three indices per triangle, all below vertex_count(). The v coordinates are as in the file,
 // not flipped.
 struct MeshData {
   std::vector<float> positions, normals, uvs;
   std::vector<std::uint32_t> indices;
   bool face_normals = false;  // true if the file requests flat triangles
-  std::uint64_t dropped_triangles =
-      0;  // number of triangles without area or with a non-finite vertex; they are left out of `indices`
+  // Number of triangles without area or with a non-finite vertex; `indices` does not contain them.
+  std::uint64_t dropped_triangles = 0;
   std::vector<MeshAttribute> attributes;     // the requested attributes
   std::vector<std::string> attribute_names;  // names of all attributes in the file
 

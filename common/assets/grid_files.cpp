@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "common/assets/bytes.h"
+#include "common/base/bytes.h"
 
 namespace ls {
 namespace {
@@ -25,7 +25,7 @@ float value(ByteReader& r, std::int32_t type) {  // the caller has checked that 
 }
 
 tl::unexpected<Error> bad_grid(std::string_view name, const std::string& text) {
-  return fail(Errc::invalid_argument, fmt::format("'{}': {}", name, text));
+  return bad_argument(fmt::format("'{}': {}", name, text));
 }
 
 Result<void> read_box(std::string_view name, ByteReader& r, GridData& g) {
@@ -44,7 +44,7 @@ Result<void> check_count(std::string_view name, std::uint64_t count) {
               fmt::format("'{}': {} values, more than the limit of {}", name, count, kMaxGridValues));
 }
 
-// Returns the error for a value that is not finite; (x, y, z) is its voxel or node.
+// Returns the error for the value `v`, which is not finite. (x, y, z) is its voxel or node.
 tl::unexpected<Error> bad_value(std::string_view name, const char* what, std::uint64_t x, std::uint64_t y,
                                 std::uint64_t z, float v) {
   return bad_grid(name, fmt::format("the {} ({}, {}, {}) is {}; repair the grid", what, x, y, z,
@@ -59,7 +59,7 @@ float density(float v, GridData& g) {
 }
 
 struct VolHeader {
-  GridData grid;  // dimensions and channels, without values
+  GridData grid;  // dimensions and channels; the values are not read yet
   std::int32_t type = 0;
   std::uint64_t count = 0;
 };
@@ -100,7 +100,7 @@ Result<VolHeader> read_vol_header(std::string_view name, ByteReader& r, std::siz
 
 constexpr std::size_t kRawHeader = 36;
 
-// Reads the header; the result has no values yet.
+// Reads the header, and returns a grid without values.
 Result<GridData> read_raw_header(std::string_view name, ByteReader& r, std::size_t size) {
   if (size < kRawHeader)
     return bad_grid(name, fmt::format("the file has {} bytes, fewer than the {} of a .bin grid's header",

@@ -1,14 +1,15 @@
 // Grids of voxels in two file formats, both little endian.
 //
 // Mitsuba's .vol, version 3: "VOL", byte 3, int32 type, int32 nx ny nz, int32 channels, six float32 (minimum
-// and maximum corner), then the values, x fastest. Types: 1 float32, 2 float16, 3 uint8 (0..255 for 0..1).
+// and maximum corner), then the values, x fastest. Types: 1 float32, 2 float16, 3 uint8 (0 to 255 mean 0 to
+// 1).
 //
 // Raw .bin: int32 nx, ny, nz; float32 minimum x, y, z and maximum x, y, z of the box in the world; nx ny nz
-// float32 values, with x fastest or (called "x-major" by some converters) z fastest. The values are at
-// nodes, the outermost of which are on the faces of the box. No bytes may follow.
+// float32 values. Either x or z varies fastest (some converters call the latter "x-major"). The values are at
+// the nodes of a lattice whose outermost nodes are on the faces of the box. No bytes may follow.
 //
 // A value that is NaN or infinite is an error that names its voxel or node; negative values become 0 and are
-// counted. The result always has x fastest.
+// counted. In the result x varies fastest.
 #pragma once
 
 #include <cstddef>

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <strings.h>
 
-#include "common/assets/bytes.h"
+#include "common/base/bytes.h"
 #include "common/image/exr/exr_file.h"
 
 namespace ls {
@@ -27,8 +27,7 @@ Result<ImageData> decode_image(std::string_view name, std::span<const std::byte>
   for (const std::string_view pfm : {"PF ", "PF\n", "PF\r", "Pf ", "Pf\n", "Pf\r"})
     if (head.starts_with(pfm)) return decode_pfm(name, file, max_pixels);
   if (ends_in_tga(name)) return decode_tga(name, file, max_pixels);
-  return fail(
-      Errc::invalid_argument,
+  return bad_argument(
       fmt::format("'{}': by its first bytes this is not a PNG, JPEG, BMP, QOI, OpenEXR, Radiance HDR or "
                   "PFM image, and its name does not end in .tga",
                   name));
@@ -39,6 +38,10 @@ Result<ImageData> load_image(const std::filesystem::path& path, std::string_view
   const auto bytes = read_asset(path, name);
   if (!bytes) return tl::unexpected(bytes.error());
   return decode_image(name, *bytes, max_pixels);
+}
+
+tl::unexpected<Error> BrokenImage::operator()(std::string_view problem) const {
+  return bad_argument(fmt::format("'{}': broken {}: {}", name, format, problem));
 }
 
 tl::unexpected<Error> too_many_pixels(std::string_view name, std::uint64_t width, std::uint64_t height,

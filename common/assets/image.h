@@ -1,5 +1,5 @@
-// Decodes PNG, JPEG, BMP, QOI, OpenEXR, Radiance HDR and PFM, recognised by their first bytes, and TGA, which
-// has no signature, recognised by the ending of its name. An image of more than max_pixels is rejected
+// Decodes images. PNG, JPEG, BMP, QOI, OpenEXR, Radiance HDR and PFM are recognised by their first bytes. TGA
+// has no signature and is recognised by the ending of its name. An image of more than max_pixels is rejected
 // (resource_exhausted) before memory is allocated for it.
 #pragma once
 
@@ -28,7 +28,7 @@ Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> 
 // BMP: 24 and 32 bits; alpha is ignored.
 Result<ImageData> decode_bmp(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
-// TGA: 15 to 32 bits of colour, 8 of grey, colour maps; alpha if the header declares it.
+// TGA: colours of 15 to 32 bits, grey of 8 bits, colour maps; alpha if the header declares it.
 Result<ImageData> decode_tga(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
 // QOI: colour and alpha, 8 bits, sRGB or linear.
@@ -44,7 +44,12 @@ Result<ImageData> decode_hdr(std::string_view name, std::span<const std::byte> f
 Result<ImageData> decode_pfm(std::string_view name, std::span<const std::byte> file,
                              std::uint64_t max_pixels = kMaxImagePixels);
 
-// Returns the error for an image of more than max_pixels, which all these decoders use.
+// Returns the error of one decoder, "'NAME': broken FORMAT: PROBLEM".
+struct BrokenImage {
+  std::string_view name, format;
+  tl::unexpected<Error> operator()(std::string_view problem) const;
+};
+// Returns the error of all these decoders for an image of more than max_pixels.
 tl::unexpected<Error> too_many_pixels(std::string_view name, std::uint64_t width, std::uint64_t height,
                                       std::uint64_t max_pixels);
 

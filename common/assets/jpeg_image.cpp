@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-
 #include <csetjmp>
 #include <cstdio>  // jpeglib.h requires it
 
@@ -22,8 +20,7 @@ void on_error(j_common_ptr info) {
   f->base.format_message(info, f->message);
   std::longjmp(f->escape, 1);
 }
-// Treats the library's warnings as errors. The library replaces missing data by grey, but a broken file must
-// be an error.
+// Treats the library's warnings as errors. For missing data the library would only warn and fill in grey.
 void on_message(j_common_ptr info, int level) {
   if (level < 0) on_error(info);
 }
@@ -41,7 +38,7 @@ struct Decoder {
   ~Decoder() { jpeg_destroy_decompress(&info); }
 };
 
-// read_header() and the next function must not have objects with destructors, which longjmp would skip.
+// read_header() and read_rows() must not have objects with destructors, because longjmp would skip them.
 bool read_header(Decoder& d, const unsigned char* data, unsigned long size) {
   if (setjmp(d.failure.escape)) return false;
   jpeg_create_decompress(&d.info);
@@ -67,11 +64,9 @@ bool read_rows(Decoder& d, unsigned char* out, std::size_t row_bytes) {
 Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> file,
                               std::uint64_t max_pixels) {
   Decoder d;
-  const auto bad = [&](const char* text) {
-    return fail(Errc::invalid_argument, fmt::format("'{}': broken JPEG: {}", name, text));
-  };
+  const BrokenImage broken{name, "JPEG"};
   if (!read_header(d, reinterpret_cast<const unsigned char*>(file.data()), file.size()))
-    return bad(d.failure.message);
+    return broken(d.failure.message);
   ImageData image;
   image.width = d.info.image_width;
   image.height = d.info.image_height;
@@ -79,14 +74,14 @@ Result<ImageData> decode_jpeg(std::string_view name, std::span<const std::byte> 
   image.srgb = true;
   const std::uint64_t pixels = std::uint64_t{image.width} * image.height;
   if (pixels == 0 || image.width > kMaxImageSide || image.height > kMaxImageSide || pixels > kMaxImagePixels)
-    return bad("its size is not believable");
+    return broken("its size is not believable");
   if (pixels > max_pixels) return too_many_pixels(name, image.width, image.height, max_pixels);
-  if (pixels / 64 / 64 >
-      file.size())  // a lenient limit: an 8 x 8 block takes at least two bits (up to 4 share their chroma)
-    return bad("it is too short for its size");
+  // A block of 8 x 8 values takes at least two bits, and chroma may have a lower resolution, so this limit of
+  // one bit per 512 pixels is lenient.
+  if (pixels / 64 / 64 > file.size()) return broken("it is too short for its size");
   image.u8.resize(pixels * image.channels);
   if (!read_rows(d, image.u8.data(), std::size_t{image.width} * image.channels))
-    return bad(d.failure.message);
+    return broken(d.failure.message);
   return image;
 }
 

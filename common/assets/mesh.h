@@ -12,19 +12,19 @@
 
 namespace ls {
 
-// Reads the statements v, vt, vn and f of an OBJ file; indices may be negative (counted back from the last
-// one). Statements for groups, materials and smoothing, points, lines and comments are ignored. Each distinct
-// (v, vt, vn) becomes one vertex. Normals and uvs are kept if any face uses them; corners without them get 0.
+// Reads the statements v, vt, vn and f of an OBJ file; negative indices count back from the last element.
+// Statements for groups, materials and smoothing, points, lines and comments are ignored. Each distinct (v,
+// vt, vn) becomes one vertex. If any face uses normals or uvs, the mesh has them, and corners without them
+// get 0.
 Result<MeshData> decode_obj(std::string_view name, std::span<const std::byte> file);
 
 // Reads a PLY file: ascii, binary_little_endian or binary_big_endian, version 1.0. It must have an element
 // `vertex` with x y z, optionally nx ny nz and (u v | s t | texture_u texture_v | texture_s texture_t), and
-// an element `face` with the list vertex_indices or vertex_index. decode_ply_with() also reads those of the
-// requested `attributes` (ply_attributes.h) that the file has. Everything else is skipped. Each triangle of a
-// polygon gets the attributes of the polygon.
-Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file);
-Result<MeshData> decode_ply_with(std::span<const std::string> attributes, std::string_view name,
-                                 std::span<const std::byte> file);
+// an element `face` with the list vertex_indices or vertex_index. The `attributes` (mesh_parts.h) are read as
+// far as the file has them. Everything else is skipped. Each triangle of a polygon gets the attributes of the
+// polygon.
+Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file,
+                            std::span<const std::string> attributes = {});
 
 // Mitsuba's `.serialized` format, version 3 or 4. is_serialized() recognises it by the first bytes;
 // decode_serialized() reads mesh number `index` of the file and skips vertex colours.

@@ -7,10 +7,9 @@
 #include <random>
 #include <unordered_map>
 
-#include "common/assets/bytes.h"
 #include "common/assets/mesh.h"
-#include "common/assets/obj_corner.h"
-#include "common/assets/triangles.h"
+#include "common/assets/mesh_parts.h"
+#include "common/base/bytes.h"
 
 namespace ls {
 
@@ -36,7 +35,7 @@ class ObjReader {
       if (!statement(line)) return bad();
     }
     if (mesh_.indices.empty() && mesh_.dropped_triangles == 0)
-      return fail(Errc::invalid_argument, fmt::format("'{}': has no faces", name_));
+      return bad_argument(fmt::format("'{}': has no faces", name_));
     if (!any_uv_) mesh_.uvs = {};
     if (!any_normal_) mesh_.normals = {};
     return std::move(mesh_);
@@ -69,8 +68,8 @@ class ObjReader {
       if (w.empty() && i >= needed) break;
       if (!w.empty() && w[0] == '+') w.remove_prefix(1);
       const auto [end, ec] = std::from_chars(w.data(), w.data() + w.size(), a[i]);
-      // On underflow the number becomes 0 or denormal, on overflow infinite. Triangles with an infinite
-      // vertex position are left out (add_polygon).
+      // A number that is too small becomes 0 or denormal, one that is too large infinite. add_polygon()
+      // leaves out triangles with an infinite vertex position.
       if (ec == std::errc::result_out_of_range)
         a[i] = static_cast<float>(std::strtod(std::string(w.substr(0, 64)).c_str(), nullptr));
       else if (ec != std::errc{} || end != w.data() + w.size())
@@ -147,7 +146,7 @@ class ObjReader {
     return false;
   }
   tl::unexpected<Error> bad() const {
-    return fail(Errc::invalid_argument, fmt::format("'{}', line {}: {}", name_, line_, problem_));
+    return bad_argument(fmt::format("'{}', line {}: {}", name_, line_, problem_));
   }
 
   std::string_view name_;
@@ -172,8 +171,7 @@ Result<MeshData> load_mesh(const std::filesystem::path& path, std::string_view n
   const auto bytes = read_asset(path, name);
   if (!bytes) return tl::unexpected(bytes.error());
   if (is_serialized(*bytes)) return decode_serialized(name, *bytes, index);
-  return as_text(*bytes).starts_with("ply") ? decode_ply_with(attributes, name, *bytes)
-                                            : decode_obj(name, *bytes);
+  return as_text(*bytes).starts_with("ply") ? decode_ply(name, *bytes, attributes) : decode_obj(name, *bytes);
 }
 
 }  // namespace ls

@@ -4,13 +4,14 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <string>
+#include <type_traits>
 
-#include "common/assets/bytes.h"
 #include "common/assets/mesh.h"
-#include "common/assets/ply_attributes.h"
-#include "common/assets/triangles.h"
+#include "common/assets/mesh_parts.h"
+#include "common/base/bytes.h"
 
 namespace ls {
 
@@ -19,35 +20,46 @@ namespace {
 constexpr std::size_t kMaxPlyLines = 1000;
 
 enum class Coding { ascii, little_endian, big_endian };
-enum class Type { i8, u8, i16, u16, i32, u32, f32, f64 };
 
-struct TypeName {
+struct Type {
   std::string_view name;
-  Type type;
   std::size_t bytes;
+  double largest;  // of an integer type; 0 for floating point
+  std::optional<double> (*take)(ByteReader&, bool big_endian);
 };
-constexpr TypeName kTypes[] = {
-    {"char", Type::i8, 1},   {"int8", Type::i8, 1},     {"uchar", Type::u8, 1},   {"uint8", Type::u8, 1},
-    {"short", Type::i16, 2}, {"int16", Type::i16, 2},   {"ushort", Type::u16, 2}, {"uint16", Type::u16, 2},
-    {"int", Type::i32, 4},   {"int32", Type::i32, 4},   {"uint", Type::u32, 4},   {"uint32", Type::u32, 4},
-    {"float", Type::f32, 4}, {"float32", Type::f32, 4}, {"double", Type::f64, 8}, {"float64", Type::f64, 8}};
+template <class T>
+constexpr Type type_of(std::string_view name) {
+  return {name, sizeof(T), std::is_integral_v<T> ? static_cast<double>(std::numeric_limits<T>::max()) : 0,
+          [](ByteReader& r, bool big_endian) {
+            const auto v = r.take<T>(big_endian);
+            return v ? std::optional(static_cast<double>(*v)) : std::nullopt;
+          }};
+}
+constexpr Type kTypes[] = {
+    type_of<std::int8_t>("char"),     type_of<std::int8_t>("int8"),     type_of<std::uint8_t>("uchar"),
+    type_of<std::uint8_t>("uint8"),   type_of<std::int16_t>("short"),   type_of<std::int16_t>("int16"),
+    type_of<std::uint16_t>("ushort"), type_of<std::uint16_t>("uint16"), type_of<std::int32_t>("int"),
+    type_of<std::int32_t>("int32"),   type_of<std::uint32_t>("uint"),   type_of<std::uint32_t>("uint32"),
+    type_of<float>("float"),          type_of<float>("float32"),        type_of<double>("double"),
+    type_of<double>("float64")};
 
-const TypeName* type_named(std::string_view name) {
-  const auto it = std::ranges::find(kTypes, name, &TypeName::name);
+const Type* type_named(std::string_view name) {
+  const auto it = std::ranges::find(kTypes, name, &Type::name);
   return it == std::end(kTypes) ? nullptr : &*it;
 }
+bool is_byte(const Type& t) { return t.largest == 255; }
 
 struct Property {
   std::string_view name;
-  const TypeName* type = nullptr;
-  const TypeName* count = nullptr;  // type of the length of a list; null for a property that is no list
+  const Type* type = nullptr;
+  const Type* count = nullptr;  // type of the length of a list; null for a property that is no list
 };
 struct Element {
   std::string_view name;
   std::uint64_t count = 0;
   std::vector<Property> properties;
 
-  // Returns the least number of bytes of one element.
+  // Returns the smallest possible number of bytes of one element.
   std::uint64_t least_bytes(Coding c) const {
     if (c == Coding::ascii) return properties.size();
     std::uint64_t n = 0;
@@ -56,8 +68,8 @@ struct Element {
   }
 };
 
-// Returns the index of a vertex property: 0-2 for the position, 3-5 for the normal, 6-7 for uv; -1: it is
-// none of these.
+// Returns the slot of a vertex property: 0-2 for the position, 3-5 for the normal, 6-7 for uv; -1 for other
+// properties.
 int vertex_slot(std::string_view name) {
   constexpr std::pair<std::string_view, int> kSlots[] = {
       {"x", 0}, {"y", 1}, {"z", 2}, {"nx", 3},        {"ny", 4},        {"nz", 5},        {"u", 6},
@@ -72,8 +84,7 @@ class PlyReader {
       : name_(name), file_(file), wanted_(wanted), body_(file) {}
 
   Result<MeshData> read() {
-    if (!header() || !elements())
-      return fail(Errc::invalid_argument, fmt::format("'{}': {}", name_, problem_));
+    if (!header() || !elements()) return bad_argument(fmt::format("'{}': {}", name_, problem_));
     return std::move(mesh_);
   }
 
@@ -137,7 +148,7 @@ class PlyReader {
     if (word == "list") {
       p.count = type_named(next_word(rest));
       word = next_word(rest);
-      if (!p.count || p.count->type >= Type::f32)
+      if (!p.count || p.count->largest == 0)
         return complain_line(line, "a list's length needs a whole-number type");
     }
     p.type = type_named(word);
@@ -160,8 +171,8 @@ class PlyReader {
       if (!ok) return false;
     }
     if (mesh_.indices.empty() && mesh_.dropped_triangles == 0) return complain("has no faces");
-    // Checked because a file may have several elements of one name, such as two elements 'face', of which
-    // only one has the attribute
+    // A file may have several elements of one name. If only one of two elements 'face' has the attribute, the
+    // attribute has too few values, which is an error.
     for (const MeshAttribute& a : mesh_.attributes)
       if (a.values.size() !=
           a.components * (a.name.starts_with("face_") ? mesh_.triangle_count() : mesh_.vertex_count()))
@@ -169,45 +180,22 @@ class PlyReader {
     return true;
   }
 
-  // Returns the next number of the file's body; nullopt at its end, or if it is not a number.
-  std::optional<double> number(const TypeName& t) {
-    if (coding_ == Coding::ascii) {
-      std::size_t a = rest_.find_first_not_of(" \t\r\n\v\f");
-      if (a == rest_.npos) return std::nullopt;
-      if (rest_[a] == '+') ++a;
-      double v = 0;
-      const char* const last = rest_.data() + rest_.size();
-      const auto [end, ec] = std::from_chars(rest_.data() + a, last, v);
-      if (ec == std::errc::invalid_argument) return std::nullopt;
-      if (ec == std::errc::result_out_of_range) v = 0;  // outside the range of double
-      if (end != last && std::string_view(" \t\r\n\v\f").find(*end) == std::string_view::npos)
-        return std::nullopt;
-      rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
-      return v;
-    }
-    const bool big = coding_ == Coding::big_endian;
-    const auto wide = [](auto v) {
-      return v ? std::optional<double>(static_cast<double>(*v)) : std::nullopt;
-    };
-    switch (t.type) {
-      case Type::i8:
-        return wide(body_.take<std::int8_t>(big));
-      case Type::u8:
-        return wide(body_.take<std::uint8_t>(big));
-      case Type::i16:
-        return wide(body_.take<std::int16_t>(big));
-      case Type::u16:
-        return wide(body_.take<std::uint16_t>(big));
-      case Type::i32:
-        return wide(body_.take<std::int32_t>(big));
-      case Type::u32:
-        return wide(body_.take<std::uint32_t>(big));
-      case Type::f32:
-        return wide(body_.take<float>(big));
-      case Type::f64:
-        return wide(body_.take<double>(big));
-    }
-    return std::nullopt;
+  // Returns the next number of the file's body; nullopt at the end of the body, or if the text is not a
+  // number.
+  std::optional<double> number(const Type& t) {
+    if (coding_ != Coding::ascii) return t.take(body_, coding_ == Coding::big_endian);
+    constexpr std::string_view kBlanks = " \t\r\n\v\f";
+    std::size_t a = rest_.find_first_not_of(kBlanks);
+    if (a == rest_.npos) return std::nullopt;
+    if (rest_[a] == '+') ++a;
+    double v = 0;
+    const char* const last = rest_.data() + rest_.size();
+    const auto [end, ec] = std::from_chars(rest_.data() + a, last, v);
+    if (ec == std::errc::invalid_argument) return std::nullopt;
+    if (ec == std::errc::result_out_of_range) v = 0;  // outside the range of double
+    if (end != last && kBlanks.find(*end) == kBlanks.npos) return std::nullopt;
+    rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
+    return v;
   }
   bool broken(const Element& e, std::uint64_t i) {
     const std::size_t at = file_.size() - (coding_ == Coding::ascii ? rest_.size() : body_.left());
@@ -307,7 +295,7 @@ class PlyReader {
     return true;
   }
 
-  // The place in the mesh where the values of a property are stored: a component of a requested attribute.
+  // The place of a property's values: a component of one of the requested attributes.
   struct Place {
     int attribute = -1;  // index in mesh_.attributes; -1: none
     std::size_t component = 0;
@@ -324,7 +312,7 @@ class PlyReader {
         places[a.properties[c]] = {static_cast<int>(mesh_.attributes.size()), c};
       mesh_.attributes.push_back({name,
                                   static_cast<std::uint32_t>(a.properties.size()),
-                                  e.properties[a.properties[0]].type->type == Type::u8,
+                                  is_byte(*e.properties[a.properties[0]].type),
                                   {}});
     }
     return places;
@@ -342,24 +330,15 @@ class PlyReader {
     const auto v = number(*p.type);
     if (!v) return false;
     MeshAttribute& a = mesh_.attributes[static_cast<std::size_t>(place.attribute)];
-    a.values[a.values.size() - a.components + place.component] =
-        static_cast<float>(decoded(p.type->type, *v));
+    a.values[a.values.size() - a.components + place.component] = static_cast<float>(decoded(*p.type, *v));
     return true;
   }
   // Decodes a value of an attribute. As in Mitsuba 3.9, values of integer types are sRGB codes of colours,
   // whatever the attribute's name. Bytes (u8) and floating-point numbers are returned as they are.
-  static double decoded(Type t, double v) {
-    constexpr std::pair<Type, double> kLargest[] = {{Type::i8, 127},
-                                                    {Type::i16, 32767},
-                                                    {Type::u16, 65535},
-                                                    {Type::i32, 2147483647},
-                                                    {Type::u32, 4294967295.}};
-    for (const auto& [type, largest] : kLargest)
-      if (t == type) {
-        const double x = v / largest;
-        return x <= .04045 ? x / 12.92 : std::pow((x + .055) / 1.055, 2.4);
-      }
-    return v;
+  static double decoded(const Type& t, double v) {
+    if (t.largest == 0 || is_byte(t)) return v;
+    const double x = v / t.largest;
+    return x <= .04045 ? x / 12.92 : std::pow((x + .055) / 1.055, 2.4);
   }
   // Copies the attributes of the last face, so that each of its triangles has them; removes them if the face
   // has no triangles.
@@ -388,12 +367,8 @@ class PlyReader {
 
 }  // namespace
 
-Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file) {
-  return decode_ply_with({}, name, file);
-}
-
-Result<MeshData> decode_ply_with(std::span<const std::string> attributes, std::string_view name,
-                                 std::span<const std::byte> file) {
+Result<MeshData> decode_ply(std::string_view name, std::span<const std::byte> file,
+                            std::span<const std::string> attributes) {
   return PlyReader(name, file, attributes).read();
 }
 

@@ -1,4 +1,4 @@
-#include "common/assets/ply_attributes.h"
+#include "common/assets/mesh_parts.h"
 
 #include <algorithm>
 #include <array>
@@ -24,7 +24,7 @@ std::optional<PlyAttribute> colour(std::span<const std::string_view> names) {
   return std::nullopt;
 }
 
-// Consecutive properties with the same prefix, whose last characters form the beginning of one of the
+// Consecutive properties with the same prefix. Their last characters are the beginning of one of the
 // sequences in kKinds.
 struct Run {
   std::string_view prefix;
@@ -61,7 +61,7 @@ std::vector<PlyAttribute> ply_attributes(std::span<const std::string_view> names
       run = {prefix, *kind, {i}};
     } else if (run.properties.size() < 4 && run.kind[run.properties.size()] == name.back()) {
       run.properties.push_back(i);
-    } else {  // breaks the sequence: no property of this prefix makes an attribute
+    } else {  // the property does not continue the sequence, so this prefix has no attribute
       done.insert(prefix);
       run = {};
     }

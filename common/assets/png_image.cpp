@@ -11,8 +11,8 @@ namespace ls {
 
 namespace {
 
-// Data for libpng's callbacks. The callbacks must not throw: errors return by longjmp, which skips only plain
-// data.
+// The source of libpng's callbacks. Callbacks must not throw. Errors return by longjmp, which calls no
+// destructors, so only plain data may be on the stack.
 struct Source {
   const std::byte* data;
   std::size_t left;
@@ -44,7 +44,7 @@ struct PngShape {
   std::size_t row_bytes = 0;
 };
 
-// read_header() and the next function must not have objects with destructors, which longjmp would skip.
+// read_header() and read_rows() must not have objects with destructors, because longjmp would skip them.
 bool read_header(Png& p, PngShape& shape) {
   if (setjmp(png_jmpbuf(p.png))) return false;
   png_set_user_limits(p.png, kMaxImageSide, kMaxImageSide);
@@ -73,26 +73,24 @@ Result<ImageData> decode_png(std::string_view name, std::span<const std::byte> f
                              std::uint64_t max_pixels) {
   Source source{file.data(), file.size(), {}};
   Png p;
-  const auto bad = [&](const char* text) {
-    return fail(Errc::invalid_argument, fmt::format("'{}': broken PNG: {}", name, text));
-  };
+  const BrokenImage broken{name, "PNG"};
   p.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &source, on_error, on_warning);
   if (p.png) p.info = png_create_info_struct(p.png);
   if (!p.info) return fail(Errc::resource_exhausted, fmt::format("'{}': no memory to read a PNG", name));
   png_set_read_fn(p.png, &source, read_bytes);
   PngShape shape;
-  if (!read_header(p, shape)) return bad(source.message);
+  if (!read_header(p, shape)) return broken(source.message);
   const std::uint64_t pixels = std::uint64_t{shape.width} * shape.height;
-  // Deflate packs at most 1032 bytes into one, and one bit of a palette image expands to four bytes, a
-  // factor of 32. A header that claims more than the file can contain is rejected.
+  // Deflate packs at most 1032 bytes into one. One bit of a palette image expands to four bytes, a factor of
+  // 32. A header that claims more pixels than the file can contain is rejected.
   if (pixels == 0 || pixels > kMaxImagePixels ||
       shape.row_bytes * std::uint64_t{shape.height} / 1032 / 32 > file.size())
-    return bad("its size is not believable");
+    return broken("its size is not believable");
   if (pixels > max_pixels) return too_many_pixels(name, shape.width, shape.height, max_pixels);
   std::vector<std::uint8_t> bytes(shape.row_bytes * shape.height);
   std::vector<png_bytep> rows(shape.height);
   for (std::size_t y = 0; y < rows.size(); ++y) rows[y] = bytes.data() + y * shape.row_bytes;
-  if (!read_rows(p, rows.data())) return bad(source.message);
+  if (!read_rows(p, rows.data())) return broken(source.message);
   ImageData image{shape.width, shape.height, shape.channels, {}, {}, true};
   if (shape.bits == 8) {
     image.u8 = std::move(bytes);

@@ -8,9 +8,9 @@
 #include <cstring>
 #include <optional>
 
-#include "common/assets/bytes.h"
 #include "common/assets/mesh.h"
-#include "common/assets/triangles.h"
+#include "common/assets/mesh_parts.h"
+#include "common/base/bytes.h"
 
 namespace ls {
 
@@ -26,8 +26,8 @@ enum Flags : std::uint32_t {
   kDouble = 0x2000  // if absent: single precision
 };
 
-// A zlib stream, unpacked on demand. So memory depends on the data that are unpacked, not on the size that
-// the file claims.
+// A zlib stream that is unpacked on demand, so that memory is only needed for data that exist, not for the
+// size that the file claims.
 class Inflater {
  public:
   explicit Inflater(std::span<const std::byte> data) : data_(data) { ok_ = inflateInit(&z_) == Z_OK; }
@@ -80,8 +80,7 @@ class SerializedReader {
 
   Result<MeshData> read(int index) {
     const auto mesh = find(index);
-    if (!mesh || !unpack(*mesh))
-      return fail(Errc::invalid_argument, fmt::format("'{}': {}", name_, problem_));
+    if (!mesh || !unpack(*mesh)) return bad_argument(fmt::format("'{}': {}", name_, problem_));
     return std::move(mesh_);
   }
 
@@ -91,7 +90,7 @@ class SerializedReader {
     return false;
   }
 
-  // Returns the bytes of mesh number `index`, starting at its compressed part; sets version_.
+  // Returns the compressed bytes of mesh number `index`; sets version_.
   std::optional<std::span<const std::byte>> find(int index) {
     if (!header(file_)) return std::nullopt;
     if (index == 0) return file_.subspan(4);
@@ -165,8 +164,8 @@ class SerializedReader {
     return false;
   }
 
-  // True if the packed bytes can contain what the counts in the header announce: zlib packs at most 1032
-  // bytes into one. Other counts are rejected before memory is allocated.
+  // True if the packed bytes can contain the vertices and triangles that the header announces: zlib packs at
+  // most 1032 bytes into one. If not, the file is rejected before memory is allocated.
   bool plausible(std::uint32_t flags, std::uint64_t vertices, std::uint64_t triangles) {
     const std::uint64_t per_vertex =
         3 + (flags & kHasNormals ? 3 : 0) + (flags & kHasUvs ? 2 : 0) + (flags & kHasColours ? 3 : 0);

@@ -1,5 +1,5 @@
-// Clocks and conversions of time. Functions get the time as an argument: only main() and SystemClock read the
-// system's clock.
+// Clocks and conversions of time. Only main() and SystemClock read the system's clock; other functions get
+// the time as an argument.
 #pragma once
 
 #include <time.h>
@@ -33,7 +33,7 @@ inline std::int64_t system_unix_ns() {
 
 inline double system_unix_seconds() { return static_cast<double>(system_unix_ns()) / 1e9; }
 
-// CPU time of the calling thread
+// Returns the CPU time of the calling thread.
 inline double thread_cpu_seconds() {
   timespec t{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);

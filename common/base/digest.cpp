@@ -8,30 +8,24 @@
 
 namespace ls {
 
-std::string Digest::hex() const {
-  static constexpr char kDigits[] = "0123456789abcdef";
-  std::string out(64, '0');
+std::string to_hex(std::span<const std::uint8_t> bytes) {
+  return fmt::format("{:02x}", fmt::join(bytes, ""));
+}
+
+bool read_hex(std::string_view text, std::span<std::uint8_t> bytes) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  if (text.size() != 2 * bytes.size()) return false;
   for (std::size_t i = 0; i < bytes.size(); ++i) {
-    out[2 * i] = kDigits[bytes[i] >> 4];
-    out[2 * i + 1] = kDigits[bytes[i] & 15];
+    const std::size_t high = kDigits.find(text[2 * i]), low = kDigits.find(text[2 * i + 1]);
+    if (high == kDigits.npos || low == kDigits.npos) return false;
+    bytes[i] = static_cast<std::uint8_t>(high * 16 + low);
   }
-  return out;
+  return true;
 }
 
 std::optional<Digest> Digest::parse(std::string_view hex) {
-  if (hex.size() != 64) return std::nullopt;
-  const auto value = [](char c) -> int {
-    if (c >= '0' && c <= '9') return c - '0';
-    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-    return -1;
-  };
   Digest d;
-  for (std::size_t i = 0; i < 32; ++i) {
-    const int hi = value(hex[2 * i]), lo = value(hex[2 * i + 1]);
-    if (hi < 0 || lo < 0) return std::nullopt;
-    d.bytes[i] = static_cast<std::uint8_t>(hi * 16 + lo);
-  }
-  return d;
+  return read_hex(hex, d.bytes) ? std::optional(d) : std::nullopt;
 }
 
 struct Sha256::State {

@@ -1,4 +1,5 @@
-// SHA-256 digests: they identify blobs, scenes, settings, units (ranges of samples of one tile) and pixels.
+// SHA-256 digests. They identify blobs (files that jobs use), scenes, settings, units (one range of samples
+// of one tile) and pixels.
 #pragma once
 
 #include <array>
@@ -17,10 +18,14 @@
 
 namespace ls {
 
+std::string to_hex(std::span<const std::uint8_t> bytes);  // returns lower-case hexadecimal digits
+// Reads exactly `bytes` from lower-case digits; returns false if the text is anything else.
+bool read_hex(std::string_view text, std::span<std::uint8_t> bytes);
+
 struct Digest {
   std::array<std::uint8_t, 32> bytes{};
 
-  std::string hex() const;  // returns 64 lower-case hexadecimal digits
+  std::string hex() const { return to_hex(bytes); }
   // Returns nullopt unless `hex` is exactly 64 digits
   static std::optional<Digest> parse(std::string_view hex);
   auto operator<=>(const Digest&) const = default;

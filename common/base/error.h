@@ -1,7 +1,9 @@
-// Errors as values. Every fallible function returns Result<T>; exceptions do not cross a folder boundary. The
-// message is for the person who must act: what happened, where, and what to do.
+// Errors as values. Every function that can fail returns Result<T>; exceptions do not cross a folder
+// boundary. The message is for the person who must act: what happened, where, and what to do.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
@@ -39,6 +41,12 @@ inline tl::unexpected<Error> bad_argument(std::string message) {
   return fail(Errc::invalid_argument, std::move(message));
 }
 
-std::string_view to_string(Errc code);  // returns "invalid_argument" ...
+// The names of the codes, in their order.
+inline constexpr std::array<std::string_view, 9> kErrcNames = {
+    "invalid_argument",    "not_found",          "already_exists",
+    "failed_precondition", "resource_exhausted", "permission_denied",
+    "unauthenticated",     "unavailable",        "internal"};
+static_assert(kErrcNames.size() == static_cast<std::size_t>(Errc::internal) + 1);
+constexpr std::string_view to_string(Errc code) { return kErrcNames[static_cast<std::size_t>(code)]; }
 
 }  // namespace ls

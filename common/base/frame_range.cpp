@@ -57,8 +57,7 @@ std::vector<std::uint32_t> FrameRange::frames() const {
 
 Result<FrameRange> parse_frames(std::string_view text) {
   const auto wrong = [&](std::string why) {
-    return fail(Errc::invalid_argument,
-                fmt::format("frames '{}': {}", plain_text(text.substr(0, kMostShown)), why));
+    return bad_argument(fmt::format("frames '{}': {}", plain_text(text.substr(0, kMostShown)), why));
   };
   const auto range = read(text);
   if (!range)

@@ -8,7 +8,8 @@
 
 namespace ls {
 
-// A short printable name such as "j-7f3a91c2". The coordinator makes it, unique within its data folder.
+// A short printable name such as "j-7f3a91c2". It is made by the coordinator and unique within its data
+// folder.
 template <class Tag>
 struct Id {
   std::string value;

@@ -98,7 +98,7 @@ std::string log_line(LogFormat format, std::string_view keys, std::string_view t
   nlohmann::ordered_json line;
   line["text"] = text;
   add_keys(line, keys);
-  // dump() with `replace` gives valid JSON whatever bytes a name contains. The opening brace is removed,
+  // With `replace`, dump() gives valid JSON whatever bytes a name contains. The opening brace is removed,
   // since kJsonPattern already contains it.
   return line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).substr(1);
 }

@@ -10,8 +10,8 @@
 namespace ls {
 
 enum class LogLevel { debug, info, warn, error, off };
-// text: "TIME LEVEL KEYS TEXT". json: one object per line, with {"time", "level", "text"} and the keys, all
-// strings; the time is in UTC.
+// text: "TIME LEVEL KEYS TEXT". json: one object per line, with "time" (UTC), "level", "text" and the keys;
+// all values are strings.
 enum class LogFormat { text, json };
 
 void log_level(LogLevel level);

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
+#include <charconv>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -34,8 +36,8 @@ bool is_shown(std::uint32_t code) {
   const auto within = [code](std::uint32_t first, std::uint32_t last) {
     return code >= first && code <= last;
   };
-  // Excluded ranges: control characters; line and paragraph separator with the directional embeddings and
-  // overrides; the directional isolates.
+  // Excluded are control characters, line and paragraph separators with the directional embeddings and
+  // overrides, and the directional isolates.
   return !within(0, 0x1F) && !within(0x7F, 0x9F) && !within(0x2028, 0x202E) && !within(0x2066, 0x2069);
 }
 
@@ -78,6 +80,29 @@ std::string shell_word(std::string_view text) {
       word += c;
   }
   return word + "'";
+}
+
+std::string percent_encode(std::string_view text) {
+  std::string out;
+  for (const unsigned char c : text)
+    if (std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.' || c == '~')
+      out += static_cast<char>(c);
+    else
+      out += fmt::format("%{:02X}", c);
+  return out;
+}
+
+std::optional<std::string> percent_decode(std::string_view text) {
+  std::string out;
+  while (!text.empty()) {
+    const char* const code = text.data() + 1;
+    const bool coded = text.front() == '%';
+    unsigned char byte = static_cast<unsigned char>(text.front());
+    if (coded && (text.size() < 3 || std::from_chars(code, code + 2, byte, 16).ptr != code + 2)) return {};
+    out += static_cast<char>(byte);
+    text.remove_prefix(coded ? 3 : 1);
+  }
+  return out;
 }
 
 }  // namespace ls

@@ -1,19 +1,25 @@
-// Makes external text (a scene, a farm's answer) safe for a terminal or a shell.
+// Makes external text (a scene, a farm's answer) safe for a terminal, a shell or a URL.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
 namespace ls {
 
-// Replaces characters that could move the cursor, colour the terminal, forge lines or reorder letters. Each
-// control character (C0, DEL, C1, also single bytes that are not UTF-8), line and paragraph separator and
-// directional override becomes one space, so that columns are kept.
+// Replaces each character that could move the cursor, colour the terminal, forge lines or reorder letters by
+// one space, so that columns stay aligned. These are control characters (C0, DEL, C1, also single bytes that
+// are not UTF-8), line and paragraph separators, and directional overrides.
 std::string plain_text(std::string_view text);
 
 // Quotes `text` as one word of a shell command, which a person can copy: returns it unchanged if none of its
 // characters has a special meaning in a shell, otherwise quoted. Control characters are written as escapes
 // ($'...', as bash, zsh and ksh read them), so the word can be shown on a terminal and in a log line.
 std::string shell_word(std::string_view text);
+
+// "a b" -> "a%20b": codes all but the unreserved characters of URLs.
+std::string percent_encode(std::string_view text);
+// "a%20b" -> "a b" (RFC 3986, section 2.1); nullopt if a '%' is not followed by two hexadecimal digits.
+std::optional<std::string> percent_decode(std::string_view text);
 
 }  // namespace ls

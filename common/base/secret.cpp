@@ -13,7 +13,7 @@
 #include <fstream>
 #include <iomanip>
 
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 
 namespace ls {
 
@@ -42,7 +42,7 @@ Result<std::string> read_secret(const std::filesystem::path& file) {
   std::string secret;
   if (!in) return fail(Errc::not_found, fmt::format("{} cannot be opened", file.string()));
   if (!(in >> std::setw(static_cast<int>(kSecretBytes)) >> secret))
-    return fail(Errc::invalid_argument, fmt::format("{} has no token in it", file.string()));
+    return bad_argument(fmt::format("{} has no token in it", file.string()));
   return secret;
 }
 
@@ -53,7 +53,7 @@ Result<std::string> read_pem(const std::filesystem::path& file) {
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(in.gcount()));
   if (text.size() > kPemBytes || text.find("-----BEGIN ") == std::string::npos)
-    return fail(Errc::invalid_argument, fmt::format("{} is no PEM file", file.string()));
+    return bad_argument(fmt::format("{} is no PEM file", file.string()));
   return text;
 }
 

@@ -12,8 +12,7 @@
 
 namespace ls {
 
-// True if the text equals the secret. The run time reveals neither where the two differ nor the secret's
-// length.
+// True if the two are equal. The run time reveals neither where they differ nor the secret's length.
 bool equal_secret(std::string_view a, std::string_view b);
 bool equal_secret(const Digest& a, const Digest& b);
 

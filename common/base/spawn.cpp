@@ -9,14 +9,15 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <utility>
 
 extern char** environ;
 
 namespace ls {
 namespace {
 
-// Duplicates of the files to be inherited, with numbers above all numbers that the files get in the program.
-// So dup2 of one file to its final number cannot overwrite another file that is not yet moved.
+// Duplicates of the files to be inherited, with higher numbers than the program will use. So dup2() of one
+// file to its final number cannot overwrite another file that is still to be moved.
 class HighFiles {
  public:
   ~HighFiles() {
@@ -48,6 +49,12 @@ std::vector<char*> environment(const std::function<bool(std::string_view)>& inhe
     if (inherits(*e)) kept.push_back(*e);
   kept.push_back(nullptr);
   return kept;
+}
+
+// Returns true for variables that the loader, the allocator and the sanitizers read.
+bool inherits(std::string_view variable) {
+  const std::string_view name = variable.substr(0, variable.find('='));
+  return name.starts_with("LD_") || name.starts_with("MALLOC_") || name.ends_with("SAN_OPTIONS");
 }
 
 int wait_with(pid_t pid, int flags, int& status) {
@@ -107,6 +114,23 @@ std::optional<int> poll_end(pid_t pid) {
   int status = 0;
   if (wait_with(pid, WNOHANG, status) == 0) return std::nullopt;
   return status;
+}
+
+std::filesystem::path program_beside_us(std::string_view name) {
+  std::error_code unknown;
+  return std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path() / name;
+}
+
+Descriptor::~Descriptor() {
+  if (fd >= 0) ::close(fd);
+}
+
+Result<int> run_helper(const std::filesystem::path& program, std::vector<std::string> arguments, int shared) {
+  arguments.insert(arguments.begin(), program.string());
+  const auto pid =
+      spawn({program.string(), std::move(arguments), {kDevNull, kDevNull, STDERR_FILENO, shared}, inherits});
+  if (!pid) return fail(Errc::internal, pid.error().message);
+  return wait_for_end(*pid);
 }
 
 }  // namespace ls

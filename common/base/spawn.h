@@ -1,8 +1,9 @@
-// Starts another program with an explicit list of what it inherits.
+// Starts other programs with an explicit list of what they inherit.
 #pragma once
 
 #include <sys/types.h>
 
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
@@ -30,10 +31,34 @@ struct Program {
 // there is no such program, else internal; the text names the program and the system's reason.
 Result<pid_t> spawn(Program program);
 
-// Waits until the process has ended, and returns its wait status as waitpid() gives it.
+// Waits until the process ends, and returns its wait status as waitpid() gives it.
 int wait_for_end(pid_t pid);
 
-// As wait_for_end(), but returns at once: nullopt while the process runs.
+// As wait_for_end(), but returns at once; nullopt if the process still runs.
 std::optional<int> poll_end(pid_t pid);
+
+// Helper programs are installed beside this one. They use third-party libraries that may crash, hang or take
+// too much memory: reading OpenVDB files, denoising. They share memory with this program through one file,
+// which they inherit as this descriptor.
+inline constexpr int kHelperFd = 3;
+
+// Returns the path of a program in the folder of the running executable.
+std::filesystem::path program_beside_us(std::string_view name);
+
+// An open file descriptor, closed by the destructor.
+class Descriptor {
+ public:
+  explicit Descriptor(int opened) : fd(opened) {}
+  ~Descriptor();
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  const int fd;
+};
+
+// Runs a helper program, waits for its end, and returns its wait status, as waitpid() gives it. It
+// inherits only two files: `shared` as kHelperFd, and standard error. Of the environment it inherits only
+// the variables that the loader, the allocator and the sanitizers read, so that it gets no secrets.
+// internal: it could not be started.
+Result<int> run_helper(const std::filesystem::path& program, std::vector<std::string> arguments, int shared);
 
 }  // namespace ls

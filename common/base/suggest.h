@@ -9,13 +9,13 @@
 
 namespace ls {
 
-// Upper limit of the cells of edit-distance tables that are computed for one suggestion
+// Limit of the work for one suggestion, in cells of edit-distance tables.
 inline constexpr std::size_t kMaxNameWork = 4'000'000;
 
-// Returns the name in `known` that is nearest to `given` by edit distance (a swap of neighbouring letters
-// counts once; case, '_' and '-' are ignored). nullopt: even the nearest name differs by more than a third of
-// the letters of the longer of the two. If `known` is very long, only as many names are compared as
-// kMaxNameWork allows.
+// Returns the name in `known` that is nearest to `given` by edit distance; a swap of neighbouring letters
+// counts as one edit; case, '_' and '-' are ignored. nullopt: even the nearest name differs by more than a
+// third of the letters of the longer of the two. If `known` is very long, only its first names are compared,
+// as far as kMaxNameWork allows.
 std::optional<std::string> nearest_name(std::string_view given, std::span<const std::string> known);
 
 // Returns "; known here: a, b, c". Empty if there are no names, or too many for a message.

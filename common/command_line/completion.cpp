@@ -99,15 +99,17 @@ std::string bash_completion(const Command& program) {
 
 namespace {
 
-// Escapes brackets and colons, which separate the parts of a specification for zsh's _arguments.
-std::string zsh_text(const std::string& text) {
+std::string with_backslashes(const std::string& text, std::string_view before) {
   std::string out;
   for (const char c : text) {
-    if (c == '[' || c == ']' || c == ':' || c == '\\') out += '\\';
+    if (before.find(c) != before.npos) out += '\\';
     out += c;
   }
   return out;
 }
+
+// Escapes brackets and colons, which separate the parts of a specification for zsh's _arguments.
+std::string zsh_text(const std::string& text) { return with_backslashes(text, "[]:\\"); }
 
 std::string zsh_value(const CommandOption& option) {
   const std::string action = !option.choices.empty() ? fmt::format("({})", fmt::join(option.choices, " "))
@@ -154,8 +156,8 @@ std::string zsh_completion(const Command& program) {
   std::string script = fmt::format("#compdef {0}\n# written by `{0} completion zsh`\n", program.name);
   walk(program.name, program,
        [&](const std::string& path, const Command& command) { script += zsh_function(path, command); });
-  // If zsh autoloads the file, the file is the function's body and must call the function defined in it; if
-  // the file is sourced, it registers the function.
+  // zsh may autoload this file as the body of the function, which must then call the function that it
+  // defines. If the file is sourced, it registers the function.
   return script +
          fmt::format("if [[ $funcstack[1] == {0} ]]; then\n  {0} \"$@\"\nelse\n  compdef {0} {1}\nfi\n",
                      function_of(program.name), program.name);
@@ -178,14 +180,7 @@ std::string fish_condition(const std::string& path, const Command& command) {
   return fmt::format("{}", fmt::join(seen, "; and "));
 }
 
-std::string fish_text(const std::string& text) {
-  std::string out = "'";
-  for (const char c : text) {
-    if (c == '\'' || c == '\\') out += '\\';
-    out += c;
-  }
-  return out + "'";
-}
+std::string fish_text(const std::string& text) { return "'" + with_backslashes(text, "'\\") + "'"; }
 
 }  // namespace
 

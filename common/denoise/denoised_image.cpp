@@ -6,17 +6,17 @@
 
 #include "common/base/check.h"
 #include "common/image/error/error_estimate.h"
-#include "common/image/frame/each_pixel.h"
+#include "common/image/frame/frame.h"
 
 namespace ls {
 namespace {
 
 constexpr double kInterval = 1.96;  // half the width of a 95 % interval, in standard errors
 
-// An interval is given only if at least this many pixels carry the noise: (sum n^2)^2 / sum n^4
-// (denoised_image.h)
+// An interval is given only if at least this many pixels carry the noise, measured as (sum n^2)^2 / sum n^4
+// (denoised_image.h).
 constexpr double kFewestPixels = 4;
-// E (a - b)^4 / Var^2 for two independent Gaussian variables a and b of variance Var
+// E (a - b)^4 / Var^2, where a and b are independent Gaussian variables of variance Var.
 constexpr double kFourthMoment = 12;
 
 struct Noisy {
@@ -39,7 +39,7 @@ GuidePlanes planes_of_guide(const AovPlanes& planes, Aov aov, int half) {
 
 Noisy gather(const Film& film) {
   const FrameSize frame = film.grid().frame;
-  const auto pixels = static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
+  const std::size_t pixels = frame.pixels();
   Noisy out;
   out.counts.assign(pixels, false);
   for (NoisyImage& half : out.halves)
@@ -70,7 +70,7 @@ Noisy gather(const Film& film) {
   return out;
 }
 
-// Sums over pixels: of the estimated squared error, and of the second and fourth powers of n, the noise of
+// Sums over pixels of the estimated squared error, and of the second and fourth powers of n, the noise of
 // that estimate (denoised_image.h).
 struct Sums {
   double estimate = 0, squares = 0, fourths = 0;

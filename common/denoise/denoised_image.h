@@ -1,27 +1,28 @@
 // The denoised image of a film, and its error.
 //
 // The two halves A and B of the samples are independent and have the same expectation R, the true image. Each
-// half is denoised separately, with its own guides; the denoised image is the mean D = (D(A) + D(B)) / 2. Let
-// a and b be the noise of A and B, and x and y the errors of D(A) and D(B): bias, blur, remaining noise. x
-// depends on a alone and y on b alone. Per pixel and channel
+// half is denoised separately, with its own guides (albedo and normals); the denoised image is the mean D =
+// (D(A) + D(B)) / 2. Let a and b be the noise of A and B, and x and y the errors of D(A) and D(B) (bias,
+// blur, remaining noise). x depends on a alone and y on b alone. Per pixel and channel
 //
 //   (A - D(A)) (B - D(B)) = (a - x) (b - y) = a b - x b - a y + x y,
 //
-// where a b, x b and a y have the expectation 0. So the product of the two residuals has the expectation of x
-// y. With D(A) - D(B) = x - y,
+// where a b, x b and a y have the expectation 0. So this product of the two residuals has the expectation of
+// x y. With D(A) - D(B) = x - y,
 //
 //   (A - D(A)) (B - D(B)) + (D(A) - D(B))^2 / 4  has the expectation of  ((x + y) / 2)^2,
 //
-// the squared error of D, for every denoiser. The product measures the errors that the denoiser makes in
-// both halves, the difference the errors that it makes in only one. Relative errors have the weight
-// f(D) = 1 / (D^2 + 0.01). This weight depends on D and so on the noise: to first order in the noise, the
-// relative error is wrong by
+// the squared error of D, for every denoiser. The product measures the errors that the denoiser makes in both
+// halves, the difference those that it makes in only one. Relative errors have the weight f(D) = 1 / (D^2 +
+// 0.01). This weight depends on D and so on the noise. To first order in the noise, this changes the relative
+// error by
 //
 //   -bias f' s Var,
 //
 // with `bias` the mean error of the denoiser, f' the derivative of the weight, s the share of a pixel's own
-// noise that remains in its denoised value, and Var the variance of the noise of one half. So the figure is
-// too low where the denoiser darkens, too high where it brightens, and nearly right where s is small.
+// noise that remains in its denoised value, and Var the variance of the noise of one half. So the relative
+// error is too low where the denoiser darkens, too high where it brightens, and nearly right where s is
+// small.
 //
 // Interval: the estimate differs from the realised squared error by n = a b - x b - a y. This n is nearly
 // uncorrelated between pixels: a pixel contributes only little to its neighbours' denoised values. If a share
@@ -29,14 +30,13 @@
 //
 //   n = (1 - 2 s) a b = (1 - s)^2 a b - s^2 a b.
 //
-// The square of such a difference is at most the sum of the squares of its two terms, which have the same
-// sign. The first term is the product of the residuals. The square of the second cannot be measured, but its
-// expectation can: s^4 Var^2, which for Gaussian noise is that of (D(A) - D(B))^4 / 12, since E (a - b)^4 =
-// 12 Var^2 (more with heavier tails). So the squared product plus (D(A) - D(B))^4 / 12 is, in the mean, at
-// least n^2; bias increases it and makes the interval wider. Channels are summed before they are squared,
-// since they share paths. No interval is given if the number of pixels that carry the noise,
-// (sum n^2)^2 / sum n^4, is below four: the variance of a single pixel cannot be estimated from one pair of
-// halves.
+// The two terms of this difference have the same sign, so its square is at most the sum of their squares. The
+// first term is the product of the residuals. The second cannot be measured, but its square has the
+// expectation s^4 Var^2, and so has, for Gaussian noise, (D(A) - D(B))^4 / 12, since E (a - b)^4 = 12 Var^2
+// (more with heavier tails). So the squared product plus (D(A) - D(B))^4 / 12 is, in the mean, at least n^2;
+// bias increases it and makes the interval wider. Channels are summed before they are squared, since they
+// share paths. No interval is given if the number of pixels that carry the noise, (sum n^2)^2 / sum n^4, is
+// below four: the variance of a single pixel cannot be estimated from one pair of halves.
 #pragma once
 
 #include <algorithm>
@@ -52,15 +52,14 @@
 namespace ls {
 
 // Means over the pixels that have samples, and 95 % intervals. The mean squared errors are estimates, which
-// noise can make negative. Lower ends of intervals are at least 0, and rmse is the square root of max(0,
+// noise can make negative. The lower ends of intervals are at least 0, and rmse is the square root of max(0,
 // mse).
 struct DenoisedError {
   double mse = 0, rmse = 0, rmse_lo = 0, rmse_hi = 0;
   double relmse = 0, relmse_lo = 0, relmse_hi = 0;
   bool rmse_interval = false, relmse_interval = false;  // false: the interval is not known
-  // The largest relMSE that the interval allows; nullopt: there is no interval. An estimate below 0 counts as
-  // 0, and the upper end moves up with it: such an estimate shows that the noise is larger than the error,
-  // not that the error is 0.
+  // The largest relMSE within the interval; nullopt: there is no interval. If noise made the estimate
+  // negative, the noise is larger than the error, and the interval is moved up so that its centre is 0.
   std::optional<double> relmse_at_most() const {
     return relmse_interval ? std::optional(relmse_hi - std::min(0.0, relmse)) : std::nullopt;
   }
@@ -78,7 +77,7 @@ struct DenoisedImage {
   FrameSize size;
   std::vector<float> rgb;  // R, G, B of each pixel, row by row; 0 where there are no samples
   DenoisedError error;
-  std::string by;  // the denoiser: Denoiser::name()
+  std::string by;  // name of the denoiser, from Denoiser::name()
 };
 // Denoises a film that has the AOVs aovs_of(AovKind::guide). The film may be unfinished. Returns the errors
 // of Denoiser::denoise().

@@ -128,9 +128,8 @@ Result<Denoiser> Denoiser::find(int threads, const std::string& library, const s
 
 int Denoiser::most_seconds(FrameSize size, std::size_t images) const {
   constexpr std::uint64_t kPixelsPerSecond = 10'000;
-  const std::uint64_t pixels =
-      static_cast<std::uint64_t>(size.width) * static_cast<std::uint64_t>(size.height);
-  return static_cast<int>(static_cast<std::uint64_t>(least_seconds_) + pixels * images / kPixelsPerSecond);
+  return static_cast<int>(static_cast<std::uint64_t>(least_seconds_) +
+                          size.pixels() * images / kPixelsPerSecond);
 }
 
 Result<std::vector<std::vector<float>>> Denoiser::denoise(FrameSize size,

@@ -1,6 +1,6 @@
-// The memory shared with lightshaft-denoise (common/denoise/program/main.cpp): a header, followed from
-// kPlanesAt on by the images. Each image has three planes, row by row, of three floats per pixel: colour,
-// albedo, normal. The program overwrites each colour with the denoised one.
+// The memory shared with lightshaft-denoise (common/denoise/program/main.cpp): a header, and from the offset
+// kPlanesAt on the images. Each image has three planes (colour, albedo, normal) of three floats per pixel,
+// row by row. The program overwrites each colour with the denoised one.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,7 @@ enum class Outcome : std::int32_t { none, done, failed };
 
 struct Header {
   std::uint64_t magic;
-  std::int32_t width, height, images;  // 0 images: only the version is requested
+  std::int32_t width, height, images;  // 0 images: only the version of the library is requested
   Outcome outcome;
   std::int32_t version;  // version of the library, 20501 for 2.5.1; 0: it was not found
   char error[512];       // null-terminated

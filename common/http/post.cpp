@@ -45,9 +45,8 @@ Result<void> check_http_url(const std::string& url, std::string_view setting) {
   const bool clean =
       std::none_of(url.begin(), url.end(), [](unsigned char c) { return c <= ' ' || c == 0x7f; });
   if (http && clean && url.size() <= 2000) return {};
-  return fail(Errc::invalid_argument,
-              fmt::format("{} '{}' is no address: http://HOST/PATH or https://HOST/PATH, without spaces",
-                          setting, url));
+  return bad_argument(fmt::format(
+      "{} '{}' is no address: http://HOST/PATH or https://HOST/PATH, without spaces", setting, url));
 }
 
 Result<HttpAnswer> post(const HttpPost& request) {
@@ -77,7 +76,7 @@ Result<HttpAnswer> post(const HttpPost& request) {
     curl_easy_setopt(c, CURLOPT_NOPROGRESS, 0L);
     curl_easy_setopt(c, CURLOPT_XFERINFOFUNCTION, &look_up);
     curl_easy_setopt(c, CURLOPT_XFERINFODATA, &request);
-    // After give_up() has returned true, do not wait for a name server that hangs, either.
+    // After give_up() has returned true, do not wait for a name server that hangs.
     curl_easy_setopt(c, CURLOPT_QUICK_EXIT, 1L);
   }
   if (const CURLcode code = curl_easy_perform(c); code != CURLE_OK)

@@ -1,5 +1,5 @@
-// Diagnostics of a scene that is read once per frame. A diagnostic that all frames share is reported once;
-// any other, such as a file missing in the middle of the sequence, is reported with the frames that have it.
+// Diagnostics of a scene that is read once per frame. A diagnostic of all frames is reported once; any other,
+// such as a file that is missing in some frames, is reported with the frames that have it.
 #pragma once
 
 #include <cstdint>
@@ -16,11 +16,12 @@ class FrameDiagnostics {
  public:
   // Adds the diagnostics found in a frame; there may be none.
   void add(std::uint32_t frame, const std::vector<Diagnostic>& found);
-  // True if there are as many distinct diagnostics as can be shown, so that further frames need not be read.
+  // True if there are as many distinct diagnostics as will be shown, so that no further frames need to be
+  // read.
   bool full() const { return all_.size() >= kMost; }
   bool empty() const { return all_.empty(); }
-  // Returns the distinct diagnostics in order of appearance. The text of a diagnostic that not all frames
-  // have begins with "frame 5: " or "frame 5 and 3 more: ".
+  // Returns the distinct diagnostics in order of appearance. If not all frames have a diagnostic, its text
+  // begins with "frame 5: " or "frame 5 and 3 more: ".
   std::vector<Diagnostic> take() const;
 
  private:

@@ -1,11 +1,14 @@
 #include "common/job/health_notes.h"
 
-#include <algorithm>
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "common/job/replay_command.h"
+#include <algorithm>
+
+#include "common/base/safe_text.h"
 
 namespace ls {
+
 namespace {
 
 using nlohmann::json;
@@ -60,6 +63,21 @@ std::string health_json(const Health& totals, std::span<const HealthNote> notes)
                {"majorant_violations", totals.majorant_violations},
                {"causes", std::move(causes)}};
   return j.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+std::string replay_command(const std::string& scene, const JobSpec& spec,
+                           std::optional<std::uint32_t> frame) {
+  std::string command = "lightshaft render " + shell_word(scene.starts_with('-') ? "./" + scene : scene);
+  if (spec.seed) command += fmt::format(" --seed {}", *spec.seed);
+  if (frame) command += fmt::format(" --frames {}", *frame);
+  if (spec.size) command += fmt::format(" --size {}x{}", spec.size->width, spec.size->height);
+  if (spec.integrator) command += " --integrator " + shell_word(*spec.integrator);
+  for (const auto& [name, value] : spec.defines) command += " -D " + shell_word(name + "=" + value);
+  return command;
+}
+
+std::string replay_command(const std::string& command, int x, int y, std::uint64_t sample) {
+  return fmt::format("{} --pixel {},{} --sample {}", command, x, y, sample);
 }
 
 }  // namespace ls

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
+#include <algorithm>
 #include <set>
 
+#include "common/base/parse_number.h"
 #include "common/base/suggest.h"
 #include "common/job/limits.h"
 
@@ -14,29 +14,21 @@ namespace {
 
 // True if the text has only letters, digits and "_-.:", which are safe for file names, labels and layers.
 bool is_name(const std::string& s) {
-  if (s.empty() || s.size() > kMaxNameBytes) return false;
-  for (const char c : s) {
-    const bool fine = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                      c == '_' || c == '-' || c == '.' || c == ':';
-    if (!fine) return false;
-  }
-  return true;
+  return !s.empty() && s.size() <= kMaxNameBytes && std::ranges::all_of(s, [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '-' || c == '.' || c == ':';
+  });
 }
 
 constexpr int kMaxNesting = 8;
 constexpr std::string_view kNameRule = "a name of up to 64 letters, digits and _-.:";
 
 std::optional<std::pair<std::int64_t, std::int64_t>> parse_wxh(std::string_view text) {
-  std::int64_t v[2];
-  const char *at = text.data(), *end = at + text.size();
-  for (int i = 0; i < 2; ++i) {
-    const auto [next, ec] = std::from_chars(at, end, v[i]);
-    if (ec != std::errc{} || next == at) return std::nullopt;
-    at = next;
-    if (i == 0 && (at == end || *at++ != 'x')) return std::nullopt;
-  }
-  if (at != end) return std::nullopt;
-  return std::pair{v[0], v[1]};
+  const std::size_t x = text.find('x');
+  if (x == text.npos) return std::nullopt;
+  const auto width = parse_number<std::int64_t>(text.substr(0, x)),
+             height = parse_number<std::int64_t>(text.substr(x + 1));
+  return width && height ? std::optional(std::pair{*width, *height}) : std::nullopt;
 }
 
 }  // namespace
@@ -51,14 +43,14 @@ std::string printable(std::string_view text, std::size_t most) {
 
 Result<Json> parse_object(std::string_view text, std::string_view what) {
   if (text.size() > kMaxSpecBytes)
-    return fail(Errc::invalid_argument,
-                fmt::format("{}: {} bytes, the limit is {}", what, text.size(), kMaxSpecBytes));
+    return bad_argument(fmt::format("{}: {} bytes, the limit is {}", what, text.size(), kMaxSpecBytes));
   std::set<std::pair<int, std::string>> keys;
   std::optional<std::string> twice;
   bool too_deep = false;
   const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
     too_deep |= depth > kMaxNesting;
-    if (too_deep) return false;  // deep values are not kept, since destroying and printing them is recursive
+    // Deep values are not kept, since code that destroys or prints them is recursive.
+    if (too_deep) return false;
     if (event == Json::parse_event_t::key && depth <= 2) {
       const auto& key = parsed.get_ref<const std::string&>();
       if (!keys.emplace(depth, key).second && !twice) twice = key;
@@ -69,27 +61,22 @@ Result<Json> parse_object(std::string_view text, std::string_view what) {
   };
   try {
     auto json = Json::parse(text, watch);
-    if (too_deep)
-      return fail(Errc::invalid_argument, fmt::format("{}: nested deeper than {} levels", what, kMaxNesting));
-    if (!json.is_object())
-      return fail(Errc::invalid_argument, fmt::format("{}: must be a JSON object {{...}}", what));
+    if (too_deep) return bad_argument(fmt::format("{}: nested deeper than {} levels", what, kMaxNesting));
+    if (!json.is_object()) return bad_argument(fmt::format("{}: must be a JSON object {{...}}", what));
     if (twice)
-      return fail(Errc::invalid_argument,
-                  fmt::format("{}: key '{}' is given twice", what, printable(*twice, kMaxNameBytes)));
+      return bad_argument(fmt::format("{}: key '{}' is given twice", what, printable(*twice, kMaxNameBytes)));
     return json;
   } catch (const Json::exception& e) {
-    return fail(Errc::invalid_argument,
-                fmt::format("{}: not valid JSON: {}", what, printable(e.what(), 300)));
+    return bad_argument(fmt::format("{}: not valid JSON: {}", what, printable(e.what(), 300)));
   }
 }
 
 Fields::Fields(const Json& object, std::string_view what, std::vector<std::string> known)
     : object_(object), what_(what) {
   for (const auto& item : object.items()) {
-    bool found = false;
-    for (const auto& k : known) found |= k == item.key();
+    if (std::ranges::find(known, item.key()) != known.end()) continue;
     const std::string name = printable(item.key(), kMaxNameBytes);
-    if (!found) wrong(name, "is not known" + suggestion(name, known));
+    wrong(name, "is not known" + suggestion(name, known));
   }
 }
 

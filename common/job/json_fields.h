@@ -1,5 +1,5 @@
-// Strict extraction of fields from a JSON object: every key must be known, and every value must have the
-// right type and range. The first error is recorded with the key's name. Used by the .cpp files of this
+// Reads fields from a JSON object and accepts no others: every key must be known, and every value must have
+// the right type and range. The first error is recorded with the key's name. Used by the .cpp files of this
 // folder only.
 #pragma once
 
@@ -21,8 +21,8 @@ using Json = nlohmann::json;
 // string.
 std::string printable(std::string_view text, std::size_t most);
 
-// Parses the text of a JSON object. Anything else, duplicate keys, and texts that are too long or too deeply
-// nested are errors. `what` is the name of the text for messages, such as "spec".
+// Parses the text of a JSON object. Errors: other JSON values, duplicate keys, and texts that are too long or
+// too deeply nested. `what` is the name of the text for messages, such as "spec".
 Result<Json> parse_object(std::string_view text, std::string_view what);
 
 class Fields {

@@ -9,8 +9,8 @@
 namespace ls {
 
 inline constexpr int kMinTile = 8, kMaxTile = 256;  // pixels per side
-// Largest number of units of a job: tiles times rounds (ranges of samples). 2^24 samples are possible for one
-// small tile (262 thousand rounds), not for a whole frame.
+// Largest number of units of a job: tiles times rounds (ranges of samples). One small tile may have 2^24
+// samples per pixel (262 thousand rounds), a whole frame may not.
 inline constexpr std::uint64_t kMaxUnits = std::uint64_t{1} << 26;
 // Largest size of a film's sums in bytes: all AOVs of a UHD frame take about 5 GB, colour alone of the
 // largest frame 3.2 GB.

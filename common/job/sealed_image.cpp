@@ -13,7 +13,7 @@ namespace ls {
 namespace {
 
 tl::unexpected<Error> bad(const std::string& name, const std::string& what) {
-  return fail(Errc::invalid_argument, fmt::format("{}: {}", name, what));
+  return bad_argument(fmt::format("{}: {}", name, what));
 }
 
 Result<std::string> text_of(const FinalPicture& from, const char* key, const std::string& name) {
@@ -105,13 +105,11 @@ Result<std::uint64_t> tile_samples(const SealedImage& image, TileIndex tile) {
   for (int y = r.y0; y < r.y1; ++y)
     for (int x = r.x0; x < r.x1; ++x)
       if (at(x, y) != first)
-        return fail(
-            Errc::invalid_argument,
+        return bad_argument(
             fmt::format("tile {}: pixel {},{} says {} samples, pixel {},{} says {}; a tile has one count",
                         tile, r.x0, r.y0, first, x, y, at(x, y)));
   if (first > kMaxSpp || first % 2 != 0)
-    return fail(Errc::invalid_argument,
-                fmt::format("tile {}: no image of ours has {} samples a pixel", tile, first));
+    return bad_argument(fmt::format("tile {}: no image of ours has {} samples a pixel", tile, first));
   return first;
 }
 

@@ -32,13 +32,12 @@ struct SealedImage {
 // it.
 Result<SealedImage> read_sealed_image(FinalPicture picture, const std::string& name);
 
-// Returns the number of samples of each pixel of the tile, according to the image's layer `spp`.
-// invalid_argument: the tile's pixels have different numbers, or one that this program never renders.
+// Returns the number of samples per pixel of the tile, from the image's layer `spp`. invalid_argument: the
+// pixels of the tile have different numbers, or one that this program never renders.
 Result<std::uint64_t> tile_samples(const SealedImage& image, TileIndex tile);
 
-// The place of the first value of a tile, in the order of layers, that differs from the value that
-// final_exr() would store for the film. If the image lacks a whole layer, the place is that layer's first
-// pixel in the tile.
+// The first value of a tile, in the order of layers, that differs from the value that final_exr() would store
+// for the film. If the image lacks a whole layer, it is the first pixel of the tile in this layer.
 struct PixelDifference {
   int x = 0, y = 0;
   std::string layer;

@@ -15,8 +15,7 @@ namespace {
 using job::Fields;
 using job::Json;
 
-// Returns canonical JSON: nlohmann's objects are sorted by key, and dump() without indentation writes no
-// spaces.
+// Returns canonical JSON: nlohmann's objects are sorted by key, and dump(-1) writes no spaces.
 std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 Json size_json(FrameSize size) { return Json::array({size.width, size.height}); }
@@ -55,8 +54,8 @@ void read_frames(Fields& fields, JobSpec& spec) {
     fields.wrong("defines", "gives $frame, which in a job with 'frames' is the number of the frame");
 }
 
-// Reads `target_layer` and `denoise`. A target error of the denoised layers implies `denoise`, which may then
-// be left out.
+// Reads `target_layer` and `denoise`. If the target error is that of the denoised layers, `denoise` is true
+// even if it is left out.
 void read_denoise(Fields& fields, JobSpec& spec) {
   const auto layer = fields.name("target_layer");
   if (layer) {
@@ -128,28 +127,28 @@ Result<RenderSettings> parse_render_settings(std::string_view text) {
 }
 
 Result<void> check_job_size(const RenderSettings& s, std::uint64_t spp) {
-  const auto refuse = [](std::string text) { return fail(Errc::invalid_argument, std::move(text)); };
   const auto pixels = static_cast<std::int64_t>(s.size.width) * s.size.height;
   if (s.size.width < 1 || s.size.height < 1 || s.size.width > kMaxFrameSide ||
       s.size.height > kMaxFrameSide || pixels > kMaxFramePixels)
-    return refuse(
+    return bad_argument(
         fmt::format("the frame is {} x {} pixels; each side must be 1 to {}, and all together at most {}",
                     s.size.width, s.size.height, kMaxFrameSide, kMaxFramePixels));
   if (s.tile < kMinTile || s.tile > kMaxTile)
-    return refuse(fmt::format("tiles of {} pixels; from {} to {} are possible", s.tile, kMinTile, kMaxTile));
+    return bad_argument(
+        fmt::format("tiles of {} pixels; from {} to {} are possible", s.tile, kMinTile, kMaxTile));
   const AovSet aovs = aovs_of(s);
   const std::uint64_t film = film_bytes_per_pixel(aovs) * static_cast<std::uint64_t>(pixels);
   if (film > kMaxFilmBytes)
-    return refuse(
+    return bad_argument(
         fmt::format("{} x {} pixels with the AOVs {} take {} bytes each, {} in all; the limit is {}: ask for "
                     "fewer AOVs or a smaller frame",
                     s.size.width, s.size.height, fmt::join(s.aov, ", "), film_bytes_per_pixel(aovs), film,
                     kMaxFilmBytes));
   if (spp < 1 || spp > kMaxSpp)
-    return refuse(fmt::format("{} samples per pixel; from 1 to {} are possible", spp, kMaxSpp));
+    return bad_argument(fmt::format("{} samples per pixel; from 1 to {} are possible", spp, kMaxSpp));
   const std::uint64_t tiles = TileGrid{s.size, s.tile}.count(), units = tiles * round_count(spp);
   if (tiles > kMaxTiles || units > kMaxUnits)
-    return refuse(
+    return bad_argument(
         fmt::format("{} x {} pixels in tiles of {} at {} samples are {} tiles and {} units of work; the "
                     "limits are {} and {}: "
                     "ask for fewer samples, a smaller frame or larger tiles",
@@ -188,7 +187,7 @@ Result<JobSpec> parse_job_spec(std::string_view text) {
 }
 
 Result<JobSpec> job_spec_of(const nlohmann::json& object) {
-  if (!object.is_object()) return fail(Errc::invalid_argument, "spec: must be a JSON object {...}");
+  if (!object.is_object()) return bad_argument("spec: must be a JSON object {...}");
   Fields fields(object, "spec",
                 {"spp", "target_error", "target_layer", "time", "seed", "size", "integrator", "aov",
                  "defines", "priority", "float", "denoise", "tags", "frames", "max_workers", "max_units",

@@ -1,6 +1,6 @@
 // The request for a job, in two parts. RenderSettings determines the pixels of a unit (one tile and range of
-// samples); JobSpec also has the settings of the job as a whole. Raising a job's number of samples must not
-// change the identity of its units, so `spp` is in JobSpec.
+// samples); JobSpec also has the settings of the job as a whole. `spp` is in JobSpec: if the number of
+// samples of a job is raised, its units must stay the same.
 #pragma once
 
 #include <cstdint>
@@ -38,8 +38,8 @@ enum class TargetLayer { raw, denoised };
 std::string_view to_string(TargetLayer layer);
 std::optional<TargetLayer> parse_target_layer(std::string_view text);
 
-// The request, as in `spec` of the HTTP API and the options of the command line. For a member without a
-// value, the scene's setting applies.
+// The request, as in `spec` of the HTTP API and in the options of the command line. If a member has no value,
+// the scene's setting applies.
 struct JobSpec {
   std::optional<std::uint64_t> spp;
   std::optional<double> target_error;  // relMSE
@@ -62,9 +62,9 @@ struct JobSpec {
   std::optional<std::uint32_t> max_units;    // maximum number of units assigned to workers at the same time
   // Memory in bytes that a worker must have; a job always requires at least the size of its files
   std::optional<std::uint64_t> memory;
-  // The numeric class that renders the job (machines of one class compute the same bits), given by the first
-  // characters of its digest in hexadecimal or of its platform (WorkerHello::platform). Only workers that
-  // match get units
+  // The numeric class that renders the job (machines of one class compute the same bits), as the first
+  // characters of its digest in hexadecimal, or of its platform (WorkerHello::platform). Only workers of this
+  // class get units of the job.
   std::optional<std::string> numeric_class;
   std::optional<Digest> reference;  // digest of the reference image, an EXR of the job's size
   bool operator==(const JobSpec&) const = default;

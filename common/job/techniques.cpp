@@ -44,36 +44,12 @@ static_assert(in_order());
 std::span<const TechniqueRow> techniques() { return kRows; }
 
 TechniqueSwitch off_switch(Technique technique, std::string_view integrator) {
-  const bool by_segments = integrator == "volpath_distant_mis";
-  switch (technique) {
-    case Technique::equiangular:
-      return by_segments ? TechniqueSwitch{"distance", "exponential"} : TechniqueSwitch{"equiangular", "-1"};
-    case Technique::exponential:
-      return {"distance", "equiangular"};
-    case Technique::camera_points:
-      return {"camera_points", "-1"};
-    case Technique::lamp_directions:
-      return {"phase_only", "true"};
-    case Technique::lamp_flights:
-      return {"lamp_flights", "-1"};
-    case Technique::light_vertices:
-      return {"light_vertices", "-1"};
-    case Technique::light_tree:
-      return {"light_tree", "-1"};
-    case Technique::path_reuse:
-      return {"path_reuse", "-1"};
-    case Technique::shadow_roulette:
-      return {"shadow_roulette", "-1"};
-    case Technique::sky_samples:
-      return {"sky_samples", "-1"};
-    case Technique::path_splitting:
-      return {"path_splitting", "-1"};
-    case Technique::sky_portals:
-      return {"sky_portals", "-1"};
-    case Technique::local_lights:
-      return {"local_lights", "-1"};
-  }
-  return {};
+  if (technique == Technique::equiangular && integrator == "volpath_distant_mis")
+    return {"distance", "exponential"};
+  if (technique == Technique::exponential) return {"distance", "equiangular"};
+  if (technique == Technique::lamp_directions) return {"phase_only", "true"};
+  return {kRows[static_cast<std::size_t>(technique)].name,
+          "-1"};  // the others have a parameter of their name
 }
 
 TechniqueSet TechniqueSet::of_bits(std::uint32_t bits) {

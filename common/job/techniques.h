@@ -1,7 +1,7 @@
-// Additional sampling techniques of the integrators. They find light that is found too rarely by sampling
-// BSDFs and phase functions and by next-event estimation at vertices. Which of them a job uses depends on
-// its scene and files: the workers choose them when they build the world (the scene prepared for rendering),
-// and report them with each result. A parameter of the scene's integrator switches each technique off
+// Additional sampling techniques of the integrators. They sample light that is found too rarely by BSDFs and
+// phase functions, or by next-event estimation at vertices. A job's techniques depend on its scene and files:
+// each worker chooses them when it builds the world (the scene prepared for rendering), and reports them with
+// its results. A parameter of the scene's integrator switches each technique off
 // (docs/reference/scene-format.md, Integrators).
 #pragma once
 
@@ -35,7 +35,7 @@ struct TechniqueRow {
 };
 std::span<const TechniqueRow> techniques();  // all, in the order of the enumeration
 
-// The integrator's parameter and its value that switch a technique off.
+// The parameter of the integrator, and its value, that switch a technique off.
 struct TechniqueSwitch {
   std::string_view parameter, value;
 };
@@ -57,7 +57,7 @@ class TechniqueSet {
   std::uint32_t bits_ = 0;
 };
 
-// A JSON list of the techniques of the set, each {name, what, off: {parameter, value}}.
+// Returns a JSON list of the techniques of the set, each {name, what, off: {parameter, value}}.
 std::string techniques_json(TechniqueSet set, std::string_view integrator);
 
 }  // namespace ls

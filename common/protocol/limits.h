@@ -1,5 +1,5 @@
-// All size limits of the worker protocol. Coordinator and worker check received data against them before
-// allocating or storing anything, and keep to them when sending.
+// All size limits of the worker protocol. Coordinator and worker keep to them when they send, and check
+// received data against them before they allocate or store anything.
 #pragma once
 
 #include <cstddef>
@@ -17,15 +17,15 @@ inline constexpr std::size_t kPartialBytes = kMessageBytes - (32 << 10);
 inline constexpr std::size_t kBlobChunkBytes = 256 << 10;
 
 inline constexpr std::size_t kIdBytes = 64;  // length of the ids of jobs, leases and workers
-// length of the names of workers, assets, tags and builds, and of a worker's activity
+// Length of the names of workers, assets, tags and builds, and of a worker's activity.
 inline constexpr std::size_t kNameBytes = 128;
 inline constexpr std::size_t kTextBytes = 4096;  // length of reasons of failures and descriptions of problems
 inline constexpr std::size_t kTokenBytes = 512;
 inline constexpr std::size_t kSettingsBytes = 64 << 10;
 inline constexpr std::size_t kNeedsBytes = 16 << 10;
 
-// Both sides ping a silent connection after this time, and close it if there is no answer: a peer that has
-// vanished is noticed within 30 s.
+// Both sides ping a connection that has been silent for the first time, and close it if there is no answer
+// within the second. So a lost peer is noticed within 30 s.
 inline constexpr int kKeepaliveMs = 20'000, kKeepaliveTimeoutMs = 10'000;
 
 inline constexpr std::size_t kUnitsPerLease = 4096;

@@ -1,6 +1,6 @@
 // Messages between coordinator and worker, as plain values. proto/farm.proto defines their form on the wire
-// and documents the exchange; `lightshaft render` passes these values inside one process. proto/convert.h
-// converts between the two.
+// and documents the exchange; proto/convert.h converts between the two. `lightshaft render` passes these
+// values inside one process.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@
 #include "common/image/frame/rounds.h"
 #include "common/job/settings.h"
 #include "common/job/techniques.h"
-#include "common/trace/context.h"
+#include "common/trace/span.h"
 
 namespace ls {
 
@@ -62,8 +62,8 @@ struct LeaseUnit {
   bool operator==(const LeaseUnit&) const = default;
 };
 
-// Units that the coordinator has assigned to one worker until a deadline. The worker renders them and reports
-// their results one by one, in order.
+// Units (one round of one tile each) that the coordinator has assigned to one worker until a deadline. The
+// worker renders them in order and reports each result on its own.
 struct Lease {
   LeaseId id;
   JobId job;
@@ -71,10 +71,10 @@ struct Lease {
   bool operator==(const Lease&) const = default;
 };
 
-// Seconds that a worker spent on a unit besides rendering it. `load` and `build` concern the job's world (the
-// scene prepared for rendering) and are sent only with the first result rendered from it: `load` is the time
-// to fetch the job's files, `build` the wall-clock time in which the loading thread reads them and builds the
-// world.
+// Seconds that a worker spent on a unit besides rendering it. `load` and `build` are the times until the
+// job's world (the scene prepared for rendering) was ready; only the first result of a world has them. `load`
+// is the time to fetch the job's files, `build` the wall-clock time in which one thread reads them and builds
+// the world.
 struct UnitTimes {
   double load = 0, build = 0;
   double transfer = 0;  // encoding the result and computing its digest
@@ -93,15 +93,15 @@ struct UnitResult {
   Health health;
   UnitTimes times;
   TechniqueSet techniques;  // techniques that the integrator uses in this job's world; empty: unknown
-  // When the worker received the unit, by its clock, in nanoseconds since 1970; sent only if the lease is
-  // traced; 0: not sent
+  // When the worker received the unit, by its clock, in nanoseconds since 1970. It is sent only if the lease
+  // has a trace; 0: not sent.
   std::uint64_t held_unix_ns = 0;
   bool operator==(const UnitResult&) const = default;
 };
 
-// A unit that could not be rendered. `scene_at_fault`: the world cannot be built from the scene (for example
-// because a grid is truncated). The coordinator then fails the job immediately, since no other worker can
-// succeed. Otherwise only this unit failed (crash, hang, memory).
+// A unit that could not be rendered. `scene_at_fault`: the world cannot be built from the scene, for example
+// because a grid is truncated. Otherwise rendering failed (crash, hang, memory). In both cases other workers
+// try the unit; the job fails after failures on several workers.
 struct UnitFailure {
   UnitKey unit;
   LeaseId lease;
@@ -124,8 +124,8 @@ struct WorkerHello {
   std::vector<std::string> tags;
   std::vector<Digest> blobs_held;
   std::string join_token;
-  // Id that the coordinator assigned in an earlier Welcome; empty for a new worker. A worker keeps its id
-  // over reconnects.
+  // The id in an earlier Welcome; empty for a new worker. With it, a worker keeps its id when it connects
+  // again.
   WorkerId previous_id;
   bool fake = false;     // true if the worker generates fake pixels instead of rendering
   std::string platform;  // machine and build of its numeric class in words; may be empty
@@ -150,7 +150,7 @@ struct WorkerDraining {
   bool operator==(const WorkerDraining&) const = default;
 };
 // Units of this lease that the worker has not rendered and will not render, because it drains
-// (WorkerDraining) or the units were cancelled.
+// (WorkerDraining), or because the units were cancelled.
 struct LeaseReturned {
   LeaseId lease;
   std::vector<UnitKey> unrendered;
@@ -162,8 +162,8 @@ using FromWorker =
 // Messages from coordinator to worker.
 struct Welcome {
   WorkerId worker;
-  // A number that grows with every registration of this worker; the coordinator closes the connections with
-  // smaller ones.
+  // A number that grows with every registration of this worker. The coordinator closes the worker's
+  // connections with smaller numbers.
   std::uint64_t epoch = 0;
   bool operator==(const Welcome&) const = default;
 };
@@ -175,12 +175,13 @@ struct Refused {  // after this message the coordinator closes the connection
 struct AssignLease {
   Lease lease;
   std::optional<JobBrief> brief;  // sent with a job's first lease on this connection
-  // The lease's trace span: the worker's own spans become its children. nullopt: the lease is not traced
+  // The span of the lease in the job's trace, the parent of the worker's spans. nullopt: the lease is not
+  // traced.
   std::optional<trace::SpanContext> trace = std::nullopt;
   bool operator==(const AssignLease&) const = default;
 };
-// The coordinator has stored the result durably, or rejected it with a reason. The worker removes the result
-// from its outbox.
+// The coordinator has stored the result durably, or rejected it with a reason. In both cases the worker
+// deletes its copy.
 struct ResultAck {
   UnitKey unit;
   std::optional<Error> refused;

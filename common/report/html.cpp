@@ -3,6 +3,10 @@
 #include <fmt/format.h>
 #include <openssl/evp.h>
 
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
 #include "common/base/digest.h"
 #include "common/base/safe_text.h"
 
@@ -10,25 +14,12 @@ namespace ls::report {
 namespace {
 
 void append_escaped(std::string& out, std::string_view line) {
-  for (const char c : plain_text(line)) switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        out += c;
-    }
+  static constexpr std::pair<char, std::string_view> kCodes[] = {
+      {'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&#39;"}};
+  for (const char c : plain_text(line)) {
+    const auto* code = std::ranges::find(kCodes, c, &std::pair<char, std::string_view>::first);
+    code == std::end(kCodes) ? out += c : out += code->second;
+  }
 }
 
 }  // namespace

@@ -9,8 +9,8 @@
 namespace ls::report {
 
 // Escapes `text` for use as the text of an element or as a quoted attribute value, in HTML and SVG.
-// Characters that could forge lines or reorder letters (common/base/plain_text.h) become spaces; line ends
-// are kept.
+// Characters that could forge lines or reorder letters (common/base/safe_text.h) become spaces; line ends are
+// kept.
 std::string escape_html(std::string_view text);
 
 std::string base64(std::span<const std::byte> bytes);  // RFC 4648, with padding

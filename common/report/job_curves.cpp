@@ -27,14 +27,14 @@ std::string range(const std::optional<std::pair<double, double>>& ci, std::strin
   return ci ? fmt::format("{} to {}", words(ci->first), words(ci->second)) : std::string();
 }
 
-// Returns the interval of the error at a checkpoint. The report judges only the last checkpoint. If its
-// figures are not trusted (`doubt`), no checkpoint gets an interval.
+// Returns the interval of the error at a checkpoint. The report judges only the last checkpoint: with `doubt`
+// its figures are not trusted, and then no checkpoint has an interval.
 std::optional<std::pair<double, double>> shown_interval(const Json& point, bool doubt) {
   return doubt ? std::nullopt : interval(point, "relmse_ci95");
 }
 
-// Returns the point at which the error will reach the requested target. If the curve is over wall time, the
-// remaining time is extrapolated at the pace so far.
+// Returns the point at which the error will reach the requested target. For the curve over wall-clock time,
+// the remaining time is extrapolated from the pace so far.
 std::optional<Ahead> ahead_of(const Json& report, const Json& last, const Clock& clock) {
   const Json& forecast = member(report, "forecast");
   const double more = number(forecast, "core_seconds"), now = number(last, clock.key);

@@ -13,7 +13,7 @@
 namespace ls::report {
 
 // Fields of a report that another version of this program, or another program, may have written
-// (report_json.cpp). Each function returns the field's value, or a default if the field is missing.
+// (job_page.cpp). Each function returns the field's value, or a default if the field is missing.
 using Json = nlohmann::json;
 
 const Json& member(const Json& j, const char* key);  // null if missing
@@ -24,7 +24,7 @@ std::optional<std::pair<double, double>> interval(const Json& j, const char* key
 std::vector<Json> objects(const Json& j, const char* key);       // the elements of a list that are objects
 std::vector<std::string> texts(const Json& j, const char* key);  // the elements of a list that are strings
 
-// Convergence status (job_verdict.cpp).
+// Convergence status (job_facts.cpp).
 bool doubtful(const Json& report);        // true if the error figures are not reliable yet
 std::string verdict(const Json& report);  // why they are not reliable, with further notes
 // A sentence for a report that is not doubtful; empty: no sentence

@@ -33,8 +33,8 @@ std::string time_label(double seconds) {
   return seconds < kDay ? fmt::format("{:g} h", seconds / kHour) : fmt::format("{:g} d", seconds / kDay);
 }
 
-// Returns the usual times for labels (1 s, 10 s, 1 min, ...) that are on the axis: if `coarse` only the main
-// ones, otherwise also the intermediate ones.
+// Returns the labelled times (1 s, 10 s, 1 min, ...) within the axis; `coarse`: without the intermediate
+// ones.
 std::vector<double> usual_times(const LogAxis& axis, bool coarse) {
   std::vector<double> all;
   const auto take = [&](double unit, std::initializer_list<double> steps) {
@@ -93,7 +93,7 @@ LogAxis log_axis(double lo, double hi, double from, double to) {
 }
 
 std::vector<Tick> ticks(const LogAxis& axis, AxisUnit unit) {
-  // no axis that log_axis() makes has such ends
+  // log_axis() makes no axis with such ends.
   if (!(axis.lo > 0) || !(axis.hi < std::pow(10.0, kFarthest + 1))) return {};
   return unit == AxisUnit::seconds ? time_ticks(axis) : plain_ticks(axis);
 }

@@ -25,8 +25,8 @@ enum class AxisUnit {
   plain,    // 0.1, 0.01, 10⁻⁴
   seconds,  // for example 1 s, 10 s, 1 min, 1 h, 1 d
 };
-// Returns the ticks in ascending order. Labels are at decades or, for time, at the usual steps (1 s, 10 s, 1
-// min, ...). A short axis also has labels between decades, a long one only at every n-th decade.
+// Returns the ticks in ascending order. Labels are at powers of ten, or for times at usual steps (1 s, 10 s,
+// 1 min, ...). A short axis also has labels between these, a long one only at every n-th power.
 std::vector<Tick> ticks(const LogAxis& axis, AxisUnit unit);
 
 }  // namespace ls::report

@@ -17,17 +17,17 @@ namespace {
 
 constexpr double kWidth = 520, kLeft = 60, kRight = 504, kTop = 14;
 constexpr double kPlotHeight = 290, kBelow = 50, kLegendLine = 22;
-// half the width of the widest time label, which must fit into the drawing
+// Half the width of the widest time label, which must fit into the drawing.
 constexpr double kHalfLabel = 25;
 constexpr double kLetter = 7.4;         // mean width of a letter in the legend
-constexpr double kFarthestAhead = 100;  // multiple of the last x: a forecast beyond it is not drawn
+constexpr double kFarthestAhead = 100;  // a forecast is drawn if it is at most this multiple of the last x
 
 using Out = std::back_insert_iterator<std::string>;
 
 bool drawable(const CurvePoint& p) { return std::isfinite(p.x) && std::isfinite(p.y) && p.x > 0 && p.y > 0; }
 bool has_band(const CurvePoint& p) { return std::isfinite(p.hi) && p.lo > 0 && p.hi >= p.lo; }
 
-// Returns the points that are drawn, in order of x.
+// Returns the points to draw, in order of x.
 std::vector<CurvePoint> chosen(const Curve& curve) {
   std::vector<CurvePoint> all;
   std::copy_if(curve.points.begin(), curve.points.end(), std::back_inserter(all), drawable);

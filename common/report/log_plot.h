@@ -10,7 +10,7 @@
 namespace ls::report {
 
 struct CurvePoint {
-  double x = 0, y = 0;    // points whose x or y is not finite and above 0 are left out
+  double x = 0, y = 0;    // points are drawn only if x and y are finite and above 0
   double lo = 0, hi = 0;  // interval of y; both 0: there is none
 };
 struct Curve {
@@ -22,7 +22,7 @@ inline constexpr std::size_t kMostCurves = 8;  // each has its own colour and ma
 // Largest number of points drawn per curve; longer curves are thinned evenly
 inline constexpr std::size_t kMostCurvePoints = 512;
 
-// A predicted point: the x at which the first curve will reach the target.
+// A forecast: the x at which the first curve will reach the target.
 struct Ahead {
   double x = 0, x_lo = 0, x_hi = 0;  // x with its interval; x_lo = x_hi = 0: there is none
 };
@@ -37,8 +37,8 @@ struct LogPlot {
   std::optional<Ahead> ahead;    // drawn only with a target
 };
 
-// Returns an SVG element for a page whose style includes plot_css(). Without points, the drawing has a note
-// instead.
+// Returns an SVG element for a page whose style includes plot_css(). If there are no points, the drawing has
+// a note instead.
 std::string svg_of(const LogPlot& plot);
 // Returns the content of a separate SVG file, which follows the reader's dark or light mode.
 std::string standalone_svg(const LogPlot& plot);

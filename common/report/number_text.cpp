@@ -21,7 +21,7 @@ std::string superscript(int n) {
 std::string figure(double x) {
   if (!std::isfinite(x)) return kAbsent;
   if (x == 0) return "0";
-  // Rounding comes first: 9.996 gets the exponent of 10.0
+  // The number is rounded first, so that 9.996 gets the exponent of 10.0.
   const std::string scientific = fmt::format("{:.2e}", x);
   const std::size_t e = scientific.find('e');
   const int exponent = std::stoi(scientific.substr(e + 1));

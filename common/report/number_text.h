@@ -11,7 +11,8 @@ inline constexpr const char* kAbsent = "–";  // shown for unknown (non-finite)
 std::string superscript(int n);  // returns "⁻⁴" for -4
 // Returns three significant digits: "0.0213", "3.20 × 10⁻⁵".
 std::string figure(double x);
-// For an error against a reference: returns figure(x) or, if `below_noise`, "below the reference's noise"
+// Returns the text for an error against a reference: figure(x) or, if `below_noise`, "below the reference's
+// noise".
 std::string true_figure(double x, bool below_noise);
 std::string given(double x);  // returns a number that a user has chosen, with its original digits: "0.001"
 // Returns "0.4 s", "12 s", "4.2 min", "1 h 12 min", "3 d 4 h".
@@ -20,8 +21,8 @@ std::string count(double n);           // returns "39,321,600"
 std::string sample_count(double spp);  // returns "1,024"; a mean below 100 has one decimal: "5.7"
 std::string threads_words(double n);   // returns "4"; a mean has one decimal: "3.5"
 std::string byte_size(double n);       // returns "34.7 MiB"
-std::string percent(
-    double part);  // returns "12 %" or "< 1 %"; 0 and 100 only for exactly nothing and everything; plain text
+// Returns "12 %" or "< 1 %" in plain text; 0 and 100 only for exactly nothing and everything.
+std::string percent(double part);
 std::string date_time(double unix_seconds);  // returns "2026-11-21 18:26 UTC"
 
 }  // namespace ls::report

@@ -1,5 +1,5 @@
 // Phrases that the report of a job, the terminal and the dashboard have in common. The dashboard reads them
-// from web/static/js/phrases.js, which phrases_test.cpp writes from this table.
+// from web/static/js/phrases.js, which texts_test.cpp writes from this table.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@ struct Phrase {
   const char* text;
 };
 inline constexpr std::array kPhrases{
-    // How far figures of the error can be trusted
+    // Doubt about the error estimate
     Phrase{"doubt", "don't trust yet"},
     Phrase{"estimateInDoubt", "This error estimate can't be trusted yet."},
     Phrase{"noIntervals", "No intervals are shown: the estimate can't be trusted yet."},
@@ -26,7 +26,7 @@ inline constexpr std::array kPhrases{
            "The reference shares this job's seed: its noise is the same noise, and the true figures say "
            "nothing. "
            "Render it with another --seed."},
-    // The reason why a job ended, for each value of the field `stopped`
+    // Why a job ended, for each value of the field `stopped`
     Phrase{"stoppedSpp", "all its samples are in"},
     Phrase{"stoppedError", "the target error is reached"},
     Phrase{"stoppedErrorDenoised", "the target error of the denoised layers is reached"},
@@ -35,7 +35,7 @@ inline constexpr std::array kPhrases{
     Phrase{"stoppedUser", "someone stopped it"},
     Phrase{"failed", "The job failed"},
     Phrase{"unwell", "Something is wrong"},
-    // Where the time went, by the members of the field `time`
+    // Where the time was spent, by the members of the field `time`
     Phrase{"timeUnit", "Seconds of threads: of render their CPU time, of the others by the clock."},
     Phrase{"timeLoad", "getting the files that the scene names"},
     Phrase{"timeBuild", "reading them and building the world"},
@@ -45,7 +45,7 @@ inline constexpr std::array kPhrases{
     Phrase{"timeIdle", "threads between two units of the job"},
 };
 
-// Returns the phrase with this key; a key that the table lacks does not compile.
+// Returns the phrase with this key. If the table lacks the key, the call does not compile.
 consteval const char* phrase(std::string_view key) {
   for (const Phrase& p : kPhrases)
     if (p.key == key) return p.text;

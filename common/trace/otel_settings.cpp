@@ -9,7 +9,7 @@
 
 #include "common/base/log.h"
 #include "common/base/parse_number.h"
-#include "common/base/percent_code.h"
+#include "common/base/safe_text.h"
 #include "common/http/post.h"
 
 namespace ls::trace {
@@ -20,9 +20,8 @@ using Pairs = std::vector<std::pair<std::string, std::string>>;
 constexpr const char* kTracesPath = "/v1/traces";
 constexpr std::string_view kServiceName = "service.name";
 
-// A setting of the exporter: the value of the variable for traces if it is set and not empty, otherwise that
-// of the variable for all signals (traces, metrics, logs). `name` is the variable that was used, for
-// messages.
+// The value of the variable for traces if it is set and not empty, otherwise that of the variable for all
+// signals (traces, metrics, logs). `name` is the variable that was used, for messages.
 struct Setting {
   std::string name, value;
 };
@@ -43,7 +42,7 @@ std::string_view trimmed(std::string_view text) {
   return begin == std::string_view::npos ? "" : text.substr(begin, end + 1 - begin);
 }
 
-// Decodes %XX, as in W3C Baggage. nullopt: wrong digits, or a control character, which could begin another
+// Decodes %XX, as in W3C Baggage. nullopt: a wrong digit, or a control character, which could begin another
 // header.
 std::optional<std::string> decoded(std::string_view text) {
   auto out = percent_decode(text);
@@ -58,7 +57,7 @@ bool is_header_name(std::string_view name) {
   });
 }
 
-// Reads "name=value,name=value". The message of an error does not contain the text, which may be a secret.
+// Reads "name=value,name=value". Error messages do not contain the text, which may be secret.
 Result<Pairs> read_pairs(const std::string& variable, std::string_view text) {
   Pairs pairs;
   while (!text.empty()) {
@@ -116,14 +115,10 @@ Result<void> check_protocol(const Setting& protocol) {
 }
 
 Result<std::string> read_url(const Environment& environment) {
-  const std::string own = plain(environment, "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT");
-  std::string url = own.empty() ? plain(environment, "OTEL_EXPORTER_OTLP_ENDPOINT") : own;
+  auto [name, url] = setting(environment, "ENDPOINT");
   if (url.empty()) return url;
-  if (auto fine = check_http_url(
-          url, own.empty() ? "OTEL_EXPORTER_OTLP_ENDPOINT" : "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT");
-      !fine)
-    return tl::unexpected(fine.error());
-  if (!own.empty()) return url;
+  if (auto fine = check_http_url(url, name); !fine) return tl::unexpected(fine.error());
+  if (name == "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT") return url;
   while (url.ends_with('/')) url.pop_back();
   return url + kTracesPath;
 }
@@ -139,7 +134,7 @@ bool Sampler::takes(const TraceId& trace, std::optional<bool> parent_sampled) co
 
 Result<std::optional<Settings>> settings_from(const Environment& environment, const std::string& program) {
   const std::string exporter = plain(environment, "OTEL_TRACES_EXPORTER");
-  // The specification compares without regard to case.
+  // By the specification, case is ignored.
   const bool off = ::strcasecmp(plain(environment, "OTEL_SDK_DISABLED").c_str(), "true") == 0;
   if (off || exporter == "none") return std::nullopt;
   auto url = read_url(environment);

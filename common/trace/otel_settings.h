@@ -9,14 +9,14 @@
 #include <vector>
 
 #include "common/base/error.h"
-#include "common/trace/context.h"
+#include "common/trace/span.h"
 
 namespace ls::trace {
 
 // Decides which traces are recorded. The same trace id always gets the same decision, in every process.
 struct Sampler {
   double ratio = 1;            // fraction of the traces that are recorded, 0 to 1
-  bool parent_decides = true;  // for a trace that another program began, that program decides instead
+  bool parent_decides = true;  // true: if another program began the trace, its decision is kept
 
   bool takes(const TraceId& trace, std::optional<bool> parent_sampled) const;
 };
@@ -36,10 +36,10 @@ using Environment = std::function<const char*(const char* name)>;
 
 // Reads OTEL_SDK_DISABLED, OTEL_TRACES_EXPORTER, OTEL_SERVICE_NAME, OTEL_RESOURCE_ATTRIBUTES,
 // OTEL_TRACES_SAMPLER with _ARG, and OTEL_EXPORTER_OTLP_ENDPOINT, _HEADERS, _TIMEOUT, _CERTIFICATE and
-// _PROTOCOL, each of which OTEL_EXPORTER_OTLP_TRACES_... overrides. nullopt: nothing is traced, for example
-// because no endpoint is set. Error invalid_argument: a variable has a value that is not understood; the
-// message names it, but not the value of a header. Spans are always sent as JSON: the protocol http/protobuf
-// is only warned about in the log, and others are errors.
+// _PROTOCOL; OTEL_EXPORTER_OTLP_TRACES_... overrides each of the latter. nullopt: nothing is traced, for
+// example because no endpoint is set. Error invalid_argument: a variable has an invalid value. The message
+// names it, but does not contain the value of a header. Spans are always sent as JSON: the protocol
+// http/protobuf is accepted with a warning in the log, others are errors.
 Result<std::optional<Settings>> settings_from(const Environment& environment, const std::string& program);
 
 }  // namespace ls::trace

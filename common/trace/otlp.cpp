@@ -17,19 +17,13 @@ constexpr int kStatusError = 2;  // STATUS_CODE_ERROR
 // JSON numbers hold 53 bits, so OTLP writes 64-bit integers as texts.
 std::string int64_text(std::int64_t value) { return std::to_string(value); }
 
+json typed(const char* type, json value) { return json{{type, std::move(value)}}; }
+
 json any_value(const Value& value) {
-  return std::visit(overloaded{[](const std::string& v) {
-                                 return json{{"stringValue", v}};
-                               },
-                               [](std::int64_t v) {
-                                 return json{{"intValue", int64_text(v)}};
-                               },
-                               [](double v) {
-                                 return json{{"doubleValue", v}};
-                               },
-                               [](bool v) {
-                                 return json{{"boolValue", v}};
-                               }},
+  return std::visit(overloaded{[](const std::string& v) { return typed("stringValue", v); },
+                               [](std::int64_t v) { return typed("intValue", int64_text(v)); },
+                               [](double v) { return typed("doubleValue", v); },
+                               [](bool v) { return typed("boolValue", v); }},
                     value);
 }
 

@@ -1,5 +1,5 @@
-// The bodies of OTLP over HTTP in JSON (https://opentelemetry.io/docs/specs/otlp/): the request
-// ExportTraceServiceRequest and the part of its answer with the number of rejected spans.
+// Requests and answers of OTLP over HTTP in JSON (https://opentelemetry.io/docs/specs/otlp/): the body of an
+// ExportTraceServiceRequest, and the number of rejected spans in its answer.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +11,14 @@
 
 namespace ls::trace {
 
-// Bytes in texts that are not UTF-8 are replaced.
+// Returns the body of a request. Bytes that are not UTF-8 are replaced.
 std::string otlp_request(const Resource& resource, std::span<const Span> spans);
 
 struct PartialSuccess {
   std::uint64_t rejected = 0;  // number of spans
   std::string message;         // for the operator, of at most 200 characters; empty: none
 };
-// Reads the body of an answer of status 2xx. A body that cannot be parsed counts as a full success: it may be
+// Reads the body of an answer of status 2xx. If it cannot be parsed, this counts as full success: it may be
 // empty or in another encoding.
 PartialSuccess otlp_partial_success(std::string_view answer);
 

@@ -1,6 +1,5 @@
-// The queue of the spans that wait to be sent. Its state depends only on the calls of its functions and on
-// the times that they are given. It is bounded: a span that finds no room is dropped and counted. Not
-// thread-safe.
+// A queue of spans to send. It depends only on the calls of its functions and the times passed to them. It is
+// bounded: if it is full, a new span is dropped and counted. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +15,7 @@ namespace ls::trace {
 
 inline constexpr std::size_t kMaxWaiting = 8192;  // spans, about 0.5 KB each
 inline constexpr std::size_t kMaxBatch = 512;     // spans in one request
-inline constexpr double kCollectSeconds = 1;      // a batch is sent at most this long after its first span
+inline constexpr double kCollectSeconds = 1;      // time from the first span of a batch until it is sent
 inline constexpr int kMaxSendings = 5;            // attempts to send a batch; then it is dropped
 inline constexpr double kFirstPauseSeconds = 1;   // after a failed attempt; each further failure doubles it
 
@@ -30,14 +29,14 @@ class SpanQueue {
  public:
   void add(Span span, TimePoint now);
   // Returns the batch to send now; empty: there is none, or its time has not come. The reference is valid
-  // until the next call of a function that is not const, except add().
+  // until the next call of a non-const function other than add().
   const std::vector<Span>& due(TimePoint now);
   // Returns the time from which due() will return a batch; nullopt: no span waits.
   std::optional<TimePoint> next_due() const;
-  // Makes all waiting spans due at once and without pauses, for the end of the program.
+  // Makes all waiting spans due at once and without pauses. Called when the program ends.
   void hurry() { hurried_ = true; }
 
-  // The caller reports how sending the batch of due() ended:
+  // When sending the batch of due() has ended, call one of these three:
   void taken(std::uint64_t rejected);              // the collector took it, except for `rejected` spans
   void failed(TimePoint now);                      // the batch may be sent again
   void refused();                                  // the batch is dropped: it would be refused again

@@ -13,8 +13,8 @@
 namespace ls::trace {
 namespace {
 
-constexpr double kLastSeconds = 2;        // time limit for sending the waiting spans when the program ends
-constexpr double kComplaintSeconds = 60;  // least time between two log lines about the collector
+constexpr double kLastSeconds = 2;  // time limit for sending the waiting spans at the end of the program
+constexpr double kComplaintSeconds = 60;  // shortest time between two log lines about the collector
 constexpr std::size_t kMostAnswer = 64 << 10;
 // If the difference between wall clock and monotonic clock changes by more than this, the wall clock was set.
 constexpr std::int64_t kClockStepNs = 100'000'000;
@@ -27,15 +27,15 @@ std::uint64_t random_number() {
   return std::uint64_t{device()} << 32 | device();
 }
 
-// A bijection of 64-bit numbers whose values look random for consecutive arguments (the finalizer of
-// SplitMix64, Steele et al. 2014, "Fast splittable pseudorandom number generators").
+// Maps 64-bit numbers one to one, so that consecutive arguments give values that look random (the finalizer
+// of SplitMix64, Steele et al. 2014, "Fast splittable pseudorandom number generators").
 std::uint64_t mixed(std::uint64_t x) {
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9;
   x = (x ^ (x >> 27)) * 0x94d049bb133111eb;
   return x ^ (x >> 31);
 }
 
-// True for answers after which the same request may succeed, according to OTLP
+// True for a status after which OTLP allows the client to send the same request again.
 bool may_pass(int status) { return status == 429 || status == 502 || status == 503 || status == 504; }
 
 }  // namespace
@@ -76,12 +76,12 @@ std::int64_t Tracer::unix_ns(TimePoint at) const { return count(at) + offset_ns_
 
 Figures Tracer::figures() const { return queue_.lock()->figures(); }
 
-// Measures the difference between the wall clock and the monotonic clock. This is repeated, since the wall
-// clock may be set and the monotonic clock stops while the machine sleeps.
+// Measures the difference between the wall clock and the monotonic clock. It changes if the wall clock is
+// set, or while the machine sleeps, when the monotonic clock stops. So this is called again and again.
 void Tracer::set_clock() {
   std::int64_t offset = 0, narrowest = std::numeric_limits<std::int64_t>::max();
-  // The wall clock is read between two readings of the monotonic clock, several times. The attempt with the
-  // shortest time between the two is used, since the thread was hardly interrupted during it.
+  // The wall clock is read several times, each between two readings of the monotonic clock. The reading with
+  // the shortest time between the two is used: the thread was interrupted least.
   for (int i = 0; i < kClockReadings; ++i) {
     const std::int64_t before = count(options_.clock->now()), wall = options_.unix_ns(),
                        after = count(options_.clock->now());

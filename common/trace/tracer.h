@@ -1,6 +1,6 @@
 // Records spans and sends them to a collector, on a thread of its own. Recording takes a short lock and never
-// waits for the collector: if the collector refuses them, hangs or is unreachable, spans are dropped and
-// counted. A program that is not traced has a null pointer instead of a Tracer.
+// waits for the collector: if the collector refuses spans, hangs or is unreachable, they are dropped and
+// counted. A program without tracing has a null pointer instead of a Tracer.
 #pragma once
 
 #include <atomic>
@@ -25,8 +25,8 @@ class Tracer {
   struct Options {
     Settings settings;
     std::string version;  // of this program
-    std::string
-        instance;  // which of the programs of this kind it is, such as a worker's name; empty: not sent
+    // Distinguishes several processes of this program, such as workers by their names; empty: not sent.
+    std::string instance;
     std::shared_ptr<const Clock> clock;
     std::function<std::int64_t()> unix_ns;  // nanoseconds since 1970
     // Sends a request; ls::post by default
@@ -39,8 +39,8 @@ class Tracer {
   // Adds the span to the queue of spans to send. Thread-safe. The span must be of a sampled trace.
   void record(Span span);
   SpanId new_span_id();
-  // A time of the injected clock as nanoseconds since 1970. In one process a later time gives a later result,
-  // unless the wall clock was set or the machine slept in between.
+  // Converts a time of the injected clock to nanoseconds since 1970. In one process a later time gives a
+  // later result, unless the wall clock was set or the machine slept in between.
   std::int64_t unix_ns(TimePoint at) const;
   const Sampler& sampler() const { return options_.settings.sampler; }
   Figures figures() const;

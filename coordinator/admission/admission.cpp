@@ -10,8 +10,8 @@
 #include <ranges>
 #include <set>
 
+#include "common/job/health_notes.h"
 #include "common/job/limits.h"
-#include "common/job/replay_command.h"
 #include "common/protocol/limits.h"
 #include "common/scene/analysis/needs.h"
 #include "common/scene/analysis/prune.h"

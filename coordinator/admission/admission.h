@@ -41,7 +41,7 @@ Result<StoredJob> admit_again(const StoredJob& before, const JobSpec& changes, c
 // missing, invalid_argument if it is not a suitable picture.
 Result<Reference> load_reference(const JobSpec& spec, FrameSize size, const BlobStore& blobs);
 
-// Returns the command that renders one of the job's samples again: common/job/replay_command.h.
+// Returns the command that renders one of the job's samples again: common/job/health_notes.h.
 std::string replay_of(const StoredJob& job);
 
 // Returns the least memory, in bytes, that a worker needs for the job.

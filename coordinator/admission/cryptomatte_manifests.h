@@ -1,8 +1,8 @@
 // A Cryptomatte manifest maps the identifiers in an image's cryptomattes to the names of objects.
 #pragma once
 
-#include "common/image/aov/cryptomatte.h"
-#include "common/image/exr/aov_layers.h"
+#include "common/image/aov/identifiers.h"
+#include "common/image/exr/final_image.h"
 #include "common/job/settings.h"
 #include "common/scene/scene.h"
 

@@ -31,7 +31,7 @@ struct JobPlan {
   std::optional<double> time;          // the job ends this many seconds after the first ray, pauses excluded
   int priority = 0;                    // higher first
   std::vector<std::string> tags;       // a worker must have all of them
-  // Command that renders one sample again. replay_command() (common/job/replay_command.h) appends the pixel
+  // Command that renders one sample again. replay_command() (common/job/health_notes.h) appends the pixel
   // and the sample to it.
   std::string replay = "lightshaft render SCENE";
   // Limits and fair shares (fair_share.h, docs/design/scheduling.md)

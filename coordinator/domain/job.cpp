@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "common/image/frame/tiles_over.h"
-#include "common/job/replay_command.h"
+#include "common/image/frame/frame.h"
+#include "common/job/health_notes.h"
 
 namespace ls::coordinator {
 

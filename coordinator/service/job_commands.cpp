@@ -6,7 +6,7 @@
 #include <cstdlib>
 
 #include "common/base/log.h"
-#include "common/image/frame/tiles_over.h"
+#include "common/image/frame/frame.h"
 #include "common/job/limits.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/service/core.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "common/image/exr/maps.h"
+#include "common/image/exr/final_image.h"
 #include "coordinator/base/limits.h"
 #include "coordinator/service/core.h"
 #include "coordinator/service/image_writer.h"

@@ -17,7 +17,6 @@
 #include <memory>
 #include <optional>
 
-#include "common/base/helper_program.h"
 #include "common/base/secret.h"
 
 namespace ls::tls {

@@ -289,7 +289,7 @@ struct SubmitRequest {
   std::map<std::string, Digest> assets;
   JobSpec spec;
   std::string owner = {};  // the user who submits it: JobView::owner
-  // Header `traceparent` of the user's request (common/trace/context.h); a malformed one is ignored
+  // Header `traceparent` of the user's request (common/trace/span.h); a malformed one is ignored
   std::string traceparent = {};
 };
 struct Rejected {

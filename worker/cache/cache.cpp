@@ -9,8 +9,8 @@
 #include <cerrno>
 #include <cstring>
 
-#include "common/base/helper_program.h"
 #include "common/base/log.h"
+#include "common/base/spawn.h"
 #include "worker/cache/cache_files.h"
 
 namespace ls::worker {

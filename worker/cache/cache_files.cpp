@@ -14,7 +14,7 @@
 #include <string>
 #include <utility>
 
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 
 namespace ls::worker {
 namespace fs = std::filesystem;

@@ -14,7 +14,7 @@
 
 #include "common/base/clock.h"
 #include "common/base/error.h"
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 #include "worker/child/child.h"
 #include "worker/child/protocol.h"
 

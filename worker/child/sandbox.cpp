@@ -19,7 +19,7 @@
 #include <system_error>
 #include <vector>
 
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 
 namespace ls::worker::child {
 namespace {

@@ -19,7 +19,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "common/image/aov/id_slots.h"
+#include "common/image/aov/identifiers.h"
 #include "common/image/film/partial.h"
 
 namespace ls {

@@ -16,7 +16,7 @@
 #include <cstring>
 #include <vector>
 
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 #include "common/denoise/exchange.h"
 
 namespace {
@@ -113,7 +113,7 @@ class Run {
   Run(const Run&) = delete;
   Run& operator=(const Run&) = delete;
 
-  // Guides are denoised first, each separately, so that the colour's filter may rely on them.
+  // Guides are denoised first, each by its own filter, so that the colour's filter may rely on them.
   bool denoise(float* color, float* albedo, float* normal) {
     if (!ready_) return false;
     const std::size_t floats = ls::denoise::plane_floats(header_.width, header_.height);
@@ -192,5 +192,5 @@ int main(int argc, char** argv) {
       done = run.denoise(planes, planes + plane, planes + 2 * plane);
   }
   header.outcome = done ? Outcome::done : Outcome::failed;
-  std::_Exit(0);  // skips the library's destructors, which may wait for its threads
+  std::_Exit(0);  // skips the destructors of the library, which may wait for its threads
 }

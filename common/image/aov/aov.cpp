@@ -7,7 +7,7 @@
 #include <array>
 #include <cctype>
 
-#include "common/image/aov/id_slots.h"
+#include "common/image/aov/identifiers.h"
 
 namespace ls {
 namespace {
@@ -97,9 +97,9 @@ Result<AovSet> parse_aovs(std::span<const std::string> names) {
     else if (alias != std::end(kAliases))
       set = set.with(alias->aov);
     else
-      return fail(Errc::invalid_argument,
-                  fmt::format("there is no output \"{}\"; there are {}, and in every image spp and stderr",
-                              shown(name), known_aovs()));
+      return bad_argument(
+          fmt::format("there is no output \"{}\"; there are {}, and in every image spp and stderr",
+                      shown(name), known_aovs()));
   }
   return set;
 }

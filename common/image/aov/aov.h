@@ -2,7 +2,7 @@
 // tile and range of samples). docs/reference/aovs.md defines each.
 //
 // After its six colour planes (A.R A.G A.B B.R B.G B.B) a partial has the planes of sums of the requested
-// AOVs, sorted by channel name, then the planes of identifiers (id_slots.h), sorted by the AOV's name. The
+// AOVs, sorted by channel name, then the planes of identifiers (identifiers.h), sorted by the AOV's name. The
 // partial's EXR file has these planes in the same order; only the colours differ (B before G before R).
 #pragma once
 
@@ -42,7 +42,7 @@ enum class Aov : std::uint8_t {
 };
 inline constexpr std::size_t kAovs = 18;
 
-// The type of an AOV's values, and the number of samples by which its sums are divided.
+// The type of an AOV's values, and by what number of samples its sums are divided.
 enum class AovKind {
   of_hits,  // sums over the samples that hit a surface, divided by the number of these samples
   // Sums over the samples that hit a surface, divided by the number of all samples: a miss counts as 0
@@ -103,9 +103,10 @@ struct AovPlanes {
 };
 AovPlanes planes_of(AovSet set);
 
-// Bytes per pixel: of a partial or of a tail (the last round of a tile in the film, if it is truncated), and
-// of the film's sums.
+// Returns the bytes per pixel of a partial. The film stores the last round of a tile in the same form if it
+// is truncated.
 std::size_t partial_bytes_per_pixel(AovSet set);
+// Returns the bytes per pixel of the sums in a film.
 std::size_t film_bytes_per_pixel(AovSet set);
 
 }  // namespace ls

@@ -13,10 +13,11 @@ namespace ls {
 namespace {
 
 constexpr double kNormal95 = 1.959964;
-constexpr double kLeastSpp = 8;  // with fewer samples, halves of one or two samples are too noisy
+// With fewer samples per pixel, a half has only one or two samples and is too noisy.
+constexpr double kLeastSpp = 8;
 constexpr double kPriorSpread = .15;
-// For forecasts: the slope changes by this standard deviation per square root of log time (b in
-// convergence.h)
+// For forecasts: the standard deviation by which the slope changes per square root of log time (b in
+// convergence.h).
 constexpr double kBend = .06;
 constexpr double kSlow = .85, kFast = 1.1;  // the verdict is slow below kSlow and fast above kFast
 constexpr std::size_t kMostPoints = 32;     // at most this many doublings of the sample count are used
@@ -36,8 +37,8 @@ Log log_of(const ErrorPoint& p) {
   return {std::log(p.core_seconds), std::log(p.relmse), p.spp, interval * std::sqrt(.5)};
 }
 
-// Returns points at doubling sample counts: from the last point back, each with at most half the samples of
-// the one after it. They are in order of samples.
+// Returns the last point, and before it points with at most half the samples of the next one, in order of
+// samples.
 std::vector<Log> doublings(std::span<const ErrorPoint> points) {
   std::vector<Log> out;
   for (std::size_t i = points.size(); i-- > 0 && out.size() < kMostPoints;) {
@@ -52,19 +53,18 @@ double covariance(const Log& a, const Log& b) {
   return a.sigma * b.sigma * std::min(a.spp, b.spp) / std::max(a.spp, b.spp);
 }
 
-// Returns the covariance that a varying slope adds to the errors at the log times u and v, counted from the
-// line's reference point. The slope follows a Brownian motion of variance 1 per unit of log time. Deviations
-// from the line on different sides of the reference point are independent.
+// Returns the covariance that a varying slope adds to the errors at the log times u and v, measured from a
+// reference point of the line. The slope follows a Brownian motion of variance 1 per unit of log time.
+// Deviations on different sides of the reference point are independent.
 double bend_covariance(double u, double v) {
   if (u * v <= 0) return 0;
   const double near = std::min(std::abs(u), std::abs(v)), far = std::max(std::abs(u), std::abs(v));
   return near * near * (3 * far - near) / 6;
 }
 
-// Returns the lower Cholesky factor of the points' covariance, including that of a random change of the
-// slope, bend^2 bend_covariance() about the last point. `bend` is the standard deviation of the change per
-// square root of log time, like kBend; 0: the slope is constant. nullopt: the covariance is not positive
-// definite.
+// Returns the lower Cholesky factor of the points' covariance, including that of a varying slope: bend^2
+// bend_covariance() about the last point. `bend` is the standard deviation of the slope's change per square
+// root of log time, like kBend; 0: the slope is constant. nullopt: the covariance is not positive definite.
 using Matrix = std::array<std::array<double, kMostPoints>, kMostPoints>;
 std::optional<Matrix> factor(const std::vector<Log>& y, double bend) {
   Matrix l{};
@@ -128,9 +128,9 @@ class Line {
   struct Value {
     double mean = 0, sigma = 0;
   };
-  // Predicts the logarithm of the estimate at exp(later) times the samples of the last point: the value of
-  // the line, plus the part of the points' deviations from the line that persists because later checkpoints
-  // contain their samples (Rasmussen and Williams 2006, section 2.7).
+  // Predicts the logarithm of the estimate when the number of samples is exp(later) times that of the last
+  // point: the value of the line, plus the part of the points' deviations from the line that persists because
+  // later checkpoints contain their samples (Rasmussen and Williams 2006, section 2.7).
   Value at(double later) const {
     const Log then{0, 0, y_.back().spp * std::exp(later), y_.back().sigma};
     const auto shared = whitened(l_, y_, [&](const Log& p) { return covariance(p, then); });
@@ -159,8 +159,8 @@ std::string words(double lo, double hi) {
 
 double excess(const ErrorPoint& p) { return *p.true_relmse - p.relmse; }
 
-// True if the true error of the last point exceeds the estimated one by more than chance, and this excess
-// falls too slowly: the two conditions of judge() in the header.
+// Tests the two conditions of a bias floor (convergence.h): the true error of the last point exceeds the
+// estimated one by more than chance, and this excess falls too slowly.
 bool stands_on_a_floor(std::span<const ErrorPoint> points) {
   constexpr double kSigmas = 4;
   if (points.empty() || !usable(points.back()) || !points.back().true_relmse) return false;
@@ -178,11 +178,11 @@ bool stands_on_a_floor(std::span<const ErrorPoint> points) {
   return false;
 }
 
-// Returns the log time at which value(log time) has fallen to `wanted`, counted from the last point and
-// never below 0.
+// Returns the log time, measured from the last point and at least 0, at which value(log time) has fallen to
+// `wanted`.
 template <class Curve>
 double when(const Curve& value, double wanted) {
-  constexpr double kMost = 60;  // reaching the value only after e^60 times as long counts as never
+  constexpr double kMost = 60;  // times beyond e^60 times the time so far count as never
   double lo = 0, hi = 1;
   while (hi < kMost && value(hi) > wanted) lo = hi, hi *= 2;
   for (int i = 0; i < 60; ++i) {
@@ -199,9 +199,9 @@ double end_of_round(double spp) {
   return static_cast<double>(round_range(round_count(samples) - 1).s1);
 }
 
-// Returns how much the cost of a sample varies: for each of the last few doublings of the number of samples,
-// its cost per sample is compared with the mean cost of all samples so far. The result is the root mean
-// square of the relative differences. 0: there are too few points.
+// Returns how much the cost of a sample varies: the root mean square of relative differences. For each of the
+// last few doublings of the number of samples, the cost of its samples is compared with the mean cost of all
+// samples so far. 0: there are too few points.
 double cost_spread(std::span<const ErrorPoint> points) {
   constexpr int kDoublings = 4;
   const ErrorPoint& now = points.back();
@@ -234,20 +234,8 @@ std::optional<Trend> trend_of(std::span<const ErrorPoint> points) {
 }
 
 const char* to_string(ConvergenceStatus::Kind kind) {
-  using Kind = ConvergenceStatus::Kind;
-  switch (kind) {
-    case Kind::early:
-      return "early";
-    case Kind::converging:
-      return "converging";
-    case Kind::fast:
-      return "fast";
-    case Kind::heavy_tail:
-      return "heavy_tail";
-    case Kind::bias_floor:
-      return "bias_floor";
-  }
-  return "";
+  static constexpr const char* kNames[] = {"early", "converging", "fast", "heavy_tail", "bias_floor"};
+  return kNames[static_cast<std::size_t>(kind)];
 }
 
 ConvergenceStatus judge(std::span<const ErrorPoint> points, const std::string& doubt) {

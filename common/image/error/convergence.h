@@ -5,10 +5,10 @@
 // half the difference of the two half images at n samples. If samples are independent, D_m is (n/m) D_n plus
 // an independent term, so corr(D_n, D_m) = sqrt(n/m). For Gaussian D the estimates, sums of D^2, have the
 // correlation n/m. The line is fitted to their logarithms by generalised least squares (Aitken 1936) with
-// this covariance; without it the slope's interval would be far too narrow. The width of an estimate's
-// interval gives twice the variance of the estimate, because it is an interval for the realised error, whose
-// own variance is equally large (error_estimate.h). So half of it is used here. Only checkpoints at doubling
-// sample counts are used; those between them add little.
+// this covariance; without it the slope's interval would be far too narrow. The variance of an estimate is
+// half of what the width of its interval gives: the interval is for the difference of estimated and realised
+// error, which both have this variance (error_estimate.h). Only checkpoints at doubling sample counts are
+// used; those between them add little.
 #pragma once
 
 #include <optional>
@@ -29,11 +29,11 @@ struct ErrorPoint {
 // The trend relMSE ~ time^-slope; the slope is 1 for independent samples of finite variance.
 struct Trend {
   int points = 0;                                // number of checkpoints used
-  double slope = 0, slope_lo = 0, slope_hi = 0;  // slope with its 95 % interval
+  double slope = 0, slope_lo = 0, slope_hi = 0;  // slope, and its 95 % interval
   std::string verdict;                           // the trend in words
 };
-// Fits the trend. `points` are in order of samples. nullopt: there are fewer than three usable points at
-// doubling sample counts.
+// Fits the trend. `points` are in order of samples. nullopt: fewer than three points at doubling sample
+// counts are usable.
 std::optional<Trend> trend_of(std::span<const ErrorPoint> points);
 
 // How far an image's error figures can be trusted, as a status and as a sentence.
@@ -42,7 +42,7 @@ struct ConvergenceStatus {
     early,       // too few checkpoints to judge
     converging,  // as expected: the error falls like 1/N
     fast,        // faster than 1/N, as low-discrepancy points do on a smooth image
-    heavy_tail,  // not to be trusted yet: few pixels carry the error, or it falls more slowly than 1/N
+    heavy_tail,  // don't trust yet: few pixels carry the error, or it falls more slowly than 1/N
     bias_floor,  // with a reference: the true error is constant while the estimated one falls
   } kind = Kind::early;
   std::string words;
@@ -51,13 +51,13 @@ struct ConvergenceStatus {
 };
 const char* to_string(ConvergenceStatus::Kind kind);
 // Judges an image's convergence. `doubt` is ImageError::verdict, empty if the image's own figures are
-// trusted. If there are several reasons for distrust, the first one in this order is given: `doubt`, a bias
+// trusted. If there are several reasons for distrust, the first in this order is given: `doubt`, a bias
 // floor, the slope. A bias floor is a squared bias: the part of the true error that the estimated one lacks
 // and that does not fall with samples. Random differences between the two errors fall with samples, except
 // for the reference's own noise, which is constant as well. A floor is reported if two conditions hold:
 // - The latest true error exceeds the estimated one by four standard deviations (by chance: once in 30,000).
-//   Two of them are added in quadrature: that of the estimate, from its interval on a logarithmic scale, and
-//   ErrorPoint::true_stderr, due to the noise of the reference.
+//   This standard deviation combines two in quadrature: that of the estimate, from its interval on a
+//   logarithmic scale, and ErrorPoint::true_stderr, due to the noise of the reference.
 // - The excess falls more slowly than 1 / sqrt(N), which is half way between a constant and 1/N. To test
 //   this, it is compared with the excess at the latest checkpoint that had at most half the samples.
 ConvergenceStatus judge(std::span<const ErrorPoint> points, const std::string& doubt);

@@ -11,30 +11,31 @@
 #include "common/image/error/relative_weights.h"
 
 namespace ls {
+
 namespace {
 
 constexpr int kReach = 2;                  // radius of the 5 x 5 window
 constexpr double k95 = 1.959963984540054;  // two-sided 95 % point of the normal distribution
-// The figures are not trusted if fewer than kFewPixels pixels carry the error: the scatter of their values
-// (sqrt(4/3/100) = 12 % of the sum) makes the sum unreliable. In small images 1 / kPartOfSmall of the pixels
+// The figures are not trusted if fewer than kFewPixels pixels carry the error: with 100 Gaussian pixels the
+// sum has a standard deviation of sqrt(4/3/100) = 12 %. In small images 1 / kPartOfSmall of the pixels
 // suffices, because object edges alone sometimes carry the error of a 32 x 32 image.
 constexpr double kFewPixels = 100, kPartOfSmall = 48;
-constexpr double kLargeShare = 0.1;  // largest share of the error in one pixel, for images with many pixels
-// In smooth parts of the image tr(V^2) is estimated both from fourth powers of D and from pairs of
-// neighbours. The figures are not trusted if the first estimate is larger than the second by more than this
-// factor. The ratio is 1 for Gaussian noise, and up to 6 for low-discrepancy points on a smooth image
+constexpr double kLargeShare = 0.1;  // in images with many pixels: largest share of the error in one pixel
+// In smooth parts of the image tr(V^2) is estimated in two ways, from fourth powers of D and from pairs of
+// neighbours. The figures are not trusted if the first estimate is more than this factor times the second.
+// The ratio is 1 for Gaussian noise, and up to 6 for low-discrepancy points on a smooth image
 // (tests/coverage).
 constexpr double kHeavy = 10;
-// a pixel has few hits if one half has at least this many times the light of the other
+// A pixel has few hits if one half has at least this many times the light of the other.
 constexpr double kOneSided = 19;
-// The distribution of the noise is estimated from the last round (range of samples) only if that round and
-// the part before it have at least this many samples per pixel each. With 8 samples per half, a single sample
-// that finds rare light would dominate.
+// The interval is computed from the last round (range of samples) only if this round has at least this many
+// samples per pixel, and the rounds before it as well. With 8 samples per half, a single sample that finds
+// rare light would dominate.
 constexpr std::uint64_t kTellingSamples = 16;
 
 // Returns the expected amount by which skewed noise lowers the sum of squared relative errors (derived in
-// error_estimate.h), as a negative number. The sum is accumulated per column, so that the loop is
-// vectorised.
+// error_estimate.h), as a negative number. The sum is accumulated per column, so that the compiler vectorises
+// the loop.
 double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earlier,
                const RelativeWeights& w) {
   const double before = static_cast<double>(earlier.spp) / static_cast<double>(spp), last = 1 - before;
@@ -46,7 +47,7 @@ double skew_of(const HalfMeans& now, std::uint64_t spp, const EarlierMeans& earl
                  *b1 = &earlier.halves.b[row];
     const double *roots = &w.roots[row], *leans = &w.leans[row];
     for (std::size_t x = 0; x < width; ++x) {
-      // The mean of each half is split into the part of the last round and that of earlier rounds: a = last *
+      // The mean of each half consists of the part of the last round and that of earlier rounds: a = last *
       // a_n + before * a_o.
       const double ao = before * a1[x], bo = before * b1[x], an = a[x] - ao, bn = b[x] - bo;
       const double of_before = 0.25 * (ao - bo) * (ao - bo), of_last = 0.25 * (an - bn) * (an - bn);
@@ -98,7 +99,8 @@ ChangeSums change_sums(const std::vector<double>& a, const std::vector<double>& 
   return out;
 }
 
-// Returns the ratio that kHeavy limits; 0 if smooth parts have at most the share kPart of the fourth powers.
+// Returns the ratio of the two estimates that kHeavy limits. Returns 0 if smooth parts have at most the share
+// kPart of the fourth powers.
 double heaviness(const NoiseSums& s) {
   constexpr double kPart = .25;
   const double flat = s.pixel_fourth - s.edge_pixel_fourth;
@@ -144,7 +146,7 @@ double light(std::span<const double> half, std::size_t pixel, std::size_t pixels
 }  // namespace
 
 bool has_few_hits(const HalfMeans& h, int x, int y) {
-  const auto pixels = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
+  const std::size_t pixels = h.pixels();
   const auto at = [&](int i, int j) {
     return static_cast<std::size_t>(j) * static_cast<std::size_t>(h.width) + static_cast<std::size_t>(i);
   };
@@ -190,10 +192,10 @@ void TileError::subtract_skew(double part) {
 
 namespace {
 
-// Counts pixels with light and with few hits. Nearly all pixels have light in both halves and are handled by
-// a vectorised loop; only black pixels need their neighbours.
+// Counts the pixels with light and those with few hits. Nearly all pixels have light in both halves and are
+// counted by a vectorised loop; only black pixels need their neighbours.
 void count_hits(const HalfMeans& h, TileError& out) {
-  const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
+  const std::size_t n = h.pixels();
   const double *a = h.a.data(), *b = h.b.data();
   std::uint64_t lit = 0, one_sided = 0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -232,7 +234,7 @@ void send_changes(const HalfMeans& h, std::uint64_t spp, const EarlierMeans& ear
 }  // namespace
 
 TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMeans* earlier) {
-  const auto n = static_cast<std::size_t>(h.width) * static_cast<std::size_t>(h.height);
+  const std::size_t n = h.pixels();
   CHECK(h.a.size() == 3 * n && h.b.size() == 3 * n, "{} and {} values for {} x {} pixels", h.a.size(),
         h.b.size(), h.width, h.height);
   TileError out{.pixels = n, .samples = spp * n};
@@ -250,9 +252,8 @@ TileError estimate_error(const HalfMeans& h, std::uint64_t spp, const EarlierMea
             earlier->spp < spp,
         "{} and {} values of {} samples before {} of {}", earlier->halves.a.size(), earlier->halves.b.size(),
         earlier->spp, 3 * n, spp);
-  // With low-discrepancy points the error of all samples together is smaller than the errors of the last
-  // round and of the samples before it suggest, so the correction, which is estimated from these two parts,
-  // must be limited.
+  // The correction is limited: it is estimated from the errors of the last round and of the samples before
+  // it, and with low-discrepancy points the error of all samples together is smaller than these two suggest.
   const double all = out.relative.squares;
   out.subtract_skew(std::clamp(skew_of(h, spp, *earlier, w), -all / 2, all / 2));
   send_changes(h, spp, *earlier, w.roots, out);
@@ -263,13 +264,16 @@ namespace {
 
 // Returns half the width of the 95 % interval of the logarithm of a sum of squares. On a log scale the lower
 // end stays above zero. The spread is itself an estimate, so the factor is not the normal quantile but
-// Student's t, to first order in 1 / degrees of freedom (Abramowitz and Stegun 26.7.5). Let x be the sum of
-// D^2 over the channels of a pixel, and e = (sum x)^2 / (sum of x^2). If the spread is from fourth powers:
-// for n equal Gaussian pixels e is n / 3, and the sum of the fourth powers has a relative variance of
-// 96 / (9 n), so it behaves like a chi square with e / 2 degrees of freedom. If it is from changes:
-// 4 products / squares^2 has a relative variance of (8 + 4 - 8) / n (from the products, the square and their
-// covariance), hence 3 e / 2 degrees; uneven noise has fewer, but at least e / 2 in the scenes of
-// tests/coverage. So e / 2 is used for both.
+// Student's t, to first order in 1 / degrees of freedom (Abramowitz and Stegun 26.7.5).
+//
+// Degrees of freedom: let x be the sum of D^2 over the channels of a pixel, and e = (sum x)^2 / (sum of x^2),
+// which is n / 3 for n equal Gaussian pixels.
+// - If the spread is from fourth powers, their sum has a relative variance of 96 / (9 n), as a chi square
+//   with e / 2 degrees of freedom.
+// - If it is from the last round, 4 products / squares^2 has a relative variance of (8 + 4 - 8) / n (from the
+//   products, the squares and their covariance), hence 3 e / 2 degrees. Uneven noise has fewer, but at least
+//   e / 2 in the scenes of tests/coverage.
+// So e / 2 is used for both.
 double half_width(const NoiseSums& s, bool trusted) {
   if (!(s.pixel_fourth > 0)) return 0;
   const double freedom = s.squares * s.squares / s.pixel_fourth / 2;
@@ -297,6 +301,58 @@ ImageError image_error(const TileError& sums) {
   out.relmse_lo = out.relmse * std::exp(-relative);
   out.relmse_hi = out.relmse * std::exp(relative);
   return out;
+}
+
+bool Checkpoints::ready(const Tile& tile) const {
+  return tile.reached > complete() || (tile.stopped && tile.reached > 0);
+}
+
+void Checkpoints::change(TileIndex index, const std::function<void(Tile&)>& edit) {
+  CHECK(index < tiles_.size(), "tile {} of {}", index, tiles_.size());
+  Tile& tile = tiles_[index];
+  const bool before = ready(tile);
+  edit(tile);
+  const bool after = ready(tile);
+  if (before && !after) ++waiting_;
+  if (!before && after) --waiting_;
+  settle();
+}
+
+void Checkpoints::folded(TileIndex index, RoundIndex round, const TileError& error) {
+  change(index, [&](Tile& tile) {
+    if (round >= complete()) {
+      // Replaces the figures of the tile from this round on. If the tile had stopped and skipped rounds,
+      // these get the figures of its previous round.
+      tile.pending.resize(round - complete(), tile.last);
+      tile.pending.push_back(error);
+    } else {
+      tile.pending.clear();
+    }
+    tile.last = error;
+    tile.reached = round + 1;
+    tile.stopped = false;
+  });
+}
+
+void Checkpoints::stopped(TileIndex index) {
+  change(index, [](Tile& tile) { tile.stopped = true; });
+}
+
+void Checkpoints::settle() {
+  while (waiting_ == 0) {
+    TileError sum;
+    bool moved = false;
+    for (const Tile& tile : tiles_) {
+      sum.add(tile.pending.empty() ? tile.last : tile.pending.front());
+      moved |= !tile.pending.empty();
+    }
+    if (!moved) return;  // if every tile has stopped, there is no further checkpoint
+    done_.push_back(sum);
+    for (Tile& tile : tiles_) {
+      if (!tile.pending.empty()) tile.pending.erase(tile.pending.begin());
+      if (!ready(tile)) ++waiting_;
+    }
+  }
 }
 
 }  // namespace ls

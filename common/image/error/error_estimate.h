@@ -6,56 +6,57 @@
 // squared error. The mean of w d estimates the relative one, with w = 1/(m^2 + 0.01) and m the pixel's true
 // value.
 //
-// The estimate of m must not contain the noise that is being measured. With S = (A+B)/2 itself, a firefly
-// would enlarge its own denominator and hide most of its error. The average W of the neighbours alone is
-// wrong where the image has edges (docs/design/error.md has figures for both). So, per channel,
+// The estimate of m must not contain the noise that is being measured. If m were the pixel's value S =
+// (A+B)/2, a firefly would enlarge its own denominator and hide most of its error. If m were W, the mean of
+// the neighbours, it would be wrong at the edges of objects (docs/design/error.md has figures for both). So,
+// per channel,
 //   m = W + g (S - W),   g = T / (T + v),
 // which is local Wiener filtering (Lee 1980) with
 //   W   the mean of the 5 x 5 window without the pixel, clipped to the tile;
 //   u   the window's mean of D^2;
-//   v   the noise: u, or D^2 of the pixel if that exceeds T + u, as for a firefly: being in one half only, it
-//       has D^2 = (S - W)^2, so it does not count as structure;
 //   T   the image's structure: the window's variance of S minus its noise u; or (S - W)^2 where that
-//       exceeds 9 u and 9 D^2, three standard deviations, as for a small bright object.
+//       exceeds 9 u and 9 D^2 (three standard deviations), as for a small bright object;
+//   v   the noise: D^2 of the pixel where that exceeds T + u, otherwise u. The former is for fireflies: a
+//       firefly is in one half only, so its D^2 equals (S - W)^2 and does not count as structure.
 // In a flat or dark area g is near 0, and m does not depend on the pixel. Where the image's structure exceeds
 // its noise, g is near 1. A tile of one pixel uses S. The noise that remains in m has the variance
 //   s^2 = g^2 u + (1 - g)^2 u / k,   k: the number of pixels from which W is computed.
-// It would bias the weight w = 1/(m^2 + c), c = 0.01, from here on called f(m), by f" s^2 / 2. This is
-// subtracted, and the result limited to [f/2, 2 f]. The remaining bias is of second order in s^2: for m = 0
-// it is 3 s^4 / c^2 relative to f.
+// Let f(m) = 1/(m^2 + c), c = 0.01, be the weight w. This noise would bias it by f" s^2 / 2, which is
+// subtracted; the result is limited to [f/2, 2 f]. The remaining bias is of second order in s^2: for m = 0 it
+// is 3 s^4 / c^2 relative to f.
 //
 // Skew: where g is near 1, the pixel's value enters its own weight, and the noise of rendered pixels is
-// skewed. A bright sample raises both D^2 and S, so the sum of f D^2 is too low: to first order in the noise
-// its error is f'(m) g cov(D^2, S), which is negative. Relative to the sum, this error falls like 1/N (2 %
-// at 64 samples, docs/design/error.md). It is estimated from the samples of the last round (range of
-// samples), which are independent of earlier ones. Of N samples, n are in the last round and o before it.
-// Let D_n and S_n be D and S of the last round alone, and D_o and S_o those of the earlier samples. With K
-// the third cumulant of a sample (the pixel's true value cancels in the differences),
+// skewed: a bright sample raises both D^2 and S. So the sum of f D^2 is too low: to first order in the noise
+// its error is f'(m) g cov(D^2, S), which is negative. Relative to the sum, this error falls like 1/N (2 % at
+// 64 samples, docs/design/error.md). It is estimated from the samples of the last round (range of samples),
+// which are independent of earlier ones. Of N samples, n are in the last round and o before it. Let D_n and
+// S_n be D and S of the last round alone, and D_o and S_o those of the earlier samples. With K the third
+// cumulant of a sample (the pixel's true value cancels in the differences),
 //   E[D_n^2 (S_n - S_o)] = K / n^2,   E[D_o^2 (S_o - S_n)] = K / o^2,   cov(D^2, S) = K / N^2.
 // So cov(D^2, S) is the expectation of
 //   t = ((n D_n / N)^2 (n / N) - (o D_o / N)^2 (o / N)) (S_n - S_o),
-// and f'(m) g t is subtracted. (To first order, this weights D_n^2 by f computed from the earlier samples,
-// and D_o^2 by f computed from the last ones.) The correction changes the weight f of a pixel by at most half
-// of f. The first round has no earlier one and is not corrected.
+// and f'(m) g t is subtracted. (To first order in the noise, this is as if D_n^2 had the weight f of the
+// earlier samples, and D_o^2 that of the last round.) The correction is limited to half of each pixel's
+// weight. The first round has no earlier one and is not corrected.
 //
 // Interval of the realised error: d - e^2 = -ab, so Var(sum of d - sum of e^2) = sum of 4 v^2 exactly,
 // whatever the distribution of a and b. Over channels it is 4 tr(V^2), with V the covariance of the channels
 // of D. Divided by the square of the sum of tr V, it depends only on how unevenly noise is spread over pixels
 // and channels:
 //   relative variance = 4 sum tr(V^2) / (sum tr V)^2.
-// It is estimated from the last round. With o samples before it and n in it, let alpha = sqrt(o / 2n) (A -
-// A_o) for one half, and beta the same for the other. Both have expectation 0 and covariance V (for
-// independent samples: Var(A - A_o) = Var(A) n / o), and they are independent, since the halves are. So
+// It is estimated from the last round. Let A_o be the mean A of the earlier samples alone, alpha = sqrt(o /
+// 2n) (A - A_o), and beta the same for B. Both have expectation 0 and covariance V (for independent samples:
+// Var(A - A_o) = Var(A) n / o), and they are independent, since the halves are. So
 //   E[(alpha . beta)^2] = tr(V^2)   and   E[(alpha . alpha + beta . beta) / 2] = tr V,
-// for each pixel separately, whatever the tails of its noise and the noise of its neighbours. The
-// alternatives are worse: fourth powers of D depend on the tails, and products of neighbours require noise
-// that varies slowly. To choose one of these two by g does not help: g depends on the pixel's own D, so large
-// D would be missing from one of the sums. With low-discrepancy points the variance of all samples together
-// is smaller than the estimate of V from the two parts, by some factor. If this factor is the same for all
-// pixels, it cancels in the relative variance.
+// for each pixel separately, whatever the tails of its noise and the noise of its neighbours. Other estimates
+// of tr(V^2) are worse: fourth powers of D depend on the tails, and products of neighbours require noise that
+// varies slowly. Choosing between these two by g would add a bias: g depends on the pixel's own D, so large D
+// would be missing from one of the sums. With low-discrepancy points the variance of all samples together is
+// smaller than V as estimated from the two parts, by some factor. If this factor is the same for all pixels,
+// it cancels in the relative variance.
 //
 // If the last round, or the rounds before it, have too few samples for this, tr(V^2) is a weighted mean of
-// two other estimates. In each pixel the first has the weight g^2, the second 1 - g^2:
+// those two other estimates, with the weights g^2 and 1 - g^2 in each pixel:
 //   From its own fourth powers, for Gaussian D: E[D_c^4] = 3 V_cc^2 and E[D_c^2 D_k^2] = V_cc V_kk (1 + 2
 //   r^2), where r is the correlation of two channels. Hence
 //     tr V^2 = sum_c E[D_c^4] / 3  +  sum_{c != k} E[D_c^2 D_k^2] r^2 / (1 + 2 r^2).
@@ -63,7 +64,7 @@
 //   pixels p, q, E[D_c D_k (p) D_c D_k (q)] / E[D_c^2 (p) D_k^2 (q)], a ratio in which image structure
 //   cancels. With heavier tails than Gaussian, E[D^4] is larger than 3 v^2.
 //
-//   From pairs of neighbours, for any distribution: E[(D(p) . D(q))^2] = tr V(p) V(q), since their D are
+//   From pairs of neighbours p, q, for any distribution: E[(D(p) . D(q))^2] = tr V(p) V(q), since their D are
 //   independent. This equals tr(V^2) where V varies slowly from pixel to pixel, as it does in smooth parts of
 //   the image, where g is small.
 // If the image's figures are not trusted (ImageError::trusted), the interval is from fourth powers alone, and
@@ -99,8 +100,8 @@ struct NoiseSums {
   double edge_channel_fourth = 0, edge_pixel_fourth = 0;
   double flat_pairs = 0;  // sum over pixels p: (1 - g^2) times the mean over neighbours q of (D(p) . D(q))^2
   double largest = 0;     // largest value of any pixel of (sum over channels of D^2)
-  // The sums for the interval of a trusted image. If the last round cannot be used, they are instead
-  // `squares` and the sum of tr(V^2) that is estimated from the sums above
+  // The sums for the interval of a trusted image. If the last round has too few samples, `squares` here is
+  // that of NoiseSums, and `products` the sum of tr(V^2) estimated from the sums above.
   ChangeSums changes;
   void add(const NoiseSums& other);
   bool operator==(const NoiseSums&) const = default;
@@ -108,7 +109,7 @@ struct NoiseSums {
 
 struct TileError {
   std::uint64_t pixels = 0;
-  std::uint64_t samples = 0;  // samples per pixel times pixels
+  std::uint64_t samples = 0;  // total of all pixels
   // Number of pixels with few hits: at least one half has almost no light although the pixel, or its
   // surroundings, have some. The pixel's light came from very few samples, so neither its value nor the
   // difference of its halves is reliable. A pixel counts if one half has 19 times as much light as the other,
@@ -125,12 +126,13 @@ struct TileError {
   bool operator==(const TileError&) const = default;
 };
 
-// Half means of a tile: R, G, B planes of rect.pixels() values each, row by row.
+// Half means of a tile: R, G, B planes of width * height values each, row by row.
 struct HalfMeans {
   int width = 0, height = 0;
   std::span<const double> a, b;
+  std::size_t pixels() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
 };
-// The half means of the same tile after fewer samples, all of which are also part of the later means.
+// The half means of the same tile after an earlier round, from a part of the same samples.
 struct EarlierMeans {
   HalfMeans halves;
   std::uint64_t spp = 0;  // samples per pixel: at least 2, and fewer than now
@@ -153,9 +155,9 @@ struct ImageError {
   double effective_pixels = 0;
   double top_share = 0;        // share of the relative error in the worst pixel
   std::uint64_t few_hits = 0;  // number of pixels with few hits
-  // False if the figures and their intervals are unreliable: no sample has found light; the halves do not
-  // differ and have fewer than 64 samples per pixel; few pixels carry the error; or single pixels differ far
-  // more than their neighbours do.
+  // False if the figures and their intervals are unreliable. This is so if no sample has found light; if the
+  // halves are equal and have fewer than 64 samples per pixel; if few pixels carry the error; or if single
+  // pixels differ far more than their neighbours.
   bool trusted = false;
   std::string verdict;  // why the figures are not trusted, in words; empty when trusted
 };
@@ -168,15 +170,15 @@ class Checkpoints {
  public:
   explicit Checkpoints(TileIndex tiles) : tiles_(tiles), waiting_(tiles) {}
 
-  // Records a tile's figures; call after each fold (addition of a round). If a round is repeated (a truncated
-  // round replaced by the full one, or a restarted tile), the figures replace the tile's figures from that
-  // round on. Complete checkpoints are final and do not change.
+  // Records a tile's figures. Call it after each fold (addition of a round's sums to the film). If a round is
+  // repeated, because the full round replaces a truncated one or the tile was restarted, the figures replace
+  // those of the tile from that round on. Complete checkpoints are final.
   void folded(TileIndex tile, RoundIndex round, const TileError& error);
   // Declares that no more rounds will follow for this tile, unless folded() is called for it again.
   void stopped(TileIndex tile);
 
-  // complete() is the number of checkpoints: rounds that every tile has reached or, having stopped earlier,
-  // will not render. at() returns the image's figures after one of these rounds.
+  // complete() is the number of complete checkpoints: a round is complete if every tile has reached it or has
+  // stopped before it. at() returns the image's figures after such a round.
   RoundIndex complete() const { return static_cast<RoundIndex>(done_.size()); }
   const TileError& at(RoundIndex round) const { return done_[round]; }
 

@@ -1,6 +1,6 @@
-// The weights of relMSE in one tile, as derived in error_estimate.h. The loops over rows have no branches, so
-// that the compiler vectorises them: the film estimates the error after every unit (a range of samples of one
-// tile), which must cost much less than rendering the unit.
+// The weights of relMSE in one tile, as derived in error_estimate.h. The film estimates the error after every
+// unit (one range of samples of one tile), and this must cost much less than rendering the unit. So the loops
+// over rows have no branches, and the compiler vectorises them.
 #pragma once
 
 #include <vector>
@@ -13,8 +13,8 @@ namespace ls {
 inline constexpr double kRelMseDenominator = 0.01;
 
 // The weights of the pixels of a tile. `roots` is the square root of the weight in each channel, `leans` the
-// derivative of the weight by the pixel's own value; both have three planes. `edges` has one plane: the
-// square of the mean of g over the channels.
+// derivative of the weight with respect to the pixel's own value; both have three planes. `edges` has one
+// plane: the square of the mean of g over the channels.
 struct RelativeWeights {
   std::vector<double> roots, leans, edges;
 };

@@ -1,6 +1,5 @@
 // The interface to OpenEXR: reads external images and writes our own. Partials have their own functions
-// (partial_exr.cpp, partial_decoder.h). No type of the library appears here, and none of its exceptions
-// escapes.
+// (partial_exr.cpp). No type of the library appears here, and none of its exceptions escapes.
 #pragma once
 
 #include <cstddef>
@@ -31,10 +30,10 @@ struct ExrLimits {
   int max_side = 65536;
 };
 
-// Reads a flat scanline or tiled EXR, half or float, with any compression. It reads the file's single part,
-// or the first part that has colour: the channels R G B, or Y alone (grey); alpha is ignored.
-// Chroma-subsampled (luminance/chroma) and deep files are rejected. `name` is for messages. Sizes are checked
-// before anything is allocated.
+// Reads a flat scanline or tiled EXR, half or float, with any compression. It reads the file's only part, or
+// the first part that has colour. The channels are R G B, or Y alone (grey); alpha is ignored. Deep files and
+// files with subsampled chroma are rejected. `name` is for messages. Sizes are checked before memory is
+// allocated.
 Result<RgbImage> read_exr_rgb(std::span<const std::byte> bytes, const std::string& name,
                               const ExrLimits& limits = {});
 // Reads a whole file. Errors: not_found, unavailable; resource_exhausted if the file has more than
@@ -55,11 +54,11 @@ Result<RgbWithError> read_exr_with_error(std::span<const std::byte> bytes, const
 
 inline constexpr float kLargestHalf = 65504;
 
-// ExrPicture is an image of several planes of the same size. The type of a plane is that of its values in
-// the file.
+// An image of several planes of the same size. The type of a plane is the type of its values in the file. The
+// caller must clamp the values of ExrHalf to at most kLargestHalf in magnitude.
 struct ExrHalf {
   std::vector<float> values;
-};  // the file has halves; the caller must clamp the values to at most kLargestHalf in magnitude
+};
 struct ExrFloat {
   std::vector<float> values;
 };
@@ -81,16 +80,17 @@ class ByteSink {
   virtual ~ByteSink() = default;
   virtual Result<void> write(std::uint64_t at, std::span<const std::byte> bytes) = 0;
 };
-// An image delivered in bands of whole rows, from the top. Each band is an ExrPicture of its rows; all bands
-// have the same channels. The strings of the first band also go into the header.
+// An image that is delivered in bands of whole rows, from the top. Each band is an ExrPicture of its rows;
+// all bands have the same channels. The strings of the first band are added to the header.
 struct ExrBands {
   FrameSize size;
   std::map<std::string, std::string> strings;
-  // Returns band 0, 1, 2, ... until all rows are delivered. It is called twice for each band, in two passes.
+  // Returns the next band, until all rows are delivered. The image is written in two passes, so this is
+  // called twice for each of the bands 0, 1, 2, ...
   std::function<ExrPicture(int band)> band;
 };
-// Writes the whole image to `sink` as one EXR file, with the seal (digests of all layers and headers, seal.h)
-// in its header.
+// Writes the image to `sink` as one EXR file with a seal (digests of all layers and headers, seal.h) in its
+// header.
 Result<void> write_sealed_exr(const ExrBands& bands, ByteSink& sink);
 
 }  // namespace ls

@@ -7,24 +7,25 @@
 #include <cmath>
 #include <limits>
 
+#include "common/image/aov/identifiers.h"
 #include "common/image/exr/exr_file.h"
 
 namespace ls {
+
 namespace {
 
-// The addition maps -0 to +0 (when rounding to nearest); all other values stay the same.
+// The addition turns -0 into +0 and changes no other value (in the rounding mode to nearest).
 float pixel_value(double mean) { return static_cast<float>(mean) + 0.0f; }
 
 struct Gathered {
-  std::size_t width;
   std::vector<float> rgb[3], standard_error[3];
   std::vector<std::uint32_t> spp;
 };
 
 Gathered gather(const Film& film) {
   const FrameSize frame = film.grid().frame;
-  const auto pixels = static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
-  Gathered out{static_cast<std::size_t>(frame.width), {}, {}, std::vector<std::uint32_t>(pixels)};
+  const std::size_t pixels = frame.pixels();
+  Gathered out{{}, {}, std::vector<std::uint32_t>(pixels)};
   for (int c = 0; c < 3; ++c) out.rgb[c].resize(pixels), out.standard_error[c].resize(pixels);
   for (TileIndex t = 0; t < film.grid().count(); ++t) {
     if (film.spp(t) == 0) continue;
@@ -32,20 +33,114 @@ Gathered gather(const Film& film) {
     // A UINT layer cannot exceed 2^32 - 1; job limits are below that.
     const auto spp = static_cast<std::uint32_t>(
         std::min<std::uint64_t>(tile.spp, std::numeric_limits<std::uint32_t>::max()));
-    std::size_t from = 0;
-    for (int y = tile.rect.y0; y < tile.rect.y1; ++y) {
-      for (int x = tile.rect.x0; x < tile.rect.x1; ++x, from += 3) {
-        const std::size_t to = static_cast<std::size_t>(y) * out.width + static_cast<std::size_t>(x);
-        for (std::size_t c = 0; c < 3; ++c) {
-          out.rgb[c][to] = pixel_value(tile.mean[from + c]);
-          out.standard_error[c][to] = static_cast<float>(tile.standard_error[from + c]);
-        }
-        out.spp[to] = spp;
+    each_pixel(tile.rect, frame, [&](std::size_t to, std::size_t from) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        out.rgb[c][to] = pixel_value(tile.mean[3 * from + c]);
+        out.standard_error[c][to] = static_cast<float>(tile.standard_error[3 * from + c]);
       }
-    }
+      out.spp[to] = spp;
+    });
   }
   return out;
 }
+
+constexpr int kCryptomatteRanks = 6;  // identifiers per pixel, those with the largest coverage
+
+// Adds a layer of half floats or of floats. Returns the number of values that were clamped, because their
+// magnitude exceeds the largest half.
+std::uint64_t add_layer(ExrPicture& picture, const std::string& name, std::vector<float> values,
+                        bool halves) {
+  if (!halves) {
+    picture.channels[name] = ExrFloat{std::move(values)};
+    return 0;
+  }
+  std::uint64_t clamped = 0;
+  for (float& v : values) {
+    if (std::abs(v) <= kLargestHalf) continue;
+    v = std::copysign(kLargestHalf, v);
+    ++clamped;
+  }
+  picture.channels[name] = ExrHalf{std::move(values)};
+  return clamped;
+}
+
+class Layers {
+ public:
+  explicit Layers(const Film& film)
+      : film_(film), frame_(film.grid().frame), planes_(planes_of(film.aovs())) {
+    sums_.assign(planes_.sums.size(), {});
+    // Two kinds of planes have no layer of their own: the number of hits, and half B of a guide (an AOV for
+    // the denoiser), whose planes follow those of half A. The layer of a guide is the sum of both halves.
+    for (std::size_t p = 0; p < sums_.size(); ++p)
+      if (p != planes_.hits && planes_.sums[p].half == 0) sums_[p].resize(frame_.pixels());
+    ids_.assign(planes_.ids.size() * 2 * kCryptomatteRanks, std::vector<float>(frame_.pixels()));
+  }
+
+  void gather() {
+    for (TileIndex t = 0; t < film_.grid().count(); ++t) {
+      if (film_.spp(t) == 0) continue;
+      const TileAovs tile = film_.aov_pixels(t);
+      gather_means(tile);
+      gather_ids(tile);
+    }
+  }
+
+  std::uint64_t move_to(ExrPicture& picture, const CryptomatteManifests& manifests, bool float_output) {
+    std::uint64_t clamped = 0;
+    for (std::size_t p = 0; p < sums_.size(); ++p) {
+      if (sums_[p].empty()) continue;
+      const AovRow& row = row_of(planes_.sums[p].aov);
+      const std::string name = fmt::format(
+          "{}.{}", layer_of(row.aov), row.components[static_cast<std::size_t>(planes_.sums[p].component)]);
+      clamped += add_layer(picture, name, std::move(sums_[p]), row.half && !float_output);
+    }
+    for (std::size_t i = 0; i < planes_.ids.size(); ++i) {
+      const std::string layer = layer_of(planes_.ids[i]);
+      for (std::size_t c = 0; c < 2 * kCryptomatteRanks; ++c)
+        picture.channels[fmt::format("{}{:02}.{}", layer, c / 4, "RGBA"[c % 4])] =
+            ExrFloat{std::move(ids_[i * 2 * kCryptomatteRanks + c])};
+      picture.strings.merge(cryptomatte_header(
+          layer, planes_.ids[i] == Aov::shape_id ? manifests.shapes : manifests.materials));
+    }
+    return clamped;
+  }
+
+ private:
+  void gather_means(const TileAovs& tile) {
+    const auto n = static_cast<std::size_t>(tile.rect.pixels());
+    const double* hits = planes_.hits == SIZE_MAX ? nullptr : &tile.sums[planes_.hits * n];
+    for (std::size_t p = 0; p < sums_.size(); ++p) {
+      if (sums_[p].empty()) continue;
+      const AovRow& row = row_of(planes_.sums[p].aov);
+      const bool by_hits = row.kind == AovKind::of_hits;
+      const double* other =
+          row.kind == AovKind::guide ? &tile.sums[(p + row.components.size()) * n] : nullptr;
+      each_pixel(tile.rect, frame_, [&](std::size_t to, std::size_t from) {
+        const double count = by_hits ? hits[from] : static_cast<double>(tile.spp);
+        const double sum = tile.sums[p * n + from] + (other ? other[from] : 0);
+        // The addition maps -0 to +0; all other values stay the same.
+        if (count > 0) sums_[p][to] = static_cast<float>(sum / count) + 0.f;
+      });
+    }
+  }
+  void gather_ids(const TileAovs& tile) {
+    const auto n = static_cast<std::size_t>(tile.rect.pixels());
+    for (std::size_t i = 0; i < planes_.ids.size(); ++i)
+      each_pixel(tile.rect, frame_, [&](std::size_t to, std::size_t from) {
+        const IdSlots slots = load_slots(&tile.ids[i * kIdPlanes * n + from], n);
+        for (std::size_t rank = 0; rank < kCryptomatteRanks; ++rank) {
+          std::vector<float>* channel = &ids_[(i * kCryptomatteRanks + rank) * 2];
+          channel[0][to] = slots.slots[rank].id;
+          channel[1][to] = static_cast<float>(double{slots.slots[rank].n} / static_cast<double>(tile.spp));
+        }
+      });
+  }
+
+  const Film& film_;
+  FrameSize frame_;
+  AovPlanes planes_;
+  std::vector<std::vector<float>> sums_, ids_;
+};
 
 std::string tile_digests(const Film& film) {
   std::string out;
@@ -91,6 +186,20 @@ std::uint64_t values_above_half(const Film& film) {
   return above;
 }
 
+std::string layer_of(Aov aov) {
+  if (aov == Aov::shape_id) return "crypto_object";
+  if (aov == Aov::material_id) return "crypto_material";
+  return std::string(row_of(aov).name);
+}
+
+std::uint64_t add_aov_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
+                             ExrPicture& picture) {
+  if (film.aovs().empty()) return 0;
+  Layers layers(film);
+  layers.gather();
+  return layers.move_to(picture, manifests, float_output);
+}
+
 ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
                         std::uint64_t* clamped) {
   Gathered planes = gather(film);
@@ -99,9 +208,7 @@ ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests,
   std::uint64_t above = 0;
   for (int c = 0; c < 3; ++c) {
     const std::string layer = fmt::format("stderr.{}", kRgb[c]);
-    if (!float_output) above += clamp_to_half(planes.rgb[c]);
-    if (float_output) picture.channels[kRgb[c]] = ExrFloat{std::move(planes.rgb[c])};
-    if (!float_output) picture.channels[kRgb[c]] = ExrHalf{std::move(planes.rgb[c])};
+    above += add_layer(picture, kRgb[c], std::move(planes.rgb[c]), !float_output);
     picture.channels[layer] = ExrFloat{std::move(planes.standard_error[c])};
   }
   picture.channels["spp"] = ExrUint{std::move(planes.spp)};
@@ -141,7 +248,7 @@ std::map<std::string, std::string> strings_of(const Film& film, const Provenance
                                                 {"lightshaft:class", from.numeric_class.hex()},
                                                 {"lightshaft:tiles", tile_digests(film)}};
   strings.merge(error_strings(film.error(), film.pixels_without_samples()));
-  // The convergence curve may show problems that the film alone does not show.
+  // The convergence of the error over time may show problems that the film alone does not show.
   if (auto verdict = strings.find("lightshaft:verdict");
       verdict != strings.end() && verdict->second == "trusted" && from.convergence_status &&
       !from.convergence_status->trusted)
@@ -166,12 +273,7 @@ std::uint64_t add_denoised(std::span<const float> denoised, const TileGrid& grid
   for (std::size_t c = 0; c < 3; ++c) {
     std::vector<float> plane(pixels);
     for (std::size_t i = 0; i < pixels; ++i) plane[i] = pixel_value(double{denoised[3 * (first + i) + c]});
-    const std::string name = fmt::format("denoised.{}", "RGB"[c]);
-    if (!float_output) clamped += clamp_to_half(plane);
-    if (float_output)
-      band.channels[name] = ExrFloat{std::move(plane)};
-    else
-      band.channels[name] = ExrHalf{std::move(plane)};
+    clamped += add_layer(band, fmt::format("denoised.{}", "RGB"[c]), std::move(plane), !float_output);
   }
   return clamped;
 }

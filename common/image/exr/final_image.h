@@ -1,4 +1,4 @@
-// The outputs of a film: the final EXR, its pixel digest, and a preview PNG.
+// The outputs of a film: the final EXR, its pixel digest, a preview and maps as PNG.
 #pragma once
 
 #include <array>
@@ -13,17 +13,23 @@
 #include "common/base/digest.h"
 #include "common/base/error.h"
 #include "common/image/error/convergence.h"
-#include "common/image/exr/aov_layers.h"
+#include "common/image/exr/exr_file.h"
 #include "common/image/film/film.h"
 
 namespace ls {
 
-// Returns the SHA-256 over the pixels as float32((sumA + sumB) / (nA + nB)), where sums and counts are those
-// of the two halves of the samples. The division is in double, and -0 is replaced by +0. The order is R, G, B
-// of each pixel, row by row, little endian. Pixels without samples are zero.
+// Returns the SHA-256 of the pixels: float32((sumA + sumB) / (nA + nB)), where sums and counts are those of
+// the two halves of the samples. The division is in double, and -0 is replaced by +0. The order is R, G, B of
+// each pixel, row by row, little endian. Pixels without samples are zero.
 Digest pixels_sha256(const Film& film);
 
-// The text of the note (Provenance::notes) called `fake`, for an image that contains results of fake workers.
+// Cryptomatte manifests of the identifier layers (cryptomatte.h); empty: no manifest.
+struct CryptomatteManifests {
+  std::string shapes, materials;
+};
+
+// A fake worker (--fake, for tests) sends generated pixels. This is the text of the note `fake`
+// (Provenance::notes) in an image that contains such pixels.
 inline constexpr const char* kFakePixels = "the pixels are made up by fake workers (--fake), not rendered";
 
 // The values of the header strings `lightshaft:...` of the final EXR that do not come from the film.
@@ -36,7 +42,7 @@ struct Provenance {
   std::string settings_json;  // canonical RenderSettings
   std::string build;
   Digest numeric_class;
-  // from here on, nullopt means unknown; unknown values are not written
+  // In the following, nullopt means unknown. Unknown values are not written.
   std::optional<std::uint64_t> seed = {};
   std::optional<double> seconds = {};  // render time
   // "clean", or canonical_json() of the Health; empty: unknown, and not written.
@@ -45,8 +51,9 @@ struct Provenance {
   double core_seconds = 0;  // CPU seconds of all units; 0: unknown, and not written
   // Why sampling stopped before the requested samples, and the consequences; empty: not written
   std::string stopped = {};
-  std::optional<ConvergenceStatus> convergence_status =
-      {};  // judged by the convergence curve, which the film does not have; used for `:verdict`
+  // A judgement from the error over time, which the film does not have. If it says not to trust the figures,
+  // `:verdict` does, too.
+  std::optional<ConvergenceStatus> convergence_status = {};
   std::map<std::string, double> figures = {};     // further numbers, by the name after "lightshaft:"
   std::map<std::string, std::string> notes = {};  // further texts, by the name after "lightshaft:"
 };
@@ -58,19 +65,28 @@ struct FinalImage {
 // the number of clamped values to `clamped`.
 ExrPicture final_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
                         std::uint64_t* clamped = nullptr);
+// Returns the name of a layer: that of the AOV, or "crypto_object", "crypto_material".
+std::string layer_of(Aov aov);
+
+// Adds the film's AOVs to `picture`: channels NAME.R, NAME.X, ... and, for identifiers, NAME00.R to NAME02.A
+// with their header strings. Pixels without a surface are 0 in the AOVs of surfaces (AovKind::of_hits,
+// of_all and ids). Returns the number of values whose magnitude exceeded 65504, the largest half.
+std::uint64_t add_aov_layers(const Film& film, const CryptomatteManifests& manifests, bool float_output,
+                             ExrPicture& picture);
+
 // Makes the final EXR; the film may be unfinished. Its layers are half (or with `float_output` float) R, G,
 // B, FLOAT stderr.R, stderr.G, stderr.B, UINT spp, the film's AOVs, and denoised.R, denoised.G, denoised.B if
 // `denoised` is not empty: the denoised image, R, G, B of each pixel of the whole frame, row by row. All are
 // sealed in `lightshaft:seal` (seal.h).
 Result<FinalImage> final_exr(const Film& film, const Provenance& provenance, bool float_output,
                              std::span<const float> denoised = {});
-// Writes the bytes of final_exr() to `sink`, one row of tiles at a time, so that a large image is never in
-// memory as a whole. Returns the number of clamped values.
+// Writes the bytes that final_exr() returns to `sink`, one row of tiles at a time, so that a large image is
+// never in memory as a whole. Returns the number of clamped values.
 Result<std::uint64_t> write_final_exr(const Film& film, const Provenance& provenance, bool float_output,
                                       ByteSink& sink, std::span<const float> denoised = {});
 
-// Returns the header strings about the error, by full name, of an image whose tiles have the sums `sums`;
-// `lightshaft:verdict` is based on the pixels only. Without samples there are no such strings.
+// Returns the header strings about the error of an image, by full name. `sums` are those of its tiles.
+// `lightshaft:verdict` is based on the pixels only. If there are no samples, there are no such strings.
 std::map<std::string, std::string> error_strings(const TileError& sums, std::uint64_t pixels_without_samples);
 
 // Returns the number of values of R, G and B that a half image would clamp.
@@ -101,5 +117,26 @@ Result<std::vector<std::byte>> write_png(FrameSize size, std::span<const std::ui
 // instead of the film's.
 Result<std::vector<std::byte>> preview_png(const Film& film, double exposure_stops,
                                            std::span<const float> denoised = {});
+
+// False-colour maps of an image's error and of its sample counts.
+//
+// Both use the same ramp from dark blue over green to yellow, on a logarithmic scale:
+//   error: each pixel's relative standard error. Its square is the mean over channels of D^2 / (S^2 + 0.01),
+//     with D the standard error and S the value of the pixel. The square is averaged over 3 x 3 pixels of the
+//     tile, because a single pixel's difference of two halves is unreliable.
+//     An error of 10^-3 or less has the lowest colour, 1 or more the highest: three decades.
+//   samples: 2 samples per pixel have the lowest colour, 2^14 the highest: thirteen doublings.
+// Magenta in the error map: pixels with too few hits (error_estimate.h). Tiles without samples are grey. The
+// maps have the image's size, so that they can be overlaid on it.
+inline constexpr double kMapLeastError = 1e-3, kMapMostError = 1;       // relative standard error
+inline constexpr double kMapLeastSamples = 2, kMapMostSamples = 16384;  // per pixel
+
+// Maps t from 0 to 1 to a colour. Lightness increases with t, so that the map can be read without seeing
+// hues.
+std::array<std::uint8_t, 3> map_colour(double t);
+inline constexpr std::array<std::uint8_t, 3> kFewHitsColour = {255, 0, 255}, kNoSampleColour = {96, 96, 96};
+
+Result<std::vector<std::byte>> error_map_png(const Film& film);
+Result<std::vector<std::byte>> samples_map_png(const Film& film);
 
 }  // namespace ls

@@ -1,4 +1,4 @@
-#include "common/image/exr/headers.h"
+#include "common/image/exr/memory.h"
 
 #include <fmt/format.h>
 
@@ -7,20 +7,22 @@
 #include <iterator>
 #include <optional>
 
+#include "common/base/bytes.h"
 #include "common/base/safe_text.h"
-#include "common/image/exr/byte_cursor.h"
 
 namespace ls::exr {
 namespace {
 
 constexpr std::uint32_t kMagic = 20000630, kTiledFlag = 0x200, kMultiPartFlag = 0x1000;
 constexpr std::size_t kMaxNameBytes = 255;
-// The library allocates a chunk's buffers before it reads the chunk. For chunks above this size the file must
-// be long enough to contain them: the best compression in the format is a few thousand to one (deflate:
-// 1032).
+constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 30;
+constexpr int kMaxParts = 256;
+// The library allocates a chunk's buffers before it reads the chunk. For chunks above kFreeChunkBytes the
+// file must therefore be long enough to contain them if they are compressed by kMostPacking. The best
+// compression in the format is a few thousand to one (deflate: 1032).
 constexpr std::uint64_t kFreeChunkBytes = std::uint64_t{64} << 20;
 constexpr double kMostPacking = 4096;
-// Smallest entry of a channel list: a name of one letter, the terminating zero, four int32
+// Size of the smallest entry of a channel list: a name of one letter, the terminating zero, four int32.
 constexpr std::size_t kLeastChannelBytes = 18;
 
 struct Part {
@@ -36,10 +38,10 @@ struct Part {
 constexpr std::int64_t kLines[] = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
 
 void note(std::string_view name, std::span<const std::byte> raw, Part& part) {
-  ByteCursor in(raw);
+  ByteReader in(raw);
   if (name == "dataWindow" && raw.size() == 16) {
-    const std::int64_t x0 = *in.value<std::int32_t>(), y0 = *in.value<std::int32_t>(),
-                       x1 = *in.value<std::int32_t>(), y1 = *in.value<std::int32_t>();
+    const std::int64_t x0 = *in.take<std::int32_t>(), y0 = *in.take<std::int32_t>(),
+                       x1 = *in.take<std::int32_t>(), y1 = *in.take<std::int32_t>();
     part.width = x1 - x0 + 1;
     part.height = y1 - y0 + 1;
   } else if (name == "compression" && raw.size() == 1) {
@@ -48,10 +50,10 @@ void note(std::string_view name, std::span<const std::byte> raw, Part& part) {
   } else if (name == "channels") {
     part.channels = raw.size() / kLeastChannelBytes;
   } else if (name == "tiles" && raw.size() == 9) {
-    part.tile_width = *in.value<std::uint32_t>();
-    part.tile_height = *in.value<std::uint32_t>();
+    part.tile_width = *in.take<std::uint32_t>();
+    part.tile_height = *in.take<std::uint32_t>();
   } else if (name == "chunkCount" && raw.size() == 4) {
-    part.chunk_count = *in.value<std::int32_t>();
+    part.chunk_count = *in.take<std::int32_t>();
   }
 }
 
@@ -85,41 +87,41 @@ constexpr Fixed kFixed[] = {{"box2i", 16},
                             {"v3d", 24}};
 
 // Checks a list of channels: each a name followed by 16 bytes, and an empty name at the end.
-bool channel_list(ByteCursor in) {
+bool channel_list(ByteReader in) {
   while (const auto name = in.name(kMaxNameBytes)) {
     if (name->empty()) return in.left() == 0;
-    if (!in.take(16)) return false;
+    if (!in.bytes(16)) return false;
   }
   return false;
 }
 
 // Checks a list of strings, each preceded by its length.
-bool strings(ByteCursor in) {
+bool strings(ByteReader in) {
   while (in.left() > 0) {
-    const auto length = in.value<std::int32_t>();
-    if (!length || *length < 0 || !in.take(static_cast<std::size_t>(*length))) return false;
+    const auto length = in.take<std::int32_t>();
+    if (!length || *length < 0 || !in.bytes(static_cast<std::size_t>(*length))) return false;
   }
   return true;
 }
 
 // Checks a preview: width, height, and four bytes per pixel.
-bool preview(ByteCursor in) {
-  const auto width = in.value<std::uint32_t>(), height = in.value<std::uint32_t>();
+bool preview(ByteReader in) {
+  const auto width = in.take<std::uint32_t>(), height = in.take<std::uint32_t>();
   return width && height && std::uint64_t{*width} * *height <= in.left() / 4 &&
          std::uint64_t{*width} * *height * 4 == in.left();
 }
 
-// Checks the size of an attribute's value against its type. The library reads most types by their contents
-// instead of the size in the header; if the two disagree, it continues at a wrong position, where any four
-// bytes may become the size of a buffer to allocate. Always true for unknown types, whose bytes the library
-// just keeps.
+// Checks the size of an attribute's value against its type. For most types the library ignores the size in
+// the header and reads as many bytes as the type or the contents require. If the two disagree, it continues
+// at a wrong position, where any four bytes may become the size of a buffer to allocate. Unknown types are
+// always accepted, since the library keeps their bytes as they are.
 bool fills_its_size(std::string_view type, std::span<const std::byte> value) {
   const auto* fixed =
       std::find_if(std::begin(kFixed), std::end(kFixed), [&](const Fixed& f) { return f.type == type; });
   if (fixed != std::end(kFixed)) return value.size() == fixed->bytes;
-  if (type == "chlist") return channel_list(ByteCursor(value));
-  if (type == "stringvector") return strings(ByteCursor(value));
-  if (type == "preview") return preview(ByteCursor(value));
+  if (type == "chlist") return channel_list(ByteReader(value));
+  if (type == "stringvector") return strings(ByteReader(value));
+  if (type == "preview") return preview(ByteReader(value));
   if (type == "floatvector") return value.size() % 4 == 0;
   return true;
 }
@@ -130,7 +132,7 @@ class Scan {
       : in_(file), file_bytes_(file.size()), name_(name), limits_(limits) {}
 
   Result<void> run() {
-    const auto magic = in_.value<std::uint32_t>(), version = in_.value<std::uint32_t>();
+    const auto magic = in_.take<std::uint32_t>(), version = in_.take<std::uint32_t>();
     if (!magic || !version || *magic != kMagic) return refuse("not an EXR file");
     tiled_ = *version & kTiledFlag;
     const bool many = *version & kMultiPartFlag;
@@ -159,9 +161,9 @@ class Scan {
         return std::optional<Part>(part);
       }
       const auto type = in_.name(kMaxNameBytes);
-      const auto size = in_.value<std::int32_t>();
+      const auto size = in_.take<std::int32_t>();
       if (!type || !size || *size < 0) return refuse("its header is cut off or damaged");
-      const auto raw = in_.take(static_cast<std::size_t>(*size));
+      const auto raw = in_.bytes(static_cast<std::size_t>(*size));
       if (!raw) return refuse(fmt::format("the header claims {} bytes, more than the file has", *size));
       if (!fills_its_size(*type, *raw))
         return refuse(fmt::format("its attribute '{}' is not as long as the header says", plain_text(*name)));
@@ -185,7 +187,7 @@ class Scan {
     };
     const std::uint64_t chunks =
         tiles ? up(w, part.tile_width) * up(h, part.tile_height) : up(h, part.lines_per_chunk);
-    // The table of chunks has 8 bytes per chunk; further mip levels make it longer, not shorter.
+    // The chunk table has 8 bytes per chunk. Further mip levels make it longer, not shorter.
     if (chunks > in_.left() / 8 || part.chunk_count < 0 ||
         static_cast<std::uint64_t>(part.chunk_count) > in_.left() / 8)
       return refuse(fmt::format("the file ends too early for {} x {} pixels", w, h));
@@ -204,7 +206,7 @@ class Scan {
     return {};
   }
 
-  ByteCursor in_;
+  ByteReader in_;
   const std::size_t file_bytes_;
   const std::string& name_;
   const ExrLimits& limits_;

@@ -1,4 +1,4 @@
-// OpenEXR streams over memory. Used by the files of this folder only.
+// OpenEXR over memory, and checks of what it reads. Used by the files of this folder only.
 #pragma once
 
 #include <ImfIO.h>
@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "common/base/error.h"
+#include "common/image/exr/exr_file.h"
 
 namespace ls::exr {
 
@@ -72,8 +73,8 @@ inline void set_up_library() {
   std::call_once(once, [] { Imf::setGlobalThreadCount(0); });
 }
 
-// Calls f, which returns a Result<T>. An exception of the library becomes an error with this code and the
-// message `what: reason`.
+// Calls f, which returns a Result<T>. An exception of the library becomes an error with the given code and
+// the message `what: reason`.
 template <class F>
 auto guarded(Errc code, const std::string& what, F&& f) -> decltype(f()) {
   try {
@@ -87,5 +88,12 @@ auto guarded(Errc code, const std::string& what, F&& f) -> decltype(f()) {
     return fail(Errc::internal, fmt::format("{}: unknown exception", what));
   }
 }
+
+// Checks an EXR's headers before the library reads the file. The library allocates tables, buffers and
+// strings of the sizes that the headers claim, and a file of a few hundred bytes can claim terabytes. Checked
+// are that every part's size is within `limits`, that every attribute lies inside the file and is as long as
+// its type requires, that every chunk table fits into the file, and that the buffer of one chunk has at most
+// 2^30 bytes. The library checks everything else.
+Result<void> check_headers(std::span<const std::byte> file, const std::string& name, const ExrLimits& limits);
 
 }  // namespace ls::exr

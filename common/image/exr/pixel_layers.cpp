@@ -9,9 +9,9 @@
 #include <cstring>
 #include <limits>
 
-#include "common/image/aov/id_slots.h"
+#include "common/image/aov/identifiers.h"
 #include "common/image/error/relative_weights.h"
-#include "common/image/exr/aov_layers.h"
+#include "common/image/exr/final_image.h"
 
 namespace ls {
 namespace {
@@ -26,7 +26,7 @@ PixelLayer layer_of_aov(Aov aov) {
   PixelLayer layer{.name = layer_of(aov), .channels = {}, .rule = BlockRule::mean, .half = true, .aov = aov};
   if (row.kind == AovKind::ids) {
     layer.rule = BlockRule::first;
-    layer.half = false;  // half floats cannot represent identifiers, which are the bits of a float
+    layer.half = false;  // a half float cannot represent the bits of an identifier
     for (std::size_t rank = 0; rank < kShownRanks; ++rank)
       for (const char* of : {"id", "coverage"}) layer.channels.push_back(fmt::format("{}{}", of, rank));
   } else {
@@ -55,8 +55,8 @@ std::vector<float> means(const TileAovs& tile, const AovPlanes& planes, const Ao
   for (std::size_t plane = 0; plane < planes.sums.size(); ++plane) {
     const AovPlane& p = planes.sums[plane];
     if (p.hits || p.aov != row.aov || p.half != 0) continue;
-    // A guide (an AOV for the denoiser) has planes for half A of the samples, then for half B. They are
-    // added.
+    // A guide (an AOV for the denoiser) has planes for half A of the samples, then planes for half B. The two
+    // are added.
     const double* other = row.kind == AovKind::guide ? &tile.sums[(plane + channels) * n] : nullptr;
     for (std::size_t i = 0; i < n; ++i) {
       const double count = row.kind == AovKind::of_hits ? hits[i] : static_cast<double>(tile.spp);
@@ -92,17 +92,8 @@ std::vector<float> narrowed(const std::vector<double>& values) {
 }  // namespace
 
 std::string_view to_string(BlockRule rule) {
-  switch (rule) {
-    case BlockRule::mean:
-      return "mean";
-    case BlockRule::error_of_mean:
-      return "error_of_mean";
-    case BlockRule::root_mean_square:
-      return "root_mean_square";
-    case BlockRule::first:
-      return "first";
-  }
-  return "";
+  static constexpr std::string_view kNames[] = {"mean", "error_of_mean", "root_mean_square", "first"};
+  return kNames[static_cast<std::size_t>(rule)];
 }
 
 std::vector<PixelLayer> pixel_layers(AovSet aovs) {
@@ -122,7 +113,7 @@ Result<PixelLayer> pixel_layer(AovSet aovs, std::string_view name) {
     if (layer.name == name) return std::move(layer);
     known += (known.empty() ? "" : ", ") + layer.name;
   }
-  return fail(Errc::invalid_argument, fmt::format("'layer' must be one of this image's: {}", known));
+  return bad_argument(fmt::format("'layer' must be one of this image's: {}", known));
 }
 
 FrameSize level_size(FrameSize frame, int level) {
@@ -137,17 +128,14 @@ PixelRect rect_in_image(FrameSize frame, int level, const PixelRect& rect) {
 
 Result<void> check_layer_rect(FrameSize frame, int level, const PixelRect& rect) {
   if (level < 0 || level > kMaxLayerLevel)
-    return fail(Errc::invalid_argument, fmt::format("'level' must be from 0 to {}", kMaxLayerLevel));
+    return bad_argument(fmt::format("'level' must be from 0 to {}", kMaxLayerLevel));
   const FrameSize size = level_size(frame, level);
-  if (rect.x0 < 0 || rect.y0 < 0 || rect.x1 > size.width || rect.y1 > size.height || rect.x0 >= rect.x1 ||
-      rect.y0 >= rect.y1)
-    return fail(Errc::invalid_argument,
-                fmt::format("'rect' must be x0,y0,x1,y1 within 0,0,{},{}, the size of level {}", size.width,
-                            size.height, level));
+  if (!lies_in(size, rect))
+    return bad_argument(fmt::format("'rect' must be x0,y0,x1,y1 within 0,0,{},{}, the size of level {}",
+                                    size.width, size.height, level));
   if (rect.width() > kMaxLayerSide || rect.height() > kMaxLayerSide ||
       rect.pixels() << (2 * level) > kMaxLayerPixels)
-    return fail(
-        Errc::invalid_argument,
+    return bad_argument(
         fmt::format("'rect' may have at most {0} pixels on a side and {1} pixels in all, at level {2}; "
                     "ask for parts of it",
                     kMaxLayerSide, kMaxLayerPixels >> (2 * level), level));

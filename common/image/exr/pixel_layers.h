@@ -41,15 +41,16 @@ std::vector<PixelLayer> pixel_layers(AovSet aovs);
 // Returns the layer of this name. invalid_argument: there is no such layer; the message lists the layers.
 Result<PixelLayer> pixel_layer(AovSet aovs, std::string_view name);
 
-// Limits of one request: pixels on a side of the answer, and pixels of the image that these represent.
+// Limits of one request: pixels per side of the answer, and pixels of the image that the answer represents.
 inline constexpr int kMaxLayerSide = 512;
 inline constexpr std::int64_t kMaxLayerPixels = std::int64_t{1} << 20;
-inline constexpr int kMaxLayerLevel = 10;  // at this level one pixel represents kMaxLayerPixels
+inline constexpr int kMaxLayerLevel =
+    10;  // at this level one pixel represents kMaxLayerPixels pixels of the image
 
 FrameSize level_size(FrameSize frame, int level);
 // Returns the pixels of the image that a rectangle of a mip level represents.
 PixelRect rect_in_image(FrameSize frame, int level, const PixelRect& rect);
-// Returns invalid_argument if the rectangle is empty, outside of the level or too large; the message contains
+// Returns invalid_argument if the rectangle is empty, not inside the level or too large. The message contains
 // the bounds.
 Result<void> check_layer_rect(FrameSize frame, int level, const PixelRect& rect);
 
@@ -68,15 +69,16 @@ class TileLayers {
   AovPlanes planes_;
 };
 
-// A rectangle of a layer at one mip level, put together from tiles.
+// A rectangle of a layer at one mip level, assembled from tiles.
 class LayerMosaic {
  public:
   LayerMosaic(PixelLayer layer, FrameSize frame, int level, PixelRect rect);
-  // Adds pixels of `level`, which is at most the level of the mosaic. Pixels outside of the mosaic are left
-  // out. `values`: the channels of each pixel of `rect`, row by row; if it is empty, nothing is added.
+  // Adds pixels of mip level `level`, which must not be above that of the mosaic. Pixels outside the mosaic
+  // are ignored. `values`: the channels of each pixel of `rect`, row by row; if it is empty, nothing is
+  // added.
   void add(int level, const PixelRect& rect, std::span<const float> values);
-  // Returns the channels of each pixel, row by row, as half floats or floats, little endian. Values that a
-  // half cannot represent are clamped to 65504 in magnitude.
+  // Returns the channels of each pixel, row by row, as half floats or floats, little endian. Values above
+  // 65504 in magnitude, the largest half, are clamped to it.
   std::vector<std::byte> bytes() const;
 
  private:

@@ -16,10 +16,10 @@
 namespace ls::exr {
 namespace {
 
-// Attributes that the seal does not cover: two about the storage of the pixels, and the seal itself.
+// Attributes that the seal does not cover: two that describe how the pixels are stored, and the seal itself.
 constexpr std::array<std::string_view, 3> kLeftOut = {"compression", "lineOrder", kSealName};
 
-// Returns the lines of a seal, keyed by the layer or header that they cover. A line of unknown form is its
+// Returns the digests in a seal, keyed by the layer or header that they cover. A line of unknown form is its
 // own key.
 std::map<std::string, std::string> lines_of(const std::string& seal) {
   constexpr std::size_t kDigits = 64;
@@ -75,7 +75,7 @@ std::vector<std::string> differences(const std::string& sealed, const std::strin
       if (found == theirs->end() || found->second != digest) names.insert(name);
     }
   std::vector<std::string> out(names.begin(), names.end());
-  // The texts differ although they list the same digests: the seal itself was changed.
+  // The texts differ, but have the same digests for the same names: the seal itself was changed.
   if (out.empty() && sealed != now) out.emplace_back(fmt::format("header {}", kSealName));
   return out;
 }

@@ -1,9 +1,9 @@
 // The seal of a final EXR is the header string `lightshaft:seal`. It has a line "SHA-256 header NAME" for
 // every header attribute that it covers, then a line "SHA-256 layer NAME" for every layer, both sorted by
-// name. A layer's digest is over its values row by row, as 32-bit little-endian numbers (halves as floats);
-// an attribute's digest is over its type, a zero and its bytes in the file. The seal does not cover itself,
-// nor the attributes about how the file stores its pixels (compression, order of lines), so repacking does
-// not break it. Used by the files of this folder only.
+// name. A layer's digest is over its values row by row, as 32-bit little-endian numbers (halves as floats).
+// An attribute's digest is over its type, a zero byte and its bytes in the file. The seal does not cover
+// itself, nor the attributes about the storage of the pixels (compression, order of lines), so it stays valid
+// if the file is repacked. Used by the files of this folder only.
 #pragma once
 
 #include <ImfHeader.h>

@@ -15,7 +15,7 @@
 namespace ls {
 namespace {
 
-// A fast level: higher levels hardly compress noise better, and users wait for images
+// A low level: higher levels hardly compress noise better, and users wait for the image.
 constexpr int kZipLevel = 2;
 
 std::vector<half> to_half(const std::vector<float>& values) {
@@ -33,20 +33,18 @@ Imf::PixelType type_of(const std::variant<ExrHalf, ExrFloat, ExrUint>& channel) 
 
 Result<void> check(const ExrPicture& picture) {
   const FrameSize size = picture.size;
-  if (size.width < 1 || size.height < 1)
-    return fail(Errc::invalid_argument, "writing an EXR: the image is empty");
-  const auto pixels = static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
+  if (size.width < 1 || size.height < 1) return bad_argument("writing an EXR: the image is empty");
   for (const auto& [name, channel] : picture.channels)
-    if (std::visit([](const auto& c) { return c.values.size(); }, channel) != pixels)
+    if (std::visit([](const auto& c) { return c.values.size(); }, channel) != size.pixels())
       return fail(Errc::internal, fmt::format("writing an EXR: channel {} has the wrong size", name));
   return {};
 }
 
-// Writes rows, the first of which is row y0 of the file.
+// Writes rows to the file; the first of them is the file's row y0.
 void write_rows(Imf::OutputFile& file, const ExrPicture& rows, int y0) {
   Imf::FrameBuffer buffer;
-  // when the outer vector grows, it moves the inner ones without copying their values, so the slices stay
-  // valid
+  // If the outer vector grows, it moves the inner ones without copying their values. So the pointers in the
+  // slices stay valid.
   std::vector<std::vector<half>> halves;
   const auto add = [&](const std::string& name, Imf::PixelType type, const void* data) {
     buffer.insert(name, Imf::Slice::Make(type, data, {0, y0}, rows.size.width, rows.size.height));
@@ -88,10 +86,11 @@ Result<void> each_band(const ExrBands& bands, Take take) {
   return {};
 }
 
-// The seal is in the header, which precedes the data that it covers, so the bands are generated twice.
+// The seal is in the header, which the file has before the data that the seal covers. So the bands are
+// generated twice: for the seal, and for the file.
 Result<void> write_bands(Imf::OStream& out, const ExrBands& bands) {
   if (bands.size.width < 1 || bands.size.height < 1)
-    return fail(Errc::invalid_argument, "writing an EXR: the image is empty");
+    return bad_argument("writing an EXR: the image is empty");
   std::optional<Imf::Header> header;
   exr::Seal seal;
   const auto read = each_band(bands, [&](const ExrPicture& rows, int) {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "common/base/check.h"
-#include "common/image/aov/id_slots.h"
+#include "common/image/aov/identifiers.h"
 
 namespace ls {
 namespace {
@@ -20,8 +20,8 @@ Digest chained(const Digest& chain, const Digest& unit) {
   return hash.finish();
 }
 
-// Adds the identifiers of `from` to those in `to`. Each has kIdPlanes planes of `pixels` values for every AOV
-// of identifiers.
+// Adds the identifiers of `from` to those of `to`. Both have kIdPlanes planes of `pixels` values for every
+// AOV of identifiers.
 void add_ids(std::vector<float>& to, std::span<const float> from, std::size_t pixels) {
   for (std::size_t first = 0; first < to.size(); first += kIdPlanes * pixels)
     for (std::size_t i = first; i < first + pixels; ++i)
@@ -44,20 +44,17 @@ std::uint64_t Film::Tile::spp() const { return tail ? tail->samples.s1 : full_sp
 
 Result<void> Film::accepts(TileIndex index, RoundIndex round, const Partial& partial) const {
   if (index >= tiles_.size())
-    return fail(Errc::invalid_argument,
-                fmt::format("tile {} does not exist; the film has {}", index, tiles_.size()));
+    return bad_argument(fmt::format("tile {} does not exist; the film has {}", index, tiles_.size()));
   const PixelRect rect = grid_.rect(index);
   const SampleRange full = round_range(round), got = partial.header.samples;
   if (partial.aovs != aovs_)
-    return fail(Errc::invalid_argument,
-                fmt::format("the partial of tile {} has other AOVs than the film", index));
+    return bad_argument(fmt::format("the partial of tile {} has other AOVs than the film", index));
   if (partial.header.tile != rect ||
       partial.sums.size() != static_cast<std::size_t>(rect.pixels()) * (planes_.sums + planes_.ids))
-    return fail(Errc::invalid_argument,
-                fmt::format("the partial's rectangle or size is not that of tile {}", index));
+    return bad_argument(fmt::format("the partial's rectangle or size is not that of tile {}", index));
   if (got.s0 != full.s0 || got.s1 <= got.s0 || got.s1 > full.s1 || got.s1 % 2 != 0)
-    return fail(Errc::invalid_argument, fmt::format("tile {}: samples {} are not of round {}, which has {}",
-                                                    index, show(got), round, show(full)));
+    return bad_argument(fmt::format("tile {}: samples {} are not of round {}, which has {}", index, show(got),
+                                    round, show(full)));
   const RoundIndex next = full_rounds(index);
   if (round > next)
     return fail(Errc::failed_precondition,
@@ -117,9 +114,8 @@ std::array<std::vector<double>, 2> Film::halves(const Tile& tile, std::size_t pi
 
 std::array<std::vector<double>, 2> Film::means(const Tile& tile, std::size_t pixels, bool with_tail) {
   auto out = halves(tile, pixels, with_tail);
-  const double samples =
-      // Samples of each half; the number of all samples is even
-      static_cast<double>((with_tail ? tile.spp() : tile.full_spp()) / 2);
+  // Samples of each half; the number of all samples is even.
+  const double samples = static_cast<double>((with_tail ? tile.spp() : tile.full_spp()) / 2);
   for (auto& half : out) {
     double* values = half.data();
     const std::size_t count = half.size();

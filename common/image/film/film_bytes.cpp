@@ -2,36 +2,34 @@
 // full rounds; 32 bytes digest chain; u64 s0, s1 of the tail (0, 0: no tail); 32 bytes digest of the tail;
 // f64 TileError::skew; 2 f64 plain.changes; 2 f64 relative.changes; the full rounds: 6 colour planes and the
 // planes of AOV sums as doubles, then the planes of identifiers as floats; the tail, if there is one: the
-// same planes, all as floats; SHA-256 of all bytes before it. The error figures that need the tile before
-// its last round are stored; the others are recomputed.
+// same planes, all as floats; SHA-256 of all bytes before it. The stored figures of TileError are those that
+// depend on the tile before its last round; the others are computed again.
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <string_view>
 
+#include "common/base/bytes.h"
 #include "common/image/film/film.h"
-#include "common/image/frame/render_limits.h"
 
 namespace ls {
 namespace {
 
-static_assert(std::endian::native == std::endian::little);
 constexpr std::string_view kTileMagic = "LSTILE03";
 
 class Writer {
  public:
   explicit Writer(std::string_view magic) { put(std::as_bytes(std::span(magic))); }
   void put(std::span<const std::byte> raw) { bytes_.insert(bytes_.end(), raw.begin(), raw.end()); }
-  template <class T>
-  void value(const T& v) {
-    put(std::as_bytes(std::span(&v, 1)));
+  template <class... T>
+  void values(const T&... v) {
+    (put(std::as_bytes(std::span(&v, 1))), ...);
   }
   void reserve(std::size_t bytes) { bytes_.reserve(bytes); }
   std::vector<std::byte> close() {
-    value(sha256(std::span<const std::byte>(bytes_)).bytes);
+    values(sha256(std::span<const std::byte>(bytes_)).bytes);
     return std::move(bytes_);
   }
 
@@ -40,56 +38,27 @@ class Writer {
 };
 
 tl::unexpected<Error> damaged(std::string_view what) {
-  return fail(Errc::invalid_argument, fmt::format("saved film: {}; render again from the partials", what));
+  return bad_argument(fmt::format("saved film: {}; render again from the partials", what));
 }
 
-class Reader {
- public:
-  // Checks the magic and the checksum, and returns a reader of the bytes in between.
-  static Result<Reader> open(std::span<const std::byte> bytes, std::string_view magic) {
-    if (bytes.size() < magic.size() + 32) return damaged("cut off");
-    if (std::memcmp(bytes.data(), magic.data(), magic.size()) != 0)
-      return damaged(fmt::format("does not begin with {} (another version?)", magic));
-    const auto body = bytes.first(bytes.size() - 32);
-    if (std::memcmp(sha256(body).bytes.data(), bytes.data() + body.size(), 32) != 0)
-      return damaged("its checksum is wrong");
-    return Reader(body.subspan(magic.size()));
-  }
-  std::size_t left() const { return bytes_.size(); }
-  // Reads a number. Past the end it returns zero, so callers must check ok() or left().
-  template <class T>
-  T value() {
-    T v{};
-    const auto raw = take(sizeof(T));
-    if (!raw.empty()) std::memcpy(&v, raw.data(), sizeof(T));
-    return v;
-  }
-  std::span<const std::byte> take(std::uint64_t n) {
-    if (n > bytes_.size()) {
-      ok_ = false;
-      return {};
-    }
-    const auto head = bytes_.first(static_cast<std::size_t>(n));
-    bytes_ = bytes_.subspan(static_cast<std::size_t>(n));
-    return head;
-  }
-  bool ok() const { return ok_; }
-
- private:
-  explicit Reader(std::span<const std::byte> bytes) : bytes_(bytes) {}
-  std::span<const std::byte> bytes_;
-  bool ok_ = true;
-};
+// Checks the magic and the checksum, and returns a reader of the bytes in between.
+Result<ByteReader> open_saved(std::span<const std::byte> bytes, std::string_view magic) {
+  if (bytes.size() < magic.size() + 32) return damaged("cut off");
+  if (!as_text(bytes).starts_with(magic))
+    return damaged(fmt::format("does not begin with {} (another version?)", magic));
+  const auto body = bytes.first(bytes.size() - 32);
+  if (std::memcmp(sha256(body).bytes.data(), bytes.data() + body.size(), 32) != 0)
+    return damaged("its checksum is wrong");
+  return ByteReader(body.subspan(magic.size()));
+}
 
 template <class T>
-bool read_finite(Reader& in, std::vector<T>& out, std::size_t count) {
-  const auto raw = in.take(count * sizeof(T));
-  if (raw.empty()) return count == 0;
+bool read_finite(ByteReader& in, std::vector<T>& out, std::size_t count) {
+  const auto raw = in.bytes(count * sizeof(T));
+  if (!raw) return false;
   out.resize(count);
-  std::memcpy(out.data(), raw.data(), raw.size());
-  for (const T v : out)
-    if (!std::isfinite(v)) return false;
-  return true;
+  if (count > 0) std::memcpy(out.data(), raw->data(), raw->size());
+  return std::all_of(out.begin(), out.end(), [](T v) { return std::isfinite(v); });
 }
 
 bool sound(const ChangeSums& sums) {
@@ -105,15 +74,8 @@ std::vector<std::byte> Film::tile_bytes(const Tile* tile, TileIndex index) {
   out.reserve(256 + tile->sums.size() * sizeof(double) + tile->ids.size() * sizeof(float) +
               (tile->tail ? tile->tail->sums.size() * sizeof(float) : 0));
   const Tail tail = tile->tail.value_or(Tail{});
-  out.value(index);
-  out.value(tile->full_rounds);
-  out.value(tile->chain.bytes);
-  out.value(tail.samples.s0);
-  out.value(tail.samples.s1);
-  out.value(tail.digest.bytes);
-  out.value(tile->error.skew);
-  out.value(tile->error.plain.changes);
-  out.value(tile->error.relative.changes);
+  out.values(index, tile->full_rounds, tile->chain.bytes, tail.samples.s0, tail.samples.s1, tail.digest.bytes,
+             tile->error.skew, tile->error.plain.changes, tile->error.relative.changes);
   out.put(std::as_bytes(std::span(tile->sums)));
   out.put(std::as_bytes(std::span(tile->ids)));
   out.put(std::as_bytes(std::span(tail.sums)));
@@ -122,26 +84,26 @@ std::vector<std::byte> Film::tile_bytes(const Tile* tile, TileIndex index) {
 
 Result<std::shared_ptr<const Film::Tile>> Film::parse_tile(TileIndex index,
                                                            std::span<const std::byte> bytes) const {
-  auto opened = Reader::open(bytes, kTileMagic);
+  auto opened = open_saved(bytes, kTileMagic);
   if (!opened) return tl::unexpected(opened.error());
-  Reader& in = *opened;
-  if (in.value<TileIndex>() != index) return damaged(fmt::format("it is not tile {}", index));
+  ByteReader& in = *opened;
+  // Sets the numbers. Those after the end of the bytes become zero; then the sums cannot be read either.
+  const auto read = [&]<class... T>(T&... to) { ((to = in.take<T>().value_or(T{})), ...); };
+  TileIndex stored = 0;
   auto tile = std::make_shared<Tile>();
-  tile->full_rounds = in.value<RoundIndex>();
-  tile->chain.bytes = in.value<decltype(Digest::bytes)>();
   Tail tail;
-  tail.samples.s0 = in.value<std::uint64_t>();
-  tail.samples.s1 = in.value<std::uint64_t>();
-  tail.digest.bytes = in.value<decltype(Digest::bytes)>();
-  const auto skew = in.value<double>();
-  const auto plain = in.value<ChangeSums>(), relative = in.value<ChangeSums>();
+  double skew = 0;
+  ChangeSums plain, relative;
+  read(stored, tile->full_rounds, tile->chain.bytes, tail.samples.s0, tail.samples.s1, tail.digest.bytes,
+       skew, plain, relative);
+  if (stored != index) return damaged(fmt::format("it is not tile {}", index));
   const bool has_tail = tail.samples.s1 != 0;
   const PixelRect rect = grid_.rect(index);
   const auto pixels = static_cast<std::size_t>(rect.pixels()), sums = pixels * planes_.sums,
              ids = pixels * planes_.ids;
-  if (!in.ok() || !std::isfinite(skew) || !sound(plain) || !sound(relative) ||
-      !read_finite(in, tile->sums, sums) || !read_finite(in, tile->ids, ids) ||
-      (has_tail && !read_finite(in, tail.sums, sums + ids)) || in.left() != 0)
+  if (!std::isfinite(skew) || !sound(plain) || !sound(relative) || !read_finite(in, tile->sums, sums) ||
+      !read_finite(in, tile->ids, ids) || (has_tail && !read_finite(in, tail.sums, sums + ids)) ||
+      in.left() != 0)
     return damaged(fmt::format("tile {} has the wrong size or a value that is not finite", index));
   const SampleRange full = round_range(tile->full_rounds);
   if (has_tail && (tail.samples.s0 != full.s0 || tail.samples.s1 <= full.s0 || tail.samples.s1 >= full.s1))
@@ -163,8 +125,7 @@ std::function<std::vector<std::byte>()> Film::saver(TileIndex index) const {
 
 Result<void> Film::load_tile(TileIndex index, std::span<const std::byte> bytes) {
   if (index >= tiles_.size())
-    return fail(Errc::invalid_argument,
-                fmt::format("tile {} does not exist; the film has {}", index, tiles_.size()));
+    return bad_argument(fmt::format("tile {} does not exist; the film has {}", index, tiles_.size()));
   if (bytes.empty()) {
     discard(index);
     return {};

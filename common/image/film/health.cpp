@@ -77,7 +77,7 @@ HealthCause cause_named(std::string_view word) {
   return HealthCause::unnamed;
 }
 
-// Returns the sum, or the largest number if it overflows: another process may send any count.
+// Returns the sum, or the largest number if the sum overflows, since another process may send any counts.
 std::uint64_t sum(std::uint64_t a, std::uint64_t b) {
   return a > std::numeric_limits<std::uint64_t>::max() - b ? std::numeric_limits<std::uint64_t>::max()
                                                            : a + b;
@@ -89,14 +89,16 @@ std::string grouped(std::uint64_t n) {
   return s;
 }
 
-Error bad_health(std::string_view what) { return {Errc::invalid_argument, fmt::format("health: {}", what)}; }
+tl::unexpected<Error> bad_health(std::string_view what) {
+  return bad_argument(fmt::format("health: {}", what));
+}
 
 Result<HealthLocation> location_from(const json& j) {
   constexpr auto kMost = static_cast<std::uint64_t>(std::numeric_limits<int>::max());
   const auto number = [&](std::size_t i) { return j[i].is_number_unsigned(); };
   if (!j.is_array() || j.size() != 3 || !number(0) || !number(1) || !number(2) ||
       j[0].get<std::uint64_t>() > kMost || j[1].get<std::uint64_t>() > kMost)
-    return tl::unexpected(bad_health("a place must be [x, y, sample]"));
+    return bad_health("a place must be [x, y, sample]");
   return HealthLocation{j[0].get<int>(), j[1].get<int>(), j[2].get<std::uint64_t>()};
 }
 
@@ -160,8 +162,8 @@ std::string canonical_json(const Health& health) {
 
 Result<Health> parse_health(std::string_view text) {
   constexpr std::size_t kMostBytes = 64 << 10, kMostCauses = 64;
-  if (text.size() > kMostBytes) return tl::unexpected(bad_health("the text is too long"));
-  // Texts of this program are nested four levels deep. The callback drops deeper levels before they take
+  if (text.size() > kMostBytes) return bad_health("the text is too long");
+  // The texts of canonical_json() have four nested levels. The callback drops deeper ones before they need
   // stack or memory.
   bool deep = false;
   const auto shallow = [&](int depth, json::parse_event_t, json&) {
@@ -169,14 +171,13 @@ Result<Health> parse_health(std::string_view text) {
     return depth <= 4;
   };
   const json j = json::parse(text, shallow, false);
-  if (deep || !j.is_object() || j.size() > kMostCauses)
-    return tl::unexpected(bad_health("it must be an object of causes"));
+  if (deep || !j.is_object() || j.size() > kMostCauses) return bad_health("it must be an object of causes");
   Health health;
   for (const auto& [word, value] : j.items()) {
     const auto count = value.find("count"), first = value.find("first");
     if (!value.is_object() || count == value.end() || !count->is_number_unsigned() || first == value.end() ||
         !first->is_array() || first->size() > kHealthLocations)
-      return tl::unexpected(bad_health("a cause must have its count and at most 8 places"));
+      return bad_health("a cause must have its count and at most 8 places");
     Health one;
     const HealthCause cause = cause_named(word);
     one.add(cause, count->get<std::uint64_t>());
@@ -185,8 +186,7 @@ Result<Health> parse_health(std::string_view text) {
       const auto location = location_from(place);
       if (!location) return tl::unexpected(location.error());
       auto& list = one.causes[cause].first;
-      if (!list.empty() && !(list.back() < *location))
-        return tl::unexpected(bad_health("places must ascend"));
+      if (!list.empty() && !(list.back() < *location)) return bad_health("places must ascend");
       list.push_back(*location);
     }
     health.merge(one);
@@ -197,14 +197,13 @@ Result<Health> parse_health(std::string_view text) {
 Result<void> check_health(const Health& health, const PixelRect& rect, const SampleRange& samples) {
   const auto most = static_cast<std::uint64_t>(rect.pixels()) * samples.count();
   if (health.nonfinite > most || health.negative > most)
-    return tl::unexpected(bad_health(
-        fmt::format("{} rejected and {} negative samples of {}", health.nonfinite, health.negative, most)));
+    return bad_health(
+        fmt::format("{} rejected and {} negative samples of {}", health.nonfinite, health.negative, most));
   for (const auto& [cause, entry] : health.causes)
     for (const HealthLocation& s : entry.first)
       if (s.x < rect.x0 || s.x >= rect.x1 || s.y < rect.y0 || s.y >= rect.y1 || s.sample < samples.s0 ||
           s.sample >= samples.s1)
-        return tl::unexpected(
-            bad_health(fmt::format("pixel {},{} sample {} is not of this unit", s.x, s.y, s.sample)));
+        return bad_health(fmt::format("pixel {},{} sample {} is not of this unit", s.x, s.y, s.sample));
   return {};
 }
 

@@ -1,4 +1,4 @@
-// Numeric health of the rendered samples: which problems occurred, how often, and where first. A Health
+// Numeric health of the rendered samples: the problems that occurred, how often, and where first. A Health
 // without problems is empty and allocates nothing. It depends only on the samples: merging gives the same
 // result in any order.
 #pragma once
@@ -16,12 +16,12 @@
 
 namespace ls {
 
-// The causes of bad health. A new cause needs an entry here and a row in health.cpp (the compiler reports a
-// missing one). Causes are stored and sent by the names in these rows, so their order here may change.
+// The causes of bad health. A new cause needs an entry here and a row in health.cpp (without it the build
+// fails). Causes are stored and sent by the names in these rows, so their order here may change.
 enum class HealthCause : std::uint8_t {
   none,  // used for a good sample; a Health never contains it
-  // Causes of rejected samples. Such a sample is counted and contributes zero to the sums. It remains one of
-  // the pixel's N samples and is not replaced.
+  // Causes of rejected samples. A rejected sample is counted, contributes zero to the sums, and is not
+  // replaced: it remains one of the pixel's N samples.
   unnamed,  // the sender named no cause, or a cause that is unknown here
   not_a_number,
   infinite,
@@ -31,7 +31,7 @@ enum class HealthCause : std::uint8_t {
   nested_media,  // the path was inside more media at once than it can store
   // Causes of samples that are counted but kept, because rejecting them would bias the result.
   negative,
-  // a density exceeded the bound (majorant) of its cell; each occurrence counts
+  // A density exceeded the bound (majorant) of its cell. Each occurrence counts.
   majorant_violation,
   // Values of the scene that were corrected. They are the same for all units (ranges of samples of one tile)
   // of a job, and have no pixel.
@@ -66,14 +66,14 @@ struct HealthEntry {
 };
 
 struct Health {
-  // Totals over the causes: `nonfinite` counts all rejected samples, the other two the cause of that name.
+  // Totals: `nonfinite` counts all rejected samples, the other two the cause of the same name.
   std::uint64_t nonfinite = 0, negative = 0, majorant_violations = 0;
   std::map<HealthCause, HealthEntry> causes;
 
   bool clean() const { return causes.empty(); }
   void add(HealthCause cause, std::uint64_t count);
   void add(HealthCause cause, std::uint64_t count, const HealthLocation& location);
-  // Merges the health of other samples of the same job: counts add up, except those of HealthEffect::input,
+  // Adds the health of other samples of the same job. Counts are added, except those of HealthEffect::input,
   // which are the same in both.
   void merge(const Health& other);
   bool operator==(const Health&) const = default;

@@ -25,9 +25,7 @@ struct ByPlace {
 };
 using Tiles = std::map<PixelRect, std::vector<Entry>, ByPlace>;
 
-tl::unexpected<Error> refuse(std::string text) {
-  return fail(Errc::invalid_argument, "merge: " + std::move(text));
-}
+tl::unexpected<Error> refuse(std::string text) { return bad_argument("merge: " + std::move(text)); }
 
 class Merger {
  public:
@@ -59,8 +57,8 @@ class Merger {
     return file;
   }
 
-  // The first pass: reads the headers of the partials and checks that they belong together. Pixels are
-  // dropped.
+  // The first pass reads the headers of the partials and checks that they belong together. It does not keep
+  // pixels.
   Result<void> index(std::size_t i) {
     const auto file = read(i);
     if (!file) return tl::unexpected(file.error());
@@ -84,8 +82,7 @@ class Merger {
     return {};
   }
 
-  // Returns the tiling. The side of the largest tile is the side of all tiles; every partial's rectangle must
-  // then fit the tiling.
+  // Returns the tiling. Its tiles have the side of the largest partial, and every partial must fit it.
   Result<TileGrid> tiling() const {
     const TileGrid grid{frame_, tile_side_};
     const std::uint64_t tiles = std::uint64_t(grid.columns()) * std::uint64_t(grid.rows());
@@ -105,8 +102,8 @@ class Merger {
 
   const std::string& name(const Entry& e) const { return sources_[e.source].name; }
 
-  // Chooses which partials of one tile are folded. Partials with the same range of samples must be equal. Of
-  // the partials that begin at the same sample, the one with the longest range is kept.
+  // Chooses the partials of one tile to fold. Partials with the same range of samples must be equal. Of the
+  // partials that begin at the same sample, the one with the longest range is kept.
   Result<std::vector<Entry>> choose(std::vector<Entry> entries) {
     std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
       return std::tie(a.samples.s0, b.samples.s1) < std::tie(b.samples.s0, a.samples.s1);

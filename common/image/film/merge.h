@@ -26,11 +26,11 @@ struct Merged {
 };
 
 // Groups the partials by tile and folds those of a tile in the order of their first sample (s0). If a tile
-// has both a full round (range of samples) and a truncated one, uses the full one. Keeps the pixels of one
-// partial in memory at a time. Errors name the files: partials of different scenes, settings or numeric
-// classes (machines of one class compute the same bits); frames or AOVs that differ; tiles that do not fit
-// one tiling; gaps and overlaps in a tile's samples; duplicates that differ; tiles of the frame without a
-// partial.
+// has both a full and a truncated version of a round (range of samples), the full one is used. Only the
+// pixels of one partial are in memory at a time. These are errors, which name the files: partials of
+// different scenes, settings or numeric classes (machines of one class compute the same bits); frames or AOVs
+// that differ; tiles that do not fit one tiling; gaps and overlaps in a tile's samples; different partials of
+// the same range; tiles of the frame without a partial.
 Result<Merged> merge_partials(const std::vector<PartialSource>& sources);
 
 }  // namespace ls

@@ -32,16 +32,17 @@ Result<UnitHeader> parse_unit_header(std::string_view json);
 
 struct Partial {
   UnitHeader header;
-  // Six planes of tile.pixels() floats each, row by row, followed by those of planes_of(aovs). Values are
-  // sums, never averages; the number of samples of each half follows from the range, and AOVs are sums over
-  // both halves. Every value is finite (a non-finite sample is counted and contributes zero).
+  // Six colour planes of tile.pixels() floats each, row by row, followed by those of planes_of(aovs). Values
+  // are sums, not averages; the number of samples of each half follows from the range. AOVs are sums over
+  // both halves, except for guides (aov.h). Every value is finite (a non-finite sample is counted and
+  // contributes zero).
   std::vector<float> sums;
   AovSet aovs;  // as requested in the settings
   bool operator==(const Partial&) const = default;
 };
 
-// Returns the SHA-256 over the header's canonical JSON followed by all planes (little endian). It does not
-// depend on the bytes of a file.
+// Returns the SHA-256 over the header's canonical JSON and all planes (little endian). It does not depend on
+// the encoding in a file.
 Digest unit_digest(const Partial& partial);
 
 // Encodes a partial as an EXR file: scanline, uncompressed, FLOAT; the dataWindow is the tile, the
@@ -49,10 +50,10 @@ Digest unit_digest(const Partial& partial);
 // planes_of(aovs).
 Result<std::vector<std::byte>> encode_partial(const Partial& partial, FrameSize frame);
 
-// Decodes a file made by encode_partial() for the unit `expected`, which must equal the header in the file;
-// `aovs` determines the required channels. Anything else is an error that names the fault: other windows,
-// channels, compression, part counts or sizes, non-finite sums, impossible identifiers and counts, trailing
-// data.
+// Decodes a file made by encode_partial() for the unit `expected`, which must equal the header in the file.
+// `aovs` determines the required channels. All other files are errors, whose message names the fault: other
+// windows, channels, compression, part counts or sizes, non-finite sums, impossible identifiers and counts,
+// trailing data.
 Result<Partial> decode_partial(std::span<const std::byte> exr, const UnitHeader& expected, FrameSize frame,
                                AovSet aovs = {});
 

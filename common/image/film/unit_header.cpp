@@ -11,34 +11,32 @@ namespace {
 
 constexpr std::size_t kMaxHeaderJson = 1024;  // in bytes; our own headers have about 320
 
-Error bad(std::string_view what) {
-  return Error{Errc::invalid_argument, fmt::format("unit header: {}", what)};
+tl::unexpected<Error> bad(std::string_view what) {
+  return bad_argument(fmt::format("unit header: {}", what));
 }
 
 Result<Digest> digest_at(const nlohmann::json& json, const char* key) {
   const auto it = json.find(key);
-  if (it == json.end() || !it->is_string())
-    return tl::unexpected(bad(fmt::format("'{}' must be a string", key)));
+  if (it == json.end() || !it->is_string()) return bad(fmt::format("'{}' must be a string", key));
   const auto digest = Digest::parse(it->get_ref<const std::string&>());
-  if (!digest) return tl::unexpected(bad(fmt::format("'{}' must be 64 lower-case hexadecimal digits", key)));
+  if (!digest) return bad(fmt::format("'{}' must be 64 lower-case hexadecimal digits", key));
   return *digest;
 }
 
 Result<std::uint64_t> sample_at(const nlohmann::json& json, const char* key) {
   const auto it = json.find(key);
   if (it == json.end() || !it->is_number_unsigned())
-    return tl::unexpected(bad(fmt::format("'{}' must be a whole number, not negative", key)));
+    return bad(fmt::format("'{}' must be a whole number, not negative", key));
   const auto value = it->get<std::uint64_t>();
   if (value % 2 != 0)
-    return tl::unexpected(bad(fmt::format("'{}' is {}, but sample ranges end at even numbers", key, value)));
+    return bad(fmt::format("'{}' is {}, but sample ranges end at even numbers", key, value));
   return value;
 }
 
 Result<PixelRect> rect_at(const nlohmann::json& json, const char* key) {
   const auto it = json.find(key);
   const auto error = [&] {
-    return tl::unexpected(
-        bad(fmt::format("'{}' must be [x0,y0,x1,y1] with 0 <= x0 < x1, 0 <= y0 < y1", key)));
+    return bad(fmt::format("'{}' must be [x0,y0,x1,y1] with 0 <= x0 < x1, 0 <= y0 < y1", key));
   };
   if (it == json.end() || !it->is_array() || it->size() != 4) return error();
   int v[4];
@@ -61,10 +59,9 @@ std::string canonical_json(const UnitHeader& h) {
 }
 
 Result<UnitHeader> parse_unit_header(std::string_view text) {
-  if (text.size() > kMaxHeaderJson)
-    return tl::unexpected(bad(fmt::format("longer than {} bytes", kMaxHeaderJson)));
+  if (text.size() > kMaxHeaderJson) return bad(fmt::format("longer than {} bytes", kMaxHeaderJson));
   const auto json = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (json.is_discarded() || !json.is_object()) return tl::unexpected(bad("not a JSON object"));
+  if (json.is_discarded() || !json.is_object()) return bad("not a JSON object");
   const auto scene = digest_at(json, "scene"), settings = digest_at(json, "settings"),
              numeric = digest_at(json, "class");
   for (const auto* d : {&scene, &settings, &numeric})
@@ -72,15 +69,15 @@ Result<UnitHeader> parse_unit_header(std::string_view text) {
   const auto s0 = sample_at(json, "s0"), s1 = sample_at(json, "s1");
   for (const auto* s : {&s0, &s1})
     if (!*s) return tl::unexpected(s->error());
-  if (*s0 >= *s1) return tl::unexpected(bad(fmt::format("sample range [{}, {}) is empty", *s0, *s1)));
+  if (*s0 >= *s1) return bad(fmt::format("sample range [{}, {}) is empty", *s0, *s1));
   const auto tile = rect_at(json, "tile");
   if (!tile) return tl::unexpected(tile.error());
 
   const UnitHeader header{*scene, *settings, *numeric, *tile, {*s0, *s1}};
-  // The unit digest covers these bytes, so their form must be unique.
+  // The unit digest covers these bytes, so the same header must always have the same bytes.
   if (canonical_json(header) != text)
-    return tl::unexpected(bad(
-        "not in canonical form (sorted keys class, s0, s1, scene, settings, tile; no spaces; nothing else)"));
+    return bad(
+        "not in canonical form (sorted keys class, s0, s1, scene, settings, tile; no spaces; nothing else)");
   return header;
 }
 

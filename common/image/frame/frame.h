@@ -1,17 +1,20 @@
-// Pixel rectangles and the tiling of a frame.
+// Pixel rectangles, and the tiling of a frame.
 #pragma once
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace ls {
 
 struct FrameSize {
   int width = 0;
   int height = 0;
+  std::size_t pixels() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
   bool operator==(const FrameSize&) const = default;
 };
 
@@ -43,5 +46,32 @@ struct TileGrid {
   }
   bool operator==(const TileGrid&) const = default;
 };
+
+// True if the rectangle is not empty and lies inside the frame.
+inline bool lies_in(FrameSize frame, const PixelRect& rect) {
+  return 0 <= rect.x0 && rect.x0 < rect.x1 && rect.x1 <= frame.width && 0 <= rect.y0 && rect.y0 < rect.y1 &&
+         rect.y1 <= frame.height;
+}
+
+// Returns the tiles that have pixels in `rect`, row by row. The rectangle must lie in the frame.
+inline std::vector<TileIndex> tiles_over(const TileGrid& grid, const PixelRect& rect) {
+  std::vector<TileIndex> out;
+  for (int row = rect.y0 / grid.tile; row * grid.tile < rect.y1; ++row)
+    for (int column = rect.x0 / grid.tile; column * grid.tile < rect.x1; ++column)
+      out.push_back(static_cast<TileIndex>(row) * static_cast<TileIndex>(grid.columns()) +
+                    static_cast<TileIndex>(column));
+  return out;
+}
+
+// Calls put(to, from) for each pixel of the tile, row by row. `to` is its index in the frame, `from` its
+// index in the tile.
+template <class Put>
+void each_pixel(const PixelRect& rect, FrameSize frame, Put put) {
+  std::size_t from = 0;
+  for (int y = rect.y0; y < rect.y1; ++y)
+    for (int x = rect.x0; x < rect.x1; ++x, ++from)
+      put(static_cast<std::size_t>(y) * static_cast<std::size_t>(frame.width) + static_cast<std::size_t>(x),
+          from);
+}
 
 }  // namespace ls

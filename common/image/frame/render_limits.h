@@ -7,7 +7,7 @@
 namespace ls {
 
 inline constexpr int kMaxFrameSide = 32768;  // pixels
-// 67 million: the film's sums then take 3.2 GB
+// 67 million pixels; the film's sums then take 3.2 GB.
 inline constexpr std::int64_t kMaxFramePixels = std::int64_t{1} << 26;
 inline constexpr std::uint32_t kMaxTiles = std::uint32_t{1} << 22;
 inline constexpr std::uint64_t kMaxSpp = std::uint64_t{1} << 24;

@@ -1,6 +1,6 @@
-// Rounds are ranges of a tile's sample indices: with 2, 2, 4, 8, 16, 32 samples per pixel, then with 64 each.
-// The grouping is fixed: it does not depend on the number of samples, cost or timing. So any two jobs add up
-// the same samples in the same groups, and their sums in double are equal bit for bit.
+// A round is a range of a tile's sample indices. The rounds have 2, 2, 4, 8, 16, 32 samples per pixel, then
+// 64 each. This grouping is fixed: it does not depend on the number of samples, cost or timing. So any two
+// jobs add up the same samples in the same groups, and their sums in double are equal bit for bit.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,8 @@ constexpr SampleRange round_range(RoundIndex k) {
   return {64 * static_cast<std::uint64_t>(k - 5), 64 * static_cast<std::uint64_t>(k - 4)};
 }
 
-// Returns the samples per pixel that are rendered: odd numbers are rounded up to even, to at least 2.
+// Returns the number of samples per pixel that is rendered for a requested number: the next even number, at
+// least 2.
 constexpr std::uint64_t even_spp(std::uint64_t spp) { return std::max<std::uint64_t>(2, spp + (spp & 1)); }
 
 // Returns the number of rounds of an image with `spp` samples; its last round may be truncated.
@@ -38,8 +39,7 @@ constexpr RoundIndex round_count(std::uint64_t spp) {
   return static_cast<RoundIndex>((n + 63) / 64 + 5);
 }
 
-// Returns the samples of round k of an image with `spp` samples: the full range, or the rest of the `spp`
-// samples.
+// Returns the samples of round k of an image with `spp` samples: the full range, truncated at `spp`.
 constexpr SampleRange cut_range(RoundIndex k, std::uint64_t spp) {
   SampleRange r = round_range(k);
   r.s1 = std::min(r.s1, even_spp(spp));

@@ -6,14 +6,175 @@
 #include <numbers>
 
 #include "common/base/check.h"
-#include "common/image/reference/flip_filters.h"
 
 namespace ls {
 namespace {
 
-using flip::Planes;
+// ---- spatial filters: each a sum of separable filters ----
 
-// Conversions from linear RGB (Rec. 709 primaries, D65 white) to CIE XYZ and back, and this white in XYZ.
+class Planes {  // three planes: Y, Cx, Cz
+ public:
+  explicit Planes(FrameSize size) : size_(size) {
+    for (auto& plane : planes_) plane.resize(pixels());
+  }
+  FrameSize size() const { return size_; }
+  std::size_t pixels() const { return size_.pixels(); }
+  std::vector<float>& operator[](std::size_t i) { return planes_[i]; }
+  const std::vector<float>& operator[](std::size_t i) const { return planes_[i]; }
+
+ private:
+  FrameSize size_;
+  std::array<std::vector<float>, 3> planes_;
+};
+
+using Plane = std::vector<float>;
+using Kernel = std::vector<float>;  // of odd length; the middle element is the weight of the pixel itself
+
+constexpr double kPi = std::numbers::pi;
+
+// Computes out[x] = sum over i of kernel[i] in[x + i - radius] along rows; values at the ends are repeated.
+Plane along_rows(const Plane& in, FrameSize size, const Kernel& kernel) {
+  const auto width = static_cast<std::size_t>(size.width), radius = kernel.size() / 2;
+  Plane out(in.size()), padded(width + 2 * radius);
+  for (std::size_t y = 0; y < static_cast<std::size_t>(size.height); ++y) {
+    const float* row = &in[y * width];
+    std::fill_n(padded.begin(), radius, row[0]);
+    std::copy_n(row, width, padded.begin() + static_cast<std::ptrdiff_t>(radius));
+    std::fill_n(padded.end() - static_cast<std::ptrdiff_t>(radius), radius, row[width - 1]);
+    float* to = &out[y * width];
+    for (std::size_t i = 0; i < kernel.size(); ++i)
+      for (std::size_t x = 0; x < width; ++x) to[x] += kernel[i] * padded[x + i];
+  }
+  return out;
+}
+
+Plane along_columns(const Plane& in, FrameSize size, const Kernel& kernel) {
+  const auto width = static_cast<std::size_t>(size.width);
+  const int radius = static_cast<int>(kernel.size() / 2);
+  Plane out(in.size());
+  for (int y = 0; y < size.height; ++y) {
+    float* to = &out[static_cast<std::size_t>(y) * width];
+    for (int i = -radius; i <= radius; ++i) {
+      const float* row = &in[static_cast<std::size_t>(std::clamp(y + i, 0, size.height - 1)) * width];
+      const float weight = kernel[static_cast<std::size_t>(i + radius)];
+      for (std::size_t x = 0; x < width; ++x) to[x] += weight * row[x];
+    }
+  }
+  return out;
+}
+
+// A term of the contrast sensitivity filter, a sqrt(pi / b) exp(-pi^2 x^2 / b) with x in degrees; it is
+// applied along both axes.
+struct Sensitivity {
+  double a, b;
+};
+constexpr std::array<std::array<Sensitivity, 2>, 3> kSensitivity = {
+    {{{{1, .0047}, {0, 1e-5}}}, {{{1, .0053}, {0, 1e-5}}}, {{{34.1, .04}, {13.5, .025}}}}};
+
+int contrast_radius(double ppd) {
+  constexpr double kWidest = .04;
+  return static_cast<int>(std::ceil(3 * std::sqrt(kWidest / (2 * kPi * kPi)) * ppd));
+}
+
+Kernel gaussian(double b, int radius, double ppd) {
+  Kernel out;
+  for (int x = -radius; x <= radius; ++x)
+    out.push_back(static_cast<float>(std::exp(-kPi * kPi * (x / ppd) * (x / ppd) / b)));
+  return out;
+}
+
+Plane filtered(const Plane& in, FrameSize size, const std::array<Sensitivity, 2>& of, double ppd) {
+  const int radius = contrast_radius(ppd);
+  Plane sum(in.size());
+  double whole = 0;
+  std::array<double, 2> level{};
+  std::array<Kernel, 2> kernels;
+  for (std::size_t k = 0; k < 2; ++k) {
+    level[k] = of[k].a * std::sqrt(kPi / of[k].b);
+    kernels[k] = gaussian(of[k].b, radius, ppd);
+    double line = 0;
+    for (const float v : kernels[k]) line += v;
+    whole += level[k] * line * line;
+  }
+  for (std::size_t k = 0; k < 2; ++k) {
+    if (level[k] == 0) continue;
+    const Plane part = along_columns(along_rows(in, size, kernels[k]), size, kernels[k]);
+    const auto weight = static_cast<float>(level[k] / whole);
+    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += weight * part[i];
+  }
+  return sum;
+}
+
+// Filters for features: a Gaussian of a feature's width, and its derivatives ([LDR] section 4.2). The
+// derivatives are normalised over the window, so that positive weights sum to 1 and negative ones to -1.
+struct FeatureKernels {
+  Kernel across;       // the Gaussian, for the axis across the derivative; sums to 1
+  Kernel edge, point;  // first and second derivative
+};
+
+void balance(Kernel& kernel) {
+  double positive = 0, negative = 0;
+  for (const float v : kernel) (v > 0 ? positive : negative) += v;
+  for (float& v : kernel) v = static_cast<float>(v > 0 ? v / positive : -v / negative);
+}
+
+FeatureKernels feature_kernels(double ppd) {
+  constexpr double kWidth = .082;  // width of a feature in degrees
+  const double sigma = .5 * kWidth * ppd;
+  const int radius = static_cast<int>(std::ceil(3 * sigma));
+  FeatureKernels out;
+  double sum = 0;
+  for (int x = -radius; x <= radius; ++x) sum += std::exp(-x * x / (2 * sigma * sigma));
+  for (int x = -radius; x <= radius; ++x) {
+    const double g = std::exp(-x * x / (2 * sigma * sigma));
+    out.across.push_back(static_cast<float>(g / sum));
+    out.edge.push_back(static_cast<float>(-x * g));
+    out.point.push_back(static_cast<float>((x * x / (sigma * sigma) - 1) * g));
+  }
+  balance(out.edge);
+  balance(out.point);
+  return out;
+}
+
+Plane strength(const Plane& grey, FrameSize size, const Kernel& along, const Kernel& across) {
+  const Plane x = along_columns(along_rows(grey, size, along), size, across),
+              y = along_columns(along_rows(grey, size, across), size, along);
+  Plane out(grey.size());
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = std::sqrt(x[i] * x[i] + y[i] * y[i]);
+  return out;
+}
+
+// Returns the image with every plane filtered by the contrast sensitivity function ([LDR] equations (3), (4),
+// table 1).
+Planes contrast_filtered(const Planes& image, float pixels_per_degree) {
+  Planes out(image.size());
+  for (std::size_t c = 0; c < 3; ++c)
+    out[c] = filtered(image[c], image.size(), kSensitivity[c], pixels_per_degree);
+  return out;
+}
+
+// Returns max(|edge_r - edge_t|, |point_r - point_t|) of each pixel, from the first plane of the reference
+// (r) and of the image (t) ([LDR] equations (10) to (12)).
+std::vector<float> feature_difference(const Planes& reference, const Planes& image, float pixels_per_degree) {
+  const FeatureKernels kernels = feature_kernels(pixels_per_degree);
+  const auto grey = [](const Planes& planes) {
+    Plane out = planes[0];
+    for (float& v : out) v = (v + 16) / 116;
+    return out;
+  };
+  const Plane r = grey(reference), t = grey(image);
+  Plane out(r.size());
+  for (const Kernel* along : {&kernels.edge, &kernels.point}) {
+    const Plane a = strength(r, reference.size(), *along, kernels.across),
+                b = strength(t, image.size(), *along, kernels.across);
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = std::max(out[i], std::abs(a[i] - b[i]));
+  }
+  return out;
+}
+
+// ---- colours ----
+
+// Conversions between linear RGB (Rec. 709 primaries, D65 white) and CIE XYZ, and this white in XYZ.
 constexpr float kToXyz[3][3] = {{10135552.F / 24577794.F, 8788810.F / 24577794.F, 4435075.F / 24577794.F},
                                 {2613072.F / 12288897.F, 8788810.F / 12288897.F, 887015.F / 12288897.F},
                                 {1425312.F / 73733382.F, 8788810.F / 73733382.F, 70074185.F / 73733382.F}};
@@ -35,7 +196,8 @@ Triple times(const float (&m)[3][3], const Triple& v) {
 
 float shown(float v) { return v > 0 ? std::min(v, 1.F) : 0.F; }  // NaN becomes 0, too
 
-// Linearised CIELAB, in which contrast sensitivity is defined ([LDR] equation (2)).
+// Returns the colour in linearised CIELAB, the space in which contrast sensitivity is defined ([LDR] equation
+// (2)).
 Triple opponent(const Triple& rgb) {
   Triple n = times(kToXyz, rgb);
   for (std::size_t i = 0; i < 3; ++i) n[i] /= kWhite[i];
@@ -85,7 +247,7 @@ Planes opponents(const FlipImage& image) {
   return out;
 }
 
-// Returns the colour of a pixel as seen at the viewing distance, in CIELAB adjusted by hunt().
+// Returns the colour of a pixel as it appears at the viewing distance, in CIELAB adjusted by hunt().
 Triple seen(const Planes& filtered, std::size_t i) {
   Triple rgb = rgb_of({filtered[0][i], filtered[1][i], filtered[2][i]});
   for (float& v : rgb) v = shown(v);
@@ -99,8 +261,8 @@ constexpr float kTone[6] = {.6F * .6F * 2.51F, .6F * .03F, 0, .6F * .6F * 2.43F,
 float tone_mapped(float v) {
   if (!(v > 0)) return 0;
   if (!std::isfinite(v)) return 1;
-  // Limits v, since larger values would overflow when squared. For such values the curve is constant, above
-  // 1.
+  // Larger values would overflow when they are squared. The curve is constant there, above 1, so they are
+  // limited.
   v = std::min(v, 1e15F);
   return shown((kTone[0] * v * v + kTone[1] * v + kTone[2]) / (kTone[3] * v * v + kTone[4] * v + kTone[5]));
 }
@@ -121,14 +283,12 @@ std::vector<float> exposed(std::span<const float> rgb, float stops) {
 }  // namespace
 
 std::vector<float> ldr_flip(const FlipImage& reference, const FlipImage& image, float pixels_per_degree) {
-  const auto pixels =
-      static_cast<std::size_t>(reference.size.width) * static_cast<std::size_t>(reference.size.height);
+  const auto pixels = reference.size.pixels();
   CHECK(reference.size == image.size && reference.rgb.size() == 3 * pixels && image.rgb.size() == 3 * pixels,
         "{} and {} values for {} pixels", reference.rgb.size(), image.rgb.size(), pixels);
   const Planes r = opponents(reference), t = opponents(image);
-  const std::vector<float> features = flip::feature_difference(r, t, pixels_per_degree);
-  const Planes rf = flip::contrast_filtered(r, pixels_per_degree),
-               tf = flip::contrast_filtered(t, pixels_per_degree);
+  const std::vector<float> features = feature_difference(r, t, pixels_per_degree);
+  const Planes rf = contrast_filtered(r, pixels_per_degree), tf = contrast_filtered(t, pixels_per_degree);
   const float largest = std::pow(hyab(hunt(lab({0, 1, 0})), hunt(lab({0, 0, 1}))), kQc);
   std::vector<float> out(pixels);
   for (std::size_t i = 0; i < pixels; ++i) {

@@ -21,8 +21,7 @@
 
 namespace ls {
 
-// The density of pixels per degree on a 0.7 m wide monitor of 3,840 pixels seen from 0.7 m: 0.7 * 3840 / 0.7
-// * pi / 180.
+// Pixels per degree on a 0.7 m wide monitor of 3,840 pixels, seen from 0.7 m: 0.7 * 3840 / 0.7 * pi / 180.
 inline constexpr float kFlipPixelsPerDegree = 67.0206432765823F;
 
 struct FlipImage {
@@ -30,8 +29,8 @@ struct FlipImage {
   std::span<const float> rgb;
 };
 
-// Returns the error of each pixel on a display that shows `rgb` clamped to 0..1. Both images have the same
-// size.
+// Returns the error of each pixel on a display that shows `rgb`, clamped to 0..1. Both images must have the
+// same size.
 std::vector<float> ldr_flip(const FlipImage& reference, const FlipImage& image,
                             float pixels_per_degree = kFlipPixelsPerDegree);
 

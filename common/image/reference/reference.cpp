@@ -12,11 +12,10 @@ namespace ls {
 namespace {
 
 tl::unexpected<Error> refuse(const std::string& name, std::string why) {
-  return fail(Errc::invalid_argument, fmt::format("{}: {}", name, why));
+  return bad_argument(fmt::format("{}: {}", name, why));
 }
 
-// Returns the mean of s^2 (the reference's squared standard error) over the eight neighbours of value i,
-// excluding i.
+// Returns the mean of s^2 (the squared standard error of the reference) over the eight neighbours of value i.
 double noise_around(const Reference& r, std::size_t i) {
   const auto width = static_cast<std::size_t>(r.size.width), height = static_cast<std::size_t>(r.size.height);
   const std::size_t channel = i % 3, x = i / 3 % width, y = i / 3 / width;

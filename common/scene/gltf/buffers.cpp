@@ -10,7 +10,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "common/base/percent_code.h"
+#include "common/base/safe_text.h"
 #include "common/scene/limits.h"
 #include "common/scene/xml/document.h"
 

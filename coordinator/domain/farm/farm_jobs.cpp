@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-#include "common/image/frame/tiles_over.h"
+#include "common/image/frame/frame.h"
 #include "coordinator/domain/farm/farm_state.h"
 
 namespace ls::coordinator {

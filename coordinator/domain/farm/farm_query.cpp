@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/image/frame/tiles_over.h"
+#include "common/image/frame/frame.h"
 #include "coordinator/domain/farm/farm_state.h"
 
 namespace ls::coordinator {

@@ -8,7 +8,7 @@
 
 #include "common/base/log.h"
 #include "common/base/parse_number.h"
-#include "common/base/percent_code.h"
+#include "common/base/safe_text.h"
 #include "common/protocol/limits.h"
 #include "common/scene/limits.h"
 #include "coordinator/http/api/handlers.h"

@@ -8,8 +8,8 @@
 #include <cstring>
 #include <system_error>
 
-#include "common/base/helper_program.h"
 #include "common/base/parse_number.h"
+#include "common/base/spawn.h"
 #include "coordinator/http/api/handlers.h"
 #include "coordinator/http/bundle/bundle.h"
 #include "coordinator/http/message/json_read.h"

@@ -15,7 +15,7 @@
 #include "common/base/digest.h"
 #include "common/base/error.h"
 #include "common/base/guarded.h"
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 #include "coordinator/http/message/message.h"
 
 namespace ls::http {

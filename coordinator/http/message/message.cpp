@@ -15,7 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/overloaded.h"
-#include "common/base/percent_code.h"
+#include "common/base/safe_text.h"
 #include "coordinator/http/message/limits.h"
 
 namespace ls::http {

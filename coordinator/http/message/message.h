@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "common/base/error.h"
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 #include "common/scene/diagnostic.h"
 
 namespace ls::http {

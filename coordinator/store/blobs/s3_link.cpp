@@ -12,7 +12,7 @@
 #include <mutex>
 
 #include "common/base/log.h"
-#include "common/base/percent_code.h"
+#include "common/base/safe_text.h"
 #include "coordinator/store/files.h"
 
 namespace ls::coordinator {

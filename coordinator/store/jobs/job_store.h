@@ -66,7 +66,7 @@ struct StoredJob {
   std::string owner;  // user name; empty: the administrator
   double submitted_unix = 0;
   // W3C `traceparent` of the span in which another program submitted the job; the job's spans belong to its
-  // trace (common/trace/context.h). Empty: there is none
+  // trace (common/trace/span.h). Empty: there is none
   std::string traceparent;
   Digest scene;  // digest of the scene's blob
   RenderSettings settings;

@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "common/base/parse_number.h"
-#include "common/base/percent_code.h"
+#include "common/base/safe_text.h"
 
 namespace ls::coordinator {
 namespace {

@@ -1,5 +1,5 @@
-// Every truncation of a file, and many random mutations of it: the decoder must come back, with a value or
-// with an error that names the file.
+// Calls a decoder with every truncation of a file and with many random mutations of it. The decoder must
+// return a value, or an error that names the file.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -23,12 +23,13 @@ void append(std::string& to, const T& v) {
   to.append(reinterpret_cast<const char*>(&v), sizeof v);
 }
 
-// Counts the truncations that were accepted.
+// Returns the number of truncations that the decoder accepted.
 template <class Decode>
 int accepted_truncations(const std::string& file, Decode decode) {
   int accepted = 0;
   for (std::size_t n = 0; n < file.size(); ++n) {
-    const std::string cut = file.substr(0, n);  // of its own, so that AddressSanitizer sees a read past it
+    // A copy, so that AddressSanitizer finds a read past its end.
+    const std::string cut = file.substr(0, n);
     const auto result = decode("cut.file", std::span(bytes_of(cut)));
     accepted += result.has_value();
     if (!result) {
@@ -38,7 +39,7 @@ int accepted_truncations(const std::string& file, Decode decode) {
   return accepted;
 }
 
-// `check` sees every value that a mutation still gives.
+// Decodes `rounds` mutations of the file, and calls `check` with each decoded value.
 template <class Decode, class Check>
 void survive_mutations(const std::string& file, Decode decode, Check check, int rounds = 3000) {
   std::mt19937 rng(7);

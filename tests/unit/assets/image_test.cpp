@@ -1,12 +1,12 @@
 #include "common/assets/image.h"
 
 #include <gmock/gmock.h>
+#include <jpeglib.h>
 #include <png.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-
-#include <jpeglib.h>
 
 #include "common/image/exr/exr_file.h"
 #include "tests/unit/assets/hostile.h"
@@ -14,13 +14,14 @@
 namespace ls {
 namespace {
 
+using test::append;
 using test::bytes_of;
 using testing::Each;
 using testing::ElementsAre;
 using testing::FloatEq;
 using testing::HasSubstr;
 
-// The decoders without their default argument, which pointers to functions lose.
+// The decoders with their default argument. A pointer to the function itself would lose it.
 constexpr auto kPng = [](std::string_view name, std::span<const std::byte> file) {
   return decode_png(name, file);
 };
@@ -31,7 +32,8 @@ constexpr auto kHdr = [](std::string_view name, std::span<const std::byte> file)
   return decode_hdr(name, file);
 };
 
-// `format`: PNG_FORMAT_... of libpng's simple interface; `pixels` as that wants them.
+// Encodes a PNG by libpng's simple interface. `format` is one of its PNG_FORMAT_... constants; `pixels` are
+// in this format.
 std::string png(std::uint32_t width, std::uint32_t height, std::uint32_t format, const void* pixels) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
@@ -73,14 +75,14 @@ std::string jpeg(int width, int height, int channels, std::uint8_t value) {
   return out;
 }
 
-// 8 x 2: the first row in runs, the second plain.
+// Returns an image of 8 x 2 pixels. The first row is run-length coded, the second plain.
 std::string hdr() {
   std::string s = "#?RADIANCE\n# made by hand\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 8\n";
   s += std::string("\x02\x02\x00\x08", 4);
   s += std::string("\x88\x80", 2);                              // red: a run of 8 x 128
-  s += std::string("\x08\x00\x20\x40\x60\x80\xa0\xc0\xe0", 9);  // green: 8 as they are
-  s += std::string("\x84\x10\x84\x20", 4) +
-       std::string("\x88\x81", 2);  // blue: two runs; exponent 129: times 2 / 256
+  s += std::string("\x08\x00\x20\x40\x60\x80\xa0\xc0\xe0", 9);  // green: 8 plain values
+  // Blue: two runs; exponent: 129, which is a factor of 2 / 256.
+  s += std::string("\x84\x10\x84\x20", 4) + std::string("\x88\x81", 2);
   for (int x = 0; x < 8; ++x) s += std::string("\x80\x40\x20\x80", 4);
   return s;
 }
@@ -109,7 +111,8 @@ TEST(Png, ReadsColourGreyAndAlpha) {
   EXPECT_THAT(grey->u8, ElementsAre(0, 128, 255));
 }
 
-// 16 bits: raw chunks are written with the full interface, since the simple one would convert.
+// Returns a PNG with 16 bits per channel. It is written with libpng's full interface, since the simple one
+// would convert the values.
 std::string png16(const std::vector<std::uint16_t>& grey) {
   std::string out;
   png_structp p = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
@@ -148,7 +151,7 @@ TEST(Jpeg, ReadsColourAndGrey) {
   const auto rgb = decode_image("a.jpg", bytes_of(jpeg(16, 8, 3, 200)));
   ASSERT_TRUE(rgb) << rgb.error().message;
   EXPECT_EQ(rgb->channels, 3u);
-  EXPECT_THAT(rgb->u8, Each(200));  // a flat image survives its discrete cosine transform
+  EXPECT_THAT(rgb->u8, Each(200));  // a flat image survives the cosine transform of JPEG unchanged
   const auto grey = decode_jpeg("a.jpg", bytes_of(jpeg(9, 9, 1, 100)));
   ASSERT_TRUE(grey) << grey.error().message;
   EXPECT_EQ(grey->channels, 1u);
@@ -157,8 +160,8 @@ TEST(Jpeg, ReadsColourAndGrey) {
 
 TEST(Jpeg, RefusesTruncatedFilesInsteadOfPaddingThemAndSurvivesMutations) {
   const std::string file = jpeg(32, 32, 3, 77);
-  EXPECT_LE(test::accepted_truncations(file, kJpeg),
-            2);  // all pixels are there when only the end marker is cut
+  // If only the end marker is cut off, all pixels are there.
+  EXPECT_LE(test::accepted_truncations(file, kJpeg), 2);
   test::survive_mutations(file, kJpeg, expect_sound);
 }
 
@@ -189,7 +192,7 @@ TEST(Hdr, ReadsRunsAndPlainRows) {
   EXPECT_EQ(i->f32[0], 1);         // 128 x 2^(129 - 136)
   EXPECT_EQ(i->f32[3 + 1], .25f);  // 32 / 128
   EXPECT_EQ(i->f32[2], .125f);
-  EXPECT_EQ(i->f32[24], .5f);  // second row
+  EXPECT_EQ(i->f32[24], .5f);  // the second row
   EXPECT_EQ(i->f32[26], .125f);
 }
 
@@ -230,6 +233,70 @@ TEST(Image, MorePixelsThanTheCallerWantsAreRefusedByTheirSize) {
     EXPECT_EQ(refused.error().code, Errc::resource_exhausted);
     EXPECT_THAT(refused.error().message, HasSubstr("2 x 2 pixels"));
   }
+}
+
+std::string pfm(const std::string& header, std::initializer_list<float> values, bool big_endian = false) {
+  std::string s = header;
+  for (const float v : values) {
+    append(s, v);
+    if (big_endian) std::reverse(s.end() - 4, s.end());
+  }
+  return s;
+}
+Result<ImageData> decode_pfm_file(const std::string& file) { return decode_image("a.pfm", bytes_of(file)); }
+std::string pfm_error(const std::string& file) {
+  const auto r = decode_pfm_file(file);
+  return r ? "accepted" : r.error().message;
+}
+
+TEST(Pfm, RowsRunFromTheBottom) {
+  const auto i = decode_pfm_file(pfm("PF\n1 2\n-1.0\n", {1, 2, 3, 4, -5, 6e10f}));
+  ASSERT_TRUE(i) << i.error().message;
+  EXPECT_EQ(i->width, 1u);
+  EXPECT_EQ(i->height, 2u);
+  EXPECT_EQ(i->channels, 3u);
+  EXPECT_FALSE(i->srgb);
+  EXPECT_THAT(i->f32, ElementsAre(4, -5, 6e10f, 1, 2, 3));
+}
+
+TEST(Pfm, TheSignOfTheScaleIsTheByteOrder) {
+  EXPECT_THAT(decode_pfm_file(pfm("Pf\n2 1\n1\n", {1.5f, -2}, true))->f32, ElementsAre(1.5f, -2));
+  EXPECT_THAT(decode_pfm_file(pfm("Pf 2 1 -1\n", {1.5f, -2}))->f32, ElementsAre(1.5f, -2));
+}
+
+TEST(Pfm, TheScaleIsAFactor) {
+  EXPECT_THAT(decode_pfm_file(pfm("Pf\n1 2\n-0.5\n", {3, 4}))->f32, ElementsAre(2, 1.5f));
+}
+
+// The byte after this blank belongs to the first value, even if it looks like another blank.
+TEST(Pfm, OneBlankEndsTheHeader) {
+  const auto i = decode_pfm_file(std::string("Pf\n1 1\n-1\n\x20\x0a\x80\x3f", 14));
+  ASSERT_TRUE(i) << i.error().message;
+  EXPECT_EQ(i->f32.at(0), 0x1.001440p+0f);  // 0x3f800a20
+}
+
+TEST(Pfm, WhatIsWrongIsTold) {
+  EXPECT_THAT(pfm_error("PF\n0 1\n-1\n"),
+              HasSubstr("'a.pfm': broken PFM image: its header has no believable"));
+  EXPECT_THAT(pfm_error("PF\n-1 1\n-1\n"), HasSubstr("no believable width and height"));
+  EXPECT_THAT(pfm_error("PF\n40000 1\n-1\n"), HasSubstr("no believable width and height"));
+  EXPECT_THAT(pfm_error("PF\n1 1 1\n\n"), HasSubstr("too short"));
+  EXPECT_THAT(pfm_error("PF\n1 1\nx\n"), HasSubstr("no scale"));
+  EXPECT_THAT(pfm_error("PF\n1 1\n0\n"), HasSubstr("no scale"));
+  EXPECT_THAT(pfm_error("PF\n1 1\nnan\n"), HasSubstr("no scale"));
+  EXPECT_THAT(pfm_error("PF\n16384 16384\n-1\n"), HasSubstr("too short"));
+  EXPECT_EQ(decode_pfm("a.pfm", bytes_of("PF\n2 2\n-1\n"), 3).error().code, Errc::resource_exhausted);
+}
+
+TEST(Pfm, NoDamageDoesHarm) {
+  const auto plain = [](std::string_view name, std::span<const std::byte> file) {
+    return decode_pfm(name, file, 1 << 16);
+  };
+  const std::string file = pfm("PF\n1 2\n-1.0\n", {1, 2, 3, 4, 5, 6});
+  EXPECT_EQ(test::accepted_truncations(file, plain), 0);
+  test::survive_mutations(file, plain, [](const ImageData& image) {
+    EXPECT_EQ(image.f32.size(), std::size_t{image.width} * image.height * image.channels);
+  });
 }
 
 }  // namespace

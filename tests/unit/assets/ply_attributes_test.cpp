@@ -1,5 +1,5 @@
-// Attributes of PLY meshes as Mitsuba 3.9.1 reads them: every expectation here is what it showed.
-#include "common/assets/ply_attributes.h"
+// Attributes of PLY meshes. All expected values are those of Mitsuba 3.9.1.
+#include "common/assets/mesh_parts.h"
 
 #include <gmock/gmock.h>
 
@@ -51,7 +51,7 @@ const MeshAttribute* find(const MeshData& m, std::string_view name) {
   return nullptr;
 }
 
-// Two squares, of two triangles each, and a face without area between them.
+// Two squares of two triangles each; between them in the file, a face without area.
 const char kSquares[] =
     "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n"
     "property float r\nproperty float g\nproperty float b\nproperty float alpha\nproperty float heat_x\n"
@@ -64,7 +64,7 @@ const char kSquares[] =
 
 TEST(PlyAttributes, OfAFaceAreThoseOfItsTriangles) {
   const std::vector<std::string> wanted{"vertex_color", "face_stamp", "face_c", "vertex_nothing"};
-  const auto m = decode_ply_with(wanted, "m.ply", bytes_of(kSquares));
+  const auto m = decode_ply("m.ply", bytes_of(kSquares), wanted);
 
   ASSERT_TRUE(m) << m.error().message;
   ASSERT_EQ(m->triangle_count(), 4u);
@@ -100,14 +100,14 @@ TEST(PlyAttributes, OfBytesCountFromZeroTo255AndOtherWholeNumbersAreSrgbCodes) {
   append(file, std::uint8_t{3});
   for (const std::int32_t i : {0, 1, 2}) append(file, i);
   const std::vector<std::string> wanted{"vertex_color", "vertex_u", "vertex_i", "vertex_d"};
-  const auto m = decode_ply_with(wanted, "m.ply", bytes_of(file));
+  const auto m = decode_ply("m.ply", bytes_of(file), wanted);
 
   ASSERT_TRUE(m) << m.error().message;
   EXPECT_TRUE(find(*m, "vertex_color")->bytes);
   EXPECT_THAT(
       std::vector(find(*m, "vertex_color")->values.begin(), find(*m, "vertex_color")->values.begin() + 3),
       ElementsAre(0, 128, 255));
-  // Its power function is good to 1e-6.
+  // Mitsuba's expected values are from its own power function, which has errors of up to 1e-6.
   EXPECT_NEAR(find(*m, "vertex_u")->values[0], .21404809f, 3e-7f);
   EXPECT_NEAR(find(*m, "vertex_i")->values[0], .21770316f, 3e-7f);
   EXPECT_FLOAT_EQ(find(*m, "vertex_d")->values[0], 64);
@@ -129,11 +129,12 @@ void expect_whole(const MeshData& m) {
         << a.name;
 }
 
-// However a file is cut or changed: no attribute has fewer values than the mesh has places for them.
+// A file that is cut or changed must not give an attribute with fewer values than the mesh has vertices or
+// triangles.
 TEST(PlyAttributes, OfDamagedFilesAreWholeOrRefused) {
   const std::string file = kSquares;
   const auto decode = [](std::string_view name, std::span<const std::byte> bytes) {
-    return decode_ply_with(kWanted, name, bytes);
+    return decode_ply(name, bytes, kWanted);
   };
   test::accepted_truncations(file, decode);
   test::survive_mutations(file, decode, expect_whole);
@@ -144,7 +145,7 @@ TEST(PlyAttributes, OfOneOfTwoListsOfFacesAreRefused) {
   file.insert(file.find("end_header"), "element face 1\nproperty list uchar int vertex_indices\n");
   file += "3 0 1 2\n";
   EXPECT_TRUE(decode_ply("m.ply", bytes_of(file)));
-  const auto m = decode_ply_with(kWanted, "m.ply", bytes_of(file));
+  const auto m = decode_ply("m.ply", bytes_of(file), kWanted);
   ASSERT_FALSE(m);
   EXPECT_EQ(m.error().message, "'m.ply': not all of it has the attribute 'face_stamp'");
 }

@@ -7,7 +7,7 @@
 namespace ls {
 namespace {
 
-// The pattern of the log writes the line's beginning.
+// Parses a logged line. log_line() omits the opening brace, which the log's pattern adds.
 nlohmann::json json_line(std::string_view keys, std::string_view text) {
   return nlohmann::json::parse("{" + log_line(LogFormat::json, keys, text));
 }

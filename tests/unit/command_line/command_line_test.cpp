@@ -1,4 +1,5 @@
-// A command line as data, and texts with signs that troff and shells read as their own.
+// A program's command line as data, and the escaping of texts with characters that are special to troff or
+// shells.
 #include <gmock/gmock.h>
 
 #include <CLI/CLI.hpp>

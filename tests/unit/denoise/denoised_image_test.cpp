@@ -1,5 +1,5 @@
-// The error of a denoised image, against the truth of images whose noise is made here, and the way from a
-// film to its denoised image.
+// Compares the estimated error of denoised images with their true error; the noise is synthetic, so the true
+// error can be computed. Also tests the denoised image of a film.
 #include "common/denoise/denoised_image.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ constexpr std::size_t kPixels = std::size_t{kSide} * kSide;
 
 using Denoise = std::function<std::vector<float>(const std::vector<float>&)>;
 
-// The right image: waves with an edge.
+// Returns the image without noise: waves with an edge.
 std::vector<float> truth() {
   std::vector<float> out;
   for (int y = 0; y < kSide; ++y)
@@ -44,8 +44,8 @@ std::vector<float> blurred(const std::vector<float>& from) {
   return out;
 }
 
-// A half of the samples: skewed noise (gamma distributed, a third of the truth in size), the same in all
-// channels, as paths bring it.
+// Returns one half of the samples: `right` with skewed noise (gamma distributed). Its standard deviation is
+// about a third of the value. It is the same in all channels, because channels share paths.
 std::vector<float> noisy(const std::vector<float>& right, std::mt19937_64& random) {
   std::gamma_distribution<double> gamma(8, 1. / 8);
   std::vector<float> out(right.size());
@@ -58,7 +58,8 @@ std::vector<float> noisy(const std::vector<float>& right, std::mt19937_64& rando
 
 struct Trial {
   DenoisedError estimate;
-  double mse = 0, relmse = 0;  // of the realised image, the latter relative to the denoised image
+  // True errors of the denoised image; relmse is relative to the denoised image, like the estimate.
+  double mse = 0, relmse = 0;
 };
 Trial trial(const Denoise& denoise, std::uint64_t seed) {
   std::mt19937_64 random(seed);
@@ -76,13 +77,13 @@ Trial trial(const Denoise& denoise, std::uint64_t seed) {
 }
 
 const Denoise kDenoisers[] = {
-    blurred,                                              // biased, and nearly free of noise
+    blurred,                                              // biased, with little noise
     [](const std::vector<float>& half) { return half; },  // does nothing
-    [](const std::vector<float>& half) { return std::vector<float>(half.size(), .8f); },  // sees nothing
+    [](const std::vector<float>& half) { return std::vector<float>(half.size(), .8f); },  // ignores the image
 };
 
-// The mean over trials of what the estimate says too much, within five standard errors of that mean, 6e-7
-// each of four means.
+// Checks that the mean over trials of (estimated - true error) is 0, within five standard errors of this
+// mean. By chance, each of the four means that are checked exceeds this once in 1.7 million times.
 void expect_right_on_average(const Denoise& denoise, double DenoisedError::*estimate, double Trial::*is) {
   constexpr int kTrials = 500;
   double sum = 0, squares = 0, size = 0;
@@ -102,12 +103,14 @@ TEST(DenoisedError, IsRightOnAverageWhateverTheDenoiserDoes) {
   for (const Denoise& denoise : kDenoisers) {
     expect_right_on_average(denoise, &DenoisedError::mse, &Trial::mse);
   }
-  // The weight of a relative error may not depend on the pixel's own noise, as it does a little after a blur.
+  // The relative error is exact only if its weight does not depend on the pixel's own noise. With the blur it
+  // does, slightly, so only the constant image is checked.
   expect_right_on_average(kDenoisers[2], &DenoisedError::relmse, &Trial::relmse);
 }
 
-// A right 95 % interval covers the true error in 463 or more of 500 trials with a probability of 0.995: the
-// count is binomial, with mean 475 and standard deviation 4.87. Wider intervals also pass.
+// A correct 95 % interval covers the true error in 463 or more of 500 trials with a probability of 0.995: the
+// number of covered trials is binomial with mean 475 and standard deviation 4.87. Intervals that are too wide
+// also pass.
 TEST(DenoisedError, HasAnIntervalThatCovers) {
   constexpr int kTrials = 500;
   for (const Denoise& denoise : kDenoisers) {
@@ -121,8 +124,8 @@ TEST(DenoisedError, HasAnIntervalThatCovers) {
   }
 }
 
-// One pixel, a lamp, that the denoiser leaves alone and that outshines all others: half of its samples say
-// nothing of the other half's noise.
+// One pixel, a lamp, is much brighter than all others, and the denoiser leaves it unchanged. The two halves
+// of a single pixel do not give the variance of its noise.
 TEST(DenoisedError, HasNoIntervalWhereAFewPixelsCarryIt) {
   std::mt19937_64 random(3);
   const std::vector<float> right = truth();
@@ -139,14 +142,13 @@ TEST(DenoisedError, HasNoIntervalWhereAFewPixelsCarryIt) {
 TEST(DenoisedError, LeavesOutPixelsWithoutSamples) {
   DenoisedHalves h{
       {1, 1, 1, 0, 0, 0}, {3, 3, 3, 0, 0, 0}, {2, 2, 2, 9, 9, 9}, {2, 2, 2, 9, 9, 9}, {true, false}};
-  EXPECT_DOUBLE_EQ(denoised_error(h).mse, -1);  // (1 - 2) (3 - 2) + 0: chance can bring it below 0
+  EXPECT_DOUBLE_EQ(denoised_error(h).mse, -1);  // (1 - 2) (3 - 2) + 0: noise can make the estimate negative
   EXPECT_EQ(denoised_error(h).rmse, 0);
   h.counts = {false, false};
   EXPECT_EQ(denoised_error(h).rmse_hi, 0);
 }
 
-// A film of three tiles of which the last has no samples, with a stand-in for the library that blurs over 3 x
-// 3 pixels.
+// The film has three tiles, the last without samples. A fake library blurs over 3 x 3 pixels.
 TEST(DenoisedImage, IsTheMeanOfTheDenoisedHalvesOfAFilm) {
   const auto denoiser = Denoiser::find(1, (program_beside_us("../fake_oidn") / "blurs.so").string());
   ASSERT_TRUE(denoiser) << denoiser.error().message;
@@ -161,8 +163,8 @@ TEST(DenoisedImage, IsTheMeanOfTheDenoisedHalvesOfAFilm) {
   ASSERT_TRUE(image) << image.error().message;
   EXPECT_EQ(image->by, "Open Image Denoise 2.99.7");
   ASSERT_EQ(image->rgb.size(), 3u * 24 * 8);
-  // Pixel (3, 3) of the first tile, green: each guide's planes of a fake partial hold the red sum of both
-  // samples, of which half A has one.
+  // The green value of pixel (3, 3) of the first tile. In a fake partial each plane of a guide is the red sum
+  // over both samples; half A has one of the two samples, so its mean is twice as large as that of the image.
   const TilePixels pixels = film.pixels(0);
   double sum = 0;
   for (std::size_t y = 2; y <= 4; ++y)

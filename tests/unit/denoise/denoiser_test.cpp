@@ -1,4 +1,4 @@
-// The program that denoises, run on stand-ins for Open Image Denoise (tests/support/fake_oidn.cpp).
+// The denoising program, with fake libraries instead of Open Image Denoise (tests/support/fake_oidn.cpp).
 #include "common/denoise/denoiser.h"
 
 #include <gmock/gmock.h>
@@ -38,7 +38,8 @@ TEST(Denoiser, DenoisesEachImageWithItsOwnGuides) {
   for (const int which : {0, 1}) {
     const auto& color = images[static_cast<std::size_t>(which)].color;
     for (std::size_t c = 0; c < 3; ++c) {
-      // Pixel (0, 0): the mean of four, and a sixteenth of the halved guides.
+      // Pixel (0, 0): the fake library computes the mean of four pixels, plus 1/16 of the guides, which it
+      // has halved.
       const float mean = (color[c] + color[3 + c] + color[9 + c] + color[12 + c]) / 4,
                   guides = (static_cast<float>(c) / 32 - static_cast<float>(c) / 64) / 2;
       EXPECT_FLOAT_EQ((*denoised)[static_cast<std::size_t>(which)][c], mean + guides / 16);

@@ -1,4 +1,4 @@
-// Ranges of frames, numbers in names, and complaints about many frames at once.
+// Ranges of frames, frame numbers in file names, and diagnostics of scenes with many frames.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// A command that is copied into a shell gives the program the words that were meant.
-#include "common/job/replay_command.h"
+// A command that is copied into a shell must give the program exactly the words that were quoted.
+#include "common/job/health_notes.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,12 +9,11 @@
 #include <cstdio>
 
 #include "common/base/safe_text.h"
-#include "common/job/health_notes.h"
 
 namespace ls {
 namespace {
 
-// What bash makes of the text as the arguments of a program, each ended by a 0.
+// Returns the arguments that bash reads from the text, each followed by a 0.
 std::string words_of(const std::string& text) {
   FILE* script = std::tmpfile();
   std::fprintf(script, "printf '%%s\\0' %s", text.c_str());

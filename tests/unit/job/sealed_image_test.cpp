@@ -45,7 +45,7 @@ std::string refusal(const std::vector<std::byte>& exr) {
   return image ? "taken" : image.error().message;
 }
 
-// The file with one text for another of the same length.
+// Returns the file with one text replaced by another of the same length.
 std::vector<std::byte> changed(std::vector<std::byte> exr, std::string_view from, std::string_view to) {
   std::string text(reinterpret_cast<const char*>(exr.data()), exr.size());
   const auto at = text.find(from);
@@ -87,7 +87,7 @@ TEST(SealedImage, GivesBackWhatTheFinalImageHolds) {
   }
 }
 
-// Every layer that there can be, with a value in each pixel.
+// Returns a film with all AOVs, with samples in every pixel.
 Film film_with_aovs() {
   AovSet all;
   for (const AovRow& row : aov_rows()) all = all.with(row.aov);
@@ -98,11 +98,12 @@ Film film_with_aovs() {
   return film;
 }
 
-// The pixel's value, as the next one that the layer can hold.
+// Changes the value of a pixel to the next larger one that the layer's type can represent, or a few steps
+// above.
 void change(std::variant<ExrHalf, ExrFloat, ExrUint>& layer, std::size_t at) {
   if (auto* halves = std::get_if<ExrHalf>(&layer))
-    halves->values[at] +=
-        std::abs(halves->values[at]) / 512 + 1e-6f;  // halves have 11 bits, or steps of 2^-24
+    // A half float has 11 significant bits, and steps of at least 2^-24.
+    halves->values[at] += std::abs(halves->values[at]) / 512 + 1e-6f;
   if (auto* floats = std::get_if<ExrFloat>(&layer))
     floats->values[at] = std::nextafter(floats->values[at], 1e30f);
   if (auto* counts = std::get_if<ExrUint>(&layer)) ++counts->values[at];
@@ -110,7 +111,7 @@ void change(std::variant<ExrHalf, ExrFloat, ExrUint>& layer, std::size_t at) {
 
 TEST(SealedImage, FindsTheFirstValueOfEachLayerThatIsNotOfItsSamples) {
   const Film film = film_with_aovs();
-  const int x = 11, y = 9;  // of tile 5, which begins at 8, 8
+  const int x = 11, y = 9;  // in tile 5, whose first pixel is (8, 8)
   for (const bool floats : {false, true}) {
     const auto whole = read(sealed(film, floats)).value();
     EXPECT_EQ(whole.picture.channels.size(), 74u);
@@ -175,9 +176,10 @@ TEST(SealedImage, CutShortAnywhereIsRefusedAndNothingElse) {
     EXPECT_FALSE(read(std::span(good).first(n))) << n;
 }
 
-// ---- the seal over the whole file ----
+// ---- the seal ----
 
-// A faulty disk: whatever a changed bit changes of what is read is refused or found.
+// Simulates a faulty disk: if a flipped bit changes anything that is read from the file, the file is rejected
+// or the seal does not match.
 TEST(SealedImage, NoBitOfTheFileChangesUnseen) {
   const auto good = sealed(film_with_aovs(), false);
   const auto before = read_final_exr(good, "image.exr").value();

@@ -78,7 +78,7 @@ TEST(JobPage, TellsWhatTheReportTells) {
     expect(page, words);
 }
 
-// A target that nobody asked for is none.
+// Without a requested target the forecast is for half of the error, and no target line is drawn.
 TEST(JobPage, WithoutATargetSaysWhatHalfOfTheErrorWouldCost) {
   json report = some_report();
   report["target_error"] = nullptr;
@@ -118,7 +118,7 @@ TEST(JobPage, WhatAReferenceCannotTellIsNotNought) {
 
   EXPECT_EQ(times(page, "<b>below the reference's noise</b>"), 2u);
   EXPECT_EQ(times(page, "<td>below the reference's noise</td>"), 1u);
-  // Not drawn either: in both plots one dot less than there are checkpoints.
+  // The checkpoint is not drawn either: both plots have one dot less than there are checkpoints.
   EXPECT_EQ(times(page, "<title>0.123 at "), 2 * (report["convergence"].size() - 1));
   EXPECT_EQ(times(page, "shares this job"), 0u);
   expect(same, "The reference shares this job&#39;s seed");
@@ -150,7 +150,8 @@ TEST(JobPage, ADoubtfulEstimateAndUncleanNumbersAreSaid) {
   expect(page, "12 pixels got too few hits");
 }
 
-// However early it is, and whatever the report calls it.
+// The verdict is shown for every report with `trusted` false, even early ones, and whatever its
+// `verdict_kind` is.
 TEST(JobPage, IsInDoubtWhereTheReportDoesNotTrustItself) {
   for (const char* kind : {"early", "heavy_tail", "bias_floor", ""}) {
     json report = some_report();
@@ -179,7 +180,7 @@ TEST(JobPage, InDoubtPromisesNothing) {
     expect_not(page, claim);
 }
 
-// Neither as bands, nor at the points, nor in the table, nor of the slope.
+// No interval is shown: not as a band, at a point, in the table, or for the slope.
 TEST(JobPage, InDoubtTheCurveHasNoIntervals) {
   json report = some_report();
   expect(page_of(report), "class=\"band c0\"");
@@ -310,7 +311,7 @@ TEST(JobPage, ThreadsAreThoseOfOneMachineOrTheMeanOfAFarm) {
   expect(page_of(report), "<dt>Threads</dt><dd><span>16</span>");
 }
 
-// Every text of the report, wherever it stands, is a stranger's.
+// Replaces every text of the report by markup, since any of them may be untrusted.
 void poison(json& j) {
   if (j.is_string()) j = kMarkup;
   if (j.is_structured())
@@ -336,7 +337,8 @@ TEST(JobPage, NoTextOfTheReportBecomesMarkup) {
   EXPECT_EQ(times(page, "onerror=\""), 0u);
 }
 
-// A mutant of the report per field: absent, and of another type. It must never throw or show a NaN.
+// Checks a page made from a damaged report: it must not show NaN or infinity. (Each "Provenance" contains
+// "nan".)
 void expect_sound(const json& report) {
   const std::string page = page_of(report);
   EXPECT_EQ(times(page, "nan"), times(page, "Provenance")) << report.dump(1);

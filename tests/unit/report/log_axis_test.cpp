@@ -60,8 +60,7 @@ TEST(LogAxis, TheEndsOfDoublesAreNotLeft) {
   }
 }
 
-// Decades on a long axis, two and five between them on a short one, and times that people count in. The
-// dashboard's are held to the same table by tests/web/test_modules.py.
+// The table is shared with the dashboard, whose ticks tests/web/test_modules.py compares with it.
 TEST(Ticks, AreThoseOfTheTable) {
   for (const auto& [what, unit] :
        {std::pair("error_ticks", AxisUnit::plain), std::pair("time_ticks", AxisUnit::seconds)})
@@ -73,7 +72,7 @@ TEST(Ticks, LinesBetweenDecadesAreThereButNotMajor) {
   const auto all = ticks({0.9, 1100, 0, 1}, AxisUnit::plain);
 
   EXPECT_EQ(std::count_if(all.begin(), all.end(), [](const Tick& t) { return t.major; }), 4);
-  EXPECT_EQ(all.size(), 2 + 3 * 9);  // .9, then 1 to 1000
+  EXPECT_EQ(all.size(), 2 + 3 * 9);  // .9, 1 to 900, and 1000
   EXPECT_TRUE(
       std::is_sorted(all.begin(), all.end(), [](const Tick& a, const Tick& b) { return a.value < b.value; }));
 }

@@ -18,7 +18,7 @@ LogPlot falling() {
   return plot;
 }
 
-// The drawing as XML; fails the test if it is none.
+// Parses the drawing as XML. If that fails, the test fails.
 pugi::xml_document parsed(const std::string& svg) {
   pugi::xml_document document;
   const auto result = document.load_string(svg.c_str(), pugi::parse_full);
@@ -30,7 +30,7 @@ std::size_t count_of(const pugi::xml_document& svg, const char* path) {
   return svg.select_nodes(path).size();
 }
 
-// Where the marks of a curve are.
+// Returns the positions of the marks of a curve.
 std::vector<std::pair<double, double>> marks(const pugi::xml_document& svg) {
   std::vector<std::pair<double, double>> all;
   for (const auto& node : svg.select_nodes("//g[starts-with(@class,'dots')]/path[title]")) {
@@ -49,7 +49,7 @@ TEST(LogPlot, ErrorThatFallsAsOneOverTimeIsAStraightLineDownwards) {
   EXPECT_GT(dx, 0);
   EXPECT_GT(dy, 0);  // downwards
   for (std::size_t i = 2; i < points.size(); ++i) {
-    EXPECT_NEAR(points[i].first - points[i - 1].first, dx, 0.11);  // written with one decimal
+    EXPECT_NEAR(points[i].first - points[i - 1].first, dx, 0.11);  // coordinates have one decimal
     EXPECT_NEAR(points[i].second - points[i - 1].second, dy, 0.11);
   }
 }
@@ -71,7 +71,8 @@ TEST(LogPlot, NamesOfStrangersAreText) {
   plot.id = "x\" onload=\"y";
   plot.title = plot.summary = plot.x_title = plot.y_title = plot.curves[0].name =
       "</title><script>alert('&')</script>";
-  plot.curves.push_back(plot.curves[0]);  // so that names are shown
+  // The legend with the names is drawn only for several curves.
+  plot.curves.push_back(plot.curves[0]);
   const auto svg = parsed(svg_of(plot));
 
   EXPECT_EQ(count_of(svg, "//script"), 0u);
@@ -116,7 +117,7 @@ TEST(LogPlot, TargetAndForecastMeetWhereTheErrorWillBe) {
   std::sscanf(svg.select_node("//path[@class='span c0']").node().attribute("d").value(), "M%lf %lf", &span_x,
               &span_y);
 
-  EXPECT_NEAR(y + 5, across, 0.11);  // the mark is 10 high
+  EXPECT_NEAR(y + 5, across, 0.11);  // half of the height of the mark
   EXPECT_NEAR(span_y + 5, across, 0.11);
   EXPECT_LT(span_x, x);
 }

@@ -1,4 +1,5 @@
-// The table of figures and ticks as people read them, which reports and the dashboard are both held to.
+// Reads the table of numbers and ticks with their texts (tests/support/shown.json). Reports and the dashboard
+// must both show these texts.
 #pragma once
 
 #include <fstream>

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <thread>
 
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 #include "common/image/exr/exr_file.h"
 #include "common/image/exr/final_image.h"
 #include "tests/unit/service/fake_farm.h"

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <random>
 
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 #include "common/image/exr/final_image.h"
 #include "coordinator/views/views.h"
 #include "tests/unit/service/fake_farm.h"

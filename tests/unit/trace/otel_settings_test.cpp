@@ -119,8 +119,9 @@ TEST(Sampler, FollowsTheProgramThatBeganTheTraceUnlessToldOtherwise) {
   EXPECT_FALSE(sampler("always_off").takes(id, true));
 }
 
-// The ids are digests, so the number taken of 10,000 is binomial with p = 1/4: standard deviation 43.3. Ids
-// are fixed, so the count is, too; 5 deviations hold for all but one choice of ids in a million.
+// The decision depends on the trace id, which is a digest. So the number of sampled traces of 10,000 is
+// binomial with p = 1/4 and has the standard deviation 43.3. It exceeds 5 deviations with a probability of
+// one in a million. The ids are fixed, and so is the count.
 TEST(Sampler, TakesItsFractionOfTheTraces) {
   const Sampler quarter = sampler("traceidratio", "0.25");
   int taken = 0;

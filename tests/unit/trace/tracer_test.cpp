@@ -94,7 +94,7 @@ TEST(Tracer, DoesNotWaitForACollectorThatHangs) {
     for (std::size_t i = 0; i < kMaxWaiting + 7; ++i) tracer.record(a_span(tracer));
 
     EXPECT_EQ(tracer.figures().left_out, 7u) << "what finds no room is counted, and nobody waits";
-  }  // ends although the collector still hangs
+  }  // the destructor ends although the collector still hangs
   SUCCEED();
 }
 

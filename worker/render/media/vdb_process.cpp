@@ -15,7 +15,7 @@
 #include <fstream>
 #include <mutex>
 
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 
 namespace ls::render {
 namespace {

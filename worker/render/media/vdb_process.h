@@ -15,7 +15,7 @@
 #include <string>
 
 #include "common/base/error.h"
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 #include "worker/render/media/vdb_reply.h"
 
 namespace ls::render {

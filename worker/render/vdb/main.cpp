@@ -11,7 +11,7 @@
 #include <cstdlib>
 #include <limits>
 
-#include "common/base/helper_program.h"
+#include "common/base/spawn.h"
 #include "worker/render/media/vdb_reply.h"
 
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "common/assets/image.h"
-#include "common/image/aov/cryptomatte.h"
+#include "common/image/aov/identifiers.h"
 #include "common/scene/schema/integrators.h"
 #include "worker/render/geometry/coincident.h"
 #include "worker/render/geometry/surface_boxes.h"

@@ -1,4 +1,4 @@
-// Names and planes of AOVs; partials, films and merges with them; what hostile ones are told.
+// Names and planes of AOVs; partials, films and merges with AOVs; the errors for damaged partials.
 #include "common/image/aov/aov.h"
 
 #include <gmock/gmock.h>
@@ -24,7 +24,7 @@ constexpr AovSet kSome = AovSet{}.with(Aov::depth).with(Aov::albedo).with(Aov::s
 Partial with_aovs(TileIndex tile, SampleRange samples, AovSet aovs = kSome) {
   return fake_partial(make_partial(kGrid, tile, samples).header, aovs);
 }
-// At which plane the n-th one of a name stands.
+// Returns the index of the partial's plane that has this name.
 std::size_t plane(AovSet aovs, std::string_view name) {
   const auto names = planes_of(aovs).names;
   const auto at = std::find(names.begin(), names.end(), name);
@@ -143,13 +143,15 @@ TEST(PartialGate, NoFlippedBitOfAnAovGoesUnnoticed) {
     if (got && unit_digest(*got) == digest) ++harmless;
   }
 
-  // The "linear" hint of channels, aspect ratio and screen window, a third of their bytes.
+  // Only bytes that are not decoded may change unnoticed: the "linear" hints of the channels, the aspect
+  // ratio and the screen window. Every third byte is tested.
   EXPECT_LE(harmless, (planes_of(kSome).count() + 6) * 4 + 16);
 }
 
 TEST(PartialGate, RefusesCountsAndIdentifiersThatNoRendererMakes) {
   const auto told = [](auto change) {
-    Partial partial = with_aovs(0, {4, 8});  // four samples, one thing in all pixels
+    // Four samples, all with the same object in every pixel.
+    Partial partial = with_aovs(0, {4, 8});
     change(partial);
     return not_written(partial);
   };
@@ -194,7 +196,8 @@ Film film_of(std::uint64_t spp, AovSet aovs = kSome) {
 }
 
 TEST(Film, AddsAovsAsItAddsColour) {
-  const Film film = film_of(24);  // with a tail of 8 of 16
+  // The last round is truncated to 8 of its 16 samples.
+  const Film film = film_of(24);
   const std::size_t depth = plane(kSome, "aov.depth.Z") * 64;
   std::vector<Partial> rounds;
   for (RoundIndex k = 0; k < round_count(24); ++k) rounds.push_back(with_aovs(1, cut_range(k, 24)));
@@ -203,7 +206,7 @@ TEST(Film, AddsAovsAsItAddsColour) {
 
   EXPECT_EQ(tile.spp, 24u);
   for (std::size_t i = 0; i < 64; ++i) {
-    double sum = 0;  // in the order of rounds
+    double sum = 0;  // summed in the order of the rounds
     for (const Partial& round : rounds) sum += round.sums[depth + i];
     EXPECT_EQ(tile.sums[depth - 64 * kPartialChannels + i], sum);
     EXPECT_EQ(tile.sums[planes_of(kSome).hits * 64 + i], 24);

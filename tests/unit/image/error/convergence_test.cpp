@@ -15,12 +15,13 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// A job of `pixels` grey pixels whose halves are Gaussian: its checkpoints, as the estimator would give them.
-// Time goes with samples. `slope` other than 1: the variance of a mean of n samples is n^-slope.
+// Simulates a job of `pixels` grey pixels with Gaussian halves, and returns the checkpoints that the error
+// estimate would give. Time is proportional to the number of samples. The variance of a mean of n samples is
+// n^-slope.
 class Job {
  public:
-  // `early`: the error of few samples is larger by a factor of 1 + early / spp^(3/4), so that it falls
-  // faster.
+  // `early`: the error at spp samples is larger by a factor of 1 + early / spp^(3/4), so that it falls faster
+  // at first.
   Job(int pixels, std::uint64_t seed, double slope = 1, double early = 0)
       : slope_(slope), early_(early), sums_(static_cast<std::size_t>(pixels)), random_(seed) {}
 
@@ -36,8 +37,8 @@ class Job {
     }
     spp_ = spp;
     const auto n = static_cast<double>(sums_.size()) / (1 + early_ * std::pow(spp, -.75));
-    // 4/3 sum D^4: the variance of the realised error (error_estimate.h, grey noise); an interval of
-    // logarithms.
+    // The variance of (estimated - realised sum of squares) is 4/3 sum D^4 for grey noise (error_estimate.h).
+    // The interval is symmetric in the logarithm.
     const double half = 1.959964 * std::sqrt(4 * fourth / 3) / squares;
     return {static_cast<double>(spp), 3. * static_cast<double>(spp), squares / n,
             squares / n * std::exp(-half), squares / n * std::exp(half)};
@@ -68,7 +69,7 @@ TEST(Trend, OfThePowerLawIsItsExponent) {
     }
     const auto trend = trend_of(points);
     ASSERT_TRUE(trend);
-    EXPECT_NEAR(trend->slope, slope, 1e-9);  // exact but for rounding
+    EXPECT_NEAR(trend->slope, slope, 1e-9);  // exact up to rounding
     EXPECT_EQ(trend->points, 8);
     EXPECT_LT(trend->slope_lo, slope);
     EXPECT_GT(trend->slope_hi, slope);
@@ -77,7 +78,8 @@ TEST(Trend, OfThePowerLawIsItsExponent) {
 
 TEST(Trend, NeedsThreeDoublings) {
   Job job(100, 1);
-  EXPECT_FALSE(trend_of(checkpoints(job, 4)));  // 2, 4, 8, 16 samples: two of 8 or more
+  // Of the checkpoints at 2, 4, 8 and 16 samples only two have the required 8 samples.
+  EXPECT_FALSE(trend_of(checkpoints(job, 4)));
   Job another(100, 1);
   EXPECT_TRUE(trend_of(checkpoints(another, 5)));
   EXPECT_FALSE(trend_of({}));
@@ -85,9 +87,9 @@ TEST(Trend, NeedsThreeDoublings) {
 
 TEST(Trend, UsesDoublingsOfALongJobOnly) {
   Job job(50, 3);
-  const auto trend = trend_of(checkpoints(job, 5 + 32));  // to 2048 samples
+  const auto trend = trend_of(checkpoints(job, 5 + 32));  // up to 2048 samples
   ASSERT_TRUE(trend);
-  EXPECT_EQ(trend->points, 9);  // 2048, 1024, ..., 8
+  EXPECT_EQ(trend->points, 9);  // at 2048, 1024, ..., 8 samples
 }
 
 TEST(Trend, IgnoresPointsThatAreNoFigures) {
@@ -102,7 +104,7 @@ TEST(Trend, IgnoresPointsThatAreNoFigures) {
   EXPECT_EQ(trend_of(points)->slope, before);
 }
 
-// By which chance moves the share of n fair trials that succeed with probability .95.
+// Returns the tolerance for the fraction of successes in n independent trials of probability .95.
 double spread(int n) { return test::kStandardErrors * std::sqrt(.95 * .05 / n); }
 
 TEST(Trend, ItsIntervalCoversTheTrueSlopeInNineteenOfTwentyJobs) {
@@ -113,7 +115,7 @@ TEST(Trend, ItsIntervalCoversTheTrueSlopeInNineteenOfTwentyJobs) {
     const auto trend = trend_of(checkpoints(job, 9));
     covered += trend->slope_lo <= 1 && 1 <= trend->slope_hi;
   }
-  // Besides chance, .01 for an interval that is itself estimated from 400 pixels.
+  // The additional .01 is for the interval's width, which is itself estimated from 400 pixels.
   EXPECT_NEAR(covered / double{kJobs}, .95, spread(kJobs) + .01);
 }
 
@@ -124,7 +126,7 @@ TEST(Trend, SaysInWordsHowItGoes) {
   EXPECT_EQ(trend_of(checkpoints(fast, 9))->verdict, "faster than 1/N");
 }
 
-// Checkpoints of an error of `variance`/N and a bias, seen against a reference.
+// Returns checkpoints with an estimated error of 1/N, and with a true error that exceeds it by bias^2.
 std::vector<ErrorPoint> against_a_reference(double bias) {
   std::vector<ErrorPoint> points;
   for (double spp = 8; spp <= 1024; spp *= 2) {
@@ -137,18 +139,21 @@ std::vector<ErrorPoint> against_a_reference(double bias) {
 TEST(ConvergenceStatus, TellsABiasFloorOnlyWhereTheTrueErrorStays) {
   using Kind = ConvergenceStatus::Kind;
   EXPECT_EQ(judge(against_a_reference(0), "").kind, Kind::converging);
-  EXPECT_EQ(judge(against_a_reference(.005), "").kind,
-            Kind::converging);  // 2.5e-5 beside 9.8e-4: within the interval
-  const ConvergenceStatus floor = judge(against_a_reference(.05), "");  // 2.5e-3
+  // The squared bias 2.5e-5 is within the interval of the error 9.8e-4.
+  EXPECT_EQ(judge(against_a_reference(.005), "").kind, Kind::converging);
+  // The squared bias is 2.5e-3.
+  const ConvergenceStatus floor = judge(against_a_reference(.05), "");
   EXPECT_EQ(floor.kind, Kind::bias_floor);
   EXPECT_THAT(floor.words, HasSubstr("0.0035"));
-  // Twice the estimate throughout, but falling with it: an estimate that is off, and no floor.
+  // The true error is always twice the estimated one, but falls at the same rate: the estimate is wrong, and
+  // there is no floor.
   auto falling = against_a_reference(0);
   for (ErrorPoint& p : falling) p.true_relmse = 2 * p.relmse;
   EXPECT_EQ(judge(falling, "").kind, Kind::converging);
 }
 
-// Gaussian jobs with a reference that has no bias: the true error is another draw of the same variance.
+// The jobs and the reference have no bias. The true error is another sample from the distribution of the
+// estimated one.
 TEST(ConvergenceStatus, SeesNoFloorWhereThereIsNone) {
   int floors = 0;
   for (std::uint64_t i = 0; i < 200; ++i) {
@@ -158,7 +163,8 @@ TEST(ConvergenceStatus, SeesNoFloorWhereThereIsNone) {
     for (std::size_t k = 0; k < points.size(); ++k) points[k].true_relmse = truth[k].relmse;
     floors += judge(points, "").kind == ConvergenceStatus::Kind::bias_floor;
   }
-  EXPECT_LE(floors, 1);  // four standard deviations each: one of 200 is a chance of .6 %
+  // By chance, one of 200 jobs exceeds four standard deviations with a probability of 0.6 %.
+  EXPECT_LE(floors, 1);
 }
 
 TEST(ConvergenceStatus, PutsDoubtFirst) {
@@ -183,7 +189,8 @@ TEST(Forecast, OfAJobThatIsThereIsZero) {
 
 TEST(Forecast, IsTheEndOfTheRoundThatReachesTheTarget) {
   const std::vector<ErrorPoint> now{{64, 10, .02, .0199, .0201}};
-  const auto forecast = forecast_of(now, .01);  // twice the samples, and these end a round
+  // This takes twice the samples, 128, where a round ends.
+  const auto forecast = forecast_of(now, .01);
   ASSERT_TRUE(forecast);
   EXPECT_EQ(forecast->spp, 128);
   EXPECT_NEAR(forecast->core_seconds, 10, 1e-9);
@@ -192,8 +199,9 @@ TEST(Forecast, IsTheEndOfTheRoundThatReachesTheTarget) {
   EXPECT_FALSE(forecast_of(now, 0));
 }
 
-// Jobs that are followed until their estimate is down to the target, as the farm does: from each of their
-// checkpoints on, how often was the time they took within the interval?
+// Runs jobs until their estimated error reaches the target, as the farm does, with a forecast at each of
+// their checkpoints. Returns the fraction of forecasts whose interval contains the time that the job then
+// took.
 double share_within(double slope, int jobs, int pixels, double early = 0) {
   int within = 0, all = 0;
   for (int i = 0; i < jobs; ++i) {
@@ -207,16 +215,16 @@ double share_within(double slope, int jobs, int pixels, double early = 0) {
     }
     for (const auto& [at, f] : said) {
       const double took = points.back().core_seconds - at;
-      within +=
-          f.core_seconds_lo <= took && took <= f.core_seconds_hi * (1 + 1e-9);  // both may end the same round
+      // The factor allows for rounding: both ends of the interval may be the end of the same round.
+      within += f.core_seconds_lo <= took && took <= f.core_seconds_hi * (1 + 1e-9);
       ++all;
     }
   }
   return within / double(all);
 }
 
-// What a sample costs drifts; an interval that knew only of rounds would end exactly at one and be missed by
-// a hair.
+// The cost per sample varies. An interval that only took the ends of rounds into account would be too narrow,
+// and the time would be just outside of it.
 TEST(Forecast, AllowsForCostsThatVary) {
   std::vector<ErrorPoint> even, uneven;
   double spent = 0, before = 0;
@@ -230,8 +238,8 @@ TEST(Forecast, AllowsForCostsThatVary) {
 
   const auto exact = forecast_of(even, .002), wide = forecast_of(uneven, .002);
 
-  // 1.96 standard deviations of about 3 %, to both sides: a factor of 1.12 between the ends. The line through
-  // the points sees the same change and moves both of them by a few per cent.
+  // 1.96 standard deviations of about 3 % on each side are a factor of 1.12 between the ends. The line that
+  // is fitted to the points includes the same variation, and so moves both ends by a few per cent.
   const auto factor = [](const Forecast& f) { return f.core_seconds_hi / f.core_seconds_lo; };
   EXPECT_NEAR(factor(*wide) / factor(*exact), 1.12, .04);
   EXPECT_GT(wide->core_seconds_hi, 1.03 * exact->core_seconds_hi);
@@ -239,22 +247,22 @@ TEST(Forecast, AllowsForCostsThatVary) {
 }
 
 TEST(Forecast, HoldsInNineOfTenCases) {
-  // Forecasts of one job are not independent, so this is a bound and no test of .95: fewer than .9 is what
-  // the user was promised not to see.
+  // The forecasts of one job are correlated, so the fraction is not binomial, and .95 cannot be tested
+  // for. The bound .9 has a margin.
   EXPECT_GE(share_within(1, 100, 400), .9);
   EXPECT_GE(share_within(1.15, 100, 400), .9);
   EXPECT_GE(share_within(.9, 100, 400), .9);
 }
 
-// A slope of 1.18 at 8 samples, 1.08 at 32, 1.03 at 128: the more surely the points are known, the more
-// surely a straight line through them is wrong.
+// The slope is 1.18 at 8 samples, 1.08 at 32, 1.03 at 128. A straight line does not fit, and the more precise
+// the points are, the more clearly its forecast is wrong.
 TEST(Forecast, HoldsInNineOfTenCasesWhereTheSlopeFlattens) {
   EXPECT_GE(share_within(1, 40, 4000, 2), .9);
   EXPECT_GE(share_within(1, 40, 400, 2), .9);
 }
 
-// It is not wide for nothing: where the slope is 1 all the way, at four times the samples a factor of 2 from
-// end to end is not reached.
+// The interval must not be needlessly wide: if the slope is always 1, the ends for a quarter of the error
+// differ by less than a factor of 2.
 TEST(Forecast, IsOfUseWhereTheSlopeStays) {
   Job job(4000, 1);
   const auto points = checkpoints(job, 8);

@@ -1,4 +1,4 @@
-// Synthetic images with known noise. Seeds are fixed; every threshold stands beside its derivation.
+// Synthetic images with known noise. Seeds are fixed. The derivation of each threshold is beside it.
 #include "common/image/error/error_estimate.h"
 
 #include <gmock/gmock.h>
@@ -24,7 +24,7 @@ struct Trial {
   TileError estimate;
   double realised_mse = 0, realised_relmse = 0;
 };
-// Given (pixel, channel).
+// A function of the pixel and the channel.
 using Field = std::function<double(std::size_t, std::size_t)>;
 // Draws the errors of the three channels of one half of one pixel, each of unit variance.
 using Noise = std::function<std::array<double, 3>(std::mt19937_64&)>;
@@ -45,7 +45,8 @@ std::array<double, 3> partly_coloured(std::mt19937_64& random) {  // correlation
   return own;
 }
 
-// `sigma`: of each half's mean. The image's error is (a + b) / 2.
+// Draws the two halves of an image and estimates its error. `sigma` is the standard deviation of a half's
+// mean. The image is the mean of the halves.
 Trial run(const Field& truth, const Field& sigma, const Noise& noise, std::mt19937_64& random) {
   std::vector<double> halves[2];
   for (auto& half : halves) half.resize(3 * kErrorPixels);
@@ -72,7 +73,7 @@ double uneven(std::size_t p, std::size_t) {
   return 0.02 + 0.1 * static_cast<double>(p % kErrorSide) / kErrorSide;
 }
 
-// z of the mean over trials of x.
+// Computes the mean of values and the standard error of this mean.
 struct Mean {
   double sum = 0, squares = 0, n = 0;
   void add(double x) { sum += x, squares += x * x, ++n; }
@@ -91,8 +92,8 @@ TEST(ErrorEstimate, IsUnbiasedForTheMeanSquaredError) {
   EXPECT_LT(std::abs(difference.mean() / difference.stderr_of_mean()), kStandardErrors);
 }
 
-// Coverage of a 95 % interval in n trials is binomial: 0.95 +- sqrt(0.95 * 0.05 / 2000) = 0.0049, so that
-// 0.93 and 0.97 are 4.1 standard deviations away.
+// The fraction of 2000 trials in which a 95 % interval covers the true value has the standard deviation
+// sqrt(0.95 * 0.05 / 2000) = 0.0049, so 0.93 and 0.97 are 4.1 standard deviations away.
 struct Coverage {
   const char* name;
   Noise noise;
@@ -123,9 +124,10 @@ INSTANTIATE_TEST_SUITE_P(Noise, Interval,
                                            Coverage{"PartlyColoured", partly_coloured}),
                          [](const auto& info) { return std::string(info.param.name); });
 
-// Noise that changes by a third from pixel to pixel, where the picture does not show it: products of
-// neighbours make the interval too narrow (90 to 92 % covered), and with the tails of a Laplace distribution
-// fourth powers make it too wide. The last round tells.
+// The standard deviation of the noise varies by about 30 % from pixel to pixel, although the image is
+// constant. Here the estimate from products of neighbours makes the interval too narrow (90 to 92 %
+// coverage), and for Laplace noise the estimate from fourth powers makes it too wide. The estimate from the
+// last round is correct.
 struct UnevenNoise {
   const char* name;
   Noise noise;
@@ -165,7 +167,7 @@ TEST_P(IntervalOfUnevenNoise, CoversTheRealisedErrorNineteenTimesInTwenty) {
     ASSERT_TRUE(e.trusted) << e.verdict;
   }
 
-  // Binomial: .0049 is one standard deviation.
+  // The coverage is binomial; its standard deviation is .0049.
   const double slack = kStandardErrors * std::sqrt(.95 * .05 / kTrials);
   EXPECT_NEAR(rmse / double{kTrials}, .95, slack);
   EXPECT_NEAR(relmse / double{kTrials}, .95, slack);
@@ -182,10 +184,10 @@ INSTANTIATE_TEST_SUITE_P(Noise, IntervalOfUnevenNoise,
                                            UnevenNoise{"HeavyTailed", laplace}),
                          [](const auto& info) { return std::string(info.param.name); });
 
-// Where it is dark the window's noise biases the weight 1/(m^2 + c) by at most s^2/c of itself, s^2 the
-// window's variance: sigma^2/48 (24 neighbours, two halves) inside, sigma^2/16 in a corner. With sigma = 0.1
-// (relMSE 0.5!) that is 2.1 % and 6.3 %; every pixel counted as a corner bounds it. Downwards only: 1/(x^2 +
-// c) <= 1/c.
+// In the dark (m = 0) the noise of the window lowers the weight 1/(m^2 + c) by at most a fraction s^2/c,
+// where s^2 is the variance of the window's mean: sigma^2/48 inside (24 neighbours, two halves), sigma^2/16
+// in a corner. With sigma = 0.1 (a relMSE of 0.5) these are 2.1 % and 6.3 %. The lower bound counts every
+// pixel as a corner. The weight is never raised, since 1/(x^2 + c) <= 1/c.
 TEST(ErrorEstimate, DenominatorIsNotBiasedByNoiseInTheDark) {
   std::mt19937_64 random(3);
   const double sigma = 0.1;
@@ -197,14 +199,15 @@ TEST(ErrorEstimate, DenominatorIsNotBiasedByNoiseInTheDark) {
 
   EXPECT_GT(ratio.mean(), 1 - sigma * sigma / 16 / kErrorDark);
   EXPECT_LT(ratio.mean(), 1 + kStandardErrors * ratio.stderr_of_mean());
-  EXPECT_LT(ratio.stderr_of_mean(), 0.002);  // or the bounds would say nothing
+  // Otherwise the bounds above would test nothing.
+  EXPECT_LT(ratio.stderr_of_mean(), 0.002);
 }
 
-// A firefly's pixel must not hide its error by raising its own denominator.
+// A firefly must not hide its error by enlarging the denominator of its own pixel.
 TEST(ErrorEstimate, CountsFirefliesInFull) {
   std::mt19937_64 random(4);
   std::uniform_real_distribution<double> uniform;
-  // A half holds a firefly with probability 1/500: unit variance, mean removed.
+  // A half has a firefly with probability 1/500. The noise has mean 0 and variance 1.
   const auto firefly = [&](std::mt19937_64& r) {
     const double q = 0.002, v = (uniform(r) < q ? 1 - q : -q) / std::sqrt(q * (1 - q));
     return std::array{v, v, v};
@@ -216,8 +219,8 @@ TEST(ErrorEstimate, CountsFirefliesInFull) {
     realised.add(t.realised_relmse);
   }
 
-  // Neighbours of a firefly have a lowered weight and spread-out windows a raised one: 24/500 * 2 of the
-  // pixels are touched, so no more than 10 % either way. (With the pixel in its own window half of the error
+  // A firefly in the window lowers the weights of its neighbours. 24/500 * 2 of the pixels have one in their
+  // window, so the sum changes by at most 10 %. (If a pixel were part of its own window, half of the error
   // would be missing.)
   EXPECT_NEAR(estimated.mean() / realised.mean(), 1, 0.1);
 }
@@ -242,7 +245,7 @@ TEST(ErrorEstimate, SumsOfTilesAreThoseOfTheImage) {
 
 TEST(ErrorEstimate, HeavyTailsGetAVerdictInsteadOfTrust) {
   std::mt19937_64 random(6);
-  // Pareto with tail index 1.1: no variance.
+  // A Pareto distribution with tail index 1.1 has no variance.
   const auto pareto = [](std::mt19937_64& r) {
     const double v = std::pow(1 - std::uniform_real_distribution<double>()(r), -1 / 1.1);
     return std::array{v, v, v};
@@ -305,7 +308,7 @@ TEST(ErrorEstimate, WorksOnTilesOfAnyShape) {
     const ImageError e = image_error(estimate_error({w, h, a, b}, 64));
 
     EXPECT_NEAR(e.rmse, 0.1, 1e-15) << w << " x " << h;  // |A - B| / 2
-    // The correction for noise takes at most half of it.
+    // The correction for noise lowers a weight by at most half.
     EXPECT_LE(e.relmse, 0.01 / (0.4 * 0.4 + 0.01) * (1 + 1e-12)) << w << " x " << h;
     EXPECT_GE(e.relmse, 0.01 / (0.4 * 0.4 + 0.01) / 2) << w << " x " << h;
   }
@@ -318,8 +321,8 @@ TEST(FewHits, ArePixelsWhoseLightStandsInOneHalf) {
   };
   set(100, 1, 0);
   set(200, 1, 20);
-  set(300, 1, 18);  // less than 19 times
-  set(400, 0, 0);   // black among lit ones
+  set(300, 1, 18);  // below the ratio of 19
+  set(400, 0, 0);   // black, but its neighbours are lit
 
   const HalfMeans halves{kErrorSide, kErrorSide, a, b};
 
@@ -332,7 +335,8 @@ TEST(FewHits, ArePixelsWhoseLightStandsInOneHalf) {
 TEST(FewHits, AreNotThePixelsBesideASilhouette) {
   std::vector<double> half(3 * kErrorPixels);
   for (std::size_t i = 0; i < half.size(); ++i)
-    half[i] = i % kErrorSide < 11 ? 1 : 0;  // lit to the left, black else
+    // The left part is lit, the rest is black.
+    half[i] = i % kErrorSide < 11 ? 1 : 0;
 
   EXPECT_EQ(estimate_error({kErrorSide, kErrorSide, half, half}, 64).few_hits, 0u);
 }
@@ -368,7 +372,8 @@ TEST(Checkpoints, StoppedTilesStandWithTheirLastFigures) {
   points.stopped(1);
   EXPECT_EQ(points.complete(), 2u);
 
-  points.folded(0, 1, figures(9));  // goes on after all: round 1 is history, round 2 is not
+  // The tile continues: the complete checkpoint of round 1 stays, that of round 2 uses the new figures.
+  points.folded(0, 1, figures(9));
   points.folded(0, 2, figures(10));
   EXPECT_EQ(points.at(1).plain.squares, 4);
   ASSERT_EQ(points.complete(), 3u);

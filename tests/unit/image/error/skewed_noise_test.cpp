@@ -1,5 +1,5 @@
-// Noise whose bright outliers raise a pixel's value together with its difference: what the samples of the
-// last round say of it.
+// Skewed noise: a bright outlier raises both a pixel's value and the difference of its halves. Tests the
+// correction that is computed from the samples of the last round.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -19,12 +19,12 @@ constexpr double kSkewedDark = 0.01;
 
 using Halves = std::array<std::vector<double>, 2>;
 
-// A picture that does not hide behind its noise: stripes, so that each pixel is weighted by its own value. A
-// sample's noise is exponential, kNoise in standard deviation everywhere.
+// The image has stripes, a structure larger than its noise, so that each pixel is weighted by its own value
+// (g near 1 in error_estimate.h). The noise of a sample is exponential with standard deviation kNoise.
 constexpr double kNoise = .35;
 double truth(std::size_t p) { return p % 2 ? .5 : .9; }
 
-// Sums of `samples` samples for each half of every pixel, three grey channels.
+// Returns the sums of `samples` samples for each half of every pixel; the three channels are equal.
 Halves skewed(double samples, std::mt19937_64& random) {
   Halves out;
   for (auto& half : out) {
@@ -41,7 +41,7 @@ struct Sums {
   double plain = 0, corrected = 0, realised = 0;
 };
 
-// 64 samples, 32 of them in the last round.
+// Estimates the error after 64 samples, 32 of which are in the last round.
 Sums trial(std::mt19937_64& random) {
   Halves before = skewed(16, random), now = skewed(16, random);
   Sums out;
@@ -63,10 +63,12 @@ Sums trial(std::mt19937_64& random) {
   return out;
 }
 
-// A sample has the variance s^2 and the third cumulant 2 s^3 (s = kNoise), so of N samples v = s^2 / N,
-// cov(D^2, S) = 2 s^3 / N^2, and f'/f cov / v = -4 m s / (m^2 + c) / N: at N = 64 that is -4.2 % at .5 and
-// -2.4 % at .9, weighted -3.8 %, of which g leaves nearly all. The mean ratio of 400 trials of 1,024 pixels
-// is known to 2 / sqrt(400 * 1024) = .3 %; .5 % for what is of second order, a few times the square of 4 %.
+// A sample has the variance s^2 and the third cumulant 2 s^3, with s = kNoise. So with N samples the variance
+// is v = s^2 / N, cov(D^2, S) = 2 s^3 / N^2, and the relative error of the uncorrected sum is f'/f cov / v =
+// -4 m s / (m^2 + c) / N. At N = 64 that is -4.2 % at m = .5 and -2.4 % at .9; the weighted mean is -3.8 %,
+// of which g leaves nearly all. The mean ratio of 400 trials of 1,024 pixels has the standard error 2 /
+// sqrt(400 * 1024) = .3 %. The additional .5 % is for terms of second order in the noise, a few times the
+// square of 4 %.
 TEST(SkewedNoise, TheLastRoundTellsWhatItTakesOffTheRelativeError) {
   std::mt19937_64 random(11);
   Sums sum;
@@ -114,7 +116,7 @@ TEST(SkewedNoise, AFilmRemembersTheCorrectionOverARestart) {
   EXPECT_EQ(one.error(0), film.error(0));
 }
 
-// The law: what is said after round k must not depend on whether a shorter round k was there before.
+// The error after round k must not depend on whether a truncated round k was folded before.
 TEST(SkewedNoise, ATailThatIsReplacedLeavesNoTrace) {
   const TileGrid grid{{kSkewedSide, kSkewedSide}, kSkewedSide};
   Film once(grid), twice(grid);

@@ -1,13 +1,11 @@
-// Slots of identifiers, Cryptomatte's names and headers, and the layers of the final image.
+// Slots of identifiers; names and headers of Cryptomatte; its layers in the final image.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <bit>
 #include <random>
 
-#include "common/image/aov/cryptomatte.h"
-#include "common/image/aov/id_slots.h"
-#include "common/image/exr/aov_layers.h"
+#include "common/image/aov/identifiers.h"
 #include "common/image/exr/final_image.h"
 #include "tests/unit/image/support.h"
 #include "worker/fake/fake_pixels.h"
@@ -58,7 +56,8 @@ TEST(IdSlots, BeyondThemTheLargestStayAndTheRestIsCounted) {
 
   const IdSlots slots = seen(many) + seen({{1, 100}});
 
-  EXPECT_EQ(slots.slots[0], (IdSlot{1, 100}));  // the one sample of it before is among the uncounted
+  // Of the 101 samples of object 1, the first one found no slot and is among the uncounted.
+  EXPECT_EQ(slots.slots[0], (IdSlot{1, 100}));
   EXPECT_EQ(slots.slots[1], (IdSlot{kIdSlots + 3, kIdSlots + 3}));
   EXPECT_EQ(slots.more, 1 + 2 + 3 + 4);
   EXPECT_EQ(wrong_with(slots, 166), "");
@@ -75,7 +74,7 @@ TEST(IdSlots, PlanesGiveThemBack) {
   EXPECT_EQ(std::count(planes.begin(), planes.end(), -1.f), 3 * static_cast<long>(kIdPlanes));
 }
 
-// Values of the reference implementation (SMHasher), seed 0.
+// The expected values are those of the reference implementation (SMHasher) with seed 0.
 TEST(Cryptomatte, HashesAsMurmurHash3Does) {
   EXPECT_EQ(murmur3_32(""), 0u);
   EXPECT_EQ(murmur3_32("hello"), 0x248bfa47u);
@@ -83,7 +82,7 @@ TEST(Cryptomatte, HashesAsMurmurHash3Does) {
   EXPECT_EQ(murmur3_32("The quick brown fox jumps over the lazy dog"), 0x2e4ff723u);
 }
 
-// The example of the specification: a layer "crypto_object" with two names.
+// The example in the specification: a layer "crypto_object" with two names.
 TEST(Cryptomatte, WritesTheHeaderOfTheSpecificationsExample) {
   const std::string manifest = cryptomatte_manifest({"default", "bunny", "bunny"});
 
@@ -103,14 +102,15 @@ TEST(Cryptomatte, EveryIdentifierIsAnOrdinaryFloat) {
     ASSERT_TRUE(is_identifier(id)) << name;
     turned += std::bit_cast<std::uint32_t>(id) != murmur3_32(name);
   }
-  EXPECT_GT(turned, 0);  // 1 in 128
+  // One hash in 128 has an exponent that no ordinary float has.
+  EXPECT_GT(turned, 0);
 }
 
 TEST(FinalImage, HasTheLayersThatAreAskedFor) {
   const AovSet aovs = AovSet{}.with(Aov::depth).with(Aov::normal).with(Aov::shape_id).with(Aov::coverage);
   const TileGrid grid{{20, 12}, 8};
   Film film(grid, aovs);
-  // The last tile stays empty.
+  // The last tile has no samples.
   for (TileIndex t = 0; t + 1 < grid.count(); ++t)
     ASSERT_TRUE(film.fold(t, 0, fake_partial(make_partial(grid, t, {0, 2}).header, aovs)));
   ExrPicture picture{grid.frame, {}, {}};

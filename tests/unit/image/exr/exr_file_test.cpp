@@ -26,12 +26,14 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr int kExrWidth = 37, kExrHeight = 70;  // more than one band of the reader, and odd
+// Odd, and more rows than one band of the reader.
+constexpr int kExrWidth = 37, kExrHeight = 70;
 
-// Exact in half: small multiples of 1/8.
+// Returns values that half floats represent exactly: small multiples of 1/8.
 float value(int x, int y, int c) { return static_cast<float>((x * 3 + y * 5 + c * 7) % 64) / 8; }
 
-// With more bits than a half has: what packs with losses has something to lose. From 0.05 to 8.
+// Returns values from 0.05 to 8 that have more bits than a half float, so that a lossy compression changes
+// them.
 float fine_value(int x, int y, int c) {
   return (value(x, y, c) + .05f) * (1 + 1e-4f * static_cast<float>(x));
 }
@@ -53,7 +55,7 @@ void expect_rgb(const Result<RgbImage>& image, bool grey = false) {
             << x << " " << y << " " << c;
 }
 
-// A foreign file: any window, compression, channels; tiled or not.
+// The parameters of a file of another program.
 struct Foreign {
   int x0 = 0, y0 = 0;
   Imf::Compression compression = Imf::ZIP_COMPRESSION;
@@ -94,16 +96,16 @@ std::vector<std::byte> write(const Foreign& f) {
 
 TEST(ExrRead, UnderstandsEveryLosslessCompressionTypeAndLayout) {
   for (const auto compression : {Imf::NO_COMPRESSION, Imf::RLE_COMPRESSION, Imf::ZIPS_COMPRESSION,
-                                 Imf::ZIP_COMPRESSION, Imf::PIZ_COMPRESSION})  // the lossless ones
+                                 Imf::ZIP_COMPRESSION, Imf::PIZ_COMPRESSION})
     for (const auto type : {Imf::HALF, Imf::FLOAT})
       for (const bool tiled : {false, true})
         expect_rgb(
             read_exr_rgb(write({.compression = compression, .type = type, .tiled = tiled}), "foreign"));
 }
 
-// ---- what packs with losses: how far from the picture it may be, by its definition ----
+// ---- lossy compression: the largest error that its definition allows ----
 
-// Both of kHeight x kWidth x 3, as read.
+// An image before and after compression: R, G, B of each pixel, row by row.
 struct Pair {
   std::vector<float> was, is;
   float before(int x, int y, int c) const { return was[at(x, y, c)]; }
@@ -126,7 +128,7 @@ Pair packed(Imf::Compression compression, Imf::PixelType type, bool tiled) {
   return pair;
 }
 
-// Calls check(x, y, c) for the pixels of each block, and done() behind each channel of it.
+// For each channel of each block, calls check(x, y, c) for its pixels and then done(x0, y0, c).
 template <class Check, class Done>
 void each_block(int side, Check check, Done done) {
   for (int c = 0; c < 3; ++c)
@@ -144,19 +146,21 @@ TEST(ExrRead, TakesPxr24WithFloatsOf24Bits) {
               packed(Imf::PXR24_COMPRESSION, Imf::HALF, tiled).was);
     const Pair p = packed(Imf::PXR24_COMPRESSION, Imf::FLOAT, tiled);
     EXPECT_NE(p.is, p.was);
-    // A sign, 8 bits of exponent and 15 of mantissa, rounded to nearest: half a unit of 2^-15.
+    // The format keeps a sign, 8 bits of exponent and 15 of mantissa, rounded to nearest: the relative error
+    // is at most 2^-16.
     for (std::size_t i = 0; i < p.was.size(); ++i)
       ASSERT_LE(std::abs(p.is[i] - p.was[i]), 0x1p-16f * p.was[i]) << i;
   }
 }
 
-// A half's place among all positive halves.
+// Returns the index of a positive half float among all of them in ascending order.
 int step_of(float v) { return half(v).bits(); }
 
-// Blocks of 4 x 4 halves keep their largest and, in steps of 2^s halves, what each value is below it; s is
-// the least for which the differences of neighbours fit into 6 bits. None is above (spread / 2^s) + 1, so s
-// is 0 where the spread is 30 or less, and else at most such that spread / 2^(s-1) > 30. A value rounds to
-// the nearest step: 2^(s-1) < spread / 30. Floats are not packed.
+// A block of 4 x 4 halves stores its largest value, and for each value its distance from the largest in steps
+// of 2^s halves. s is the smallest number for which the differences of neighbours fit into 6 bits. No
+// difference exceeds spread / 2^s + 1, with `spread` the largest distance in the block. So s is 0 if spread
+// is at most 30, and otherwise spread / 2^(s-1) > 30. Values are rounded to the nearest step, so the error is
+// at most 2^(s-1) < spread / 30. Floats are not compressed.
 TEST(ExrRead, TakesB44AsFarAsItsStepsReach) {
   for (const auto compression : {Imf::B44_COMPRESSION, Imf::B44A_COMPRESSION})
     for (const bool tiled : {false, true}) {
@@ -178,16 +182,18 @@ TEST(ExrRead, TakesB44AsFarAsItsStepsReach) {
     }
 }
 
-// DWA's own scale, in which it packs: x^(1/2.2) up to 1, ln(x) / 2.2 + 1 beyond.
+// The scale on which DWA stores values: x^(1/2.2) up to 1, ln(x) / 2.2 + 1 above.
 double on_dwa_scale(double v) { return v <= 1 ? std::pow(v, 1 / 2.2) : std::log(v) / 2.2 + 1; }
 
-// Y', Cb and Cr of blocks of 8 x 8, on that scale, go through an orthonormal cosine transform, whose
-// coefficients are rounded within 45 / 100,000 (the usual level) times JPEG's table, over the table's least
-// number. The squares of the errors of 64 pixels sum up to those of 64 coefficients (Parseval): their root
-// mean square is at most 0.00045 times that of the table, 6.71 for Y' and 5.31 for Cb and Cr. Of those blue
-// has Y' and 1.8556 Cb, red Y' and 1.5747 Cr. Coefficients, results and the pixels themselves are halves:
-// each rounding is 2^-11 of what is at most 8 times (a sum over 64, over 8) a value below 2.2, in a block
-// 2^-11 times 2.2 a pixel, four times (forth, into Y'CbCr, back and out), and up to 2.9 times in blue.
+// The bound of the error on that scale. DWA applies an orthonormal cosine transform to blocks of 8 x 8 values
+// of Y', Cb and Cr. It rounds the coefficients within 45 / 100,000 (the default level) times JPEG's
+// quantisation table divided by the table's smallest number. The sum of squared errors of the 64 pixels is
+// that of the 64 coefficients (Parseval). So the root mean square error is at most 0.00045 times that of the
+// divided table: 6.71 for Y', 5.31 for Cb and Cr. Blue is Y' + 1.8556 Cb, red is Y' + 1.5747 Cr.
+// Roundings to half floats add to this. The values are below 2.2, a coefficient is at most 8 times as large
+// (a sum over 64 values, divided by 8), and a rounding is 2^-11 of the number: over a block, 2^-11 times 2.2
+// per pixel. There are four such roundings (to the scale, to Y'CbCr, and back from both), which blue enlarges
+// by up to 2.9.
 TEST(ExrRead, TakesDwaWithinItsQuantisation) {
   constexpr double kBase = 45. / 100'000, kY = 6.71 * kBase, kC = 5.31 * kBase;
   const double bound = kY + 1.8556 * kC + 2.9 * 4 * 0x1p-11 * 2.2;
@@ -196,7 +202,8 @@ TEST(ExrRead, TakesDwaWithinItsQuantisation) {
       for (const bool tiled : {false, true}) {
         const Pair p = packed(compression, type, tiled);
         if (!tiled)
-          EXPECT_NE(p.is, p.was);  // a block that does not shrink, as of small tiles, stays as it is
+          // Blocks that do not become smaller, as in small tiles, are stored uncompressed.
+          EXPECT_NE(p.is, p.was);
         double squares = 0;
         each_block(
             8,
@@ -265,7 +272,7 @@ TEST(ExrRead, KeepsItsLimits) {
                            {.max_bytes = exr.size(), .max_pixels = kExrWidth * kExrHeight, .max_side = 70}));
 }
 
-// Small files that claim to be large must be refused before anything of that size is allocated.
+// Small files that claim a large size must be rejected before memory of that size is allocated.
 TEST(ExrRead, DoesNotBelieveLargeClaims) {
   const ExrLimits wide{.max_pixels = std::uint64_t{1} << 32, .max_side = 1 << 30};
   const auto claim = [&](const Foreign& f, std::string_view attribute, std::size_t skip,
@@ -278,7 +285,7 @@ TEST(ExrRead, DoesNotBelieveLargeClaims) {
     const auto got = read_exr_rgb(exr, "claim", wide);
     return got ? "accepted" : got.error().message;
   };
-  // After the attribute's name: its zero, its type and zero, its size.
+  // The bytes between an attribute's name and its value: a zero, the type with a zero, and the size.
   EXPECT_THAT(claim({}, "dataWindow", 1 + 6 + 4, {0, 0, 0, 99'999'999}), HasSubstr("ends too early"));
   EXPECT_THAT(claim({}, "dataWindow", 1 + 6 + 4, {-2147483647, -2147483647, 2147483646, 2147483646}),
               HasSubstr("limits"));
@@ -289,7 +296,8 @@ TEST(ExrRead, DoesNotBelieveLargeClaims) {
   EXPECT_THAT(claim({}, "dataWindow", 1 + 6 + 4, {0, 0, 1'999'999, 15}), HasSubstr("can hold packed"));
 }
 
-// The library would read the first bytes as the value and go on in its middle: there stands what claims 2 GB.
+// The library would read only the first bytes of this value, and continue in its middle, where another
+// attribute claims 2 GB.
 TEST(ExrRead, RefusesAttributesThatHideOthers) {
   const std::string size("\x00\x00\x00\x7e", 4), hidden = std::string("\0\0\0\0hidden\0opaque\0", 18) + size;
   const auto file_with = [](const std::string& type, const std::string& value) {
@@ -309,7 +317,8 @@ TEST(ExrRead, RefusesAttributesThatHideOthers) {
   EXPECT_FALSE(read_exr_rgb(file_with("stringvector", size + "abc"), "a.exr"));
   EXPECT_FALSE(read_exr_rgb(file_with("floatvector", "abc"), "a.exr"));
 
-  // An attribute more moves what lies behind it, which tables of chunks don't know; all else is as before.
+  // An inserted attribute of correct size is accepted. But it moves the pixels, so the chunk table is wrong,
+  // and the file may be rejected for that.
   for (const auto& [type, value] :
        std::vector<std::pair<std::string, std::string>>{{"int", "abcd"},
                                                         {"stringvector", std::string("\1\0\0\0x", 5)},
@@ -330,8 +339,8 @@ TEST(ExrRead, SurvivesEveryTruncation) {
   }
 }
 
-// Every byte of header and tables, three ways. It may be read or refused, but never crash (run under ASan,
-// too).
+// Changes every byte of header and tables in three ways. The file may be read or rejected, but the reader
+// must not crash (AddressSanitizer runs this test, too).
 TEST(ExrRead, SurvivesDamage) {
   for (const bool tiled : {false, true}) {
     const auto good = write({.type = Imf::HALF, .tiled = tiled});
@@ -387,7 +396,8 @@ class Memory final : public ByteSink {
   std::vector<std::byte> bytes;
 };
 
-// 50 rows in bands of 13: neither is a multiple of the 16 rows that are compressed together.
+// Returns some of an image's 50 rows. They are written in bands of 13 rows; neither number is a multiple of
+// the 16 rows that are compressed together.
 ExrPicture rows_of(int y0, int rows) {
   ExrPicture picture{{7, rows}, {}, {}};
   std::vector<float> half, full;

@@ -21,7 +21,7 @@ using ::testing::HasSubstr;
 
 const TileGrid kFinalGrid{{20, 13}, 8};
 
-// Both halves of every pixel of a tile have this sum.
+// Returns a tile in which both halves of every pixel have this sum.
 Partial flat(const TileGrid& grid, TileIndex tile, std::array<float, 3> half_sum) {
   Partial p = make_partial(grid, tile, {0, 2});
   const auto n = static_cast<std::size_t>(p.header.tile.pixels());
@@ -117,9 +117,11 @@ TEST(FinalExr, RoundsToTheNearestHalf) {
 
   const auto rgb = read_exr_rgb(final_exr(film, some_provenance(), false)->exr, "half")->rgb;
 
-  EXPECT_NEAR(rgb[0], 0.1f, 0.1f * 0x1p-11f);  // half a unit of a 10-bit mantissa
+  // Half a unit of the 10-bit mantissa.
+  EXPECT_NEAR(rgb[0], 0.1f, 0.1f * 0x1p-11f);
   EXPECT_EQ(rgb[1], 1.0f);
-  EXPECT_NEAR(rgb[2], 3e-8f, 0x1p-25f);  // half of the smallest step, 2^-24
+  // Half of the smallest step of a half float, which is 2^-24.
+  EXPECT_NEAR(rgb[2], 3e-8f, 0x1p-25f);
 }
 
 TEST(FinalExr, OfAnUnfinishedFilmHasZerosWhereNothingIs) {
@@ -144,7 +146,7 @@ TEST(FinalExr, SaysNothingOfTheErrorOfPixelsThatAreNotThere) {
   const auto part = strings(film), none = strings(Film(kFinalGrid));
 
   EXPECT_EQ(part.at("lightshaft:pixels_without_samples"), std::to_string(kFinalGrid.rect(0).pixels()));
-  // That of the pixels that are there, rather than thinned by those that are not.
+  // The error is the mean over the pixels that have samples. Pixels without samples must not lower it.
   TileError rest;
   for (TileIndex t = 1; t < kFinalGrid.count(); ++t) rest.add(film.error(t));
   EXPECT_EQ(part.at("lightshaft:relmse"), fmt::format("{:.9g}", image_error(rest).relmse));
@@ -196,8 +198,8 @@ TEST(Preview, IsSrgbWithExposureInStops) {
   const Decoded normal = decode(preview_png(film, 0).value()), darker = decode(preview_png(film, -1).value());
 
   EXPECT_EQ(normal.size, kFinalGrid.frame);
-  // sRGB of 0.5 is 0.735357 (188), of 0.001 the linear piece 0.01292 (3), of 0.25 0.537099 (137), of 0.0005
-  // 0.00646 (2).
+  // sRGB values: 0.5 is 0.735357 (188); 0.25 is 0.537099 (137); on the linear part 0.001 is 0.01292 (3) and
+  // 0.0005 is 0.00646 (2).
   EXPECT_EQ(normal.at(3, 3), (std::array{188, 3, 255}));
   EXPECT_EQ(normal.at(9, 3), (std::array{0, 0, 255}));
   EXPECT_EQ(darker.at(3, 3), (std::array{137, 2, 255}));

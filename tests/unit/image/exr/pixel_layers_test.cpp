@@ -1,5 +1,5 @@
 #include "common/image/exr/pixel_layers.h"
-#include "common/image/frame/tiles_over.h"
+#include "common/image/frame/frame.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 namespace ls {
 namespace {
 
-// 3 x 2 tiles; those of the right column and of the lower row are smaller.
+// 3 x 2 tiles. The tiles of the right column and of the lower row are smaller.
 constexpr TileGrid kLayerGrid{{83, 45}, 32};
 constexpr PixelRect kLayerWhole{0, 0, 83, 45};
 
@@ -62,9 +62,9 @@ TEST(PixelLayers, APartIsThatPartOfTheWhole) {
 
 TEST(PixelLayers, ABlockAtTheEdgeHasTheMeanOfItsOwnPixels) {
   const Film film = test::make_film(kLayerGrid, 16);
-  const TilePixels corner = film.pixels(kLayerGrid.count() - 1);  // 19 x 13 pixels from (64, 32) on
+  const TilePixels corner = film.pixels(kLayerGrid.count() - 1);  // 19 x 13 pixels, from (64, 32)
   double mean = 0, squares = 0;
-  for (std::size_t y = 8; y < 13; ++y)  // the last block of level 3: 3 x 5 pixels
+  for (std::size_t y = 8; y < 13; ++y)  // the last block of level 3 has 3 x 5 pixels
     for (std::size_t x = 16; x < 19; ++x) {
       mean += corner.mean[3 * (y * 19 + x)] / 15;
       squares += std::pow(corner.standard_error[3 * (y * 19 + x)] / 15, 2);

@@ -93,7 +93,8 @@ TEST(Film, IsTheSameWhateverOrderTheTilesComeIn) {
     std::shuffle(order.begin(), order.end(), std::mt19937(seed));
     Film film(kFilmGrid);
     auto waiting = order;
-    while (!waiting.empty())  // early rounds wait, as in the coordinator
+    // A round that comes too early is folded later, as in the coordinator.
+    while (!waiting.empty())
       std::erase_if(waiting, [&](const auto& unit) {
         return film.fold(unit.first, unit.second, make_round(kFilmGrid, unit.first, unit.second, 70))
             .has_value();
@@ -203,8 +204,9 @@ TEST(FilmBytes, RefusesTruncationAndDamage) {
   }
 }
 
-// A film refuses any order but 0, 1, 2 ..., so each round's sums go under the name of the round it waits for:
-// the finished pixels divide by all samples, whatever round they are of.
+// Folds the sums of rounds in a wrong order, and returns the digest of the pixels. A film accepts only the
+// order 0, 1, 2, ..., so the sums of each round are labelled as the round that the film expects. The finished
+// pixels are still correct means, since they are divided by the number of all samples.
 Digest folded_in(const std::vector<RoundIndex>& order) {
   const TileGrid grid{{32, 32}, 32};
   static std::map<RoundIndex, Partial> rounds;
@@ -220,15 +222,15 @@ Digest folded_in(const std::vector<RoundIndex>& order) {
 }
 
 TEST(FakePixels, ShowWhenTwoRoundsAreFoldedInReversedOrder) {
-  std::vector<RoundIndex> order(kFakeMarkerRounds + 4);  // more than one group of marks
+  std::vector<RoundIndex> order(kFakeMarkerRounds + 4);  // more than one group of marks (fake_pixels.h)
   std::iota(order.begin(), order.end(), RoundIndex{0});
   const Digest right = folded_in(order);
   for (std::size_t i = 0; i < order.size(); ++i)
     for (std::size_t k = i + 1; k < order.size(); ++k) {
       std::swap(order[i], order[k]);
-      if (k > 1)
-        EXPECT_NE(folded_in(order), right) << "rounds " << i << " and " << k;
-      else  // a + b is b + a, so no pixel can tell
+      if (k > 1) EXPECT_NE(folded_in(order), right) << "rounds " << i << " and " << k;
+      // Since a + b = b + a, swapping the first two rounds changes no pixel.
+      else
         EXPECT_EQ(folded_in(order), right);
       std::swap(order[i], order[k]);
     }

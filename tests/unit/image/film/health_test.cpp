@@ -1,4 +1,4 @@
-// What went wrong, counted by cause and located: the same in whatever order units come.
+// Problems counted by cause and located: the result does not depend on the order of the units.
 #include "common/image/film/health.h"
 
 #include <gmock/gmock.h>
@@ -20,7 +20,7 @@ Health of(HealthCause cause, int x, int y, std::uint64_t sample) {
   return h;
 }
 
-// Samples all over an image, each by itself.
+// Returns problems all over an image, each as a Health of its own.
 std::vector<Health> scattered() {
   std::vector<Health> all;
   for (int i = 0; i < 40; ++i) {
@@ -59,7 +59,7 @@ TEST(Health, KeepsTheFirstPlacesOfEachCauseRowByRowAndCountsAll) {
   const auto& first = h.causes.at(HealthCause::infinite).first;
   ASSERT_EQ(first.size(), kHealthLocations);
   EXPECT_TRUE(std::is_sorted(first.begin(), first.end()));
-  // In row 0 stand i = 0, 9, 18, 27 and 36, at columns 0, 15, 14, 13, 12; row 1 has i = 2, 11, 20, 29, 38.
+  // Row 0 has i = 0, 9, 18, 27 and 36, in columns 0, 15, 14, 13 and 12. Row 1 has i = 2, 11, 20, 29 and 38.
   EXPECT_EQ(first[0], (HealthLocation{0, 0, 0}));
   EXPECT_EQ(first[1], (HealthLocation{12, 0, 36}));
   EXPECT_EQ(first[4], (HealthLocation{15, 0, 9}));

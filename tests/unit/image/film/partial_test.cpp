@@ -141,8 +141,8 @@ TEST(PartialGate, RefusesTrailingBytes) {
   EXPECT_THAT(refusal(exr, partial.header), HasSubstr("needs exactly"));
 }
 
-// Whatever bit flips: the file is refused, or it decodes to other sums and so to another digest, or the byte
-// means nothing to us (aspect ratio, screen window, a channel's "linear" hint).
+// If one bit is flipped, the file is rejected, or it decodes to other sums and so has another digest, or the
+// byte is one that is not decoded (aspect ratio, screen window, the "linear" hints of the channels).
 TEST(PartialGate, NoFlippedBitGoesUnnoticed) {
   const Partial partial = make_partial(kPartialGrid, 5, {0, 2});
   const auto good = encoded(partial);
@@ -158,7 +158,8 @@ TEST(PartialGate, NoFlippedBitGoesUnnoticed) {
     }
   }
 
-  // Six channels' 4 bytes, pixelAspectRatio 4, screenWindowCenter 8, screenWindowWidth 4.
+  // The bytes that are not decoded: 4 for each of six channels, 4 of pixelAspectRatio, 8 of
+  // screenWindowCenter, 4 of screenWindowWidth.
   EXPECT_EQ(harmless, 8u * (6 * 4 + 4 + 8 + 4));
 }
 
@@ -212,8 +213,8 @@ TEST(PartialGate, RefusesNonFiniteSumsNamingThePixel) {
   const Partial partial = make_partial(kPartialGrid, 4, {2, 4});
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), -std::numeric_limits<float>::infinity()}) {
     auto exr = encoded(partial);
-    std::memcpy(exr.data() + exr.size() - sizeof bad, &bad,
-                sizeof bad);  // last line, last channel (B.R), last pixel
+    // The last pixel of the last channel (B.R) in the last line.
+    std::memcpy(exr.data() + exr.size() - sizeof bad, &bad, sizeof bad);
 
     EXPECT_THAT(refusal(exr, partial.header), HasSubstr("B.R of pixel (15, 12)"));
   }
@@ -232,7 +233,7 @@ TEST(PartialGate, DoesNotAllocateForAHugeTile) {
 
   EXPECT_THAT(refusal(exr, partial.header), HasSubstr("is not the unit's tile"));
 
-  const std::int32_t beyond[4] = {0, 0, kMaxFrameSide, 0};  // inclusive
+  const std::int32_t beyond[4] = {0, 0, kMaxFrameSide, 0};  // bounds are inclusive
   std::memcpy(exr.data() + find(exr, "dataWindow") + 21, beyond, sizeof beyond);
   EXPECT_THAT(refusal(exr, partial.header), HasSubstr("is out of range"));
 }

@@ -1,4 +1,4 @@
-// Sums over more samples than float32 can count.
+// Sums over more samples than a float32 can count.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -12,7 +12,8 @@ namespace {
 
 using test::name_of;
 
-// A film of one pixel, all of whose samples are `value`: units of float32 sums, rounded once.
+// Returns a film of one pixel whose samples all have this value. The float32 sums of each unit are rounded
+// once.
 Film alike(double value, RoundIndex rounds) {
   const TileGrid grid{{1, 1}, 1};
   Film film(grid);
@@ -26,7 +27,8 @@ Film alike(double value, RoundIndex rounds) {
 }
 
 TEST(Sums, OfMoreOnesThanFloat32CountsAreExact) {
-  const Film film = alike(1, (1 << 19) + 8);  // 64 samples in all but the first few: beyond 2^25
+  // 64 samples in all but the first few rounds: more than 2^25 together.
+  const Film film = alike(1, (1 << 19) + 8);
 
   EXPECT_GT(film.spp(0), std::uint64_t{1} << 25);
   EXPECT_EQ(film.pixels(0).mean[0], 1);
@@ -36,14 +38,14 @@ TEST(Sums, OfMoreOnesThanFloat32CountsAreExact) {
 TEST(Sums, OfTenthsDriftByNoMoreThanTheirRounding) {
   const Film film = alike(.1, 1 << 14);
 
-  // Each unit's sum is a float32, off by the same share of at most 2^-24: the mean is off by that, not more.
+  // The float32 sum of each unit has the same relative error of at most 2^-24, so the mean has no larger one.
   EXPECT_NEAR(film.pixels(0).mean[0], .1, .1 * 0x1p-24);
 }
 
-// A film of one pixel that has `rounds` rounds of 64 samples of float32's .1 behind it, without the hours
-// that folding them takes: a saved tile's count and sums are put in its place (film_bytes.cpp says where).
-// The sums are what folding gives, exactly: 24 bits times a count below 2^29, no step of which a double
-// rounds.
+// Returns a film of one pixel with `samples` samples of value float32(.1), as if its rounds had been folded,
+// which would take hours. It replaces the number of rounds and the sums in a saved tile (film_bytes.cpp has
+// the format). The sums are those that folding would give: a 24-bit number times a count below 2^29 is exact
+// in double at every step.
 constexpr std::size_t kRoundsAt = 12, kSumsAt = 136, kChecksum = 32;
 Film long_ago(std::uint64_t samples) {
   Film film = alike(.1, 6);
@@ -77,8 +79,8 @@ TEST(Sums, OfABillionTenthsAreExactToTheLastSample) {
 
   fold_tenths(film, kMore);
 
-  // A sum that no longer took on what is folded into it (float32's did not from 2^24 times a round on) would
-  // be off by 64 in a million here.
+  // If the sum stopped growing in these last rounds, as a float32 sum does when it is 2^24 times a round, the
+  // mean would be too low by 64 in a million.
   EXPECT_EQ(film.spp(0), 1'000'000'000u);
   EXPECT_NEAR(film.pixels(0).mean[0] / double{.1f}, 1, 1e-12);
   EXPECT_EQ(film.pixels(0).standard_error[0], 0);

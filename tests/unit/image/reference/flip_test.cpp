@@ -20,8 +20,8 @@ Picture flat(float r, float g, float b) {
   return p;
 }
 
-// Waves of all three channels, raised to `power` and scaled; the other one is brighter in a pattern of 11
-// steps.
+// Returns waves in all three channels, raised to `power` and scaled. If `other`, the image is also brightened
+// by a pattern of 11 steps.
 Picture waves(double power, double scale, bool other) {
   Picture p;
   for (int y = 0; y < p.size.height; ++y)
@@ -46,26 +46,30 @@ TEST(Flip, OfEqualImagesIsZero) {
 
 TEST(Flip, DoesNotDependOnWhichImageIsFirstUntilExposuresAreChosen) {
   const Picture a = waves(1, 1, false), b = waves(1, 1, true);
-  EXPECT_NEAR(ldr(a, b), ldr(b, a), 1e-6);  // only roundings differ: both are below 1
+  // The results differ only by rounding, since both images are below 1.
+  EXPECT_NEAR(ldr(a, b), ldr(b, a), 1e-6);
 }
 
 // Flat images have no features, so the error is that of the colours alone. Black has L* = 0, white 100, and
-// no hue: HyAB = 100, 100^.7 = 25.119. The largest is that of Hunt-adjusted green (87.73, -75.61, 72.98) and
-// blue (32.30, 25.58, -34.84): (55.43 + sqrt(101.19^2 + 107.82^2))^.7 = 41.28. Above .4 of it the rest is .05
-// wide: .95 + (25.119 - 16.51) / (41.28 - 16.51) * .05 = .96738.
+// both have no hue, so HyAB = 100 and 100^.7 = 25.119. The largest difference is between Hunt-adjusted green
+// (87.73, -75.61, 72.98) and blue (32.30, 25.58, -34.84): (55.43 + sqrt(101.19^2 + 107.82^2))^.7 = 41.28. The
+// range above .4 of it, 16.51, is compressed to the width .05: .95 + (25.119 - 16.51) / (41.28 - 16.51) * .05
+// = .96738.
 TEST(Flip, OfBlackAndWhiteIsTheHandComputedValue) {
   const auto error = ldr_flip(flat(0, 0, 0).view(), flat(1, 1, 1).view());
-  for (const float e : error) EXPECT_NEAR(e, .96738, 2e-5);  // five digits by hand
+  // Computed by hand to five digits.
+  for (const float e : error) EXPECT_NEAR(e, .96738, 2e-5);
 }
 
-// Greys of Y = .2 and .3: L* = 116 cbrt(Y) - 16 = 51.837 and 61.654; 9.817^.7 = 4.948, below the bend
-// at 16.51: .95 / 16.51 * 4.948 = .2847.
+// Greys of Y = .2 and .3 have L* = 116 cbrt(Y) - 16 = 51.837 and 61.654. The difference 9.817^.7 = 4.948 is
+// below the bend at 16.51, so the error is .95 / 16.51 * 4.948 = .2847.
 TEST(Flip, OfTwoGreysIsTheHandComputedValue) {
   EXPECT_NEAR(ldr(flat(.2F, .2F, .2F), flat(.3F, .3F, .3F)), .2847, 1e-4);
 }
 
-// Values of flip-evaluator 1.7, the authors' own program, for the same float images. It computes in single
-// precision, too, with other roundings; its white point for HDR differs in the fifth digit.
+// The expected values are those of flip-evaluator 1.7, the authors' own program, for the same float images.
+// It also computes in single precision, but rounds differently, and its white point for HDR differs in the
+// fifth digit.
 TEST(Flip, GivesTheValuesOfTheAuthorsProgram) {
   Picture r = waves(1, 1, false), t = waves(1, 1, true);
   EXPECT_NEAR(ldr(r, t), .2094682, 1e-5);
@@ -82,7 +86,7 @@ TEST(Flip, ExposuresFollowFromTheReferenceAlone) {
   EXPECT_FLOAT_EQ(e.at(e.count - 1), e.last);
 }
 
-// A difference that the eye cannot resolve at a distance is seen from near by.
+// Fine noise is less visible from a distance.
 TEST(Flip, FineNoiseIsSeenLessFromFarAway) {
   const Picture grey = flat(.4F, .4F, .4F);
   Picture noisy = grey;
@@ -105,7 +109,7 @@ TEST(Flip, StaysBetweenZeroAndOneWhateverThePixels) {
       EXPECT_GE(e, 0);
       EXPECT_LE(e, 1);
     }
-  EXPECT_EQ(hdr(flat(0, 0, 0), flat(0, 0, 0)), 0);  // a median of nothing
+  EXPECT_EQ(hdr(flat(0, 0, 0), flat(0, 0, 0)), 0);  // the reference has no positive value, and so no median
 }
 
 }  // namespace

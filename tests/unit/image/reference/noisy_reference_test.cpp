@@ -1,4 +1,5 @@
-// What a noisy reference leaves of its own noise in the true figures, and what is concluded from them.
+// The true error against a noisy reference: the noise of the reference that remains in it, and the
+// conclusions drawn from it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,8 +20,8 @@ constexpr std::size_t kPixels = std::size_t{kWidth} * kWidth, kValues = 3 * kPix
 
 double brightness(std::size_t pixel) { return .5 + static_cast<double>(pixel % kWidth) / kWidth; }
 
-// An image in the making: grey Gaussian noise of `spread` times the pixel's brightness a sample, and `bias`,
-// which no sample takes away.
+// Simulates an image: grey Gaussian noise, per sample `spread` times the pixel's brightness, and `bias`,
+// which does not fall with samples.
 class Render {
  public:
   Render(std::uint64_t seed, double spread, double bias = 0) : spread_(spread), bias_(bias), random_(seed) {}
@@ -55,7 +56,7 @@ class Render {
     const TrueError truth = true_error(against, image());
     return {spp, spp, e.relmse, e.relmse_lo, e.relmse_hi, truth.relmse, truth.relmse_stderr};
   }
-  // Against the right image.
+  // Returns the error against the noise-free image.
   double relmse() const {
     double sum = 0;
     const std::vector<float> x = image();
@@ -74,7 +75,8 @@ class Render {
   std::normal_distribution<double> normal_;
 };
 
-// The verdicts of jobs of 256 samples, each with a reference of its own.
+// Simulates jobs of 256 samples, each with its own reference. Returns the number of jobs for which a bias
+// floor is reported.
 int floors(int jobs, std::uint64_t reference_spp, double bias) {
   int found = 0;
   for (int i = 0; i < jobs; ++i) {
@@ -89,20 +91,22 @@ int floors(int jobs, std::uint64_t reference_spp, double bias) {
   return found;
 }
 
-// Four standard errors are passed by chance once in 30,000: two of 200 jobs in 50,000 runs of this test.
+// By chance, a job exceeds four standard errors once in 30,000 times. So two of 200 jobs do once in 50,000
+// runs of this test.
 TEST(NoisyReference, IsNoBiasFloor) {
   EXPECT_LE(floors(200, 8, 0), 1);
   EXPECT_LE(floors(200, 64, 0), 1);
 }
 
-// A bias of .05 beside noise of .5: of 256 samples the squared error is a thousandth, of the bias 2.5 of
-// them. What a reference of 64 samples leaves has a standard error of about 2 * .004 / sqrt(1024) = .00025.
+// Averaged over the pixels, the bias of .05 has a relative squared error of .0033; that of the noise is .001
+// at 256 samples. With a reference of 64 samples, whose relative variance is .004, the true error has a
+// standard error of about 2 sqrt(.004 (.0043 + .004)) / sqrt(1024) = .00036.
 TEST(NoisyReference, DoesNotHideAFloor) { EXPECT_EQ(floors(50, 64, .05), 50); }
 
-// A reference with a quarter of the samples: its noise r is four times the squared error of the image, and r
-// / m^2 is .0625 / 8 = .0078 for a pixel m. One figure strays by 2 sqrt(4 + 16) / sqrt(1024) = 28 %
-// (reference.h), their mean by .6 %. What the derivation there leaves out is of second order: 60 (r / m^2)^2
-// = .4 %.
+// The reference has a quarter of the image's samples, so its variance r is four times the squared error of
+// the image, and r / m^2 = .0625 / 8 = .0078 for a pixel of value m. One figure has the relative standard
+// deviation 2 sqrt(4 + 16) / sqrt(1024) = 28 % (reference.h), the mean of 2000 .6 %. The derivation there
+// neglects terms of second order in r: 60 (r / m^2)^2 = .4 %.
 TEST(NoisyReference, DoesNotBiasTheRelativeError) {
   constexpr int kTrials = 2000;
   double sum = 0, squares = 0;
@@ -115,11 +119,14 @@ TEST(NoisyReference, DoesNotBiasTheRelativeError) {
   }
   const double mean = sum / kTrials, sigma = std::sqrt((squares / kTrials - mean * mean) / kTrials);
   EXPECT_NEAR(mean, 1, test::kStandardErrors * sigma + .004);
-  EXPECT_LT(sigma, .008);  // or the bound would say nothing
+  // Otherwise the bound above would test nothing.
+  EXPECT_LT(sigma, .008);
 }
 
-// Its standard error, told of each reference, against how far the figures of many references stray. Grey
-// noise: right, to 1 / sqrt(2 * 2000) = 1.6 %, one standard deviation, and the mean of what is told to less.
+// Compares the standard error that is computed for each reference with the standard deviation of the figures
+// over many references. For grey noise the computation is exact. The standard deviation of 2000 figures is
+// known to 1 / sqrt(2 * 2000) = 1.6 % (one standard deviation), the mean of the computed standard errors more
+// precisely.
 TEST(NoisyReference, TellsTheStandardErrorOfWhatItLeaves) {
   constexpr int kTrials = 2000;
   double sum = 0, squares = 0, variance = 0;
@@ -142,8 +149,8 @@ TEST(NoisyReference, OfTheSameErrorLeavesNothingAboveItsNoise) {
                   told = true_error(exact.reference(), job.image());
   EXPECT_TRUE(below_noise(noisy.relmse, noisy.relmse_stderr));
   EXPECT_TRUE(below_noise(noisy.rmse * noisy.rmse, noisy.mse_stderr));
-  EXPECT_FALSE(
-      below_noise(told.relmse, told.relmse_stderr));  // its standard error is sqrt(8 / 1024) of it, 9 %
+  // Its standard error is sqrt(8 / 1024) = 9 % of it.
+  EXPECT_FALSE(below_noise(told.relmse, told.relmse_stderr));
   EXPECT_FALSE(below_noise(told.rmse * told.rmse, told.mse_stderr));
   EXPECT_TRUE(below_noise(0, 0.));
   EXPECT_FALSE(below_noise(0, std::nullopt));

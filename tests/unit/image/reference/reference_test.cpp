@@ -8,7 +8,6 @@
 
 #include "common/image/error/error_estimate.h"
 #include "common/image/exr/final_image.h"
-#include "common/image/exr/maps.h"
 #include "tests/support/significance.h"
 #include "tests/unit/image/support.h"
 
@@ -18,7 +17,7 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr FrameSize kSize{16, 12};
-constexpr double kRounding = 576 * 0x1p-53;  // of a sum of kReferenceValues values below 1
+constexpr double kRounding = 576 * 0x1p-53;  // rounding error of a sum of kReferenceValues values below 1
 constexpr std::size_t kReferenceValues = std::size_t{3} * 16 * 12;
 
 ExrPicture picture(float level) {
@@ -57,18 +56,20 @@ TEST(Reference, TakesItsOwnErrorAway) {
   const TrueError e = true_error(*reference, std::vector<float>(kReferenceValues, 2.5F));
 
   EXPECT_DOUBLE_EQ(e.rmse, std::sqrt(.25 - .0625));
-  // Halves of 2.25 and 1.75, each with the variance 2 s^2.
+  // The halves are 2.25 and 1.75, each with the variance 2 s^2.
   const double h = (relative_weight(2.25, .125) + relative_weight(1.75, .125)) / 2;
   EXPECT_NEAR(e.relmse, (.25 - .0625) * h, kRounding);
   EXPECT_DOUBLE_EQ(noise_of(*reference).mse, .0625);
   EXPECT_NEAR(noise_of(*reference).relmse, .0625 * h, kRounding);
-  EXPECT_EQ(true_error(*reference, std::vector<float>(kReferenceValues, 2.1F)).rmse, 0);  // .01 - .0625
+  // .01 - .0625 is negative and becomes 0.
+  EXPECT_EQ(true_error(*reference, std::vector<float>(kReferenceValues, 2.1F)).rmse, 0);
 }
 
-// A reference of four times the samples of the image has a fifth of the squared difference. With its layers
-// of errors, made of two halves as ours are, the image's own squared error is found: of 2000 images the mean
-// is known to 1 / sqrt(2000 * 576 / 2) = .13 %, but the quotient's noise is larger; the bound is its measured
-// error times 4.
+// The reference has an eighth of the image's squared error, .005, so a ninth of the squared difference is its
+// own. With its error layers, made of two halves as in our images, the squared error of the image alone is
+// found. The mean over 2000 images would be known to 1 / sqrt(2000 * 576 / 2) = .13 % from the image's noise
+// alone, but subtracting the reference's noise adds to this, so the tolerance is computed from the measured
+// standard error.
 TEST(Reference, LeavesTheErrorOfTheImageInTheMean) {
   std::mt19937_64 random(7);
   std::normal_distribution<float> normal;
@@ -78,10 +79,11 @@ TEST(Reference, LeavesTheErrorOfTheImageInTheMean) {
     Reference reference{kSize, {}, {}};
     std::vector<float> image;
     for (std::size_t v = 0; v < kReferenceValues; ++v) {
-      const float a = 1 + .1F * normal(random), b = 1 + .1F * normal(random);  // halves: their mean has .005
+      // Two halves: their mean has the variance .005.
+      const float a = 1 + .1F * normal(random), b = 1 + .1F * normal(random);
       reference.rgb.push_back((a + b) / 2);
       reference.error.push_back(std::abs(a - b) / 2);
-      image.push_back(1 + .2F * normal(random));  // .04
+      image.push_back(1 + .2F * normal(random));  // variance .04
     }
     const double mse = std::pow(true_error(reference, image).rmse, 2);
     sum += mse, squares += mse * mse;
@@ -90,8 +92,9 @@ TEST(Reference, LeavesTheErrorOfTheImageInTheMean) {
   }
   const double mean = sum / kTrials, sigma = std::sqrt((squares / kTrials - mean * mean) / kTrials);
   EXPECT_LT(std::abs(mean - .04), test::kStandardErrors * sigma);
-  EXPECT_LT(sigma, .0001);                                         // or the bound would say nothing
-  EXPECT_GT(raw / kTrials, .045 - test::kStandardErrors * sigma);  // with the reference's noise left in
+  EXPECT_LT(sigma, .0001);  // otherwise the tolerance above would test nothing
+  EXPECT_GT(raw / kTrials,
+            .045 - test::kStandardErrors * sigma);  // without the error layers the reference's noise remains
 }
 
 TEST(Reference, RefusesWhatCannotBeOne) {
@@ -135,11 +138,12 @@ TEST(Maps, ColoursRiseInLightness) {
 
 TEST(Maps, HaveTheSizeOfTheImage) {
   Film film(TileGrid{kSize, 8});
-  ASSERT_TRUE(film.fold(0, 0, test::make_round(film.grid(), 0, 0, 2)));  // the others have no sample
+  ASSERT_TRUE(film.fold(0, 0, test::make_round(film.grid(), 0, 0, 2)));  // the other tiles have no samples
   for (const auto& png : {error_map_png(film), samples_map_png(film)}) {
     ASSERT_TRUE(png);
     ASSERT_GT(png->size(), 24u);
-    EXPECT_EQ(std::to_integer<int>((*png)[19]), kSize.width);  // of IHDR, big endian
+    EXPECT_EQ(std::to_integer<int>((*png)[19]),
+              kSize.width);  // width and height in the chunk IHDR, big endian
     EXPECT_EQ(std::to_integer<int>((*png)[23]), kSize.height);
   }
 }

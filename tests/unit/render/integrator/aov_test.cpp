@@ -8,8 +8,7 @@
 
 #include <cmath>
 
-#include "common/image/aov/cryptomatte.h"
-#include "common/image/aov/id_slots.h"
+#include "common/image/aov/identifiers.h"
 #include "common/image/film/partial.h"
 #include "tests/support/render_check.h"
 

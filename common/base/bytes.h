@@ -1,4 +1,4 @@
-// Reads numbers from untrusted bytes.
+// Reads numbers and words from untrusted bytes.
 #pragma once
 
 #include <algorithm>
@@ -18,28 +18,36 @@ inline std::string_view as_text(std::span<const std::byte> b) {
   return {reinterpret_cast<const char*>(b.data()), b.size()};
 }
 
-// A bounds-checked cursor. A take() of more bytes than are left returns nullopt and does not advance.
+// A bounds-checked cursor. If too few bytes are left, its functions return nullopt and do not advance.
 class ByteReader {
  public:
   explicit ByteReader(std::span<const std::byte> data) : data_(data) {}
 
   std::size_t position() const { return position_; }
   std::size_t left() const { return data_.size() - position_; }
-  bool skip(std::uint64_t n) {
-    if (n > left()) return false;
+  std::optional<std::span<const std::byte>> bytes(std::uint64_t n) {
+    if (n > left()) return std::nullopt;
     position_ += n;
-    return true;
+    return data_.subspan(position_ - n, n);
   }
+  bool skip(std::uint64_t n) { return bytes(n).has_value(); }
   template <class T>
   std::optional<T> take(bool big_endian = false) {
-    if (left() < sizeof(T)) return std::nullopt;
+    const auto from = bytes(sizeof(T));
+    if (!from) return std::nullopt;
     std::byte raw[sizeof(T)];
-    for (std::size_t i = 0; i < sizeof(T); ++i)
-      raw[i] = data_[position_ + (big_endian ? sizeof(T) - 1 - i : i)];
-    position_ += sizeof(T);
+    for (std::size_t i = 0; i < sizeof(T); ++i) raw[i] = (*from)[big_endian ? sizeof(T) - 1 - i : i];
     T v;
     std::memcpy(&v, raw, sizeof v);
     return v;
+  }
+  // Reads a zero-terminated text of at most `longest` characters.
+  std::optional<std::string_view> name(std::size_t longest) {
+    const std::string_view rest = as_text(data_.subspan(position_));
+    const std::size_t length = rest.substr(0, longest + 1).find('\0');
+    if (length == rest.npos) return std::nullopt;
+    position_ += length + 1;
+    return rest.substr(0, length);
   }
 
  private:
@@ -47,8 +55,8 @@ class ByteReader {
   std::size_t position_ = 0;
 };
 
-// Removes the next word (non-blank characters) from the front of `line` and returns it; an empty word means
-// that `line` has no more.
+// Removes the next word (a run of non-blank characters) from the front of `line` and returns it; returns an
+// empty word at the end of the line.
 inline std::string_view next_word(std::string_view& line) {
   const std::size_t a = line.find_first_not_of(" \t\r\v\f");
   if (a == line.npos) return line = {};

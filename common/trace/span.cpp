@@ -1,4 +1,4 @@
-#include "common/trace/context.h"
+#include "common/trace/span.h"
 
 #include <fmt/format.h>
 
@@ -12,27 +12,6 @@ namespace {
 constexpr std::size_t kTraceparent = 55;  // characters of version 00
 constexpr std::uint8_t kSampledFlag = 1;
 
-template <std::size_t N>
-std::string hex_of(const std::array<std::uint8_t, N>& bytes) {
-  return fmt::format("{:02x}", fmt::join(bytes, ""));
-}
-
-std::optional<int> digit_of(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  return std::nullopt;
-}
-
-template <std::size_t N>
-bool read_hex(std::string_view text, std::array<std::uint8_t, N>& out) {
-  for (std::size_t i = 0; i < N; ++i) {
-    const auto high = digit_of(text[2 * i]), low = digit_of(text[2 * i + 1]);
-    if (!high || !low) return false;
-    out[i] = static_cast<std::uint8_t>(*high * 16 + *low);
-  }
-  return true;
-}
-
 template <class Id>
 Id first_bytes(const Digest& digest) {
   Id id;
@@ -42,8 +21,8 @@ Id first_bytes(const Digest& digest) {
 
 }  // namespace
 
-std::string hex(const TraceId& id) { return hex_of(id.bytes); }
-std::string hex(const SpanId& id) { return hex_of(id.bytes); }
+std::string hex(const TraceId& id) { return to_hex(id.bytes); }
+std::string hex(const SpanId& id) { return to_hex(id.bytes); }
 
 std::string to_traceparent(const SpanContext& context) {
   return fmt::format("00-{}-{}-{:02x}", hex(context.trace), hex(context.span),
