@@ -12,8 +12,8 @@ namespace ls::race {
 
 using Pixels = std::vector<float>;  // R, G, B interleaved, row by row from the top; all finite
 
-// A folder for the images of one race, which is removed with the object. The images are many, and are read
-// only once, at the end.
+// A folder for the images of one race, which is removed with the object. The images are on disk because they
+// are many, and are read only once, at the end.
 class Scratch {
  public:
   static Result<Scratch> make();

@@ -17,7 +17,7 @@ namespace {
 // tile is a small part of the turn, and short enough that changes of the machine's speed affect all racers.
 constexpr double kTurnSeconds = 1;
 
-// Runs `work` on this many threads; returns their total CPU seconds.
+// Runs `work` on `threads` threads at once; returns their total CPU seconds.
 template <class Work>
 double on_threads(int threads, const Work& work) {
   std::mutex mutex;
@@ -156,8 +156,8 @@ class RenderRacer final : public Racer {
     return keep(file("b"), means(1, 2, spp / 2));
   }
 
-  // Returns the mean image of one half of the samples, A (0, 1) or B (1, 2), or of both (0, 2), given as the
-  // range [from, to) of their indices. The range has `samples` samples per pixel in total.
+  // Returns the mean image of the halves [from, to) of the samples: [0, 1) is half A, [1, 2) is half B, and
+  // [0, 2) is both. `samples` is the number of these samples per pixel.
   Pixels means(std::size_t from, std::size_t to, std::uint64_t samples) const {
     Pixels out(values());
     for (std::size_t i = 0; i < out.size(); ++i) {
@@ -175,7 +175,7 @@ class RenderRacer final : public Racer {
   // guards the data shared by the threads of a turn: film_, sums_, health_, next_tile_, trouble_
   std::mutex mutex_;
   Film film_;
-  std::vector<double> sums_;  // of half A, then of half B; interleaved
+  std::vector<double> sums_;  // of half A, then of half B; R, G, B interleaved
   Health health_;
   TileIndex next_tile_ = 0;
   std::optional<Error> trouble_;

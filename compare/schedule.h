@@ -30,9 +30,10 @@ struct Turn {
   double used = 0;      // seconds of the race used so far
   double expected = 0;  // seconds expected for the next turn; 0: unknown
 };
-// Returns the index of the racer that runs next: the one whose next turn has the earliest middle, used +
-// expected / 2. So turns alternate. Among equals, the first one from index `lap` on, cyclically, runs, so
-// that no racer always goes first. nullopt: all are done.
+// Returns the index of the racer that runs next: the one with the smallest used + expected / 2, the middle of
+// its next turn in its own time. So racers take turns and use equal times. If several have the same middle,
+// the first one from index `lap` on, cyclically, runs, so that no racer always goes first. nullopt: all are
+// done.
 std::optional<std::size_t> next_turn(std::span<const Turn> turns, std::size_t lap);
 
 // Returns the samples that a render adds next: those of round `k` (a fixed range of samples), cut to what

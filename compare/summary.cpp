@@ -79,8 +79,8 @@ std::vector<Row> rows_of(const Race& race) {
 
 std::vector<CurveAt> curve_of(const Race& race, std::size_t entrant) {
   const auto lanes = lanes_of(race, entrant);
-  const double end =
-      std::numeric_limits<double>::infinity();  // key for the final points, whose samples differ
+  // Key for the final points of all seeds, which belong together although their sample counts differ
+  const double end = std::numeric_limits<double>::infinity();
   std::map<double, std::vector<const JudgedPoint*>> groups;
   for (const JudgedLane* lane : lanes)
     for (const JudgedPoint& p : lane->points) groups[p.last ? end : p.spp].push_back(&p);

@@ -17,8 +17,8 @@ struct Row {
   double spp = 0, seconds = 0;         // geometric means at the end
   std::optional<Estimate> relmse;      // at the end
   std::optional<Estimate> efficiency;  // 1 / (relMSE x seconds) at the end
-  std::optional<Estimate> slope;       // s of relMSE ~ seconds^-s, from points of doubling samples
-  // Mean over the seeds of the efficiency of the first entrant divided by that of this one. nullopt for the
+  std::optional<Estimate> slope;       // s of relMSE ~ seconds^-s, fitted to points at doubling sample counts
+  // The first entrant's efficiency divided by this one's, as geometric mean over the seeds. nullopt for the
   // first entrant.
   std::optional<Estimate> ratio;
   double spread = 1;  // largest final relMSE of a seed over the smallest: large if few pixels dominate

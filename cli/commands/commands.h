@@ -1,5 +1,5 @@
 // The commands. Each function adds its command to the command line. If the user gives that command, parsing
-// sets `action`, which main() then runs; its result is the exit code.
+// the command line sets `action`. main() then runs `action` and exits with the exit code that it returns.
 #pragma once
 
 #include <fmt/format.h>
@@ -18,10 +18,8 @@ void add_render(CLI::App& app, Action& action);
 void add_inspect(CLI::App& app, Action& action);
 void add_convert(CLI::App& app, Action& action);
 void add_submit(CLI::App& app, Action& action);
-void add_farm_commands(CLI::App& app,
-                       // The commands jobs, show, watch, pause, resume, cancel, extend, fetch, focus,
-                       // video, workers
-                       Action& action);
+// Adds jobs, show, watch, pause, resume, cancel, extend, fetch, focus, video and workers.
+void add_farm_commands(CLI::App& app, Action& action);
 void add_farm_up(CLI::App& app, Action& action);  // the command farm up
 void add_tokens(CLI::App& app, Action& action);
 void add_merge(CLI::App& app, Action& action);
@@ -31,7 +29,7 @@ void add_compare(CLI::App& app, Action& action);
 void add_doctor(CLI::App& app, Action& action);
 void add_completion(CLI::App& app, Action& action);
 
-// returns "lightshaft 0.2.0, build ..."
+// Returns "lightshaft 0.2.0, build ..."
 inline std::string version_text() {
   return fmt::format("lightshaft {}, build {}", LIGHTSHAFT_VERSION, render::kBuildId);
 }

@@ -1,4 +1,4 @@
-// lightshaft compare: compares our integrators by their error against time.
+// lightshaft compare: renders scenes with several of our integrators and compares how fast their errors fall.
 #include <fmt/format.h>
 
 #include <atomic>

@@ -92,7 +92,7 @@ int focus(FarmApi& api, const FarmFlags& flags) {
   return change(api, flags, {{"focus", *region}});
 }
 
-// Asks for a video, waits until it is made, and downloads it.
+// Requests a video, waits until the coordinator has made it, and downloads it.
 int video(FarmApi& api, const FarmFlags& flags) {
   if (const auto ok = check_output("-o", flags.out); !ok) return print_error(ok.error());
   json asked = json::object();
@@ -142,7 +142,7 @@ int fetch(FarmApi& api, const FarmFlags& flags) {
   return fetch_results(api, flags.id, {flags.out, flags.report, flags.html, flags.farm.json, false});
 }
 
-// Changes `flags` to the job of one frame: each frame of a sequence is a separate job with its own id.
+// With --frame, replaces the id of a sequence in `flags` by the id of one frame, which is a separate job.
 Result<void> choose_frame(FarmFlags& flags) {
   if (flags.frame.empty()) return {};
   const auto frame = parse_whole("--frame", flags.frame, 0, kMaxFrameNumber);

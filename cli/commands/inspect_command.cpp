@@ -22,8 +22,8 @@ struct InspectFlags {
   bool json = false, strict = false, variants = false, work = false;
 };
 
-// Longer side, in pixels, of the small image that --variants renders with every variant of the integrator. It
-// is large enough that paths hit all parts of a scene, and small enough to be fast.
+// Longer side, in pixels, of the small image that --variants and --work render: large enough that paths hit
+// all parts of a scene, and small enough to be fast.
 constexpr int kSmallSide = 32;
 constexpr SampleRange kSmallSamples{0, 4};
 
@@ -33,8 +33,8 @@ FrameSize small(FrameSize size) {
   return {scaled(size.width), scaled(size.height)};
 }
 
-// Builds the world for a small image of the scene. If path_reuse is 0, the decision whether pixels share the
-// tails of their paths depends on the image's size. So the decision for the whole image is used here, too.
+// Builds the world for a small image of the scene. If path_reuse is 0, the renderer decides by the image's
+// size whether pixels share the tails of their paths. The small image uses the decision for the full size.
 tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> small_world(
     LocalScene scene, const LocalWorld& whole) {
   int& path_reuse = scene.scene.integrator.path_reuse;
@@ -46,8 +46,8 @@ tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> small_
   return build_world_again(scene, settings, worker::usable_cpus());
 }
 
-// Renders a small image with every integrator variant that has the scene's features. Returns the digest of
-// each variant's pixel sums.
+// Renders a small image with every variant of the integrator that has the scene's features. (A variant is
+// compiled for a subset of the features that scenes can have.) Returns digests of the pixel sums.
 tl::expected<VariantBitsList, coordinator::Rejected> render_variants(const LocalScene& scene,
                                                                      const LocalWorld& whole) {
   const auto world = small_world(scene, whole);

@@ -43,8 +43,8 @@ Result<FinalPicture> open_image(const std::string& path) {
   return read_final_exr(*bytes, path);
 }
 
-// Checks the conditions of a comparison: image and scene belong together, and this machine has the numeric
-// class of the image (machines of one class give the same bits).
+// Checks that the image was rendered from this scene, and that this machine has the image's numeric class
+// (machines of one class give the same bits).
 Result<void> check_same(const SealedImage& image, const LocalScene& scene, const VerifyFlags& flags) {
   if (const Digest mine = digest_of(scene.scene); mine != image.scene)
     return fail(
@@ -64,7 +64,7 @@ Result<void> check_same(const SealedImage& image, const LocalScene& scene, const
   return {};
 }
 
-// The number of tiles with each result. Tiles that were not rendered count as neither right nor wrong.
+// The number of tiles with each result. `stopped`: not rendered, because the user interrupted the check.
 struct Tally {
   std::size_t right = 0, wrong = 0, stopped = 0;
 };

@@ -21,9 +21,9 @@ struct FarmFacts {
   bool has_token = false;
   std::string trouble;            // why there was no answer; empty: there was an answer
   bool is_coordinator = false;    // true if a coordinator answered
-  std::string not_ready, remark;  // from /readyz: why it cannot take jobs, and other remarks
-  // Clocks, in seconds since 1970: this machine's before and after the request, and the coordinator's in the
-  // answer.
+  std::string not_ready, remark;  // from /readyz: why the coordinator cannot take jobs; another remark
+  // In seconds since 1970: this machine's clock before and after the request, and the coordinator's clock,
+  // from the header Date of its answer.
   double asked_at = 0, answered_at = 0;
   std::optional<std::int64_t> date;
   int session_status = 0;  // HTTP status of GET /api/v1/session, which returns the token's role

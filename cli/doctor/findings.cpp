@@ -14,8 +14,8 @@
 namespace ls::cli {
 namespace {
 
-// Memory below this causes a warning: denoising an image takes up to 2 GiB (lightshaft-denoise limits itself
-// to that).
+// Memory below this causes a warning: denoising an image takes up to 2 GiB, the limit that lightshaft-denoise
+// sets itself.
 constexpr std::uint64_t kLittleMemory = std::uint64_t{2} << 30;
 // Free disk space below kNoRoom is a problem, and below kLittleRoom causes a warning. A coordinator stores
 // each scene twice, as XML and in canonical form, so a disk with less than twice the size of the largest XML
@@ -149,8 +149,8 @@ std::vector<Finding> judge_machine(const MachineFacts& facts) {
 }
 
 double clock_lead(double asked_at, double answered_at, std::int64_t date) {
-  // While the request ran, the coordinator's clock was at some time in [date, date + 1), and this machine's
-  // in [asked_at, answered_at].
+  // When the coordinator wrote the date, its clock was in [date, date + 1), and this machine's in
+  // [asked_at, answered_at]. So the difference of the clocks is in [least, most).
   const double least = static_cast<double>(date) - answered_at;
   const double most = static_cast<double>(date) + 1 - asked_at;
   return least > 0 ? least : most < 0 ? most : 0;

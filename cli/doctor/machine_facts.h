@@ -21,13 +21,14 @@ struct FolderFacts {
 struct MachineFacts {
   std::string processor_target;  // processor for which the program was compiled: "x86-64-v3"
   bool processor_fits = false;
-  std::string numeric_class;  // that of `lightshaft render` on this machine, in hexadecimal; machines of one
-                              // class render the same bits
+  // Numeric class of `lightshaft render` on this machine, in hexadecimal: machines of one class render the
+  // same bits.
+  std::string numeric_class;
   std::uint64_t memory_bytes = 0;
   int cpus = 0;
   double cpu_quota = 0;  // number of CPUs that the control group allows; 0: no limit
   std::uint64_t file_limit = 0;
-  // The restrictions that the sandbox puts in place on this machine; nullopt: entering it failed
+  // Which restrictions the sandbox can put in place on this machine; nullopt: this could not be tried
   std::optional<worker::child::Sandboxed> sandbox;
   std::filesystem::path vdb_program;
   bool vdb_found = false;

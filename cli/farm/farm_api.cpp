@@ -219,7 +219,8 @@ FarmApi::Answer<HttpResponse> FarmApi::send_rest(const std::string& path, const 
   sending.reached = std::max(sending.reached, offset);
   auto put = client_.upload(path, file, offset);
   sending.retry.answered();
-  // 409: between the two requests, an earlier connection has delivered more bytes.
+  // Status 409: more bytes arrived over an earlier connection after the HEAD request, so `offset` is out of
+  // date.
   if (put && put->status == 409)
     return coordinator::rejected({Errc::unavailable, problem_of(*put).error.message});
   return checked(std::move(put));

@@ -42,7 +42,7 @@ ProgressFigures progress_of(const json& job) {
     f.samples_per_second = f.spp_done * size->first * size->second / elapsed;
   if (const auto frames = job.find("frames"); frames != job.end() && frames->is_object()) {
     const int total = int_field(*frames, "total", 0);
-    // Multiplied by the number of frames, since spp_done is the mean over them
+    // spp_done is the mean over the frames, and the rate is that of all frames together
     f.samples_per_second *= total;
     f.frames = fmt::format("{} of {} frames", int_field(*frames, "done", 0), total);
   }

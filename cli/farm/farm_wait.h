@@ -13,8 +13,8 @@ struct WatchOptions {
   bool quiet = false;
   bool json = false;  // print the job as a line of JSON on stdout after each change
 };
-// Waits until the job `id` ends and returns the job. Keeps trying while the coordinator cannot be reached for
-// a while (a restart). Returns an error if the job cannot be followed.
+// Waits until the job `id` ends and returns the job. If the coordinator cannot be reached, as during a
+// restart, keeps trying for a while (RetryPolicy), and then returns the error.
 FarmApi::Answer<nlohmann::json> watch_job(FarmApi& api, const std::string& id, const WatchOptions& options);
 
 ProgressFigures progress_of(const nlohmann::json& job);

@@ -12,7 +12,7 @@ struct Results {
   // File names; empty: not wanted. A run of # is replaced by the frame number
   std::string image, report, html;
   bool json = false;     // print each file as a line of JSON on stdout
-  bool patient = false;  // keep trying if the coordinator is unreachable for a while
+  bool patient = false;  // keep trying for a while if the coordinator is unreachable
 };
 
 // Checks, before a job is submitted, that files of this name (or one per frame) can be written.

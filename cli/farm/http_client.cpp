@@ -153,8 +153,9 @@ void HttpClient::State::set_common(const std::string& url, const Headers& header
   curl_easy_setopt(curl, CURLOPT_USERAGENT, "lightshaft/" LIGHTSHAFT_VERSION);
   curl_easy_setopt(curl, CURLOPT_NOSIGNAL, 1L);
   curl_easy_setopt(curl, CURLOPT_PROTOCOLS_STR, "http,https");
-  // A coordinator may redirect to another one that has the job. Both belong to the farm that the token is
-  // for. A redirect from TLS to an address without TLS is not followed.
+  // A coordinator may redirect to another coordinator of the farm, which has the job. The token is valid for
+  // the whole farm, so it is sent on (UNRESTRICTED_AUTH). A redirect from TLS to an address without TLS is
+  // not followed.
   curl_easy_setopt(curl, CURLOPT_FOLLOWLOCATION, 1L);
   curl_easy_setopt(curl, CURLOPT_MAXREDIRS, kRedirects);
   curl_easy_setopt(curl, CURLOPT_REDIR_PROTOCOLS_STR, url.starts_with("https:") ? "https" : "http,https");

@@ -42,8 +42,8 @@ class HttpClient {
   Result<HttpResponse> request(std::string_view method, const std::string& path, std::string_view body = {},
                                std::string_view content_type = "application/json");
   // Sends the bytes of a file by PUT without holding them all in memory. With `offset`, sends only the bytes
-  // from that one on. The server appends them to those that it has, and keeps them even if the connection
-  // breaks.
+  // from that position on. The server appends them to those that it has, and keeps them even if the
+  // connection breaks.
   Result<HttpResponse> upload(const std::string& path, const std::filesystem::path& file,
                               std::optional<std::uint64_t> offset = std::nullopt);
   // Sends a file by POST. The coordinator may take up to an hour to answer, because it unpacks the archive

@@ -218,7 +218,7 @@ class LocalRender {
 
   const LocalScene& scene_;
   const LocalRenderOptions& options_;
-  Interrupt interrupt_;  // created before any member that has threads
+  Interrupt interrupt_;  // created before any member that has threads, as Interrupt requires
   Result<InstructionCounter> counter_ = InstructionCounter::open();
   Keepers keepers_;
   std::unique_ptr<LocalFarm> farm_;

@@ -57,8 +57,8 @@ std::string estimate_text(const json& job, const char* key, const char* interval
 std::string time_left_text(const json& job, const json& times, const char* key, const char* interval) {
   const auto value = number_field(times, key);
   if (!value) return "-";
-  // The doubt matters only with a target error: a job that ends after a fixed number of samples takes the
-  // same time whatever its error.
+  // Doubt about the error makes the time doubtful only if the job ends at a target error. A job that ends
+  // after a fixed number of samples takes the same time whatever its error.
   if (number_field(job, "target_error") && verdict_of(job).doubtful)
     return "at least " + show_seconds(*value);
   const auto ci = interval ? pair_field(times, interval) : std::nullopt;

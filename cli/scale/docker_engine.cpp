@@ -18,8 +18,8 @@ constexpr double kDockerRunLimit = 600;  // the same for a command that may have
 
 // The container's command waits at a named pipe for the farm's token. The pipe is in the container's /tmp,
 // which is in memory. So the token is in no argument, in no file, and not in the environment that `docker
-// inspect` shows; only the worker's own environment has it, which its user and root can read. Both commands
-// try to make the pipe, since either may come first.
+// inspect` shows; only the worker's own environment has it, which its user and root can read. This command
+// and kGiveToken both try to make the pipe, since either may run first.
 constexpr const char* kTakeToken =
     "mkfifo -m 600 /tmp/join-token 2>/dev/null; IFS= read -r LIGHTSHAFT_JOIN_TOKEN </tmp/join-token; "
     "export LIGHTSHAFT_JOIN_TOKEN; exec \"$@\"";

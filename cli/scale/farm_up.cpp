@@ -26,7 +26,7 @@ class Pause {
     ended_ = true;
     wake_.notify_all();
   }
-  // True if the end was requested.
+  // Returns true if the user has asked `farm up` to end.
   bool wait(double seconds) {
     std::unique_lock lock(mutex_);
     const bool before = ended_;

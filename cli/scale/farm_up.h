@@ -15,10 +15,11 @@ namespace ls::cli {
 struct FarmUpOptions {
   ScaleLimits limits;
   Budgets budgets;
-  bool until_done = false;       // end when every job has ended or used up its budget
-  bool json = false;             // print the report as JSON at the end
-  std::filesystem::path report;  // file with the costs so far; read at the start, to continue their sums, and
-                                 // written after each check
+  bool until_done = false;  // end when every job has ended or used up its budget
+  bool json = false;        // print the report as JSON at the end
+  // File with the costs so far. It is read at the start, so that the sums of an earlier run are continued,
+  // and written after each check.
+  std::filesystem::path report;
 };
 
 // Runs until a signal asks it to end or, with until_done, until every job has ended or used up its budget.

@@ -15,7 +15,7 @@ struct KubernetesOptions {
   std::string like = "deployment/worker";  // the Deployment whose template the pods get
   int threads = 1;                         // cores that the template must request
   int drain_seconds = 120;  // the pods' grace period: time that a worker has to deliver its results and end
-  int minutes = 60;         // a pod's time limit: Kubernetes ends it then, with that grace period
+  int minutes = 60;         // time limit, after which Kubernetes ends the pod, with that grace period
   std::string logs = ".";   // folder for the logs of workers that have ended
   std::vector<std::string> kubectl;         // more options of kubectl, one word each
   std::vector<std::string> worker_options;  // more options of the worker

@@ -11,8 +11,8 @@ void Ledger::observe(std::span<const EngineWorker> workers, double elapsed) {
   for (const auto& w : workers) {
     if (w.state != EngineWorker::State::running) continue;
     const auto before = running_.find(w.id);
-    // A worker's running time that is shorter than before means that the engine requeued it: the earlier run
-    // has ended.
+    // If the worker has run for a shorter time than at the previous call, its earlier run has ended and the
+    // engine has started it again.
     const bool same_run = before != running_.end() && w.seconds >= before->second.seconds;
     if (same_run)
       running_.erase(before);

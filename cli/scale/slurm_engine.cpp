@@ -172,8 +172,8 @@ Result<std::vector<EngineWorker>> parse_squeue(const std::string& lines) {
     const std::string& state = fields[1];
     const std::string reason = fields.size() > 4 ? fields[4] : "";
     // Two kinds of jobs count as stuck, so that other workers are started instead: jobs that Slurm holds
-    // because it could not start them several times, and jobs that wait for two minutes (BeginTime) because
-    // they were requeued after the loss of their node.
+    // because several attempts to start them failed, and jobs that Slurm delays by two minutes (BeginTime)
+    // after it has requeued them because their node was lost.
     const bool held = state == "REQUEUE_HOLD" || state == "SPECIAL_EXIT" ||
                       (state == "PENDING" && reason.find("requeued held") != std::string::npos) ||
                       (state == "PENDING" && (reason.starts_with("JobHeld") || reason == "BeginTime"));

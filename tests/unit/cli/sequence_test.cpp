@@ -1,4 +1,4 @@
-// Sequences on the command line: what is asked for, what is read, and where it goes.
+// Tests sequences on the command line: the options, the files that are read, and the files that are written.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
