@@ -9,12 +9,8 @@
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
-#include "cli/scale/docker_engine.h"
+#include "cli/scale/engines.h"
 #include "cli/scale/farm_up.h"
-#include "cli/scale/kubernetes_engine.h"
-#include "cli/scale/slurm_engine.h"
-#include "cli/scale/ssh_engine.h"
-#include "common/base/clock.h"
 #include "common/base/helper_program.h"
 #include "common/base/secret.h"
 
@@ -135,12 +131,10 @@ Result<std::unique_ptr<Engine>> open_engine_of_pods(const FarmUpFlags& f, const 
                           .minutes = *minutes,
                           .logs = f.logs,
                           .kubectl = f.kubectl,
-                          .worker_options = f.worker_options},
-                         system_unix_seconds);
+                          .worker_options = f.worker_options});
 }
 
-Result<std::unique_ptr<Engine>> open_engine(const FarmUpFlags& f, const FarmUpOptions& o,
-                                            const Clock& clock) {
+Result<std::unique_ptr<Engine>> open_engine(const FarmUpFlags& f, const FarmUpOptions& o) {
   const auto logs = check_folder("--logs", f.logs);
   if (!logs) return tl::unexpected(logs.error());
   if (f.engine == "kubernetes") return open_engine_of_pods(f, o);
@@ -173,8 +167,7 @@ Result<std::unique_ptr<Engine>> open_engine(const FarmUpFlags& f, const FarmUpOp
                         .image = f.image,
                         .drain_seconds = drain_seconds,
                         .logs = log_folder,
-                        .run = f.docker},
-                       system_unix_seconds);
+                        .run = f.docker});
   if (f.machines.empty()) return bad_argument("--machines FILE is needed with --on ssh: one machine a line");
   auto machines = read_machines(f.machines);
   if (!machines) return tl::unexpected(machines.error());
@@ -182,19 +175,17 @@ Result<std::unique_ptr<Engine>> open_engine(const FarmUpFlags& f, const FarmUpOp
                    .join_token = *token,
                    .machines = std::move(*machines),
                    .config = f.ssh_config,
-                   .logs = log_folder},
-                  clock);
+                   .logs = log_folder});
 }
 
 int farm_up(const FarmUpFlags& flags) {
   Interrupt interrupt;
-  const SystemClock clock;
   const auto options = parse_options(flags);
   if (!options) return print_error(options.error());
-  auto engine = open_engine(flags, *options, clock);
+  auto engine = open_engine(flags, *options);
   if (!engine) return print_error(engine.error());
   auto api = FarmApi::open(flags.farm);
-  return api ? run_farm_up(*api, **engine, *options, interrupt, clock) : print_error(api.error());
+  return api ? run_farm_up(*api, **engine, *options, interrupt) : print_error(api.error());
 }
 
 void describe(CLI::App& app, FarmUpFlags& f) {

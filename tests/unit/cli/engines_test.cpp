@@ -5,11 +5,8 @@
 #include <fstream>
 
 #include "cli/scale/child_command.h"
-#include "cli/scale/demand.h"
-#include "cli/scale/docker_engine.h"
-#include "cli/scale/kubernetes_engine.h"
-#include "cli/scale/slurm_engine.h"
-#include "cli/scale/ssh_engine.h"
+#include "cli/scale/engines.h"
+#include "cli/scale/farm_up.h"
 
 namespace ls::cli {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "cli/scale/ledger.h"
+#include "cli/scale/costs.h"
 #include "tests/support/fake_clock.h"
 
 namespace ls::cli {

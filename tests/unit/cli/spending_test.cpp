@@ -1,4 +1,4 @@
-#include "cli/scale/spending.h"
+#include "cli/scale/costs.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
