@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "cli/commands/commands.h"
-#include "cli/doctor/machine_facts.h"
+#include "cli/doctor/facts.h"
 #include "cli/local/local_farm.h"
 #include "cli/output/console.h"
 #include "common/base/log.h"

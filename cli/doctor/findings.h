@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/doctor/farm_facts.h"
-#include "cli/doctor/machine_facts.h"
+#include "cli/doctor/facts.h"
 
 namespace ls::cli {
 

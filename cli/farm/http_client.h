@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/base/clock.h"
 #include "common/base/error.h"
@@ -15,7 +16,6 @@ namespace ls::cli {
 
 struct HttpResponse {
   int status = 0;
-  std::string content_type;
   std::string body;
   std::optional<std::uint64_t> upload_offset;  // value of the header Upload-Offset
   std::optional<std::int64_t> date;            // value of the header Date, in seconds since 1970
@@ -61,6 +61,9 @@ class HttpClient {
   explicit HttpClient(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
+
+// Returns the addresses in Options::url, without slashes at their ends.
+std::vector<std::string> addresses_in(const std::string& url);
 
 // Decides whether to repeat a failed request: a restart, a proxy in between, or too many requests may make a
 // coordinator unreachable for a while.

@@ -35,7 +35,7 @@ FarmFacts good_farm() {
   facts.session_status = 200;
   facts.role = "admin";
   facts.version = "1.0";
-  facts.workers = {{"w1", "connected", "", "1.0", "abc", false}};
+  facts.workers = {{"w1", "connected", "1.0", "abc", false}};
   return facts;
 }
 
@@ -148,7 +148,7 @@ INSTANTIATE_TEST_SUITE_P(
         FarmFault{"numeric-class", Status::warning, "other bits",
                   [](FarmFacts& f) { f.workers->at(0).numeric_class = "def"; }},
         FarmFault{"numeric-class", Status::warning, "2 numeric classes", [](FarmFacts& f) {
-                    f.workers->push_back({"w2", "connected", "", "1.0", "def", false});
+                    f.workers->push_back({"w2", "connected", "1.0", "def", false});
                   }}));
 
 // At some time between request and answer, the coordinator's clock was in [date, date + 1).

@@ -1,4 +1,5 @@
-// Facts about this machine for `lightshaft doctor`. Observing them changes nothing.
+// Facts for `lightshaft doctor`: about this machine, and about a farm, read from the coordinator's HTTP interface
+// by GET requests only. Observing them changes nothing.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/farm/http_client.h"
 #include "worker/child/sandbox.h"
 
 namespace ls::cli {
@@ -43,5 +45,29 @@ MachineFacts observe_machine(const std::filesystem::path& cache, const std::file
 // this program with this flag; its exit code is the result.
 inline constexpr const char* kSandboxProbeFlag = "--sandbox-probe";
 int run_sandbox_probe();
+
+struct WorkerFacts {
+  std::string name, state, version, numeric_class;
+  bool fake = false;
+};
+
+struct FarmFacts {
+  std::string url;  // address without user and password
+  bool has_token = false;
+  std::string trouble;            // why there was no answer; empty: there was an answer
+  bool is_coordinator = false;    // true if a coordinator answered
+  std::string not_ready, remark;  // from /readyz: why the coordinator cannot take jobs; another remark
+  // In seconds since 1970: this machine's clock before and after the request, and the coordinator's clock,
+  // from the header Date of its answer.
+  double asked_at = 0, answered_at = 0;
+  std::optional<std::int64_t> date;
+  int session_status = 0;  // HTTP status of GET /api/v1/session, which returns the token's role
+  std::string session_trouble, role, user, version;
+  std::optional<std::vector<WorkerFacts>> workers;
+};
+
+// Returns one result for each address of `connection`. invalid_argument: an address or the CA file cannot be
+// used.
+Result<std::vector<FarmFacts>> observe_farm(const HttpClient::Options& connection);
 
 }  // namespace ls::cli

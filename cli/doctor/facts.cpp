@@ -1,0 +1,202 @@
+#include "cli/doctor/facts.h"
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+
+#include "cli/farm/farm_api.h"
+#include "cli/output/reply_fields.h"
+#include "common/base/clock.h"
+#include "common/base/helper_program.h"
+#include "common/denoise/denoiser.h"
+#include "worker/machine.h"
+#include "worker/render/render.h"
+
+namespace ls::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+enum ProbeBits : int { kProbed = 64, kCalls = 1, kFiles = 2, kSizes = 4 };
+
+std::optional<worker::child::Sandboxed> probe_sandbox() {
+  const Descriptor nothing(::open("/dev/null", O_RDWR | O_CLOEXEC));
+  if (nothing.fd < 0) return std::nullopt;
+  const auto status = run_helper("/proc/self/exe", {kSandboxProbeFlag}, nothing.fd);
+  if (!status || !WIFEXITED(*status) || !(WEXITSTATUS(*status) & kProbed)) return std::nullopt;
+  const int bits = WEXITSTATUS(*status);
+  return worker::child::Sandboxed{(bits & kCalls) != 0, (bits & kFiles) != 0, (bits & kSizes) != 0};
+}
+
+bool processor_fits([[maybe_unused]] const std::string& target) {
+  // The program runs, so the processor supports every target that is not tested here.
+#ifdef __x86_64__
+  if (target == "x86-64-v3") return __builtin_cpu_supports("x86-64-v3") != 0;
+#endif
+  return true;
+}
+
+double cpu_quota() {
+  double quota = 0, period = 0;
+  std::ifstream group("/sys/fs/cgroup/cpu.max");
+  return group >> quota >> period && period > 0 ? quota / period : 0;  // "max 100000" means no limit
+}
+
+bool may_run(const fs::path& program) { return ::access(program.c_str(), X_OK) == 0; }
+
+fs::path in_path(const std::string& program) {
+  const char* variable = std::getenv("PATH");
+  const std::string folders = variable ? variable : "";
+  for (std::size_t at = 0; at < folders.size();) {
+    const std::size_t end = std::min(folders.find(':', at), folders.size());
+    const fs::path candidate = fs::path(folders.substr(at, end - at)) / program;
+    if (may_run(candidate)) return candidate;
+    at = end + 1;
+  }
+  return {};
+}
+
+// Observes a folder. A folder that does not exist is judged by the nearest existing one above it, where it
+// would be created.
+FolderFacts observe_folder(const std::string& name, const fs::path& path) {
+  FolderFacts facts{name, path, false, 0};
+  std::error_code error;
+  fs::path existing = fs::absolute(path, error);
+  while (!existing.empty() && existing != existing.root_path() && !fs::exists(existing, error))
+    existing = existing.parent_path();
+  facts.usable = fs::is_directory(existing, error) && ::access(existing.c_str(), W_OK | X_OK) == 0;
+  const auto space = fs::space(existing, error);
+  if (!error) facts.free_bytes = space.available;
+  return facts;
+}
+
+// Removes user and password: "https://user:password@host" becomes "https://host".
+std::string without_password(const std::string& url) {
+  const std::size_t start = url.find("://");
+  const std::size_t host = start == std::string::npos ? 0 : start + 3;
+  const std::size_t end = std::min(url.find('/', host), url.size());
+  const std::size_t at = url.substr(0, end).rfind('@');
+  return at == std::string::npos || at < host ? url : url.substr(0, host) + url.substr(at + 1);
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+    text.replace(at, from.size(), to);
+  return text;
+}
+
+std::vector<WorkerFacts> workers_of(const json& answer) {
+  std::vector<WorkerFacts> all;
+  const auto list = answer.find("workers");
+  if (list == answer.end() || !list->is_array()) return all;
+  for (const json& w : *list)
+    if (w.is_object())
+      all.push_back({text_field(w, "name"), text_field(w, "state"), text_field(w, "build"),
+                     text_field(w, "numeric_class"), flag_field(w, "fake")});
+  return all;
+}
+
+void ask_readiness(HttpClient& client, FarmFacts& facts) {
+  const auto ready = client.request("GET", "/readyz");
+  if (!ready) {
+    facts.not_ready = ready.error().message;
+  } else if (ready->status / 100 != 2) {
+    facts.not_ready = problem_of(*ready).error.message;
+  } else if (ready->body != "ready\n") {
+    facts.remark = ready->body.substr(0, ready->body.find('\n'));
+  }
+}
+
+void ask_session(HttpClient& client, FarmFacts& facts) {
+  const auto session = client.request("GET", "/api/v1/session");
+  if (!session) {
+    facts.session_trouble = session.error().message;
+    return;
+  }
+  facts.session_status = session->status;
+  const json answer = json::parse(session->body, nullptr, false);
+  if (session->status / 100 != 2 || !answer.is_object()) {
+    facts.session_trouble = problem_of(*session).error.message;
+    return;
+  }
+  facts.role = text_field(answer, "role");
+  facts.user = text_field(answer, "user");
+  facts.version = text_field(answer, "version");
+  const auto workers = client.request("GET", "/api/v1/workers");
+  if (!workers || workers->status / 100 != 2) return;
+  if (const json list = json::parse(workers->body, nullptr, false); list.is_object())
+    facts.workers = workers_of(list);
+}
+
+Result<FarmFacts> observe_one(const HttpClient::Options& connection) {
+  auto client = HttpClient::open(connection);
+  if (!client) return tl::unexpected(client.error());
+  FarmFacts facts;
+  facts.has_token = !connection.token.empty();
+  facts.asked_at = system_unix_seconds();
+  const auto health = client->request("GET", "/healthz");
+  facts.answered_at = system_unix_seconds();
+  if (!health) {
+    facts.trouble = health.error().message;
+    return facts;
+  }
+  facts.date = health->date;
+  facts.is_coordinator = health->status == 200 && health->body == "ok\n";
+  if (!facts.is_coordinator) return facts;
+  ask_readiness(*client, facts);
+  if (facts.has_token) ask_session(*client, facts);
+  return facts;
+}
+
+}  // namespace
+
+int run_sandbox_probe() {
+  const auto held = worker::child::enter_sandbox({});
+  return kProbed | (held.calls ? kCalls : 0) | (held.files ? kFiles : 0) | (held.sizes ? kSizes : 0);
+}
+
+MachineFacts observe_machine(const fs::path& cache, const fs::path& data) {
+  MachineFacts facts;
+  facts.processor_target = LIGHTSHAFT_ARCH;
+  facts.processor_fits = processor_fits(facts.processor_target);
+  facts.numeric_class = render::numeric_class().hex();
+  facts.memory_bytes = worker::usable_memory_bytes();
+  facts.cpus = worker::usable_cpus();
+  facts.cpu_quota = cpu_quota();
+  rlimit files{};
+  if (::getrlimit(RLIMIT_NOFILE, &files) == 0) facts.file_limit = files.rlim_max;
+  facts.sandbox = probe_sandbox();
+  facts.vdb_program = program_beside_us("lightshaft-vdb");
+  facts.vdb_found = may_run(facts.vdb_program);
+  const auto denoiser = Denoiser::find(1);
+  if (denoiser) facts.denoiser = denoiser->name();
+  if (!denoiser) facts.denoiser_trouble = denoiser.error().message;
+  facts.redis_server = in_path("redis-server");
+  facts.folders.push_back(observe_folder("cache", cache.empty() ? worker::default_cache() : cache));
+  if (!data.empty()) facts.folders.push_back(observe_folder("data", data));
+  return facts;
+}
+
+Result<std::vector<FarmFacts>> observe_farm(const HttpClient::Options& connection) {
+  std::vector<FarmFacts> all;
+  HttpClient::Options one = connection;
+  for (const std::string& url : addresses_in(connection.url)) {
+    one.url = url;
+    const std::string shown = without_password(url);
+    auto facts = observe_one(one);
+    if (!facts) return fail(facts.error().code, replaced(facts.error().message, url, shown));
+    facts->url = shown;
+    for (std::string* text : {&facts->trouble, &facts->not_ready, &facts->session_trouble})
+      *text = replaced(*text, url, shown);
+    all.push_back(std::move(*facts));
+  }
+  return all;
+}
+
+}  // namespace ls::cli
