@@ -6,13 +6,26 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <memory>
 #include <string>
+#include <utility>
 
 #include "worker/render/base/build_id.h"
 
 namespace ls::cli {
 
 using Action = std::function<int()>;
+
+// Adds a command with options in `Flags`, which `run` executes. Returns the command and its flags, which live
+// as long as `app`.
+template <class Flags>
+std::pair<CLI::App*, Flags*> add_command(CLI::App& app, Action& action, const std::string& name,
+                                         const std::string& help, int (*run)(const Flags& flags)) {
+  auto flags = std::make_shared<Flags>();
+  CLI::App* command = app.add_subcommand(name, help);
+  command->callback([flags, run, &action] { action = [flags, run] { return run(*flags); }; });
+  return {command, flags.get()};
+}
 
 void add_render(CLI::App& app, Action& action);
 void add_inspect(CLI::App& app, Action& action);
@@ -27,7 +40,6 @@ void add_validate(CLI::App& app, Action& action);
 void add_verify(CLI::App& app, Action& action);
 void add_compare(CLI::App& app, Action& action);
 void add_doctor(CLI::App& app, Action& action);
-void add_completion(CLI::App& app, Action& action);
 
 // Returns "lightshaft 0.2.0, build ..."
 inline std::string version_text() {

@@ -185,19 +185,18 @@ int run(const ConvertFlags& flags) {
 }  // namespace
 
 void add_convert(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<ConvertFlags>();
-  CLI::App* convert = app.add_subcommand("convert",
-                                         "write a scene as canonical Mitsuba 3 XML. Its files are copied to "
-                                         "OUT's folder under the names that the scene "
-                                         "has for them, unless they are there; a name that leads out of the "
-                                         "folder becomes one in it. OUT has the same "
-                                         "digest then, if no file had to be renamed; it is printed");
+  const auto [convert, flags] = add_command<ConvertFlags>(
+      app, action, "convert",
+      "write a scene as canonical Mitsuba 3 XML. Its files are copied to OUT's folder under the names that "
+      "the "
+      "scene has for them, unless they are there; a name that leads out of the folder becomes one in it. OUT "
+      "has the same digest then, if no file had to be renamed; it is printed",
+      run);
   convert->add_option("in", flags->in, "the scene")->required()->type_name("IN");
   convert->add_option("out", flags->out, "the XML file to write")->required()->type_name("OUT");
   add_defines(*convert, flags->defines);
   convert->add_flag("--strict", flags->strict, "warnings are errors");
   convert->add_flag("--quiet", flags->quiet, "only the digest, warnings and errors");
-  convert->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }
 
 }  // namespace ls::cli

@@ -258,10 +258,9 @@ void describe(CLI::App& app, FarmUpFlags& f) {
 void add_farm_up(CLI::App& app, Action& action) {
   CLI::App* farm = app.add_subcommand("farm", "workers that come and go with the jobs of a farm");
   farm->require_subcommand(1);
-  CLI::App* up = farm->add_subcommand("up", "starts workers while jobs need them, until Ctrl-C");
-  auto flags = std::make_shared<FarmUpFlags>();
+  const auto [up, flags] = add_command<FarmUpFlags>(
+      *farm, action, "up", "starts workers while jobs need them, until Ctrl-C", farm_up);
   describe(*up, *flags);
-  up->callback([flags, &action] { action = [flags] { return farm_up(*flags); }; });
 }
 
 }  // namespace ls::cli

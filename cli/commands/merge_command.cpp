@@ -148,9 +148,8 @@ int run(const MergeFlags& flags) {
 }  // namespace
 
 void add_merge(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<MergeFlags>();
-  CLI::App* merge =
-      app.add_subcommand("merge", "fold partial images into the final one, exactly as the coordinator does");
+  const auto [merge, flags] = add_command<MergeFlags>(
+      app, action, "merge", "fold partial images into the final one, exactly as the coordinator does", run);
   merge->add_option("partials", flags->partials, "partial images, or folders of them")
       ->required()
       ->type_name("PARTIAL.exr...");
@@ -163,7 +162,6 @@ void add_merge(CLI::App& app, Action& action) {
   add_defines(*merge, flags->defines);
   merge->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
   merge->add_flag("--float", flags->float_output, "32-bit pixels instead of half");
-  merge->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }
 
 }  // namespace ls::cli

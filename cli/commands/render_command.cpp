@@ -154,8 +154,8 @@ int run(const RenderFlags& flags) {
 }  // namespace
 
 void add_render(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<RenderFlags>();
-  CLI::App* render = app.add_subcommand("render", "render a scene on this machine");
+  const auto [render, flags] =
+      add_command<RenderFlags>(app, action, "render", "render a scene on this machine", run);
   render->add_option("scene", flags->scene, "Mitsuba XML, .pbrt, .gltf or .glb")
       ->required()
       ->type_name("SCENE");
@@ -187,7 +187,6 @@ void add_render(CLI::App& app, Action& action) {
       ->add_flag("--progress", flags->progress,
                  "progress as lines, one for each percent, for logs and programs")
       ->excludes(quiet);
-  render->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }
 
 }  // namespace ls::cli

@@ -106,9 +106,8 @@ int run(const SubmitFlags& flags) {
 }  // namespace
 
 void add_submit(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<SubmitFlags>();
-  CLI::App* submit =
-      app.add_subcommand("submit", "send a scene and its files to a farm; prints the job's id");
+  const auto [submit, flags] = add_command<SubmitFlags>(
+      app, action, "submit", "send a scene and its files to a farm; prints the job's id", run);
   submit
       ->add_option("scene", flags->scene,
                    "Mitsuba XML, .pbrt, .gltf or .glb, or a .zip, .tar or .tar.gz with one and all its files")
@@ -150,7 +149,6 @@ void add_submit(CLI::App& app, Action& action) {
                    "wait, then fetch the report as a page; of a sequence every frame's, with # in the name")
       ->type_name("REPORT.html");
   submit->add_flag("--quiet", flags->quiet, "only the id, warnings and errors");
-  submit->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }
 
 }  // namespace ls::cli

@@ -1,5 +1,5 @@
-// Facts for `lightshaft doctor`: about this machine, and about a farm, read from the coordinator's HTTP interface
-// by GET requests only. Observing them changes nothing.
+// Facts for `lightshaft doctor`: about this machine, and about a farm, read from the coordinator's HTTP
+// interface by GET requests only. Observing them changes nothing.
 #pragma once
 
 #include <cstdint>

@@ -39,9 +39,10 @@ inline std::optional<std::pair<double, double>> pair_field(const nlohmann::json&
   return std::pair((*found)[0].get<double>(), (*found)[1].get<double>());
 }
 
-// Returns indented JSON, for --json. Invalid UTF-8 is replaced.
-inline std::string dump(const nlohmann::json& value) {
-  return value.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+// Returns JSON with this indentation; -1: in one line. Invalid UTF-8 is replaced.
+template <class Json>
+std::string dump(const Json& value, int indent = 2) {
+  return value.dump(indent, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace ls::cli
