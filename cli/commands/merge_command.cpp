@@ -108,7 +108,7 @@ tl::expected<CryptomatteManifests, coordinator::Rejected> manifests(const MergeF
 }
 
 int run(const MergeFlags& flags) {
-  if (const auto ok = check_image(flags.out); !ok) return print_error(ok.error());
+  if (const auto ok = check_outputs("-o", flags.out, std::nullopt); !ok) return print_error(ok.error());
   if (!flags.report.empty())
     if (const auto ok = check_output("--report", flags.report); !ok) return print_error(ok.error());
   const auto files = files_of(flags.partials);

@@ -4,8 +4,7 @@
 
 #include "cli/commands/commands.h"
 #include "cli/farm/farm_api.h"
-#include "cli/farm/farm_wait.h"
-#include "cli/farm/fetch_results.h"
+#include "cli/farm/job_results.h"
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
@@ -51,9 +50,7 @@ Job submit_bundle(const SubmitFlags& flags, const JobSpec& spec, const std::stri
   if (!api) return coordinator::rejected(api.error());
   auto job = api->submit_bundle(flags.scene, type, spec_query(spec, !flags.job.priority.empty()));
   if (!job) return job;
-  if (const auto warnings = job->find("warnings"); warnings != job->end() && warnings->is_array())
-    for (const auto& warning : *warnings)
-      if (warning.is_string()) print_note(warning.get<std::string>());
+  for (const std::string& warning : texts_field(*job, "warnings")) print_note(warning);
   return job;
 }
 

@@ -93,12 +93,9 @@ std::string replaced(std::string text, const std::string& from, const std::strin
 
 std::vector<WorkerFacts> workers_of(const json& answer) {
   std::vector<WorkerFacts> all;
-  const auto list = answer.find("workers");
-  if (list == answer.end() || !list->is_array()) return all;
-  for (const json& w : *list)
-    if (w.is_object())
-      all.push_back({text_field(w, "name"), text_field(w, "state"), text_field(w, "build"),
-                     text_field(w, "numeric_class"), flag_field(w, "fake")});
+  for (const json& w : objects_field(answer, "workers"))
+    all.push_back({text_field(w, "name"), text_field(w, "state"), text_field(w, "build"),
+                   text_field(w, "numeric_class"), flag_field(w, "fake")});
   return all;
 }
 

@@ -16,12 +16,6 @@ namespace {
 
 using nlohmann::json;
 
-const json& list_in(const json& answer, const char* key) {
-  static const json none = json::array();
-  const auto found = answer.find(key);
-  return found != answer.end() && found->is_array() ? *found : none;
-}
-
 double positive_field(const json& object, const char* key) {
   return std::max(0.0, number_field(object, key).value_or(0));
 }
@@ -61,8 +55,7 @@ void read_jobs(const json& jobs, const Spending& spending, Demand& demand) {
       continue;
     }
     forecast = true;
-    const auto more = job.find("eta_with_more");
-    helps |= more != job.end() && more->is_object();
+    helps |= object_field(job, "eta_with_more") != nullptr;
   }
   demand.more_helps = !forecast || helps;
 }
@@ -260,10 +253,10 @@ int run_farm_up(FarmApi& api, Engine& engine, const FarmUpOptions& options, Inte
 }
 
 Demand demand_of(const json& jobs, const json& workers, const OurWorkers& ours, Spending& spending) {
-  observe(spending, list_in(jobs, "jobs"), list_in(workers, "workers"), ours);
+  observe(spending, list_field(jobs, "jobs"), list_field(workers, "workers"), ours);
   Demand demand;
-  read_jobs(list_in(jobs, "jobs"), spending, demand);
-  for (const json& worker : list_in(workers, "workers")) {
+  read_jobs(list_field(jobs, "jobs"), spending, demand);
+  for (const json& worker : list_field(workers, "workers")) {
     const std::string name = text_field(worker, "name");
     if (text_field(worker, "state") != "connected") continue;
     if (!name.starts_with(ours.farm + "-")) {

@@ -5,7 +5,7 @@
 #include <fstream>
 
 #include "cli/farm/farm_tables.h"
-#include "cli/farm/fetch_results.h"
+#include "cli/local/local_scene.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
 

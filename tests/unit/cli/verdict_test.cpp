@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "cli/farm/farm_tables.h"
-#include "cli/farm/farm_wait.h"
+#include "cli/farm/job_results.h"
 #include "cli/output/console.h"
 #include "cli/output/final_report.h"
 

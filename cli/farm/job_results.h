@@ -1,7 +1,6 @@
-// Follows a job of a farm until it ends.
+// Follows a job of a farm until it ends, and downloads its results to local files.
 #pragma once
 
-#include <functional>
 #include <string>
 
 #include "cli/farm/farm_api.h"
@@ -25,5 +24,17 @@ int print_end(const nlohmann::json& job, bool quiet);
 // Prints the error of the denoised image of a job that is done; it is in the job's report only. Prints
 // nothing if no denoising was requested.
 void print_denoised(FarmApi& api, const nlohmann::json& job);
+
+struct Results {
+  // File names; empty: not wanted. A run of # is replaced by the frame number
+  std::string image, report, html;
+  bool json = false;     // print each file as a line of JSON on stdout
+  bool patient = false;  // keep trying for a while if the coordinator is unreachable
+};
+
+// Downloads the results of job `id`; returns the exit code. For a sequence (a job with several frames),
+// downloads every frame that has data; if any has none, prints the numbers of those frames and returns
+// kFailed. A report name without # gets one report for the whole sequence.
+int fetch_results(FarmApi& api, const std::string& id, const Results& results);
 
 }  // namespace ls::cli
