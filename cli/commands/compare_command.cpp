@@ -27,17 +27,6 @@ struct CompareFlags {
   bool strict = false, quiet = false;
 };
 
-// Parses `text`, the value of the option `name`, into `to`; an empty text means that the option was not
-// given. Returns an error if it is not a whole number from `least` to `most`.
-Result<void> take(const char* name, const std::string& text, std::uint64_t least, std::uint64_t most,
-                  std::uint64_t& to) {
-  if (text.empty()) return {};
-  const auto number = parse_whole(name, text, least, most);
-  if (!number) return tl::unexpected(number.error());
-  to = *number;
-  return {};
-}
-
 Result<void> take_numbers(const CompareFlags& flags, CompareOptions& options) {
   const auto time = parse_positive("--time", flags.time, kMaxSeconds);
   if (!time) return tl::unexpected(time.error());
@@ -46,17 +35,14 @@ Result<void> take_numbers(const CompareFlags& flags, CompareOptions& options) {
   auto cores = static_cast<std::uint64_t>(worker::usable_cpus());
   std::uint64_t spp = options.conditions.most_spp, seeds = options.seeds;
   for (const auto& ok :
-       {take("--spp", flags.spp, 2, kMaxSpp, spp), take("--seeds", flags.seeds, 1, kMostSeeds, seeds),
-        take("--seed", flags.first_seed, 0, UINT64_MAX - kMostSeeds, options.first_seed),
-        take("--threads", flags.threads, 1, cores, cores)})
+       {take(flags.spp, spp, whole("--spp", 2, kMaxSpp)),
+        take(flags.seeds, seeds, whole("--seeds", 1, kMostSeeds)),
+        take(flags.first_seed, options.first_seed, whole("--seed", 0, UINT64_MAX - kMostSeeds)),
+        take(flags.threads, cores, whole("--threads", 1, cores)), take(flags.size, options.size, parse_size)})
     if (!ok) return ok;
   options.conditions.most_spp = spp;
   options.conditions.threads = static_cast<int>(cores);
   options.seeds = seeds;
-  if (flags.size.empty()) return {};
-  const auto size = parse_size(flags.size);
-  if (!size) return tl::unexpected(size.error());
-  options.size = *size;
   return {};
 }
 

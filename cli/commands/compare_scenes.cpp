@@ -8,8 +8,8 @@
 #include "cli/local/local_world.h"
 #include "cli/output/console.h"
 #include "common/scene/schema/integrators.h"
-#include "compare/references.h"
-#include "compare/render_racer.h"
+#include "compare/picture.h"
+#include "compare/racer.h"
 
 namespace ls::cli {
 namespace {
@@ -124,12 +124,11 @@ class SceneRace {
     }
     const RenderSettings& settings = world->job.settings;
     return race::make_render_racer({world->world, {settings.size, settings.tile}, name, folder_},
-                                   race_.conditions, clock_);
+                                   race_.conditions);
   }
 
   const CompareOptions& options_;
   const LocalScene& scene_;
-  const SystemClock clock_;
   race::Race race_;
   std::vector<Ours> ours_;
   // Digests of the scene, one per integrator, because each integrator leaves out what it cannot see. An image

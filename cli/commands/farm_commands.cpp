@@ -146,9 +146,9 @@ int fetch(FarmApi& api, const FarmFlags& flags) {
 // With --frame, replaces the id of a sequence in `flags` by the id of one frame, which is a separate job.
 Result<void> choose_frame(FarmFlags& flags) {
   if (flags.frame.empty()) return {};
-  const auto frame = parse_whole("--frame", flags.frame, 0, kMaxFrameNumber);
+  const auto frame = parse_frame(flags.frame);
   if (!frame) return tl::unexpected(frame.error());
-  flags.id = coordinator::frame_job(JobId{flags.id}, static_cast<std::uint32_t>(*frame)).value;
+  flags.id = coordinator::frame_job(JobId{flags.id}, *frame).value;
   return {};
 }
 

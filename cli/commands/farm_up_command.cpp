@@ -54,26 +54,29 @@ Result<std::string> read_join_token(const std::string& file) {
   return token;
 }
 
+// Returns a parser of a budget in core hours; the parsed value is in core seconds.
+auto core_hours(const char* option) {
+  return [=](const std::string& text) {
+    return parse_positive(option, text, kMostHours).map([](double hours) { return hours * kCoreHour; });
+  };
+}
+
 // Parses HOURS (a budget for each user) or USER=HOURS (a budget for one user).
 Result<void> read_user_budget(const std::string& text, Budgets& budgets) {
   const auto sign = text.rfind('=');
-  const auto hours =
-      parse_positive("--user-budget", sign == std::string::npos ? text : text.substr(sign + 1), kMostHours);
-  if (!hours) return tl::unexpected(hours.error());
+  const auto budget = core_hours("--user-budget")(sign == std::string::npos ? text : text.substr(sign + 1));
+  if (!budget) return tl::unexpected(budget.error());
   if (sign == std::string::npos)
-    budgets.user = *hours * kCoreHour;
+    budgets.user = *budget;
   else
-    budgets.users[text.substr(0, sign)] = *hours * kCoreHour;
+    budgets.users[text.substr(0, sign)] = *budget;
   return {};
 }
 
 Result<Budgets> parse_budgets(const FarmUpFlags& f) {
   Budgets budgets;
-  if (!f.job_budget.empty()) {
-    const auto hours = parse_positive("--job-budget", f.job_budget, kMostHours);
-    if (!hours) return tl::unexpected(hours.error());
-    budgets.job = *hours * kCoreHour;
-  }
+  if (const auto ok = take(f.job_budget, budgets.job, core_hours("--job-budget")); !ok)
+    return tl::unexpected(ok.error());
   for (const std::string& text : f.user_budgets)
     if (const auto read = read_user_budget(text, budgets); !read) return tl::unexpected(read.error());
   return budgets;
@@ -101,11 +104,8 @@ Result<FarmUpOptions> parse_options(const FarmUpFlags& f) {
     if (!value) return tl::unexpected(value.error());
     row.value = *value;
   }
-  if (!f.budget.empty()) {
-    const auto hours = parse_positive("--budget", f.budget, kMostHours);
-    if (!hours) return tl::unexpected(hours.error());
-    o.limits.budget_core_seconds = *hours * kCoreHour;
-  }
+  if (const auto ok = take(f.budget, o.limits.budget_core_seconds, core_hours("--budget")); !ok)
+    return tl::unexpected(ok.error());
   auto budgets = parse_budgets(f);
   if (!budgets) return tl::unexpected(budgets.error());
   o.budgets = std::move(*budgets);

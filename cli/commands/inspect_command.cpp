@@ -307,11 +307,7 @@ int run(const InspectFlags& flags) {
   if (!defines) return print_error(defines.error());
   spec.defines = std::move(*defines);
   std::optional<std::uint32_t> frame;
-  if (!flags.frame.empty()) {
-    const auto number = parse_whole("--frame", flags.frame, 0, kMaxFrameNumber);
-    if (!number) return print_error(number.error());
-    frame = static_cast<std::uint32_t>(*number);
-  }
+  if (const auto ok = take(flags.frame, frame, parse_frame); !ok) return print_error(ok.error());
   const auto scene = read_local_scene(flags.scene, spec.defines, flags.strict, frame);
   if (!scene) return print_rejected(scene.error());
   const auto built = build_local_world(*scene, spec, worker::usable_cpus());

@@ -34,12 +34,11 @@ Result<LocalRenderOptions> options_of(const RenderFlags& flags) {
   if (!spec) return tl::unexpected(spec.error());
   options.spec = std::move(*spec);
   const int most = flags.isolate ? worker::kMostChildThreads : limits::kThreads;
-  options.threads = std::min(worker::usable_cpus(), most);
-  if (!flags.threads.empty()) {
-    const auto threads = parse_whole("--threads", flags.threads, 1, static_cast<std::uint64_t>(most));
-    if (!threads) return tl::unexpected(threads.error());
-    options.threads = static_cast<int>(*threads);
-  }
+  auto threads = static_cast<std::uint64_t>(std::min(worker::usable_cpus(), most));
+  if (const auto ok = take(flags.threads, threads, whole("--threads", 1, static_cast<std::uint64_t>(most)));
+      !ok)
+    return tl::unexpected(ok.error());
+  options.threads = static_cast<int>(threads);
   options.isolate = flags.isolate;
   options.quiet = flags.quiet;
   options.progress = flags.quiet      ? ProgressForm::none

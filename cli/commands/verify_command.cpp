@@ -244,22 +244,10 @@ struct Numbers {
 Result<Numbers> numbers_of(const VerifyFlags& flags) {
   Numbers n;
   n.seed = std::random_device{}();
-  const auto read = [](const char* name, const std::string& text, std::uint64_t least, std::uint64_t most,
-                       std::uint64_t& to) -> Result<void> {
-    if (text.empty()) return {};
-    const auto number = parse_whole(name, text, least, most);
-    if (!number) return tl::unexpected(number.error());
-    to = *number;
-    return {};
-  };
-  std::uint64_t frame = 0;
-  if (const auto ok = read("--tiles", flags.tiles, 1, UINT32_MAX, n.tiles); !ok)
-    return tl::unexpected(ok.error());
-  if (const auto ok = read("--seed", flags.seed, 0, UINT64_MAX, n.seed); !ok)
-    return tl::unexpected(ok.error());
-  if (const auto ok = read("--frame", flags.frame, 0, kMaxFrameNumber, frame); !ok)
-    return tl::unexpected(ok.error());
-  if (!flags.frame.empty()) n.frame = static_cast<std::uint32_t>(frame);
+  for (const auto& ok :
+       {take(flags.tiles, n.tiles, whole("--tiles", 1, UINT32_MAX)),
+        take(flags.seed, n.seed, whole("--seed", 0, UINT64_MAX)), take(flags.frame, n.frame, parse_frame)})
+    if (!ok) return tl::unexpected(ok.error());
   return n;
 }
 

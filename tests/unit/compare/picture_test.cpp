@@ -8,7 +8,6 @@
 #include <fstream>
 
 #include "common/image/exr/exr_file.h"
-#include "compare/references.h"
 
 namespace ls::race {
 namespace {

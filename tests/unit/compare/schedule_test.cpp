@@ -1,5 +1,5 @@
 // Tests the turns and rounds of a race at given times.
-#include "compare/schedule.h"
+#include "compare/racer.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Tests intervals over seeds against values that were computed by hand.
-#include "compare/statistics.h"
+#include "compare/summary.h"
 
 #include <gtest/gtest.h>
 
