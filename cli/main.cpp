@@ -1,19 +1,23 @@
 // The program `lightshaft`: renders, inspects and merges on this machine, and is a client of a farm's
 // coordinator. Exit codes: 0 success, 1 failure, 2 bad usage or bad scene.
+#include <fmt/format.h>
 #include <signal.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdlib>
+#include <memory>
 #include <string_view>
 
 #include "cli/commands/commands.h"
-#include "cli/doctor/machine_facts.h"
+#include "cli/doctor/facts.h"
 #include "cli/local/local_farm.h"
 #include "cli/output/console.h"
 #include "common/base/log.h"
 #include "common/command_line/command.h"
 
 namespace {
+
+using namespace ls::cli;
 
 // Sets the log level of coordinator and worker, by LIGHTSHAFT_LOG. By default they log nothing: commands
 // report everything relevant themselves.
@@ -26,10 +30,27 @@ void set_log_level() {
                                    : ls::LogLevel::off);
 }
 
+// `lightshaft completion bash | zsh | fish`: prints the script by which a shell completes this command.
+void add_completion(CLI::App& app, Action& action) {
+  auto shell = std::make_shared<std::string>();
+  app.add_subcommand("completion", "prints the script by which a shell completes commands and options")
+      ->callback([shell, &app, &action] {
+        action = [shell, &app] {
+          const ls::Command program = ls::describe_command(app);
+          fmt::print("{}", *shell == "bash"  ? ls::bash_completion(program)
+                           : *shell == "zsh" ? ls::zsh_completion(program)
+                                             : ls::fish_completion(program));
+          return kOk;
+        };
+      })
+      ->add_option("shell", *shell, "the shell")
+      ->required()
+      ->check(CLI::IsMember({"bash", "zsh", "fish"}));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  using namespace ls::cli;
   if (argc == 3 && std::string_view(argv[1]) == kRenderChildFlag) return run_render_child(argv[2]);
   if (argc == 2 && std::string_view(argv[1]) == kSandboxProbeFlag) return run_sandbox_probe();
   ::signal(SIGPIPE, SIG_IGN);

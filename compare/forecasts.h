@@ -1,4 +1,4 @@
-// Compares the remaining times that our renders predicted while they ran with the actual ones.
+// Compares two remaining times of our renders: the one predicted while a render ran, and the actual one.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@ struct Prediction {
   double spp = 0, spent = 0;
   double target = 0;                     // the relMSE to be reached, as the image estimates it
   double predicted = 0, lo = 0, hi = 0;  // remaining core seconds, with the 95 % interval
-  std::optional<double> actual;          // nullopt: not reached by the end of the race, hence later than hi
+  std::optional<double> actual;          // nullopt: the race ended before that, hence later than `hi`
   bool within() const { return actual && *actual >= lo && *actual <= hi; }
 };
 // Returns the forecasts of all renders, made at 8 samples per pixel and at each doubling after that. Each

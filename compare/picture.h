@@ -1,19 +1,21 @@
-// Stores the images of a race until they are judged, and computes their errors.
+// Stores the images of a race until they are judged, reads reference images, and computes errors.
 #pragma once
 
 #include <filesystem>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "common/base/error.h"
 #include "common/image/frame/frame.h"
+#include "common/image/reference/reference.h"
 
 namespace ls::race {
 
 using Pixels = std::vector<float>;  // R, G, B interleaved, row by row from the top; all finite
 
-// A folder for the images of one race, which is removed with the object. The images are many, and are read
-// only once, at the end.
+// A folder for the images of one race, which is removed with the object. The images are on disk because they
+// are many, and are read only once, at the end.
 class Scratch {
  public:
   static Result<Scratch> make();
@@ -40,6 +42,20 @@ Result<Pixels> read_picture(const std::filesystem::path& exr, FrameSize size);
 struct Reference {
   Pixels first, second;
 };
+
+// A reference image given by the user.
+struct ReferenceFile {
+  std::string name;  // without folders
+  ls::Reference picture;
+};
+// Reads an image like read_picture(), with the error layers and the seed that the file has.
+Result<ReferenceFile> read_reference(const std::filesystem::path& exr, FrameSize size);
+
+// Makes the reference of a race from one file, or from two that are independent of each other. A single file
+// with a layer of standard errors s counts as two images: ref + s and ref - s are the means of the two halves
+// of its samples, though it is unknown which is which (common/image/reference/reference.h).
+Reference combine(const std::vector<ReferenceFile>& files);
+std::string describe(const std::vector<ReferenceFile>& files);
 
 struct Wrong {
   double mse = 0, relmse = 0;

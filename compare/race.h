@@ -34,7 +34,7 @@ struct Lanes {
   std::vector<Failure> failures;  // an entrant that failed has no lanes
 };
 
-// Creates the racer that renders for an entrant with the seed of this index, loaded and ready.
+// Creates the racer of an entrant for one seed (both are indices), with the scene loaded.
 using MakeRacer = std::function<Result<std::unique_ptr<Racer>>(std::size_t entrant, std::size_t seed)>;
 // Called before each turn of a lane; `used` is the time that the lane has used so far, in seconds on the
 // race's clock.

@@ -14,7 +14,7 @@ namespace {
 
 using report::figure;
 
-// A share of all cores' time that the background activity of an otherwise idle system does not exceed.
+// The background activity of an otherwise idle system takes at most this share of all cores' time.
 constexpr double kIdleShare = .05;
 constexpr double kHeavySpread = 4;
 

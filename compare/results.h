@@ -16,8 +16,8 @@ namespace ls::race {
 
 struct Machine {
   std::string words;  // "AMD EPYC, 2 of 8 cores"
-  double others =
-      -1;  // share of the time of all cores used by other processes during the races; negative: unknown
+  // Share, 0 to 1, of all cores' time that other processes used during the races; negative: unknown
+  double others = -1;
   std::string build;  // our build
 };
 // True if other processes used so much of the machine that wall times are unreliable.
@@ -27,7 +27,7 @@ struct Results {
   Machine machine;
   std::size_t seeds = 0;
   std::vector<Race> races;
-  std::uint64_t first_seed = 0;  // the others follow consecutively
+  std::uint64_t first_seed = 0;  // first of `seeds` consecutive seeds
 };
 
 // Returns a table with a row per image and the columns scene, entrant, seed, spp, wall_seconds, cpu_seconds,

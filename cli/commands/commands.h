@@ -1,12 +1,14 @@
 // The commands. Each function adds its command to the command line. If the user gives that command, parsing
-// sets `action`, which main() then runs; its result is the exit code.
+// the command line sets `action`. main() then runs `action` and exits with the exit code that it returns.
 #pragma once
 
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <memory>
 #include <string>
+#include <utility>
 
 #include "worker/render/base/build_id.h"
 
@@ -14,14 +16,23 @@ namespace ls::cli {
 
 using Action = std::function<int()>;
 
+// Adds a command with options in `Flags`, which `run` executes. Returns the command and its flags, which live
+// as long as `app`.
+template <class Flags>
+std::pair<CLI::App*, Flags*> add_command(CLI::App& app, Action& action, const std::string& name,
+                                         const std::string& help, int (*run)(const Flags& flags)) {
+  auto flags = std::make_shared<Flags>();
+  CLI::App* command = app.add_subcommand(name, help);
+  command->callback([flags, run, &action] { action = [flags, run] { return run(*flags); }; });
+  return {command, flags.get()};
+}
+
 void add_render(CLI::App& app, Action& action);
 void add_inspect(CLI::App& app, Action& action);
 void add_convert(CLI::App& app, Action& action);
 void add_submit(CLI::App& app, Action& action);
-void add_farm_commands(CLI::App& app,
-                       // The commands jobs, show, watch, pause, resume, cancel, extend, fetch, focus,
-                       // video, workers
-                       Action& action);
+// Adds jobs, show, watch, pause, resume, cancel, extend, fetch, focus, video and workers.
+void add_farm_commands(CLI::App& app, Action& action);
 void add_farm_up(CLI::App& app, Action& action);  // the command farm up
 void add_tokens(CLI::App& app, Action& action);
 void add_merge(CLI::App& app, Action& action);
@@ -29,9 +40,8 @@ void add_validate(CLI::App& app, Action& action);
 void add_verify(CLI::App& app, Action& action);
 void add_compare(CLI::App& app, Action& action);
 void add_doctor(CLI::App& app, Action& action);
-void add_completion(CLI::App& app, Action& action);
 
-// returns "lightshaft 0.2.0, build ..."
+// Returns "lightshaft 0.2.0, build ..."
 inline std::string version_text() {
   return fmt::format("lightshaft {}, build {}", LIGHTSHAFT_VERSION, render::kBuildId);
 }

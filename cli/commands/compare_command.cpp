@@ -1,4 +1,4 @@
-// lightshaft compare: compares our integrators by their error against time.
+// lightshaft compare: renders scenes with several of our integrators and compares how fast their errors fall.
 #include <fmt/format.h>
 
 #include <atomic>
@@ -27,17 +27,6 @@ struct CompareFlags {
   bool strict = false, quiet = false;
 };
 
-// Parses `text`, the value of the option `name`, into `to`; an empty text means that the option was not
-// given. Returns an error if it is not a whole number from `least` to `most`.
-Result<void> take(const char* name, const std::string& text, std::uint64_t least, std::uint64_t most,
-                  std::uint64_t& to) {
-  if (text.empty()) return {};
-  const auto number = parse_whole(name, text, least, most);
-  if (!number) return tl::unexpected(number.error());
-  to = *number;
-  return {};
-}
-
 Result<void> take_numbers(const CompareFlags& flags, CompareOptions& options) {
   const auto time = parse_positive("--time", flags.time, kMaxSeconds);
   if (!time) return tl::unexpected(time.error());
@@ -46,17 +35,14 @@ Result<void> take_numbers(const CompareFlags& flags, CompareOptions& options) {
   auto cores = static_cast<std::uint64_t>(worker::usable_cpus());
   std::uint64_t spp = options.conditions.most_spp, seeds = options.seeds;
   for (const auto& ok :
-       {take("--spp", flags.spp, 2, kMaxSpp, spp), take("--seeds", flags.seeds, 1, kMostSeeds, seeds),
-        take("--seed", flags.first_seed, 0, UINT64_MAX - kMostSeeds, options.first_seed),
-        take("--threads", flags.threads, 1, cores, cores)})
+       {take(flags.spp, spp, whole("--spp", 2, kMaxSpp)),
+        take(flags.seeds, seeds, whole("--seeds", 1, kMostSeeds)),
+        take(flags.first_seed, options.first_seed, whole("--seed", 0, UINT64_MAX - kMostSeeds)),
+        take(flags.threads, cores, whole("--threads", 1, cores)), take(flags.size, options.size, parse_size)})
     if (!ok) return ok;
   options.conditions.most_spp = spp;
   options.conditions.threads = static_cast<int>(cores);
   options.seeds = seeds;
-  if (flags.size.empty()) return {};
-  const auto size = parse_size(flags.size);
-  if (!size) return tl::unexpected(size.error());
-  options.size = *size;
   return {};
 }
 
@@ -164,48 +150,47 @@ int run(const CompareFlags& flags) {
   return failed ? kFailed : kOk;
 }
 
-void add_options(CLI::App& compare, const std::shared_ptr<CompareFlags>& flags) {
-  compare.add_option("scenes", flags->scenes, "one scene, or a set")->required()->type_name("SCENE...");
-  compare.add_option("--integrators", flags->integrators, "those that race; default: the scene's")
+void add_options(CLI::App& compare, CompareFlags& flags) {
+  compare.add_option("scenes", flags.scenes, "one scene, or a set")->required()->type_name("SCENE...");
+  compare.add_option("--integrators", flags.integrators, "those that race; default: the scene's")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("A,B");
-  compare.add_option("--time", flags->time, "that each entrant has for each seed, after loading")
+  compare.add_option("--time", flags.time, "that each entrant has for each seed, after loading")
       ->required()
       ->type_name("SECONDS");
-  compare.add_option("--clock", flags->clock, "wall, or cpu: CPU seconds over threads, for a busy machine")
+  compare.add_option("--clock", flags.clock, "wall, or cpu: CPU seconds over threads, for a busy machine")
       ->check(CLI::IsMember({"wall", "cpu"}))
       ->type_name("wall|cpu");
-  compare.add_option("--spp", flags->spp, "stop at so many samples if that comes first")->type_name("N");
-  compare.add_option("--seeds", flags->seeds, "renders of each entrant (default 5)")->type_name("K");
-  compare.add_option("--seed", flags->first_seed, "the first of them (default 0)")->type_name("N");
-  compare.add_option("--threads", flags->threads, "and cores, for everybody; default: all")->type_name("N");
-  compare.add_option("--size", flags->size, "size of the image instead of the scene's")->type_name("WxH");
+  compare.add_option("--spp", flags.spp, "stop at so many samples if that comes first")->type_name("N");
+  compare.add_option("--seeds", flags.seeds, "renders of each entrant (default 5)")->type_name("K");
+  compare.add_option("--seed", flags.first_seed, "the first of them (default 0)")->type_name("N");
+  compare.add_option("--threads", flags.threads, "and cores, for everybody; default: all")->type_name("N");
+  compare.add_option("--size", flags.size, "size of the image instead of the scene's")->type_name("WxH");
   compare
-      .add_option("--reference", flags->reference,
+      .add_option("--reference", flags.reference,
                   "the right picture, or two independent ones; default: the other seeds' pictures")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("REF.exr[,REF2.exr]");
   compare
-      .add_option("--references", flags->references,
+      .add_option("--references", flags.references,
                   "of a set: a folder with NAME.exr, or NAME.0.exr and NAME.1.exr")
       ->type_name("DIR");
-  add_defines(compare, flags->defines);
-  compare.add_option("--report", flags->report, "the folder for page, plots and tables")
+  add_defines(compare, flags.defines);
+  compare.add_option("--report", flags.report, "the folder for page, plots and tables")
       ->required()
       ->type_name("DIR");
-  compare.add_flag("--strict", flags->strict, "warnings of the scene are errors");
-  compare.add_flag("--quiet", flags->quiet, "only warnings, errors and the figures");
+  compare.add_flag("--strict", flags.strict, "warnings of the scene are errors");
+  compare.add_flag("--quiet", flags.quiet, "only warnings, errors and the figures");
 }
 
 }  // namespace
 
 void add_compare(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<CompareFlags>();
-  CLI::App* compare = app.add_subcommand("compare", "race integrators: error against time, with intervals");
-  add_options(*compare, flags);
-  compare->callback([flags, &action] { action = [flags] { return run(*flags); }; });
+  const auto [compare, flags] = add_command<CompareFlags>(
+      app, action, "compare", "race integrators: error against time, with intervals", run);
+  add_options(*compare, *flags);
 }
 
 }  // namespace ls::cli

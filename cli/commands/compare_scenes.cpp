@@ -8,8 +8,8 @@
 #include "cli/local/local_world.h"
 #include "cli/output/console.h"
 #include "common/scene/schema/integrators.h"
-#include "compare/references.h"
-#include "compare/render_racer.h"
+#include "compare/picture.h"
+#include "compare/racer.h"
 
 namespace ls::cli {
 namespace {
@@ -48,11 +48,12 @@ class SceneRace {
   struct Ours {
     std::string name;
     JobSpec spec;
-    std::optional<LocalWorld> world;  // the scene for the first seed; nullopt: not kept, or already used
+    std::optional<LocalWorld>
+        world;  // the scene ready to trace with the first seed; nullopt: not kept, or used up
   };
 
-  // Prepares every integrator of the race. Each is tried before the race begins, so that errors in the scene
-  // are found before hours of rendering.
+  // Builds the world (the scene ready to trace) for every integrator of the race, so that errors are found
+  // before hours of rendering. Keeps only the first world: all of them together would take too much memory.
   tl::expected<void, Rejected> line_up() {
     std::vector<std::string> wanted = options_.integrators;
     if (wanted.empty()) wanted.emplace_back();
@@ -70,7 +71,6 @@ class SceneRace {
       if (ours.name.empty()) ours.name = world->job.settings.integrator;
       const bool whole = scene_.scene.media.empty() || scene::sees_media(world->job.settings.integrator);
       race_.entrants.push_back({"Lightshaft " + ours.name, whole});
-      // Only one world (a scene ready to trace) is kept: all of them together would take too much memory
       if (first) ours.world = std::move(*world);
       ours_.push_back(std::move(ours));
       first = false;
@@ -97,8 +97,8 @@ class SceneRace {
     return std::optional(race::combine(read));
   }
 
-  // Rejects a reference that was rendered from this scene with a seed that races, too. The reference would
-  // have the same noise as the image with that seed, and the image would seem much better than it is.
+  // Rejects a reference that was rendered from this scene with one of the race's seeds. It would have the
+  // same noise as the race's image with that seed, whose error would then seem much smaller than it is.
   Result<void> refuse_own_noise(const race::ReferenceFile& file) const {
     for (const Digest& scene : scenes_)
       for (std::size_t i = 0; i < options_.seeds; ++i)
@@ -124,15 +124,16 @@ class SceneRace {
     }
     const RenderSettings& settings = world->job.settings;
     return race::make_render_racer({world->world, {settings.size, settings.tile}, name, folder_},
-                                   race_.conditions, clock_);
+                                   race_.conditions);
   }
 
   const CompareOptions& options_;
   const LocalScene& scene_;
-  const SystemClock clock_;
   race::Race race_;
   std::vector<Ours> ours_;
-  std::vector<Digest> scenes_;  // digests of the scene, one per integrator, as stored in our images
+  // Digests of the scene, one per integrator, because each integrator leaves out what it cannot see. An image
+  // file has the digest of the scene that it shows.
+  std::vector<Digest> scenes_;
   std::filesystem::path folder_;
 };
 

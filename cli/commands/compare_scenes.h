@@ -14,7 +14,7 @@ namespace ls::cli {
 struct CompareOptions {
   std::vector<std::string> scenes;
   std::vector<std::string> integrators;  // empty: the integrator that the scene names
-  race::Conditions conditions;           // all conditions except the size of the image
+  race::Conditions conditions;           // without the size of the image
   std::optional<FrameSize> size;         // nullopt: the size that the scene gives
   std::size_t seeds = 5;
   std::uint64_t first_seed = 0;

@@ -33,14 +33,15 @@ struct FileCopy {
   bool renamed = false;
 };
 
-// A scene's canonical XML.
+// A scene as canonical XML.
 struct Converted {
   std::string text;
   Digest digest;                 // digest of the scene that the text describes
-  std::vector<FileCopy> copies;  // files that must be copied
+  std::vector<FileCopy> copies;  // files to copy beside the XML file
 };
 
-// An asset source that has only the assets of a scene that has already been read.
+// Knows the assets of a scene that was read before. With it, the scene's new text is read without opening any
+// file.
 class KnownAssets final : public AssetSource {
  public:
   explicit KnownAssets(const Scene& scene) {
@@ -69,7 +70,8 @@ bool leads_out(const std::string& name) {
   return name.starts_with('/') || name == ".." || name.starts_with("../");
 }
 
-// Renames assets whose names lead out of the new folder. The new names lie in the folder and are unique.
+// Renames the assets whose names lead out of the scene's folder (absolute paths, or by ".."), so that their
+// copies lie in the new folder. The new names are unique.
 void rename_those_outside(Scene& scene) {
   std::set<std::string> taken;
   for (const Asset& a : scene.assets)
@@ -85,8 +87,8 @@ void rename_those_outside(Scene& scene) {
   }
 }
 
-// Returns the copies of files that the converted scene needs. If `all` is false, these are only files that
-// were made from numbers in the scene's text.
+// Returns the files that must be copied for the converted scene; files that exist already are left out. If
+// `all` is false, only files that the reader made from numbers in the scene's text are copied.
 Result<std::vector<FileCopy>> copies_for(const LocalScene& scene, const Scene& written,
                                          const fs::path& folder, bool all) {
   std::vector<FileCopy> copies;
@@ -115,10 +117,11 @@ Result<std::vector<FileCopy>> copies_for(const LocalScene& scene, const Scene& w
 }
 
 // Converts a scene to the text of the file `out`, and lists the files to copy beside it. If `out` is in the
-// folder of the original scene, these are only files made from numbers in the scene's text. Otherwise they
-// are all files that the scene needs, with the same relative names; a file whose name is absolute or leaves
-// the folder by ".." goes directly into the folder of `out`. The new text is read and compared with the
-// scene. internal: they differ; already_exists: the folder contains another file with a name that is needed.
+// folder of the original scene, these are only files that the reader made from numbers in the scene's text.
+// Otherwise they are all files that the scene needs, with the same relative names; a file whose name is
+// absolute or leaves the folder by ".." goes directly into the folder of `out`. The new text is read again
+// and compared with the scene. internal: they differ; already_exists: the folder has another file under a
+// name that the scene needs.
 Result<Converted> convert_scene(const LocalScene& scene, const fs::path& out) {
   Scene written = scene.scene;
   Converted converted;
@@ -182,19 +185,18 @@ int run(const ConvertFlags& flags) {
 }  // namespace
 
 void add_convert(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<ConvertFlags>();
-  CLI::App* convert = app.add_subcommand("convert",
-                                         "write a scene as canonical Mitsuba 3 XML. Its files are copied to "
-                                         "OUT's folder under the names that the scene "
-                                         "has for them, unless they are there; a name that leads out of the "
-                                         "folder becomes one in it. OUT has the same "
-                                         "digest then, if no file had to be renamed; it is printed");
+  const auto [convert, flags] = add_command<ConvertFlags>(
+      app, action, "convert",
+      "write a scene as canonical Mitsuba 3 XML. Its files are copied to OUT's folder under the names that "
+      "the "
+      "scene has for them, unless they are there; a name that leads out of the folder becomes one in it. OUT "
+      "has the same digest then, if no file had to be renamed; it is printed",
+      run);
   convert->add_option("in", flags->in, "the scene")->required()->type_name("IN");
   convert->add_option("out", flags->out, "the XML file to write")->required()->type_name("OUT");
   add_defines(*convert, flags->defines);
   convert->add_flag("--strict", flags->strict, "warnings are errors");
   convert->add_flag("--quiet", flags->quiet, "only the digest, warnings and errors");
-  convert->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }
 
 }  // namespace ls::cli

@@ -43,8 +43,7 @@ std::string findings_json(const std::vector<Finding>& findings) {
                       {"status", to_string(each.status)},
                       {"what", each.what},
                       {"advice", each.advice}});
-  const ordered_json all{{"status", to_string(worst(findings))}, {"checks", std::move(checks)}};
-  return all.dump(2, ' ', false, ordered_json::error_handler_t::replace);
+  return dump(ordered_json{{"status", to_string(worst(findings))}, {"checks", std::move(checks)}});
 }
 
 int run_doctor(const DoctorFlags& flags) {
@@ -74,16 +73,15 @@ int run_doctor(const DoctorFlags& flags) {
 }  // namespace
 
 void add_doctor(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<DoctorFlags>();
-  CLI::App* doctor = app.add_subcommand(
-      "doctor", "checks this machine, and whether a farm can be used from it; exit code 1 if not");
+  const auto [doctor, flags] = add_command<DoctorFlags>(
+      app, action, "doctor",
+      "checks this machine, and whether a farm can be used from it; exit code 1 if not", run_doctor);
   flags->farm.add_to(*doctor);
   doctor->add_option("--farm", flags->farm.url, "the same as --to")->type_name("URL")->excludes("--to");
   doctor->add_option("--cache", flags->cache, "the cache of a worker; default: that of this user's workers")
       ->type_name("DIR");
   doctor->add_option("--data", flags->data, "the data folder of a coordinator, to check it, too")
       ->type_name("DIR");
-  doctor->callback([flags, &action] { action = [flags] { return run_doctor(*flags); }; });
 }
 
 }  // namespace ls::cli

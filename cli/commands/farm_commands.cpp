@@ -1,3 +1,5 @@
+// The commands that ask a farm or change it. `lightshaft token add | list | revoke` manages the tokens that
+// give access to the farm; only its administrator may use it.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,8 +10,7 @@
 #include "cli/commands/commands.h"
 #include "cli/farm/farm_api.h"
 #include "cli/farm/farm_tables.h"
-#include "cli/farm/farm_wait.h"
-#include "cli/farm/fetch_results.h"
+#include "cli/farm/job_results.h"
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
@@ -26,7 +27,7 @@ using nlohmann::json;
 
 struct FarmFlags {
   FarmOptions farm;
-  std::string id, frame, spp, target_error, out, report, html, region, fps, exposure;
+  std::string id, frame, spp, target_error, out, report, html, region, fps, exposure, role, user;
   bool quiet = false, none = false, denoised = false;
 };
 constexpr std::chrono::milliseconds kVideoPause(500);  // between two checks whether the video is ready
@@ -92,7 +93,7 @@ int focus(FarmApi& api, const FarmFlags& flags) {
   return change(api, flags, {{"focus", *region}});
 }
 
-// Asks for a video, waits until it is made, and downloads it.
+// Requests a video, waits until the coordinator has made it, and downloads it.
 int video(FarmApi& api, const FarmFlags& flags) {
   if (const auto ok = check_output("-o", flags.out); !ok) return print_error(ok.error());
   json asked = json::object();
@@ -142,17 +143,39 @@ int fetch(FarmApi& api, const FarmFlags& flags) {
   return fetch_results(api, flags.id, {flags.out, flags.report, flags.html, flags.farm.json, false});
 }
 
-// Changes `flags` to the job of one frame: each frame of a sequence is a separate job with its own id.
+// With --frame, replaces the id of a sequence in `flags` by the id of one frame, which is a separate job.
 Result<void> choose_frame(FarmFlags& flags) {
   if (flags.frame.empty()) return {};
-  const auto frame = parse_whole("--frame", flags.frame, 0, kMaxFrameNumber);
+  const auto frame = parse_frame(flags.frame);
   if (!frame) return tl::unexpected(frame.error());
-  flags.id = coordinator::frame_job(JobId{flags.id}, static_cast<std::uint32_t>(*frame)).value;
+  flags.id = coordinator::frame_job(JobId{flags.id}, *frame).value;
   return {};
 }
 
-CLI::App* add(CLI::App& app, Action& action, const char* name, const char* help, Run run,
-              const std::shared_ptr<FarmFlags>& flags, bool of_a_job) {
+int add_token(FarmApi& api, const FarmFlags& flags) {
+  json body{{"role", flags.role}};
+  if (!flags.user.empty()) body["user"] = flags.user;
+  const auto made = api.post("/api/v1/tokens", body);
+  if (!made) return print_rejected(made.error());
+  print(flags.farm.json ? dump(*made) : text_field(*made, "token"));
+  return kOk;
+}
+
+int list_tokens(FarmApi& api, const FarmFlags& flags) {
+  return show_answer(api.get("/api/v1/tokens"), flags, tokens_table);
+}
+
+int revoke_token(FarmApi& api, const FarmFlags& flags) {
+  if (flags.id.find_first_not_of("0123456789abcdef") != std::string::npos)
+    return usage_error(fmt::format("'{}' is no token's id: `lightshaft token list` prints them", flags.id));
+  const auto done = api.remove("/api/v1/tokens/" + flags.id);
+  return done ? kOk : print_rejected(done.error());
+}
+
+// Adds a command that `run` executes with a connection to the farm.
+std::pair<CLI::App*, FarmFlags*> add(CLI::App& app, Action& action, const char* name, const char* help,
+                                     Run run, bool of_a_job = false) {
+  auto flags = std::make_shared<FarmFlags>();
   CLI::App* command = app.add_subcommand(name, help);
   flags->farm.add_to(*command);
   if (of_a_job) {
@@ -168,34 +191,28 @@ CLI::App* add(CLI::App& app, Action& action, const char* name, const char* help,
       return api ? run(*api, *flags) : print_error(api.error());
     };
   });
-  return command;
+  return {command, flags.get()};
 }
 
 }  // namespace
 
 void add_farm_commands(CLI::App& app, Action& action) {
-  const auto plain = [&](const char* name, const char* help, Run run, bool of_a_job) {
-    add(app, action, name, help, run, std::make_shared<FarmFlags>(), of_a_job);
-  };
-  plain("jobs", "the jobs of a farm", jobs, false);
-  plain("show", "one job", show, true);
-  auto watching = std::make_shared<FarmFlags>();
-  add(app, action, "watch", "follow a job until it ends", watch, watching, true)
-      ->add_flag("--quiet", watching->quiet, "no progress bar");
-  plain("pause", "hand out no more of a job", pause, true);
-  plain("resume", "go on with a paused job", resume, true);
-  plain("cancel", "end a job for good", cancel, true);
-  auto extending = std::make_shared<FarmFlags>();
-  CLI::App* extend_command = add(app, action, "extend", "more samples or less error for a job, done or not",
-                                 extend, extending, true);
+  add(app, action, "jobs", "the jobs of a farm", jobs);
+  add(app, action, "show", "one job", show, true);
+  const auto [watch_command, watching] = add(app, action, "watch", "follow a job until it ends", watch, true);
+  watch_command->add_flag("--quiet", watching->quiet, "no progress bar");
+  add(app, action, "pause", "hand out no more of a job", pause, true);
+  add(app, action, "resume", "go on with a paused job", resume, true);
+  add(app, action, "cancel", "end a job for good", cancel, true);
+  const auto [extend_command, extending] =
+      add(app, action, "extend", "more samples or less error for a job, done or not", extend, true);
   extend_command->add_option("--spp", extending->spp, "the new total per pixel")->type_name("TOTAL");
   extend_command
       ->add_option("--target-error", extending->target_error,
                    "of a job that has one: go on until the image's relMSE is below this")
       ->type_name("E");
-  auto fetching = std::make_shared<FarmFlags>();
-  CLI::App* fetch_command =
-      add(app, action, "fetch", "the image of a job, finished or as it is", fetch, fetching, true);
+  const auto [fetch_command, fetching] =
+      add(app, action, "fetch", "the image of a job, finished or as it is", fetch, true);
   fetch_command
       ->add_option("-o,--output", fetching->out,
                    "the image, .exr or .png; of a sequence every frame's, out_####.exr say")
@@ -207,20 +224,36 @@ void add_farm_commands(CLI::App& app, Action& action) {
       ->add_option("--html", fetching->html,
                    "its report as a page; of a sequence every frame's, with # in the name")
       ->type_name("REPORT.html");
-  auto looking = std::make_shared<FarmFlags>();
-  CLI::App* focus_command = add(
-      app, action, "focus", "which part of a job's image gets the next samples first", focus, looking, true);
+  const auto [focus_command, looking] =
+      add(app, action, "focus", "which part of a job's image gets the next samples first", focus, true);
   focus_command->add_option("--region", looking->region, "the tiles of these pixels go before all others")
       ->type_name("X0,Y0,X1,Y1");
   focus_command->add_flag("--none", looking->none, "all tiles are treated alike again");
-  auto filming = std::make_shared<FarmFlags>();
-  CLI::App* video_command =
-      add(app, action, "video", "a video of the finished frames of a sequence", video, filming, true);
+  const auto [video_command, filming] =
+      add(app, action, "video", "a video of the finished frames of a sequence", video, true);
   video_command->add_option("-o,--output", filming->out, "the video")->required()->type_name("OUT.mp4");
   video_command->add_option("--fps", filming->fps, "pictures per second; without it 24")->type_name("N");
   video_command->add_option("--exposure", filming->exposure, "in stops; without it 0")->type_name("STOPS");
   video_command->add_flag("--denoised", filming->denoised, "of the denoised images");
-  plain("workers", "the workers of a farm", workers, false);
+  add(app, action, "workers", "the workers of a farm", workers);
+}
+
+void add_tokens(CLI::App& app, Action& action) {
+  CLI::App* token = app.add_subcommand("token", "who may use a farm: for its admin");
+  token->require_subcommand(1);
+  const auto [adder, adding] =
+      add(*token, action, "add", "makes a token and prints it; it is kept nowhere else", add_token);
+  adder
+      ->add_option("--role", adding->role,
+                   "what it may do: submit (own jobs), read, join (a worker's) or admin")
+      ->required()
+      ->check(CLI::IsMember({"submit", "read", "join", "admin"}));
+  adder->add_option("--user", adding->user, "whose it is: owner of the jobs handed in with it")
+      ->type_name("NAME");
+  add(*token, action, "list", "the tokens, without their secrets", list_tokens);
+  const auto [revoke, revoking] =
+      add(*token, action, "revoke", "makes a token worthless, at once", revoke_token);
+  revoke->add_option("id", revoking->id, "its id, as `list` prints it")->required()->type_name("ID");
 }
 
 }  // namespace ls::cli

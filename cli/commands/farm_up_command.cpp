@@ -9,14 +9,10 @@
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
-#include "cli/scale/docker_engine.h"
+#include "cli/scale/engines.h"
 #include "cli/scale/farm_up.h"
-#include "cli/scale/kubernetes_engine.h"
-#include "cli/scale/slurm_engine.h"
-#include "cli/scale/ssh_engine.h"
-#include "common/base/clock.h"
-#include "common/base/secret.h"
 #include "common/base/spawn.h"
+#include "common/base/secret.h"
 
 namespace ls::cli {
 namespace {
@@ -58,26 +54,29 @@ Result<std::string> read_join_token(const std::string& file) {
   return token;
 }
 
+// Returns a parser of a budget in core hours; the parsed value is in core seconds.
+auto core_hours(const char* option) {
+  return [=](const std::string& text) {
+    return parse_positive(option, text, kMostHours).map([](double hours) { return hours * kCoreHour; });
+  };
+}
+
 // Parses HOURS (a budget for each user) or USER=HOURS (a budget for one user).
 Result<void> read_user_budget(const std::string& text, Budgets& budgets) {
   const auto sign = text.rfind('=');
-  const auto hours =
-      parse_positive("--user-budget", sign == std::string::npos ? text : text.substr(sign + 1), kMostHours);
-  if (!hours) return tl::unexpected(hours.error());
+  const auto budget = core_hours("--user-budget")(sign == std::string::npos ? text : text.substr(sign + 1));
+  if (!budget) return tl::unexpected(budget.error());
   if (sign == std::string::npos)
-    budgets.user = *hours * kCoreHour;
+    budgets.user = *budget;
   else
-    budgets.users[text.substr(0, sign)] = *hours * kCoreHour;
+    budgets.users[text.substr(0, sign)] = *budget;
   return {};
 }
 
 Result<Budgets> parse_budgets(const FarmUpFlags& f) {
   Budgets budgets;
-  if (!f.job_budget.empty()) {
-    const auto hours = parse_positive("--job-budget", f.job_budget, kMostHours);
-    if (!hours) return tl::unexpected(hours.error());
-    budgets.job = *hours * kCoreHour;
-  }
+  if (const auto ok = take(f.job_budget, budgets.job, core_hours("--job-budget")); !ok)
+    return tl::unexpected(ok.error());
   for (const std::string& text : f.user_budgets)
     if (const auto read = read_user_budget(text, budgets); !read) return tl::unexpected(read.error());
   return budgets;
@@ -105,11 +104,8 @@ Result<FarmUpOptions> parse_options(const FarmUpFlags& f) {
     if (!value) return tl::unexpected(value.error());
     row.value = *value;
   }
-  if (!f.budget.empty()) {
-    const auto hours = parse_positive("--budget", f.budget, kMostHours);
-    if (!hours) return tl::unexpected(hours.error());
-    o.limits.budget_core_seconds = *hours * kCoreHour;
-  }
+  if (const auto ok = take(f.budget, o.limits.budget_core_seconds, core_hours("--budget")); !ok)
+    return tl::unexpected(ok.error());
   auto budgets = parse_budgets(f);
   if (!budgets) return tl::unexpected(budgets.error());
   o.budgets = std::move(*budgets);
@@ -135,12 +131,10 @@ Result<std::unique_ptr<Engine>> open_engine_of_pods(const FarmUpFlags& f, const 
                           .minutes = *minutes,
                           .logs = f.logs,
                           .kubectl = f.kubectl,
-                          .worker_options = f.worker_options},
-                         system_unix_seconds);
+                          .worker_options = f.worker_options});
 }
 
-Result<std::unique_ptr<Engine>> open_engine(const FarmUpFlags& f, const FarmUpOptions& o,
-                                            const Clock& clock) {
+Result<std::unique_ptr<Engine>> open_engine(const FarmUpFlags& f, const FarmUpOptions& o) {
   const auto logs = check_folder("--logs", f.logs);
   if (!logs) return tl::unexpected(logs.error());
   if (f.engine == "kubernetes") return open_engine_of_pods(f, o);
@@ -173,8 +167,7 @@ Result<std::unique_ptr<Engine>> open_engine(const FarmUpFlags& f, const FarmUpOp
                         .image = f.image,
                         .drain_seconds = drain_seconds,
                         .logs = log_folder,
-                        .run = f.docker},
-                       system_unix_seconds);
+                        .run = f.docker});
   if (f.machines.empty()) return bad_argument("--machines FILE is needed with --on ssh: one machine a line");
   auto machines = read_machines(f.machines);
   if (!machines) return tl::unexpected(machines.error());
@@ -182,19 +175,17 @@ Result<std::unique_ptr<Engine>> open_engine(const FarmUpFlags& f, const FarmUpOp
                    .join_token = *token,
                    .machines = std::move(*machines),
                    .config = f.ssh_config,
-                   .logs = log_folder},
-                  clock);
+                   .logs = log_folder});
 }
 
 int farm_up(const FarmUpFlags& flags) {
   Interrupt interrupt;
-  const SystemClock clock;
   const auto options = parse_options(flags);
   if (!options) return print_error(options.error());
-  auto engine = open_engine(flags, *options, clock);
+  auto engine = open_engine(flags, *options);
   if (!engine) return print_error(engine.error());
   auto api = FarmApi::open(flags.farm);
-  return api ? run_farm_up(*api, **engine, *options, interrupt, clock) : print_error(api.error());
+  return api ? run_farm_up(*api, **engine, *options, interrupt) : print_error(api.error());
 }
 
 void describe(CLI::App& app, FarmUpFlags& f) {
@@ -267,10 +258,9 @@ void describe(CLI::App& app, FarmUpFlags& f) {
 void add_farm_up(CLI::App& app, Action& action) {
   CLI::App* farm = app.add_subcommand("farm", "workers that come and go with the jobs of a farm");
   farm->require_subcommand(1);
-  CLI::App* up = farm->add_subcommand("up", "starts workers while jobs need them, until Ctrl-C");
-  auto flags = std::make_shared<FarmUpFlags>();
+  const auto [up, flags] = add_command<FarmUpFlags>(
+      *farm, action, "up", "starts workers while jobs need them, until Ctrl-C", farm_up);
   describe(*up, *flags);
-  up->callback([flags, &action] { action = [flags] { return farm_up(*flags); }; });
 }
 
 }  // namespace ls::cli

@@ -31,8 +31,8 @@ struct MergeFlags {
   bool float_output = false;
 };
 
-// Returns the given files. A folder means all EXR files in it, sorted by name: there may be more of them than
-// a command line can contain.
+// Returns the given files and, for each given folder, all EXR files in it, sorted by name. (A folder may hold
+// more files than a command line can name.)
 Result<std::vector<fs::path>> files_of(const std::vector<std::string>& arguments) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -75,9 +75,9 @@ Result<void> write_report(const MergeFlags& flags, const Merged& merged, const s
   return save_result(flags.report, j.dump(2) + "\n");
 }
 
-// True if `digest` is that of the scene in the form in which a job renders it: pruned, that is, reduced to
-// what the job's integrator can see. Since partials (files with pixel sums) do not name the integrator, all
-// possible forms are tried.
+// True if `digest` is that of the scene as a job renders it: pruned, that is, reduced to what the job's
+// integrator can see. Partials (files with pixel sums) do not name the integrator, so all possible ones are
+// tried.
 bool is_of(const Scene& scene, const Digest& digest) {
   const std::string own = scene.integrator.name;
   return std::ranges::any_of(
@@ -87,8 +87,8 @@ bool is_of(const Scene& scene, const Digest& digest) {
       });
 }
 
-// Returns the names for the Cryptomatte manifests. They come from the scene, because partials contain only
-// identifiers.
+// Returns the Cryptomatte manifests, which give each identifier its name. The names come from the scene,
+// because partials contain only the identifiers.
 tl::expected<CryptomatteManifests, coordinator::Rejected> manifests(const MergeFlags& flags,
                                                                     const Merged& merged) {
   const AovSet aovs = merged.film.aovs();
@@ -108,7 +108,7 @@ tl::expected<CryptomatteManifests, coordinator::Rejected> manifests(const MergeF
 }
 
 int run(const MergeFlags& flags) {
-  if (const auto ok = check_image(flags.out); !ok) return print_error(ok.error());
+  if (const auto ok = check_outputs("-o", flags.out, std::nullopt); !ok) return print_error(ok.error());
   if (!flags.report.empty())
     if (const auto ok = check_output("--report", flags.report); !ok) return print_error(ok.error());
   const auto files = files_of(flags.partials);
@@ -121,7 +121,7 @@ int run(const MergeFlags& flags) {
   if (!merged) return print_error(merged.error());
   Provenance provenance;
   provenance.scene = merged->scene;
-  // Partials contain only the digest of the settings.
+  // Partials contain the digest of the settings, not the settings.
   provenance.settings_json = nlohmann::json{{"sha256", merged->settings.hex()}}.dump();
   provenance.build = LIGHTSHAFT_VERSION;
   provenance.numeric_class = merged->numeric_class;
@@ -148,9 +148,8 @@ int run(const MergeFlags& flags) {
 }  // namespace
 
 void add_merge(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<MergeFlags>();
-  CLI::App* merge =
-      app.add_subcommand("merge", "fold partial images into the final one, exactly as the coordinator does");
+  const auto [merge, flags] = add_command<MergeFlags>(
+      app, action, "merge", "fold partial images into the final one, exactly as the coordinator does", run);
   merge->add_option("partials", flags->partials, "partial images, or folders of them")
       ->required()
       ->type_name("PARTIAL.exr...");
@@ -163,7 +162,6 @@ void add_merge(CLI::App& app, Action& action) {
   add_defines(*merge, flags->defines);
   merge->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
   merge->add_flag("--float", flags->float_output, "32-bit pixels instead of half");
-  merge->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }
 
 }  // namespace ls::cli

@@ -34,12 +34,11 @@ Result<LocalRenderOptions> options_of(const RenderFlags& flags) {
   if (!spec) return tl::unexpected(spec.error());
   options.spec = std::move(*spec);
   const int most = flags.isolate ? worker::kMostChildThreads : limits::kThreads;
-  options.threads = std::min(worker::usable_cpus(), most);
-  if (!flags.threads.empty()) {
-    const auto threads = parse_whole("--threads", flags.threads, 1, static_cast<std::uint64_t>(most));
-    if (!threads) return tl::unexpected(threads.error());
-    options.threads = static_cast<int>(*threads);
-  }
+  auto threads = static_cast<std::uint64_t>(std::min(worker::usable_cpus(), most));
+  if (const auto ok = take(flags.threads, threads, whole("--threads", 1, static_cast<std::uint64_t>(most)));
+      !ok)
+    return tl::unexpected(ok.error());
+  options.threads = static_cast<int>(threads);
   options.isolate = flags.isolate;
   options.quiet = flags.quiet;
   options.progress = flags.quiet      ? ProgressForm::none
@@ -95,29 +94,25 @@ LocalRenderOptions of_frame(const LocalRenderOptions& options, std::uint32_t fra
   return o;
 }
 
-Result<void> check_frames_outputs(const FrameRange& frames, const LocalRenderOptions& options) {
-  const auto check = [&](const char* option, const std::filesystem::path& path,
-                         bool is_file) -> Result<void> {
-    if (auto ok = check_numbered(option, path.string(), frames); !ok) return ok;
-    for (const std::uint32_t frame : frames.frames())
-      if (is_file)
-        if (auto ok = check_output(option, of_frame(path, frame)); !ok) return ok;
-    return {};
-  };
-  if (const auto format = image_format(options.out); !format) return tl::unexpected(format.error());
-  if (auto ok = check("-o", options.out, true); !ok) return ok;
-  if (options.report)
-    if (auto ok = check("--report", *options.report, true); !ok) return ok;
-  if (options.html)
-    if (auto ok = check("--html", *options.html, true); !ok) return ok;
-  return options.partial_dir ? check("--partial-dir", *options.partial_dir, false) : Result<void>{};
+Result<void> check_files(const LocalRenderOptions& o) {
+  const auto& frames = o.spec.frames;
+  if (auto ok = check_outputs("-o", o.out.string(), frames); !ok) return ok;
+  for (const auto& [option, path] : {std::pair("--report", &o.report), std::pair("--html", &o.html),
+                                     std::pair("--partial-dir", &o.partial_dir)}) {
+    if (!*path) continue;
+    const std::string name = (*path)->string();
+    if (frames)
+      if (auto ok = check_numbered(option, name, *frames); !ok) return ok;
+    if (path != &o.partial_dir)
+      if (auto ok = check_outputs(option, name, frames); !ok) return ok;
+  }
+  return {};
 }
 
 // Renders the frames, with the same pixels as on a farm. `options` are those for one image; a run of # in
-// their paths is replaced by the frame number. Everything is checked before the first frame is rendered.
+// their paths is replaced by the frame number. Reads the scene of every frame before it renders the first.
 // Returns the exit code, and stops at the first frame whose exit code is not 0.
 int render_sequence(const std::string& path, const FrameRange& frames, const LocalRenderOptions& options) {
-  if (const auto ok = check_frames_outputs(frames, options); !ok) return print_error(ok.error());
   auto reader = SceneReader::open(path, options.spec.defines, options.strict);
   if (!reader) return print_rejected(reader.error());
   if (const auto all = reader->read_all(frames); !all) return print_rejected(all.error());
@@ -135,16 +130,11 @@ int run(const RenderFlags& flags) {
   if (!options) return print_error(options.error());
   const bool one_sample = !flags.pixel.empty() || !flags.sample.empty();
   const auto& frames = options->spec.frames;
+  if (!one_sample)
+    if (const auto ok = check_files(*options); !ok) return print_error(ok.error());
   if (frames && !one_sample) return render_sequence(flags.scene, *frames, *options);
   if (frames && frames->count() > 1)
     return usage_error("--pixel and --sample are of one frame: name it, --frames 7 say");
-  if (!one_sample) {
-    if (const auto ok = check_image(options->out); !ok) return print_error(ok.error());
-    if (options->report)
-      if (const auto ok = check_output("--report", *options->report); !ok) return print_error(ok.error());
-    if (options->html)
-      if (const auto ok = check_output("--html", *options->html); !ok) return print_error(ok.error());
-  }
   const auto scene = read_local_scene(flags.scene, options->spec.defines, flags.job.strict,
                                       frames ? std::optional(frames->first) : std::nullopt);
   if (!scene) return print_rejected(scene.error());
@@ -154,8 +144,8 @@ int run(const RenderFlags& flags) {
 }  // namespace
 
 void add_render(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<RenderFlags>();
-  CLI::App* render = app.add_subcommand("render", "render a scene on this machine");
+  const auto [render, flags] =
+      add_command<RenderFlags>(app, action, "render", "render a scene on this machine", run);
   render->add_option("scene", flags->scene, "Mitsuba XML, .pbrt, .gltf or .glb")
       ->required()
       ->type_name("SCENE");
@@ -187,7 +177,6 @@ void add_render(CLI::App& app, Action& action) {
       ->add_flag("--progress", flags->progress,
                  "progress as lines, one for each percent, for logs and programs")
       ->excludes(quiet);
-  render->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }
 
 }  // namespace ls::cli

@@ -4,8 +4,7 @@
 
 #include "cli/commands/commands.h"
 #include "cli/farm/farm_api.h"
-#include "cli/farm/farm_wait.h"
-#include "cli/farm/fetch_results.h"
+#include "cli/farm/job_results.h"
 #include "cli/output/console.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
@@ -51,9 +50,7 @@ Job submit_bundle(const SubmitFlags& flags, const JobSpec& spec, const std::stri
   if (!api) return coordinator::rejected(api.error());
   auto job = api->submit_bundle(flags.scene, type, spec_query(spec, !flags.job.priority.empty()));
   if (!job) return job;
-  if (const auto warnings = job->find("warnings"); warnings != job->end() && warnings->is_array())
-    for (const auto& warning : *warnings)
-      if (warning.is_string()) print_note(warning.get<std::string>());
+  for (const std::string& warning : texts_field(*job, "warnings")) print_note(warning);
   return job;
 }
 
@@ -106,9 +103,8 @@ int run(const SubmitFlags& flags) {
 }  // namespace
 
 void add_submit(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<SubmitFlags>();
-  CLI::App* submit =
-      app.add_subcommand("submit", "send a scene and its files to a farm; prints the job's id");
+  const auto [submit, flags] = add_command<SubmitFlags>(
+      app, action, "submit", "send a scene and its files to a farm; prints the job's id", run);
   submit
       ->add_option("scene", flags->scene,
                    "Mitsuba XML, .pbrt, .gltf or .glb, or a .zip, .tar or .tar.gz with one and all its files")
@@ -150,7 +146,6 @@ void add_submit(CLI::App& app, Action& action) {
                    "wait, then fetch the report as a page; of a sequence every frame's, with # in the name")
       ->type_name("REPORT.html");
   submit->add_flag("--quiet", flags->quiet, "only the id, warnings and errors");
-  submit->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }
 
 }  // namespace ls::cli

@@ -101,11 +101,11 @@ int run(const ValidateFlags& flags) {
 }  // namespace
 
 void add_validate(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<ValidateFlags>();
-  CLI::App* validate = app.add_subcommand(
-      "validate",
+  const auto [validate, flags] = add_command<ValidateFlags>(
+      app, action, "validate",
       "check the renderer against known answers: stiff and extreme cases, or the tests of a Nori file "
-      "(ttest, chi2test); exit code 0 if all pass, 1 if not");
+      "(ttest, chi2test); exit code 0 if all pass, 1 if not",
+      run);
   validate->add_option("file", flags->file, "Nori XML with a <test>; without: the table of cases")
       ->type_name("FILE");
   validate
@@ -119,7 +119,6 @@ void add_validate(CLI::App& app, Action& action) {
       ->check(CLI::Range(1, 1024))
       ->type_name("N");
   validate->add_flag("--strict", flags->strict, "warnings are errors");
-  validate->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }
 
 }  // namespace ls::cli

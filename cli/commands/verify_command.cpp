@@ -7,17 +7,20 @@
 #include <atomic>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <random>
 #include <thread>
 
 #include "cli/commands/commands.h"
-#include "cli/commands/verify_image.h"
 #include "cli/local/local_scene.h"
 #include "cli/local/local_world.h"
 #include "cli/output/console.h"
 #include "cli/output/interrupt.h"
 #include "cli/output/job_options.h"
 #include "common/base/safe_text.h"
+#include "common/image/film/film.h"
+#include "common/image/frame/rounds.h"
+#include "common/job/sealed_image.h"
 #include "common/scene/analysis/prune.h"
 #include "common/scene/json/serialize.h"
 #include "coordinator/admission/cryptomatte_manifests.h"
@@ -43,8 +46,8 @@ Result<FinalPicture> open_image(const std::string& path) {
   return read_final_exr(*bytes, path);
 }
 
-// Checks the conditions of a comparison: image and scene belong together, and this machine has the numeric
-// class of the image (machines of one class give the same bits).
+// Checks that the image was rendered from this scene, and that this machine has the image's numeric class
+// (machines of one class give the same bits).
 Result<void> check_same(const SealedImage& image, const LocalScene& scene, const VerifyFlags& flags) {
   if (const Digest mine = digest_of(scene.scene); mine != image.scene)
     return fail(
@@ -64,7 +67,100 @@ Result<void> check_same(const SealedImage& image, const LocalScene& scene, const
   return {};
 }
 
-// The number of tiles with each result. Tiles that were not rendered count as neither right nor wrong.
+struct VerifiedTile {
+  TileIndex tile = 0;
+  PixelRect rect;
+  std::uint64_t spp = 0;
+  // True if verification was interrupted before the tile was rendered: its result is unknown.
+  bool stopped = false;
+  TileError error;      // error of the tile, estimated from its samples
+  std::string problem;  // empty: the digest and all layers match
+
+  bool wrong() const { return !problem.empty(); }
+};
+
+// Returns `count` distinct tiles from 0 to `all` - 1, or all of them if there are fewer, in ascending order.
+// The choice is a function of `seed`.
+std::vector<TileIndex> random_tiles(TileIndex all, std::uint64_t count, std::uint64_t seed) {
+  std::vector<TileIndex> tiles(all);
+  std::iota(tiles.begin(), tiles.end(), TileIndex{0});
+  if (count >= all) return tiles;
+  std::mt19937_64 random(seed);
+  std::vector<TileIndex> chosen;
+  std::sample(tiles.begin(), tiles.end(), std::back_inserter(chosen), static_cast<std::ptrdiff_t>(count),
+              random);
+  return chosen;
+}
+
+// Renders all rounds (ranges of samples) of the tile again. Compares the hash chain over the rounds' digests
+// with the chain stored in the image, and the values in every layer with the image's. The world must have
+// been built from the image's scene and settings.
+VerifiedTile verify_tile(const render::World& world, const SealedImage& image, TileIndex tile,
+                         const std::atomic<bool>& stop) {
+  VerifiedTile out{tile, image.grid().rect(tile), 0, false, {}};
+  const auto spp = tile_samples(image, tile);
+  if (!spp) {
+    out.problem = spp.error().message;
+    return out;
+  }
+  out.spp = *spp;
+  const AovSet aovs = aovs_of(image.settings);
+  Film film(image.grid(), aovs);
+  const Digest settings = digest_of(image.settings);
+  for (RoundIndex k = 0; *spp > 0 && k < round_count(*spp); ++k) {
+    const SampleRange samples = cut_range(k, *spp);
+    render::TileResult rendered = render::render_tile(world, out.rect, samples, &stop, nullptr);
+    if (rendered.stopped) {
+      out.stopped = true;
+      return out;
+    }
+    const Partial partial{
+        {image.scene, settings, image.numeric_class, out.rect, samples}, std::move(rendered.sums), aovs};
+    if (const auto folded = film.fold(tile, k, partial); !folded) {
+      out.problem = folded.error().message;
+      return out;
+    }
+  }
+  if (film.tile_digest(tile) != image.tiles[tile])
+    out.problem = fmt::format("rendered again it is {}, the image seals {}", film.tile_digest(tile).hex(),
+                              image.tiles[tile].hex());
+  else if (const auto pixel = first_difference(image, film, tile))
+    out.problem = fmt::format(
+        "its seal is right, but pixel {},{} has another value in layer {} than its samples give: the image "
+        "was changed afterwards",
+        pixel->x, pixel->y, pixel->layer);
+  out.error = film.error(tile);
+  return out;
+}
+
+// Returns, as "header NAME", the headers in the image that contradict its settings or the names in the scene.
+// If `tiles` has all tiles of the image, also returns headers that contradict the tiles' samples. Only the
+// seal (the digests of all layers and headers) protects the other headers (seconds, health, ...).
+std::vector<std::string> wrong_headers(const SealedImage& image, const CryptomatteManifests& names,
+                                       const std::vector<VerifiedTile>& tiles) {
+  auto expected = final_layers(Film(image.grid(), aovs_of(image.settings)).row(0), names, true).strings;
+  expected["lightshaft:seed"] = fmt::format("{}", image.settings.seed);
+  const bool all = tiles.size() == image.grid().count() &&
+                   std::none_of(tiles.begin(), tiles.end(), [](const auto& t) { return t.stopped; });
+  if (all) {
+    TileError sums;
+    std::uint64_t missing = 0;
+    for (const VerifiedTile& t : tiles) {
+      if (t.spp > 0) sums.add(t.error);
+      if (t.spp == 0) missing += static_cast<std::uint64_t>(t.rect.pixels());
+    }
+    expected.merge(error_strings(sums, missing));
+    expected.erase("lightshaft:verdict");  // also depends on the convergence curve, which is unknown here
+  }
+  std::vector<std::string> wrong;
+  for (const auto& [name, value] : expected) {
+    const auto found = image.picture.strings.find(name);
+    if (found == image.picture.strings.end() || found->second != value) wrong.push_back("header " + name);
+  }
+  return wrong;
+}
+
+// The number of tiles with each result. `stopped`: not rendered, because the user interrupted the check.
 struct Tally {
   std::size_t right = 0, wrong = 0, stopped = 0;
 };
@@ -147,22 +243,10 @@ struct Numbers {
 Result<Numbers> numbers_of(const VerifyFlags& flags) {
   Numbers n;
   n.seed = std::random_device{}();
-  const auto read = [](const char* name, const std::string& text, std::uint64_t least, std::uint64_t most,
-                       std::uint64_t& to) -> Result<void> {
-    if (text.empty()) return {};
-    const auto number = parse_whole(name, text, least, most);
-    if (!number) return tl::unexpected(number.error());
-    to = *number;
-    return {};
-  };
-  std::uint64_t frame = 0;
-  if (const auto ok = read("--tiles", flags.tiles, 1, UINT32_MAX, n.tiles); !ok)
-    return tl::unexpected(ok.error());
-  if (const auto ok = read("--seed", flags.seed, 0, UINT64_MAX, n.seed); !ok)
-    return tl::unexpected(ok.error());
-  if (const auto ok = read("--frame", flags.frame, 0, kMaxFrameNumber, frame); !ok)
-    return tl::unexpected(ok.error());
-  if (!flags.frame.empty()) n.frame = static_cast<std::uint32_t>(frame);
+  for (const auto& ok :
+       {take(flags.tiles, n.tiles, whole("--tiles", 1, UINT32_MAX)),
+        take(flags.seed, n.seed, whole("--seed", 0, UINT64_MAX)), take(flags.frame, n.frame, parse_frame)})
+    if (!ok) return tl::unexpected(ok.error());
   return n;
 }
 
@@ -214,10 +298,9 @@ int run(const VerifyFlags& flags) {
 }  // namespace
 
 void add_verify(CLI::App& app, Action& action) {
-  auto flags = std::make_shared<VerifyFlags>();
-  CLI::App* verify = app.add_subcommand(
-      "verify",
-      "render random tiles of a finished image again and compare them with the digests sealed in it");
+  const auto [verify, flags] = add_command<VerifyFlags>(
+      app, action, "verify",
+      "render random tiles of a finished image again and compare them with the digests sealed in it", run);
   verify->add_option("image", flags->image, "a finished EXR")->required()->type_name("OUT.exr");
   verify->add_option("--scene", flags->scene, "the scene it was rendered from")
       ->required()
@@ -229,7 +312,6 @@ void add_verify(CLI::App& app, Action& action) {
   verify->add_option("--frame", flags->frame, "of a sequence: this frame")->type_name("N");
   verify->add_option("--threads", flags->threads, "default: all")->type_name("N")->check(CLI::Range(1, 1024));
   verify->add_flag("--json", flags->json, "as JSON");
-  verify->callback([flags, &action] { action = [flags] { return run(*flags); }; });
 }
 
 }  // namespace ls::cli

@@ -14,8 +14,8 @@
 namespace ls::cli {
 namespace {
 
-// Memory below this causes a warning: denoising an image takes up to 2 GiB (lightshaft-denoise limits itself
-// to that).
+// Memory below this causes a warning: denoising an image takes up to 2 GiB, the limit that lightshaft-denoise
+// sets itself.
 constexpr std::uint64_t kLittleMemory = std::uint64_t{2} << 30;
 // Free disk space below kNoRoom is a problem, and below kLittleRoom causes a warning. A coordinator stores
 // each scene twice, as XML and in canonical form, so a disk with less than twice the size of the largest XML
@@ -41,35 +41,28 @@ Finding problem(std::string name, std::string what, std::string advice) {
 }
 
 Finding of_memory(const MachineFacts& facts) {
-  Finding found = ok("memory", fmt::format("{} for this process", show_bytes(facts.memory_bytes)));
-  if (facts.memory_bytes < kLittleMemory) {
-    found.status = Status::warning;
-    found.what += ": large scenes and denoising need more than " + show_bytes(kLittleMemory);
-    found.advice = "raise the limit of the control group or container, or use a machine with more memory";
-  }
-  return found;
+  const std::string what = show_bytes(facts.memory_bytes) + " for this process";
+  if (facts.memory_bytes >= kLittleMemory) return ok("memory", what);
+  return warning("memory", what + ": large scenes and denoising need more than " + show_bytes(kLittleMemory),
+                 "raise the limit of the control group or container, or use a machine with more memory");
 }
 
 Finding of_cores(const MachineFacts& facts) {
-  Finding found = ok("cores", fmt::format("{} usable", facts.cpus));
-  if (facts.cpu_quota > 0 && facts.cpu_quota < facts.cpus) {
-    found.status = Status::warning;
-    found.what += fmt::format(", but the control group grants the time of {:.3g}", facts.cpu_quota);
-    found.advice = fmt::format("start renders and workers with --threads {}",
-                               std::max(1, static_cast<int>(std::lround(facts.cpu_quota))));
-  }
-  return found;
+  const std::string what = fmt::format("{} usable", facts.cpus);
+  if (!(facts.cpu_quota > 0 && facts.cpu_quota < facts.cpus)) return ok("cores", what);
+  return warning("cores",
+                 what + fmt::format(", but the control group grants the time of {:.3g}", facts.cpu_quota),
+                 fmt::format("start renders and workers with --threads {}",
+                             std::max(1, static_cast<int>(std::lround(facts.cpu_quota)))));
 }
 
 Finding of_file_limit(const MachineFacts& facts) {
-  Finding found = ok("open-files", fmt::format("up to {}", facts.file_limit));
-  if (facts.file_limit < worker::kWantedFiles) {
-    found.status = Status::warning;
-    found.what += fmt::format(": a worker wants {}, one for each file in use", worker::kWantedFiles);
-    found.advice = fmt::format("raise the hard limit: ulimit -Hn {0}, or LimitNOFILE={0} in the unit",
-                               worker::kWantedFiles);
-  }
-  return found;
+  const std::string what = fmt::format("up to {}", facts.file_limit);
+  if (facts.file_limit >= worker::kWantedFiles) return ok("open-files", what);
+  return warning("open-files",
+                 what + fmt::format(": a worker wants {}, one for each file in use", worker::kWantedFiles),
+                 fmt::format("raise the hard limit: ulimit -Hn {0}, or LimitNOFILE={0} in the unit",
+                             worker::kWantedFiles));
 }
 
 Finding of_sandbox(const MachineFacts& facts) {
@@ -105,58 +98,6 @@ Finding of_folder(const FolderFacts& folder) {
   }
   return found;
 }
-
-}  // namespace
-
-std::string to_string(Status status) {
-  return status == Status::ok ? "ok" : status == Status::warning ? "warning" : "problem";
-}
-
-Status worst(const std::vector<Finding>& findings) {
-  Status status = Status::ok;
-  for (const Finding& each : findings) status = std::max(status, each.status);
-  return status;
-}
-
-std::vector<Finding> judge_machine(const MachineFacts& facts) {
-  std::vector<Finding> all;
-  all.push_back(
-      facts.processor_fits
-          ? ok("processor", fmt::format("has what this build needs ({}); numeric class {:.12}",
-                                        facts.processor_target, facts.numeric_class))
-          : problem("processor",
-                    fmt::format("lacks instructions that this build needs ({})", facts.processor_target),
-                    "use a newer machine, or build with another LIGHTSHAFT_ARCH on all machines"));
-  all.push_back(of_memory(facts));
-  all.push_back(of_cores(facts));
-  all.push_back(of_file_limit(facts));
-  all.push_back(of_sandbox(facts));
-  all.push_back(facts.vdb_found
-                    ? ok("openvdb", facts.vdb_program.string())
-                    : problem("openvdb",
-                              fmt::format("{} is missing: .vdb and .nvdb files cannot be read",
-                                          facts.vdb_program.string()),
-                              "install the package lightshaft-vdb, or build the target lightshaft-vdb"));
-  all.push_back(!facts.denoiser.empty() ? ok("denoiser", facts.denoiser)
-                                        : warning("denoiser", facts.denoiser_trouble,
-                                                  "only --denoise needs it: run deploy/install-denoiser.sh"));
-  all.push_back(ok("redis", facts.redis_server.empty()
-                                ? "no redis-server in PATH; only a coordinator with --store redis:// needs "
-                                  "one, on any machine"
-                                : facts.redis_server.string()));
-  for (const FolderFacts& folder : facts.folders) all.push_back(of_folder(folder));
-  return all;
-}
-
-double clock_lead(double asked_at, double answered_at, std::int64_t date) {
-  // While the request ran, the coordinator's clock was at some time in [date, date + 1), and this machine's
-  // in [asked_at, answered_at].
-  const double least = static_cast<double>(date) - answered_at;
-  const double most = static_cast<double>(date) + 1 - asked_at;
-  return least > 0 ? least : most < 0 ? most : 0;
-}
-
-namespace {
 
 std::string host_of(const std::string& url) {
   const std::size_t host = url.find("://") + 3;
@@ -297,6 +238,52 @@ void add_workers(std::vector<Finding>& all, const FarmFacts& facts, const std::s
 }
 
 }  // namespace
+
+std::string to_string(Status status) {
+  return status == Status::ok ? "ok" : status == Status::warning ? "warning" : "problem";
+}
+
+Status worst(const std::vector<Finding>& findings) {
+  Status status = Status::ok;
+  for (const Finding& each : findings) status = std::max(status, each.status);
+  return status;
+}
+
+std::vector<Finding> judge_machine(const MachineFacts& facts) {
+  std::vector<Finding> all{
+      facts.processor_fits
+          ? ok("processor", fmt::format("has what this build needs ({}); numeric class {:.12}",
+                                        facts.processor_target, facts.numeric_class))
+          : problem("processor",
+                    fmt::format("lacks instructions that this build needs ({})", facts.processor_target),
+                    "use a newer machine, or build with another LIGHTSHAFT_ARCH on all machines"),
+      of_memory(facts),
+      of_cores(facts),
+      of_file_limit(facts),
+      of_sandbox(facts),
+      facts.vdb_found ? ok("openvdb", facts.vdb_program.string())
+                      : problem("openvdb",
+                                fmt::format("{} is missing: .vdb and .nvdb files cannot be read",
+                                            facts.vdb_program.string()),
+                                "install the package lightshaft-vdb, or build the target lightshaft-vdb"),
+      !facts.denoiser.empty() ? ok("denoiser", facts.denoiser)
+                              : warning("denoiser", facts.denoiser_trouble,
+                                        "only --denoise needs it: run deploy/install-denoiser.sh"),
+      ok("redis", facts.redis_server.empty()
+                      ? "no redis-server in PATH; only a coordinator with --store redis:// needs one, on any "
+                        "machine"
+                      : facts.redis_server.string())};
+  for (const FolderFacts& folder : facts.folders) all.push_back(of_folder(folder));
+  return all;
+}
+
+double clock_lead(double asked_at, double answered_at, std::int64_t date) {
+  // When the coordinator wrote the date, its clock was in [date, date + 1), and this machine's in
+  // [asked_at, answered_at]. So the difference of the clocks is in [least, most).
+  const double least = static_cast<double>(date) - answered_at;
+  const double most = static_cast<double>(date) + 1 - asked_at;
+  return least > 0 ? least : most < 0 ? most : 0;
+}
 
 std::vector<Finding> judge_farm(const FarmFacts& facts, const std::string& program_version,
                                 const std::string& numeric_class) {

@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/doctor/farm_facts.h"
-#include "cli/doctor/machine_facts.h"
+#include "cli/doctor/facts.h"
 
 namespace ls::cli {
 
@@ -29,10 +28,10 @@ std::vector<Finding> judge_farm(const FarmFacts& facts, const std::string& progr
 
 Status worst(const std::vector<Finding>& findings);
 
-// Returns the smallest difference, in seconds, between the coordinator's clock and this machine's that is
-// consistent with the answer: positive if the coordinator's is ahead, negative if it is behind, 0 if the
-// clocks may agree. The difference has an uncertainty: the header Date (`date`) has whole seconds, rounded
-// down, and was written at some time between request and answer.
+// Returns by how many seconds, at least, the coordinator's clock is ahead of this machine's; negative if it
+// is behind, 0 if the clocks may agree. The exact difference is unknown: the coordinator writes `date`, the
+// header Date of its answer, in whole seconds, rounded down, at some time between the request (`asked_at`)
+// and the answer (`answered_at`).
 double clock_lead(double asked_at, double answered_at, std::int64_t date);
 
 }  // namespace ls::cli

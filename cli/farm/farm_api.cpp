@@ -103,9 +103,7 @@ Rejected problem_of(const HttpResponse& response) {
     out.error.message +=
         " (give the token with --token-file FILE or in LIGHTSHAFT_TOKEN; a coordinator keeps it in the file "
         "`token` of its data folder)";
-  if (const auto list = j.find("diagnostics"); list != j.end() && list->is_array())
-    for (const json& d : *list)
-      if (d.is_object()) out.diagnostics.push_back(diagnostic_of(d));
+  for (const json& d : objects_field(j, "diagnostics")) out.diagnostics.push_back(diagnostic_of(d));
   return out;
 }
 
@@ -219,7 +217,8 @@ FarmApi::Answer<HttpResponse> FarmApi::send_rest(const std::string& path, const 
   sending.reached = std::max(sending.reached, offset);
   auto put = client_.upload(path, file, offset);
   sending.retry.answered();
-  // 409: between the two requests, an earlier connection has delivered more bytes.
+  // Status 409: more bytes arrived over an earlier connection after the HEAD request, so `offset` is out of
+  // date.
   if (put && put->status == 409)
     return coordinator::rejected({Errc::unavailable, problem_of(*put).error.message});
   return checked(std::move(put));
@@ -249,8 +248,7 @@ FarmApi::Answer<json> FarmApi::submit(const LocalScene& scene, const JobSpec& sp
             {"name", std::filesystem::path(scene.name).filename().string()}};
   for (const auto& [name, file] : scene.files) body["assets"][name] = file.digest.hex();
   body["spec"] = json::parse(canonical_json(spec), nullptr, false);
-  return as_json(
-      client_.request("POST", "/api/v1/jobs", body.dump(-1, ' ', false, json::error_handler_t::replace)));
+  return as_json(client_.request("POST", "/api/v1/jobs", dump(body, -1)));
 }
 
 FarmApi::Answer<json> FarmApi::submit_bundle(const std::filesystem::path& file, const std::string& type,

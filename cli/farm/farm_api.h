@@ -43,7 +43,8 @@ class FarmApi {
   // `on_progress` receives a message for each upload.
   Answer<Json> submit(const LocalScene& scene, const JobSpec& spec,
                       const std::function<void(const std::string&)>& on_progress);
-  // Uploads a file unless the coordinator has it. Returns its digest, which a spec can refer to.
+  // Uploads a file unless the coordinator has it. Returns its digest, by which a job's spec can name the
+  // file.
   Answer<Digest> upload(const std::filesystem::path& file,
                         const std::function<void(const std::string&)>& on_progress);
   // Sends an archive of a scene unchanged, to create a job from it. `type` comes from bundle_type(), `query`
@@ -78,9 +79,9 @@ coordinator::Rejected problem_of(const HttpResponse& response);
 // sends an archive unchanged, with the options in the query of the request.
 std::optional<std::string> bundle_type(const std::string& file);
 
-// Returns the spec as query parameters, such as "?spp=8&define=a%3D1", or an empty text. Options that were
-// not given are left out, because the archive may set them. `with_priority`: the priority was given (its
-// value alone does not show this).
+// Returns the spec as query parameters, such as "?spp=8&define=a%3D1", or an empty text. Options that the
+// user did not give are left out, because the archive may set them. `with_priority`: true if the user gave
+// the priority, which its value does not show.
 std::string spec_query(const JobSpec& spec, bool with_priority);
 
 }  // namespace ls::cli

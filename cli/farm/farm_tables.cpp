@@ -36,32 +36,9 @@ std::string percent(const json& object, const char* key) {
   return value ? fmt::format("{:.0f} %", 100 * *value) : "-";
 }
 
-std::string table(const std::vector<Row>& rows) {
-  std::vector<std::size_t> widths;
-  for (const Row& row : rows)
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      if (widths.size() <= i) widths.push_back(0);
-      widths[i] = std::max(widths[i], row[i].size());
-    }
-  std::string out;
-  for (const Row& row : rows) {
-    std::string line;
-    for (std::size_t i = 0; i < row.size(); ++i)
-      line += fmt::format("{:<{}}", row[i], i + 1 < row.size() ? widths[i] + 2 : 0);
-    line.erase(line.find_last_not_of(' ') + 1);
-    out += (out.empty() ? "" : "\n") + line;
-  }
-  return out;
-}
-
 // A sequence with at most this many frames is listed completely. In a longer one, frames that are done or
 // queued are left out.
 constexpr std::size_t kMostFrames = 100;
-
-const json* frames_of(const json& job) {
-  const auto frames = job.find("frames");
-  return frames != job.end() && frames->is_object() ? &*frames : nullptr;
-}
 
 std::string frames_done(const json& frames) {
   std::string out = fmt::format("{} of {} done", int_field(frames, "done", 0), int_field(frames, "total", 0));
@@ -70,16 +47,8 @@ std::string frames_done(const json& frames) {
   return out;
 }
 
-std::vector<json> objects(const json& answer, const char* key) {
-  std::vector<json> all;
-  if (const auto list = answer.find(key); list != answer.end() && list->is_array())
-    std::copy_if(list->begin(), list->end(), std::back_inserter(all),
-                 [](const json& j) { return j.is_object(); });
-  return all;
-}
-
 std::string frames_table(const json& frames) {
-  const std::vector<json> all = objects(frames, "list");
+  const std::vector<json> all = objects_field(frames, "list");
   std::vector<Row> rows{{"FRAME", "STATE", "DONE", "SPP", "RELMSE", "ERROR"}};
   for (const json& f : all) {
     const std::string state = text(f, "state");
@@ -87,7 +56,7 @@ std::string frames_table(const json& frames) {
     rows.push_back({number(f, "frame", "{:.0f}"), state, percent(f, "progress"),
                     number(f, "spp_done", "{:.4g}"), number(f, "relmse", "{:.3g}"), text(f, "error")});
   }
-  return rows.size() == 1 ? "" : "\n" + table(rows);
+  return rows.size() == 1 ? "" : "\n" + aligned(rows);
 }
 
 // Describes the samples done and requested. For a job that ends by target error or time only, `spp` is a
@@ -125,10 +94,10 @@ void add_error_rows(std::vector<Row>& rows, const json& job) {
   rows.push_back({"relMSE", estimate_text(job, "relmse", "relmse_ci95")});
   const bool denoised = text_field(job, "target_layer") == "denoised";
   add_known(rows, denoised ? "target relMSE, denoised" : "target relMSE", job, "target_error", "{:g}");
-  if (const auto check = job.find("denoised_check"); check != job.end() && check->is_object())
+  if (const json* check = object_field(job, "denoised_check"))
     rows.push_back({"relMSE, denoised", denoised_check_text(*check)});
   rows.push_back({"RMSE", estimate_text(job, "rmse", "rmse_ci95")});
-  if (const auto reference = job.find("reference"); reference != job.end() && reference->is_object()) {
+  if (const json* reference = object_field(job, "reference")) {
     const auto add_reference_error = [&](const char* name, const char* key, const char* below) {
       const std::string text =
           reference_error_text(*reference, key, below, flag_field(job, "reference_same_seed"), 4);
@@ -171,31 +140,33 @@ bool is_over(const json& job) {
 
 std::string jobs_table(const json& answer) {
   std::vector<Row> rows{{"ID", "STATE", "DONE", "SPP", "RELMSE", "LEFT", "NAME"}};
-  for (const json& job : objects(answer, "jobs"))
+  for (const json& job : objects_field(answer, "jobs")) {
+    const json* frames = object_field(job, "frames");
     rows.push_back({text(job, "id"), text(job, "state"), percent(job, "progress"),
                     number(job, "spp_done", "{:.4g}"), number(job, "relmse", "{:.3g}"),
                     time_left_text(job, job, "eta_seconds"),
                     text(job, "name") + (flag_field(job, "fake") ? " (fake pixels)" : "") +
                         (unclean(job) ? " (numbers not clean)" : "") +
                         (verdict_of(job).doubtful ? " (don't trust its error yet)" : "") +
-                        (frames_of(job) ? fmt::format(" (frames: {})", frames_done(*frames_of(job))) : "")});
-  return rows.size() == 1 ? "no jobs" : table(rows);
+                        (frames ? fmt::format(" (frames: {})", frames_done(*frames)) : "")});
+  }
+  return rows.size() == 1 ? "no jobs" : aligned(rows);
 }
 
 std::string tokens_table(const json& answer) {
   std::vector<Row> rows{{"ID", "ROLE", "USER", ""}};
-  for (const json& t : objects(answer, "tokens")) {
-    const bool of_file = t.value("of_file", json()) == json(true);
-    rows.push_back({text(t, "id"), text(t, "role"), text(t, "user"),
-                    of_file ? text(t, "role") == "join" ? "DATA/join-token" : "DATA/token" : ""});
+  for (const json& t : objects_field(answer, "tokens")) {
+    rows.push_back(
+        {text(t, "id"), text(t, "role"), text(t, "user"),
+         flag_field(t, "of_file") ? text(t, "role") == "join" ? "DATA/join-token" : "DATA/token" : ""});
   }
-  return table(rows);
+  return aligned(rows);
 }
 
 std::string workers_table(const json& answer) {
   std::vector<Row> rows{
       {"NAME", "STATE", "THREADS", "UNITS", "CPU", "MEMORY", "SEEN", "CLASS", "JOB", "ACTIVITY"}};
-  for (const json& w : objects(answer, "workers")) {
+  for (const json& w : objects_field(answer, "workers")) {
     const auto rss = w.find("rss_bytes");
     rows.push_back({text(w, "name"), text(w, "state") + (flag_field(w, "fake") ? " (fake)" : ""),
                     number(w, "threads", "{:.0f}"), number(w, "units_done", "{:.0f}"),
@@ -203,7 +174,7 @@ std::string workers_table(const json& answer) {
                     rss != w.end() && rss->is_number_unsigned() ? show_bytes(rss->get<std::uint64_t>()) : "-",
                     time_of(w, "last_seen_seconds"), class_text(w), text(w, "job"), text(w, "activity")});
   }
-  return rows.size() == 1 ? "no workers" : table(rows);
+  return rows.size() == 1 ? "no workers" : aligned(rows);
 }
 
 std::string job_text(const json& job) {
@@ -211,28 +182,26 @@ std::string job_text(const json& job) {
   if (const std::string stopped = text(job, "stopped"); !stopped.empty())
     rows.push_back({"stopped by", stopped});
   rows.push_back({"done", percent(job, "progress")});
-  if (const json* frames = frames_of(job))
-    rows.push_back({"frames", fmt::format("{}: {}", text(*frames, "range"), frames_done(*frames))});
+  const json* frames = object_field(job, "frames");
+  if (frames) rows.push_back({"frames", fmt::format("{}: {}", text(*frames, "range"), frames_done(*frames))});
   rows.push_back({"samples per pixel", samples(job)});
   add_error_rows(rows, job);
   rows.push_back({"time", time_of(job, "elapsed_seconds")});
   rows.push_back({"core time", time_of(job, "core_seconds")});
   rows.push_back({"left", time_left_text(job, job, "eta_seconds", "eta_ci95")});
-  if (const auto more = job.find("eta_with_more"); more != job.end() && more->is_object())
+  if (const json* more = object_field(job, "eta_with_more"))
     rows.push_back({fmt::format("with {} more workers", int_field(*more, "workers", 0)),
                     time_left_text(job, *more, "seconds", "ci95")});
   if (const std::string pinned = class_text(job); !pinned.empty()) rows.push_back({"numeric class", pinned});
-  if (const auto share = job.find("class_share"); share != job.end() && share->is_object())
+  if (const json* share = object_field(job, "class_share"))
     rows.push_back({"can take it", share_text(*share)});
   if (const std::string error = text(job, "error"); !error.empty()) rows.push_back({"error", error});
   if (flag_field(job, "fake")) rows.push_back({"fake", kFakePixels});
-  if (const auto warnings = job.find("warnings"); warnings != job.end() && warnings->is_array())
-    for (const json& warning : *warnings)
-      if (warning.is_string()) rows.push_back({"warning", plain_text(warning.get<std::string>())});
+  for (const std::string& warning : texts_field(job, "warnings"))
+    rows.push_back({"warning", plain_text(warning)});
   if (job.contains("health")) rows.push_back({"numbers", unclean(job) ? "not clean" : "clean"});
   for (const std::string& line : health_lines(job)) rows.push_back({"", line});
-  const json* frames = frames_of(job);
-  return frames ? table(rows) + frames_table(*frames) : table(rows);
+  return aligned(rows) + (frames ? frames_table(*frames) : "");
 }
 
 }  // namespace ls::cli

@@ -9,7 +9,6 @@
 #include <charconv>
 #include <cstdio>
 #include <mutex>
-#include <vector>
 
 namespace ls::cli {
 namespace {
@@ -19,6 +18,8 @@ namespace fs = std::filesystem;
 constexpr long kConnectSeconds = 15;
 constexpr long kStallSeconds = 60;  // longest time without a byte of an answer
 constexpr long kRedirects = 3;
+constexpr double kRemoteSeconds = 120;
+constexpr int kFirstPauseMilliseconds = 250, kLongestPauseMilliseconds = 4000;
 constexpr long kWorkSeconds = 3600;  // kStallSeconds for requests that take the server long to process
 
 struct CloseFile {
@@ -117,16 +118,21 @@ struct HttpClient::State {
   }
 };
 
-Result<HttpClient> HttpClient::open(Options options) {
-  std::vector<std::string> urls;
-  for (std::size_t at = 0; at <= options.url.size();) {
-    const std::size_t comma = std::min(options.url.find(',', at), options.url.size());
-    std::string url = options.url.substr(at, comma - at);
-    while (url.ends_with('/')) url.pop_back();
-    if (auto ok = check_url(url); !ok) return tl::unexpected(ok.error());
-    urls.push_back(std::move(url));
+std::vector<std::string> addresses_in(const std::string& url) {
+  std::vector<std::string> addresses;
+  for (std::size_t at = 0; at <= url.size();) {
+    const std::size_t comma = std::min(url.find(',', at), url.size());
+    addresses.push_back(url.substr(at, comma - at));
+    while (addresses.back().ends_with('/')) addresses.back().pop_back();
     at = comma + 1;
   }
+  return addresses;
+}
+
+Result<HttpClient> HttpClient::open(Options options) {
+  std::vector<std::string> urls = addresses_in(options.url);
+  for (const std::string& url : urls)
+    if (auto ok = check_url(url); !ok) return tl::unexpected(ok.error());
   if (std::any_of(options.token.begin(), options.token.end(),
                   [](unsigned char c) { return c <= ' ' || c >= 0x7f; }))
     return fail(Errc::invalid_argument, "the token has characters that a token cannot have");
@@ -153,8 +159,9 @@ void HttpClient::State::set_common(const std::string& url, const Headers& header
   curl_easy_setopt(curl, CURLOPT_USERAGENT, "lightshaft/" LIGHTSHAFT_VERSION);
   curl_easy_setopt(curl, CURLOPT_NOSIGNAL, 1L);
   curl_easy_setopt(curl, CURLOPT_PROTOCOLS_STR, "http,https");
-  // A coordinator may redirect to another one that has the job. Both belong to the farm that the token is
-  // for. A redirect from TLS to an address without TLS is not followed.
+  // A coordinator may redirect to another coordinator of the farm, which has the job. The token is valid for
+  // the whole farm, so it is sent on (UNRESTRICTED_AUTH). A redirect from TLS to an address without TLS is
+  // not followed.
   curl_easy_setopt(curl, CURLOPT_FOLLOWLOCATION, 1L);
   curl_easy_setopt(curl, CURLOPT_MAXREDIRS, kRedirects);
   curl_easy_setopt(curl, CURLOPT_REDIR_PROTOCOLS_STR, url.starts_with("https:") ? "https" : "http,https");
@@ -184,11 +191,8 @@ Result<HttpResponse> HttpClient::State::perform(const std::string& path, const H
     current = (current + 1) % urls.size();  // nothing was sent yet, so the next address is tried
   }
   long status = 0;
-  char* type = nullptr;
   curl_easy_getinfo(curl, CURLINFO_RESPONSE_CODE, &status);
-  curl_easy_getinfo(curl, CURLINFO_CONTENT_TYPE, &type);
   response.status = static_cast<int>(status);
-  if (type) response.content_type = type;
   curl_easy_reset(curl);  // resets the options; the connection stays open
   if (code == CURLE_OK) return response;
   if (receiver.too_large)
@@ -286,11 +290,6 @@ Result<HttpResponse> HttpClient::download(const std::string& path, const fs::pat
   return fail(Errc::resource_exhausted,
               fmt::format("{} cannot be written{}", file.string(), error ? ": " + error.message() : ""));
 }
-
-namespace {
-constexpr double kRemoteSeconds = 120;
-constexpr int kFirstPauseMilliseconds = 250, kLongestPauseMilliseconds = 4000;
-}  // namespace
 
 bool RetryPolicy::again(const Error& error) {
   if (error.code != Errc::unavailable || seconds(clock_.now() - last_answer_) > kRemoteSeconds) return false;

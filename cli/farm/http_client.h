@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/base/clock.h"
 #include "common/base/error.h"
@@ -15,7 +16,6 @@ namespace ls::cli {
 
 struct HttpResponse {
   int status = 0;
-  std::string content_type;
   std::string body;
   std::optional<std::uint64_t> upload_offset;  // value of the header Upload-Offset
   std::optional<std::int64_t> date;            // value of the header Date, in seconds since 1970
@@ -42,8 +42,8 @@ class HttpClient {
   Result<HttpResponse> request(std::string_view method, const std::string& path, std::string_view body = {},
                                std::string_view content_type = "application/json");
   // Sends the bytes of a file by PUT without holding them all in memory. With `offset`, sends only the bytes
-  // from that one on. The server appends them to those that it has, and keeps them even if the connection
-  // breaks.
+  // from that position on. The server appends them to those that it has, and keeps them even if the
+  // connection breaks.
   Result<HttpResponse> upload(const std::string& path, const std::filesystem::path& file,
                               std::optional<std::uint64_t> offset = std::nullopt);
   // Sends a file by POST. The coordinator may take up to an hour to answer, because it unpacks the archive
@@ -61,6 +61,9 @@ class HttpClient {
   explicit HttpClient(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
+
+// Returns the addresses in Options::url, without slashes at their ends.
+std::vector<std::string> addresses_in(const std::string& url);
 
 // Decides whether to repeat a failed request: a restart, a proxy in between, or too many requests may make a
 // coordinator unreachable for a while.

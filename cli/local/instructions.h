@@ -1,5 +1,5 @@
-// Counts the instructions that a thread and the threads that it starts execute, with the processor's counter.
-// From these counts it measures the cost of the integrator's variants. A variant is compiled for a subset of
+// Counts, with the processor's counter, the instructions that a thread and the threads that it starts
+// execute. The counts measure the cost of the integrator's variants. A variant is compiled for a subset of
 // the features that a scene can have.
 #pragma once
 
@@ -34,8 +34,8 @@ class InstructionCounter {
   int fd_;
 };
 
-// The result of one variant for a small image. Every variant that has the scene's features renders the same
-// image, to compare their bits and their costs.
+// The result of rendering a small image with one variant. All variants that have the scene's features render
+// the same image, so that their bits and their costs can be compared.
 struct VariantBits {
   std::string name;
   Digest sums;

@@ -41,8 +41,8 @@ class LocalLink final : public worker::CoordinatorLink {
 };
 
 // Gives the worker agent in this process the blobs (scene and assets, identified by digest) of the
-// coordinator in this process as files. Adopted files stay where they are. Blobs in memory (the canonical
-// scene) become memory files, which leave nothing on disk.
+// coordinator in this process as files. For an asset this is the user's file, where it is. The canonical
+// scene, which the coordinator has in memory, becomes a memory file, which leaves nothing on disk.
 class LocalBlobFiles final : public worker::BlobFiles {
  public:
   explicit LocalBlobFiles(std::shared_ptr<coordinator::MemoryBlobs> blobs) : blobs_(std::move(blobs)) {}
@@ -73,14 +73,13 @@ class LocalFarm {
   Result<void> start(std::function<void(const UnitResult&)> on_result);
   void stop();
 
-  // Observations of the worker.
-  double load_seconds() const;
+  double load_seconds() const;  // the longest time that preparing a scene for rendering took
   // Why the scene could not be prepared for rendering; nullopt: it could
   std::optional<std::string> scene_fault() const;
   std::optional<Error> agent_error() const;  // the error with which the agent ended; nullopt: none
 
  private:
-  struct Watched;  // wraps the render backend and records its results
+  struct Watched;  // the render backend, which also records what the functions above return
   explicit LocalFarm(Options options);
   Result<std::unique_ptr<worker::RenderBackend>> make_backend() const;
 

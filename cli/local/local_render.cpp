@@ -1,7 +1,9 @@
 #include "cli/local/local_render.h"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <filesystem>
@@ -13,9 +15,10 @@
 #include "cli/local/local_farm.h"
 #include "cli/local/local_world.h"
 #include "cli/output/console.h"
-#include "cli/output/final_report.h"
+#include "cli/output/convergence_text.h"
 #include "cli/output/interrupt.h"
 #include "cli/output/output_file.h"
+#include "cli/output/reply_fields.h"
 #include "common/image/reference/reference.h"
 #include "common/report/job_page.h"
 #include "coordinator/service/coordinator.h"
@@ -26,6 +29,7 @@ namespace {
 
 using coordinator::JobState;
 using coordinator::JobView;
+using nlohmann::json;
 
 // Writes the report as an HTML page to `file`. `report` is the JSON report of this job.
 Result<void> save_html_report(const std::filesystem::path& file, const coordinator::Coordinator& coordinator,
@@ -39,26 +43,6 @@ Result<void> save_html_report(const std::filesystem::path& file, const coordinat
 }
 
 constexpr auto kProgressPeriod = std::chrono::milliseconds(200);
-
-// Stores the results of units (each the pixel sums of one tile and one range of samples) in the folder of
-// --partial-dir, if that option was given. add() is called on the worker agent's thread, everything else
-// before that thread starts or after it has ended.
-struct Keepers {
-  std::optional<PartialDir> partials;
-  std::mutex mutex;
-  std::optional<Error> trouble;  // the first error; guarded by mutex
-
-  Result<void> add(const UnitResult& result) { return partials ? partials->keep(result) : Result<void>{}; }
-};
-
-Result<void> open_keepers(Keepers& keepers, const LocalRenderOptions& options) {
-  if (options.partial_dir) {
-    auto folder = PartialDir::open(*options.partial_dir);
-    if (!folder) return tl::unexpected(folder.error());
-    keepers.partials = std::move(*folder);
-  }
-  return {};
-}
 
 bool doubtful(const std::optional<ConvergenceStatus>& convergence_status) {
   return convergence_status && !convergence_status->trusted;
@@ -102,6 +86,39 @@ void wait_with_progress(coordinator::Coordinator& coordinator, const JobId& id, 
   if (const auto job = coordinator.job(id); job && bar.shown()) bar.show(figures_of(*job));
 }
 
+double number(const json& object, const char* key) { return number_field(object, key).value_or(0); }
+
+// Describes the cost of reducing the error further, from the report's forecast.
+std::string forecast_text(const json& report, bool doubtful) {
+  const json* forecast = object_field(report, "forecast");
+  if (!forecast) return "";
+  const double more = number(*forecast, "core_seconds");
+  if (!(more > 0)) return "";
+  std::string line = fmt::format("; {:.3g} would cost {}{} more on one core", number(*forecast, "target"),
+                                 doubtful ? "at least " : "", show_seconds(more));
+  if (const auto ci = pair_field(*forecast, "core_seconds_ci95"); ci && !doubtful)
+    line += fmt::format(" ({} to {})", show_seconds(ci->first), show_seconds(ci->second));
+  return line;
+}
+
+// Prints numeric health problems to stderr; usually nothing.
+void print_report_health(const json& j) {
+  print_health(j);
+  if (const auto cut = number(j, "clamped_values"); cut > 0)
+    print_note(fmt::format(
+        "{:.0f} values are above 65504, the largest of a half-precision image, and stand in it as that; "
+        "--float keeps them",
+        cut));
+}
+
+// Returns the larger peak: of this process, or of any ended child process.
+std::uint64_t peak_rss_bytes() {
+  rusage own{}, children{};
+  ::getrusage(RUSAGE_SELF, &own);
+  ::getrusage(RUSAGE_CHILDREN, &children);
+  return static_cast<std::uint64_t>(std::max(own.ru_maxrss, children.ru_maxrss)) << 10;
+}
+
 class LocalRender {
  public:
   LocalRender(const LocalScene& scene, const LocalRenderOptions& options)
@@ -128,7 +145,11 @@ class LocalRender {
       fmt::print(stderr, "{}{}", warning, warning.ends_with('\n') ? "" : "\n");
     if (view->reference_same_seed) print_note(fmt::format("warning: {}", kSameSeed));
     if (options_.strict && !view->warnings.empty()) return usage_error("--strict: the scene has warnings");
-    if (const auto opened = open_keepers(keepers_, options_); !opened) return print_error(opened.error());
+    if (options_.partial_dir) {
+      auto folder = PartialDir::open(*options_.partial_dir);
+      if (!folder) return print_error(folder.error());
+      partials_ = std::move(*folder);
+    }
     if (const auto started = start(); !started) return print_error(started.error());
     wait_with_progress(farm_->coordinator(), job_, options_.progress);
     farm_->stop();
@@ -138,14 +159,11 @@ class LocalRender {
  private:
   Result<void> start() {
     interrupt_.on_signal([this] { (void)farm_->coordinator().cancel(job_); });
-    if (!keepers_.partials) return farm_->start({});
+    if (!partials_) return farm_->start({});
     return farm_->start([this](const UnitResult& result) {
-      const auto kept = keepers_.add(result);
+      const auto kept = partials_->keep(result);
       if (kept) return;
-      {
-        const std::lock_guard lock(keepers_.mutex);
-        if (!keepers_.trouble) keepers_.trouble = kept.error();
-      }
+      if (!trouble_) trouble_ = kept.error();
       (void)farm_->coordinator().cancel(job_);
     });
   }
@@ -165,7 +183,7 @@ class LocalRender {
       return print_error({Errc::unavailable, view->error});
     }
     // An error in the folder of partials, such as a full disk, does not affect the image.
-    if (keepers_.trouble) complain(keepers_.trouble->message);
+    if (trouble_) complain(trouble_->message);
     const bool cut = view->state != JobState::done;
     if (cut && view->spp_done == 0) {
       print_note("lightshaft: interrupted before anything was rendered: no image is written");
@@ -173,7 +191,7 @@ class LocalRender {
     }
     if (const auto written = write_results(cut); !written)
       return print_error(Error{Errc::unavailable, written.error().message});
-    if (keepers_.trouble && !cut) return kFailed;
+    if (trouble_ && !cut) return kFailed;
     if (cut)
       print_note(fmt::format("lightshaft: interrupted: {} holds what there was", options_.out.string()));
     return cut ? kFailed : kOk;
@@ -196,36 +214,83 @@ class LocalRender {
     if (!tiles) return tl::unexpected(tiles.error());
     std::vector<RoundIndex> folded;
     for (const auto& tile : *tiles) folded.push_back(tile.rounds_folded);
-    if (keepers_.partials && !keepers_.trouble)
-      if (auto dropped = keepers_.partials->drop_unfolded(folded); !dropped) return dropped;
+    if (partials_ && !trouble_)
+      if (auto dropped = partials_->drop_unfolded(folded); !dropped) return dropped;
     const auto report_text = coordinator.report_json(job_);
     if (!report_text) return tl::unexpected(report_text.error());
     LocalFacts facts{farm_->load_seconds(), peak_rss_bytes(), options_.threads, cut,
                      counter_.and_then([](const InstructionCounter& c) { return c.read(); })};
     const auto report = local_report(*report_text, facts);
     if (!report) return tl::unexpected(report.error());
+    const std::string text = dump(*report) + "\n";
     if (options_.report)
-      if (auto saved = save_result(*options_.report, *report); !saved) return saved;
+      if (auto saved = save_result(*options_.report, text); !saved) return saved;
     if (options_.html)
-      if (auto saved = save_html_report(*options_.html, coordinator, job_, *report); !saved) return saved;
+      if (auto saved = save_html_report(*options_.html, coordinator, job_, text); !saved) return saved;
     if (!options_.quiet && print_summary)
       print_note(fmt::format("{}: {}", options_.out.string(), report_summary(*report)));
     print_report_health(*report);
     if (options_.quiet || !print_summary) return {};
-    print("pixels_sha256 " + pixels_digest(*report));
+    print("pixels_sha256 " + text_field(*report, "pixels_sha256"));
     return {};
   }
 
   const LocalScene& scene_;
   const LocalRenderOptions& options_;
-  Interrupt interrupt_;  // created before any member that has threads
+  Interrupt interrupt_;  // created before any member that has threads, as Interrupt requires
   Result<InstructionCounter> counter_ = InstructionCounter::open();
-  Keepers keepers_;
+  // The folder of --partial-dir, for the results of units (each the pixel sums of one tile and one range of
+  // samples), and the first error in it. While the farm runs, only the worker agent's thread uses the two.
+  std::optional<PartialDir> partials_;
+  std::optional<Error> trouble_;
   std::unique_ptr<LocalFarm> farm_;
   JobId job_;
 };
 
 }  // namespace
+
+Result<json> local_report(const std::string& report, const LocalFacts& facts) {
+  json j = json::parse(report, nullptr, false);
+  if (!j.is_object()) return fail(Errc::internal, "the coordinator's report cannot be read");
+  // The report may be shared, so it should not contain the scene's local path.
+  j["name"] = std::filesystem::path(text_field(j, "name")).filename().string();
+  j["load_seconds"] = facts.load_seconds;
+  j["peak_rss_bytes"] = facts.peak_rss_bytes;
+  j["threads"] = facts.threads;
+  if (facts.interrupted) j["stopped"] = "user";
+  if (facts.instructions) {
+    const double samples = number(j, "samples");
+    j["instructions"] = {{"count", *facts.instructions}};
+    if (samples > 0) j["instructions"]["per_sample"] = static_cast<double>(*facts.instructions) / samples;
+  } else {
+    j["instructions"] = {{"uncounted", facts.instructions.error().message}};
+  }
+  return j;
+}
+
+std::string report_summary(const json& j) {
+  std::string line =
+      fmt::format("{:g} samples per pixel in {} ({} of loading)", number(j, "spp"),
+                  show_seconds(number(j, "render_seconds")), show_seconds(number(j, "load_seconds")));
+  if (const auto relmse = number_field(j, "relmse")) line += fmt::format(", relMSE {:.3g}", *relmse);
+  const Verdict verdict = verdict_of_report(j);
+  if (const auto ci = pair_field(j, "relmse_ci95"); ci && !verdict.doubtful)
+    line += fmt::format(" ({:.3g} to {:.3g})", ci->first, ci->second);
+  const json* reference = object_field(j, "reference");
+  const bool same_seed = reference && flag_field(*reference, "same_seed");
+  if (const std::string reference_error =
+          reference_error_text(j, "true_relmse", "true_relmse_below_noise", same_seed);
+      !reference_error.empty())
+    line += ", true relMSE " + reference_error;
+  if (const auto flip = number_field(j, "true_flip")) line += fmt::format(", FLIP {:.3g}", *flip);
+  if (const std::string denoised = denoised_text(j); !denoised.empty()) line += ", " + denoised;
+  if (const auto target = number_field(j, "target_error"))
+    line += fmt::format(", target {:g}{}", *target,
+                        text_field(j, "target_layer") == "denoised" ? " for the denoised layers" : "");
+  const bool news = verdict.doubtful || text_field(j, "verdict_kind") != "early";
+  if (news && !verdict.words.empty()) line += ": " + verdict.words;
+  return line + forecast_text(j, verdict.doubtful);
+}
 
 int render_locally(const LocalScene& scene, const LocalRenderOptions& options) {
   return LocalRender(scene, options).run();

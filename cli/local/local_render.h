@@ -1,7 +1,9 @@
 // `lightshaft render`: one job on a LocalFarm, from the scene to the output files.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
@@ -20,5 +22,20 @@ struct LocalRenderOptions {
 };
 // Renders the scene, and writes the output files; returns the exit code.
 int render_locally(const LocalScene& scene, const LocalRenderOptions& options);
+
+// What only this process can measure.
+struct LocalFacts {
+  double load_seconds = 0;
+  std::uint64_t peak_rss_bytes = 0;
+  int threads = 1;
+  bool interrupted = false;
+  // Instructions of the whole process; an error: why they were not counted
+  Result<std::uint64_t> instructions = 0;
+};
+// Returns the coordinator's report with these facts.
+Result<nlohmann::json> local_report(const std::string& report, const LocalFacts& facts);
+
+// Returns one line with the main results of the report.
+std::string report_summary(const nlohmann::json& report);
 
 }  // namespace ls::cli

@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostShown = 200;  // a message lists names until it has this many characters of them
+constexpr std::size_t kMostShown = 200;  // a list of names in a message ends after this many characters
 
 // A folder of assets that also records which files were requested.
 class RecordedFolder final : public AssetSource {
@@ -64,7 +64,8 @@ class RecordedFolder final : public AssetSource {
   std::string texts_;  // the included texts; the reader limits their size
 };
 
-// Returns the $names in a text, each as long as possible.
+// Returns the names of the parameters ($name) in a text. Each name extends to the first character that cannot
+// be part of a name.
 std::set<std::string> parameters_in(const std::string& text) {
   const auto is_name = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
   std::set<std::string> names;
@@ -76,8 +77,8 @@ std::set<std::string> parameters_in(const std::string& text) {
   return names;
 }
 
-// Returns the name of a -D option that nothing in the scene uses, which is probably misspelt. ($ab in the
-// scene may also mean the value of $a followed by the letter b.)
+// Returns an error message if nothing in the scene uses one of the -D options, which is then probably
+// misspelt. $ab in the scene also counts as a use of -D a: it may mean the value of $a and then the letter b.
 std::optional<std::string> unused_define(const std::map<std::string, std::string>& defines,
                                          const std::string& texts) {
   if (defines.empty()) return std::nullopt;

@@ -23,7 +23,8 @@ struct LocalFile {
   Digest digest;
   std::uint64_t bytes = 0;
   bool is_text = false;  // true for an included scene file
-  // True for a temporary file that was made from numbers in the scene's text; LocalScene::made keeps it
+  // True for a temporary file that the reader made from numbers in the scene's text; it exists as long as
+  // LocalScene::made
   bool is_made = false;
 };
 

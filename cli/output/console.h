@@ -30,6 +30,10 @@ void print_diagnostics(const std::vector<Diagnostic>& diagnostics);
 void print_note(const std::string& line);  // prints to stderr; control characters become spaces
 void print(const std::string& line);       // prints to stdout, unmodified and flushed
 
+// Returns the rows as lines with aligned columns, each after `indent`, without a newline at the end. The last
+// column is not padded.
+std::string aligned(const std::vector<std::vector<std::string>>& rows, const std::string& indent = "");
+
 std::string show_bytes(std::uint64_t bytes);  // returns, for example, "3.2 MiB"
 std::string show_seconds(double seconds);     // returns, for example, "0.8 s", "42 s", "3:07", "2:05:11"
 

@@ -25,8 +25,8 @@ Verdict verdict(const json& object, const char* kind_key, const char* words_key)
 
 // Returns the errors against a reference image, each preceded by a comma and a space.
 std::string reference_errors_text(const json& job) {
-  const auto reference = job.find("reference");
-  if (reference == job.end() || !reference->is_object()) return "";
+  const json* reference = object_field(job, "reference");
+  if (!reference) return "";
   std::string out;
   const bool same_seed = flag_field(job, "reference_same_seed");
   if (const std::string relmse = reference_error_text(*reference, "relmse", "below_noise", same_seed);
@@ -36,11 +36,34 @@ std::string reference_errors_text(const json& job) {
   return out;
 }
 
+constexpr std::size_t kMostCauses = 64;  // largest number of causes shown from a farm's answer
+
+// Returns the causes of a job whose numbers are not clean.
+const json& causes_of(const json& job) {
+  static const json kNone = json::array();
+  const json* health = object_field(job, "health");
+  return health ? list_field(*health, "causes") : kNone;
+}
+
+// Returns, for example, "; first at pixel 3,4 sample 7"; empty for a cause without a location.
+std::string place_of(const json& cause) {
+  const json& first = list_field(cause, "first");
+  if (first.empty() || !first[0].is_object()) return "";
+  const json& spot = first[0];
+  const auto pixel = pair_field(spot, "pixel");
+  const auto sample = number_field(spot, "sample");
+  if (!pixel || !sample) return "";
+  const auto frame = number_field(cause, "frame");
+  return fmt::format("; first {}at pixel {:.0f},{:.0f} sample {:.0f}",
+                     frame ? fmt::format("in frame {:.0f} ", *frame) : "", pixel->first, pixel->second,
+                     *sample);
+}
+
 }  // namespace
 
 Verdict verdict_of(const json& job) {
-  const auto found = job.find("verdict");
-  return found != job.end() && found->is_object() ? verdict(*found, "kind", "words") : Verdict{};
+  const json* found = object_field(job, "verdict");
+  return found ? verdict(*found, "kind", "words") : Verdict{};
 }
 
 Verdict verdict_of_report(const json& report) { return verdict(report, "verdict_kind", "verdict"); }
@@ -57,8 +80,8 @@ std::string estimate_text(const json& job, const char* key, const char* interval
 std::string time_left_text(const json& job, const json& times, const char* key, const char* interval) {
   const auto value = number_field(times, key);
   if (!value) return "-";
-  // The doubt matters only with a target error: a job that ends after a fixed number of samples takes the
-  // same time whatever its error.
+  // Doubt about the error makes the time doubtful only if the job ends at a target error. A job that ends
+  // after a fixed number of samples takes the same time whatever its error.
   if (number_field(job, "target_error") && verdict_of(job).doubtful)
     return "at least " + show_seconds(*value);
   const auto ci = interval ? pair_field(times, interval) : std::nullopt;
@@ -86,8 +109,8 @@ std::string error_text(const json& job) {
 }
 
 std::string denoised_text(const json& report) {
-  const auto denoised = report.find("denoised");
-  if (denoised == report.end() || !denoised->is_object()) return "";
+  const json* denoised = object_field(report, "denoised");
+  if (!denoised) return "";
   const auto relmse = number_field(*denoised, "relmse");
   if (!relmse) return "not denoised: " + text_field(*denoised, "error");
   if (const auto ci = pair_field(*denoised, "relmse_ci95"))
@@ -95,40 +118,9 @@ std::string denoised_text(const json& report) {
   return fmt::format("denoised {:.3g} (a few pixels carry its noise: no interval)", *relmse);
 }
 
-namespace {
-
-using nlohmann::json;
-
-constexpr std::size_t kMostCauses = 64;  // largest number of causes shown from a farm's answer
-
-const json* causes_of(const json& job) {
-  const auto health = job.find("health");
-  if (health == job.end() || !health->is_object()) return nullptr;
-  const auto causes = health->find("causes");
-  return causes != health->end() && causes->is_array() ? &*causes : nullptr;
-}
-
-// Returns, for example, "; first at pixel 3,4 sample 7"; empty for a cause without a location.
-std::string place_of(const json& cause) {
-  const auto first = cause.find("first");
-  if (first == cause.end() || !first->is_array() || first->empty() || !(*first)[0].is_object()) return "";
-  const json& spot = (*first)[0];
-  const auto pixel = pair_field(spot, "pixel");
-  const auto sample = number_field(spot, "sample");
-  if (!pixel || !sample) return "";
-  const auto frame = number_field(cause, "frame");
-  return fmt::format("; first {}at pixel {:.0f},{:.0f} sample {:.0f}",
-                     frame ? fmt::format("in frame {:.0f} ", *frame) : "", pixel->first, pixel->second,
-                     *sample);
-}
-
-}  // namespace
-
 std::vector<std::string> health_lines(const json& job) {
   std::vector<std::string> lines;
-  const json* causes = causes_of(job);
-  if (!causes) return lines;
-  for (const json& cause : *causes) {
+  for (const json& cause : causes_of(job)) {
     if (!cause.is_object() || lines.size() >= 2 * kMostCauses) continue;
     lines.push_back(plain_text(text_field(cause, "text")) + place_of(cause));
     if (const std::string replay = text_field(cause, "replay"); !replay.empty())
@@ -137,10 +129,7 @@ std::vector<std::string> health_lines(const json& job) {
   return lines;
 }
 
-bool unclean(const json& job) {
-  const json* causes = causes_of(job);
-  return causes && !causes->empty();
-}
+bool unclean(const json& job) { return !causes_of(job).empty(); }
 
 void print_health(const json& job) {
   const auto lines = health_lines(job);

@@ -20,16 +20,6 @@ std::optional<std::pair<int, int>> two_numbers(std::string_view text, char betwe
   return std::pair(*first, *second);
 }
 
-// Sets an optional field if the option was given.
-template <class T, class Parse>
-Result<void> take(const std::string& text, std::optional<T>& field, Parse parse) {
-  if (text.empty()) return {};
-  auto value = parse(text);
-  if (!value) return tl::unexpected(value.error());
-  field = std::move(*value);
-  return {};
-}
-
 Result<TargetLayer> parse_layer(const std::string& text) {
   const auto layer = parse_target_layer(text);
   return layer ? Result<TargetLayer>(*layer)
@@ -53,6 +43,12 @@ Result<std::uint64_t> parse_whole(const std::string& what, const std::string& te
     return bad_argument(
         fmt::format("{} '{}': it must be a whole number from {} to {}", what, text, least, most));
   return *value;
+}
+
+Result<std::uint32_t> parse_frame(const std::string& text) {
+  const auto frame = parse_whole("--frame", text, 0, kMaxFrameNumber);
+  if (!frame) return tl::unexpected(frame.error());
+  return static_cast<std::uint32_t>(*frame);
 }
 
 Result<std::uint64_t> parse_bytes(const std::string& what, const std::string& text) {
@@ -147,12 +143,6 @@ void JobOptions::add_to(CLI::App& app) {
 
 Result<JobSpec> JobOptions::parse() const {
   JobSpec spec;
-  const auto whole = [](const char* name, std::uint64_t least, std::uint64_t most) {
-    return [=](const std::string& text) { return parse_whole(name, text, least, most); };
-  };
-  const auto positive = [](const char* name, double most) {
-    return [=](const std::string& text) { return parse_positive(name, text, most); };
-  };
   std::optional<int> priority_value;
   std::optional<std::uint64_t> workers, units;
   std::optional<TargetLayer> layer;

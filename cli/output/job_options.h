@@ -31,6 +31,8 @@ void add_defines(CLI::App& app, std::vector<std::string>& defines);  // adds -D 
 // Parses a whole number, as in "--spp 64". `what` is the option's name, for the message.
 Result<std::uint64_t> parse_whole(const std::string& what, const std::string& text, std::uint64_t least,
                                   std::uint64_t most);
+// Parses the value of --frame.
+Result<std::uint32_t> parse_frame(const std::string& text);
 // parses, for example, "8G"; the units are powers of 1024
 Result<std::uint64_t> parse_bytes(const std::string& what, const std::string& text);
 Result<double> parse_positive(const std::string& what, const std::string& text, double most);
@@ -38,5 +40,22 @@ Result<FrameSize> parse_size(const std::string& text);             // parses, fo
 Result<std::pair<int, int>> parse_pixel(const std::string& text);  // parses, for example, "12,34"
 Result<std::map<std::string, std::string>> parse_defines(
     const std::vector<std::string>& defines);  // each is "name=value"
+
+// Parses the value of an option into `field` if the option was given, that is, if `text` is not empty.
+template <class T, class Parse>
+Result<void> take(const std::string& text, T& field, const Parse& parse) {
+  if (text.empty()) return {};
+  auto value = parse(text);
+  if (!value) return tl::unexpected(value.error());
+  field = std::move(*value);
+  return {};
+}
+// The parsers parse_whole() and parse_positive() for take().
+inline auto whole(const char* what, std::uint64_t least, std::uint64_t most) {
+  return [=](const std::string& text) { return parse_whole(what, text, least, most); };
+}
+inline auto positive(const char* what, double most) {
+  return [=](const std::string& text) { return parse_positive(what, text, most); };
+}
 
 }  // namespace ls::cli

@@ -43,11 +43,6 @@ Result<ImageFormat> image_format(const fs::path& file) {
       fmt::format("-o {}: an image is written as .exr (all layers) or .png (8-bit colours)", file.string()));
 }
 
-Result<void> check_image(const fs::path& file) {
-  if (const auto format = image_format(file); !format) return tl::unexpected(format.error());
-  return check_output("-o", file);
-}
-
 Result<void> check_folder(const std::string& option, const fs::path& folder) {
   std::string trial = (folder / ".lightshaft-XXXXXX").string();
   const coordinator::File made(::mkostemp(trial.data(), O_CLOEXEC));
@@ -65,6 +60,20 @@ Result<void> check_numbered(const std::string& option, const std::string& name, 
   return fail(Errc::invalid_argument,
               fmt::format("{} {}: {} frames need as many names: {} say, where #### is the frame's number",
                           option, name, frames.count(), better.string()));
+}
+
+Result<void> check_outputs(const std::string& option, const std::string& name,
+                           const std::optional<FrameRange>& frames) {
+  if (option == "-o")
+    if (const auto format = image_format(name); !format) return tl::unexpected(format.error());
+  if (!frames) return check_output(option, name);
+  if (option != "--report")
+    if (auto ok = check_numbered(option, name, *frames); !ok) return ok;
+  for (const std::uint32_t frame : frames->frames()) {
+    if (auto ok = check_output(option, numbered(name, frame)); !ok) return ok;
+    if (!has_frame_number(name)) break;
+  }
+  return {};
 }
 
 Result<void> write_output(const fs::path& file, std::span<const std::byte> bytes) {
@@ -104,8 +113,6 @@ Result<void> save_result(const fs::path& file, std::span<const std::byte> bytes)
 Result<void> save_result(const fs::path& file, const std::string& text) {
   return save_result(file, std::as_bytes(std::span(text)));
 }
-
-namespace fs = std::filesystem;
 
 Result<PartialDir> PartialDir::open(fs::path folder) {
   std::error_code error;

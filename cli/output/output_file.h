@@ -24,12 +24,14 @@ enum class ImageFormat { exr, png };
 // Returns the format from the file name's extension, in upper or lower case; EXR if it has none.
 // invalid_argument: it has the extension of another format.
 Result<ImageFormat> image_format(const std::filesystem::path& file);
-// Checks the name of the image that `-o` gives, by check_output() and image_format().
-Result<void> check_image(const std::filesystem::path& file);
 Result<void> check_folder(const std::string& option, const std::filesystem::path& folder);
 // Checks the name of an output file that is written once per frame. invalid_argument: there are several
 // frames, and the name has no # to distinguish their files.
 Result<void> check_numbered(const std::string& option, const std::string& name, const FrameRange& frames);
+// Checks, before a job begins, that an output file, or one per frame, can be written. The name of an image
+// ("-o") must be that of an image format. A report may be a single file for all frames.
+Result<void> check_outputs(const std::string& option, const std::string& name,
+                           const std::optional<FrameRange>& frames);
 Result<void> write_output(const std::filesystem::path& file, std::span<const std::byte> bytes);
 Result<void> write_output(const std::filesystem::path& file, const std::string& text);
 // Writes a result that must not be lost. If it cannot be written to `file`, it is written to a new file in

@@ -20,7 +20,7 @@ struct ProgressFigures {
   std::optional<std::pair<double, double>> eta_ci95 = {};
   std::optional<std::pair<double, double>> relmse_ci95 = {};
   std::optional<double> target_error = {};   // requested target, in relMSE
-  std::optional<double> eta_with_more = {};  // remaining time with `more_workers` more workers
+  std::optional<double> eta_with_more = {};  // remaining time with `more_workers` additional workers
   int more_workers = 8;
   bool doubtful = false;         // the error is not reliable yet, nor is the time to a target
   bool target_denoised = false;  // target_error means the denoised layers

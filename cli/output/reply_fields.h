@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace ls::cli {
 
@@ -39,9 +40,39 @@ inline std::optional<std::pair<double, double>> pair_field(const nlohmann::json&
   return std::pair((*found)[0].get<double>(), (*found)[1].get<double>());
 }
 
-// Returns indented JSON, for --json. Invalid UTF-8 is replaced.
-inline std::string dump(const nlohmann::json& value) {
-  return value.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+// Returns the field, or null if it is missing or no object.
+inline const nlohmann::json* object_field(const nlohmann::json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_object() ? &*found : nullptr;
+}
+
+// Returns the field, or an empty list if it is missing or no list.
+inline const nlohmann::json& list_field(const nlohmann::json& object, const char* key) {
+  static const nlohmann::json none = nlohmann::json::array();
+  const auto found = object.find(key);
+  return found != object.end() && found->is_array() ? *found : none;
+}
+
+// Returns the elements of a list that are objects.
+inline std::vector<nlohmann::json> objects_field(const nlohmann::json& object, const char* key) {
+  std::vector<nlohmann::json> objects;
+  for (const auto& element : list_field(object, key))
+    if (element.is_object()) objects.push_back(element);
+  return objects;
+}
+
+// Returns the elements of a list that are strings.
+inline std::vector<std::string> texts_field(const nlohmann::json& object, const char* key) {
+  std::vector<std::string> texts;
+  for (const auto& element : list_field(object, key))
+    if (element.is_string()) texts.push_back(element.get<std::string>());
+  return texts;
+}
+
+// Returns JSON with this indentation; -1: in one line. Invalid UTF-8 is replaced.
+template <class Json>
+std::string dump(const Json& value, int indent = 2) {
+  return value.dump(indent, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace ls::cli

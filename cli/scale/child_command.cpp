@@ -12,6 +12,7 @@
 #include <csignal>
 #include <cstring>
 #include <optional>
+#include <sstream>
 #include <string_view>
 #include <utility>
 
@@ -102,6 +103,13 @@ Result<CommandOutput> run_command(const Words& words, const std::string& input, 
   }
   output.code = *code;
   return output;
+}
+
+std::vector<std::string> split(const std::string& text, char separator) {
+  std::vector<std::string> parts;
+  std::istringstream in(text);
+  for (std::string part; std::getline(in, part, separator);) parts.push_back(part);
+  return parts;
 }
 
 Result<LongCommand> LongCommand::start(const Words& words, const std::string& input, const std::string& log) {

@@ -22,6 +22,9 @@ struct CommandOutput {
 // resource_exhausted: it printed too much, and was killed; not_found: there is no such program.
 Result<CommandOutput> run_command(const Words& words, const std::string& input, double most_seconds);
 
+// Returns the parts of a command's output between the characters `separator`: its lines, or a line's fields.
+std::vector<std::string> split(const std::string& text, char separator);
+
 // A program that runs in the background. Its output goes to a file.
 class LongCommand {
  public:

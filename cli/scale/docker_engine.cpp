@@ -1,11 +1,10 @@
-#include "cli/scale/docker_engine.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <sstream>
 
 #include "cli/scale/child_command.h"
+#include "cli/scale/engines.h"
+#include "common/base/clock.h"
 #include "common/base/parse_number.h"
 
 namespace ls::cli {
@@ -18,8 +17,8 @@ constexpr double kDockerRunLimit = 600;  // the same for a command that may have
 
 // The container's command waits at a named pipe for the farm's token. The pipe is in the container's /tmp,
 // which is in memory. So the token is in no argument, in no file, and not in the environment that `docker
-// inspect` shows; only the worker's own environment has it, which its user and root can read. Both commands
-// try to make the pipe, since either may come first.
+// inspect` shows; only the worker's own environment has it, which its user and root can read. This command
+// and kGiveToken both try to make the pipe, since either may run first.
 constexpr const char* kTakeToken =
     "mkfifo -m 600 /tmp/join-token 2>/dev/null; IFS= read -r LIGHTSHAFT_JOIN_TOKEN </tmp/join-token; "
     "export LIGHTSHAFT_JOIN_TOKEN; exec \"$@\"";
@@ -27,10 +26,8 @@ constexpr const char* kGiveToken = "mkfifo -m 600 /tmp/join-token 2>/dev/null; e
 
 class Docker final : public Engine {
  public:
-  Docker(DockerOptions options, std::string version, std::function<double()> unix_time)
-      : options_(std::move(options)), version_(std::move(version)), unix_time_(std::move(unix_time)) {}
-
-  std::string version() override { return version_; }
+  Docker(DockerOptions options, std::string version)
+      : Engine(std::move(version)), options_(std::move(options)) {}
 
   Result<std::vector<EngineWorker>> list() override {
     const auto lines =
@@ -38,7 +35,7 @@ class Docker final : public Engine {
              "{{.Label \"lightshaft.worker\"}}|{{.State}}|{{.Label \"lightshaft.started\"}}|"
              "{{.Label \"lightshaft.cores\"}}"});
     if (!lines) return tl::unexpected(lines.error());
-    auto found = parse_docker_ps(*lines, unix_time_());
+    auto found = parse_docker_ps(*lines, system_unix_seconds());
     if (!found) return tl::unexpected(found.error());
     for (const std::string& id : found->ended) remove(id);
     return std::move(found->workers);
@@ -59,17 +56,13 @@ class Docker final : public Engine {
   }
 
   Result<void> drain(std::span<const EngineWorker> workers) override {
-    std::vector<std::string> running, others;
-    for (const auto& w : workers) (w.state == State::running ? running : others).push_back(w.id);
-    const auto drained = for_all({"docker", "kill", "--signal=TERM"}, running);
-    const auto withdrawn = for_all({"docker", "rm", "--force"}, others);
+    const auto drained = for_all({"docker", "kill", "--signal=TERM"}, ids_of(workers, true));
+    const auto withdrawn = for_all({"docker", "rm", "--force"}, ids_of(workers, false));
     return drained ? withdrawn : drained;
   }
 
   Result<void> kill(std::span<const EngineWorker> workers) override {
-    std::vector<std::string> all;
-    for (const auto& w : workers) all.push_back(w.id);
-    return for_all({"docker", "kill"}, all);
+    return for_all({"docker", "kill"}, ids_of(workers));
   }
 
  private:
@@ -91,7 +84,7 @@ class Docker final : public Engine {
                 "--name=" + container(id),
                 "--label=lightshaft.farm=" + w.farm,
                 "--label=lightshaft.worker=" + id,
-                fmt::format("--label=lightshaft.started={:.0f}", unix_time_()),
+                fmt::format("--label=lightshaft.started={:.0f}", system_unix_seconds()),
                 fmt::format("--label=lightshaft.cores={}", w.threads),
                 fmt::format("--cpus={}", w.threads),
                 fmt::format("--stop-timeout={}", options_.drain_seconds)};
@@ -132,8 +125,7 @@ class Docker final : public Engine {
     for (const std::string& id : ids) words.push_back(container(id));
     const auto done = run_command(words, "", kDockerLimit);
     if (!done) return tl::unexpected(done.error());
-    std::istringstream in(done->err);
-    for (std::string line; std::getline(in, line);)
+    for (const std::string& line : split(done->err, '\n'))
       if (line.find("No such container") == std::string::npos &&
           line.find("is not running") == std::string::npos)
         return fail(Errc::unavailable, fmt::format("docker {}: {}", words[1], line));
@@ -141,30 +133,24 @@ class Docker final : public Engine {
   }
 
   DockerOptions options_;
-  std::string version_;
-  std::function<double()> unix_time_;
 };
 
 }  // namespace
 
-Result<std::unique_ptr<Engine>> open_docker(DockerOptions options, std::function<double()> unix_time) {
+Result<std::unique_ptr<Engine>> open_docker(DockerOptions options) {
   const auto version = run_command({"docker", "version", "--format={{.Server.Version}}"}, "", kDockerLimit);
   if (!version)
     return fail(Errc::failed_precondition, "docker does not run here: " + version.error().message);
   if (version->code != 0)
     return fail(Errc::failed_precondition, "no Docker engine answers: " + first_line(version->err));
-  return std::make_unique<Docker>(std::move(options), "docker " + first_line(version->out),
-                                  std::move(unix_time));
+  return std::make_unique<Docker>(std::move(options), "docker " + first_line(version->out));
 }
 
-Result<DockerContainers> parse_docker_ps(const std::string& lines, double unix_time) {
-  DockerContainers found;
-  std::istringstream in(lines);
-  for (std::string line; std::getline(in, line);) {
+Result<EngineList> parse_docker_ps(const std::string& lines, double unix_time) {
+  EngineList found;
+  for (const std::string& line : split(lines, '\n')) {
     if (line.empty()) continue;
-    std::vector<std::string> fields;
-    std::istringstream row(line);
-    for (std::string field; std::getline(row, field, '|');) fields.push_back(field);
+    const std::vector<std::string> fields = split(line, '|');
     const auto started = fields.size() == 4 ? parse_number<double>(fields[2]) : std::nullopt;
     const auto cores = fields.size() == 4 ? parse_number<int>(fields[3]) : std::nullopt;
     if (!started || cores.value_or(0) < 1 || fields[0].empty())

@@ -7,6 +7,7 @@
 
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <random>
 #include <span>
 #include <string>
@@ -31,8 +32,9 @@ struct EngineWorker {
 
 class Engine {
  public:
+  explicit Engine(std::string version) : version_(std::move(version)) {}
   virtual ~Engine() = default;
-  virtual std::string version() = 0;  // returns the engine's version, such as "slurm-wlm 22.05.8"
+  const std::string& version() const { return version_; }  // such as "slurm-wlm 22.05.8"
   // Returns the workers that this farm-up started, now or in an earlier run under the same name. An error
   // means that they are unknown, not that there are none.
   virtual Result<std::vector<EngineWorker>> list() = 0;
@@ -40,6 +42,9 @@ class Engine {
   // Asks workers to deliver their results and end. Workers that have not started yet are withdrawn.
   virtual Result<void> drain(std::span<const EngineWorker> workers) = 0;
   virtual Result<void> kill(std::span<const EngineWorker> workers) = 0;
+
+ private:
+  const std::string version_;
 };
 
 // How a worker is started, by any engine.
@@ -57,6 +62,15 @@ inline std::string worker_name(const std::string& farm, const std::string& id) {
 
 // Returns a new id of a worker in a container: eight random hexadecimal digits.
 inline std::string new_worker_id() { return fmt::format("{:08x}", std::random_device{}()); }
+
+// Returns the ids of the workers that run (`running`), or that do not run; nullopt: of all.
+inline std::vector<std::string> ids_of(std::span<const EngineWorker> workers,
+                                       std::optional<bool> running = std::nullopt) {
+  std::vector<std::string> ids;
+  for (const EngineWorker& w : workers)
+    if (!running || *running == (w.state == EngineWorker::State::running)) ids.push_back(w.id);
+  return ids;
+}
 
 // Writes FOLDER/NAME.log, the log of an ended worker. If that fails, the log is lost; the caller removes the
 // worker in any case.

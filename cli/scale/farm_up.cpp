@@ -10,13 +10,55 @@
 #include "cli/output/console.h"
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
-#include "cli/scale/demand.h"
-#include "cli/scale/ledger.h"
 
 namespace ls::cli {
 namespace {
 
 using nlohmann::json;
+
+double positive_field(const json& object, const char* key) {
+  return std::max(0.0, number_field(object, key).value_or(0));
+}
+
+void observe(Spending& spending, const json& jobs, const json& workers, const OurWorkers& ours) {
+  std::vector<JobCost> job_costs;
+  for (const json& job : jobs)
+    job_costs.push_back({text_field(job, "id"), text_field(job, "name"), text_field(job, "owner"),
+                         positive_field(job, "core_seconds")});
+  std::vector<WorkerCost> worker_costs;
+  for (const json& worker : workers) {
+    const bool is_ours = text_field(worker, "name").starts_with(ours.farm + "-");
+    worker_costs.push_back(
+        {text_field(worker, "id"), is_ours ? ours.engine : "others", positive_field(worker, "cpu_seconds")});
+  }
+  spending.observe(job_costs, worker_costs);
+}
+
+void read_jobs(const json& jobs, const Spending& spending, Demand& demand) {
+  bool forecast = false, helps = false;
+  std::map<std::string, double> left_of_user;
+  for (const json& job : jobs) {
+    const std::string state = text_field(job, "state"), owner = text_field(job, "owner");
+    if (state != "queued" && state != "running") continue;
+    double& left_of_owner = left_of_user.try_emplace(owner, spending.left_of_user(owner)).first->second;
+    const double left = std::min(left_of_owner, spending.left_of_job(text_field(job, "id")));
+    if (left <= 0) {
+      ++demand.unpaid_jobs;
+      continue;
+    }
+    ++demand.open_jobs;
+    const double queued = std::min(left, positive_field(job, "queued_core_seconds"));
+    demand.queued_core_seconds += queued;
+    left_of_owner -= queued;
+    if (!number_field(job, "eta_seconds")) {
+      helps = true;  // without a forecast, assume that more workers help
+      continue;
+    }
+    forecast = true;
+    helps |= object_field(job, "eta_with_more") != nullptr;
+  }
+  demand.more_helps = !forecast || helps;
+}
 
 // The pause between two checks. It ends early if the user asks `farm up` to end.
 class Pause {
@@ -26,7 +68,7 @@ class Pause {
     ended_ = true;
     wake_.notify_all();
   }
-  // True if the end was requested.
+  // Returns true if the user has asked `farm up` to end.
   bool wait(double seconds) {
     std::unique_lock lock(mutex_);
     const bool before = ended_;
@@ -75,18 +117,23 @@ Result<void> go_on_from(const std::filesystem::path& file, const std::string& fa
   return went_on ? Result<void>{} : named(went_on.error());
 }
 
+FarmApi::Answer<Demand> ask_demand(FarmApi& api, const OurWorkers& ours, Spending& spending) {
+  const auto jobs = api.get("/api/v1/jobs");
+  if (!jobs) return tl::unexpected(jobs.error());
+  const auto workers = api.get("/api/v1/workers");
+  if (!workers) return tl::unexpected(workers.error());
+  return demand_of(*jobs, *workers, ours, spending);
+}
+
 class FarmUp {
  public:
-  FarmUp(FarmApi& api, Engine& engine, const FarmUpOptions& options, const Clock& clock, Ledger ledger,
-         Spending spending)
+  FarmUp(FarmApi& api, Engine& engine, const FarmUpOptions& options, Ledger ledger, Spending spending)
       : api_(api),
         engine_(engine),
         options_(options),
-        clock_(clock),
         scaler_(options.limits),
         ledger_(std::move(ledger)),
-        spending_(std::move(spending)),
-        version_(engine.version()) {}
+        spending_(std::move(spending)) {}
 
   int run(Pause& pause) {
     bool ending = false;
@@ -112,7 +159,7 @@ class FarmUp {
   // Reads the demand. While the coordinator does not answer, the number of workers does not change. Returns
   // an error only if it has never answered.
   FarmApi::Answer<void> look_at_jobs() {
-    auto asked = ask_demand(api_, {options_.limits.farm, version_}, spending_);
+    auto asked = ask_demand(api_, {options_.limits.farm, engine_.version()}, spending_);
     if (asked) {
       demand_ = std::move(*asked);
       known_ = true;
@@ -151,7 +198,7 @@ class FarmUp {
   json report() const {
     const auto& budget = options_.limits.budget_core_seconds;
     return {{"name", options_.limits.farm},
-            {"engine", version_},
+            {"engine", engine_.version()},
             {"spent_core_hours", hours()},
             {"budget_core_hours", budget ? json(*budget / kCoreHour) : json()},
             {"workers_started", ledger_.started()},
@@ -169,8 +216,9 @@ class FarmUp {
       return kOk;
     }
     const auto& budget = options_.limits.budget_core_seconds;
-    print(fmt::format("{}: {} workers started, {:.3f} core hours spent{}", version_, ledger_.started(),
-                      hours(), budget ? fmt::format(" of {:.3f}", *budget / kCoreHour) : ""));
+    print(fmt::format("{}: {} workers started, {:.3f} core hours spent{}", engine_.version(),
+                      ledger_.started(), hours(),
+                      budget ? fmt::format(" of {:.3f}", *budget / kCoreHour) : ""));
     const json rendered = spending_.report();
     for (const auto& [user, core_hours] : rendered["by_user"].items())
       print(fmt::format("{}: {:.3f} core hours rendered", user, core_hours.get<double>()));
@@ -180,11 +228,10 @@ class FarmUp {
   FarmApi& api_;
   Engine& engine_;
   const FarmUpOptions& options_;
-  const Clock& clock_;
+  const SystemClock clock_;
   Scaler scaler_;
   Ledger ledger_;
   Spending spending_;
-  const std::string version_;
   Demand demand_;
   bool known_ = false;
   std::optional<TimePoint> last_list_;
@@ -193,8 +240,7 @@ class FarmUp {
 
 }  // namespace
 
-int run_farm_up(FarmApi& api, Engine& engine, const FarmUpOptions& options, Interrupt& interrupt,
-                const Clock& clock) {
+int run_farm_up(FarmApi& api, Engine& engine, const FarmUpOptions& options, Interrupt& interrupt) {
   Ledger ledger;
   Spending spending(options.budgets);
   if (const auto read = go_on_from(options.report, options.limits.farm, ledger, spending); !read)
@@ -203,7 +249,24 @@ int run_farm_up(FarmApi& api, Engine& engine, const FarmUpOptions& options, Inte
     return print_error(writable.error());
   Pause pause;
   interrupt.on_signal([&pause] { pause.end(); });
-  return FarmUp(api, engine, options, clock, std::move(ledger), std::move(spending)).run(pause);
+  return FarmUp(api, engine, options, std::move(ledger), std::move(spending)).run(pause);
+}
+
+Demand demand_of(const json& jobs, const json& workers, const OurWorkers& ours, Spending& spending) {
+  observe(spending, list_field(jobs, "jobs"), list_field(workers, "workers"), ours);
+  Demand demand;
+  read_jobs(list_field(jobs, "jobs"), spending, demand);
+  for (const json& worker : list_field(workers, "workers")) {
+    const std::string name = text_field(worker, "name");
+    if (text_field(worker, "state") != "connected") continue;
+    if (!name.starts_with(ours.farm + "-")) {
+      demand.other_threads += int_field(worker, "threads", 0);
+      continue;
+    }
+    demand.joined.insert(name);
+    if (text_field(worker, "job").empty()) demand.idle.insert(name);
+  }
+  return demand;
 }
 
 }  // namespace ls::cli

@@ -1,5 +1,3 @@
-#include "cli/scale/kubernetes_engine.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,6 +8,8 @@
 
 #include "cli/output/reply_fields.h"
 #include "cli/scale/child_command.h"
+#include "cli/scale/engines.h"
+#include "common/base/clock.h"
 #include "common/base/parse_number.h"
 
 namespace ls::cli {
@@ -77,20 +77,14 @@ Result<std::string> run_kubectl(const Words& options, const Words& words, const 
 
 class Kubernetes final : public Engine {
  public:
-  Kubernetes(KubernetesOptions options, json deployment, std::string version,
-             std::function<double()> unix_time)
-      : options_(std::move(options)),
-        deployment_(std::move(deployment)),
-        version_(std::move(version)),
-        unix_time_(std::move(unix_time)) {}
-
-  std::string version() override { return version_; }
+  Kubernetes(KubernetesOptions options, json deployment, std::string version)
+      : Engine(std::move(version)), options_(std::move(options)), deployment_(std::move(deployment)) {}
 
   Result<std::vector<EngineWorker>> list() override {
     const auto text =
         kubectl({"get", "pods", fmt::format("--selector={}={}", kFarmLabel, options_.farm), "--output=json"});
     if (!text) return tl::unexpected(text.error());
-    auto found = parse_pods(json::parse(*text, nullptr, false), unix_time_());
+    auto found = parse_pods(json::parse(*text, nullptr, false), system_unix_seconds());
     if (!found) return tl::unexpected(found.error());
     for (const std::string& id : found->ended) remove_ended(id);
     return std::move(found->workers);
@@ -140,14 +134,11 @@ class Kubernetes final : public Engine {
 
   KubernetesOptions options_;
   json deployment_;
-  std::string version_;
-  std::function<double()> unix_time_;
 };
 
 }  // namespace
 
-Result<std::unique_ptr<Engine>> open_kubernetes(KubernetesOptions options,
-                                                std::function<double()> unix_time) {
+Result<std::unique_ptr<Engine>> open_kubernetes(KubernetesOptions options) {
   const auto refused = [](const Error& error) { return fail(Errc::failed_precondition, error.message); };
   const auto version = run_kubectl(options.kubectl, {"version", "--output=json"});
   if (!version) return refused(version.error());
@@ -156,8 +147,7 @@ Result<std::unique_ptr<Engine>> open_kubernetes(KubernetesOptions options,
   json deployment = json::parse(*text, nullptr, false);
   if (const auto pod = pod_like(deployment, options, "0"); !pod) return tl::unexpected(pod.error());
   const std::string number = text_at(json::parse(*version, nullptr, false), "/serverVersion/gitVersion");
-  return std::make_unique<Kubernetes>(std::move(options), std::move(deployment), "kubernetes " + number,
-                                      std::move(unix_time));
+  return std::make_unique<Kubernetes>(std::move(options), std::move(deployment), "kubernetes " + number);
 }
 
 Result<json> pod_like(const json& deployment, const KubernetesOptions& options, const std::string& id) {
@@ -191,11 +181,11 @@ Result<json> pod_like(const json& deployment, const KubernetesOptions& options, 
   return pod;
 }
 
-Result<KubernetesPods> parse_pods(const json& list, double unix_time) {
+Result<EngineList> parse_pods(const json& list, double unix_time) {
   const json::json_pointer containers("/spec/containers/0");
   if (!list.is_object() || !list.contains("items") || !list["items"].is_array())
     return bad_argument("kubectl answered with no list of pods");
-  KubernetesPods found;
+  EngineList found;
   for (const json& pod : list["items"]) {
     const std::string id = text_at(pod, "/metadata/labels/lightshaft.io~1worker");
     const std::string phase = text_at(pod, "/status/phase");

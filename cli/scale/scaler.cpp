@@ -110,8 +110,8 @@ int Scaler::wanted(const Demand& demand) const {
   return static_cast<int>(std::clamp(workers, least, static_cast<double>(limits_.most_workers)));
 }
 
-// Returns how many more workers the budget allows. For each new and each existing worker it must pay for
-// kWorthStarting seconds and the time to end.
+// Returns how many more workers the budget allows. It must pay every worker, existing or new, for
+// kWorthStarting seconds and for the time to end.
 int Scaler::affordable(std::span<const EngineWorker> workers, double spent) const {
   if (!limits_.budget_core_seconds) return limits_.most_workers;
   const double each = kWorthStarting + seconds_to_end();

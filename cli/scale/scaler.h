@@ -62,8 +62,8 @@ class Scaler {
 
   // A worker is started only if it can run for at least this many seconds within the budget.
   static constexpr double kWorthStarting = 60;
-  // Pauses in seconds before the next attempt to start workers: the one after the first failure, which
-  // doubles with each further failure, and the longest
+  // After a failed start, seconds until the next attempt: kFirstPause after the first failure, doubled by
+  // each further failure, at most kLongestPause.
   static constexpr double kFirstPause = 5, kLongestPause = 600;
 
  private:

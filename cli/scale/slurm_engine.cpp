@@ -1,13 +1,11 @@
-#include "cli/scale/slurm_engine.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
 #include <optional>
-#include <sstream>
 
 #include "cli/scale/child_command.h"
+#include "cli/scale/engines.h"
 #include "common/base/parse_number.h"
 
 namespace ls::cli {
@@ -53,9 +51,7 @@ std::optional<double> seconds_of(std::string_view text) {
 class Slurm final : public Engine {
  public:
   Slurm(SlurmOptions options, std::string version)
-      : options_(std::move(options)), version_(std::move(version)) {}
-
-  std::string version() override { return version_; }
+      : Engine(std::move(version)), options_(std::move(options)) {}
 
   Result<std::vector<EngineWorker>> list() override {
     const auto lines =
@@ -82,8 +78,7 @@ class Slurm final : public Engine {
                 fmt::format("--output={}/{}-%A_%a.log", options_.logs, job_name())};
     words.insert(words.end(), options_.sbatch.begin(), options_.sbatch.end());
     words.insert(words.end(), {"/dev/stdin", w.program, "--coordinator", w.coordinator, "--threads",
-                               std::to_string(w.threads)});
-    if (!w.token_file.empty()) words.insert(words.end(), {"--token-file", w.token_file});
+                               std::to_string(w.threads), "--token-file", w.token_file});
     words.insert(words.end(), w.options.begin(), w.options.end());
     words.insert(words.end(), {"--name", w.farm});  // the script appends the job's id to this name
     const auto started = run(words, kScript);
@@ -91,20 +86,14 @@ class Slurm final : public Engine {
   }
 
   Result<void> drain(std::span<const EngineWorker> workers) override {
-    std::vector<std::string> running, others;
-    for (const auto& w : workers) (w.state == State::running ? running : others).push_back(w.id);
     // With --batch only the worker itself gets the signal. With --state=PENDING, jobs that have started since
     // they were listed are left alone; they are drained after the next list.
-    const auto drained = scancel({"--batch", "--signal=TERM"}, running);
-    const auto withdrawn = scancel({"--state=PENDING"}, others);
+    const auto drained = scancel({"--batch", "--signal=TERM"}, ids_of(workers, true));
+    const auto withdrawn = scancel({"--state=PENDING"}, ids_of(workers, false));
     return drained ? withdrawn : drained;
   }
 
-  Result<void> kill(std::span<const EngineWorker> workers) override {
-    std::vector<std::string> all;
-    for (const auto& w : workers) all.push_back(w.id);
-    return scancel({}, all);
-  }
+  Result<void> kill(std::span<const EngineWorker> workers) override { return scancel({}, ids_of(workers)); }
 
  private:
   std::string job_name() const { return "lightshaft-" + options_.worker.farm; }
@@ -135,16 +124,13 @@ class Slurm final : public Engine {
   // call must not be repeated: the other jobs have received their signal, and a second SIGTERM stops a worker
   // immediately.
   static bool only_ended(const std::string& complaints) {
-    std::istringstream in(complaints);
-    for (std::string line; std::getline(in, line);)
-      if (line.find("already completing or completed") == std::string::npos &&
-          line.find("Invalid job id") == std::string::npos)
-        return false;
-    return !complaints.empty();
+    return !complaints.empty() && std::ranges::all_of(split(complaints, '\n'), [](const std::string& line) {
+      return line.find("already completing or completed") != std::string::npos ||
+             line.find("Invalid job id") != std::string::npos;
+    });
   }
 
   SlurmOptions options_;
-  std::string version_;
 };
 
 }  // namespace
@@ -159,12 +145,9 @@ Result<std::unique_ptr<Engine>> open_slurm(SlurmOptions options) {
 
 Result<std::vector<EngineWorker>> parse_squeue(const std::string& lines) {
   std::vector<EngineWorker> workers;
-  std::istringstream in(lines);
-  for (std::string line; std::getline(in, line);) {
+  for (const std::string& line : split(lines, '\n')) {
     if (line.empty()) continue;
-    std::vector<std::string> fields;
-    std::istringstream row(line);
-    for (std::string field; std::getline(row, field, '|');) fields.push_back(field);
+    const std::vector<std::string> fields = split(line, '|');
     const auto seconds = fields.size() >= 4 ? seconds_of(fields[2]) : std::nullopt;
     int cores = 0;
     if (seconds) std::from_chars(fields[3].data(), fields[3].data() + fields[3].size(), cores);
@@ -172,8 +155,8 @@ Result<std::vector<EngineWorker>> parse_squeue(const std::string& lines) {
     const std::string& state = fields[1];
     const std::string reason = fields.size() > 4 ? fields[4] : "";
     // Two kinds of jobs count as stuck, so that other workers are started instead: jobs that Slurm holds
-    // because it could not start them several times, and jobs that wait for two minutes (BeginTime) because
-    // they were requeued after the loss of their node.
+    // because several attempts to start them failed, and jobs that Slurm delays by two minutes (BeginTime)
+    // after it has requeued them because their node was lost.
     const bool held = state == "REQUEUE_HOLD" || state == "SPECIAL_EXIT" ||
                       (state == "PENDING" && reason.find("requeued held") != std::string::npos) ||
                       (state == "PENDING" && (reason.starts_with("JobHeld") || reason == "BeginTime"));

@@ -1,5 +1,3 @@
-#include "cli/scale/ssh_engine.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +5,8 @@
 #include <map>
 
 #include "cli/scale/child_command.h"
+#include "cli/scale/engines.h"
+#include "common/base/clock.h"
 
 namespace ls::cli {
 namespace {
@@ -30,10 +30,7 @@ exit "$code"')";
 
 class Ssh final : public Engine {
  public:
-  Ssh(SshOptions options, std::string version, const Clock& clock)
-      : options_(std::move(options)), version_(std::move(version)), clock_(clock) {}
-
-  std::string version() override { return version_; }
+  Ssh(SshOptions options, std::string version) : Engine(std::move(version)), options_(std::move(options)) {}
 
   Result<std::vector<EngineWorker>> list() override {
     std::vector<EngineWorker> workers;
@@ -92,8 +89,8 @@ class Ssh final : public Engine {
         "ssh", "-T", "-o", "BatchMode=yes", "-o", "ConnectTimeout=15", "-o", "ServerAliveInterval=15"};
     if (!options_.config.empty()) words.insert(words.end(), {"-F", options_.config});
     words.insert(words.end(), {"--", machine, kRemote});
-    Words remote{w.program, "--coordinator", w.coordinator, "--name", worker_name(w.farm, id)};
-    if (w.threads > 0) remote.insert(remote.end(), {"--threads", std::to_string(w.threads)});
+    Words remote{w.program,   "--coordinator",          w.coordinator, "--name", worker_name(w.farm, id),
+                 "--threads", std::to_string(w.threads)};
     remote.insert(remote.end(), w.options.begin(), w.options.end());
     std::string input;
     for (const std::string& word : remote) {
@@ -110,8 +107,7 @@ class Ssh final : public Engine {
   }
 
   SshOptions options_;
-  std::string version_;
-  const Clock& clock_;
+  const SystemClock clock_;
   std::map<std::string, Running> running_;  // key: machine
   std::size_t next_ = 0;
   int count_ = 0;
@@ -126,12 +122,11 @@ bool plain_machine(const std::string& name) {
 
 }  // namespace
 
-Result<std::unique_ptr<Engine>> open_ssh(SshOptions options, const Clock& clock) {
+Result<std::unique_ptr<Engine>> open_ssh(SshOptions options) {
   const auto version = run_command({"ssh", "-V"}, "", 10);
   if (!version || version->code != 0)
     return fail(Errc::failed_precondition, "ssh does not run here: install an OpenSSH client");
-  return std::make_unique<Ssh>(std::move(options), version->err.substr(0, version->err.find_first_of(",\n")),
-                               clock);
+  return std::make_unique<Ssh>(std::move(options), version->err.substr(0, version->err.find_first_of(",\n")));
 }
 
 Result<std::vector<std::string>> read_machines(const std::filesystem::path& file) {

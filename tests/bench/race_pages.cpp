@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "cli/output/output_file.h"
-#include "compare/references.h"
+#include "compare/picture.h"
 #include "compare/results.h"
 
 namespace ls::test {

@@ -30,7 +30,6 @@ ALLOWED = {
     ("glows", "worker/render/world/world_build.cpp"): "a local name",
     ("outlook", "common/report/job_curves.cpp"): "the forecast beyond the curve, as its plot calls it",
     ("outlook", "common/report/job_sections.h"): "the forecast beyond the curve, as its plot calls it",
-    ("outlook", "cli/output/final_report.cpp"): "the forecast beyond the curve, as its plot calls it",
     ("kTellingSamples", "common/image/error/error_estimate.cpp"): "samples from which the halves tell the error",
     ("said", "worker/render/media/vdb_reply.cpp"): "what the other process replied",
     ("said", "coordinator/store/redis/redis_link.cpp"): "Redis' own words",

@@ -1,7 +1,7 @@
-// Judges simulated broken renderers by the cases of `lightshaft validate`: every case must fail for a
-// renderer whose image is black and for one whose image is twice as bright. Cases that pass for one of these
-// are listed here, each with a partner, a case that fails for it. Renderers that lack a single term are
-// tested by tests/mutation (docs/design/validation.md).
+// Runs the table of cases of `lightshaft validate` with two broken renderers: one that renders black, and one
+// that renders everything twice as bright. Every case must fail for both. Cases that cannot detect one of
+// them are listed here, each with another case that detects it. tests/mutation tests renderers that lack a
+// single term (docs/design/validation.md).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,8 +15,8 @@ namespace {
 
 struct Blind {
   const char *ids, *why;
-  bool black, twice;    // true if the case passes for the black renderer, for the one that is twice as bright
-  const char* partner;  // a case on the same code path that fails for them; null: nothing is rendered
+  bool black, twice;    // whether the case passes for a black image, for a twice as bright one
+  const char* partner;  // a case on the same code path that fails; null where nothing is rendered
 };
 
 constexpr const char *kNoPicture = "the scene is refused, or its inputs are counted: nothing is rendered",
@@ -114,7 +114,7 @@ TEST(BrokenRenderers, ArePassedByCasesThatHaveAPartnerWhichFails) {
     }
 }
 
-// The same judgement passes right figures: it does not fail everything.
+// A correct renderer passes all cases, so the tests above do not fail just because every result fails.
 TEST(BrokenRenderers, AreToldFromARightOneByTheSameFigures) {
   const Table table = all_cases();
   std::size_t measured = 0;

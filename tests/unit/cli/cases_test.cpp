@@ -1,5 +1,5 @@
-// How the cases of `lightshaft validate` are judged: a renderer that is off by the band fails, and so do too
-// few samples.
+// Tests how the cases of the validation table are judged. A renderer fails whose error is as large as the
+// band, and so does a result from too few samples.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -21,7 +21,7 @@ cli::ValidateCase judged(double got, double error, double band, double freedom =
   c.got = got;
   c.standard_error = error;
   c.band = band;
-  c.level = c.band_level = .01;  // +- 2.58 standard errors
+  c.level = c.band_level = .01;  // an interval of +- 2.58 standard errors
   judge_equivalence(c, freedom, unknown, 1e-9, 40);
   return c;
 }
@@ -59,7 +59,7 @@ TEST(Equivalence, HasALevelOfItsOwnForTheBand) {
     judge_equivalence(c, 1e6, 0, 1e-9, 40);
     return c;
   };
-  // An interval at level 1e-6 is +- 4.89 standard errors, one at .01 is +- 2.58.
+  // The level 1e-6 means an interval of +- 4.89 standard errors, .01 one of +- 2.58.
   EXPECT_TRUE(judged_at(0, 1e-6, .01).passed());
   EXPECT_TRUE(judged_at(0, .01, 1e-6).too_wide);
   EXPECT_TRUE(judged_at(.0016, 1e-6, .01).too_wide);
@@ -72,7 +72,7 @@ TEST(Equivalence, QuantilesAreThoseOfTheTables) {
   EXPECT_NEAR(cli::student_quantile(.01, 1e9), 2.575829, 1e-5);
 }
 
-// One case: a white environment seen through half a mean free path.
+// A table of one case: white light behind half a mean free path of medium.
 Table one_case(double expected, double band) {
   Table t;
   t.mean("one", "N0", "",
@@ -116,7 +116,8 @@ TEST(Cases, ASceneThatIsRefusedFails) {
   EXPECT_NE(line.why.find("extinction"), std::string::npos) << line.why;
 }
 
-// If pruning removes the medium that a case is about, the case would pass whatever the renderer does.
+// A case about media fails if pruning removes its medium, since it would then pass whatever the renderer
+// does.
 TEST(Cases, AskNothingWhereTheirMediumIsLeftOut) {
   const auto nothing = [](bool grid) {
     SceneBuilder builder;
@@ -163,8 +164,8 @@ TEST(Cases, SayWhyTheirBandIsWiderThanOthers) {
     EXPECT_EQ(c.options.band > kBand, !c.options.why_band.empty()) << c.id << ": " << c.options.band;
 }
 
-// The expected values, with eight digits, are from an independent method: quadrature of the Fourier
-// transform.
+// The known values are eight digits of a point source's fluence, by quadrature of its Fourier transform, a
+// method that the tested code does not use.
 TEST(EndlessMedium, FluenceOfAPointIsThatOfItsFourierTransform) {
   constexpr double kRadii[] = {.25, 1, 2, 5};
   const std::map<double, std::array<double, 4>> known = {
@@ -175,13 +176,13 @@ TEST(EndlessMedium, FluenceOfAPointIsThatOfItsFourierTransform) {
       {.99, {1.8031446, .22019457, .084976895, .019841736}},
       {.999, {1.8404525, .24795726, .10858551, .036265014}}};
   for (const auto& [c, phi] : known)
-    for (std::size_t i = 0; i < 4; ++i)  // half a unit of the eighth digit is at most 5e-8
+    for (std::size_t i = 0; i < 4; ++i)  // eight digits are exact to a relative 5e-8
       EXPECT_NEAR(endless_fluence(c, kRadii[i], 0), phi[i], 6e-8 * phi[i]) << c << ' ' << kRadii[i];
 }
 
-// The fluence of a ball is the mean of the fluence of its points, here by the midpoint rule over radius and
-// angle (the code under test has the angle's integral in closed form). With 40 x 40 midpoints and second
-// derivatives of about 1, the rule is off by a share of h^2 = 6e-4.
+// The fluence of a ball is the mean fluence of its points. Here the mean is taken by the midpoint rule over
+// radius and angle, since the tested code integrates over the angle in closed form. With 40 x 40 midpoints
+// (h = 1/40) of a function whose second derivatives are about 1, the relative error is about h^2 = 6e-4.
 TEST(EndlessMedium, FluenceOfABallIsTheMeanOfItsPoints) {
   constexpr double kRadius = .5, kDistance = 1, kAlbedo = .8;
   constexpr int kSteps = 40;

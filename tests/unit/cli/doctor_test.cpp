@@ -1,4 +1,4 @@
-// `lightshaft doctor`: what follows from observed facts.
+// Tests which findings `lightshaft doctor` makes from observed facts.
 #include <gmock/gmock.h>
 
 #include "cli/doctor/findings.h"
@@ -35,13 +35,13 @@ FarmFacts good_farm() {
   facts.session_status = 200;
   facts.role = "admin";
   facts.version = "1.0";
-  facts.workers = {{"w1", "connected", "", "1.0", "abc", false}};
+  facts.workers = {{"w1", "connected", "1.0", "abc", false}};
   return facts;
 }
 
 std::vector<Finding> judge(const FarmFacts& facts) { return judge_farm(facts, "1.0", "abc"); }
 
-// The finding `name` that is worst.
+// Returns the worst finding with this name.
 Finding find(const std::vector<Finding>& findings, const std::string& name) {
   Finding found{"none", {}, Status::ok, {}, {}};
   for (const Finding& each : findings)
@@ -148,10 +148,10 @@ INSTANTIATE_TEST_SUITE_P(
         FarmFault{"numeric-class", Status::warning, "other bits",
                   [](FarmFacts& f) { f.workers->at(0).numeric_class = "def"; }},
         FarmFault{"numeric-class", Status::warning, "2 numeric classes", [](FarmFacts& f) {
-                    f.workers->push_back({"w2", "connected", "", "1.0", "def", false});
+                    f.workers->push_back({"w2", "connected", "1.0", "def", false});
                   }}));
 
-// The coordinator's clock is in [date, date + 1) at some time between question and answer.
+// At some time between request and answer, the coordinator's clock was in [date, date + 1).
 TEST(ClockLead, IsTheLeastThatTheAnswerAllows) {
   EXPECT_EQ(clock_lead(1000, 1000, 1000), 0);
   EXPECT_EQ(clock_lead(1000.75, 1000.75, 1000), 0);
@@ -165,7 +165,7 @@ TEST(ClockLead, OfAMinuteIsTolerated) {
 
   facts.date = 1060;  // at least 59.5 s ahead
   EXPECT_EQ(find(judge(facts), "clock").status, Status::ok);
-  facts.date = 1061;  // at least 60.5 s
+  facts.date = 1061;  // at least 60.5 s ahead
   EXPECT_EQ(find(judge(facts), "clock").status, Status::warning);
 }
 

@@ -5,11 +5,8 @@
 #include <fstream>
 
 #include "cli/scale/child_command.h"
-#include "cli/scale/demand.h"
-#include "cli/scale/docker_engine.h"
-#include "cli/scale/kubernetes_engine.h"
-#include "cli/scale/slurm_engine.h"
-#include "cli/scale/ssh_engine.h"
+#include "cli/scale/engines.h"
+#include "cli/scale/farm_up.h"
 
 namespace ls::cli {
 namespace {
@@ -275,9 +272,9 @@ TEST(Demand, LeavesOutJobsWhoseBudgetIsUsedUpAndAsksForNoMoreThanBudgetsPay) {
 
   const Demand d = demand_of({{"jobs",
                                {job_of("j-1", "bob", 100, 5000),    // used up
-                                job_of("j-2", "bob", 40, 5000),     // 60 of the job are left
-                                job_of("j-3", "ann", 30, 5000),     // 70 of the job, and
-                                job_of("j-4", "ann", 10, 5000)}}},  // together 110 of the user
+                                job_of("j-2", "bob", 40, 5000),     // 60 are left of the job's budget
+                                job_of("j-3", "ann", 30, 5000),     // 70 are left of the job's budget;
+                                job_of("j-4", "ann", 10, 5000)}}},  // 110 are left of ann's budget
                              json::object(), kOurs, spending);
 
   EXPECT_EQ(d.open_jobs, 3);

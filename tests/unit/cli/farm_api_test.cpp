@@ -24,7 +24,7 @@ TEST(Problem, KeepsTheDiagnosticsWithTheirPlace) {
                      {"source_line", "<bsdf/>"},
                      {"length", 4}}}}};
 
-  const auto problem = problem_of({400, "application/problem+json", body.dump()});
+  const auto problem = problem_of({400, body.dump()});
 
   EXPECT_EQ(problem.error, (Error{Errc::invalid_argument, "the scene a.xml cannot be read"}));
   ASSERT_EQ(problem.diagnostics.size(), 1u);
@@ -33,18 +33,18 @@ TEST(Problem, KeepsTheDiagnosticsWithTheirPlace) {
 }
 
 TEST(Problem, SaysWhereATokenIsFound) {
-  const auto problem = problem_of({401, "", R"({"detail": "the token is wrong"})"});
+  const auto problem = problem_of({401, R"({"detail": "the token is wrong"})"});
 
   EXPECT_EQ(problem.error.code, Errc::unauthenticated);
   EXPECT_THAT(problem.error.message, HasSubstr("LIGHTSHAFT_TOKEN"));
 }
 
 TEST(Problem, StandsAnswersThatAreNoProblemDetails) {
-  EXPECT_THAT(problem_of({502, "text/html", "<html>Bad gateway" + std::string(5000, '!')}).error.message,
+  EXPECT_THAT(problem_of({502, "<html>Bad gateway" + std::string(5000, '!')}).error.message,
               testing::AllOf(HasSubstr("502"), HasSubstr("Bad gateway")));
   for (const char* body :
        {"", "[]", "{}", R"({"detail": 5, "diagnostics": "x"})", R"({"diagnostics": [1, {"line": "x"}]})"})
-    EXPECT_FALSE(problem_of({500, "", body}).error.message.empty()) << body;
+    EXPECT_FALSE(problem_of({500, body}).error.message.empty()) << body;
 }
 
 TEST(JobPath, EscapesWhatIsNoId) {

@@ -36,7 +36,7 @@ TEST(HealthLines, SayNothingWhereAllIsWellOrNothingIsTold) {
   }
 }
 
-// A farm may answer anything: no line moves the cursor, and there is an end to them.
+// Whatever a farm answers, no line contains control characters, and the number of lines is limited.
 TEST(HealthLines, AreTextWhateverAFarmAnswers) {
   json causes = json::array();
   const json cause =

@@ -27,7 +27,7 @@ TEST(InstructionCounter, CountsWhatThisThreadExecutesOrSaysWhyItCannot) {
   const auto after = counter->read();
 
   ASSERT_TRUE(before && after);
-  EXPECT_GE(*after - *before, std::uint64_t{2} * kTurns);  // a store and a jump each, at the least
+  EXPECT_GE(*after - *before, std::uint64_t{2} * kTurns);  // at least a store and a jump per turn
   const InstructionCounter moved = std::move(*counter);
   EXPECT_GE(moved.read().value_or(0), *after);
 }
@@ -53,7 +53,7 @@ TEST(InstructionCounter, SaysOfAMachineWithoutOneOrThatHidesItWhatTheUserCanDo) 
   EXPECT_THAT(InstructionCounter::open(&refusing<EMFILE>).error().message, HasSubstr("Too many open files"));
 }
 
-// A counter that shows these numbers one after the other and then fails.
+// Returns a counter that reads these numbers one after the other and then fails.
 std::array<int, 2> shown{-1, -1};
 InstructionCounter showing(std::initializer_list<std::uint64_t> counts) {
   EXPECT_EQ(pipe(shown.data()), 0);

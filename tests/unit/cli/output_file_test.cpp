@@ -13,7 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-// A folder that nobody, not even root, can make a file in.
+// A folder in which nobody, not even root, can create a file.
 const fs::path kClosed = "/proc/self";
 
 class OutputFile : public testing::Test {

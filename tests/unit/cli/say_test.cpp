@@ -15,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-// What an action says on stderr.
+// Returns what `run` prints to stderr.
 template <class Run>
 std::string said(Run run) {
   testing::internal::CaptureStderr();

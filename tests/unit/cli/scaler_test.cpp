@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "cli/scale/ledger.h"
+#include "cli/scale/costs.h"
 #include "tests/support/fake_clock.h"
 
 namespace ls::cli {
@@ -16,7 +16,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using Kind = EngineWorker::State;
 
-// A farm-up under a fake clock: workers are what the test says they are.
+// A scaler with a fake clock; the test sets the demand and the engine's list of workers.
 struct World {
   ScaleLimits limits{.farm = "f", .most_workers = 8, .threads = 2, .finish_in = 100};
   Scaler scaler{limits};
@@ -80,7 +80,7 @@ TEST(Scaler, StartsNoMoreThanItMay) {
 TEST(Scaler, CountsWorkersThatWaitAndThoseOfOthers) {
   World w;
   w.work(900);
-  w.demand.other_threads = 3;  // 6 threads are left for it: 3 workers
+  w.demand.other_threads = 3;  // of 9 threads, 6 are left: 3 workers
   w.run("1");
   w.workers.push_back({"2", Kind::waiting, 0, 2});
 
@@ -224,7 +224,7 @@ TEST(Scaler, StartsOnlyWhatTheBudgetLetsRun) {
            .threads = 2,
            .finish_in = 100,
            .drain_seconds = 40,
-           .budget_core_seconds = 500});  // a worker needs 2 x (60 + 40 + two looks) of it
+           .budget_core_seconds = 500});  // each worker needs 2 x (60 + 40 + 2 x 5) of it
   w.work(1e6);
 
   EXPECT_EQ(w.look().start, 2);
@@ -244,7 +244,7 @@ TEST(Scaler, DrainsAllWhileTheBudgetStillPaysForIt) {
            .budget_core_seconds = 500});
   w.work(1e6);
   w.run("1");
-  w.run("2");  // both draining, with two looks: 200 core seconds
+  w.run("2");  // draining both takes 2 x 2 x (40 + 2 x 5) = 200 core seconds
   w.spent = 299;
   EXPECT_THAT(w.look().drain, IsEmpty());
 
@@ -282,8 +282,8 @@ TEST(Scaler, EndingDrainsAllAndStartsNothing) {
   EXPECT_EQ(actions.start, 0);
 }
 
-// An engine that loses workers at random: there are never more workers than allowed, nothing is spent beyond
-// the budget, and without jobs all workers go.
+// The engine loses workers at random. There are never more workers than allowed, the cost stays within the
+// budget, and all workers end when no jobs are left.
 TEST(Scaler, KeepsItsLimitsWhateverTheEngineDoes) {
   for (unsigned seed = 0; seed < 50; ++seed) {
     std::mt19937 random(seed);

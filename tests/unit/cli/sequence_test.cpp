@@ -1,11 +1,11 @@
-// Sequences on the command line: what is asked for, what is read, and where it goes.
+// Tests sequences on the command line: the options, the files that are read, and the files that are written.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
 
 #include "cli/farm/farm_tables.h"
-#include "cli/farm/fetch_results.h"
+#include "cli/local/local_scene.h"
 #include "cli/output/job_options.h"
 #include "cli/output/output_file.h"
 

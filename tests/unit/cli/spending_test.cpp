@@ -1,4 +1,4 @@
-#include "cli/scale/spending.h"
+#include "cli/scale/costs.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -87,8 +87,8 @@ TEST(Spending, RefusesAFileWithoutSums) {
     EXPECT_FALSE(Spending().go_on_from(bad)) << bad;
 }
 
-// Jobs and workers that come, go, are forgotten and are started again, and a farm-up that goes on from its
-// file at any time: every second is counted once, and sums of users are the sums of their jobs.
+// Jobs and workers appear, end, restart and are forgotten by the coordinator, and `farm up` restarts from its
+// file at any time. Every core second is counted once, and a user's sum is that of the user's jobs.
 TEST(Spending, CountsEverySecondOnceWhateverHappens) {
   for (unsigned seed = 0; seed < 50; ++seed) {
     std::mt19937 random(seed);
@@ -118,7 +118,7 @@ TEST(Spending, CountsEverySecondOnceWhateverHappens) {
       for (const auto& [id, job] : jobs) report.jobs.push_back(job);
       for (const auto& [id, worker] : workers) report.workers.push_back(worker);
       observe(spending, report);
-      if (chance(20)) observe(spending, {});  // a coordinator that has just been started again
+      if (chance(20)) observe(spending, {});  // the coordinator has just restarted
       if (chance(5)) {
         Spending again;
         ASSERT_TRUE(again.go_on_from(spending.to_json()));
@@ -131,12 +131,12 @@ TEST(Spending, CountsEverySecondOnceWhateverHappens) {
     for (const auto& [id, line] : report["by_job"].items()) by_job += line["core_hours"].get<double>();
     for (const auto& [user, hours] : report["by_user"].items()) by_user += hours.get<double>();
     for (const auto& [engine, hours] : report["by_engine"].items()) by_engine += hours.get<double>();
-    // Whole seconds below 2^53 add up exactly; dividing each of some hundred sums by 3600 rounds by 2^-53 of
-    // it.
+    // Sums of whole seconds are exact. Dividing each of some hundred sums by 3600 has a relative rounding
+    // error of 2^-53.
     EXPECT_NEAR(by_job * kCoreHour, rendered, rendered * 1e-12) << "seed " << seed;
     EXPECT_NEAR(by_user * kCoreHour, rendered, rendered * 1e-12) << "seed " << seed;
-    // A worker that was started again and has rendered as much as before between two reports looks like one
-    // that goes on, so its engine may be told less, never more.
+    // If a worker restarts and renders at least as much as before until the next report, its restart is not
+    // noticed. So the sum by engines may be too small, never too large.
     EXPECT_LE(by_engine * kCoreHour, rendered * (1 + 1e-12)) << "seed " << seed;
   }
 }

@@ -1,5 +1,5 @@
-// Tests of `lightshaft validate`: its probabilities against printed tables, its verdicts, and the tests of
-// Nori files.
+// Tests the statistics of `lightshaft validate` against printed tables, its verdicts, and its tests from Nori
+// files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -29,22 +29,22 @@ TEST(ValidateStats, TailsAreThoseOfTheTables) {
 }
 
 TEST(ValidateStats, ChiSquareMergesRareCellsAndFindsSamplesWithoutDensity) {
-  // The cells with 2, 3 and 15 expected samples are merged to one of 20, so the statistic is (24 - 20)^2 / 20
-  // + (36 - 40)^2 / 40.
+  // The cells that expect 2, 3 and 15 are merged into one of 20, where 5 + 4 + 15 = 24 are observed. The
+  // statistic is (24 - 20)^2 / 20 + (36 - 40)^2 / 40.
   const std::array<double, 4> expected{2, 40, 3, 15}, observed{5, 36, 4, 15};
   const ChiSquare merged = chi_square(expected, observed, 10);
   EXPECT_EQ(merged.freedom, 1);
   EXPECT_DOUBLE_EQ(merged.statistic, 16. / 20 + 16. / 40);
   EXPECT_EQ(merged.p, chi2_tail(merged.statistic, 1));
   EXPECT_EQ(merged.impossible, 0);
-  // A few samples may lie in a cell where none is expected, because the edges of cells are rounded.
+  // Since the edges of cells are rounded, a few samples may lie in a cell with density 0.
   for (const double strays : {10., 11.}) {
     const std::array<double, 2> none{0, 100}, some{strays, 100 - strays};
     EXPECT_EQ(chi_square(none, some, 10).impossible, strays > 10 ? strays : 0);
   }
 }
 
-// The expected values are the levels that Nori prints for .01 and 4, 3 and 2 references.
+// The significance levels that Nori prints for the level .01 and 4, 3 and 2 references.
 TEST(ValidateStats, SidakIsNoris) {
   EXPECT_NEAR(sidak(.01, 4), .00250943, 1e-8);
   EXPECT_NEAR(sidak(.01, 3), .00334451, 1e-8);
@@ -67,7 +67,7 @@ TEST(ValidateTable, AVerdictIsByProbability) {
   EXPECT_TRUE(judged(1, 1.02, .01).passed());
   EXPECT_FALSE(judged(1, 1.03, .01).passed());
   EXPECT_NEAR(judged(1, 1.03, .01).z, 3, 1e-9);
-  // With a standard error of 0 only the deviation that float32 rounding explains is allowed.
+  // An exact answer (standard error 0) may differ only by the rounding of float32.
   EXPECT_TRUE(judged(1, 1 + 1e-6, 0, 2e-6).passed());
   EXPECT_FALSE(judged(1, 1 + 1e-6, 0, 5e-7).passed());
   EXPECT_FALSE(judged(1, 1, .01, 0, 3).passed()) << "samples that went wrong";
@@ -85,7 +85,7 @@ TEST(ValidateTable, JsonHasEveryCaseAndTheCounts) {
 }
 
 TEST(ValidateFile, ABsdfIsSeenFromTheAngleThatIsAsked) {
-  // A metal that absorbs nothing (k = 0) reflects like a smooth boundary of its index, here 1.5. The
+  // A conductor with index 1.5 that absorbs nothing reflects as a smooth dielectric boundary does. The
   // references are Fresnel's formulas at 0 and 60 degrees.
   test::SceneBuilder builder;
   builder.shape(RectangleShape{}, {},
@@ -114,8 +114,7 @@ TEST(ValidateFile, DeltaLobesHaveNoDensityToTest) {
 }
 
 TEST(ValidateChi2, FollowsItsDegreesOfFreedomForARightSampler) {
-  // The samples of a diffuse surface follow its density, so the case passes and the statistic is near its
-  // degrees of freedom.
+  // The samples of a diffuse surface pass the test against its own density, with a p-value that is not small.
   test::SceneBuilder builder;
   builder.shape(RectangleShape{}, {}, builder.diffuse(.5));
   NoriTest t;
@@ -126,8 +125,8 @@ TEST(ValidateChi2, FollowsItsDegreesOfFreedomForARightSampler) {
   ASSERT_TRUE(c) << c.error().message;
   EXPECT_TRUE(c->why.empty()) << c->why;
   EXPECT_GT(c->p, 1e-4);
-  // The upper hemisphere has 100 cells. No sample is expected in the lower one, whose cells are merged into
-  // another.
+  // The expected statistic is the number of degrees of freedom: the upper hemisphere has about 100 cells, and
+  // the empty cells of the lower one are merged into another cell.
   EXPECT_GT(c->expected, 90);
   EXPECT_LT(c->expected, 110);
 }

@@ -4,9 +4,9 @@
 #include <gtest/gtest.h>
 
 #include "cli/farm/farm_tables.h"
-#include "cli/farm/farm_wait.h"
+#include "cli/farm/job_results.h"
+#include "cli/local/local_render.h"
 #include "cli/output/console.h"
-#include "cli/output/final_report.h"
 
 namespace ls::cli {
 namespace {
@@ -176,21 +176,21 @@ TEST(ReportSummary, OfAnImageInDoubtHasNoInterval) {
     "forecast": {"target": 0.2, "core_seconds": 60, "core_seconds_ci95": [50, 80]}})");
 
   EXPECT_THAT(
-      report_summary(report.dump()),
+      report_summary(report),
       HasSubstr(", relMSE 0.39: don't trust yet: no sample has found light; 0.2 would cost at least 1:00 "
                 "more on one core"));
-  EXPECT_THAT(report_summary(report.dump()), Not(HasSubstr("0.8")));
+  EXPECT_THAT(report_summary(report), Not(HasSubstr("0.8")));
   report["trusted"] = true;
-  EXPECT_THAT(report_summary(report.dump()), HasSubstr("relMSE 0.39 (0.2 to 0.8); 0.2 would cost 1:00 more"));
+  EXPECT_THAT(report_summary(report), HasSubstr("relMSE 0.39 (0.2 to 0.8); 0.2 would cost 1:00 more"));
 }
 
 TEST(ReportSummary, SaysWhatTheReferenceCannotTell) {
   json report = json::parse(R"({"spp": 64, "render_seconds": 9, "relmse": 0.39, "true_relmse": 0,
     "true_relmse_below_noise": true, "reference": {"same_seed": false}})");
 
-  EXPECT_THAT(report_summary(report.dump()), HasSubstr("true relMSE below the reference's noise"));
+  EXPECT_THAT(report_summary(report), HasSubstr("true relMSE below the reference's noise"));
   report["reference"]["same_seed"] = true;
-  EXPECT_THAT(report_summary(report.dump()), HasSubstr("true relMSE 0 (not to be trusted"));
+  EXPECT_THAT(report_summary(report), HasSubstr("true relMSE 0 (not to be trusted"));
 }
 
 }  // namespace

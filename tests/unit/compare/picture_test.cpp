@@ -1,4 +1,4 @@
-// Pictures handed in by others.
+// Tests images that are read from files of the user.
 #include "compare/picture.h"
 
 #include <gmock/gmock.h>
@@ -8,7 +8,6 @@
 #include <fstream>
 
 #include "common/image/exr/exr_file.h"
-#include "compare/references.h"
 
 namespace ls::race {
 namespace {
@@ -39,7 +38,7 @@ TEST(HandedIn, PicturesAreReadAndKept) {
   EXPECT_EQ(pixels->size(), 36u);
 }
 
-// (x - ref)^2 - s^2, with the reference's standard errors s.
+// With the standard errors s of the reference, the squared error is (x - ref)^2 - s^2.
 TEST(HandedIn, AReferencesOwnErrorsAreSubtracted) {
   const auto scratch = Scratch::make();
   ExrPicture picture{kSize, {}, {}};
@@ -57,7 +56,7 @@ TEST(HandedIn, AReferencesOwnErrorsAreSubtracted) {
   const Pixels x(36, 2.5f);
   EXPECT_DOUBLE_EQ(wrong(x, combine({*unknown})).mse, .25);
   EXPECT_DOUBLE_EQ(wrong(x, combine({*known})).mse, .25 - .0625);
-  EXPECT_NEAR(wrong(x, combine({*known})).relmse, (.25 - .0625) / (4 + .01), 1e-15);  // a sum of 36
+  EXPECT_NEAR(wrong(x, combine({*known})).relmse, (.25 - .0625) / (4 + .01), 1e-15);  // 36 values are summed
   EXPECT_DOUBLE_EQ(noise_of(combine({*known})), .0625 / (4 + .01));
   EXPECT_EQ(describe({*known}), "ref.exr, less its own noise by its layers of errors");
   EXPECT_EQ(describe({*unknown}), "picture.exr, whose own noise counts as everybody's error");

@@ -1,4 +1,4 @@
-// Races of made-up entrants whose pictures have a known error.
+// Tests races of simulated entrants whose images have a known error.
 #include "compare/race.h"
 
 #include <gmock/gmock.h>
@@ -17,7 +17,7 @@ using testing::HasSubstr;
 constexpr FrameSize kRaceSize{64, 48};
 constexpr double kGrey = .5;
 
-// The right picture with independent normal noise of this variance in every value; nearly: values are floats.
+// Returns the right image plus independent normal noise of this variance in every value.
 Pixels noisy(double variance, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise(kGrey, std::sqrt(variance));
@@ -26,7 +26,7 @@ Pixels noisy(double variance, std::uint64_t seed) {
   return pixels;
 }
 
-// A renderer of noise: variance 1 / (speed x seconds), in turns of a second.
+// A racer whose images have noise of variance 1 / (speed x seconds); each turn takes one second.
 class Noise final : public Racer {
  public:
   Noise(double speed, double time, std::filesystem::path stem, std::uint64_t seed, std::string fails = "")
@@ -65,10 +65,10 @@ class Noise final : public Racer {
 struct Ran {
   Race race;
   Result<Lanes> lanes;
-  std::vector<std::size_t> order;  // of entrants, of all seeds
+  std::vector<std::size_t> order;  // the entrant of each turn, over all seeds
 };
 
-// Entrants with these speeds, `time` turns each.
+// Runs a race of entrants with these speeds, `time` turns each.
 Ran ran(const Scratch& scratch, const std::vector<double>& speeds, std::size_t seeds, double time,
         const std::string& second_fails = "") {
   Ran out;
@@ -97,8 +97,9 @@ TEST(Races, GoSeedBySeedInTurns) {
   EXPECT_EQ(r.lanes->lanes[0].checkpoints.size(), 3u);
 }
 
-// 9216 values, noise variance v, references of variance vr each in product: the measured mean square has a
-// standard error below v sqrt(2 / 9216) (1 + vr / v) < 4 % for vr <= v; 5 of those are 20 %.
+// The image has 9216 values with noise of variance v, and the two references have noise of variance vr each.
+// If vr <= v, the standard error of the measured mean square is below v sqrt(2 / 9216) (1 + vr / v) < .04 v.
+// The tests allow five standard errors, 20 %.
 TEST(Races, FindTheTrueErrorAndRatioByTheOtherSeeds) {
   const auto scratch = Scratch::make();
   Ran r = ran(*scratch, {1000, 250}, 4, 4);
@@ -116,7 +117,7 @@ TEST(Races, FindTheTrueErrorAndRatioByTheOtherSeeds) {
   ASSERT_EQ(rows.size(), 2u);
   EXPECT_FALSE(rows[0].ratio);
   ASSERT_TRUE(rows[1].ratio);
-  EXPECT_NEAR(rows[1].ratio->value, 4, .4);  // the mean of four, each within 6 % or so
+  EXPECT_NEAR(rows[1].ratio->value, 4, .4);  // the mean over four seeds, each within about 6 %
   EXPECT_LT(rows[1].ratio->lo, 4.4);
   EXPECT_GT(rows[1].ratio->hi, 3.6);
 }
@@ -132,7 +133,7 @@ TEST(Races, TwoReferencesDropTheirOwnNoise) {
   ASSERT_TRUE(judge(once, *r.lanes, 1, one));
 
   EXPECT_NEAR(twice.lanes[0].points.back().mse / v, 1, .2);
-  EXPECT_NEAR(once.lanes[0].points.back().mse / v, 2, .2);  // the reference's noise counts as the picture's
+  EXPECT_NEAR(once.lanes[0].points.back().mse / v, 2, .2);  // the reference's noise counts as error
   EXPECT_NEAR(twice.reference_noise / (v / 2 / (kGrey * kGrey + .01)), 1, .2);
 }
 
@@ -155,7 +156,7 @@ TEST(Races, NeedAReferenceOrTwoSeedsOfSomethingWhole) {
   EXPECT_THAT(judge(single.race, *single.lanes, 1, std::nullopt).error().message, HasSubstr("--reference"));
 
   Ran blind = ran(*scratch, {1000}, 2, 3);
-  blind.race.entrants[0].whole = false;  // sees no media, say
+  blind.race.entrants[0].whole = false;  // such as an integrator that ignores media
   EXPECT_FALSE(judge(blind.race, *blind.lanes, 2, std::nullopt));
 }
 

@@ -1,4 +1,4 @@
-// Curves, predictions and the files that are made of them.
+// Tests curves, predictions and the files of a comparison.
 #include "compare/results.h"
 
 #include <gmock/gmock.h>
@@ -14,7 +14,8 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-// Error 1 / (speed x seconds), estimated as it is with an interval of this ratio to each side.
+// Returns a lane with the error 1 / (speed x seconds). The estimate is the true error; its interval extends
+// by the factor `interval` to each side.
 JudgedLane lane(std::size_t entrant, std::size_t seed, double speed, const std::vector<double>& spp,
                 double interval = 1.2) {
   JudgedLane out{entrant, seed, {}};
@@ -52,7 +53,8 @@ TEST(Curves, JoinSeedsAtEqualSamplesAndAtTheirEnds) {
   EXPECT_NEAR(curve[0].seconds, .02, 1e-12);
   EXPECT_NEAR(curve[0].relmse.value, 1 / (.02 * std::cbrt(10. * 11 * 12)), 1e-9);
   EXPECT_LT(curve[0].relmse.lo, curve[0].relmse.value);
-  EXPECT_NEAR(curve[8].spp, std::cbrt(200. * 202 * 204), 1e-9);  // the three ends, at different samples
+  EXPECT_NEAR(curve[8].spp, std::cbrt(200. * 202 * 204),
+              1e-9);  // the three ends have different sample counts
 }
 
 TEST(Curves, LeaveOutWhatTheReferenceCannotSee) {
@@ -81,7 +83,7 @@ TEST(Rows, HaveEfficiencySlopeAndRatio) {
   EXPECT_NEAR(rows[1].spread, 1, 1e-9);
 }
 
-// Errors that fall exactly as 1/N are foretold exactly, up to the ends of rounds.
+// If errors fall exactly as 1/N, every prediction is right.
 TEST(Predictions, AreMadeOnlyWhereTheirOutcomeIsSeen) {
   const auto all = predictions_of(results().races[0]);
 
@@ -99,7 +101,7 @@ TEST(Predictions, OfATargetThatIsNotReachedAreWrong) {
   for (JudgedLane& l : r.races[0].lanes)
     for (JudgedPoint& p : l.points)
       if (p.estimate && p.spp > 32)
-        p.estimate->relmse = l.points[4].estimate->relmse;  // stands still from 32 on
+        p.estimate->relmse = l.points[4].estimate->relmse;  // constant from 32 samples on
   const auto all = predictions_of(r.races[0]);
 
   const auto early = std::count_if(all.begin(), all.end(), [](const Prediction& p) { return p.spp == 32; });

@@ -1,5 +1,5 @@
-// Turns and rounds of a race, at times that are told.
-#include "compare/schedule.h"
+// Tests the turns and rounds of a race at given times.
+#include "compare/racer.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 namespace ls::race {
 namespace {
 
-// Plays a race of turns of these lengths to time 10; who was on, in order.
+// Simulates a race of racers with these lengths of turns until each has used 10 s. Returns who ran, in order.
 std::vector<std::size_t> play(const std::vector<double>& lengths, std::size_t first_lap = 0) {
   std::vector<Turn> turns;
   for (const double length : lengths) turns.push_back({false, 0, length});
@@ -63,8 +63,9 @@ TEST(RoundsOfARace, AreThoseOfAJobWhileTheyFit) {
 
 TEST(RoundsOfARace, AreCutToTheTimeLeft) {
   constexpr std::uint64_t kNoLimit = 1 << 20;
-  EXPECT_EQ(next_range(7, .1, 3.15, kNoLimit), (SampleRange{128, 158}));  // 31 fit, and samples come in pairs
-  EXPECT_FALSE(next_range(7, .1, .5, kNoLimit));                          // 4 after 128 say nothing new
+  EXPECT_EQ(next_range(7, .1, 3.15, kNoLimit),
+            (SampleRange{128, 158}));             // 31 samples fit, an even number is rendered
+  EXPECT_FALSE(next_range(7, .1, .5, kNoLimit));  // 5 fit; the even 4 are fewer than 128 / 16
   EXPECT_FALSE(next_range(3, .1, 0, kNoLimit));
   EXPECT_FALSE(next_range(3, .1, -2, kNoLimit));
 }

@@ -1,5 +1,5 @@
-// Intervals over seeds, against figures worked out by hand.
-#include "compare/statistics.h"
+// Tests intervals over seeds against values that were computed by hand.
+#include "compare/summary.h"
 
 #include <gtest/gtest.h>
 
@@ -10,14 +10,14 @@
 namespace ls::race {
 namespace {
 
-constexpr double kRounding = 1e-9;  // of a handful of double operations, far above their 1e-15
+constexpr double kRounding = 1e-9;  // far above the 1e-15 of a few operations in double
 
 TEST(SeedStatistics, IntervalIsStudents) {
   const std::array values{1., 2., 3., 4., 5.};
 
   const auto m = mean(values);
 
-  // s = sqrt(2.5), t(.975, 4) = 2.776445 of the tables
+  // The standard deviation is sqrt(2.5); by the tables, Student's t(.975, 4) is 2.776445
   const double half = 2.7764451052 * std::sqrt(2.5 / 5);
   ASSERT_TRUE(m);
   EXPECT_NEAR(m->value, 3, kRounding);
@@ -30,7 +30,7 @@ TEST(SeedStatistics, GeometricMeanIsThatOfLogarithms) {
 
   const auto m = geometric_mean(values);
 
-  // logarithms -L, 0, L with L = ln 100: s = L, t(.975, 2) = 4.302653
+  // The logarithms are -L, 0 and L with L = ln 100, so their standard deviation is L; t(.975, 2) = 4.302653
   const double half = 4.3026527297 * std::log(100.) / std::sqrt(3.);
   ASSERT_TRUE(m);
   EXPECT_NEAR(m->value, 1, kRounding);
@@ -56,7 +56,7 @@ TEST(SeedStatistics, RefusesWhatHasNoLogarithm) {
   EXPECT_FALSE(geometric_ratio(std::array{1.}, std::array{1., 1.}));
 }
 
-// A machine that is three times as slow for one seed is so for both: the ratio does not see it.
+// The machine is three times as slow for one seed, for both entrants: this cancels in the ratio.
 TEST(SeedStatistics, WhatBothHaveInCommonDropsOutOfARatio) {
   const std::array a{2., 6., 2.}, b{1., 3., 1.};
 

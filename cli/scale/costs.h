@@ -1,5 +1,5 @@
-// Adds up the core seconds that each job and each user has cost, from the coordinator's reports, and compares
-// them with the budgets. A pure state machine: it reads no clock and sends no requests.
+// What `lightshaft farm up` costs, in core seconds. The sums are kept in a file, so that the next run under
+// the same name continues them. Pure state machines: they read no clock and send no requests.
 #pragma once
 
 #include <limits>
@@ -9,9 +9,33 @@
 #include <span>
 #include <string>
 
-#include "common/base/error.h"
+#include "cli/scale/engine.h"
 
 namespace ls::cli {
+
+// Adds up the core seconds that workers have reserved at the engine (Slurm, ssh, Docker or Kubernetes).
+class Ledger {
+ public:
+  // Adds the cost since the previous call, `elapsed` seconds ago. `workers` is the engine's present list. A
+  // worker that is no longer in it is charged for all of `elapsed`, since the time of its end is unknown.
+  void observe(std::span<const EngineWorker> workers, double elapsed);
+  double core_seconds() const;
+  // Returns how many workers have started to run. A worker that the engine requeued and ran again counts
+  // again.
+  int started() const { return started_; }
+
+  nlohmann::json to_json() const;
+  static Result<Ledger> from_json(const nlohmann::json& json);
+
+ private:
+  struct Line {
+    double seconds = 0;
+    int cores = 1;
+  };
+  std::map<std::string, Line> running_;
+  double ended_ = 0;  // core seconds of workers that have ended
+  int started_ = 0;
+};
 
 inline constexpr double kCoreHour = 3600;  // core seconds
 
@@ -32,8 +56,9 @@ struct WorkerCost {
   double core_seconds = 0;  // spent on rendering since the worker was started
 };
 
-// Costs before the first report are not counted. A job or worker that the coordinator has forgotten keeps its
-// most recent sum.
+// Adds up the core seconds that each job and each user has cost, from the coordinator's reports, and compares
+// them with the budgets. Costs before the first report are not counted. A job or worker that the coordinator
+// has forgotten keeps its most recent sum.
 class Spending {
  public:
   explicit Spending(Budgets budgets = {}) : budgets_(std::move(budgets)) {}

@@ -1,12 +1,15 @@
-#include "cli/farm/fetch_results.h"
+#include "cli/farm/job_results.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <poll.h>
 
 #include <vector>
 
+#include "cli/farm/farm_tables.h"
 #include "cli/farm/http_client.h"
 #include "cli/output/console.h"
+#include "cli/output/convergence_text.h"
 #include "cli/output/output_file.h"
 #include "cli/output/reply_fields.h"
 
@@ -14,6 +17,8 @@ namespace ls::cli {
 namespace {
 
 using nlohmann::json;
+
+constexpr int kPollMilliseconds = 250;
 
 struct Download {
   std::string path, option, file;
@@ -38,8 +43,8 @@ std::string image_of(const json& job, const Results& wanted) {
   return flag_field(job, "denoise") ? "/image.png?layer=denoised" : "/image.png";
 }
 
-Result<Plan> plan_sequence(const std::string& id, const json& job, const Results& wanted) {
-  const json& frames = job["frames"];
+Result<Plan> plan_sequence(const std::string& id, const json& job, const json& frames,
+                           const Results& wanted) {
   const auto list = frames.find("list");
   if (list == frames.end() || !list->is_array())
     return fail(Errc::internal, "the coordinator does not say which frames the job has");
@@ -84,18 +89,78 @@ Plan plan_image(const std::string& id, const json& job, const Results& wanted) {
 
 }  // namespace
 
-Result<void> check_outputs(const std::string& option, const std::string& name,
-                           const std::optional<FrameRange>& frames) {
-  if (option == "-o")
-    if (const auto format = image_format(name); !format) return tl::unexpected(format.error());
-  if (!frames) return check_output(option, name);
-  if (option != "--report")
-    if (auto ok = check_numbered(option, name, *frames); !ok) return ok;
-  for (const std::uint32_t frame : frames->frames()) {
-    if (auto ok = check_output(option, numbered(name, frame)); !ok) return ok;
-    if (!has_frame_number(name)) break;
+ProgressFigures progress_of(const json& job) {
+  ProgressFigures f;
+  f.state = text_field(job, "state");
+  f.progress = number_field(job, "progress").value_or(0);
+  f.spp_done = number_field(job, "spp_done").value_or(0);
+  f.relmse = number_field(job, "relmse");
+  f.eta_seconds = number_field(job, "eta_seconds");
+  f.eta_ci95 = pair_field(job, "eta_ci95");
+  f.relmse_ci95 = pair_field(job, "relmse_ci95");
+  f.target_error = number_field(job, "target_error");
+  f.target_denoised = text_field(job, "target_layer") == "denoised";
+  if (const json* check = object_field(job, "denoised_check"))
+    f.denoised_at_most = number_field(*check, "at_most");
+  if (const json* more = object_field(job, "eta_with_more")) {
+    f.eta_with_more = number_field(*more, "seconds");
+    f.more_workers = int_field(*more, "workers", f.more_workers);
   }
-  return {};
+  f.doubtful = verdict_of(job).doubtful;
+  f.trouble = text_field(job, "error");
+  const double elapsed = number_field(job, "elapsed_seconds").value_or(0);
+  if (const auto size = pair_field(job, "size"); elapsed > 0 && size)
+    f.samples_per_second = f.spp_done * size->first * size->second / elapsed;
+  if (const json* frames = object_field(job, "frames")) {
+    const int total = int_field(*frames, "total", 0);
+    // spp_done is the mean over the frames, and the rate is that of all frames together
+    f.samples_per_second *= total;
+    f.frames = fmt::format("{} of {} frames", int_field(*frames, "done", 0), total);
+  }
+  return f;
+}
+
+FarmApi::Answer<json> watch_job(FarmApi& api, const std::string& id, const WatchOptions& options) {
+  ProgressBar bar(options.quiet || options.json ? ProgressForm::none : ProgressForm::bar);
+  RetryPolicy retry;
+  std::string reported;
+  for (;; ::poll(nullptr, 0, kPollMilliseconds)) {
+    auto job = api.get(job_path(id));
+    if (!job) {
+      bar.show({.state = "waiting for the coordinator"});
+      if (!retry.again(job.error().error)) return job;
+      continue;
+    }
+    retry.answered();
+    bar.show(progress_of(*job));
+    if (options.json)
+      if (const std::string line = dump(*job, -1); line != reported) print(reported = line);
+    if (is_over(*job)) return job;
+  }
+}
+
+int print_end(const json& job, bool quiet) {
+  print_health(job);
+  const std::string state = text_field(job, "state"), id = text_field(job, "id");
+  if (state == "done") {
+    if (const std::string worth = error_text(job); !worth.empty() && (!quiet || verdict_of(job).doubtful))
+      print_note(worth);
+    return kOk;
+  }
+  const std::string error = text_field(job, "error");
+  complain(fmt::format("job {} was {}{}", id, state == "failed" ? "given up" : state,
+                       error.empty() ? "" : ": " + error));
+  return kFailed;
+}
+
+void print_denoised(FarmApi& api, const json& job) {
+  // A sequence has no error of its own; the report of each frame has the error of that frame.
+  if (!flag_field(job, "denoise") || object_field(job, "frames")) return;
+  const auto report = api.get(job_path(text_field(job, "id")) + "/report");
+  if (!report)
+    print_note("the error of the denoised image is unknown: " + report.error().error.message);
+  else if (const std::string denoised = denoised_text(*report); !denoised.empty())
+    print_note(denoised);
 }
 
 int fetch_results(FarmApi& api, const std::string& id, const Results& wanted) {
@@ -104,15 +169,15 @@ int fetch_results(FarmApi& api, const std::string& id, const Results& wanted) {
   const auto call = [&](auto request) { return wanted.patient ? with_retries(request) : request(); };
   const auto job = call([&] { return api.get(job_path(id)); });
   if (!job) return print_rejected(job.error());
-  const auto frames = job->find("frames");
-  const auto plan = frames != job->end() && frames->is_object() ? plan_sequence(id, *job, wanted)
-                                                                : Result<Plan>(plan_image(id, *job, wanted));
+  const json* frames = object_field(*job, "frames");
+  const auto plan =
+      frames ? plan_sequence(id, *job, *frames, wanted) : Result<Plan>(plan_image(id, *job, wanted));
   if (!plan) return print_error(plan.error());
   for (const Download& d : plan->downloads) {
     if (const auto ok = check_output(d.option, d.file); !ok) return print_error(ok.error());
     if (const auto got = call([&] { return api.download(d.path, d.file); }); !got)
       return print_rejected(got.error());
-    if (wanted.json) print(json{{"file", d.file}}.dump(-1, ' ', false, json::error_handler_t::replace));
+    if (wanted.json) print(dump(json{{"file", d.file}}, -1));
   }
   if (plan->empty.empty()) return kOk;
   constexpr std::size_t kShown = 20;

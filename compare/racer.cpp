@@ -1,4 +1,4 @@
-#include "compare/render_racer.h"
+#include "compare/racer.h"
 
 #include <fmt/format.h>
 
@@ -9,15 +9,20 @@
 #include "common/base/clock.h"
 #include "common/image/film/film.h"
 #include "compare/picture.h"
+#include "worker/render/render.h"
 
 namespace ls::race {
 namespace {
+
+// A round that was cut to the time left is not rendered if it would add less than 1 / kLeastShare of the
+// existing samples.
+constexpr std::uint64_t kLeastShare = 16;
 
 // Wall seconds after which a turn ends, unless the round ends earlier: long enough that waiting for the last
 // tile is a small part of the turn, and short enough that changes of the machine's speed affect all racers.
 constexpr double kTurnSeconds = 1;
 
-// Runs `work` on this many threads; returns their total CPU seconds.
+// Runs `work` on `threads` threads at once; returns their total CPU seconds.
 template <class Work>
 double on_threads(int threads, const Work& work) {
   std::mutex mutex;
@@ -38,10 +43,9 @@ double on_threads(int threads, const Work& work) {
 
 class RenderRacer final : public Racer {
  public:
-  RenderRacer(RenderEntry entry, const Conditions& conditions, const Clock& clock)
+  RenderRacer(RenderEntry entry, const Conditions& conditions)
       : entry_(std::move(entry)),
         conditions_(conditions),
-        clock_(clock),
         film_(entry_.grid),
         sums_(2 * values(), 0.),
         range_(next_range(0, 0, conditions.time, conditions.most_spp)) {
@@ -156,8 +160,8 @@ class RenderRacer final : public Racer {
     return keep(file("b"), means(1, 2, spp / 2));
   }
 
-  // Returns the mean image of one half of the samples, A (0, 1) or B (1, 2), or of both (0, 2), given as the
-  // range [from, to) of their indices. The range has `samples` samples per pixel in total.
+  // Returns the mean image of the halves [from, to) of the samples: [0, 1) is half A, [1, 2) is half B, and
+  // [0, 2) is both. `samples` is the number of these samples per pixel.
   Pixels means(std::size_t from, std::size_t to, std::uint64_t samples) const {
     Pixels out(values());
     for (std::size_t i = 0; i < out.size(); ++i) {
@@ -170,12 +174,12 @@ class RenderRacer final : public Racer {
 
   const RenderEntry entry_;
   const Conditions conditions_;
-  const Clock& clock_;
+  const SystemClock clock_;
 
   // guards the data shared by the threads of a turn: film_, sums_, health_, next_tile_, trouble_
   std::mutex mutex_;
   Film film_;
-  std::vector<double> sums_;  // of half A, then of half B; interleaved
+  std::vector<double> sums_;  // of half A, then of half B; R, G, B interleaved
   Health health_;
   TileIndex next_tile_ = 0;
   std::optional<Error> trouble_;
@@ -189,9 +193,36 @@ class RenderRacer final : public Racer {
 
 }  // namespace
 
-std::unique_ptr<Racer> make_render_racer(RenderEntry entry, const Conditions& conditions,
-                                         const Clock& clock) {
-  return std::make_unique<RenderRacer>(std::move(entry), conditions, clock);
+std::optional<std::size_t> next_turn(std::span<const Turn> turns, std::size_t lap) {
+  std::optional<std::size_t> best;
+  const auto middle = [&](std::size_t i) { return turns[i].used + turns[i].expected / 2; };
+  for (std::size_t k = 0; k < turns.size(); ++k) {
+    const std::size_t i = (k + lap) % turns.size();
+    if (turns[i].done) continue;
+    if (!best || middle(i) < middle(*best)) best = i;
+  }
+  return best;
+}
+
+std::optional<SampleRange> next_range(RoundIndex k, double seconds_per_sample, double seconds_left,
+                                      std::uint64_t most_spp) {
+  SampleRange range = round_range(k);
+  const std::uint64_t most = even_spp(most_spp);
+  if (range.s0 >= most) return std::nullopt;
+  range.s1 = std::min(range.s1, most);
+  if (k == 0) return range;
+  if (!(seconds_left > 0)) return std::nullopt;
+  const double fits = seconds_left / seconds_per_sample;
+  if (fits >= static_cast<double>(range.count())) return range;
+  const auto whole = static_cast<std::uint64_t>(fits);
+  const std::uint64_t count = whole - whole % 2;
+  if (count < 2 || count * kLeastShare < range.s0) return std::nullopt;
+  range.s1 = range.s0 + count;
+  return range;
+}
+
+std::unique_ptr<Racer> make_render_racer(RenderEntry entry, const Conditions& conditions) {
+  return std::make_unique<RenderRacer>(std::move(entry), conditions);
 }
 
 }  // namespace ls::race

@@ -1,4 +1,4 @@
-#include "cli/doctor/machine_facts.h"
+#include "cli/doctor/facts.h"
 
 #include <fcntl.h>
 #include <sys/resource.h>
@@ -9,6 +9,9 @@
 #include <cstdlib>
 #include <fstream>
 
+#include "cli/farm/farm_api.h"
+#include "cli/output/reply_fields.h"
+#include "common/base/clock.h"
 #include "common/base/spawn.h"
 #include "common/denoise/denoiser.h"
 #include "worker/machine.h"
@@ -18,6 +21,7 @@ namespace ls::cli {
 namespace {
 
 namespace fs = std::filesystem;
+using nlohmann::json;
 
 enum ProbeBits : int { kProbed = 64, kCalls = 1, kFiles = 2, kSizes = 4 };
 
@@ -72,6 +76,81 @@ FolderFacts observe_folder(const std::string& name, const fs::path& path) {
   return facts;
 }
 
+// Removes user and password: "https://user:password@host" becomes "https://host".
+std::string without_password(const std::string& url) {
+  const std::size_t start = url.find("://");
+  const std::size_t host = start == std::string::npos ? 0 : start + 3;
+  const std::size_t end = std::min(url.find('/', host), url.size());
+  const std::size_t at = url.substr(0, end).rfind('@');
+  return at == std::string::npos || at < host ? url : url.substr(0, host) + url.substr(at + 1);
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+    text.replace(at, from.size(), to);
+  return text;
+}
+
+std::vector<WorkerFacts> workers_of(const json& answer) {
+  std::vector<WorkerFacts> all;
+  for (const json& w : objects_field(answer, "workers"))
+    all.push_back({text_field(w, "name"), text_field(w, "state"), text_field(w, "build"),
+                   text_field(w, "numeric_class"), flag_field(w, "fake")});
+  return all;
+}
+
+void ask_readiness(HttpClient& client, FarmFacts& facts) {
+  const auto ready = client.request("GET", "/readyz");
+  if (!ready) {
+    facts.not_ready = ready.error().message;
+  } else if (ready->status / 100 != 2) {
+    facts.not_ready = problem_of(*ready).error.message;
+  } else if (ready->body != "ready\n") {
+    facts.remark = ready->body.substr(0, ready->body.find('\n'));
+  }
+}
+
+void ask_session(HttpClient& client, FarmFacts& facts) {
+  const auto session = client.request("GET", "/api/v1/session");
+  if (!session) {
+    facts.session_trouble = session.error().message;
+    return;
+  }
+  facts.session_status = session->status;
+  const json answer = json::parse(session->body, nullptr, false);
+  if (session->status / 100 != 2 || !answer.is_object()) {
+    facts.session_trouble = problem_of(*session).error.message;
+    return;
+  }
+  facts.role = text_field(answer, "role");
+  facts.user = text_field(answer, "user");
+  facts.version = text_field(answer, "version");
+  const auto workers = client.request("GET", "/api/v1/workers");
+  if (!workers || workers->status / 100 != 2) return;
+  if (const json list = json::parse(workers->body, nullptr, false); list.is_object())
+    facts.workers = workers_of(list);
+}
+
+Result<FarmFacts> observe_one(const HttpClient::Options& connection) {
+  auto client = HttpClient::open(connection);
+  if (!client) return tl::unexpected(client.error());
+  FarmFacts facts;
+  facts.has_token = !connection.token.empty();
+  facts.asked_at = system_unix_seconds();
+  const auto health = client->request("GET", "/healthz");
+  facts.answered_at = system_unix_seconds();
+  if (!health) {
+    facts.trouble = health.error().message;
+    return facts;
+  }
+  facts.date = health->date;
+  facts.is_coordinator = health->status == 200 && health->body == "ok\n";
+  if (!facts.is_coordinator) return facts;
+  ask_readiness(*client, facts);
+  if (facts.has_token) ask_session(*client, facts);
+  return facts;
+}
+
 }  // namespace
 
 int run_sandbox_probe() {
@@ -99,6 +178,22 @@ MachineFacts observe_machine(const fs::path& cache, const fs::path& data) {
   facts.folders.push_back(observe_folder("cache", cache.empty() ? worker::default_cache() : cache));
   if (!data.empty()) facts.folders.push_back(observe_folder("data", data));
   return facts;
+}
+
+Result<std::vector<FarmFacts>> observe_farm(const HttpClient::Options& connection) {
+  std::vector<FarmFacts> all;
+  HttpClient::Options one = connection;
+  for (const std::string& url : addresses_in(connection.url)) {
+    one.url = url;
+    const std::string shown = without_password(url);
+    auto facts = observe_one(one);
+    if (!facts) return fail(facts.error().code, replaced(facts.error().message, url, shown));
+    facts->url = shown;
+    for (std::string* text : {&facts->trouble, &facts->not_ready, &facts->session_trouble})
+      *text = replaced(*text, url, shown);
+    all.push_back(std::move(*facts));
+  }
+  return all;
 }
 
 }  // namespace ls::cli

@@ -1,0 +1,73 @@
+// Facts for `lightshaft doctor`: about this machine, and about a farm, read from the coordinator's HTTP
+// interface by GET requests only. Observing them changes nothing.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/farm/http_client.h"
+#include "worker/child/sandbox.h"
+
+namespace ls::cli {
+
+struct FolderFacts {
+  std::string name;  // purpose of the folder: "cache"
+  std::filesystem::path path;
+  bool usable = false;  // true if a writable folder exists there or can be created
+  std::uint64_t free_bytes = 0;
+};
+
+struct MachineFacts {
+  std::string processor_target;  // processor for which the program was compiled: "x86-64-v3"
+  bool processor_fits = false;
+  // Numeric class of `lightshaft render` on this machine, in hexadecimal: machines of one class render the
+  // same bits.
+  std::string numeric_class;
+  std::uint64_t memory_bytes = 0;
+  int cpus = 0;
+  double cpu_quota = 0;  // number of CPUs that the control group allows; 0: no limit
+  std::uint64_t file_limit = 0;
+  // Which restrictions the sandbox can put in place on this machine; nullopt: this could not be tried
+  std::optional<worker::child::Sandboxed> sandbox;
+  std::filesystem::path vdb_program;
+  bool vdb_found = false;
+  std::string denoiser, denoiser_trouble;  // name of the denoiser, or why there is none
+  std::filesystem::path redis_server;      // path of redis-server; empty: not in PATH
+  std::vector<FolderFacts> folders;
+};
+
+MachineFacts observe_machine(const std::filesystem::path& cache, const std::filesystem::path& data);
+
+// Entering the sandbox is tried in a separate process, since a process cannot leave it again. That process is
+// this program with this flag; its exit code is the result.
+inline constexpr const char* kSandboxProbeFlag = "--sandbox-probe";
+int run_sandbox_probe();
+
+struct WorkerFacts {
+  std::string name, state, version, numeric_class;
+  bool fake = false;
+};
+
+struct FarmFacts {
+  std::string url;  // address without user and password
+  bool has_token = false;
+  std::string trouble;            // why there was no answer; empty: there was an answer
+  bool is_coordinator = false;    // true if a coordinator answered
+  std::string not_ready, remark;  // from /readyz: why the coordinator cannot take jobs; another remark
+  // In seconds since 1970: this machine's clock before and after the request, and the coordinator's clock,
+  // from the header Date of its answer.
+  double asked_at = 0, answered_at = 0;
+  std::optional<std::int64_t> date;
+  int session_status = 0;  // HTTP status of GET /api/v1/session, which returns the token's role
+  std::string session_trouble, role, user, version;
+  std::optional<std::vector<WorkerFacts>> workers;
+};
+
+// Returns one result for each address of `connection`. invalid_argument: an address or the CA file cannot be
+// used.
+Result<std::vector<FarmFacts>> observe_farm(const HttpClient::Options& connection);
+
+}  // namespace ls::cli

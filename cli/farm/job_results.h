@@ -1,0 +1,40 @@
+// Follows a job of a farm until it ends, and downloads its results to local files.
+#pragma once
+
+#include <string>
+
+#include "cli/farm/farm_api.h"
+#include "cli/output/progress.h"
+
+namespace ls::cli {
+
+struct WatchOptions {
+  bool quiet = false;
+  bool json = false;  // print the job as a line of JSON on stdout after each change
+};
+// Waits until the job `id` ends and returns the job. If the coordinator cannot be reached, as during a
+// restart, keeps trying for a while (RetryPolicy), and then returns the error.
+FarmApi::Answer<nlohmann::json> watch_job(FarmApi& api, const std::string& id, const WatchOptions& options);
+
+ProgressFigures progress_of(const nlohmann::json& job);
+
+// Prints how a job ended. If it is done, prints the error of its image (with `quiet` only if the error cannot
+// be trusted) and returns kOk; otherwise prints the reason and returns kFailed.
+int print_end(const nlohmann::json& job, bool quiet);
+// Prints the error of the denoised image of a job that is done; it is in the job's report only. Prints
+// nothing if no denoising was requested.
+void print_denoised(FarmApi& api, const nlohmann::json& job);
+
+struct Results {
+  // File names; empty: not wanted. A run of # is replaced by the frame number
+  std::string image, report, html;
+  bool json = false;     // print each file as a line of JSON on stdout
+  bool patient = false;  // keep trying for a while if the coordinator is unreachable
+};
+
+// Downloads the results of job `id`; returns the exit code. For a sequence (a job with several frames),
+// downloads every frame that has data; if any has none, prints the numbers of those frames and returns
+// kFailed. A report name without # gets one report for the whole sequence.
+int fetch_results(FarmApi& api, const std::string& id, const Results& results);
+
+}  // namespace ls::cli
