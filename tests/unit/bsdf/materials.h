@@ -1,4 +1,4 @@
-// Scenes of one material each, for the tests of this folder.
+// Scenes with one material each, for the tests of this folder.
 #pragma once
 
 #include <fmt/format.h>
@@ -18,7 +18,7 @@ struct Bench {
   TextureTable textures;
   BsdfTable bsdfs;
   BsdfIndex bsdf;
-  UvPoint at{{.4f, .55f}, {2, 0, 0}, {-.5f, 1.5f, 0}};  // as in make_oracle.py
+  UvPoint at{{.4f, .55f}, {2, 0, 0}, {-.5f, 1.5f, 0}};  // the same as in make_oracle.py
 
   BsdfEval eval(const V3& wo, const V3& wi) const { return bsdfs.eval(bsdf, at, wo, wi); }
   std::optional<BsdfSample> sample(const V3& wo, float u_lobe, const V2& u) const {
@@ -37,7 +37,7 @@ inline BsdfIndex add(Scene& s, const Bsdf& b) {
   return {static_cast<std::uint32_t>(s.bsdfs.size() - 1)};
 }
 
-// Ready to evaluate its last material. `image` is what its files hold.
+// The scene, ready to evaluate its last material. `image` is the content of all its image files.
 inline std::unique_ptr<Bench> bench(Scene scene, const ImageData& image = {}) {
   auto b = std::make_unique<Bench>();
   b->scene = std::move(scene);
@@ -63,7 +63,7 @@ inline double seconds_to_build(Scene scene, int count) {
   return thread_cpu_seconds() - start;
 }
 
-// True if shadow rays must ask the material what passes straight through it.
+// True if light may pass straight through, so that shadow rays must ask the material.
 inline bool passes_light(const Bench& b) { return scene::bsdf_traits(b.scene)->at(b.bsdf.value).passes; }
 
 inline const Rgb kGoldEta{.14, .37, 1.44}, kGoldK{3.98, 2.38, 1.60};
@@ -129,7 +129,7 @@ inline Scene rough_sheet(Microfacet d, double au, double av, double ior, const R
                                  texture(s, transmittance)});
   return s;
 }
-// Burley's, by the dialect's parameters.
+// The parameters of the principled material.
 struct PrincipledValues {
   double roughness = .5, anisotropic = 0, metallic = 0, spec_trans = 0, eta = 1.5, spec_tint = 0, sheen = 0,
          sheen_tint = 0, flatness = 0, clearcoat = 0, clearcoat_gloss = 0;

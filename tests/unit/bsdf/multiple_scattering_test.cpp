@@ -1,4 +1,5 @@
-// Compensation of the light that microfacets throw onto each other: white furnaces, and what it leaves alone.
+// Compensation of the light that scatters several times between microfacets: white furnaces, and what it must
+// not change.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -25,7 +26,7 @@ Scene compensated(Scene s) {
   return s;
 }
 
-// Energy that leaves, of a unit that comes along wo, by random samples.
+// The share of the energy from wo that leaves, estimated by random samples.
 struct Mean {
   double value, error;
 };
@@ -44,15 +45,15 @@ Mean albedo_along(const Bench& b, const V3& wo) {
   const double mean = sum / kSamples;
   return {mean, std::sqrt(std::max(0., square / kSamples - mean * mean) / kSamples)};
 }
-// 5 standard errors: once in 1.7 million; the errors are such that a loss of 2 % (single scattering loses up
-// to 70) shows.
+// Allows 5 standard errors, which are exceeded once in 1.7 million cases. They are small enough to show a
+// loss of 2 %; single scattering loses up to 70 %.
 void expect_white(const Bench& b, const V3& wo, double tolerance, const std::string& what) {
   const Mean e = albedo_along(b, wo);
   EXPECT_NEAR(e.value, 1, tolerance + 5 * e.error) << what << " at " << wo.z;
   EXPECT_LT(e.error, .006) << what << " at " << wo.z;
 }
 
-// Seen from above, single scattering off GGX of roughness 1 keeps 1 - ln 2 of the light.
+// Seen from above, single scattering by GGX facets of roughness 1 reflects 1 - ln 2 of the light.
 TEST(MultipleScattering, WithoutItWhiteGgxOfRoughnessOneKeepsOneLessLogTwo) {
   const auto b = bench(rough_metal(Microfacet::ggx, 1, 1, {0, 0, 0}, {1, 1, 1}));
   const Mean e = albedo_along(*b, {0, 0, 1});
@@ -61,7 +62,7 @@ TEST(MultipleScattering, WithoutItWhiteGgxOfRoughnessOneKeepsOneLessLogTwo) {
   EXPECT_NEAR(rough_share(Way::mirrored, Microfacet::ggx, 1, 1, 1, q), 1 - std::log(2.), 1e-5);
 }
 
-// The tables, and the quadrature that they are made by, against one of 16 times as many nodes.
+// Tests the tables, and the quadrature behind them, against a quadrature with 16 times as many nodes.
 TEST(MultipleScattering, TablesKeepAllWithinTheirTolerance) {
   static const Quadrature fine = gauss_legendre(400);
   for (const auto& [d, name] : kDistributions)
@@ -73,7 +74,7 @@ TEST(MultipleScattering, TablesKeepAllWithinTheirTolerance) {
                    ? 1.
                    : double{beckmann::G1_over_cos(w, a, a)} / double{beckmann::exact_G1_over_cos(w, a, a)};
       };
-      const double rough = double{static_cast<float>(alpha)};  // as materials have it
+      const double rough = double{static_cast<float>(alpha)};  // rounded as in materials
       const MicrofacetEnergy metal = conductor_energy(d, rough), glass = dielectric_energy(d, rough, 1.5);
       for (const double mu : {.97, .76, .74, .33, .03, 2e-3}) {
         const auto E = [&](Way way, double eta) {
@@ -120,8 +121,8 @@ TEST(MultipleScattering, AWhitePlasticKeepsAll) {
     }
 }
 
-// A metal that absorbs gains less than a white one, and the more it absorbs the less; with tints as with
-// indices. The series: each return brings F (1 - E_mean) more.
+// A metal that absorbs gains less from compensation than a white one, whether by its tint or by its index.
+// `gain` is summed as a series, in which each further bounce has the factor F (1 - E_mean).
 TEST(MultipleScattering, AMetalGainsByItsOwnReflectance) {
   const MicrofacetEnergy e = conductor_energy(Microfacet::ggx, .8);
   const float mu = .6f, missing = e.missing.at(mu), E = 1 / (1 + missing);
@@ -142,7 +143,8 @@ TEST(MultipleScattering, AMetalGainsByItsOwnReflectance) {
   EXPECT_GT(after.z, before.z);
 }
 
-// Only values change: samples and their densities are the same, so all that holds of them holds here.
+// Compensation changes only values. Samples and their densities stay the same, so tests of them without
+// compensation apply.
 TEST(MultipleScattering, LeavesSamplingAlone) {
   const Scene all[] = {rough_metal(Microfacet::ggx, .4, .4, kGoldEta, kGoldK),
                        rough_glass(Microfacet::beckmann, .3, .3, 1.5, 1)};
@@ -190,7 +192,7 @@ TEST(MultipleScattering, TablesAreAsGoodAsTheySay) {
     const double x = i / 5000.;
     EXPECT_NEAR(t.at(static_cast<float>(x)), f(x), x > 1e-4 ? 1.1e-3 : 2e-3) << x;
   }
-  // 2 int x (sqrt x + .2 (x - .3)+) dx
+  // The mean is 2 int x (sqrt x + .2 max(0, x - .3)) dx
   EXPECT_NEAR(t.mean(), .8 + 2 * .2 * ((1 - .027) / 3 - .3 * (1 - .09) / 2), 1e-3);
   EXPECT_LT(t.bytes(), 4096u);
 }

@@ -13,7 +13,7 @@ namespace ls::render {
 using Size = std::array<int, 3>;
 inline constexpr VolumeFilter kNearest = VolumeFilter::nearest, kTrilinear = VolumeFilter::trilinear;
 
-// Nodes at integer points of the world; the domain may reach beyond them.
+// Nodes at integer points of the world; the domain may extend beyond them.
 inline Grid unit_grid(Size n, std::vector<float> v, double beyond = 0, double sigma = 1) {
   return {n,
           std::move(v),
@@ -22,11 +22,11 @@ inline Grid unit_grid(Size n, std::vector<float> v, double beyond = 0, double si
           V3d(n[0] - 1 + beyond, n[1] - 1 + beyond, n[2] - 1 + beyond),
           sigma};
 }
-// Voxels of width 1 with their centres at integer points, as a .vol file's.
+// Voxels of width 1 with their centres at integer points, as in a .vol file.
 inline Grid voxel_grid(Size n, std::vector<float> v, VolumeFilter filter, Wrap wrap, double sigma = 1) {
   return {n, std::move(v), Affine(), V3d(-.5), V3d(n[0] - .5, n[1] - .5, n[2] - .5), sigma, filter, wrap};
 }
-// At a point of the world: repeated grids have index coordinates of their own.
+// The value at a point of the world, also outside of a grid that repeats.
 inline float value_at(const Grid& g, const V3& p) { return g.value_anywhere(g.to_index(p)); }
 inline std::vector<float> random_values(Size n, unsigned seed, bool sparse = false) {
   std::mt19937 rng(seed);

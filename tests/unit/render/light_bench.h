@@ -1,4 +1,4 @@
-// Scenes of lights, and the irradiance that their own sampling gives.
+// Scenes of lights, and the irradiance that sampling these lights gives.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,13 +12,13 @@
 
 namespace ls::render {
 
-// From numbers in [0, 1).
+// The words of numbers in [0, 1).
 inline LightNumbers numbers(float light, float x, float y) {
   const auto bits = [](float f) { return static_cast<std::uint32_t>(f * 0x1p32f); };
   return {bits(light), bits(x), bits(y)};
 }
 
-// A scene of one light; its world, and points given in scene coordinates.
+// The world of a scene of one light, in which points are given in scene coordinates.
 struct LightBench {
   std::shared_ptr<const World> world;
   explicit LightBench(const test::SceneBuilder& builder) : world(test::world_of(builder)) {}
@@ -27,7 +27,8 @@ struct LightBench {
   struct Irradiance {
     double mean, se;
   };
-  // On a plane through x with normal n, over a stratified square of light samples.
+  // Estimates the irradiance on a plane through x with the normal n, with a stratified square of light
+  // samples.
   Irradiance irradiance(const V3d& x, const V3& n, int side = 128) const {
     RandomStream r(11);
     double sum = 0, square = 0;
@@ -40,8 +41,8 @@ struct LightBench {
       square += e * e;
     }
     const double count = double{1} * side * side, mean = sum / count;
-    return {mean,
-            std::sqrt(std::max(0., square / count - mean * mean) / count)};  // of unstratified samples: more
+    // The error is that of unstratified samples, an upper bound.
+    return {mean, std::sqrt(std::max(0., square / count - mean * mean) / count)};
   }
 };
 inline test::SceneBuilder area(const ls::Geometry& g, const Transform& t, bool flip = false) {
@@ -49,8 +50,8 @@ inline test::SceneBuilder area(const ls::Geometry& g, const Transform& t, bool f
   builder.lamp(g, t).flip_normals = flip;
   return builder;
 }
-// 5 standard errors of what independent samples would give, and float32 (the light's offset from its own
-// surface: 2^-20 of the world).
+// Allows 5 standard errors of independent samples, and float32 rounding (the light's offset from its own
+// surface is 2^-20 of the world's size).
 inline void expect_close(const LightBench::Irradiance& e, double expected) {
   EXPECT_NEAR(e.mean, expected, 5 * e.se + expected * 1e-5);
   EXPECT_LT(e.se, .02 * expected);

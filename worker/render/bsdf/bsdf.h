@@ -48,8 +48,8 @@ struct BsdfSample {
 
 struct NullTransmission {
   C3 transmission{0, 0, 0};  // share of light that passes straight through
-  // The probability with which a path should pass straight through. It is below 1 wherever the surface can
-  // also scatter otherwise.
+  // The probability with which a path should pass straight through. It is below 1 wherever the surface also
+  // scatters light, so that paths can do either.
   float probability = 0;
 };
 

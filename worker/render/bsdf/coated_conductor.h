@@ -1,29 +1,28 @@
 // Metals under a dielectric coat that absorbs nothing. Coat and metal are each smooth or have GGX facets.
 //
-// Let F be the coat's reflectance for light from outside, T = 1 - F its transmittance, and R the metal's
-// reflectance relative to the coat's index, at the refracted angle. By reciprocity the coat reflects the
-// share F of light that meets it from inside at the refracted angle. If both are smooth, the sum over all
-// inner reflections is exact:
+// Let F be the coat's reflectance for light from outside and T = 1 - F its transmittance. Let R be the
+// metal's reflectance at the refracted angle, for an index relative to the coat's. By reciprocity the coat
+// also reflects the share F of light that meets it from inside at the refracted angle. If coat and metal are
+// smooth, the sum over all inner reflections is exact:
 //
 //   R_all = F + T R T + T R F R T + ... = F + T^2 R / (1 - F R).
 //
-// Otherwise the value has three parts (docs/design/coated-metal.md says how far they are from the exact
-// ones):
+// Otherwise the value has three parts (docs/design/coated-metal.md gives their errors):
 //
 //   coat     The reflection of the coat: F D G / (4 cos cos), or a delta if the coat is smooth.
 //   metal    T_o T_i / n^2 times the value of the metal's facets between the two refracted directions, times
-//            the series 1 / (1 - (1 - T) R) with T = max(T_o, T_i). 1 / n^2 is the ratio of the projected
-//            solid angles inside and outside. Under a smooth coat the first term of the series is exact. A
-//            rough coat is a plane for the directions; it adds (n - 1)^2 / (2 n^2) times its squared
-//            roughness to that of the metal, which is what two refractions add to the variance of the slope
-//            in the limit of small slopes.
+//            the series 1 / (1 - (1 - T) R) with T = max(T_o, T_i). n is the coat's index, and 1 / n^2 is the
+//            ratio of the projected solid angles inside and outside. Under a smooth coat the first term of
+//            the series is exact. A rough coat refracts directions as a plane does, but (n - 1)^2 / (2 n^2)
+//            times its squared roughness is added to the metal's: two refractions add this to the variance of
+//            the slope, in the limit of small slopes.
 //   rest     Light that the metal reflects beyond the cone of refraction, or that the series above leaves
-//            out: it stays in the coat, and leaves it after more reflections as Q(wo) Q(wi) / (pi Q_mean),
-//            where Q(w) is the share of the light from w that stays. This form is reciprocal and gives back
-//            the energy Q (Kulla and Conty 2017).
+//            out. It stays in the coat at first, and leaves it after more reflections as
+//            Q(wo) Q(wi) / (pi Q_mean), where Q(w) is the share of the light from w that stays. This form is
+//            reciprocal and returns the energy Q (Kulla and Conty 2017).
 //
-// For a white metal the three sum to 1 less what single scattering between the metal's facets loses, and
-// that is how much a roughconductor loses, too. T and Q are tabulated over the cosine.
+// For a white metal the three parts sum to 1 minus the light that single scattering between the metal's
+// facets loses; a roughconductor loses as much. T and Q are tabulated over the cosine.
 #pragma once
 
 #include "worker/render/bsdf/conductor.h"
@@ -50,9 +49,10 @@ struct CoatedConductor : Conductor {
 struct RoughCoatedConductor : CoatedConductor {
   static constexpr bool kSmooth = true;
   bool coat_is_smooth = true;
-  Microfacets coat, base;  // the base's facets are those that are seen through the coat
+  // The base is the metal; its roughness includes what the refractions of a rough coat add.
+  Microfacets coat, base;
   CoatedConductorTables tables;
-  C3 mean_fresnel{1, 1, 1};  // of the metal, without its tint
+  C3 mean_fresnel{1, 1, 1};  // the metal's, without its tint
 
   bool anisotropic() const { return base.ax != base.ay; }
   struct Shares {

@@ -25,8 +25,8 @@ struct Conductor : MaterialKind {
 struct RoughConductor : Conductor {
   static constexpr bool kSmooth = true;
   Roughness roughness;
-  const MicrofacetEnergy* energy = nullptr;  // only with multiple_scattering
-  C3 mean_fresnel{1, 1, 1};                  // only with multiple_scattering
+  const MicrofacetEnergy* energy = nullptr;  // null unless the material has multiple_scattering
+  C3 mean_fresnel{1, 1, 1};                  // set only with multiple_scattering
 
   bool reads_uv() const { return any_texture(tint, roughness.u, roughness.v); }
   bool anisotropic() const { return !roughness.same_along_both(); }

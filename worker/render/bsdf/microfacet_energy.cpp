@@ -10,11 +10,11 @@
 namespace ls::render {
 namespace {
 
-// A table starts with kOctaves octaves between powers of two, since near grazing angles the functions vary
-// on the scale of alpha, which is at least 1/1024. Each interval is halved at most kDeepest times: the error
-// of linear interpolation falls with the square of the width, so with 2^12 parts it reaches the resolution
-// of float32. A table with kMostEntries entries is not refined further, because at extreme roughnesses the
-// functions consist of rounding noise.
+// The first nodes of a table are 0 and the powers of two from 2^-kOctaves to 1, since near grazing angles the
+// functions vary on the scale of alpha, which is at least 1/1024. Each interval is halved at most kDeepest
+// times: the error of linear interpolation falls with the square of the width, so with 2^12 parts it reaches
+// the resolution of float32. A table with kMostEntries entries is not refined further, because at extreme
+// roughnesses the functions consist of rounding noise.
 constexpr int kOctaves = 16, kDeepest = 12;
 constexpr std::size_t kMostEntries = 1024;
 

@@ -70,8 +70,8 @@ struct CoatedConductorTables {
   CosineTable through, reflected;  // T and F over the cosine outside; only of a rough coat
   CosineTable staying;             // Q
   float staying_mean = 0;          // 2 int Q mu dmu
-  // Shares of diffuse light inside the coat: the coat reflects `internal` and lets out `leaving`, and the
-  // metal's facets keep `metal_albedo`
+  // Shares of diffuse light inside the coat: the coat reflects `internal` and transmits `leaving`, and a
+  // metal that absorbs nothing reflects `metal_albedo`, since its facets mask the rest.
   float internal = 0, leaving = 1, metal_albedo = 1;
 };
 

@@ -172,8 +172,8 @@ struct Mapped : MaterialKind {
     const float a2 = std::min(.125f * (n.x * n.x + n.y * n.y) / (n.z * n.z), 1.f);
     return a2 > 0 ? 2 / (1 + std::sqrt(1 + a2 * (wi.x * wi.x + wi.y * wi.y) / (wi.z * wi.z))) : 1;
   }
-  // True if one direction, with the components a in one frame and b in another, is on the same side of the
-  // surface in both. Callers drop other directions, along which light would leak through the surface.
+  // True if a direction is on the same side of the surface in two frames; a and b are its components in them.
+  // Callers drop other directions, along which light would leak through the surface.
   static bool same_side(const V3& a, const V3& b) { return a.z * b.z > 0; }
 };
 

@@ -93,7 +93,7 @@ class Finder {
     ++marks_;
     SurfaceInfo& s = g_.surfaces[surface];
     s.coincident_reach = std::max(s.coincident_reach, static_cast<float>(reach));
-    if (!own) return;  // a hit in an instance computes its reach itself
+    if (!own) return;  // hits in instances compute their own reach
     if (!(s.reach > 0)) {
       const Parts& p = shapes_[surface];
       for (std::uint32_t i = 0; i < p.triangles; ++i) s.reach = std::max(s.reach, g_.reach_of(p.first + i));

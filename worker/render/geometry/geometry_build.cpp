@@ -19,8 +19,8 @@ namespace {
 // is inside out).
 float orientation_of(const Shape& shape, bool vertex_normals) {
   float sign = shape.flip_normals ? -1.f : 1.f;
-  // A rectangle's normal is its transformed +z axis, and a mesh with normals follows these. Mirroring
-  // reverses the winding.
+  // Mirroring reverses the winding, but not the normals of rectangles and cubes, nor those of a mesh with
+  // vertex normals. A mirrored sphere is inside out.
   const bool follows = std::holds_alternative<RectangleShape>(shape.geometry) ||
                        std::holds_alternative<CubeShape>(shape.geometry) ||
                        std::holds_alternative<SphereShape>(shape.geometry) || vertex_normals;

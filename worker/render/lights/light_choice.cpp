@@ -12,8 +12,8 @@ namespace {
 // The smallest number of lights with a position for which the tree is used
 // (docs/decisions/0008-many-lights.md). With fewer, the table is used alone.
 constexpr std::ptrdiff_t kTreeFrom = 32;
-// Every kTableShare-th of the words that choose lights in the tree chooses by the table instead. So no light
-// gets less than 1/16 of its probability in the table.
+// Of the words that choose lights in the tree, every kTableShare-th uses the table instead. So no light gets
+// less than 1/16 of its probability in the table.
 constexpr std::uint64_t kTableShare = 16;
 
 }  // namespace

@@ -43,7 +43,7 @@ class LocalLights {
   // lights.
   LocalLights(const LightVisits& visits, std::span<const double> table);
 
-  // True if places in media were visited. Else lights can be chosen for places on surfaces alone.
+  // True if places in media were visited. If not, lights can be chosen only for places on surfaces.
   bool in_media() const { return in_media_; }
   // Chooses a light for the point p on a surface of normal n, or in a medium (n = 0), by a random word.
   DrawnLight draw(std::uint32_t word, const V3& p, const V3& n) const;
@@ -56,8 +56,8 @@ class LocalLights {
   static constexpr std::uint8_t kLeaf = 3;
   struct Node {
     float plane = 0;
-    std::uint32_t next =
-        0;  // index of the child below the plane; the child above follows it. Leaf: start of its table
+    // Index of the child below the plane; the child above follows it. For a leaf: start of its table
+    std::uint32_t next = 0;
     std::uint8_t axis = kLeaf;  // of the plane
   };
   struct Builder;

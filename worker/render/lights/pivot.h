@@ -7,7 +7,8 @@ namespace ls::render {
 
 struct Pivot {
   V3 p;
-  // All light leaves p at a cosine of at least cos_reach to the axis, a unit vector. -1: in all directions.
+  // Light leaves p only in directions whose cosine to the axis, a unit vector, is at least cos_reach. -1: in
+  // all directions.
   V3 axis{0, 0, 0};
   float cos_reach = -1;
 

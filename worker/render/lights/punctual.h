@@ -106,8 +106,8 @@ struct ProjectorLight : Punctual<ProjectorLight> {
   }
   LightBounds bounds(const LightWorld& world) const {
     LightBounds b = bounds_of(value * world.textures.mean(image));
-    // The mean over its directions: towards the corners of a wide image the intensity is far higher than
-    // along the axis (see towards()).
+    // The mean intensity over all directions of the image is used: towards the corners of a wide image the
+    // intensity is far higher than along the axis (see towards()).
     if (!even) b.intensity *= area() / solid_angle();
     b.axis = axis;
     b.cos_spread = cos_corner();

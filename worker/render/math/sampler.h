@@ -52,7 +52,7 @@ class SampleStream {
   SampleStream(std::uint64_t seed, std::uint32_t x, std::uint32_t y, std::uint64_t sample)
       : SampleStream(combine(combine(seed, (std::uint64_t{y} << 32) | x), sample & 1), sample >> 1) {}
 
-  // Returns the random numbers of the second path, where a path with these numbers splits into two.
+  // Where a path splits in two, the first continues with this stream; returns the stream of the second.
   SampleStream of_branch() const {
     SampleStream s(*this);
     s.sequence_ = combine(sequence_, kBranch);

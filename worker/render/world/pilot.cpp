@@ -22,7 +22,8 @@ constexpr std::uint64_t kFewestPaths = 16;
 // Number of pixels from which the noise is estimated, and of samples of each
 constexpr std::uint64_t kNoisePixels = 128;
 constexpr std::uint64_t kNoiseSamples = 16;
-// pilot_pays(): the smallest frame, in pixels, and the largest number of shapes that light passes
+// pilot_pays() is false for frames of fewer pixels than kPilotFrame, and for scenes in which light passes
+// through more than kPilotBoundaries shapes.
 constexpr std::uint64_t kPilotFrame = 256;
 constexpr std::ptrdiff_t kPilotBoundaries = 64;
 

@@ -12,8 +12,9 @@
 
 namespace ls::render {
 
-// The smallest probability with which a shadow ray is traced. In pixels of any brightness, roulette adds to
-// the variance at most 1 / kLeastTraced - 1 times the second moment of the light that is found.
+// The smallest probability with which a shadow ray is traced. It limits the noise: in pixels of any
+// brightness, roulette adds to the variance at most 1 / kLeastTraced - 1 times the second moment of the light
+// that the shadow rays find.
 inline constexpr float kLeastTraced = .25f;
 // Shadow rays that could add less than this share of the mean radiance are subject to Russian roulette.
 inline constexpr float kFaintShadowRay = 1;

@@ -17,7 +17,7 @@ void learn_sky_samples(const IntegratorSettings& settings, World& w) {
       is_black(w.lights.constant_environment()))
     return;
   if (!w.depth_allows(1)) return;
-  // Paths that end after two segments are scattered once at most.
+  // Paths of two segments are scattered at most once, so they find direct light only.
   const bool hide_emitters = std::exchange(w.hide_emitters, true);
   const auto all = pilot_radiance(w, 2);
   const C3 sky = w.lights.exchange_constant_environment(C3(0));

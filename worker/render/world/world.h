@@ -63,7 +63,7 @@ class World {
   MisHeuristic heuristic = MisHeuristic::power;
   // With Features::aimed:
   Lamps lamps;                // lights without extent, near which directions are also sampled
-  bool lamp_flights = false;  // a share of the flights through homogeneous media end near lamps
+  bool lamp_flights = false;  // true if a share of the flights through homogeneous media ends near lamps
   int camera_points = 0;      // number of points on a segment (camera_segment_nee.h); 0: none
   // With Features::connected:
   Lights::Directional sun;  // the light that the light vertices come from

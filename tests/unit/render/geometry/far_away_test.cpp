@@ -1,4 +1,4 @@
-// Rays that begin where no scene is, and cameras that send no rays at all.
+// Rays that begin far outside of the scene, and cameras whose rays are not finite.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -14,8 +14,8 @@ using test::SceneBuilder;
 
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-// Debian's Embree stops the process at rays that begin beyond 1.8e18; a flight through a medium that is all
-// but nothing gets there.
+// Debian's build of Embree aborts for rays whose origin is farther than 1.8e18. A flight through an extremely
+// thin medium can get there.
 TEST(FarAway, RaysMeetNothingAndNothingHidesLight) {
   SceneBuilder builder;
   builder.shape(SphereShape{}, {}, builder.diffuse(.5));

@@ -28,7 +28,7 @@ TEST(SphereIntersection, IsExactForDistantTinyAndGrazingRays) {
   EXPECT_NEAR(intersect(sphere({0, 0, 1e6}, 1), {0, 0, 0}, {0, 0, 1}, 0, kFarOut), 1e6 - 1, 1e-9);
   EXPECT_NEAR(intersect(sphere({0, 0, 1}, 1e-6), {0, 0, 0}, {0, 0, 1}, 0, kFarOut), 1 - 1e-6, 1e-15);
   EXPECT_NEAR(intersect(sphere({0, 0, 0}, 1), {0, 0, 0}, {0, 0, 1}, 0, kFarOut), 1, 0);
-  // Height 1 - 1e-12 over the centre: half chord sqrt(2e-12).
+  // At a distance of 1 - 1e-12 from the centre half the chord is sqrt(2e-12).
   EXPECT_NEAR(intersect(sphere({0, 0, 0}, 1), {-5, 1 - 1e-12, 0}, {1, 0, 0}, 0, kFarOut),
               5 - std::sqrt(2e-12), 1e-9);
   EXPECT_EQ(intersect(sphere({0, 0, 0}, 1), {-5, 1 + 1e-12, 0}, {1, 0, 0}, 0, kFarOut), kFarOut);
@@ -36,7 +36,8 @@ TEST(SphereIntersection, IsExactForDistantTinyAndGrazingRays) {
   EXPECT_EQ(intersect(sphere({0, 0, 0}, 1), {0, 0, -5}, {0, 0, 1}, 0, 4), kFarOut) << "beyond t_max";
 }
 
-// A box of size 2 with a lamp of 1e5 at 1e7: about the middle of all, 2 is two last places of float32.
+// A box of size 2, and a lamp of radius 1e5 at 1e7. If the world were centred on both, 2 would be two ulps of
+// float32 coordinates.
 TEST(World, IsAboutTheMeshThatElseWouldHaveNoFormLeft) {
   SceneBuilder builder;
   builder.shape(CubeShape{}, {}, builder.diffuse(.5));
@@ -80,7 +81,7 @@ V3 any_direction(std::mt19937& rng) {
   return V3(V3d(x, y, z).normalized());
 }
 
-// A path that bounces about inside a closed shape must never get out.
+// Counts how often a path that bounces inside a closed shape gets out.
 std::uint64_t leaks(const ls::Geometry& shape, const Transform& t, int rays, unsigned seed) {
   SceneBuilder builder;
   builder.shape(shape, t, builder.diffuse(.5));
@@ -98,7 +99,8 @@ std::uint64_t leaks(const ls::Geometry& shape, const Transform& t, int rays, uns
       continue;
     }
     d = any_direction(rng);
-    if (dot(d, hit.ng) * dot(hit.ng, hit.p) > 0) d = -d;  // inwards: these shapes are about the origin
+    // The centre of these shapes is the origin: d is turned inwards.
+    if (dot(d, hit.ng) * dot(hit.ng, hit.p) > 0) d = -d;
     o = offset_point(hit, d);
   }
   return lost;
@@ -128,7 +130,7 @@ std::shared_ptr<const World> one(const ls::Geometry& g, const Transform& t, bool
   return test::world_of(builder);
 }
 
-// What Mitsuba 3.9.1 says of rays at unit shapes (scalar_rgb, ray_intersect): shading normal, uv, and the
+// Values of Mitsuba 3.9.1 for rays at unit shapes (scalar_rgb, ray_intersect): shading normal, uv, and the
 // direction of dp/du.
 struct SeenShape {
   const char* shape;
@@ -166,7 +168,7 @@ const SeenShape kSeenShapes[] = {
     {"sphere", {.6, .8, -5}, {0, 0, 0}, {.11767f, .156893f, -.980581f}, {.147584f, .937167f}, {-.8f, .6f, 0}},
     {"disk", {.6, .4, 5}, {.3, .2, 0}, {0, 0, 1}, {.360555f, .0935835f}, {.83205f, .5547f, 0}},
 };
-// Mitsuba's figures are printed to 6 digits (dp/du to 5).
+// Mitsuba's values are printed with 6 digits (dp/du with 5).
 void expect_near(const V3& a, const V3& b, const char* what) {
   EXPECT_LT((a - b).length(), 2e-5f) << what << a << b;
 }
@@ -177,7 +179,7 @@ ls::Geometry named(const std::string& name) {
   return SphereShape{};
 }
 
-// A material that wants all that a hit can say.
+// A material that needs uv and tangents of hits.
 BsdfIndex brushed_shape(SceneBuilder& builder) {
   const TextureIndex grey = builder.texture({.5, .5, .5}), white = builder.texture({1, 1, 1});
   RoughConductorBsdf b;
@@ -199,8 +201,8 @@ TEST(Shapes, NormalsUvAndTangentsAreMitsubas) {
   }
 }
 
-// The side that shines, by Mitsuba 3.9.1: flat shapes and cubes keep the normal that was mapped, a mirrored
-// sphere turns inside out, a flip turns them all.
+// The side that shines in Mitsuba 3.9.1: flat shapes and cubes keep the transformed normal, a mirrored sphere
+// is inside out, and flip_normals reverses the normals of each.
 TEST(Shapes, ShineToTheSideThatMitsubaSays) {
   for (const char* name : {"cube", "rectangle", "disk", "sphere"}) {
     for (const bool mirror : {false, true}) {
@@ -215,7 +217,7 @@ TEST(Shapes, ShineToTheSideThatMitsubaSays) {
   }
 }
 
-// A square in z = 0 by an OBJ file with or without vertex normals along +z or -z.
+// The hit on a square in z = 0 that is read from an OBJ file, with or without vertex normals along +z or -z.
 SurfaceHit square_hit(bool normals, bool mirror, int z = 1) {
   std::string text = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn 0 0 " + std::to_string(z) + "\n";
   text += normals ? "f 1//1 2//1 3//1\nf 1//1 3//1 4//1\n" : "f 1 2 3\nf 1 3 4\n";
@@ -242,8 +244,8 @@ TEST(Meshes, FollowTheirNormalsEvenAgainstTheirWinding) {
   }
 }
 
-// Light in a closed room whose normals point inwards, against its winding; the medium lies where the winding
-// has the inside.
+// A closed room that emits light. Its vertex normals point inwards, against its winding, and its medium is on
+// the side that is inside by the winding.
 TEST(Meshes, ShineToTheSideOfTheirNormalsAndKeepTheirMediaInside) {
   std::string text =
       "v -1 -1 -1\nv 1 -1 1\nv -1 1 1\nv 1 1 -1\nvn 1 1 1\nvn -1 1 -1\nvn 1 -1 -1\nvn -1 -1 1\n";
@@ -271,7 +273,8 @@ TEST(Meshes, ShineToTheSideOfTheirNormalsAndKeepTheirMediaInside) {
 }
 
 TEST(Meshes, WithoutNormalsAreSmooth) {
-  // A roof without normals, hit near its ridge; Mitsuba 3.9.1: shading normal (.0358577, 0, .999357).
+  // A roof without normals, hit near its ridge. The shading normal of Mitsuba 3.9.1 is (.0358577, 0,
+  // .999357).
   const std::string text =
       "v -1 -1 0\nv 0 -1 1\nv 0 1 1\nv -1 1 0\nv 1 -1 0\nv 1 1 0\nf 1 2 3\nf 1 3 4\nf 2 5 6\nf 2 6 3\n";
   SceneBuilder builder;

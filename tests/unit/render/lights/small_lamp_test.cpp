@@ -1,5 +1,5 @@
-// Small lamps in the middle of a wide world: their own coordinates are small, those of the points that they
-// light are not.
+// Small lamps in the middle of a large world: their own coordinates are small, those of the points that they
+// light are large.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// Where paths look for light beside the vertices that they reach by chance: which scenes use it, and that it
-// brings what it is for. That the image stays the same is tested in tests/statistical and tests/property.
+// Additional points on segments and directions near lamps (aim.h): which scenes use them, and that they
+// reduce noise. That the image stays the same is tested in tests/statistical and tests/property.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -82,13 +82,13 @@ TEST(Aim, LeavesOutWhatASceneDoesNotNeed) {
     EXPECT_THAT(report(builder).variant, Not(HasSubstr("aimed")));
 }
 
-// A crop has the pixels of the full frame, so the choice must not look at the crop alone.
+// A crop must have the pixels of the full frame, so the decision must not depend on the crop.
 TEST(Aim, ChoosesForACropAsForTheWholeFrame) {
   SceneBuilder whole = fog(.1);
   add_sun(whole);
   SceneBuilder crop = whole;
   crop.scene.film.crop_offset = {0, 0};
-  crop.scene.film.crop_size = {4, 4};  // sees next to nothing of the fog
+  crop.scene.film.crop_size = {4, 4};  // shows hardly any fog
   const auto a = render_tile(*test::world_of(whole), {0, 0, 4, 4}, {0, 8}, nullptr, nullptr);
   const auto b = render_tile(*test::world_of(crop), {0, 0, 4, 4}, {0, 8}, nullptr, nullptr);
   EXPECT_EQ(a.sums, b.sums);
@@ -99,10 +99,10 @@ double squared_error(const SceneBuilder& builder) {
   return estimate.standard_error[1] * estimate.standard_error[1];
 }
 
-// With the optical depth 0.2 a flight ends in the fog in a share p = 0.18 of all samples, and then brings all
-// that is scattered there: the variance of a sample is (1 - p) / p = 4.5 times the square of its mean. Points
-// on the segment leave what the sun's way through the fog varies by: its transmittance lies between 1 and
-// exp(-0.2), so the variance is below 0.01 times that square.
+// With an optical depth of 0.2 a share p = 0.18 of the flights ends in the fog, and only these find the light
+// that is scattered there: the variance of a sample is (1 - p) / p = 4.5 times the square of its mean. With
+// points on the segment only the sun's transmittance through the fog varies, between 1 and exp(-0.2), so the
+// variance is below 0.01 times that square.
 TEST(Aim, TakesTheNoiseFromLightScatteredOnceInThinFog) {
   for (const bool grid : {false, true}) {
     SceneBuilder points = fog(.1, grid, 0);

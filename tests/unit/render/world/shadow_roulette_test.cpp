@@ -21,8 +21,8 @@ TEST(ShadowRoulette, TracesFaintShadowRaysLessOften) {
   EXPECT_EQ(shadow_ray_probability(0, 0), 1) << "no roulette";
 }
 
-// 512 paths tell the mean. If their standard deviation is at most twice the mean, that of their mean is at
-// most 0.09 of it, and a factor of 2 is more than 5 standard deviations away.
+// The renderer estimates the mean radiance by 512 paths. If their standard deviation is at most twice the
+// mean, the standard error is at most 0.09 of it, and a factor of 2 is more than 5 standard errors away.
 TEST(ShadowRoulette, MeasuresByTheMeanRadiance) {
   const SceneBuilder b = test::lit_cloud({128, 64});
   const auto mean = test::estimate(b, 4).mean;

@@ -1,4 +1,5 @@
-// Where a second direction looks for the sky. That the image stays the same is tested in techniques_test.cpp.
+// Second directions towards the sky: which scenes use them. That the image stays the same is tested in
+// techniques_test.cpp.
 #include "worker/render/world/sky_samples.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +31,7 @@ TEST(SkySamples, AreTakenWhereTheSkyLightsTheScene) {
   })) << "the lamp is far brighter";
 }
 
-// The mean light of the pilot's paths, by which the world decides.
+// The mean radiance of the pilot's paths of two segments, from which the decision is made.
 double light_scattered_once(const SceneBuilder& b, std::uint64_t seed = 0) {
   RenderSettings settings = test::settings_of(b.scene);
   settings.seed = seed;
@@ -68,8 +69,8 @@ TEST(SkySamples, ReduceNoise) {
     const auto e = test::estimate(b, 32);
     return e.standard_error[1];
   };
-  // Always the same two images. Their standard errors are those of sums over 512 pixels, so each is known to
-  // about 1 / sqrt(2 * 512) = 3 %; a second direction takes a sixth away.
+  // The two images are the same in each run. Each standard error is that of a sum over 512 pixels, so it is
+  // accurate to about 1 / sqrt(2 * 512) = 3 %. A second direction removes a sixth of the noise.
   EXPECT_LT(noise(yard()), .95 * noise(without));
 }
 
