@@ -54,8 +54,8 @@ class MaterialBuilder {
   const MicrofacetEnergy* energy(EnergyOf of, const Roughness& roughness, double eta);
   const MicrofacetEnergy* energy(EnergyOf of, Microfacet type, double alpha, double eta);
 
-  // Returns the tables of a coated metal with these parameters, and calls `make` to compute them if no
-  // earlier material had the same parameters.
+  // Returns the tables of a coated metal with these parameters, which `make` makes. Materials with equal
+  // parameters share the work.
   const CoatedConductorTables& coated_conductor(const std::array<float, 4>& parameters,
                                                 const std::function<CoatedConductorTables()>& make);
 

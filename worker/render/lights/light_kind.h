@@ -21,7 +21,6 @@
 #include "worker/render/base/kinds.h"
 #include "worker/render/geometry/geometry.h"
 #include "worker/render/lights/light_tree.h"
-#include "worker/render/math/color.h"
 #include "worker/render/math/math.h"
 #include "worker/render/math/random.h"
 #include "worker/render/math/transform.h"

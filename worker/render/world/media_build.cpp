@@ -7,7 +7,7 @@
 #include "common/base/overloaded.h"
 #include "common/scene/schema/medium_traits.h"
 #include "worker/render/math/blackbody.h"
-#include "worker/render/math/color.h"
+#include "worker/render/math/transform.h"
 #include "worker/render/media/grid_load.h"
 
 namespace ls::render {
