@@ -10,7 +10,7 @@
 #include "worker/render/base/work_counters.h"
 #include "worker/render/geometry/accel.h"
 #include "worker/render/geometry/embree.h"
-#include "worker/render/geometry/shape_boxes.h"
+#include "worker/render/geometry/surface_boxes.h"
 
 namespace ls::render {
 

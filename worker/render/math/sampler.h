@@ -2,9 +2,9 @@
 // branch, vertex, purpose), where a branch is one of the paths into which a path splits. Even sample indices
 // form half A, odd ones half B; each half of each pixel is its own scrambled Sobol sequence.
 //
-// Sobol points have four dimensions, hash-based Owen scrambling and nested uniform shuffling (Burley, "Practical
-// Hash-based Owen Scrambling", JCGT 9(4), 2020), and the direction numbers of Joe and Kuo 2008 for dimensions 1
-// to 4.
+// Sobol points have four dimensions, hash-based Owen scrambling and nested uniform shuffling (Burley,
+// "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020), and the direction numbers of Joe and Kuo 2008 for
+// dimensions 1 to 4.
 #pragma once
 
 #include <array>
