@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "tests/unit/bsdf/materials.h"
-#include "worker/render/bsdf/microfacet_energy.h"
+#include "worker/render/bsdf/microfacet_tables.h"
 
 namespace ls::render::test {
 namespace {

@@ -163,7 +163,7 @@ const Kind kKinds[] = {
     {"sheet", random_sheet, true, kFit},
     {"coated metal", random_coated_metal, false, 0},
     // Coat and base are linked by Mitsuba's tables, whose internal reflectance is a plain mean (see
-    // rough_plastic_table.h). So the base may return up to 1.5 % more than the coat transmits.
+    // microfacet_tables.h). So the base may return up to 1.5 % more than the coat transmits.
     {"plastic", random_plastic, false, .015},
     {"smooth plastic",
      [](Dice& d) { return plastic(1.01 + d.uniform(), 1, d.uniform() < .5, d.rgb(), d.rgb()); }, false, 1e-3},

@@ -7,8 +7,7 @@
 
 #include "tests/unit/bsdf/materials.h"
 #include "worker/render/bsdf/microfacet.h"
-#include "worker/render/bsdf/microfacet_energy.h"
-#include "worker/render/bsdf/visible_normals.h"
+#include "worker/render/bsdf/microfacet_tables.h"
 
 namespace ls::render::test {
 namespace {

@@ -7,7 +7,7 @@
 #include "tests/unit/bsdf/materials.h"
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/microfacet.h"
-#include "worker/render/bsdf/microfacet_energy.h"
+#include "worker/render/bsdf/microfacet_tables.h"
 
 namespace ls::render::test {
 namespace {

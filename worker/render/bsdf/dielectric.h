@@ -24,7 +24,7 @@
 #pragma once
 
 #include "worker/render/bsdf/material_builder.h"
-#include "worker/render/bsdf/microfacet_energy.h"
+#include "worker/render/bsdf/microfacet_tables.h"
 
 namespace ls::render {
 

@@ -14,8 +14,7 @@
 
 #include "common/scene/schema/bsdf_traits.h"
 #include "worker/render/bsdf/lobes.h"
-#include "worker/render/bsdf/microfacet_energy.h"
-#include "worker/render/bsdf/rough_plastic_table.h"
+#include "worker/render/bsdf/microfacet_tables.h"
 
 namespace ls::render {
 
@@ -44,12 +43,12 @@ class MaterialBuilder {
   BsdfIndex side(BsdfIndex b);
   bool passes(BsdfIndex b) const { return traits_[b.value].passes; }
 
-  // Returns the transmittance table of a rough plastic's coat (rough_plastic_table.h). Computing one takes
+  // Returns the transmittance table of a rough plastic's coat (microfacet_tables.h). Computing one takes
   // about 30 ms, and many objects of a scene often have the same coat, so materials with equal parameters
   // share one table.
   const RoughPlasticTable& coat(Microfacet type, double alpha, double eta);
   // energy() returns the tables that compensate for light lost between the microfacets of a surface of the
-  // kind `of` (microfacet_energy.h). Materials with equal parameters share them.
+  // kind `of` (microfacet_tables.h). Materials with equal parameters share them.
   enum class EnergyOf { conductor, dielectric, coat };
   const MicrofacetEnergy* energy(EnergyOf of, const Roughness& roughness, double eta);
   const MicrofacetEnergy* energy(EnergyOf of, Microfacet type, double alpha, double eta);

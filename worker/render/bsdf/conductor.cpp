@@ -1,8 +1,6 @@
-#include "worker/render/bsdf/coated_conductor.h"
+#include "worker/render/bsdf/conductor.h"
 
 #include <cmath>
-
-#include "worker/render/bsdf/visible_normals.h"
 
 namespace ls::render {
 namespace {
@@ -26,7 +24,7 @@ struct SeenCoatedConductor {
   Metal metal;
   RoughCoatedConductor::Shares coat_o;
   float staying_o;
-  // Colour of the third part of the value (`rest` in coated_conductor.h): light that stays in the coat at
+  // Colour of the third part of the value (`rest` in conductor.h): light that stays in the coat at
   // first.
   C3 rest;
   float p_coat, p_base, p_rest;
@@ -215,7 +213,7 @@ class Tabulator {
   }
 
   // Returns the share of light from wo that stays in the coat at first, minus kTolerance: light that the
-  // metal reflects, that its facets do not mask, and that the series of the part `metal` (coated_conductor.h)
+  // metal reflects, that its facets do not mask, and that the series of the part `metal` (conductor.h)
   // leaves out.
   double staying(const V3& wo) const {
     const V3 inner = refracted(wo, m_.ior);
