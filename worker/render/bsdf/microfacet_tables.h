@@ -1,5 +1,5 @@
-// Integrals over the visible normals of microfacets, by Gauss-Legendre quadrature in double, and the tables that
-// materials make of them.
+// Integrals over the visible normals of microfacets, by Gauss-Legendre quadrature in double, and the tables
+// that materials make of them.
 #pragma once
 
 #include <algorithm>
