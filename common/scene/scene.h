@@ -396,7 +396,7 @@ struct IntegratorSettings {
   int local_lights = 0;
   // For "volpath" only: whether, in scenes with grids, paths may split at their first scattering, and
   // Russian roulette may end them where their throughput is below that behind the first scattering
-  // (worker/render/world/splitting.h). 0: chosen for the scene; -1: neither.
+  // (worker/render/world/roulette.h). 0: chosen for the scene; -1: neither.
   int path_splitting = 0;
   bool operator==(const IntegratorSettings&) const = default;
 };

@@ -1,5 +1,5 @@
 // Which shadow rays are traced at random. That the image stays the same is tested in techniques_test.cpp.
-#include "worker/render/world/shadow_roulette.h"
+#include "worker/render/world/roulette.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Second directions towards the sky: which scenes use them. That the image stays the same is tested in
 // techniques_test.cpp.
-#include "worker/render/world/sky_samples.h"
+#include "worker/render/world/aim.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Splitting and roulette of paths: which scenes use them. That the image stays the same is tested here for
 // scenes in which paths meet several media or surfaces, and in techniques_test.cpp.
-#include "worker/render/world/splitting.h"
+#include "worker/render/world/roulette.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include "tests/support/lit_cloud.h"
 #include "tests/support/render_check.h"
 #include "tests/support/significance.h"
-#include "worker/render/world/camera_collisions.h"
+#include "worker/render/world/pilot.h"
 
 namespace ls::render {
 namespace {
