@@ -1,12 +1,12 @@
 // Lights: the irradiance by their own sampling is compared with closed forms, and their densities with the
 // samples.
 #include "worker/render/lights/lights.h"
-#include "common/base/clock.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "common/base/clock.h"
 #include "tests/unit/render/light_bench.h"
 
 namespace ls::render {
@@ -14,6 +14,7 @@ namespace {
 
 using test::SceneBuilder;
 using test::operator*;
+using test::scale;
 using test::translate;
 
 TEST(Lights, RectangleGivesLambertsIrradiance) {
@@ -257,6 +258,45 @@ TEST(Lights, LightsWithoutPowerAreLeftOut) {
   const LightBench b(builder);
   EXPECT_FALSE(b.world->lights.can_sample());
   EXPECT_EQ(b.world->lights.left_out(), 2u);
+}
+
+// A lamp of half size `size` near the centre of a ball of radius 1 that encloses it.
+SceneBuilder lamp_in_a_ball(const ls::Geometry& g, double size) {
+  SceneBuilder builder;
+  builder.lamp(g, translate({1e-4, -2e-4, 3e-5}) * test::rotate_x(33) * scale(size));
+  builder.shape(SphereShape{}, {}, builder.diffuse(.5)).flip_normals = true;
+  return builder;
+}
+
+V3 direction_of(RandomStream& r) {
+  const float z = 2 * r.uniform() - 1;
+  const V2 c = unit_circle(r.uniform());
+  const float sine = std::sqrt(1 - z * z);
+  return {sine * c.x, sine * c.y, z};
+}
+
+TEST(SmallLamp, IsNotHiddenByItself) {
+  const ls::Geometry kinds[] = {RectangleShape{}, DiskShape{}, CubeShape{}, SphereShape{},
+                                CylinderShape{{0, 0, -1}, {0, 0, 1}, .5}};
+  for (const ls::Geometry& kind : kinds)
+    for (const double size : {.2, .02, .001}) {
+      const LightBench b(lamp_in_a_ball(kind, size));
+      RandomStream r(3);
+      int sampled = 0, hidden = 0;
+      for (int i = 0; i < 20000; ++i) {
+        const V3 x = direction_of(r) * (.9f * static_cast<float>(b.world->geometry.scale));
+        const auto s =
+            b.world->lights.sample(b.world->lights.choose(numbers(0, r.uniform(), r.uniform())), x);
+        if (!s) continue;
+        ++sampled;
+        const V3 f = s->target - x;  // shadow rays are aimed at the target
+        const float distance = std::sqrt(dot(f, f));
+        hidden += b.world->accel.occluded(x, f / distance, distance) ? 1 : 0;
+      }
+      // Half of the points see only the back of a flat lamp
+      EXPECT_GT(sampled, 5000) << kind.index() << ' ' << size;
+      EXPECT_EQ(hidden, 0) << kind.index() << ' ' << size << " of " << sampled;
+    }
 }
 
 }  // namespace
