@@ -265,10 +265,9 @@ std::variant<Conductor, RoughConductor, CoatedConductor, RoughCoatedConductor> m
   };
   const double coat = alpha(b.coat_alpha), u = alpha(b.alpha_u), v = alpha(b.alpha_v);
   const bool mirror = u < double{kSpecularAlpha} && v < double{kSpecularAlpha};
-  RoughCoatedConductor m;
   CoatedConductorBsdf inside = b;
   for (std::size_t c = 0; c < 3; ++c) inside.eta[c] /= b.int_ior, inside.k[c] /= b.int_ior;
-  set_metal(m, inside, builder);
+  auto m = metal_of<RoughCoatedConductor>(inside, builder);
   if (builder.refused()) return static_cast<const Conductor&>(m);
   m.ior = static_cast<float>(ior);
   m.coat_is_smooth = coat < double{kSpecularAlpha};

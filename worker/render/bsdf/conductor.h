@@ -71,8 +71,9 @@ struct RoughConductor : Conductor {
 
 using ConductorKinds = Kinds<Conductor, RoughConductor>;
 
-template <class Description>
-void set_metal(Conductor& m, const Description& b, MaterialBuilder& builder) {
+template <class Kind, class Description>
+Kind metal_of(const Description& b, MaterialBuilder& builder) {
+  Kind m;
   // The largest index of a metal. A metal with this index reflects all but 4e-9 of the light, which is total
   // reflection in float32; larger indices would overflow the fourth powers in fresnel_conductor.
   constexpr double kLargestIndex = 1e9;
@@ -84,17 +85,15 @@ void set_metal(Conductor& m, const Description& b, MaterialBuilder& builder) {
       builder.refuse(fmt::format("the conductor's index {} + {} i is not finite and >= 0", eta, k));
   }
   m.tint = builder.reflectance(b.specular_reflectance);
+  return m;
 }
 
 inline Conductor make_material(const ConductorBsdf& b, MaterialBuilder& builder) {
-  Conductor m;
-  set_metal(m, b, builder);
-  return m;
+  return metal_of<Conductor>(b, builder);
 }
 inline std::variant<Conductor, RoughConductor> make_material(const RoughConductorBsdf& b,
                                                              MaterialBuilder& builder) {
-  RoughConductor m;
-  set_metal(m, b, builder);
+  auto m = metal_of<RoughConductor>(b, builder);
   m.roughness = builder.roughness(b.distribution, b.alpha_u, b.alpha_v);
   if (m.roughness.always_mirror()) return static_cast<const Conductor&>(m);
   if (b.multiple_scattering) {

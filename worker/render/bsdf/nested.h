@@ -214,21 +214,20 @@ inline Blend make_material(const BlendBsdf& b, MaterialBuilder& builder) {
   return m;
 }
 template <class Map, class Description>
-void set_map(Map& m, const Description& b, TextureIndex texture, MaterialBuilder& builder) {
+Map map_of(const Description& b, TextureIndex texture, MaterialBuilder& builder) {
+  Map m;
   m.map = builder.slot(texture);
   m.part = b.bsdf;
   m.passes = builder.passes(b.bsdf);
   m.flips = b.flip_invalid_normals;
   m.shadows = b.use_shadowing_function;
-}
-inline NormalMap make_material(const NormalMapBsdf& b, MaterialBuilder& builder) {
-  NormalMap m;
-  set_map(m, b, b.normalmap, builder);
   return m;
 }
+inline NormalMap make_material(const NormalMapBsdf& b, MaterialBuilder& builder) {
+  return map_of<NormalMap>(b, b.normalmap, builder);
+}
 inline BumpMap make_material(const BumpMapBsdf& b, MaterialBuilder& builder) {
-  BumpMap m;
-  set_map(m, b, b.texture, builder);
+  auto m = map_of<BumpMap>(b, b.texture, builder);
   m.scale = static_cast<float>(b.scale);
   if (!std::isfinite(m.scale)) builder.refuse(fmt::format("a bump map's scale is {}", b.scale));
   return m;

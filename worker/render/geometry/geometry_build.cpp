@@ -182,28 +182,25 @@ void append(Geometry& g, const Placed& p, std::uint32_t surface, const Space& sp
   append_mesh(g, p.mesh, p.normals_given, surface, space);
   if (g.triangle_count() > triangles) note_reach(g, triangles, g.surfaces[surface]);
   if (p.sphere) {
-    Sphere s = *p.sphere;
+    Sphere& s = g.spheres.emplace_back(*p.sphere);
     s.center = space(s.center);
     s.radius *= space.scale;
     s.surface = surface;
-    g.spheres.push_back(s);
   }
   if (p.disk || p.cylinder) g.surfaces[surface].sheet = true;
   if (p.disk) {
-    Disk d = *p.disk;
+    Disk& d = g.disks.emplace_back(*p.disk);
     d.center = space(d.center);
     d.u *= space.scale;
     d.v *= space.scale;
     d.surface = surface;
-    g.disks.push_back(d);
   }
   if (p.cylinder) {
-    Cylinder c = *p.cylinder;
+    Cylinder& c = g.cylinders.emplace_back(*p.cylinder);
     c.p0 = space(c.p0);
     c.radius *= space.scale;
     c.length *= space.scale;
     c.surface = surface;
-    g.cylinders.push_back(c);
   }
 }
 
