@@ -38,13 +38,13 @@ Material material_of(std::variant<Kind...> kind) {
   return std::visit([](auto& k) { return Material{std::move(k)}; }, kind);
 }
 
-// True if `holds` is true for the kind of material i or of any material that it consists of.
+// True if `holds` is true for m or any of the materials that m consists of.
 template <class F>
-bool any_kind(const std::vector<Material>& materials, BsdfIndex i, F holds) {
-  return with_kind(materials[i.value].kind, [&](const auto& k) {
+bool any_part(const Material& m, F holds) {
+  return with_kind(m.kind, [&](const auto& k) {
     for (const BsdfIndex part : k.parts())
-      if (any_kind(materials, part, holds)) return true;
-    return holds(k);
+      if (holds(part)) return true;
+    return false;
   });
 }
 
@@ -138,23 +138,31 @@ std::uint64_t BsdfTable::clamped_inputs() const { return clamped_; }
 bool BsdfTable::is_null(BsdfIndex i) const {
   return std::holds_alternative<NullBoundary>(materials_[i.value].kind);
 }
+bool BsdfTable::has_smooth(BsdfIndex i) const {
+  const Material& m = materials_[i.value];
+  return with_kind(m.kind, [](const auto& k) { return k.kSmooth; }) ||
+         any_part(m, [&](BsdfIndex part) { return has_smooth(part); });
+}
 bool BsdfTable::is_diffuse(BsdfIndex i) const {
   const Material& m = materials_[i.value];
   if (const auto* sides = std::get_if<TwoSided>(&m.kind))
     return is_diffuse(sides->front) && is_diffuse(sides->back);
   return with_kind(m.kind, [](const auto& k) { return k.kDiffuse; });
 }
-bool BsdfTable::has_smooth(BsdfIndex i) const {
-  return any_kind(materials_, i, [](const auto& k) { return k.kSmooth; });
-}
 bool BsdfTable::reads_uv(BsdfIndex i) const {
-  return any_kind(materials_, i, [](const auto& k) { return k.reads_uv(); });
+  const Material& m = materials_[i.value];
+  return with_kind(m.kind, [](const auto& k) { return k.reads_uv(); }) ||
+         any_part(m, [&](BsdfIndex part) { return reads_uv(part); });
 }
 bool BsdfTable::anisotropic(BsdfIndex i) const {
-  return any_kind(materials_, i, [](const auto& k) { return k.anisotropic(); });
+  const Material& m = materials_[i.value];
+  return with_kind(m.kind, [](const auto& k) { return k.anisotropic(); }) ||
+         any_part(m, [&](BsdfIndex part) { return anisotropic(part); });
 }
 bool BsdfTable::reads_slopes(BsdfIndex i) const {
-  return any_kind(materials_, i, [](const auto& k) { return k.kReadsSlopes; });
+  const Material& m = materials_[i.value];
+  return with_kind(m.kind, [](const auto& k) { return k.kReadsSlopes; }) ||
+         any_part(m, [&](BsdfIndex part) { return reads_slopes(part); });
 }
 
 }  // namespace ls::render

@@ -240,24 +240,27 @@ struct NullBoundary : MaterialKind {
 
 using DielectricKinds = Kinds<Dielectric, ThinDielectric, RoughDielectric, NullBoundary, RoughThinDielectric>;
 
-template <class Kind, class Description>
-Kind dielectric_of(const Description& b, MaterialBuilder& builder) {
-  Kind m;
+template <class Description>
+void set_dielectric(DielectricKind& m, const Description& b, MaterialBuilder& builder) {
   m.ior = static_cast<float>(builder.index(b.int_ior, b.ext_ior));
   m.reflectance = builder.reflectance(b.specular_reflectance);
   m.transmittance = builder.reflectance(b.specular_transmittance);
-  return m;
 }
 
 inline Dielectric make_material(const DielectricBsdf& b, MaterialBuilder& builder) {
-  return dielectric_of<Dielectric>(b, builder);
+  Dielectric m;
+  set_dielectric(m, b, builder);
+  return m;
 }
 inline ThinDielectric make_material(const ThinDielectricBsdf& b, MaterialBuilder& builder) {
-  return dielectric_of<ThinDielectric>(b, builder);
+  ThinDielectric m;
+  set_dielectric(m, b, builder);
+  return m;
 }
 inline std::variant<Dielectric, RoughDielectric> make_material(const RoughDielectricBsdf& b,
                                                                MaterialBuilder& builder) {
-  auto m = dielectric_of<RoughDielectric>(b, builder);
+  RoughDielectric m;
+  set_dielectric(m, b, builder);
   m.roughness = builder.roughness(b.distribution, b.alpha_u, b.alpha_v);
   // Facets of slope t deflect refracted light by about (ior - 1) t. With an ior this close to 1 the
   // deflection is invisible, but the lobe would be too narrow for float32, so the boundary is treated as
@@ -271,7 +274,8 @@ inline std::variant<Dielectric, RoughDielectric> make_material(const RoughDielec
 }
 inline std::variant<ThinDielectric, RoughThinDielectric> make_material(const RoughThinDielectricBsdf& b,
                                                                        MaterialBuilder& builder) {
-  auto m = dielectric_of<RoughThinDielectric>(b, builder);
+  RoughThinDielectric m;
+  set_dielectric(m, b, builder);
   m.roughness = builder.roughness(b.distribution, b.alpha_u, b.alpha_v);
   if (m.roughness.always_mirror()) return static_cast<const ThinDielectric&>(m);
   // Masking removes the same share of reflected and transmitted light, so both use the table of a rough
