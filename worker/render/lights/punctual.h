@@ -3,7 +3,6 @@
 
 #include "worker/render/camera/fov.h"
 #include "worker/render/lights/light_kind.h"
-#include "worker/render/lights/pivot.h"
 #include "worker/render/math/equal_area.h"
 
 namespace ls::render {
