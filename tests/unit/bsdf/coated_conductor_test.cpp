@@ -201,25 +201,6 @@ TEST(CoatedConductor, WithoutContrastIsTheMetalAloneBitForBit) {
   }
 }
 
-// The share of the light from wo that the surface reflects, estimated by random samples.
-struct Albedo {
-  double mean, error;
-};
-Albedo white_albedo(const Bench& b, const V3& wo) {
-  constexpr int kN = 10000;
-  std::mt19937 rng(9);
-  const auto uniform = [&] { return static_cast<float>(rng() >> 8) * 0x1p-24f; };
-  double sum = 0, square = 0;
-  for (int i = 0; i < kN; ++i) {
-    const float l = uniform(), x = uniform(), y = uniform();
-    const auto s = b.sample(wo, l, {x, y});
-    const double w = s ? double{s->weight.y} : 0;
-    sum += w / kN;
-    square += w * w / kN;
-  }
-  return {sum, std::sqrt(std::max(0., square - sum * sum) / kN)};
-}
-
 // Allows 5 standard errors. Where almost nothing is lost, all weights are near 1 and the standard error is
 // small.
 TEST(CoatedConductor, NeverGivesMoreThanItGets) {
@@ -229,7 +210,7 @@ TEST(CoatedConductor, NeverGivesMoreThanItGets) {
         const auto b = bench(coated(coat, u, v, kWhiteEta, kWhiteK, ior));
         for (const double mu : {1., .6, .2, .01})
           for (const double phi : {0., .5, 1.5}) {
-            const Albedo e = white_albedo(*b, direction(mu, phi));
+            const SampledAlbedo e = sampled_albedo(*b, direction(mu, phi), 10000);
             EXPECT_LE(e.mean, 1 + 5 * e.error + 1e-5)
                 << ior << " " << coat << " " << u << " " << v << " " << mu << " " << phi;
             EXPECT_LT(e.error, .01) << ior << " " << coat << " " << u << " " << v << " " << mu << " " << phi;
@@ -322,17 +303,7 @@ TEST(CoatedConductor, StaysFiniteAtEveryExtreme) {
         for (const auto& [eta, k] :
              {std::pair{Rgb{0, 1, 1.5}, Rgb{0, 0, 0}}, {Rgb{0, 1e30, 1}, Rgb{1e30, 0, 1}}}) {
           const auto b = bench(coated(coat, metal, .1 * metal, eta, k, ior));
-          for (const double mu : {1., .5, 1e-3, 1e-7, 1e-20})
-            for (const float u : {0.f, .5f, 0x1.fffffep-1f})
-              for (const float v : {0.f, .25f, 0x1.fffffep-1f}) {
-                const V3 wo = direction(mu, 1);
-                const auto s = b->sample(wo, v, {u, v});
-                if (!s) continue;
-                EXPECT_TRUE(is_finite(s->weight) && is_finite(s->wi) && s->pdf > 0 && std::isfinite(s->pdf))
-                    << coat << " " << metal << " " << ior << " " << mu;
-                const BsdfEval e = b->eval(wo, s->wi);
-                EXPECT_TRUE(is_finite(e.f_cos) && std::isfinite(e.pdf)) << coat << " " << metal << " " << ior;
-              }
+          expect_finite(*b, {1., .5, 1e-3, 1e-7, 1e-20});
         }
 }
 

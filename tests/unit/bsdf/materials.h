@@ -4,7 +4,10 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <initializer_list>
 #include <memory>
+#include <random>
 #include <string>
 
 #include "common/base/clock.h"
@@ -52,6 +55,16 @@ inline std::unique_ptr<Bench> bench(Scene scene, const ImageData& image = {}) {
   b->bsdfs = std::move(*bsdfs);
   b->bsdf = {static_cast<std::uint32_t>(b->scene.bsdfs.size() - 1)};
   return b;
+}
+
+// The material with compensation for multiple scattering (Bsdf::multiple_scattering).
+inline Scene with_compensation(Scene s) {
+  std::visit(
+      [](auto& b) {
+        if constexpr (requires { b.multiple_scattering; }) b.multiple_scattering = true;
+      },
+      s.bsdfs.back());
+  return s;
 }
 
 // CPU time of this thread for building `count` materials like the one of `scene`. Tests compare it with that
@@ -231,6 +244,40 @@ inline V3 direction(double cos_theta, double phi) {
   const double sin = std::sqrt(std::max(0., 1 - cos_theta * cos_theta));
   return {static_cast<float>(sin * std::cos(phi)), static_cast<float>(sin * std::sin(phi)),
           static_cast<float>(cos_theta)};
+}
+
+// The share of the energy from wo that leaves, and its standard error, estimated by random samples.
+struct SampledAlbedo {
+  double mean, error;
+};
+inline SampledAlbedo sampled_albedo(const Bench& b, const V3& wo, int samples, unsigned seed = 3) {
+  std::mt19937 rng(seed);
+  const auto uniform = [&] { return static_cast<float>(rng() >> 8) * 0x1p-24f; };
+  double sum = 0, square = 0;
+  for (int i = 0; i < samples; ++i) {
+    const float l = uniform(), u = uniform(), v = uniform();
+    const auto s = b.sample(wo, l, {u, v});
+    const double x = s ? double{s->weight.y} * sqr(double{s->eta}) : 0;
+    sum += x;
+    square += x * x;
+  }
+  const double mean = sum / samples;
+  return {mean, std::sqrt(std::max(0., square / samples - mean * mean) / samples)};
+}
+
+// Expects finite samples and values for extreme directions and random numbers.
+inline void expect_finite(const Bench& b, std::initializer_list<double> view_cosines) {
+  for (const double mu : view_cosines)
+    for (const float u : {0.f, 1e-9f, .5f, 0x1.fffffep-1f})
+      for (const float v : {0.f, .25f, .6f, 0x1.fffffep-1f}) {
+        const V3 wo = direction(mu, 1);
+        const auto s = b.sample(wo, v, {u, v});
+        if (!s) continue;
+        EXPECT_TRUE(is_finite(s->weight) && is_finite(s->wi) && s->pdf > 0 && std::isfinite(s->pdf)) << mu;
+        EXPECT_EQ(s->transmitted, s->wi.z * wo.z < 0) << mu;
+        const BsdfEval e = b.eval(wo, s->wi);
+        EXPECT_TRUE(is_finite(e.f_cos) && std::isfinite(e.pdf)) << mu;
+      }
 }
 
 }  // namespace ls::render::test

@@ -16,47 +16,19 @@ const double kAlphas[] = {0, 1e-3, .01, .1, .5, 1};
 const std::pair<Microfacet, const char*> kDistributions[] = {{Microfacet::beckmann, "beckmann"},
                                                              {Microfacet::ggx, "ggx"}};
 
-Scene compensated(Scene s) {
-  std::visit(
-      [](auto& b) {
-        if constexpr (requires { b.multiple_scattering; }) b.multiple_scattering = true;
-      },
-      s.bsdfs.back());
-  return s;
-}
-
-// The share of the energy from wo that leaves, estimated by random samples.
-struct Mean {
-  double value, error;
-};
-Mean albedo_along(const Bench& b, const V3& wo) {
-  constexpr int kSamples = 40000;
-  std::mt19937 rng(3);
-  const auto uniform = [&] { return static_cast<float>(rng() >> 8) * 0x1p-24f; };
-  double sum = 0, square = 0;
-  for (int i = 0; i < kSamples; ++i) {
-    const float l = uniform(), u = uniform(), v = uniform();
-    const auto s = b.sample(wo, l, {u, v});
-    const double x = s ? double{s->weight.y} * sqr(double{s->eta}) : 0;
-    sum += x;
-    square += x * x;
-  }
-  const double mean = sum / kSamples;
-  return {mean, std::sqrt(std::max(0., square / kSamples - mean * mean) / kSamples)};
-}
 // Allows 5 standard errors, which are exceeded once in 1.7 million cases. They are small enough to show a
 // loss of 2 %; single scattering loses up to 70 %.
 void expect_white(const Bench& b, const V3& wo, double tolerance, const std::string& what) {
-  const Mean e = albedo_along(b, wo);
-  EXPECT_NEAR(e.value, 1, tolerance + 5 * e.error) << what << " at " << wo.z;
+  const SampledAlbedo e = sampled_albedo(b, wo, 40000);
+  EXPECT_NEAR(e.mean, 1, tolerance + 5 * e.error) << what << " at " << wo.z;
   EXPECT_LT(e.error, .006) << what << " at " << wo.z;
 }
 
 // Seen from above, single scattering by GGX facets of roughness 1 reflects 1 - ln 2 of the light.
 TEST(MultipleScattering, WithoutItWhiteGgxOfRoughnessOneKeepsOneLessLogTwo) {
   const auto b = bench(rough_metal(Microfacet::ggx, 1, 1, {0, 0, 0}, {1, 1, 1}));
-  const Mean e = albedo_along(*b, {0, 0, 1});
-  EXPECT_NEAR(e.value, 1 - std::log(2.), 5 * e.error);
+  const SampledAlbedo e = sampled_albedo(*b, {0, 0, 1}, 40000);
+  EXPECT_NEAR(e.mean, 1 - std::log(2.), 5 * e.error);
   static const Quadrature q = gauss_legendre(256);
   EXPECT_NEAR(rough_share(Way::mirrored, Microfacet::ggx, 1, 1, 1, q), 1 - std::log(2.), 1e-5);
 }
@@ -95,7 +67,7 @@ TEST(MultipleScattering, TablesKeepAllWithinTheirTolerance) {
 TEST(MultipleScattering, AWhiteMetalKeepsAll) {
   for (const auto& [d, name] : kDistributions)
     for (const double alpha : kAlphas) {
-      const auto b = bench(compensated(rough_metal(d, alpha, alpha, {0, 0, 0}, {1, 1, 1})));
+      const auto b = bench(with_compensation(rough_metal(d, alpha, alpha, {0, 0, 0}, {1, 1, 1})));
       for (const double mu : {1., .75, .25, .03, 1e-3})
         expect_white(*b, direction(mu, .3), kEnergyTolerance, fmt::format("{} {}", name, alpha));
     }
@@ -104,7 +76,7 @@ TEST(MultipleScattering, AWhiteMetalKeepsAll) {
 TEST(MultipleScattering, AWhiteDielectricKeepsAllFromBothSides) {
   for (const auto& [d, name] : kDistributions)
     for (const double alpha : kAlphas) {
-      const auto b = bench(compensated(rough_glass(d, alpha, alpha, 1.5, 1)));
+      const auto b = bench(with_compensation(rough_glass(d, alpha, alpha, 1.5, 1)));
       for (const double mu : {1., .73, .25, .03})
         for (const double side : {1., -1.})
           expect_white(*b, direction(side * mu, .3), kEnergyTolerance, fmt::format("{} {}", name, alpha));
@@ -114,7 +86,7 @@ TEST(MultipleScattering, AWhiteDielectricKeepsAllFromBothSides) {
 TEST(MultipleScattering, AWhitePlasticKeepsAll) {
   for (const auto& [d, name] : kDistributions)
     for (const double alpha : kAlphas) {
-      const auto b = bench(compensated(rough_plastic(d, alpha, 1.5, 1, true, {1, 1, 1})));
+      const auto b = bench(with_compensation(rough_plastic(d, alpha, 1.5, 1, true, {1, 1, 1})));
       for (const double mu : {1., .7, .25, .03, 1e-3})
         expect_white(*b, direction(mu, .3), 2 * kEnergyTolerance, fmt::format("{} {}", name, alpha));
     }
@@ -134,7 +106,7 @@ TEST(MultipleScattering, AMetalGainsByItsOwnReflectance) {
     last = gain;
   }
   const auto gold = bench(rough_metal(Microfacet::ggx, .8, .8, kGoldEta, kGoldK)),
-             more = bench(compensated(rough_metal(Microfacet::ggx, .8, .8, kGoldEta, kGoldK)));
+             more = bench(with_compensation(rough_metal(Microfacet::ggx, .8, .8, kGoldEta, kGoldK)));
   const V3 wo = direction(.6, 0), wi = direction(.7, 2);
   const C3 before = gold->eval(wo, wi).f_cos, after = more->eval(wo, wi).f_cos;
   EXPECT_GT(after.x / before.x, after.y / before.y);
@@ -148,7 +120,7 @@ TEST(MultipleScattering, LeavesSamplingAlone) {
   const Scene all[] = {rough_metal(Microfacet::ggx, .4, .4, kGoldEta, kGoldK),
                        rough_glass(Microfacet::beckmann, .3, .3, 1.5, 1)};
   for (const Scene& s : all) {
-    const auto plain = bench(s), more = bench(compensated(s));
+    const auto plain = bench(s), more = bench(with_compensation(s));
     for (const double mu : {.9, .3, -.4})
       for (int i = 0; i < 50; ++i) {
         const float u = (i + .5f) / 50;

@@ -22,15 +22,6 @@ struct Named {
   std::unique_ptr<Bench> bench;
   bool both_sides = false;
 };
-// The material with compensation for multiple scattering (Bsdf::multiple_scattering).
-Scene with_compensation(Scene s) {
-  std::visit(
-      [](auto& b) {
-        if constexpr (requires { b.multiple_scattering; }) b.multiple_scattering = true;
-      },
-      s.bsdfs.back());
-  return s;
-}
 void add_more(std::vector<Named>& all) {
   const auto one_sided = [&](std::string name, Scene s) {
     all.push_back({std::move(name), bench(std::move(s))});

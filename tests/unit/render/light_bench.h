@@ -57,4 +57,26 @@ inline void expect_close(const LightBench::Irradiance& e, double expected) {
   EXPECT_LT(e.se, .02 * expected);
 }
 
+// Samples the light of `b` at x, and calls f(sample, hit, cosine) for each sample that a ray from x hits.
+// Leaves out samples behind another surface, whose hit is not at the sample's distance, and hits at grazing
+// angles, where the light's offset moves the point along the light. Returns the number of calls.
+template <class F>
+int for_hits_of_samples(const LightBench& b, const V3& x, int samples, F f) {
+  RandomStream r(5);
+  int hits = 0;
+  for (int i = 0; i < samples; ++i) {
+    const auto s = b.world->lights.sample(b.world->lights.choose(numbers(0, r.uniform(), r.uniform())), x);
+    if (!s) continue;
+    const auto primitive = b.world->accel.nearest(x, s->direction, kInfinity);
+    SurfaceHit hit;
+    if (!primitive || !b.world->geometry.complete(*primitive, x, s->direction, hit)) continue;  // the rim
+    if (std::abs(hit.t - s->distance) > 1e-5f * s->distance + 4e-6f) continue;
+    const float cosine = std::abs(dot(hit.ng, s->direction));
+    if (cosine < .05f) continue;
+    ++hits;
+    f(*s, hit, cosine);
+  }
+  return hits;
+}
+
 }  // namespace ls::render

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "tests/support/chi_square.h"
+#include "tests/unit/render/hits.h"
 #include "tests/unit/render/light_bench.h"
 
 namespace ls::render {
@@ -43,25 +44,6 @@ TEST(CylinderIntersection, SeesTheFarWallThroughTheOpenEnd) {
   EXPECT_EQ(intersect(c, {-2, 0, 6}, {1, 0, -1}, 0, kEndless), kEndless) << "over both";
   EXPECT_EQ(intersect(c, {0, 0, -1}, {0, 0, 1}, 0, kEndless), kEndless) << "along the axis";
   EXPECT_NEAR(intersect(c, {0, 0, 1}, {0, 2, 0}, 0, kEndless), .5, 1e-15) << "from inside";
-}
-
-BsdfIndex brushed_and_textured(SceneBuilder& builder) {
-  const TextureIndex grey = builder.texture({.5, .5, .5}), white = builder.texture({1, 1, 1});
-  RoughConductorBsdf b;
-  b.alpha_u = builder.texture({.1, .1, .1});
-  b.alpha_v = builder.texture({.3, .3, .3});
-  b.specular_reflectance =
-      SceneBuilder::push<TextureTag>(builder.scene.textures, Texture(CheckerboardTexture{grey, white, {}}));
-  return SceneBuilder::push<BsdfTag>(builder.scene.bsdfs, Bsdf(b));
-}
-
-SurfaceHit hit_from(const World& w, const V3d& from, const V3d& to) {
-  const auto at = [&](const V3d& p) { return (p - w.geometry.center) * w.geometry.scale; };
-  const V3 o(at(from)), d((at(to) - at(from)).normalized());
-  const auto primitive = w.accel.nearest(o, d, kInfinity);
-  SurfaceHit hit;
-  EXPECT_TRUE(primitive && w.geometry.complete(*primitive, o, d, hit));
-  return hit;
 }
 
 // Values of Mitsuba 3.9.1 (scalar_rgb, ray_intersect): shading normal, uv, direction of dp/du.
@@ -116,9 +98,9 @@ const Seen kSeen[] = {
 TEST(Cylinders, NormalsUvAndTangentsAreMitsubas) {
   for (const Seen& s : kSeen) {
     SceneBuilder builder;
-    builder.shape(s.shape, s.to_world, brushed_and_textured(builder));
+    builder.shape(s.shape, s.to_world, brushed(builder));
     const auto world = test::world_of(builder);
-    const SurfaceHit h = hit_from(*world, s.from, s.to);
+    const SurfaceHit h = hit_towards(*world, s.from, s.to);
     // Mitsuba's values are printed with 6 digits.
     EXPECT_LT((h.shading.n - s.normal).length(), 2e-5f) << h.shading.n << s.normal;
     EXPECT_LT((h.uv - s.uv).length(), 2e-5f) << h.uv << s.uv;
@@ -135,7 +117,7 @@ TEST(Cylinders, AFlipTurnsTheirNormalsInwards) {
     SceneBuilder builder;
     builder.shape(CylinderShape{}, test::scale(1, mirrored ? -1 : 1, 1), builder.diffuse(.5)).flip_normals =
         true;
-    EXPECT_LT(hit_from(*test::world_of(builder), {5, .1, .5}, {0, 0, .5}).ng.x, -.9f);
+    EXPECT_LT(hit_towards(*test::world_of(builder), {5, .1, .5}, {0, 0, .5}).ng.x, -.9f);
   }
 }
 

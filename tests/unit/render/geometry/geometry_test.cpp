@@ -10,7 +10,7 @@
 #include <random>
 
 #include "tests/support/render_check.h"
-#include "worker/render/world/world.h"
+#include "tests/unit/render/hits.h"
 
 namespace ls::render {
 namespace {
@@ -120,14 +120,6 @@ TEST(ClosedShapes, LoseNoRayAtAnyScale) {
   EXPECT_EQ(leaks(CubeShape{}, {}, 400000, 4), 0u);
 }
 
-SurfaceHit geometry_hit(const World& w, const V3d& from, const V3d& to) {
-  const auto at = [&](const V3d& p) { return (p - w.geometry.center) * w.geometry.scale; };
-  const V3 o(at(from)), d((at(to) - at(from)).normalized());
-  const auto primitive = w.accel.nearest(o, d, kInfinity);
-  SurfaceHit hit;
-  EXPECT_TRUE(primitive && w.geometry.complete(*primitive, o, d, hit));
-  return hit;
-}
 std::shared_ptr<const World> one(const ls::Geometry& g, const Transform& t, bool flip) {
   SceneBuilder builder;
   builder.shape(g, t, builder.diffuse(.5)).flip_normals = flip;
@@ -183,22 +175,11 @@ ls::Geometry named(const std::string& name) {
   return SphereShape{};
 }
 
-// A material that needs uv and tangents of hits.
-BsdfIndex brushed_shape(SceneBuilder& builder) {
-  const TextureIndex grey = builder.texture({.5, .5, .5}), white = builder.texture({1, 1, 1});
-  RoughConductorBsdf b;
-  b.alpha_u = builder.texture({.1, .1, .1});
-  b.alpha_v = builder.texture({.3, .3, .3});
-  b.specular_reflectance =
-      SceneBuilder::push<TextureTag>(builder.scene.textures, Texture(CheckerboardTexture{grey, white, {}}));
-  return SceneBuilder::push<BsdfTag>(builder.scene.bsdfs, Bsdf(b));
-}
-
 TEST(Shapes, NormalsUvAndTangentsAreMitsubas) {
   for (const SeenShape& s : kSeenShapes) {
     SceneBuilder builder;
-    builder.shape(named(s.shape), {}, brushed_shape(builder));
-    const SurfaceHit h = geometry_hit(*test::world_of(builder), s.from, s.to);
+    builder.shape(named(s.shape), {}, brushed(builder));
+    const SurfaceHit h = hit_towards(*test::world_of(builder), s.from, s.to);
     expect_near(h.shading.n, s.normal, s.shape);
     expect_near({h.uv.x, h.uv.y, 0}, {s.uv.x, s.uv.y, 0}, s.shape);
     expect_near(h.shading.s, s.along_u, s.shape);
@@ -213,7 +194,7 @@ TEST(Shapes, ShineToTheSideThatMitsubaSays) {
       for (const bool flip : {false, true}) {
         const bool inside_out = flip != (mirror && std::string(name) == "sphere");
         const auto world = one(named(name), test::scale(mirror ? -1 : 1, 1, 1), flip);
-        const SurfaceHit h = geometry_hit(*world, {.3, .2, 5}, {.3, .2, 0});
+        const SurfaceHit h = hit_towards(*world, {.3, .2, 5}, {.3, .2, 0});
         EXPECT_EQ(h.ng.z > 0, !inside_out) << name << mirror << flip;
         EXPECT_EQ(h.shading.n.z > 0, !inside_out) << name << mirror << flip;
       }
@@ -230,7 +211,7 @@ SurfaceHit square_hit(bool normals, bool mirror, int z = 1) {
   mesh.file = builder.asset("square.obj", text);
   mesh.face_normals = !normals;
   builder.shape(mesh, test::scale(mirror ? -1 : 1, 1, 1), builder.diffuse(.5));
-  return geometry_hit(*test::world_of(builder), {.3, .2, 5}, {.3, .2, 0});
+  return hit_towards(*test::world_of(builder), {.3, .2, 5}, {.3, .2, 0});
 }
 
 TEST(Meshes, FollowTheirNormalsAndElseTheirWinding) {
@@ -286,7 +267,7 @@ TEST(Meshes, WithoutNormalsAreSmooth) {
   mesh.file = builder.asset("roof.obj", text);
   builder.shape(mesh, {}, builder.diffuse(.5));
 
-  const SurfaceHit h = geometry_hit(*test::world_of(builder), {.05, .2, 5}, {.05, .2, 0});
+  const SurfaceHit h = hit_towards(*test::world_of(builder), {.05, .2, 5}, {.05, .2, 0});
 
   expect_near(h.shading.n, {.0358577f, 0, .999357f}, "smooth");
   expect_near(h.ng, {.707107f, 0, .707107f}, "flat");
@@ -295,7 +276,7 @@ TEST(Meshes, WithoutNormalsAreSmooth) {
 TEST(Normals, ShadingFrameIsRightHandedAndAgreesWithTheGeometricNormal) {
   for (const ls::Geometry& g : {ls::Geometry{CubeShape{}}, ls::Geometry{SphereShape{}},
                                 ls::Geometry{DiskShape{}}, ls::Geometry{RectangleShape{}}}) {
-    const SurfaceHit h = geometry_hit(*one(g, {}, false), {.3, .4, 5}, {.2, .3, 0});
+    const SurfaceHit h = hit_towards(*one(g, {}, false), {.3, .4, 5}, {.2, .3, 0});
     EXPECT_NEAR(dot(h.shading.n, h.ng), 1, 1e-6);
     EXPECT_NEAR(dot(cross(h.shading.s, h.shading.t), h.shading.n), 1, 1e-6);
   }

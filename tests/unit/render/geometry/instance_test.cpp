@@ -6,7 +6,7 @@
 #include <random>
 
 #include "tests/support/render_check.h"
-#include "worker/render/world/world.h"
+#include "tests/unit/render/hits.h"
 
 namespace ls::render {
 namespace {
@@ -15,16 +15,6 @@ using test::SceneBuilder;
 using test::translate;
 using test::operator*;
 using testing::HasSubstr;
-
-BsdfIndex brushed_instance(SceneBuilder& builder) {
-  const TextureIndex grey = builder.texture({.5, .5, .5}), white = builder.texture({1, 1, 1});
-  RoughConductorBsdf b;
-  b.alpha_u = builder.texture({.1, .1, .1});
-  b.alpha_v = builder.texture({.3, .3, .3});
-  b.specular_reflectance =
-      SceneBuilder::push<TextureTag>(builder.scene.textures, Texture(CheckerboardTexture{grey, white, {}}));
-  return SceneBuilder::push<BsdfTag>(builder.scene.bsdfs, Bsdf(b));
-}
 
 // A bumpy sheet with vertex normals, as an OBJ file.
 MeshShape sheet(SceneBuilder& builder) {
@@ -162,7 +152,7 @@ const Transform kMirrored = translate({0, 3, 0}) * test::rotate_x(10) * test::sc
 
 TEST(Instances, ShowMeshesAsIfTheyWerePlacedThemselves) {
   SceneBuilder builder;
-  builder.shape(sheet(builder), test::rotate_x(15), brushed_instance(builder));
+  builder.shape(sheet(builder), test::rotate_x(15), brushed(builder));
   expect_alike(instanced(builder, {kSimilar}), copied(builder, {kSimilar}), "similar");
   expect_alike(instanced(builder, {kStretched}), copied(builder, {kStretched}), "stretched", .01f);
   expect_alike(instanced(builder, {kMirrored}), copied(builder, {kMirrored}), "mirrored", .01f);
@@ -175,7 +165,7 @@ TEST(Instances, ShowAnalyticShapesAsIfTheyWerePlacedThemselves) {
        {ls::Geometry{SphereShape{}}, ls::Geometry{CylinderShape{}}, ls::Geometry{DiskShape{}},
         ls::Geometry{CubeShape{}}, ls::Geometry{RectangleShape{}}}) {
     SceneBuilder builder;
-    builder.shape(g, translate({.2, .1, -.3}) * test::scale(.8), brushed_instance(builder));
+    builder.shape(g, translate({.2, .1, -.3}) * test::scale(.8), brushed(builder));
     expect_alike(instanced(builder, {kSimilar}), copied(builder, {kSimilar}), "analytic");
   }
 }
@@ -238,7 +228,7 @@ TEST(Instances, HaveMitsubasNormalsUvAndTangents) {
   };
   for (const SeenInstance& s : all) {
     SceneBuilder builder;
-    builder.shape(s.shape, {}, brushed_instance(builder));
+    builder.shape(s.shape, {}, brushed(builder));
     const auto w = test::world_of(instanced(builder, {s.to_world}));
     const Met m = meet(*w, {5, .1, .2}, V3d(-5, -.1, -.05).normalized());
     ASSERT_TRUE(m.any);

@@ -80,24 +80,13 @@ TEST(AreaBeam, AHitHasTheRadianceAndDensityOfItsSample) {
     for (const Beam& beam : {kBeams[1], kBeams[3], kBeams[4]}) {
       const LightBench b(shining(g, up, beam));
       const V3 x = b.at({.3, .2, -1});
-      RandomStream r(5);
-      int hits = 0;
-      for (int i = 0; i < 4000; ++i) {
-        const auto s =
-            b.world->lights.sample(b.world->lights.choose(numbers(0, r.uniform(), r.uniform())), x);
-        if (!s) continue;
-        const auto primitive = b.world->accel.nearest(x, s->direction, kInfinity);
-        SurfaceHit hit;
-        if (!primitive || !b.world->geometry.complete(*primitive, x, s->direction, hit)) continue;
-        if (std::abs(hit.t - s->distance) > 1e-4f * s->distance + 1e-5f) continue;  // another face in front
-        const float c = std::abs(dot(hit.ng, s->direction));
-        if (c < .05f) continue;
-        ++hits;
-        // Cosines are accurate to 2^-20 of the world's size over a length of 1/100 of it, relative to the
-        // width of the transition.
-        ASSERT_NEAR(b.world->lights.emitted(hit, -s->direction).x, s->radiance.x, 2e-3) << g.index();
-        ASSERT_NEAR(b.world->lights.pdf(hit, x, s->direction) / s->pdf, 1, 1e-4 / c) << g.index();
-      }
+      const int hits =
+          for_hits_of_samples(b, x, 4000, [&](const LightSample& s, const SurfaceHit& hit, float cosine) {
+            // Cosines are accurate to 2^-20 of the world's size over a length of 1/100 of it, relative to the
+            // width of the transition.
+            ASSERT_NEAR(b.world->lights.emitted(hit, -s.direction).x, s.radiance.x, 2e-3) << g.index();
+            ASSERT_NEAR(b.world->lights.pdf(hit, x, s.direction) / s.pdf, 1, 1e-4 / cosine) << g.index();
+          });
       EXPECT_GT(hits, 100) << g.index() << " " << beam.cutoff;
     }
 }

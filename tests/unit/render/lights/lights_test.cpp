@@ -109,23 +109,11 @@ TEST(Lights, DensityOfAHitIsThatOfItsSample) {
   for (const Named& n : all) {
     const LightBench b(n.builder);
     const V3 x = b.at(n.x);
-    RandomStream r(5);
-    int hits = 0;
-    for (int i = 0; i < 2000; ++i) {
-      const float u = r.uniform(), v = r.uniform();
-      const auto s = b.world->lights.sample(b.world->lights.choose(numbers(0, u, v)), x);
-      if (!s) continue;
-      const auto primitive = b.world->accel.nearest(x, s->direction, kInfinity);
-      SurfaceHit hit;
-      // The ray misses at the rim.
-      if (!primitive || !b.world->geometry.complete(*primitive, x, s->direction, hit)) continue;
-      if (std::abs(hit.t - s->distance) > 1e-4f * s->distance + 1e-5f) continue;  // another face in front
-      const float cosine = std::abs(dot(hit.ng, s->direction));
-      if (cosine < .05f) continue;  // At grazing angles the light's offset moves the point along the light.
-      ++hits;
-      ASSERT_NEAR(b.world->lights.pdf(hit, x, s->direction) / s->pdf, 1, 1e-4 / cosine) << n.name;
-      ASSERT_EQ(b.world->lights.emitted(hit, -s->direction).x, 1.f) << n.name;
-    }
+    const int hits =
+        for_hits_of_samples(b, x, 2000, [&](const LightSample& s, const SurfaceHit& hit, float cosine) {
+          ASSERT_NEAR(b.world->lights.pdf(hit, x, s.direction) / s.pdf, 1, 1e-4 / cosine) << n.name;
+          ASSERT_EQ(b.world->lights.emitted(hit, -s.direction).x, 1.f) << n.name;
+        });
     EXPECT_GT(hits, 300) << n.name;
   }
 }

@@ -60,25 +60,12 @@ TEST(TwoSidedLight, AHitHasTheRadianceAndDensityOfItsSample) {
     for (const V3d& place : {V3d(.3, .2, -4), V3d(.3, .2, 4), V3d(.1, .2, -.3)}) {
       const LightBench b(two_sided(g, turned));
       const V3 x = b.at(place);
-      RandomStream r(5);
-      int hits = 0;
-      for (int i = 0; i < 4000; ++i) {
-        const auto s =
-            b.world->lights.sample(b.world->lights.choose(numbers(0, r.uniform(), r.uniform())), x);
-        if (!s) continue;
-        const auto primitive = b.world->accel.nearest(x, s->direction, kInfinity);
-        SurfaceHit hit;
-        if (!primitive || !b.world->geometry.complete(*primitive, x, s->direction, hit)) continue;
-        // Another face is in front of the sample, or next to it at an edge. Samples end 2^-20 of the world's
-        // size before the light.
-        if (std::abs(hit.t - s->distance) > 1e-5f * s->distance + 4e-6f) continue;
-        const float c = std::abs(dot(hit.ng, s->direction));
-        if (c < .05f) continue;
-        ++hits;
-        ASSERT_EQ(b.world->lights.emitted(hit, -s->direction), s->radiance) << g.index();
-        // Cosines are accurate to 2^-20 of the world's size over a length of 1/100 of it.
-        ASSERT_NEAR(b.world->lights.pdf(hit, x, s->direction) / s->pdf, 1, 1e-4 / c) << g.index();
-      }
+      const int hits =
+          for_hits_of_samples(b, x, 4000, [&](const LightSample& s, const SurfaceHit& hit, float cosine) {
+            ASSERT_EQ(b.world->lights.emitted(hit, -s.direction), s.radiance) << g.index();
+            // Cosines are accurate to 2^-20 of the world's size over a length of 1/100 of it.
+            ASSERT_NEAR(b.world->lights.pdf(hit, x, s.direction) / s.pdf, 1, 1e-4 / cosine) << g.index();
+          });
       EXPECT_GT(hits, 300) << g.index() << " " << place.z;
     }
 }
