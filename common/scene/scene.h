@@ -395,7 +395,7 @@ struct IntegratorSettings {
   int local_lights = 0;
   // For "volpath" only, in scenes with grids: whether paths may split at their first scattering, and Russian
   // roulette may end them where their throughput is lower than just after that scattering
-  // (worker/render/world/splitting.h). 0: chosen for the scene; -1: neither.
+  // (worker/render/world/roulette.h). 0: chosen for the scene; -1: neither.
   int path_splitting = 0;
   bool operator==(const IntegratorSettings&) const = default;
 };

@@ -213,7 +213,7 @@ void rough_sheets(Table& t) {
            "A sheet of clear rough glass that loses nothing is as bright as a white sky.",
            [=] { return in_white(sheet(30, [=](SceneBuilder& k) { return pane(k, alpha, true); })); },
            // The slack is kEnergyTolerance, the error of the energy tables
-           // (worker/render/bsdf/microfacet_energy.h).
+           // (worker/render/bsdf/microfacet_tables.h).
            grey(1), {.slack = 5e-4});
   for (const double alpha : {.3, 1.})
     t.mean(fmt::format("N38-rough-sheet-{:g}", alpha), "N38",

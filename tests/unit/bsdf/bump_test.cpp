@@ -19,7 +19,7 @@ ImageData random_image(std::uint32_t width, std::uint32_t height, std::uint32_t 
     d.f32.push_back(static_cast<float>(rng() >> 8) * 0x1p-24f);
   return d;
 }
-// Heights a x + b y at the centres of the texels, x and y from 0 to 1.
+// An image of the heights 1 + a x + b y at the centres of the texels, with x and y from 0 to 1.
 ImageData ramp(std::uint32_t width, std::uint32_t height, float a, float b) {
   ImageData d;
   d.width = width;
@@ -70,8 +70,8 @@ TEST(BumpMap, SlopesAreTheDerivativesOfTheLuminance) {
       const Bumped b({}, random_image(6, 4, channels), how);
       for (int i = 0; i < 500; ++i) {
         const V2 uv(4 * uniform() - 2, 4 * uniform() - 2);
-        // Central differences of a bilinear patch are exact along each axis, but at the edges of patches, a
-        // share of a step over a texel; heights are good to 1e-7, over steps of 1e-3.
+        // Central differences of a bilinear patch are exact along each axis. At the edges of patches they are
+        // not, so such places, a small share, are skipped. Heights are accurate to 1e-7, over steps of 1e-3.
         constexpr float h = 5e-4f;
         const auto at = [&](float u, float v) { return luminance(b.textures.eval(b.image, {u, v})); };
         const V2 slope = b.textures.slope(b.image, uv);
@@ -80,7 +80,8 @@ TEST(BumpMap, SlopesAreTheDerivativesOfTheLuminance) {
         const bool edge = std::abs(at(uv.x + h, uv.y) + at(uv.x - h, uv.y) - 2 * at(uv.x, uv.y)) > 1e-5f ||
                           std::abs(at(uv.x, uv.y + h) + at(uv.x, uv.y - h) - 2 * at(uv.x, uv.y)) > 1e-5f;
         if (edge) continue;
-        ASSERT_NEAR(slope.x, du, .05) << i;  // to_uv's shear makes patches curved: 12 texels^2 h at the most
+        // The shear of to_uv makes the patches curved along u: by at most 12 texels^2 h.
+        ASSERT_NEAR(slope.x, du, .05) << i;
         ASSERT_NEAR(slope.y, dv, .05) << i;
       }
     }
@@ -93,13 +94,13 @@ TEST(BumpMap, OfAnythingButABilinearBitmapThereIsNoSlope) {
   EXPECT_EQ(b.textures.slope(b.image, {.3f, .6f}), V2(0, 0));
 }
 
-// h = a u over dp/du of length l: the surface rises by a / l a unit.
+// With the height h = a u and a dp/du of length l, the surface rises by a / l per unit of length.
 TEST(BumpMap, TurnsTheNormalAsAnInclinedPlane) {
   const Scene gold = rough_metal(Microfacet::beckmann, .3, .3, kGoldEta, kGoldK);
   for (const double scale : {1., .25, -2.}) {
     const Bumped b(gold, ramp(8, 8, .3f, .8f), {}, scale);
-    // dp/du = 2 s, dp/dv = -.5 s + 1.5 t: the heights' gradient on the surface solves g . dp/du = .3 scale,
-    // g . dp/dv = .8 scale.
+    // dp/du = 2 s and dp/dv = -.5 s + 1.5 t. The gradient g of the heights on the surface solves g . dp/du =
+    // .3 scale and g . dp/dv = .8 scale.
     const UvPoint at({.5f, .5f}, {2, 0, .7f}, {-.5f, 1.5f, -.1f});
     const double gs = .3 * scale / 2, gt = (.8 * scale + .5 * gs) / 1.5;
     const V3 n = normalize(V3(static_cast<float>(-gs), static_cast<float>(-gt), 1));
@@ -108,8 +109,9 @@ TEST(BumpMap, TurnsTheNormalAsAnInclinedPlane) {
       for (const double nu : {.95, .5}) {
         const V3 wo = direction(mu, 1), wi = direction(nu, 3);
         const BsdfEval e = b.bsdfs.eval(last(b.scene), at, wo, wi), t = turned_gold->eval(wo, wi);
-        // The normal map's colour is rounded at 6e-8, and so the half vector's slope, of up to 1 / cos^2 = 10
-        // times as much in the tail: over alpha = .3, times 2 sqrt(e) = 13 for the farthest tail.
+        // The colour of the normal map is rounded to 6e-8. In the tail this changes the slope of the half
+        // vector by up to 1 / cos^2 = 10 times as much. Divided by alpha = .3, and times 2 sqrt(e) = 13 in
+        // the farthest tail, it bounds the relative error.
         EXPECT_NEAR(e.f_cos.x, t.f_cos.x, 2e-4 * t.f_cos.x) << scale;
         EXPECT_NEAR(e.pdf, t.pdf, 2e-4 * t.pdf);
         const auto s = b.bsdfs.sample(last(b.scene), at, wo, .3f, {.4f, .7f});
@@ -124,7 +126,7 @@ TEST(BumpMap, RisesWithTheHeightsWhicheverWayUAndVRun) {
   const UvPoint right({.5f, .5f}, {1, 0, 0}, {0, 1, 0}), mirrored({.5f, .5f}, {1, 0, 0}, {0, -1, 0});
   const V3 up(0, 0, 1), left = direction(.7, M_PI), uphill = direction(.7, 0);
   for (const UvPoint& at : {right, mirrored}) {
-    // It rises towards +s: it faces -s.
+    // The surface rises towards +s, so it faces -s.
     EXPECT_GT(b.bsdfs.eval(last(b.scene), at, up, left).f_cos.x,
               2 * b.bsdfs.eval(last(b.scene), at, up, uphill).f_cos.x);
   }
@@ -137,7 +139,7 @@ TEST(BumpMap, WhereNothingSaysWhichWayUAndVRunIsFlat) {
   EXPECT_FLOAT_EQ(b.bsdfs.eval(last(b.scene), pole, up, up).f_cos.x, .5f * kInvPi);
 }
 
-// Rough roughly as the map without it, and its normal in the frame that the outer one turned.
+// A bump map inside a normal map: it must be evaluated in the frame that the normal map rotates.
 TEST(BumpMap, StandsInOtherMaps) {
   const Scene gold = rough_metal(Microfacet::beckmann, .4, .4, kGoldEta, kGoldK);
   Bumped b(gold, ramp(8, 8, .5f, 0));

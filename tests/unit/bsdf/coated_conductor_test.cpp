@@ -1,5 +1,5 @@
-// The coated metal against its exact smooth case and against a random walk between coat and metal that shares
-// no code with it.
+// Compares the coated metal with its exact smooth case, and with a random walk between coat and metal that
+// shares no code with it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "tests/unit/bsdf/materials.h"
-#include "worker/render/bsdf/microfacet_energy.h"
+#include "worker/render/bsdf/microfacet_tables.h"
 
 namespace ls::render::test {
 namespace {
 
-// The walk, in double
+// The random walk, in double
 namespace walking {
 struct D3 {
   double x, y, z;
@@ -24,7 +24,8 @@ D3 operator*(const D3& a, double s) { return {a.x * s, a.y * s, a.z * s}; }
 double dot(const D3& a, const D3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 D3 unit(const D3& a) { return a * (1 / std::sqrt(dot(a, a))); }
 
-// Reflectances by complex refraction: cos' = sqrt(1 - sin^2 / n^2), with n the index beyond over that here.
+// Fresnel reflectance by complex refraction: cos' = sqrt(1 - sin^2 / n^2). n is the index on the other side
+// over that on this side.
 double reflectance(double cos, std::complex<double> n) {
   const std::complex<double> inside = std::sqrt(1. - (1 - cos * cos) / (n * n));
   return .5 * (std::norm((cos - n * inside) / (cos + n * inside)) +
@@ -39,8 +40,8 @@ class Walk {
     Rgb3 weight{0, 0, 0};
   };
   double ior, coat, alpha_u, alpha_v;
-  std::array<std::complex<double>, 3> metal;  // against a vacuum
-  bool lossless = false;                      // the metal reflects all
+  std::array<std::complex<double>, 3> metal;  // relative to a vacuum
+  bool lossless = false;                      // the metal absorbs nothing
   std::mt19937_64 rng{7};
 
   End from(const D3& wo) {
@@ -48,17 +49,17 @@ class Walk {
     D3 m = normal(wo, coat, coat);
     const double F = reflectance(dot(wo, m), ior);
     if (uniform() < F) return out(mirror(wo, m), w, coat);
-    D3 v = bent(wo, m, ior);  // travels down
+    D3 v = bent(wo, m, ior);  // points down, towards the metal
     if (!(v.z < 0)) return {};
     scale(w, masking(v, coat, coat));
     for (int bounces = 0; bounces < 1000; ++bounces) {
-      const D3 up = v * -1;  // towards where the light was
+      const D3 up = v * -1;  // points back to where the light came from
       m = normal(up, alpha_u, alpha_v);
       const D3 r = mirror(up, m);
       if (!(r.z > 0)) return {};
       for (std::size_t c = 0; c < 3; ++c)
         w[c] *= (lossless ? 1 : reflectance(dot(up, m), metal[c] / ior)) * masking(r, alpha_u, alpha_v);
-      // The coat from inside, seen upside down
+      // The coat from inside, turned upside down
       const D3 at{-r.x, -r.y, r.z};
       m = normal(at, coat, coat);
       const double n = 1 / ior, c = dot(at, m), inner = (1 - c * c) / (n * n) >= 1 ? 1 : reflectance(c, n);
@@ -89,12 +90,13 @@ class Walk {
     return 2 / (1 + std::sqrt(1 + tan2));
   }
   static D3 mirror(const D3& w, const D3& m) { return m * (2 * dot(w, m)) + w * -1; }
-  // The direction in which light from w goes on beyond the facet; n is the index there over that here.
+  // The direction into which a facet refracts light from w. n is the index on the other side over that on
+  // this side.
   static D3 bent(const D3& w, const D3& m, double n) {
     const double c = dot(w, m), t = std::sqrt(1 - (1 - c * c) / (n * n));
     return m * (c / n - t) + w * (-1 / n);
   }
-  // A normal visible from w (Heitz 2018)
+  // Samples a normal that is visible from w (Heitz 2018)
   D3 normal(const D3& w, double au, double av) {
     const double x = uniform(), y = uniform();
     if (au == 0) return {0, 0, 1};
@@ -114,10 +116,11 @@ using walking::Walk;
 
 const Rgb kWhiteEta{0, 0, 0}, kWhiteK{1, 1, 1};
 
-// Light by direction: 6 rings of equal projected solid angle, 8 sectors each; and its sum by channel.
+// The distribution of light over directions, in 6 rings of equal projected solid angle with 8 sectors each,
+// and its sum per channel.
 constexpr int kRings = 6, kSectors = 8;
 struct Light {
-  std::vector<double> cells = std::vector<double>(kRings * kSectors, 0);  // of green
+  std::vector<double> cells = std::vector<double>(kRings * kSectors, 0);  // the green channel
   std::array<double, 3> sum{};
   void add(double x, double y, double z, const std::array<double, 3>& w) {
     const int ring = std::clamp(static_cast<int>((1 - z * z) * kRings), 0, kRings - 1);
@@ -154,7 +157,7 @@ Light of_model(const Bench& b, const V3& wo, int n) {
   return l;
 }
 
-// F + T^2 R / (1 - F R) by complex refraction.
+// F + T^2 R / (1 - F R), by complex refraction.
 double exact(double cos, double ior, std::complex<double> metal) {
   const double F = walking::reflectance(cos, ior), inside = std::sqrt(1 - (1 - cos * cos) / (ior * ior));
   const double R = walking::reflectance(inside, metal / ior);
@@ -172,7 +175,7 @@ TEST(CoatedConductor, SmoothOverSmoothIsTheExactSumOfAllInnerReflections) {
       EXPECT_EQ(s->wi, (V3{-wo.x, -wo.y, wo.z}));
       for (int c = 0; c < 3; ++c) {
         const auto i = static_cast<std::size_t>(c);
-        // Some tens of operations in float32, of numbers up to 1
+        // The rounding error of some tens of float32 operations on numbers up to 1
         EXPECT_NEAR(s->weight[c], exact(double{wo.z}, ior, {kGoldEta[i], kGoldK[i]}), 3e-6)
             << ior << " " << mu << " " << c;
       }
@@ -198,26 +201,8 @@ TEST(CoatedConductor, WithoutContrastIsTheMetalAloneBitForBit) {
   }
 }
 
-// The share of the light from wo that the surface gives back, by random samples.
-struct Albedo {
-  double mean, error;
-};
-Albedo white_albedo(const Bench& b, const V3& wo) {
-  constexpr int kN = 10000;
-  std::mt19937 rng(9);
-  const auto uniform = [&] { return static_cast<float>(rng() >> 8) * 0x1p-24f; };
-  double sum = 0, square = 0;
-  for (int i = 0; i < kN; ++i) {
-    const float l = uniform(), x = uniform(), y = uniform();
-    const auto s = b.sample(wo, l, {x, y});
-    const double w = s ? double{s->weight.y} : 0;
-    sum += w / kN;
-    square += w * w / kN;
-  }
-  return {sum, std::sqrt(std::max(0., square - sum * sum) / kN)};
-}
-
-// 5 standard errors; where nearly nothing is lost weights are all near 1, and the errors far below the bound.
+// Allows 5 standard errors. Where almost nothing is lost, all weights are near 1 and the standard error is
+// small.
 TEST(CoatedConductor, NeverGivesMoreThanItGets) {
   for (const double ior : {.7, 1.5, 2.4})
     for (const double coat : {0., .002, .1, 1.})
@@ -225,7 +210,7 @@ TEST(CoatedConductor, NeverGivesMoreThanItGets) {
         const auto b = bench(coated(coat, u, v, kWhiteEta, kWhiteK, ior));
         for (const double mu : {1., .6, .2, .01})
           for (const double phi : {0., .5, 1.5}) {
-            const Albedo e = white_albedo(*b, direction(mu, phi));
+            const SampledAlbedo e = sampled_albedo(*b, direction(mu, phi), 10000);
             EXPECT_LE(e.mean, 1 + 5 * e.error + 1e-5)
                 << ior << " " << coat << " " << u << " " << v << " " << mu << " " << phi;
             EXPECT_LT(e.error, .01) << ior << " " << coat << " " << u << " " << v << " " << mu << " " << phi;
@@ -233,17 +218,18 @@ TEST(CoatedConductor, NeverGivesMoreThanItGets) {
       }
 }
 
-// Towards the smooth case the model loses nothing and has no light beside the mirror's. A roughness of .0011
-// is the least that is no mirror. Where light meets the coat from inside near the angle of total reflection
-// it is twice that.
+// At small roughnesses the model must lose nothing, and all light must be near the mirror's direction. .0011
+// is just above the roughness of a mirror. Near the angle of total reflection inside the coat the lobe is
+// twice as wide.
 TEST(CoatedConductor, GoesOverIntoTheSmoothCase) {
   for (const double mu : {1., .6, .2}) {
     const V3 wo = direction(mu, 1);
     for (const auto& [coat, metal] : {std::pair{0., .0011}, {.0011, 0.}, {.0011, .0011}}) {
       const Light l = of_model(*bench(coated(coat, metal, metal, kGoldEta, kGoldK)), wo, 40000);
       for (std::size_t c = 0; c < 3; ++c)
-        // 5 standard errors of weights that differ by less than .2; the tables' tolerance; and 1 % of light
-        // that leaves the narrow lobe, whose GGX tail beyond ten times alpha has 1 / 101 of it
+        // Allows 5 standard errors of weights that differ by less than .2, the tolerance of the tables, and
+        // the 1 % of the light that is outside of the narrow lobe: in a GGX tail, 1 / 101 is beyond ten times
+        // alpha
         EXPECT_NEAR(l.sum[c], exact(double{wo.z}, 1.5, {kGoldEta[c], kGoldK[c]}), .005 + .01)
             << mu << " " << coat << " " << metal;
     }
@@ -251,14 +237,17 @@ TEST(CoatedConductor, GoesOverIntoTheSmoothCase) {
 }
 
 constexpr int kWalks = 40000;
-// Noise of a sum of walk and model: 5 standard errors, sqrt(2 / n) / 2 each. A cell of share p has
-// sqrt(2 p / n), and 48 cells sum up to at most sqrt(48 * 2 / n) / 2 = .025 in the mean.
+// The noise of the difference between walk and model. Of a sum it is 5 standard errors, each at most sqrt(2 /
+// n) / 2. A cell with the share p has sqrt(2 p / n), and half the sum over 48 cells has a mean of at most
+// sqrt(48 * 2 / n) / 2 = .025.
 constexpr double kSumNoise = .018, kCellNoise = .03;
 
 struct Deviation {
-  double less = 0, more = 0, cells = 0;  // by how much the sums are below and above; total variation of green
+  // `less` and `more`: by how much the sums are below and above those of the walk. `cells`: the total
+  // variation distance of the green channel.
+  double less = 0, more = 0, cells = 0;
 };
-// The largest over four directions.
+// Returns the largest deviation over four directions.
 Deviation deviation(double coat, double u, double v, bool white) {
   const Rgb eta = white ? kWhiteEta : kGoldEta, k = white ? kWhiteK : kGoldK;
   const auto b = bench(coated(coat, u, v, eta, k));
@@ -281,7 +270,7 @@ Deviation deviation(double coat, double u, double v, bool white) {
   return d;
 }
 
-// The limits are those that docs/design/coated-metal.md states.
+// The limits are those stated in docs/design/coated-metal.md.
 TEST(CoatedConductor, UnderASmoothCoatIsNearTheRandomWalk) {
   for (const bool white : {true, false})
     for (const auto& [u, v] : {std::pair{.02, .02}, {.1, .1}, {.3, .3}, {.6, .6}, {.4, .1}}) {
@@ -314,17 +303,7 @@ TEST(CoatedConductor, StaysFiniteAtEveryExtreme) {
         for (const auto& [eta, k] :
              {std::pair{Rgb{0, 1, 1.5}, Rgb{0, 0, 0}}, {Rgb{0, 1e30, 1}, Rgb{1e30, 0, 1}}}) {
           const auto b = bench(coated(coat, metal, .1 * metal, eta, k, ior));
-          for (const double mu : {1., .5, 1e-3, 1e-7, 1e-20})
-            for (const float u : {0.f, .5f, 0x1.fffffep-1f})
-              for (const float v : {0.f, .25f, 0x1.fffffep-1f}) {
-                const V3 wo = direction(mu, 1);
-                const auto s = b->sample(wo, v, {u, v});
-                if (!s) continue;
-                EXPECT_TRUE(is_finite(s->weight) && is_finite(s->wi) && s->pdf > 0 && std::isfinite(s->pdf))
-                    << coat << " " << metal << " " << ior << " " << mu;
-                const BsdfEval e = b->eval(wo, s->wi);
-                EXPECT_TRUE(is_finite(e.f_cos) && std::isfinite(e.pdf)) << coat << " " << metal << " " << ior;
-              }
+          expect_finite(*b, {1., .5, 1e-3, 1e-7, 1e-20});
         }
 }
 

@@ -1,4 +1,4 @@
-// Which materials are diffuse: what they reflect is the same for every viewer on one side.
+// Which materials count as diffuse: on each side they have the same value for all viewers.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -57,7 +57,7 @@ TEST(DiffuseMaterials, LookTheSameFromEverywhereOnOneSide) {
         const BsdfEval one = b->eval(direction(side), wi), other = b->eval(direction(side), wi);
         EXPECT_EQ(one.f_cos, other.f_cos);
         EXPECT_EQ(one.pdf, other.pdf);
-        // In proportion to the cosine: two products, each rounded by half an ulp
+        // The value is proportional to the cosine. Two products are rounded by half an ulp each
         const BsdfEval upright = b->eval(direction(side), {0, 0, std::copysign(1.f, wi.z)});
         for (int c = 0; c < 3; ++c) EXPECT_FLOAT_EQ(one.f_cos[c], upright.f_cos[c] * std::abs(wi.z));
         EXPECT_FLOAT_EQ(one.pdf, upright.pdf * std::abs(wi.z));

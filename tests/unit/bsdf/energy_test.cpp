@@ -1,4 +1,4 @@
-// Surfaces give back no more than they get, and light goes both ways alike.
+// No surface reflects more energy than it receives, and BSDFs are reciprocal.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace ls::render::test {
 namespace {
 
-// Mean weight over a grid of samples: the albedo.
+// The albedo: the mean weight over a grid of samples.
 double albedo(const Bench& b, const V3& wo, int n = 128) {
   double sum = 0;
   for (int l = 0; l < 16; ++l)
@@ -35,8 +35,8 @@ TEST(Energy, NoSurfaceGivesMoreThanItGets) {
       }
 }
 
-// What a white rough dielectric loses is what a single bounce between microfacets does not follow. Radiance
-// grows by eta^2 on the way into the denser side, energy does not.
+// A white rough dielectric loses only light that would meet a second microfacet. Radiance grows by eta^2 on
+// the way into the denser side, while energy does not, so weights are corrected by eta^2.
 TEST(Energy, ARoughDielectricLosesOnlyByMasking) {
   for (const auto& [d, excess] : {std::pair{Microfacet::beckmann, .0035}, std::pair{Microfacet::ggx, 0.}})
     for (const double alpha : {2e-3, .02, .1, .5, 1.})
@@ -50,9 +50,9 @@ TEST(Energy, ARoughDielectricLosesOnlyByMasking) {
         }
 }
 
-// The base gives back what does not leave as specular light: exactly all, as the coat's internal reflectance
-// is that of its own Fresnel formula. 1e-3: the grid of samples near grazing directions, where the integrand
-// ends in a square root.
+// The base returns all light that the coat does not reflect, because the coat's internal reflectance follows
+// from the same Fresnel formula. The tolerance of 1e-3 is for the grid of samples near grazing directions,
+// where the integrand ends in a square root.
 TEST(Energy, AWhiteSmoothPlasticKeepsAll) {
   for (const double ior : {1.1, 1.5, 1.9, 2.4})
     for (const double mu : {1., .5, .1})
@@ -75,9 +75,8 @@ TEST(Energy, AWhiteDielectricKeepsAll) {
 }
 
 TEST(Energy, WhitePlasticStaysNearOneUnderASmoothCoatAndLosesByMaskingUnderARoughOne) {
-  // Coat and base are coupled by tables (64 nodes, a plain mean), not derived from one another: the dialect's
-  // internal reflectance lies .009 below the integral of .596, which costs the base up to 1 - (1 - .596) / (1
-  // - .587) = 2.2 %.
+  // Coat and base are linked by Mitsuba's tables (64 nodes, a plain mean): their internal reflectance is .009
+  // below the integral of .596, so the base loses up to 1 - (1 - .596) / (1 - .587) = 2.2 %.
   for (const auto d : {Microfacet::beckmann, Microfacet::ggx})
     for (const double alpha : {5e-4, .1, .5})
       for (const double mu : {1., .5, .1}) {
@@ -90,7 +89,7 @@ TEST(Energy, WhitePlasticStaysNearOneUnderASmoothCoatAndLosesByMaskingUnderARoug
       }
 }
 
-// ---- random materials, extremes among them
+// Random materials, including extreme ones
 class Dice {
  public:
   explicit Dice(unsigned seed) : rng_(seed) {}
@@ -107,7 +106,7 @@ class Dice {
     return {r, g, unit()};
   }
   Microfacet facets() { return rng_() % 2 ? Microfacet::ggx : Microfacet::beckmann; }
-  // Grazing ones as well.
+  // Returns a random direction, sometimes a grazing one.
   V3 way(bool behind) {
     const double mu = rng_() % 3 ? uniform() : one_of({1e-7, 1e-5, 1e-3, .03, 1.});
     return direction(behind && rng_() % 2 ? -mu : mu, 2 * M_PI * uniform());
@@ -120,8 +119,9 @@ class Dice {
 struct Kind {
   const char* name;
   Scene (*make)(Dice&);
-  bool behind;    // is seen from behind, too
-  double excess;  // how far above 1 its albedo may come, and why
+  bool behind;  // true if it is also seen from behind
+  // By how much its albedo may exceed 1; comments at the table state the reasons.
+  double excess;
 };
 Scene random_metal(Dice& d) {
   const double a = d.alpha(), b = d.uniform() < .5 ? a : d.alpha();
@@ -162,8 +162,8 @@ const Kind kKinds[] = {
     {"leaf", random_leaf, true, 0},
     {"sheet", random_sheet, true, kFit},
     {"coated metal", random_coated_metal, false, 0},
-    // Coat and base are coupled by the dialect's tables, whose internal reflectance is a plain mean (see
-    // rough_plastic_table.h): a base may give back up to 1.5 % more than the coat lets in.
+    // Coat and base are linked by Mitsuba's tables, whose internal reflectance is a plain mean (see
+    // microfacet_tables.h). So the base may return up to 1.5 % more than the coat transmits.
     {"plastic", random_plastic, false, .015},
     {"smooth plastic",
      [](Dice& d) { return plastic(1.01 + d.uniform(), 1, d.uniform() < .5, d.rgb(), d.rgb()); }, false, 1e-3},
@@ -174,7 +174,8 @@ const Kind kKinds[] = {
 
 float min_component(const C3& c) { return std::min(c.x, std::min(c.y, c.z)); }
 
-// Over a lattice of 4096 samples; for these weights (below 2 but where light bends) it is good to 2 %.
+// The albedo by a lattice of 4096 samples. It is accurate to 2 % for these weights, which are below 2 except
+// for refraction.
 double quick_albedo(const Bench& b, const V3& wo) {
   constexpr int kPoints = 4096;
   double sum = 0;
@@ -209,10 +210,9 @@ TEST(Energy, NoRandomMaterialGivesMoreThanItGetsAtAnyAngle) {
   }
 }
 
-// f(wo, wi) = f(wi, wo), and across a boundary f(wi, wo) = eta^2 f(wo, wi), with eta the index beyond over
-// that here: radiance is denser by its square there.
-// Directions are rounded, and so are half vectors made of them: how much the value of each channel changes by
-// that, measured by moving either direction a few units in the last place along each axis.
+// The BSDF, and in `slack` an estimate of its rounding error per channel: directions are rounded, and so are
+// half vectors. The estimate is the largest change of the value if either direction moves by a few ulps along
+// one axis.
 struct Value {
   double f[3], slack[3];
 };
@@ -232,11 +232,11 @@ Value value_of(const Bench& b, const V3& wo, const V3& wi) {
   return v;
 }
 
-// f(wo, wi) = f(wi, wo), and across a boundary f(wi, wo) = eta^2 f(wo, wi), with eta the index beyond over
-// that here: radiance is denser by its square there. Besides the above 1e-4 for some tens of operations. A
-// metal's reflectance is a difference of float32 amplitudes, good to a few units of 2^-24 of 1, whatever is
-// left of it: of what a mirror of the same facets would send, which is about the density of sampling, that is
-// allowed too.
+// Expects f(wo, wi) = f(wi, wo), and across a boundary f(wi, wo) = eta^2 f(wo, wi), since radiance is larger
+// by eta^2 in the denser medium. eta is the index beyond over that here. The tolerance has three parts: the
+// rounding errors of directions; 1e-4 for some tens of operations; and a few units of 2^-24 of the value of a
+// mirror with the same facets (about the density of sampling), because a metal's reflectance is a difference
+// of float32 amplitudes.
 void expect_reciprocal(const Bench& b, const V3& wo, const V3& wi, double eta, const std::string& what) {
   const double across = wo.z * wi.z < 0 ? (wo.z > 0 ? eta * eta : 1 / (eta * eta)) : 1;
   const Value there = value_of(b, wo, wi), back = value_of(b, wi, wo);
@@ -254,7 +254,7 @@ void expect_reciprocal(const Bench& b, const V3& wo, const V3& wi, double eta, c
 TEST(Reciprocity, HoldsForRandomMaterialsAtAnyAngle) {
   for (const Kind& k : kKinds) {
     if (std::string_view(k.name).find("smooth glass") != std::string_view::npos)
-      continue;  // single directions
+      continue;  // its lobes are deltas
     Dice dice(10);
     for (int i = 0; i < 200; ++i) {
       const Scene s = k.make(dice);

@@ -1,4 +1,4 @@
-// Closed forms, symmetries and edges.
+// Compares BSDFs with closed forms, and tests symmetries and edge cases.
 #include <gmock/gmock.h>
 
 #include <limits>
@@ -130,7 +130,7 @@ TEST(Conductor, OfAHugeIndexReflectsEverything) {
       const auto b = bench(rough_metal(Microfacet::ggx, 1e-4, 1e-4, eta, k));
       const auto s = b->sample(direction(.8, 1), .5f, {.2f, .7f});
       ASSERT_TRUE(s);
-      // At a right angle 1 - R is 4 / eta or 4 / k^2, elsewhere no more than 4 / (eta cos).
+      // At normal incidence 1 - R is 4 / eta or 4 / k^2, at other angles at most 4 / (eta cos).
       EXPECT_NEAR(s->weight.x, 1, 8e-6) << huge;
       if (huge > 1e9) EXPECT_NEAR(s->weight.x, 1, 2e-7) << huge;
     }
@@ -146,13 +146,14 @@ TEST(Roughness, BelowTheSpecularLimitIsAMirror) {
 }
 
 TEST(Roughness, HemisphericalReflectanceOfGgxAtRoughnessOneSeenFromAbove) {
-  // From mu = 1, alpha = 1: D = 1/pi, visible normals have the density cos / pi, and the masking of the
-  // reflected direction is G1 = 2 z / (1 + z) with z = 2 c^2 - 1 for a normal at cosine c (G1 of the viewer
-  // is 1, so that separable and height-correlated Smith masking are the same there): E = int_{1/sqrt 2}^1 2 c
-  // G1 dc = int_0^1 z / (1 + z) dz = 1 - ln 2.
+  // For mu = 1 and alpha = 1: D = 1 / pi, visible normals have the density cos / pi, and the masking of the
+  // reflected direction is G1 = 2 z / (1 + z), with z = 2 c^2 - 1 for a normal at the cosine c. (G1 of the
+  // viewer is 1, so separable and height-correlated Smith masking agree.) So E = int_{1/sqrt 2}^1 2 c G1 dc =
+  // int_0^1 z / (1 + z) dz = 1 - ln 2.
   const auto b = bench(rough_metal(Microfacet::ggx, 1, 1, {0, 0, 0}, {1, 1, 1}));
   double sum = 0;
-  constexpr int n = 20000;  // midpoint rule in z: error n^-2 times a bounded second derivative
+  // The midpoint rule in z has an error of n^-2 times a bounded second derivative.
+  constexpr int n = 20000;
   for (int i = 0; i < n; ++i) sum += 2. * M_PI / n * b->eval({0, 0, 1}, direction((i + .5) / n, .3)).f_cos.x;
   EXPECT_NEAR(sum, 1 - std::log(2.), 1e-6);
 }
@@ -167,7 +168,8 @@ TEST(Roughness, IsReciprocal) {
         for (const double nu : {.95, .5, .1}) {
           const V3 a = direction(mu, .3), c = direction(nu, 2.9);
           const float ab = b->eval(a, c).f_cos.y / c.z, ba = b->eval(c, a).f_cos.y / a.z;
-          EXPECT_NEAR(ab, ba, 2e-5f * ab);  // rounding of the half vector, over alpha >= .05: some 100 ulps
+          // Rounding of the half vector, divided by alpha >= .05, is about 100 ulps.
+          EXPECT_NEAR(ab, ba, 2e-5f * ab);
         }
   }
 }
@@ -178,17 +180,7 @@ TEST(Roughness, StaysFiniteAtEveryExtreme) {
       const std::unique_ptr<Bench> all[] = {bench(rough_metal(d, alpha, alpha, kGoldEta, kGoldK)),
                                             bench(rough_metal(d, alpha, 1e-4, kGoldEta, kGoldK)),
                                             bench(rough_plastic(d, alpha, 1.5, 1, false, {1, 1, 1}))};
-      for (const auto& b : all)
-        for (const double mu : {1., .5, 1e-3, 1e-7, 1e-20})
-          for (const float u : {0.f, 1e-9f, .5f, 0x1.fffffep-1f})
-            for (const float v : {0.f, .25f, 0x1.fffffep-1f}) {
-              const V3 wo = direction(mu, 1);
-              const auto s = b->sample(wo, v, {u, v});
-              if (!s) continue;
-              EXPECT_TRUE(is_finite(s->weight) && is_finite(s->wi) && s->pdf > 0 && std::isfinite(s->pdf));
-              const BsdfEval e = b->eval(wo, s->wi);
-              EXPECT_TRUE(is_finite(e.f_cos) && std::isfinite(e.pdf));
-            }
+      for (const auto& b : all) expect_finite(*b, {1., .5, 1e-3, 1e-7, 1e-20});
     }
 }
 
@@ -200,7 +192,7 @@ TEST(RoughPlastic, AlikeCoatsAreIntegratedOnce) {
   const auto seconds = [](double alpha, int count) {
     return seconds_to_build(rough_plastic(Microfacet::ggx, alpha, 1.5, 1, false, {.5, .5, .5}), count);
   };
-  seconds(.21, 1);  // what all coats share
+  seconds(.21, 1);  // builds tables that all coats share
   const double one = seconds(.22, 1);
   EXPECT_LT(seconds(.23, 100), 20 * one);
 }

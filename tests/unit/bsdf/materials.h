@@ -1,10 +1,13 @@
-// Scenes of one material each, for the tests of this folder.
+// Scenes with one material each, for the tests of this folder.
 #pragma once
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <initializer_list>
 #include <memory>
+#include <random>
 #include <string>
 
 #include "common/base/clock.h"
@@ -18,7 +21,7 @@ struct Bench {
   TextureTable textures;
   BsdfTable bsdfs;
   BsdfIndex bsdf;
-  UvPoint at{{.4f, .55f}, {2, 0, 0}, {-.5f, 1.5f, 0}};  // as in make_oracle.py
+  UvPoint at{{.4f, .55f}, {2, 0, 0}, {-.5f, 1.5f, 0}};  // the same as in make_oracle.py
 
   BsdfEval eval(const V3& wo, const V3& wi) const { return bsdfs.eval(bsdf, at, wo, wi); }
   std::optional<BsdfSample> sample(const V3& wo, float u_lobe, const V2& u) const {
@@ -37,7 +40,7 @@ inline BsdfIndex add(Scene& s, const Bsdf& b) {
   return {static_cast<std::uint32_t>(s.bsdfs.size() - 1)};
 }
 
-// Ready to evaluate its last material. `image` is what its files hold.
+// The scene, ready to evaluate its last material. `image` is the content of all its image files.
 inline std::unique_ptr<Bench> bench(Scene scene, const ImageData& image = {}) {
   auto b = std::make_unique<Bench>();
   b->scene = std::move(scene);
@@ -54,6 +57,16 @@ inline std::unique_ptr<Bench> bench(Scene scene, const ImageData& image = {}) {
   return b;
 }
 
+// The material with compensation for multiple scattering (Bsdf::multiple_scattering).
+inline Scene with_compensation(Scene s) {
+  std::visit(
+      [](auto& b) {
+        if constexpr (requires { b.multiple_scattering; }) b.multiple_scattering = true;
+      },
+      s.bsdfs.back());
+  return s;
+}
+
 // CPU time of this thread for building `count` materials like the one of `scene`. Tests compare it with that
 // of one material, so that neither the machine nor its load matters.
 inline double seconds_to_build(Scene scene, int count) {
@@ -63,7 +76,7 @@ inline double seconds_to_build(Scene scene, int count) {
   return thread_cpu_seconds() - start;
 }
 
-// True if shadow rays must ask the material what passes straight through it.
+// True if light may pass straight through, so that shadow rays must ask the material.
 inline bool passes_light(const Bench& b) { return scene::bsdf_traits(b.scene)->at(b.bsdf.value).passes; }
 
 inline const Rgb kGoldEta{.14, .37, 1.44}, kGoldK{3.98, 2.38, 1.60};
@@ -129,7 +142,7 @@ inline Scene rough_sheet(Microfacet d, double au, double av, double ior, const R
                                  texture(s, transmittance)});
   return s;
 }
-// Burley's, by the dialect's parameters.
+// The parameters of the principled material.
 struct PrincipledValues {
   double roughness = .5, anisotropic = 0, metallic = 0, spec_trans = 0, eta = 1.5, spec_tint = 0, sheen = 0,
          sheen_tint = 0, flatness = 0, clearcoat = 0, clearcoat_gloss = 0;
@@ -231,6 +244,40 @@ inline V3 direction(double cos_theta, double phi) {
   const double sin = std::sqrt(std::max(0., 1 - cos_theta * cos_theta));
   return {static_cast<float>(sin * std::cos(phi)), static_cast<float>(sin * std::sin(phi)),
           static_cast<float>(cos_theta)};
+}
+
+// The share of the energy from wo that leaves, and its standard error, estimated by random samples.
+struct SampledAlbedo {
+  double mean, error;
+};
+inline SampledAlbedo sampled_albedo(const Bench& b, const V3& wo, int samples, unsigned seed = 3) {
+  std::mt19937 rng(seed);
+  const auto uniform = [&] { return static_cast<float>(rng() >> 8) * 0x1p-24f; };
+  double sum = 0, square = 0;
+  for (int i = 0; i < samples; ++i) {
+    const float l = uniform(), u = uniform(), v = uniform();
+    const auto s = b.sample(wo, l, {u, v});
+    const double x = s ? double{s->weight.y} * sqr(double{s->eta}) : 0;
+    sum += x;
+    square += x * x;
+  }
+  const double mean = sum / samples;
+  return {mean, std::sqrt(std::max(0., square / samples - mean * mean) / samples)};
+}
+
+// Expects finite samples and values for extreme directions and random numbers.
+inline void expect_finite(const Bench& b, std::initializer_list<double> view_cosines) {
+  for (const double mu : view_cosines)
+    for (const float u : {0.f, 1e-9f, .5f, 0x1.fffffep-1f})
+      for (const float v : {0.f, .25f, .6f, 0x1.fffffep-1f}) {
+        const V3 wo = direction(mu, 1);
+        const auto s = b.sample(wo, v, {u, v});
+        if (!s) continue;
+        EXPECT_TRUE(is_finite(s->weight) && is_finite(s->wi) && s->pdf > 0 && std::isfinite(s->pdf)) << mu;
+        EXPECT_EQ(s->transmitted, s->wi.z * wo.z < 0) << mu;
+        const BsdfEval e = b.eval(wo, s->wi);
+        EXPECT_TRUE(is_finite(e.f_cos) && std::isfinite(e.pdf)) << mu;
+      }
 }
 
 }  // namespace ls::render::test

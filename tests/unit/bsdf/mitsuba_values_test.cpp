@@ -1,4 +1,4 @@
-// The values of our materials are those of Mitsuba 3, in a table that make_oracle.py wrote.
+// Compares our materials with values of Mitsuba 3, in a table that make_oracle.py wrote.
 #include <gmock/gmock.h>
 
 #include <charconv>
@@ -60,12 +60,12 @@ V3 vec(const double (&v)[3]) {
   return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
 }
 
-// Both sides work in float32. The half vector is good to about 1e-7 absolute, which an exponent e =
-// (tan/alpha)^2 turns into a relative error of 2 sqrt(e) 1e-7 / alpha of the lobe: below 1e-4 for alpha >=
-// .02 and e < 87. Plastic: Mitsuba integrates its tables in float32 with fewer nodes; 1e-3 is what we ask
-// there. Smooth plastic: Mitsuba takes the internal reflectance from a fit that is good to 1e-3, we the
-// integral; a share of (1 - r) near .4 makes it 2e-3. The coat of principled_thin: Mitsuba subtracts the
-// cosine's square from 1 where alpha^2 = 1e-4 remains, good to 6e-8 / 1e-4.
+// Both renderers compute in float32. The half vector is accurate to about 1e-7. With the exponent e = (tan /
+// alpha)^2 this is a relative error of 2 sqrt(e) 1e-7 / alpha of the lobe: below 1e-4 for alpha >= .02 and e
+// < 87. Rough plastic: 1e-3, because Mitsuba integrates its tables in float32 with fewer nodes. Smooth
+// plastic: 2e-3, because Mitsuba's internal reflectance is a fit with an error of 1e-3 (ours is the
+// integral), which is divided by 1 - r, about .4. principled_thin: 1e-3, because Mitsuba subtracts the
+// squared cosine from 1, where alpha^2 = 1e-4 remains, with an error of 6e-8 / 1e-4.
 TEST(MitsubaValues, EveryMaterialAgreesAtEveryDirection) {
   std::map<std::string, std::unique_ptr<Bench>> benches;
   for (auto& [name, scene] : materials()) benches[name] = bench(scene, oracle_heights());
@@ -78,7 +78,8 @@ TEST(MitsubaValues, EveryMaterialAgreesAtEveryDirection) {
     const double tolerance = name.starts_with("smooth_plastic")                         ? 2e-3
                              : name.starts_with("plastic") || name == "principled_thin" ? 1e-3
                                                                                         : 1e-4;
-    // Refraction goes with dot(wo, m), which is rounded at 6e-8 and for facets seen edge on is no more.
+    // Refraction is proportional to dot(wo, m), which has a rounding error of 6e-8 and is about as small for
+    // facets seen edge on.
     const double least = name.starts_with("principled_glass") ? 1e-9 : 1e-20;
 
     const BsdfEval e = benches[name]->eval(vec(row.wo), vec(row.wi));

@@ -1,4 +1,5 @@
-// Compensation of the light that microfacets throw onto each other: white furnaces, and what it leaves alone.
+// Compensation of the light that scatters several times between microfacets: white furnaces, and what it must
+// not change.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -6,8 +7,7 @@
 
 #include "tests/unit/bsdf/materials.h"
 #include "worker/render/bsdf/microfacet.h"
-#include "worker/render/bsdf/microfacet_energy.h"
-#include "worker/render/bsdf/visible_normals.h"
+#include "worker/render/bsdf/microfacet_tables.h"
 
 namespace ls::render::test {
 namespace {
@@ -16,52 +16,24 @@ const double kAlphas[] = {0, 1e-3, .01, .1, .5, 1};
 const std::pair<Microfacet, const char*> kDistributions[] = {{Microfacet::beckmann, "beckmann"},
                                                              {Microfacet::ggx, "ggx"}};
 
-Scene compensated(Scene s) {
-  std::visit(
-      [](auto& b) {
-        if constexpr (requires { b.multiple_scattering; }) b.multiple_scattering = true;
-      },
-      s.bsdfs.back());
-  return s;
-}
-
-// Energy that leaves, of a unit that comes along wo, by random samples.
-struct Mean {
-  double value, error;
-};
-Mean albedo_along(const Bench& b, const V3& wo) {
-  constexpr int kSamples = 40000;
-  std::mt19937 rng(3);
-  const auto uniform = [&] { return static_cast<float>(rng() >> 8) * 0x1p-24f; };
-  double sum = 0, square = 0;
-  for (int i = 0; i < kSamples; ++i) {
-    const float l = uniform(), u = uniform(), v = uniform();
-    const auto s = b.sample(wo, l, {u, v});
-    const double x = s ? double{s->weight.y} * sqr(double{s->eta}) : 0;
-    sum += x;
-    square += x * x;
-  }
-  const double mean = sum / kSamples;
-  return {mean, std::sqrt(std::max(0., square / kSamples - mean * mean) / kSamples)};
-}
-// 5 standard errors: once in 1.7 million; the errors are such that a loss of 2 % (single scattering loses up
-// to 70) shows.
+// Allows 5 standard errors, which are exceeded once in 1.7 million cases. They are small enough to show a
+// loss of 2 %; single scattering loses up to 70 %.
 void expect_white(const Bench& b, const V3& wo, double tolerance, const std::string& what) {
-  const Mean e = albedo_along(b, wo);
-  EXPECT_NEAR(e.value, 1, tolerance + 5 * e.error) << what << " at " << wo.z;
+  const SampledAlbedo e = sampled_albedo(b, wo, 40000);
+  EXPECT_NEAR(e.mean, 1, tolerance + 5 * e.error) << what << " at " << wo.z;
   EXPECT_LT(e.error, .006) << what << " at " << wo.z;
 }
 
-// Seen from above, single scattering off GGX of roughness 1 keeps 1 - ln 2 of the light.
+// Seen from above, single scattering by GGX facets of roughness 1 reflects 1 - ln 2 of the light.
 TEST(MultipleScattering, WithoutItWhiteGgxOfRoughnessOneKeepsOneLessLogTwo) {
   const auto b = bench(rough_metal(Microfacet::ggx, 1, 1, {0, 0, 0}, {1, 1, 1}));
-  const Mean e = albedo_along(*b, {0, 0, 1});
-  EXPECT_NEAR(e.value, 1 - std::log(2.), 5 * e.error);
+  const SampledAlbedo e = sampled_albedo(*b, {0, 0, 1}, 40000);
+  EXPECT_NEAR(e.mean, 1 - std::log(2.), 5 * e.error);
   static const Quadrature q = gauss_legendre(256);
   EXPECT_NEAR(rough_share(Way::mirrored, Microfacet::ggx, 1, 1, 1, q), 1 - std::log(2.), 1e-5);
 }
 
-// The tables, and the quadrature that they are made by, against one of 16 times as many nodes.
+// Tests the tables, and the quadrature behind them, against a quadrature with 16 times as many nodes.
 TEST(MultipleScattering, TablesKeepAllWithinTheirTolerance) {
   static const Quadrature fine = gauss_legendre(400);
   for (const auto& [d, name] : kDistributions)
@@ -73,7 +45,7 @@ TEST(MultipleScattering, TablesKeepAllWithinTheirTolerance) {
                    ? 1.
                    : double{beckmann::G1_over_cos(w, a, a)} / double{beckmann::exact_G1_over_cos(w, a, a)};
       };
-      const double rough = double{static_cast<float>(alpha)};  // as materials have it
+      const double rough = double{static_cast<float>(alpha)};  // rounded as in materials
       const MicrofacetEnergy metal = conductor_energy(d, rough), glass = dielectric_energy(d, rough, 1.5);
       for (const double mu : {.97, .76, .74, .33, .03, 2e-3}) {
         const auto E = [&](Way way, double eta) {
@@ -95,7 +67,7 @@ TEST(MultipleScattering, TablesKeepAllWithinTheirTolerance) {
 TEST(MultipleScattering, AWhiteMetalKeepsAll) {
   for (const auto& [d, name] : kDistributions)
     for (const double alpha : kAlphas) {
-      const auto b = bench(compensated(rough_metal(d, alpha, alpha, {0, 0, 0}, {1, 1, 1})));
+      const auto b = bench(with_compensation(rough_metal(d, alpha, alpha, {0, 0, 0}, {1, 1, 1})));
       for (const double mu : {1., .75, .25, .03, 1e-3})
         expect_white(*b, direction(mu, .3), kEnergyTolerance, fmt::format("{} {}", name, alpha));
     }
@@ -104,7 +76,7 @@ TEST(MultipleScattering, AWhiteMetalKeepsAll) {
 TEST(MultipleScattering, AWhiteDielectricKeepsAllFromBothSides) {
   for (const auto& [d, name] : kDistributions)
     for (const double alpha : kAlphas) {
-      const auto b = bench(compensated(rough_glass(d, alpha, alpha, 1.5, 1)));
+      const auto b = bench(with_compensation(rough_glass(d, alpha, alpha, 1.5, 1)));
       for (const double mu : {1., .73, .25, .03})
         for (const double side : {1., -1.})
           expect_white(*b, direction(side * mu, .3), kEnergyTolerance, fmt::format("{} {}", name, alpha));
@@ -114,14 +86,14 @@ TEST(MultipleScattering, AWhiteDielectricKeepsAllFromBothSides) {
 TEST(MultipleScattering, AWhitePlasticKeepsAll) {
   for (const auto& [d, name] : kDistributions)
     for (const double alpha : kAlphas) {
-      const auto b = bench(compensated(rough_plastic(d, alpha, 1.5, 1, true, {1, 1, 1})));
+      const auto b = bench(with_compensation(rough_plastic(d, alpha, 1.5, 1, true, {1, 1, 1})));
       for (const double mu : {1., .7, .25, .03, 1e-3})
         expect_white(*b, direction(mu, .3), 2 * kEnergyTolerance, fmt::format("{} {}", name, alpha));
     }
 }
 
-// A metal that absorbs gains less than a white one, and the more it absorbs the less; with tints as with
-// indices. The series: each return brings F (1 - E_mean) more.
+// A metal that absorbs gains less from compensation than a white one, whether by its tint or by its index.
+// `gain` is summed as a series, in which each further bounce has the factor F (1 - E_mean).
 TEST(MultipleScattering, AMetalGainsByItsOwnReflectance) {
   const MicrofacetEnergy e = conductor_energy(Microfacet::ggx, .8);
   const float mu = .6f, missing = e.missing.at(mu), E = 1 / (1 + missing);
@@ -134,7 +106,7 @@ TEST(MultipleScattering, AMetalGainsByItsOwnReflectance) {
     last = gain;
   }
   const auto gold = bench(rough_metal(Microfacet::ggx, .8, .8, kGoldEta, kGoldK)),
-             more = bench(compensated(rough_metal(Microfacet::ggx, .8, .8, kGoldEta, kGoldK)));
+             more = bench(with_compensation(rough_metal(Microfacet::ggx, .8, .8, kGoldEta, kGoldK)));
   const V3 wo = direction(.6, 0), wi = direction(.7, 2);
   const C3 before = gold->eval(wo, wi).f_cos, after = more->eval(wo, wi).f_cos;
   EXPECT_GT(after.x / before.x, after.y / before.y);
@@ -142,12 +114,13 @@ TEST(MultipleScattering, AMetalGainsByItsOwnReflectance) {
   EXPECT_GT(after.z, before.z);
 }
 
-// Only values change: samples and their densities are the same, so all that holds of them holds here.
+// Compensation changes only values. Samples and their densities stay the same, so tests of them without
+// compensation apply.
 TEST(MultipleScattering, LeavesSamplingAlone) {
   const Scene all[] = {rough_metal(Microfacet::ggx, .4, .4, kGoldEta, kGoldK),
                        rough_glass(Microfacet::beckmann, .3, .3, 1.5, 1)};
   for (const Scene& s : all) {
-    const auto plain = bench(s), more = bench(compensated(s));
+    const auto plain = bench(s), more = bench(with_compensation(s));
     for (const double mu : {.9, .3, -.4})
       for (int i = 0; i < 50; ++i) {
         const float u = (i + .5f) / 50;
@@ -190,7 +163,7 @@ TEST(MultipleScattering, TablesAreAsGoodAsTheySay) {
     const double x = i / 5000.;
     EXPECT_NEAR(t.at(static_cast<float>(x)), f(x), x > 1e-4 ? 1.1e-3 : 2e-3) << x;
   }
-  // 2 int x (sqrt x + .2 (x - .3)+) dx
+  // The mean is 2 int x (sqrt x + .2 max(0, x - .3)) dx
   EXPECT_NEAR(t.mean(), .8 + 2 * .2 * ((1 - .027) / 3 - .3 * (1 - .09) / 2), 1e-3);
   EXPECT_LT(t.bytes(), 4096u);
 }

@@ -1,4 +1,4 @@
-// Nori's model of rough plastic, as it is read: kd / pi + (1 - max kd) D F G / (4 cos cos).
+// Nori's rough plastic, as scenes of Nori are read: kd / pi + (1 - max kd) D F G / (4 cos cos).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,8 +27,8 @@ Scene wearing(const std::string& bsdf) {
   return r.scene.value_or(Scene{});
 }
 
-// Written down from the definitions, in double: Beckmann's D, Smith's exact G1 (Walter et al. 2007, eq. 25),
-// Fresnel's equations for n >= 1 from outside.
+// The specular term from its definitions, in double: Beckmann's D, Smith's exact G1 (Walter et al. 2007, eq.
+// 25), and Fresnel's equations for light from outside with n >= 1.
 double gloss(const V3& i, const V3& o, double alpha, double n) {
   const auto smith = [&](const V3& v) {
     const double t = std::sqrt(1 - double{v.z} * v.z) / v.z;
@@ -57,11 +57,11 @@ void expect_model(const Bench& b, const Rgb& kd, double alpha, double n) {
       const C3 f = b.eval(o, i).f_cos;
       for (int k = 0; k < 3; ++k) {
         const double wanted = (kd[static_cast<std::size_t>(k)] / M_PI + ks * gloss(i, o, alpha, n)) * i.z;
-        // The renderer's G1 is a rational fit, good to 0.35 %, and enters twice.
+        // The renderer's G1 is a rational fit with an error of 0.35 %, and enters twice.
         EXPECT_NEAR((&f.x)[k], wanted, .0071 * wanted) << theta << " " << phi;
       }
       EXPECT_EQ(b.eval(o, V3(i.x, i.y, -i.z)).f_cos, C3(0));
-      EXPECT_EQ(b.eval(V3(o.x, o.y, -o.z), V3(i.x, i.y, -i.z)).f_cos, C3(0));  // it has one side
+      EXPECT_EQ(b.eval(V3(o.x, o.y, -o.z), V3(i.x, i.y, -i.z)).f_cos, C3(0));  // its back is black
     }
 }
 
@@ -95,7 +95,8 @@ TEST(NoriMicrofacet, OfPeakAndHueIsTheTextureAgain) {
   EXPECT_EQ(t->eval({3}, {.1f, .1f}), C3(.5f));
   EXPECT_EQ(t->eval({4}, {.1f, .1f}), C3(.4f, 1, .5f));
   EXPECT_EQ(t->eval({3}, {.7f, .1f}), C3(0));
-  EXPECT_EQ(t->eval({4}, {.7f, .1f}), C3(1));  // black has no hue: white, times nothing
+  // Black has no hue: the hue is white, and the peak 0.
+  EXPECT_EQ(t->eval({4}, {.7f, .1f}), C3(1));
   s.textures = {PeakTexture{{1}}, PeakTexture{{0}}};
   EXPECT_FALSE(
       TextureTable::build(s, [](const Asset&) -> Result<ImageData> { return fail(Errc::not_found, ""); }));

@@ -1,4 +1,4 @@
-// Samples follow their density, weights fit values, and no surface gives back more than it gets.
+// Samples follow their density, weights match values, and no surface reflects more energy than it receives.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,15 +22,6 @@ struct Named {
   std::unique_ptr<Bench> bench;
   bool both_sides = false;
 };
-// A material with its microfacets' light to each other (Bsdf::multiple_scattering).
-Scene with_compensation(Scene s) {
-  std::visit(
-      [](auto& b) {
-        if constexpr (requires { b.multiple_scattering; }) b.multiple_scattering = true;
-      },
-      s.bsdfs.back());
-  return s;
-}
 void add_more(std::vector<Named>& all) {
   const auto one_sided = [&](std::string name, Scene s) {
     all.push_back({std::move(name), bench(std::move(s))});
@@ -45,7 +36,8 @@ void add_more(std::vector<Named>& all) {
   wide("glass that scatters often", with_compensation(rough_glass(Microfacet::ggx, .5, .5, 1.5, 1)));
   wide("thin glass and rough gold",
        blend(thin_glass(1.5), rough_metal(Microfacet::ggx, .3, .3, kGoldEta, kGoldK), .6));
-  // Nori's: a base, and a coat whose share is what the base leaves (as it is read; see nori_microfacet_test).
+  // As Nori's rough plastic is read: a base, and a coat with the share that the base leaves
+  // (nori_microfacet_test.cpp).
   one_sided("diffuse and metal",
             blend(diffuse({.2, .6, .4}),
                   rough_metal(Microfacet::beckmann, .3, .3, {1.5, 1.5, 1.5}, {0, 0, 0}), .4));
@@ -109,14 +101,14 @@ std::vector<Named> smooth_materials() {
   return all;
 }
 
-// Over the sphere, by angles: points .005 rad apart in theta and .003 rad in phi; the narrowest lobe (alpha
-// .05 seen at cosine .1) is 2 alpha = .1 wide in theta and 2 alpha cos = .01 in phi.
+// The grid over the sphere has points .005 rad apart in theta and .003 rad in phi. The narrowest lobe (alpha
+// .05, seen at the cosine .1) is 2 alpha = .1 wide in theta and 2 alpha cos = .01 in phi.
 constexpr int kThetaCells = 32, kPhiCells = 32, kSubTheta = 20, kSubPhi = 64, kSamples = 100000;
 constexpr int kCells = kThetaCells * kPhiCells;
 
-// Probabilities of the cells, and of "nothing, or a delta lobe" last. From one phi to the next the points
-// move in theta by the golden ratio of a step: the density of refraction by GGX facets ends in a step along a
-// theta, which a plain grid would hit or miss as a whole.
+// Returns the expected counts of the cells; the last entry is for samples without direction or of a delta
+// lobe. From one phi to the next the points move in theta by the golden ratio of a step: the density of
+// refraction by GGX facets ends abruptly at one theta, which a plain grid would hit or miss as a whole.
 std::vector<double> expected_cells(const Bench& b, const V3& wo) {
   std::vector<double> p(kCells + 1, 0);
   const double dt = M_PI / (kThetaCells * kSubTheta), df = 2 * M_PI / (kPhiCells * kSubPhi);
@@ -175,7 +167,7 @@ TEST(Sampling, FollowsItsDensity) {
   tally.close();
 }
 
-// Of lobes alone: what a mixture of them does is no map of the square.
+// Tests single lobes, because a mixture of lobes is not one map of the unit square.
 TEST(Sampling, StretchesTheSquareByOneOverTheDensity) {
   const auto lobe = [](const Bench& b, const V3& wo, float u_lobe, const auto& chance) {
     return [&b, wo, u_lobe, chance](const V2& u) -> std::optional<ls::test::Mapped> {
@@ -204,7 +196,8 @@ TEST(Sampling, StretchesTheSquareByOneOverTheDensity) {
         ls::test::expect_jacobian(fmt::format("metal {} {} at {}", name, a, mu),
                                   lobe(*metal, wo, .5f, always));
       }
-      // Of glass the facets that reflect, by Fresnel's formula at the half vector, and those that refract.
+      // For glass, tests the reflected and the refracted lobe; the probability of each is given by the
+      // Fresnel reflectance at the half vector.
       const auto window = bench(rough_glass(d, .3, .3, 1.5, 1));
       for (const bool out : {true, false}) {
         const double eta = out ? 1.5 : 1 / 1.5;
@@ -217,7 +210,8 @@ TEST(Sampling, StretchesTheSquareByOneOverTheDensity) {
         };
         ls::test::expect_jacobian(fmt::format("reflected by glass {} at {}", name, o.z),
                                   lobe(*window, o, 0, fresnel));
-        if (out)  // from inside most facets of grazing light reflect all of it
+        // From inside, most facets totally reflect grazing light.
+        if (out)
           ls::test::expect_jacobian(fmt::format("refracted by glass {} at {}", name, o.z),
                                     lobe(*window, o, 1 - 0x1p-24f, fresnel));
       }
@@ -251,8 +245,9 @@ TEST(Sampling, WeightTimesDensityIsTheValue) {
         if (!s || s->delta) continue;
         EXPECT_EQ(s->transmitted, s->wi.z * wo.z < 0) << m.name;
         const BsdfEval e = m.bench->eval(wo, s->wi);
-        // eval() finds the half vector again from wi: 1e-7 absolute, over alpha >= .05 and the slopes of the
-        // lobe's tail (up to 5 alpha) some 1e-4 relative; tails beyond are rare and steeper.
+        // eval() computes the half vector from wi with an error of 1e-7. Divided by alpha >= .05, and times
+        // the slopes of the lobe's tail (up to 5 alpha), this is a relative error of about 1e-4. Samples
+        // farther out in the tail are rare, but have larger errors.
         EXPECT_NEAR(e.pdf, s->pdf, 1e-3f * s->pdf) << m.name;
         for (int c = 0; c < 3; ++c)
           EXPECT_NEAR(s->weight[c] * s->pdf, e.f_cos[c], 1e-3f * e.f_cos[c] + 1e-20f) << m.name;

@@ -7,7 +7,7 @@
 #include "tests/unit/bsdf/materials.h"
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/microfacet.h"
-#include "worker/render/bsdf/microfacet_energy.h"
+#include "worker/render/bsdf/microfacet_tables.h"
 
 namespace ls::render::test {
 namespace {
@@ -37,7 +37,8 @@ TEST(DiffuseTransmission, LetsNothingPassStraightOn) {
   EXPECT_FALSE(passes_light(*b));
 }
 
-// A reader refuses the first; of images none knows before they are rendered.
+// Reflectance and transmittance that add up to more than 1 are scaled to 1. The reader refuses such
+// constants, but cannot check images.
 TEST(DiffuseTransmission, OfMoreThanAllLightIsBroughtToAll) {
   const auto constant = bench(leaf({.9, .5, .25}, {.9, .5, .25}));
   Scene s = leaf({1, 1, 1}, {1, 1, 1});
@@ -51,7 +52,8 @@ TEST(DiffuseTransmission, OfMoreThanAllLightIsBroughtToAll) {
       expect_colour(b->eval({0, 0, 1}, {0, 0, static_cast<float>(to)}).f_cos, C3(.5f, .5f, .25f) * kInvPi);
 }
 
-// f_transmitted / (1 - R) is f_reflected / R of the direction mirrored at the sheet, from both sides.
+// The transmitted value over 1 - R is the reflected value over R for the direction mirrored at the sheet, on
+// both sides.
 TEST(RoughSheet, TransmitsTheMirroredLobeOfItsReflection) {
   for (const auto d : {Microfacet::ggx, Microfacet::beckmann}) {
     const auto b = bench(rough_sheet(d, .5, .2, 1.5));
@@ -64,7 +66,7 @@ TEST(RoughSheet, TransmitsTheMirroredLobeOfItsReflection) {
             const double r = fresnel_dielectric(double{dot(wo, m)}, 1.5).reflectance, R = 2 * r / (1 + r);
             const double back = double{b->eval(wo, wi).f_cos.x} / R,
                          through = double{b->eval(wo, mirrored_below(wi)).f_cos.x} / (1 - R);
-            // R is a float32 there: at most 2^-24 of 1 off, of R >= 2 * .04 / 1.04 = .077.
+            // R is a float32 with an error of at most 2^-24, relative to R >= 2 * .04 / 1.04 = .077.
             EXPECT_NEAR(through, back, 2e-6 * back);
             EXPECT_NEAR(b->eval(wo, wi).pdf / R, b->eval(wo, mirrored_below(wi)).pdf / (1 - R), 2e-6 / R);
           }
@@ -73,7 +75,8 @@ TEST(RoughSheet, TransmitsTheMirroredLobeOfItsReflection) {
 
 struct Shares {
   double back = 0, through = 0;
-  double farthest = 0;  // from the directions of a smooth sheet, in radians: the mean over samples
+  // The mean angle [rad] between the samples and the directions of a smooth sheet
+  double farthest = 0;
 };
 Shares shares(const Bench& b, const V3& wo) {
   constexpr int kPoints = 256;
@@ -97,9 +100,9 @@ Shares shares(const Bench& b, const V3& wo) {
   return s;
 }
 
-// The shares differ from those of a smooth sheet by R at facets tilted by about alpha: R' alpha tan, and by
-// masking, of the order of alpha^2; and the lattice of 65,536 samples is good to some 1e-4 for the choice of
-// the lobe.
+// The shares differ from those of a smooth sheet by R' alpha tan, because facets are tilted by about alpha,
+// and by masking, which is of the order of alpha^2. The choice of the lobe by a lattice of 65,536 samples has
+// an error of some 1e-4.
 TEST(RoughSheet, GoesToTheSmoothSheetAsRoughnessGoes) {
   for (const auto d : {Microfacet::ggx, Microfacet::beckmann})
     for (const double mu : {1., .8, .5, -.7}) {
@@ -118,7 +121,7 @@ TEST(RoughSheet, GoesToTheSmoothSheetAsRoughnessGoes) {
 TEST(RoughSheet, BelowTheSpecularLimitIsTheSmoothOne) {
   const auto smooth = bench(thin_glass(1.5, {.9, .8, .7}, {.5, .6, .7})),
              rough = bench(rough_sheet(Microfacet::ggx, 9e-4, 5e-4, 1.5, {.9, .8, .7}, {.5, .6, .7}));
-  // The same where a texture says so.
+  // The same roughness from a texture.
   Scene s = rough_sheet(Microfacet::ggx, 1, 1, 1.5, {.9, .8, .7}, {.5, .6, .7});
   s.textures.push_back(CheckerboardTexture{texture(s, 5e-4), texture(s, 5e-4), {}});
   const TextureIndex board{static_cast<std::uint32_t>(s.textures.size() - 1)};
@@ -149,24 +152,9 @@ TEST(RoughSheet, LetsNothingPassStraightOn) {
   EXPECT_EQ(constant->bsdfs.null_transmission(constant->bsdf, constant->at, {0, 0, 1}).probability, 0);
 }
 
-// With the light that facets throw onto each other a white sheet sends on all of its light. Without it keeps
-// what a rough mirror keeps, whatever its index.
+// With compensation for multiple scattering a white sheet loses no light. Without it, it loses as much as a
+// rough mirror, whatever its index.
 TEST(RoughSheet, OfWhiteGlassKeepsAllButWhatAMirrorLoses) {
-  std::mt19937 rng(3);
-  const auto uniform = [&] { return static_cast<float>(rng() >> 8) * 0x1p-24f; };
-  const auto albedo = [&](const Bench& b, const V3& wo) {
-    constexpr int kSamples = 40000;
-    double sum = 0, square = 0;
-    for (int i = 0; i < kSamples; ++i) {
-      const float l = uniform(), u = uniform(), v = uniform();
-      const auto s = b.sample(wo, l, {u, v});
-      const double x = s ? double{s->weight.y} : 0;
-      sum += x;
-      square += x * x;
-    }
-    const double mean = sum / kSamples;
-    return std::pair{mean, std::sqrt(std::max(0., square / kSamples - mean * mean) / kSamples)};
-  };
   for (const auto d : {Microfacet::beckmann, Microfacet::ggx})
     for (const double alpha : {.01, .1, .5, 1.})
       for (const double mu : {1., .7, .25, .03, -.6}) {
@@ -174,13 +162,13 @@ TEST(RoughSheet, OfWhiteGlassKeepsAllButWhatAMirrorLoses) {
         Scene white = rough_sheet(d, alpha, alpha, 1.5);
         const auto plain = bench(white);
         std::get<RoughThinDielectricBsdf>(white.bsdfs.back()).multiple_scattering = true;
-        const auto [all, error] = albedo(*bench(white), wo);
+        const auto [all, error] = sampled_albedo(*bench(white), wo, 40000);
         EXPECT_NEAR(all, 1, kEnergyTolerance + 5 * error) << alpha << " " << mu;
-        const auto kept = albedo(*plain, wo);
+        const auto kept = sampled_albedo(*plain, wo, 40000);
         const double mirror = 1 / double{conductor_energy(d, static_cast<double>(static_cast<float>(alpha)))
                                              .factor(static_cast<float>(std::abs(mu)), C3(1))
                                              .x};
-        EXPECT_NEAR(kept.first, mirror, kEnergyTolerance + 5 * kept.second) << alpha << " " << mu;
+        EXPECT_NEAR(kept.mean, mirror, kEnergyTolerance + 5 * kept.error) << alpha << " " << mu;
       }
 }
 

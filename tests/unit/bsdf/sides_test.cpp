@@ -1,5 +1,5 @@
-// Surfaces whose back is black to the analysis of a scene (bsdf_traits.h), which leaves out what only they
-// could show, are black there when they are rendered.
+// The analysis of a scene (bsdf_traits.h) treats the backs of some materials as black, and leaves out what
+// only they could show. These backs must be black when rendered.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -11,7 +11,7 @@
 namespace ls::render::test {
 namespace {
 
-// A surface of default parameters, over a diffuse one if it holds others.
+// A material with default parameters, over a diffuse one if it contains others.
 template <class Kind>
 std::unique_ptr<Bench> plain() {
   Scene s = diffuse({.5, .5, .5});
@@ -34,7 +34,7 @@ bool shows_its_back(const Bench& b) {
 template <class... Kinds>
 void expect_black_backs(std::type_identity<std::variant<Kinds...>>) {
   const auto ask = []<class Kind>() {
-    // Its texture must be an image; its back is that of the surface that it holds.
+    // A bump map needs an image as its texture. Its back is that of the material that it contains.
     if constexpr (!std::is_same_v<Kind, BumpMapBsdf>) {
       const auto b = plain<Kind>();
       const bool black = scene::bsdf_traits(b->scene)->back().black_behind;

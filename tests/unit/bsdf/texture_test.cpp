@@ -13,7 +13,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// Texel (x, y) is (x, y, 1), y counted from the top.
+// An image whose texel (x, y) has the value (x, y, 1), with y counted from the top.
 ImageData ramp() {
   ImageData image{4, 4, 3, {}, {}, false};
   for (int y = 0; y < 4; ++y)
@@ -38,7 +38,7 @@ Scene with(const Texture& t) {
   return s;
 }
 
-// The values of Mitsuba 3.9.1 for the same image and coordinates.
+// Values of Mitsuba 3.9.1 for the same image at these coordinates.
 const V2 kUv[] = {{.1f, .1f}, {.9f, .1f}, {.125f, .125f}, {0, 0}, {1, 1}, {1.3f, -.4f}, {-.2f, 2.6f}};
 
 struct Expected {
@@ -58,8 +58,8 @@ const Expected kExpected[] = {
      {{0, 0}, {3, 0}, {0, 0}, {0, 0}, {3, 3}, {2.3f, 1.1f}, {.3f, 1.9f}}},
     {TextureFilter::bilinear, Wrap::clamp, {{0, 0}, {3, 0}, {0, 0}, {0, 0}, {3, 3}, {3, 0}, {0, 3}}}};
 
-// Coordinates are scaled by 4: float32 leaves 4 x 2.6 x 2^-24 of them, times a slope of 3 over the repeated
-// edge.
+// Coordinates are scaled by 4, so their float32 error is 4 x 2.6 x 2^-24, times a slope of 3 across the edge
+// of the repeated image.
 constexpr float kUvError = 4e-6f;
 
 TEST(Bitmap, FiltersAndWrapsAsMitsubaDoes) {
@@ -87,7 +87,8 @@ TEST(Bitmap, TransformsCoordinatesAsMitsubaDoes) {
                          {1.4282f, 2.2923f},  {.28001f, .94308f},  {1.45692f, 2.11999f}};
   for (int i = 0; i < 7; ++i) {
     EXPECT_NEAR(t.eval({0}, kUv[i]).x, expected[i].x, 5e-5f)
-        << i;  // printed to five digits, arguments up to 7
+        // The expected values have five digits, and coordinates are up to 7.
+        << i;
     EXPECT_NEAR(t.eval({0}, kUv[i]).y, expected[i].y, 5e-5f) << i;
   }
 }
@@ -113,14 +114,14 @@ TEST(Bitmap, DecodesSrgbBeforeFilteringUnlessRaw) {
 
   EXPECT_EQ(cooked.eval({0}, {.25f, .5f}), C3(0));
   EXPECT_EQ(cooked.eval({0}, {.75f, .5f}), C3(1));
-  EXPECT_EQ(cooked.eval({0}, {.5f, .5f}), C3(.5f));  // filtered codes would give .2140
+  EXPECT_EQ(cooked.eval({0}, {.5f, .5f}), C3(.5f));  // filtering before decoding would give .2140
   EXPECT_EQ(raw.eval({0}, {.75f, .5f}), C3(128.f / 255));
 }
 
 TEST(Bitmap, SrgbIsContinuousAndExactAtItsEnds) {
   EXPECT_EQ(srgb_to_linear(0), 0);
   EXPECT_EQ(srgb_to_linear(1), 1);
-  // The standard's rounded constants leave a gap of 3e-8 between the pieces.
+  // The rounded constants of the standard leave a gap of 3e-8 between the two pieces.
   EXPECT_NEAR(srgb_to_linear(.04045), srgb_to_linear(std::nextafter(.04045, 1)), 1e-7);
   EXPECT_NEAR(srgb_to_linear(.04045), .0031308, 5e-8);
 }
@@ -194,7 +195,7 @@ TEST(Checkerboard, ChoosesAsMitsubaDoes) {
   expect(turned(), {0, 1, 1, 0, 1, 0, 1, 1, 1, 0, 1});
 }
 
-// As Mitsuba 3.9.1's eval_1: 0.9 where eval gives 0.1.
+// As in Mitsuba 3.9.1, where eval_1 gives 0.9 if eval gives 0.1.
 TEST(Checkerboard, IsTheOtherWayRoundAsANumber) {
   Scene s;
   s.textures = {ConstantTexture{{.1, .1, .1}}, ConstantTexture{{0, 1, 0}}, CheckerboardTexture{{0}, {1}, {}},
@@ -206,11 +207,12 @@ TEST(Checkerboard, IsTheOtherWayRoundAsANumber) {
   EXPECT_EQ(t.eval({2}, odd), C3(0, 1, 0));
   EXPECT_FLOAT_EQ(t.number({2}, even), luminance(C3(0, 1, 0)));
   EXPECT_FLOAT_EQ(t.number({2}, odd), .1f);
-  // Boards in boards: even of the outer one is its color1, odd its color0, which is a board as a number, too.
+  // Nested boards: the even squares of the outer board have its color1, the odd ones its color0, which is a
+  // board that is also evaluated as a number.
   EXPECT_FLOAT_EQ(t.number({3}, even), .1f);
   EXPECT_FLOAT_EQ(t.number({3}, odd), .1f);
   EXPECT_EQ(t.eval({3}, even), C3(.1f));
-  // What is between is asked for its colours.
+  // A texture in between (here PeakTexture) evaluates the colours of the board.
   EXPECT_FLOAT_EQ(t.number({4}, even), .1f);
   EXPECT_FLOAT_EQ(t.number({4}, odd), 1);
   EXPECT_FLOAT_EQ(t.number({0}, even), .1f);
@@ -225,11 +227,11 @@ TEST(Checkerboard, RefusesCirclesAndMissingTextures) {
   EXPECT_THAT(build_error(with(BitmapTexture{{3}})), HasSubstr("file 3 of 1"));
 }
 
-// As deep as scenes may be written (common/scene/limits.h), and no deeper.
+// Textures may be nested as deeply as in files (common/scene/limits.h), and no deeper.
 TEST(Checkerboard, MayHoldOthersAsDeepAsTheReaderLetsThem) {
   const auto chain = [](int n) {
     Scene s;
-    for (std::uint32_t i = 1; i <= static_cast<std::uint32_t>(n); ++i)  // the outermost first
+    for (std::uint32_t i = 1; i <= static_cast<std::uint32_t>(n); ++i)  // the outermost board first
       s.textures.push_back(CheckerboardTexture{{i}, {i}, {}});
     s.textures.push_back(ConstantTexture{{.5, .5, .5}});
     return s;
@@ -283,7 +285,7 @@ TEST(Product, MultipliesAndCuts) {
 
   EXPECT_EQ(t.eval({2}, {0, 0}), C3(.25f, .25f, .5f));
   EXPECT_EQ(t.mean({2}), C3(.25f, .25f, .5f));
-  EXPECT_EQ(t.number({3}, {0, 0}), 1);  // a luminance of at least .25
+  EXPECT_EQ(t.number({3}, {0, 0}), 1);  // the luminance is at least .25
   EXPECT_EQ(t.number({4}, {0, 0}), 0);  // and below .3
 }
 

@@ -1,5 +1,5 @@
-// Materials that scatter to both sides, let light pass, or consist of others: closed forms, symmetries and
-// edges.
+// Materials that scatter to both sides, let light pass, or contain others: closed forms, symmetries and edge
+// cases.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -38,8 +38,8 @@ TEST(Plastic, IsADiffuseBaseSeenTwiceThroughItsCoat) {
 }
 
 TEST(RoughDielectric, AtNormalIncidenceIsTheHandMadeValue) {
-  // m = z, D = 1 / (pi alpha^2), G = 1: reflected F D / 4, refracted (1 - F) D / (1 - n)^2 (times n^2 for the
-  // density).
+  // With m = z, D = 1 / (pi alpha^2) and G = 1 the reflected value is F D / 4, and the refracted one (1 - F)
+  // D / (1 - n)^2 (its density has the additional factor n^2).
   const double a = .3, D = 1 / (M_PI * a * a);
   const auto b = bench(rough_glass(Microfacet::ggx, a, a, 1.5, 1, {1, .5, 1}, {1, .25, 1}));
   const BsdfEval up = b->eval(kUp, kUp), down = b->eval(kUp, kDown), out = b->eval(kDown, kUp);
@@ -52,7 +52,7 @@ TEST(RoughDielectric, AtNormalIncidenceIsTheHandMadeValue) {
   EXPECT_NEAR(out.f_cos.x, .96 * D / sqr(1 - 1 / 1.5), 1e-4);
 }
 
-// Radiance over the square of the index is what is conserved along a path.
+// Along a path, radiance divided by the square of the index is conserved.
 TEST(RoughDielectric, IsReciprocalUpToTheSquareOfTheIndex) {
   for (const auto d : {Microfacet::beckmann, Microfacet::ggx}) {
     const double n = 1.5;
@@ -64,7 +64,7 @@ TEST(RoughDielectric, IsReciprocalUpToTheSquareOfTheIndex) {
         const double square_a = a.z > 0 ? 1 : n * n, square_c = c.z > 0 ? 1 : n * n;
         const double ac = b->eval(a, c).f_cos.y / std::abs(c.z) / square_a,
                      ca = b->eval(c, a).f_cos.y / std::abs(a.z) / square_c;
-        // The half vector is rounded at 1e-7 of |wo + eta wi| >= n - 1, over the slopes of alpha >= .2.
+        // The half vector is rounded by 1e-7 of |wo + eta wi| >= n - 1; slopes are divided by alpha >= .2.
         EXPECT_NEAR(ac, ca, 1e-4 * ac) << mu << " " << nu;
         lit += ac > 0;
       }
@@ -86,11 +86,12 @@ TEST(RoughDielectric, BecomesTheSmoothOneAsRoughnessGoes) {
           EXPECT_EQ(r->transmitted, s->transmitted);
           EXPECT_EQ(r->eta, s->eta);
           EXPECT_NEAR((r->wi - s->wi).length(), 0,
-                      3 * 3 * 1.5e-3);  // 3 alpha of slope, turned by at most 3 times
+                      // The slope is up to 3 alpha, and refraction turns directions by up to 3 times as much
+                      3 * 3 * 1.5e-3);
           EXPECT_NEAR(r->weight.x, s->weight.x, 1e-3);
         }
       }
-    for (const double ior : {1.0005, 1.})  // bends nothing to speak of
+    for (const double ior : {1.0005, 1.})  // deflection is negligible
       EXPECT_FALSE(bench(rough_glass(d, .3, .3, ior, 1))->bsdfs.has_smooth({0}));
     EXPECT_FALSE(bench(rough_glass(d, 9e-4, 9e-4, 1.5, 1))->bsdfs.has_smooth({0}));
   }
@@ -101,16 +102,7 @@ TEST(RoughDielectric, StaysFiniteAtEveryExtreme) {
     for (const double alpha : {1e-3, 1e-2, 1., 10.})
       for (const double ior : {1.002, 1.5, 100.}) {
         const auto b = bench(rough_glass(d, alpha, alpha, ior, 1));
-        for (const double mu : {1., .5, 1e-3, 1e-20, -1e-20, -1e-3, -.7, -1.})
-          for (const float u : {0.f, 1e-9f, .5f, 0x1.fffffep-1f})
-            for (const float v : {0.f, .25f, 0x1.fffffep-1f}) {
-              const V3 wo = direction(mu, 1);
-              const auto s = b->sample(wo, v, {u, v});
-              if (!s) continue;
-              EXPECT_TRUE(is_finite(s->weight) && is_finite(s->wi) && s->pdf > 0 && std::isfinite(s->pdf));
-              const BsdfEval e = b->eval(wo, s->wi);
-              EXPECT_TRUE(is_finite(e.f_cos) && std::isfinite(e.pdf));
-            }
+        expect_finite(*b, {1., .5, 1e-3, 1e-20, -1e-20, -1e-3, -.7, -1.});
       }
 }
 
@@ -143,7 +135,8 @@ TEST(Mask, LetsTheRestPass) {
   EXPECT_EQ(b->eval(kUp, kUp).pdf, bare->eval(kUp, kUp).pdf);
   EXPECT_EQ(b->sample(kUp, .3f, {.2f, .8f})->weight.x, .05f);
 
-  const auto sheet = bench(masked(thin_glass(1.5), .5));  // half a sheet of glass
+  // Half of the surface is a sheet of glass.
+  const auto sheet = bench(masked(thin_glass(1.5), .5));
   EXPECT_NEAR(sheet->bsdfs.null_transmission(sheet->bsdf, {0, 0}, kUp).transmission.x,
               1 - .5 * 2 * .04 / 1.04, 1e-7);
   EXPECT_FALSE(sheet->bsdfs.has_smooth(sheet->bsdf));
@@ -216,7 +209,7 @@ TEST(NormalMap, TurnsTheCosineOfADiffuseSurfaceAndTheWayOfAMirror) {
   const V3 wi = direction(.9, 2.5);
   EXPECT_NEAR(b->eval(kUp, wi).f_cos.x, .5f * kInvPi * dot(n, wi), 1e-6);
   EXPECT_NEAR(b->eval(kUp, wi).pdf, kInvPi * dot(n, wi), 1e-6);
-  // Above the surface, but below the horizon of its normal, and the reverse.
+  // wi is above the surface but below the horizon of the mapped normal, and the reverse.
   EXPECT_EQ(b->eval(kUp, direction(.1, 2 + M_PI)).f_cos, C3(0));
   EXPECT_EQ(b->eval(kUp, direction(-.1, 2)).f_cos, C3(0));
 
@@ -232,7 +225,8 @@ TEST(NormalMap, TurnsTheCosineOfADiffuseSurfaceAndTheWayOfAMirror) {
 }
 
 TEST(NormalMap, TurnsTheDirectionsOfAnisotropyAlong) {
-  // Turned about y: the tangent along u turns in the plane of x and z, the one across stays.
+  // The normal is turned about y: the tangent along u turns in the plane of x and z, and the other tangent
+  // stays.
   const double a = .3;
   const V3 n(static_cast<float>(std::sin(a)), 0, static_cast<float>(std::cos(a))), s(n.z, 0, -n.x),
       t(0, 1, 0);
@@ -244,8 +238,8 @@ TEST(NormalMap, TurnsTheDirectionsOfAnisotropyAlong) {
               1e-4 * bare->eval(local(wo), local(wi)).f_cos.x);
 }
 
-// As Mitsuba 3.9.1's sample() of what goes on unscattered: shadowed as a reflection would be, and nothing
-// where the map's normal has the direction on its other side.
+// As in Mitsuba 3.9.1: unscattered light is shadowed as reflected light would be, and there is none if the
+// direction is on different sides of the surface and of the mapped normal.
 TEST(NormalMap, ShadowsWhatPassesStraightOnAsWell) {
   const auto map = [](bool flips, bool shadows) {
     Scene s = masked(diffuse({.5, .5, .5}), .25);

@@ -2,9 +2,21 @@
 
 #include "common/scene/limits.h"
 #include "worker/render/base/work_counters.h"
-#include "worker/render/bsdf/material.h"
+#include "worker/render/bsdf/conductor.h"
+#include "worker/render/bsdf/dielectric.h"
+#include "worker/render/bsdf/diffuse.h"
+#include "worker/render/bsdf/nested.h"
+#include "worker/render/bsdf/plastic.h"
+#include "worker/render/bsdf/principled.h"
 
 namespace ls::render {
+
+// A material in the form that the inner loop uses: one of the kinds of all families.
+struct BsdfTable::Material {
+  VariantOf<DiffuseKinds, ConductorKinds, DielectricKinds, PlasticKinds, NestedKinds, PrincipledKinds,
+            CoatedConductorKinds>
+      kind;
+};
 
 BsdfTable::BsdfTable() = default;
 BsdfTable::~BsdfTable() = default;

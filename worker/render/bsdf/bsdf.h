@@ -1,7 +1,7 @@
 // The surface scattering functions (BSDFs) of a scene, in one flat table by index. Each kind of material is
-// a struct in the file of its family (material.h). A texture is looked up only if it is not constant. The
-// BSDF values are those of Mitsuba 3 (separable Smith masking, its Beckmann rational fit, its rough plastic
-// tables).
+// a struct in the file of its family (bsdf.cpp lists them). A texture is looked up only if it is not
+// constant. The BSDF values are those of Mitsuba 3 (separable Smith masking, its Beckmann rational fit, its
+// rough plastic tables).
 //
 // Some surfaces have null transmission (mask, thin dielectric): part of the light passes straight through.
 // Paths and shadow rays pass such a surface without a vertex, so that next-event estimation reaches lights
@@ -48,8 +48,8 @@ struct BsdfSample {
 
 struct NullTransmission {
   C3 transmission{0, 0, 0};  // share of light that passes straight through
-  // The probability with which a path should pass straight through. It is below 1 wherever the surface can
-  // also scatter otherwise.
+  // The probability with which a path should pass straight through. It is below 1 wherever the surface also
+  // scatters light, so that paths can do either.
   float probability = 0;
 };
 

@@ -24,7 +24,7 @@
 #pragma once
 
 #include "worker/render/bsdf/material_builder.h"
-#include "worker/render/bsdf/microfacet_energy.h"
+#include "worker/render/bsdf/microfacet_tables.h"
 
 namespace ls::render {
 
@@ -78,7 +78,7 @@ struct ThinDielectric : DielectricKind {
 struct RoughDielectric : Dielectric {
   static constexpr bool kSmooth = true;
   Roughness roughness;
-  const MicrofacetEnergy* energy = nullptr;  // only with multiple_scattering
+  const MicrofacetEnergy* energy = nullptr;  // null unless the material has multiple_scattering
 
   bool reads_uv() const { return any_texture(reflectance, transmittance, roughness.u, roughness.v); }
   bool anisotropic() const { return !roughness.same_along_both(); }
@@ -169,7 +169,8 @@ struct RoughDielectric : Dielectric {
 struct RoughThinDielectric : ThinDielectric {
   static constexpr bool kSmooth = true;
   Roughness roughness;
-  const MicrofacetEnergy* energy = nullptr;  // of a rough mirror; only with multiple_scattering
+  // That of a rough mirror; null unless the material has multiple_scattering
+  const MicrofacetEnergy* energy = nullptr;
 
   bool reads_uv() const { return any_texture(reflectance, transmittance, roughness.u, roughness.v); }
   bool anisotropic() const { return !roughness.same_along_both(); }

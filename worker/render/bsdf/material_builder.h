@@ -14,12 +14,11 @@
 
 #include "common/scene/schema/traits.h"
 #include "worker/render/bsdf/lobes.h"
-#include "worker/render/bsdf/microfacet_energy.h"
-#include "worker/render/bsdf/rough_plastic_table.h"
+#include "worker/render/bsdf/microfacet_tables.h"
 
 namespace ls::render {
 
-// Collects errors: only the first one is recorded, and building continues. So make_material() needs no error
+// Records the first error and goes on building; later errors are ignored. So make_material() needs no error
 // handling of its own.
 class MaterialBuilder {
  public:
@@ -49,11 +48,10 @@ class MaterialBuilder {
   // kMostTables of them is refused: a small hostile file could keep a worker busy for hours.
   static constexpr std::size_t kMostTables = 2048;
 
-  // Returns the transmittance table of a rough plastic's coat (rough_plastic_table.h).
+  // Returns the transmittance table of a rough plastic's coat (microfacet_tables.h).
   const RoughPlasticTable& coat(Microfacet type, double alpha, double eta);
   // energy() returns the tables that compensate for light lost between the microfacets of a surface of the
-  // kind `of` (microfacet_energy.h).
-  // Null: the scene is refused.
+  // kind `of` (microfacet_tables.h); null: the scene is refused.
   enum class EnergyOf { conductor, dielectric, coat };
   const MicrofacetEnergy* energy(EnergyOf of, const Roughness& roughness, double eta);
   const MicrofacetEnergy* energy(EnergyOf of, Microfacet type, double alpha, double eta);
@@ -66,7 +64,7 @@ class MaterialBuilder {
   std::vector<std::unique_ptr<const MicrofacetEnergy>> take_energies() { return std::move(energies_); }
 
  private:
-  // Counts a new table; false, and the scene is refused, if there are too many.
+  // Returns true if the new table is within kMostTables; otherwise refuses the scene.
   bool room_for_table();
 
   const Scene& scene_;

@@ -22,8 +22,9 @@ double erf_inverse(double x) {
   return p * x;
 }
 
-// The density of visible slopes s, which are at most cot = cos / sin, is proportional to the function
-// exp(-s^2) (cos - s sin). The integral of this function up to s is
+// Let theta be the angle between the viewer and the normal, and cos and sin those of theta. The density of
+// visible slopes s, which are at most cot = cos / sin, is proportional to the function exp(-s^2) (cos - s
+// sin). The integral of this function up to s is
 //   H(s) = cos sqrt(pi)/2 (1 + erf s) + sin/2 exp(-s^2).
 // H(s) = u H(cot) is solved by Newton's method inside a shrinking bracket, in at most 64 steps. A step that
 // would leave the bracket is replaced by one that halves it, and 64 halvings exhaust a double.

@@ -172,8 +172,8 @@ struct Mapped : MaterialKind {
     const float a2 = std::min(.125f * (n.x * n.x + n.y * n.y) / (n.z * n.z), 1.f);
     return a2 > 0 ? 2 / (1 + std::sqrt(1 + a2 * (wi.x * wi.x + wi.y * wi.y) / (wi.z * wi.z))) : 1;
   }
-  // True if one direction, with the components a in one frame and b in another, is on the same side of the
-  // surface in both. Callers drop other directions, along which light would leak through the surface.
+  // True if a direction is on the same side of the surface in two frames; a and b are its components in them.
+  // Callers drop other directions, along which light would leak through the surface.
   static bool same_side(const V3& a, const V3& b) { return a.z * b.z > 0; }
 };
 
@@ -214,21 +214,20 @@ inline Blend make_material(const BlendBsdf& b, MaterialBuilder& builder) {
   return m;
 }
 template <class Map, class Description>
-void set_map(Map& m, const Description& b, TextureIndex texture, MaterialBuilder& builder) {
+Map map_of(const Description& b, TextureIndex texture, MaterialBuilder& builder) {
+  Map m;
   m.map = builder.slot(texture);
   m.part = b.bsdf;
   m.passes = builder.passes(b.bsdf);
   m.flips = b.flip_invalid_normals;
   m.shadows = b.use_shadowing_function;
-}
-inline NormalMap make_material(const NormalMapBsdf& b, MaterialBuilder& builder) {
-  NormalMap m;
-  set_map(m, b, b.normalmap, builder);
   return m;
 }
+inline NormalMap make_material(const NormalMapBsdf& b, MaterialBuilder& builder) {
+  return map_of<NormalMap>(b, b.normalmap, builder);
+}
 inline BumpMap make_material(const BumpMapBsdf& b, MaterialBuilder& builder) {
-  BumpMap m;
-  set_map(m, b, b.texture, builder);
+  auto m = map_of<BumpMap>(b, b.texture, builder);
   m.scale = static_cast<float>(b.scale);
   if (!std::isfinite(m.scale)) builder.refuse(fmt::format("a bump map's scale is {}", b.scale));
   return m;

@@ -2,8 +2,7 @@
 #pragma once
 
 #include "worker/render/bsdf/material_builder.h"
-#include "worker/render/bsdf/microfacet_energy.h"
-#include "worker/render/bsdf/rough_plastic_table.h"
+#include "worker/render/bsdf/microfacet_tables.h"
 
 namespace ls::render {
 
@@ -96,8 +95,8 @@ struct RoughPlastic : CoatedDiffuse {
   static constexpr bool kHasFacets = true;
   bool mirror = false;  // true if the coat is smooth; its transmittance is read from tables nevertheless
   Microfacets facets;
-  const MicrofacetEnergy* energy = nullptr;  // only with multiple_scattering
-  RoughPlasticTable coat;                    // only without multiple_scattering
+  const MicrofacetEnergy* energy = nullptr;  // null unless the material has multiple_scattering
+  RoughPlasticTable coat;                    // set only without multiple_scattering
 
   float through(float cos) const { return energy ? energy->through.at(cos) : coat.at(cos); }
   BsdfEval eval(const Lookup& look, const V3& wo, const V3& wi) const {

@@ -29,7 +29,7 @@ Side side_of(const PrimitiveRange& r, int side) {
 #ifdef __x86_64__
 constexpr char kDeviceConfig[] = "isa=avx2,max_isa=avx2,frequency_level=simd256,set_affinity=0";
 #else
-constexpr char kDeviceConfig[] = "set_affinity=0";  // one set of instructions: NEON
+constexpr char kDeviceConfig[] = "set_affinity=0";  // on ARM Embree has one instruction set, NEON
 #endif
 
 // set_ray() writes the ray in 16-byte words, as Embree reads it. If it wrote smaller words, the processor
@@ -151,8 +151,8 @@ void attach(RTCDevice device, const Geometry& g, const PrimitiveSet& set, Scenes
 // caller then adds any instances and commits the scenes.
 void fill(const Accel::State& st, const Geometry& g, const PrimitiveSet& set, bool boundaries, Scenes& to) {
   const RTCDevice device = st.device;
-  // Only between() needs hits to be filtered (st.coincident). It traces `all`, which is the same scene as
-  // `opaque` if there are no boundaries.
+  // between() needs a scene whose hits are filtered (st.coincident). It traces `all`, which without
+  // boundaries is the same scene as `opaque`.
   to.opaque = new_scene(device, st.coincident && !boundaries);
   if (!boundaries) {
     to.all = to.opaque;

@@ -10,7 +10,7 @@
 #include "worker/render/base/work_counters.h"
 #include "worker/render/geometry/accel.h"
 #include "worker/render/geometry/embree.h"
-#include "worker/render/geometry/shape_boxes.h"
+#include "worker/render/geometry/surface_boxes.h"
 
 namespace ls::render {
 
@@ -54,7 +54,7 @@ void bounds_callback(const RTCBoundsFunctionArguments* args) {
 struct Tracing {
   EmbreeContext context;
   const V3 *o, *d;
-  bool collects = false;  // true for Collecting
+  bool collects = false;  // true if this object is a Collecting
 
   Tracing(const V3& origin, const V3& direction) : o(&origin), d(&direction) { embree_start(context); }
 

@@ -22,8 +22,8 @@ class ClearRegion {
 
   // Returns the region inside of a surface. Returns nullopt if the surface is in a group, if it is neither a
   // sphere nor such a body, or if the box of another surface touches its box. `boxes` holds the boxes of all
-  // surfaces. `media_overlap` is true if another medium may fill the space outside although the surface
-  // names no exterior medium.
+  // surfaces. `media_overlap` is true if the scene's media may overlap: then the space outside may be filled
+  // by a medium even if the surface names no exterior medium.
   static std::optional<ClearRegion> inside(const Geometry& g, std::uint32_t surface,
                                            const std::vector<SurfaceBox>& boxes, bool media_overlap);
 

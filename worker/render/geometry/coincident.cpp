@@ -17,6 +17,11 @@ constexpr std::uint64_t kMaxSurfacePairs = std::uint64_t{1} << 27;
 struct Piece {  // a triangle, or half of the square about a disk
   V3d a, b, c;
   double reach() const { return std::max(largest(V3(a)), std::max(largest(V3(b)), largest(V3(c)))); }
+  Box box() const {
+    Box box;
+    for (const V3d& p : {a, b, c}) box.add(p);
+    return box;
+  }
 };
 
 // True if no corner of q is farther than `tolerance` from the plane of p. The tolerance is the offset by
@@ -93,7 +98,7 @@ class Finder {
     ++marks_;
     SurfaceInfo& s = g_.surfaces[surface];
     s.coincident_reach = std::max(s.coincident_reach, static_cast<float>(reach));
-    if (!own) return;  // a hit in an instance computes its reach itself
+    if (!own) return;  // hits in instances compute their own reach
     if (!(s.reach > 0)) {
       const Parts& p = shapes_[surface];
       for (std::uint32_t i = 0; i < p.triangles; ++i) s.reach = std::max(s.reach, g_.reach_of(p.first + i));
@@ -132,14 +137,9 @@ class Finder {
     const Parts &mine = shapes_[n], &other = shapes_[o.surface];
     for (std::uint32_t i = 0; i < mine.pieces(); ++i) {
       const Piece p = piece(mine, i);
-      const V3d a = p.a, b = p.b, c = p.c;
       if (spent(1)) return;
-      SurfaceBox box;
-      for (int k = 0; k < 3; ++k) {
-        box.lo[k] = static_cast<float>(std::min({a[k], b[k], c[k]}));
-        box.hi[k] = static_cast<float>(std::max({a[k], b[k], c[k]}));
-      }
-      if (!box.touches(o)) continue;
+      const Box box = p.box();
+      if (!SurfaceBox{n, kNone, V3(box.lo), V3(box.hi)}.touches(o)) continue;
       if (spent(other.pieces())) return;
       for (std::uint32_t k = 0; k < other.pieces(); ++k) {
         const Piece q = piece(other, k);

@@ -1,8 +1,8 @@
-// Finds surfaces that coincide somewhere and of which at least one is null, that is, index-matched: the floor
-// under a box of fog, or boxes that share a face. Ray intersection finds them in arbitrary order, and the
-// offset that moves a ray's origin off one of them also moves it past the others. So a ray that hits one of
-// them has to test for the others too (medium_crossing.h). The surfaces are found once, when the world is
-// built, so that only rays that hit them take longer.
+// Finds surfaces that coincide in some places if at least one of them is null, that is, index-matched.
+// Examples are the floor under a box of fog, and boxes that share a face. Ray intersection finds such
+// surfaces in arbitrary order, and the offset that moves a ray's origin off one of them also moves it past
+// the others. So a ray that hits one of them has to test for the others too (medium_crossing.h). The surfaces
+// are found once, when the world is built, so that only rays that hit them take longer.
 #pragma once
 
 #include "worker/render/geometry/geometry.h"

@@ -210,7 +210,7 @@ V2 sphere_uv(const Sphere& s, const V3d& n) { return uv_of(local_direction(s, n)
 
 namespace {
 
-// True for a triangle outside of groups, the case of most hits. It takes one test.
+// True for a triangle outside of groups, the case of most hits. Both conditions are tested by one comparison.
 bool is_usual(const PrimitiveId& id) {
   static_assert(PrimitiveId::Kind::triangle == PrimitiveId::Kind{0} && kNone == ~0u);
   return (static_cast<std::uint32_t>(id.kind) | ~id.instance) == 0;
@@ -247,13 +247,13 @@ bool Geometry::complete_local(PrimitiveId id, const V3d& o, const V3d& d, Surfac
 
 namespace {
 
-// Returns the reach (SurfaceHit::reach) in the world of a hit p, with normal ng, in the instance i, where
-// `local` is its reach in the group's space. The BVH transforms the ray to the group's space in single
-// precision. Each component of the ray's origin is then a sum of four products, accurate to four ulps of the
-// sum of their absolute values. offset_point() moves rays by 16 ulps of the reach, so the reach must be at
-// least a quarter of that sum. In the world, the errors of the three components move the hit off the surface
-// in proportion to the components of the normal in the group's space. The reach in the group's space is
-// transformed to the world in the same way.
+// Returns the reach (SurfaceHit::reach) in the world of a hit in the instance i. p is its position and ng its
+// normal, and `local` is its reach in the group's space. The BVH transforms the ray to the group's space in
+// single precision. Each component of the ray's origin is then a sum of four products, accurate to four ulps
+// of the sum of their absolute values. offset_point() moves rays by 16 ulps of the reach, so the reach must
+// be at least a quarter of that sum. In the world, an error in component k moves the hit off the surface by
+// the error times |A^T ng|_k, where A is the matrix of the map to the world. `local` is transformed to the
+// world by the same factors.
 float reach_of(const PlacedInstance& i, const V3& p, const V3& ng, float local) {
   const auto& a = i.to_world.a;
   const auto& b = i.to_local.a;

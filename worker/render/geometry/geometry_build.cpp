@@ -9,7 +9,6 @@
 #include "common/scene/schema/traits.h"
 #include "worker/render/geometry/geometry.h"
 #include "worker/render/geometry/shape_import.h"
-#include "worker/render/geometry/vertex_attributes.h"
 
 namespace ls::render {
 namespace {
@@ -19,8 +18,8 @@ namespace {
 // is inside out).
 float orientation_of(const Shape& shape, bool vertex_normals) {
   float sign = shape.flip_normals ? -1.f : 1.f;
-  // A rectangle's normal is its transformed +z axis, and a mesh with normals follows these. Mirroring
-  // reverses the winding.
+  // Mirroring reverses the winding, but not the normals of rectangles and cubes, nor those of a mesh with
+  // vertex normals. A mirrored sphere is inside out.
   const bool follows = std::holds_alternative<RectangleShape>(shape.geometry) ||
                        std::holds_alternative<CubeShape>(shape.geometry) ||
                        std::holds_alternative<SphereShape>(shape.geometry) || vertex_normals;
@@ -46,7 +45,7 @@ struct Space {
   V3d operator()(const V3d& p) const { return (p - center) * scale; }
 };
 
-Space unit_space(const Bounds& b) {
+Space unit_space(const Box& b) {
   Space s;
   if (b.empty()) return s;
   s.center = (b.lo + b.hi) * .5;
@@ -63,7 +62,7 @@ Space unit_space(const Bounds& b) {
 // Returns the share of float32's resolution that remains for the shape of a mesh with the bounds b if
 // coordinates are relative to `origin`: 1 near the origin, and 2^-n if the mesh is so far away that n of the
 // 24 bits only encode its position.
-double bits_left(const Bounds& b, const V3d& origin) {
+double bits_left(const Box& b, const V3d& origin) {
   const V3d half = (b.hi - b.lo) * .5, away = (b.hi + b.lo) * .5 - origin;
   const double size = std::max(half.x, std::max(half.y, half.z)),
                far = std::max(std::abs(away.x), std::max(std::abs(away.y), std::abs(away.z)));
@@ -74,11 +73,11 @@ double bits_left(const Bounds& b, const V3d& origin) {
 // than 8 of the 24 bits of float32 (as in a small scene lit by a sphere of radius 1e5 at 1e7), the centre of
 // the mesh with the fewest bits is used instead, provided that every mesh then has more bits than this one
 // had before.
-Space world_space(const std::vector<Bounds>& meshes, const Bounds& all) {
+Space world_space(const std::vector<Box>& meshes, const Box& all) {
   Space s = unit_space(all);
   constexpr double kFewBits = 0x1p-16;
   const auto worst = [&](const V3d& origin) {
-    return std::min_element(meshes.begin(), meshes.end(), [&](const Bounds& a, const Bounds& b) {
+    return std::min_element(meshes.begin(), meshes.end(), [&](const Box& a, const Box& b) {
       return bits_left(a, origin) < bits_left(b, origin);
     });
   };
@@ -86,7 +85,7 @@ Space world_space(const std::vector<Bounds>& meshes, const Bounds& all) {
   if (m == meshes.end() || !(bits_left(*m, s.center) < kFewBits)) return s;
   const V3d there = (m->lo + m->hi) * .5;
   if (!(bits_left(*worst(there), there) > bits_left(*m, s.center))) return s;
-  Bounds wide = all;  // enlarged to be symmetric about `there`, the new centre
+  Box wide = all;  // enlarged to be symmetric about `there`, the new centre
   for (const V3d& corner : {all.lo, all.hi}) wide.add(there * 2 - corner);
   return unit_space(wide);
 }
@@ -183,28 +182,25 @@ void append(Geometry& g, const Placed& p, std::uint32_t surface, const Space& sp
   append_mesh(g, p.mesh, p.normals_given, surface, space);
   if (g.triangle_count() > triangles) note_reach(g, triangles, g.surfaces[surface]);
   if (p.sphere) {
-    Sphere s = *p.sphere;
+    Sphere& s = g.spheres.emplace_back(*p.sphere);
     s.center = space(s.center);
     s.radius *= space.scale;
     s.surface = surface;
-    g.spheres.push_back(s);
   }
   if (p.disk || p.cylinder) g.surfaces[surface].sheet = true;
   if (p.disk) {
-    Disk d = *p.disk;
+    Disk& d = g.disks.emplace_back(*p.disk);
     d.center = space(d.center);
     d.u *= space.scale;
     d.v *= space.scale;
     d.surface = surface;
-    g.disks.push_back(d);
   }
   if (p.cylinder) {
-    Cylinder c = *p.cylinder;
+    Cylinder& c = g.cylinders.emplace_back(*p.cylinder);
     c.p0 = space(c.p0);
     c.radius *= space.scale;
     c.length *= space.scale;
     c.surface = surface;
-    g.cylinders.push_back(c);
   }
 }
 
@@ -223,16 +219,16 @@ SurfaceInfo surface_info(const Scene& scene, const std::vector<scene::BsdfTraits
   return info;
 }
 
-bool finite(const Bounds& b) {
+bool finite(const Box& b) {
   return b.empty() || (std::isfinite(b.lo.x + b.lo.y + b.lo.z) && std::isfinite(b.hi.x + b.hi.y + b.hi.z));
 }
 
 // The placed shapes of a scene, with the bounds of the world (including instances) and of the groups.
 struct Parts {
   std::vector<Placed> shapes;
-  Bounds world;
-  std::vector<Bounds> groups;
-  std::vector<Bounds> meshes;  // bounds of the world's own triangle meshes
+  Box world;
+  std::vector<Box> groups;
+  std::vector<Box> meshes;  // bounds of the world's own triangle meshes
 };
 
 // The largest number of vertices of a scene. Indices of vertices have 32 bits, also in the BVH.
@@ -253,9 +249,8 @@ Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
       return fail(Errc::resource_exhausted,
                   fmt::format("the scene's meshes have more than {} vertices together", kMaxVertices));
     const auto& group = scene.shapes[i].group;
-    add_bounds(*p, group ? parts.groups[group->value] : parts.world);
-    Bounds own;
-    add_bounds(*p, own);
+    const Box own = bounds_of(*p);
+    (group ? parts.groups[group->value] : parts.world).add(own);
     if (!group && !p->mesh.positions.empty() && (own.hi - own.lo).length() > 0) parts.meshes.push_back(own);
     parts.shapes.push_back(std::move(*p));
   }
@@ -263,9 +258,8 @@ Result<Parts> place_all(const Scene& scene, const AssetLoader& files) {
     const Affine m(scene.instances[i].to_world);
     if (!m.invertible())
       return fail(Errc::invalid_argument, fmt::format("instance {}: its to_world has no inverse", i + 1));
-    const Bounds& b = parts.groups[scene.instances[i].group.value];
-    for (int k = 0; !b.empty() && k < 8; ++k)
-      parts.world.add(m.point({k & 1 ? b.hi.x : b.lo.x, k & 2 ? b.hi.y : b.lo.y, k & 4 ? b.hi.z : b.lo.z}));
+    const Box& b = parts.groups[scene.instances[i].group.value];
+    if (!b.empty()) parts.world.add(b.moved(m));
   }
   if (!finite(parts.world) || !std::all_of(parts.groups.begin(), parts.groups.end(), finite))
     return fail(Errc::invalid_argument,

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <string>
+#include <string_view>
 
 #include "common/assets/mesh.h"
 #include "common/base/overloaded.h"
-#include "worker/render/geometry/vertex_attributes.h"
 
 namespace ls::render {
 namespace {
@@ -39,6 +41,75 @@ LocalMesh cube() {
     for (std::uint32_t k : {0u, 2u, 1u, 0u, 3u, 2u}) m.indices.push_back(base + k);
   }
   return m;
+}
+
+const MeshAttributeTexture& texture_of(const Scene& scene, const scene::AttributeUse& use) {
+  return std::get<MeshAttributeTexture>(scene.textures[use.texture.value]);
+}
+bool per_face(const std::string& name) { return name.starts_with("face_"); }
+
+std::string list_of(const MeshData& mesh) {
+  std::string out;
+  for (const std::string& name : mesh.attribute_names) out += (out.empty() ? "it has " : ", ") + name;
+  return out.empty() ? "it has none" : out;
+}
+
+Result<void> check(const MeshAttribute& a, std::string_view file, const scene::AttributeUse& use,
+                   double scale) {
+  using As = scene::AttributeUse::As;
+  if (use.as == As::number && a.components != 1)
+    return fail(Errc::invalid_argument,
+                fmt::format("'{}': a bsdf reads the attribute \"{}\" as one number, but it has {}: name an "
+                            "attribute of one number instead",
+                            file, a.name, a.components));
+  if (use.as == As::colour && a.components != 3)
+    return fail(
+        Errc::invalid_argument,
+        fmt::format("'{}': a normal map reads the attribute \"{}\", which has one number instead of three",
+                    file, a.name));
+  float largest = 0;
+  for (const float x : a.values) {
+    if (!std::isfinite(x))
+      return fail(Errc::invalid_argument,
+                  fmt::format("'{}': the attribute \"{}\" holds a number that is not finite", file, a.name));
+    largest = std::max(largest, x);
+  }
+  if (a.bytes && !use.in_light && largest * scale > 1.0001)
+    return fail(
+        Errc::invalid_argument,
+        fmt::format(
+            "'{}': the attribute \"{}\" is stored in bytes, which are numbers from 0 to 255 (as in "
+            "Mitsuba), but a bsdf needs numbers up to 1: set `scale` of the texture to 0.00392157, or "
+            "store floats from 0 to 1",
+            file, a.name));
+  return {};
+}
+
+std::vector<std::string> attribute_names(const Scene& scene, const std::vector<scene::AttributeUse>& uses) {
+  std::vector<std::string> names;
+  for (const scene::AttributeUse& use : uses) {
+    const std::string& name = texture_of(scene, use).name;
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  }
+  return names;
+}
+
+// Checks that `mesh`, read from `file`, has the attributes that the textures in `uses` read, in the expected
+// size and range. If not, fails with invalid_argument; the message names the file, the attribute and a
+// remedy.
+Result<void> check_attributes(const MeshData& mesh, std::string_view file, const Scene& scene,
+                              const std::vector<scene::AttributeUse>& uses) {
+  for (const scene::AttributeUse& use : uses) {
+    const MeshAttributeTexture& t = texture_of(scene, use);
+    const auto it = std::find_if(mesh.attributes.begin(), mesh.attributes.end(),
+                                 [&](const MeshAttribute& a) { return a.name == t.name; });
+    if (it == mesh.attributes.end())
+      return fail(Errc::invalid_argument,
+                  fmt::format("the mesh '{}' has no attribute \"{}\", which a texture reads; {}", file,
+                              t.name, list_of(mesh)));
+    if (auto ok = check(*it, file, use, t.scale); !ok) return ok;
+  }
+  return {};
 }
 
 Result<LocalMesh> load(const MeshShape& shape, const AssetLoader& files,
@@ -86,6 +157,16 @@ Result<Sphere> place_sphere(const SphereShape& s, const Affine& m) {
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k) r.to_local[3 * i + k] = rows[i][k];
   return r;
+}
+
+Disk place_disk(const Affine& m) {
+  Disk d;
+  d.center = m.point({0, 0, 0});
+  d.u = m.vector({1, 0, 0});
+  d.v = m.vector({0, 1, 0});
+  // The +z axis, also for a mirrored disk
+  d.n = m.normal({0, 0, 1}).normalized() * (m.determinant() < 0 ? -1. : 1.);
+  return d;
 }
 
 // Places a cylinder. Its azimuth starts, as in Mitsuba, at the first axis of the frame of Duff et al. 2017
@@ -150,43 +231,19 @@ Result<Placed> place(const Shape& shape, const AssetLoader& files,
                 fmt::format("a texture reads its attribute \"{}\", but only meshes have attributes",
                             attribute_names(files.scene, uses).front()));
   Placed out;
-  auto ok = std::visit(overloaded{[&](const RectangleShape&) -> Result<void> {
-                                    out.mesh = rectangle();
-                                    return {};
-                                  },
-                                  [&](const CubeShape&) -> Result<void> {
-                                    out.mesh = cube();
-                                    return {};
-                                  },
-                                  [&](const SphereShape& s) -> Result<void> {
-                                    auto r = place_sphere(s, m);
-                                    if (!r) return tl::unexpected(r.error());
-                                    out.sphere = *r;
-                                    return {};
-                                  },
-                                  [&](const DiskShape&) -> Result<void> {
-                                    Disk d;
-                                    d.center = m.point({0, 0, 0});
-                                    d.u = m.vector({1, 0, 0});
-                                    d.v = m.vector({0, 1, 0});
-                                    // the +z axis, also for a mirrored disk
-                                    d.n = m.normal({0, 0, 1}).normalized() * (m.determinant() < 0 ? -1. : 1.);
-                                    out.disk = d;
-                                    return {};
-                                  },
-                                  [&](const CylinderShape& s) -> Result<void> {
-                                    auto r = place_cylinder(s, m);
-                                    if (!r) return tl::unexpected(r.error());
-                                    out.cylinder = *r;
-                                    return {};
-                                  },
-                                  [&](const MeshShape& s) -> Result<void> {
-                                    auto r = load(s, files, uses);
-                                    if (!r) return tl::unexpected(r.error());
-                                    out.mesh = std::move(*r);
-                                    return {};
-                                  }},
-                       shape.geometry);
+  const auto set = [](auto& to, auto placed) -> Result<void> {
+    if (!placed) return tl::unexpected(placed.error());
+    to = std::move(*placed);
+    return {};
+  };
+  const auto ok = std::visit(
+      overloaded{[&](const RectangleShape&) { return set(out.mesh, Result<LocalMesh>(rectangle())); },
+                 [&](const CubeShape&) { return set(out.mesh, Result<LocalMesh>(cube())); },
+                 [&](const SphereShape& s) { return set(out.sphere, place_sphere(s, m)); },
+                 [&](const DiskShape&) { return set(out.disk, Result<Disk>(place_disk(m))); },
+                 [&](const CylinderShape& s) { return set(out.cylinder, place_cylinder(s, m)); },
+                 [&](const MeshShape& s) { return set(out.mesh, load(s, files, uses)); }},
+      shape.geometry);
   if (!ok) return tl::unexpected(ok.error());
   transform(out.mesh, m);
   out.normals_given = !out.mesh.normals.empty();
@@ -196,25 +253,45 @@ Result<Placed> place(const Shape& shape, const AssetLoader& files,
   return out;
 }
 
-void add_bounds(const Placed& p, Bounds& b) {
+Box bounds_of(const Placed& p) {
+  Box b;
   for (const V3d& v : p.mesh.positions) b.add(v);
-  if (p.sphere) {
-    b.add(p.sphere->center - V3d(p.sphere->radius));
-    b.add(p.sphere->center + V3d(p.sphere->radius));
-  }
-  if (p.cylinder) {
-    const Cylinder& c = *p.cylinder;
-    for (int k = 0; k < 3; ++k) {
-      // `r` is the half extent of the cylinder's circle along axis k.
-      const double r = c.radius * std::sqrt(c.u[k] * c.u[k] + c.v[k] * c.v[k]),
-                   end = c.p0[k] + c.axis[k] * c.length;
-      b.lo[k] = std::min(b.lo[k], std::min(c.p0[k], end) - r);
-      b.hi[k] = std::max(b.hi[k], std::max(c.p0[k], end) + r);
-    }
-  }
-  if (p.disk) {
+  if (p.sphere) b.add(box_of(*p.sphere));
+  if (p.cylinder) b.add(box_of(*p.cylinder));
+  if (p.disk) {  // the square around the disk
     for (int k = 0; k < 4; ++k)
       b.add(p.disk->center + p.disk->u * (k & 1 ? 1. : -1.) + p.disk->v * (k & 2 ? 1. : -1.));
+  }
+  return b;
+}
+
+SurfaceAttributes attributes_of(const Scene& scene) {
+  SurfaceAttributes all;
+  for (const Texture& t : scene.textures) {
+    if (const auto* a = std::get_if<MeshAttributeTexture>(&t))
+      all.names.try_emplace(a->name, static_cast<std::uint32_t>(all.names.size()));
+  }
+  all.first_of.assign(scene.shapes.size(), SurfaceAttributes::kNoChannel);
+  return all;
+}
+
+void add_channel(SurfaceAttributes& all, const MeshAttribute& a, std::uint32_t surface, std::uint32_t base,
+                 const std::vector<std::uint32_t>& kept) {
+  const auto name = all.names.find(a.name);
+  if (name == all.names.end()) return;
+  const bool faces = per_face(a.name);
+  const std::size_t count = faces ? kept.size() : a.values.size() / a.components;
+  all.channels.push_back({faces, base, static_cast<std::uint32_t>(count), all.values.size(), name->second,
+                          all.first_of[surface]});
+  all.first_of[surface] = static_cast<std::uint32_t>(all.channels.size() - 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    const float* v = &a.values[(faces ? kept[i] : i) * a.components];
+    C3 c = a.components == 3 ? C3(v[0], v[1], v[2]) : C3(v[0]);
+    for (int k = 0; k < 3; ++k) {
+      all.clamped += c[k] < 0;
+      c[k] = std::max(c[k], 0.f);
+    }
+    all.values.push_back(c);
   }
 }
 

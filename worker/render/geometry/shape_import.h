@@ -1,13 +1,14 @@
 // Reads the scene's shapes as primitives in scene space, in double. Geometry later recentres and rounds them.
+// Also checks and stores mesh attributes (values at vertices or faces) for the textures that read them.
 #pragma once
 
-#include <limits>
 #include <optional>
 #include <vector>
 
 #include "common/assets/data.h"
 #include "common/scene/schema/mesh_attributes.h"
-#include "worker/render/geometry/geometry.h"
+#include "worker/render/geometry/surface_boxes.h"
+#include "worker/render/texture/surface_attributes.h"
 
 namespace ls::render {
 
@@ -28,21 +29,18 @@ struct Placed {
   std::optional<Cylinder> cylinder;
 };
 
-struct Bounds {
-  V3d lo{std::numeric_limits<double>::infinity()}, hi{-std::numeric_limits<double>::infinity()};
-  void add(const V3d& p) {
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], p[k]);
-      hi[k] = std::max(hi[k], p[k]);
-    }
-  }
-  bool empty() const { return !(lo.x <= hi.x); }
-};
-
 // Reads one shape and places it by its to_world, with the attributes that textures use. Fails if the file or
 // the transform cannot give a surface, or if the mesh lacks an attribute or has it in another form.
 Result<Placed> place(const Shape& shape, const AssetLoader& files,
                      const std::vector<scene::AttributeUse>& uses = {});
-void add_bounds(const Placed& placed, Bounds& bounds);
+Box bounds_of(const Placed& placed);
+
+// Returns storage, still empty, for the attributes that the scene's textures name.
+SurfaceAttributes attributes_of(const Scene& scene);
+// Adds the values of one attribute of the mesh of `surface` to `all`. `base` is the index of the mesh's first
+// vertex (for an attribute of faces: first triangle) in the world's lists. `kept` is used for attributes of
+// faces: it lists the triangles that were kept when those without area were left out.
+void add_channel(SurfaceAttributes& all, const MeshAttribute& attribute, std::uint32_t surface,
+                 std::uint32_t base, const std::vector<std::uint32_t>& kept);
 
 }  // namespace ls::render

@@ -1,33 +1,13 @@
 #include "worker/render/geometry/surface_boxes.h"
 
-#include <limits>
-
-#include "worker/render/geometry/shape_boxes.h"
-
 namespace ls::render {
 namespace {
 
 constexpr std::size_t kMaxBoxes = std::size_t{1} << 23;  // these boxes take 300 MB
 
-struct Grown : Box {
-  Grown()
-      : Box{V3d(std::numeric_limits<double>::infinity()), V3d(-std::numeric_limits<double>::infinity())} {}
-  void add(const V3d& p) {
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], p[k]);
-      hi[k] = std::max(hi[k], p[k]);
-    }
-  }
-  void add(const Box& b) {
-    add(b.lo);
-    add(b.hi);
-  }
-  bool empty() const { return !(lo.x <= hi.x); }
-};
-
 // Returns the box of each wanted surface, in the space of its primitives: the world's or that of its group.
-std::vector<Grown> own_boxes(const Geometry& g, const std::vector<bool>& wanted) {
-  std::vector<Grown> boxes(g.surfaces.size());
+std::vector<Box> own_boxes(const Geometry& g, const std::vector<bool>& wanted) {
+  std::vector<Box> boxes(g.surfaces.size());
   for (std::uint32_t i = 0; i < g.triangle_count(); ++i) {
     if (!wanted[g.triangle_surface[i]]) continue;
     for (int k = 0; k < 3; ++k) boxes[g.triangle_surface[i]].add(V3d(g.vertex(i, k)));
@@ -36,13 +16,6 @@ std::vector<Grown> own_boxes(const Geometry& g, const std::vector<bool>& wanted)
   for (const Disk& s : g.disks) boxes[s.surface].add(box_of(s));
   for (const Cylinder& s : g.cylinders) boxes[s.surface].add(box_of(s));
   return boxes;
-}
-
-Grown moved(const Grown& b, const Affine& m) {
-  Grown r;
-  for (int k = 0; k < 8; ++k)
-    r.add(m.point({k & 1 ? b.hi.x : b.lo.x, k & 2 ? b.hi.y : b.lo.y, k & 4 ? b.hi.z : b.lo.z}));
-  return r;
 }
 
 // Returns the group that each surface belongs to, or kNone.
@@ -65,7 +38,7 @@ std::optional<std::vector<SurfaceBox>> surface_boxes(const Geometry& g,
                                                      const std::function<bool(const SurfaceInfo&)>& wanted) {
   std::vector<bool> want;
   for (const SurfaceInfo& s : g.surfaces) want.push_back(wanted(s));
-  const std::vector<Grown> own = own_boxes(g, want);
+  const std::vector<Box> own = own_boxes(g, want);
   const std::vector<std::uint32_t> group = groups_of(g);
   std::vector<std::vector<std::uint32_t>> instances(g.groups.size());
   for (std::uint32_t k = 0; k < g.instances.size(); ++k) instances[g.instances[k].group].push_back(k);
@@ -78,7 +51,7 @@ std::optional<std::vector<SurfaceBox>> surface_boxes(const Geometry& g,
     }
     if (boxes.size() + instances[group[i]].size() > kMaxBoxes) return std::nullopt;
     for (const std::uint32_t k : instances[group[i]]) {
-      const Grown b = moved(own[i], g.instances[k].to_world);
+      const Box b = own[i].moved(g.instances[k].to_world);
       boxes.push_back({i, k, V3(b.lo), V3(b.hi)});
     }
   }

@@ -1,8 +1,10 @@
-// Computes the bounding boxes of a world's surfaces: one for each surface, or one for each of its instances
-// if it is in a group.
+// Bounding boxes: of shapes, and of the surfaces of a world.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -10,6 +12,47 @@
 
 namespace ls::render {
 
+struct Box {
+  V3d lo{std::numeric_limits<double>::infinity()}, hi{-std::numeric_limits<double>::infinity()};
+
+  bool empty() const { return !(lo.x <= hi.x); }
+  void add(const V3d& p) { add({p, p}); }
+  void add(const Box& b) {
+    for (int k = 0; k < 3; ++k) {
+      lo[k] = std::min(lo[k], b.lo[k]);
+      hi[k] = std::max(hi[k], b.hi[k]);
+    }
+  }
+  // The box around the image of this box, which must not be empty, under the map m.
+  Box moved(const Affine& m) const {
+    Box r;
+    for (int k = 0; k < 8; ++k)
+      r.add(m.point({k & 1 ? hi.x : lo.x, k & 2 ? hi.y : lo.y, k & 4 ? hi.z : lo.z}));
+    return r;
+  }
+};
+// The boxes of shapes are exact up to rounding in double.
+inline Box box_of(const Sphere& s) { return {s.center - V3d(s.radius), s.center + V3d(s.radius)}; }
+inline V3d reach(const V3d& u, const V3d& v) {  // half extent of the ellipse u cos a + v sin a
+  V3d r;
+  for (int k = 0; k < 3; ++k) r[k] = std::sqrt(u[k] * u[k] + v[k] * v[k]);
+  return r;
+}
+inline Box box_of(const Disk& s) {
+  const V3d r = reach(s.u, s.v);
+  return {s.center - r, s.center + r};
+}
+inline Box box_of(const Cylinder& s) {
+  const V3d r = reach(s.u, s.v) * s.radius, end = s.p0 + s.axis * s.length;
+  Box b;
+  for (int k = 0; k < 3; ++k) {
+    b.lo[k] = std::min(s.p0[k], end[k]) - r[k];
+    b.hi[k] = std::max(s.p0[k], end[k]) + r[k];
+  }
+  return b;
+}
+
+// The box of a surface, or of one instance of it if the surface is in a group.
 struct SurfaceBox {
   std::uint32_t surface = 0, instance = kNone;
   V3 lo, hi;

@@ -1,9 +1,9 @@
 // Equi-angular distance sampling along a segment about a pivot, the point that stands for the light
-// (pivot.h). The method is that of Kulla and Fajardo 2012: the density is proportional to 1 / distance^2,
-// where distance is the distance to the pivot. Positions are offsets x in [a, b] along the segment, measured
-// from the foot of the perpendicular from the pivot. The textbook difference of arctangents cancels when both
-// ends are far from the foot on one side; the forms used here do not (pdf accurate to 4e-7 in float32). If
-// the light shines into a cone, only the part of the segment inside the cone is sampled.
+// (light_kind.h). The method is that of Kulla and Fajardo 2012: the density is proportional to 1 /
+// distance^2, where distance is the distance to the pivot. Positions are offsets x in [a, b] along the
+// segment, measured from the foot of the perpendicular from the pivot. The textbook difference of arctangents
+// cancels when both ends are far from the foot on one side; the forms used here do not (pdf accurate to 4e-7
+// in float32). If the light shines into a cone, only the part of the segment inside the cone is sampled.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 #include "worker/render/base/work_counters.h"
 #include "worker/render/lights/lamp_directions.h"
-#include "worker/render/lights/pivot.h"
+#include "worker/render/lights/light_kind.h"
 #include "worker/render/math/math.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/medium.h"

@@ -14,9 +14,7 @@
 #include "worker/render/math/processor.h"
 #include "worker/render/world/aim.h"
 #include "worker/render/world/pilot.h"
-#include "worker/render/world/shadow_roulette.h"
-#include "worker/render/world/sky_samples.h"
-#include "worker/render/world/splitting.h"
+#include "worker/render/world/roulette.h"
 #include "worker/render/world/world_build.h"
 
 namespace ls::render {

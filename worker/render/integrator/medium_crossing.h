@@ -91,7 +91,7 @@ auto PathTracer<F, Light>::collide(const Medium& medium, Segment segment, const 
   return scatter_in(medium);
 }
 
-// Scatters the path at its vertex in the medium. If paths split there (splitting.h), first follows a second
+// Scatters the path at its vertex in the medium. If paths split there (roulette.h), first follows a second
 // path from the vertex on, and adds the light that it finds.
 template <Features F, template <Features> class Light>
 auto PathTracer<F, Light>::scatter_in(const Medium& medium) -> Step {

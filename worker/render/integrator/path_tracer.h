@@ -34,7 +34,7 @@
 #include "worker/render/integrator/vertex_nee.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/medium_stack.h"
-#include "worker/render/world/splitting.h"
+#include "worker/render/world/roulette.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {
@@ -105,7 +105,7 @@ class PathTracer {
   friend class Light<F>;
   friend class VertexNee<F>;
   friend class SegmentNee<F>;
-  // True if paths may split (splitting.h): worlds with Features::connected or Features::reuse never do.
+  // True if paths may split (roulette.h): worlds with Features::connected or Features::reuse never do.
   static constexpr bool kSplits = F.grids && !F.connected && !F.reuse;
   struct Vertex {  // where the current ray was scattered
     V3 p{0, 0, 0};
@@ -302,7 +302,7 @@ class PathTracer {
   LightSplit* split_;
   OffsetRay ray_;
   C3 beta_{1, 1, 1}, density_{1, 1, 1};
-  // Russian roulette may end the path if its throughput is below this (splitting.h). If it depends on the
+  // Russian roulette may end the path if its throughput is below this (roulette.h). If it depends on the
   // first vertex, it is kNoReference before that vertex.
   float reference_ = 1;
   static constexpr float kNoReference = -1;
@@ -525,7 +525,7 @@ void PathTracer<F, Light>::light_surface_by(const LightChoice& choice, const Sur
 }
 
 // At the path's first vertex: samples a second direction and adds half of the constant environment's light
-// from there (sky_samples.h). `numbers` are the random numbers of the path's own direction. Only in scenes
+// from there (aim.h). `numbers` are the random numbers of the path's own direction. Only in scenes
 // without media.
 template <Features F, template <Features> class Light>
 void PathTracer<F, Light>::look_for_sky(const SurfaceHit& hit, const SurfaceInfo& surface, const V3& wo,

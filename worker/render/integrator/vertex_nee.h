@@ -20,7 +20,7 @@
 #include "worker/render/integrator/offset_ray.h"
 #include "worker/render/math/sampler.h"
 #include "worker/render/media/optical_depth.h"
-#include "worker/render/world/shadow_roulette.h"
+#include "worker/render/world/roulette.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {

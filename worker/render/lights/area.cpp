@@ -5,15 +5,16 @@ namespace {
 
 V3 absolute(const V3& v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)}; }
 
-// The cone of directions from x to the sphere's emitting side, as 1 - cos of its half angle, without
-// cancellation (docs/measurements/stability.md N26). The value is 2 (all directions) if the inner side emits
-// and x is inside, and 0 (none) if x cannot see the emitting side. Points on the surface itself, up to a few
-// ulps of their coordinates, count as being on the emitting side, so that sampling and density agree on them.
+// True if x is inside the sphere. Points on the surface itself, up to a few ulps of their coordinates, count
+// as being on the emitting side (`sign`: 1 outer, -1 inner), so that sampling and density agree on them.
 bool is_inside(const Sphere& s, float reach, float sign, const V3& x) {
   const V3d f = s.center - V3d(x);
   const double margin = std::max(0., s.radius - double{sign} * 0x1p-20 * double{reach});
   return f.dot(f) < margin * margin;
 }
+// The cone of directions from x to the sphere's emitting side, as 1 - cos of its half angle, without
+// cancellation (docs/measurements/stability.md N26). The value is 2 (all directions) if the inner side emits
+// and x is inside, and 0 (none) if x cannot see the emitting side.
 float one_minus_cos(const Sphere& s, float reach, float sign, const V3& x) {
   const V3d f = s.center - V3d(x);
   const double d2 = f.dot(f);
@@ -139,7 +140,8 @@ LightBounds MeshLight::bounds(const LightWorld& world) const {
   return b;
 }
 
-// numbers.x chooses the triangle; its remainder, rescaled to [0, 1], is used for the point.
+// numbers.x chooses the triangle. Its position among the numbers that choose this triangle is used for the
+// point.
 AreaPoint MeshLight::point(const LightWorld& world, const LightNumbers& numbers) const {
   const Geometry& g = world.geometry;
   const double target = (numbers.x + .5) * 0x1p-32 * cdf.back();
@@ -162,8 +164,9 @@ AreaPoint MeshLight::point(const LightWorld& world, const LightNumbers& numbers)
   return y;
 }
 
-// The side whose light arrives at x: 1 is the outer one. A point on a surface that shines on both sides
-// counts as inside: the inner side is seen from its own points, the outer one is not, as it is convex.
+// Returns the side of the sphere whose light arrives at x: 1 for the outer side, -1 for the inner one. If
+// both sides shine, a point on the surface counts as inside: because the sphere is convex, such a point sees
+// the inner side and not the outer one.
 float SphereLight::side_of(const Sphere& s, const V3& x) const {
   if (!two_sided) return sign;
   return is_inside(s, reach, -1, x) ? -1.f : 1.f;
@@ -209,8 +212,8 @@ float SphereLight::pdf(const LightWorld& world, const SurfaceHit& hit, const V3&
                        float p) const {
   const Sphere& sphere = world.geometry.spheres[primitive];
   const float side = side_of(sphere, x);
-  // Rays that pass the near wall of a sphere that lets light through meet the far wall from inside. Sampling
-  // finds the side that x sees alone.
+  // If the sphere lets light through, a ray may pass its near wall and hit the far wall from inside. sample()
+  // finds only points on the side that x sees.
   if (two_sided && dot(direction, hit.ng) * sign * side > 0) return 0;
   const float cone = one_minus_cos(sphere, reach, side, x);
   return cone > 0 ? p / (kTwoPi * cone) : 0;

@@ -60,7 +60,8 @@ struct AreaLight : LightKind {
   // Returns bounds whose box reaches from middle - half to middle + half, for a light with normals in all
   // directions.
   LightBounds bounds_of(const LightWorld& world, const V3& middle, const V3& half) const;
-  // Adds the cone of the normals of the emitting side. The normals of both sides are in all directions.
+  // Sets the cone of the normals of the emitting side. If both sides emit, the normals point in all
+  // directions, which is the default.
   void set_normals(const V3& axis, float cos_spread, LightBounds& b) const {
     if (two_sided) return;
     b.axis = axis;

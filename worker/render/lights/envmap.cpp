@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "worker/render/base/work_counters.h"
@@ -77,29 +78,23 @@ Result<void> check_values(std::string_view name, const Texels& t, float scale) {
 
 Result<EnvironmentMap> EnvironmentMap::build(std::string_view name, ImageData image, double scale,
                                              const Transform& to_world, SkyMapping mapping) {
+  const auto refuse = [](const std::string& why) { return fail(Errc::invalid_argument, why); };
+  const std::string size =
+      fmt::format("environment map '{}' has {} x {} pixels; ", name, image.width, image.height);
   if (std::uint64_t{image.width} * image.height > kMaxEnvironmentPixels)
-    return fail(Errc::resource_exhausted,
-                fmt::format("environment map '{}' has {} x {} pixels; scale it down to 8192 x 4096 ({} "
-                            "pixels) or less",
-                            name, image.width, image.height, kMaxEnvironmentPixels));
+    return fail(
+        Errc::resource_exhausted,
+        size + fmt::format("scale it down to 8192 x 4096 ({} pixels) or less", kMaxEnvironmentPixels));
   if (mapping == SkyMapping::equal_area && image.width != image.height)
-    return fail(Errc::invalid_argument,
-                fmt::format("environment map '{}' has {} x {} pixels; an equal-area map is square: if it is "
-                            "in latitude-longitude form, say so",
-                            name, image.width, image.height));
+    return refuse(size + "an equal-area map is square: if it is in latitude-longitude form, say so");
   if (mapping == SkyMapping::latlong && (image.width < 2 || image.height < 3))
-    return fail(Errc::invalid_argument,
-                fmt::format("environment map '{}' has {} x {} pixels; it takes at least 2 x 3", name,
-                            image.width, image.height));
+    return refuse(size + "it takes at least 2 x 3");
   const auto turn = rotation_of(to_world);
   if (!turn)
-    return fail(Errc::invalid_argument,
-                fmt::format("environment map '{}': its to_world may turn and mirror it, not stretch or "
-                            "flatten it",
-                            name));
+    return refuse(fmt::format(
+        "environment map '{}': its to_world may turn and mirror it, not stretch or flatten it", name));
   if (!(scale >= 0 && scale <= double{kLargestTexel}))
-    return fail(
-        Errc::invalid_argument,
+    return refuse(
         fmt::format("environment map '{}': its scale is {}, not from 0 to {:g}", name, scale, kLargestTexel));
   auto texels = make_texels(name, std::move(image), /*raw=*/false);
   if (!texels) return tl::unexpected(texels.error());

@@ -63,8 +63,9 @@ class EnvironmentMap {
   V3 sample(std::uint32_t x, std::uint32_t y) const;
 
   bool black() const { return used_rows_ == 0; }
-  // The luminance integrated over all directions, as approximated by the sampling table: the sum over cells
-  // of the mean luminance at a cell's corners (of equal_area its luminance) times its solid angle.
+  // The luminance integrated over all directions, as the sampling table approximates it: the sum over cells
+  // of the solid angle times the mean luminance at the corners (in an equal_area map, times the luminance of
+  // the texel).
   double flux() const { return flux_; }
   std::uint64_t clamped() const { return texels_.clamped; }
   std::uint64_t bytes() const;

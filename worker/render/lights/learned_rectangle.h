@@ -11,7 +11,7 @@ namespace ls::render {
 
 class LearnedRectangle {
  public:
-  LearnedRectangle() = default;  // without cells: only to be assigned to
+  LearnedRectangle() = default;  // empty; another must be assigned before use
   explicit LearnedRectangle(std::size_t side) : side_(side) {}
 
   // Adds a point; a weight that is not positive and finite is ignored.

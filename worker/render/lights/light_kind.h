@@ -21,7 +21,6 @@
 #include "worker/render/base/kinds.h"
 #include "worker/render/geometry/geometry.h"
 #include "worker/render/lights/light_tree.h"
-#include "worker/render/math/color.h"
 #include "worker/render/math/math.h"
 #include "worker/render/math/random.h"
 #include "worker/render/math/transform.h"
@@ -40,6 +39,18 @@ struct LightSample {
   // lights it is the probability of choosing the light alone.
   float pdf = 0;
   bool delta = false;
+};
+
+// The point on a light about which segments are sampled equi-angularly, and the cone into which it emits.
+struct Pivot {
+  V3 p;
+  // Light leaves p only in directions whose cosine to the axis, a unit vector, is at least cos_reach. -1: in
+  // all directions.
+  V3 axis{0, 0, 0};
+  float cos_reach = -1;
+
+  Pivot(const V3& point) : p(point) {}
+  Pivot(const V3& point, const V3& towards, float cosine) : p(point), axis(towards), cos_reach(cosine) {}
 };
 
 // Random words for choosing a light and a point on it. All 32 bits of each are used, because among many

@@ -55,8 +55,9 @@ class LightTree::Builder {
  private:
   static constexpr std::uint32_t kNoParent = 0xffffffffu;
   static constexpr int kBins = 16;
-  // From depth kDeepest on, lights are halved by their order, regardless of cost. So 2^24 lights are all
-  // separated at depth 30 + 24, and the turns on a path fit the 64 bits of a trail.
+  // From depth kDeepest on, a node's lights are split into halves of equal size, regardless of cost. So 2^24
+  // lights are all separated at depth 30 + 24, and the turns on the way to a light fit the 64 bits of its
+  // trail (trails_).
   static constexpr int kDeepest = 30;
   struct Job {
     std::uint32_t begin, end;

@@ -27,10 +27,11 @@ namespace ls::render {
 
 struct LightBounds {
   V3 low, high;           // bounding box of the light
-  V3 axis{0, 0, 1};       // axis of a cone that contains its emission directions (normals),
-  float cos_spread = -1;  // cosine of the cone's half angle; -1: all directions
+  V3 axis{0, 0, 1};       // axis of a cone that contains its emission directions, the normals
+  float cos_spread = -1;  // cosine of that cone's half angle; -1: all directions
   float cos_reach = 0;    // cosine of the largest angle between a normal and the emitted light
-  double intensity = 0;   // luminous flux per steradian along a normal, by mean texels; positive and finite
+  // Luminous flux per steradian along a normal, with textures averaged; positive and finite
+  double intensity = 0;
 };
 
 class LightTree {

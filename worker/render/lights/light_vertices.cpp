@@ -65,9 +65,10 @@ void LightVertices::finish() {
 }
 
 // Estimates the contributions of a block's light vertices y to the receiver x, without visibility and
-// transmittance. Up to a common factor they are L_y * f_x * c / (c r^2 + p_x cos_y), where L_y is the
-// radiance times cosine by Look, c is Look::density, r the distance, f_x the BSDF times cosine or the phase
-// function at x, and p_x its density. Surfaces at x count as diffuse. Unused lanes have a radiance of 0.
+// transmittance. Up to a common factor they are L_y * f_x * c / (c r^2 + p_x cos_y). L_y is the radiance
+// times cosine that y's Look describes, c is Look::density, and r the distance. f_x is the BSDF times cosine
+// or the phase function at x, and p_x its density. Surfaces at x count as diffuse. Unused lanes have a
+// radiance of 0.
 void LightVertices::towards(const Block& b, const Receiver& x, Lane& target) {
   const float other_side = x.both_sides ? 1.f : 0.f;
   const auto phase = [](float g, float cosine) {

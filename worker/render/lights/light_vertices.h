@@ -140,8 +140,8 @@ class LightVertices {
     float even = 0, lobe = 0;  // their sum is positive
     V3 axis{0, 0, 1};
     float g = 0;
-    // 1 / densities.sum(1 / (4 pi)). The larger it is, the better connections are compared with the other
-    // strategies that find the light of the vertex.
+    // 1 / densities.sum(1 / (4 pi)). The larger it is, the more weight connections to this vertex have among
+    // all strategies that find its light.
     float density = 0;
   };
   void add(const LightVertex& vertex, const Look& look);

@@ -140,8 +140,8 @@ class Lights {
   }
   // True if set_local() may be called.
   bool can_be_local() const { return lights_.size() > 1 && lights_.size() <= LocalLights::kMostLights; }
-  // The mean square of next-event estimation at these places, over the square of its mean, if the table
-  // chooses the light. It is at least 1, and is 1 where each light contributes in proportion to its
+  // How noisy the table's choice of a light is at these places: the mean square of next-event estimation over
+  // the square of its mean. It is at least 1, and is 1 where each light contributes in proportion to its
   // probability in the table.
   double spread_over(const LightVisits& visits) const;
   // From this call on, lights are chosen by probabilities learned from these visits; null: no longer.

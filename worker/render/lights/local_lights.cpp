@@ -42,7 +42,7 @@ void LightVisits::add(const LightVisits& more) {
 
 struct LocalLights::Builder {
   using Index = std::uint32_t;
-  using Means = std::vector<double>;  // of the squared value of each light
+  using Means = std::vector<double>;  // for each light, the mean of its squared value
 
   LocalLights& of;
   const LightVisits& visits;

@@ -77,7 +77,8 @@ struct Portals::Box {
     if (!(share.x >= 0 && share.x < 1 && share.y >= 0 && share.y < 1)) return std::nullopt;
     return Place{at, share};
   }
-  // The face through which a ray from inside leaves: 2 axis + (1 if it is the one where p[axis] is larger)
+  // Returns the face through which a ray from inside leaves the box: 2 axis, plus 1 if the face is the one
+  // with the larger p[axis].
   int face_of(const Found& f) const {
     int face = 0;
     float nearest = kInfinity;

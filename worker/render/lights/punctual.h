@@ -3,7 +3,6 @@
 
 #include "worker/render/camera/camera.h"
 #include "worker/render/lights/light_kind.h"
-#include "worker/render/lights/pivot.h"
 #include "worker/render/math/equal_area.h"
 
 namespace ls::render {
@@ -106,8 +105,8 @@ struct ProjectorLight : Punctual<ProjectorLight> {
   }
   LightBounds bounds(const LightWorld& world) const {
     LightBounds b = bounds_of(value * world.textures.mean(image));
-    // The mean over its directions: towards the corners of a wide image the intensity is far higher than
-    // along the axis (see towards()).
+    // The mean intensity over all directions of the image is used: towards the corners of a wide image the
+    // intensity is far higher than along the axis (see towards()).
     if (!even) b.intensity *= area() / solid_angle();
     b.axis = axis;
     b.cos_spread = cos_corner();

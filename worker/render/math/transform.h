@@ -1,4 +1,5 @@
-// Affine maps in double. They apply the scene's transforms before coordinates are rounded to float32.
+// The scene's colours and transforms in the renderer's types. Transforms are affine maps in double, which are
+// applied before coordinates are rounded to float32.
 #pragma once
 
 #include <array>
@@ -8,6 +9,10 @@
 #include "worker/render/math/math.h"
 
 namespace ls::render {
+
+inline C3 color(const Rgb& c) {
+  return {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
+}
 
 struct Affine {
   std::array<double, 9> a{1, 0, 0, 0, 1, 0, 0, 0, 1};  // row-major linear part

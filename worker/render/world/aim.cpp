@@ -1,8 +1,9 @@
 #include "worker/render/world/aim.h"
 
 #include <algorithm>
+#include <utility>
 
-#include "worker/render/world/camera_collisions.h"
+#include "worker/render/world/pilot.h"
 #include "worker/render/world/world.h"
 
 namespace ls::render {
@@ -15,6 +16,8 @@ constexpr int kPointsThatPay = 2;
 // (CameraCollisions::met), is below this. In denser media the flights that end on the segment find the light
 // often enough, unless connections to light vertices (light_vertices.h) have removed most of the other noise.
 constexpr float kThin = .35f;
+// Second directions pay if more than this share of the direct light comes from the constant environment.
+constexpr double kSkyThatPays = .125;
 
 int points_for(const IntegratorSettings& settings, const World& w) {
   if (settings.camera_points != 0) return std::max(0, settings.camera_points);
@@ -43,6 +46,21 @@ void aim(const IntegratorSettings& settings, World& w) {
   w.lamp_flights = settings.lamp_flights == 0 && w.lamps.count > 0 && homogeneous;
   w.camera_points = points_for(settings, w);
   w.need.aimed = w.lamps.count > 0 || w.camera_points > 0;
+}
+
+void learn_sky_samples(const IntegratorSettings& settings, World& w) {
+  if (settings.sky_samples < 0 || w.need.media || w.need.connected ||
+      is_black(w.lights.constant_environment()))
+    return;
+  if (!w.depth_allows(1)) return;
+  // Paths of two segments are scattered at most once, so they find direct light only.
+  const bool hide_emitters = std::exchange(w.hide_emitters, true);
+  const auto all = pilot_radiance(w, 2);
+  const C3 sky = w.lights.exchange_constant_environment(C3(0));
+  const auto others = pilot_radiance(w, 2);
+  (void)w.lights.exchange_constant_environment(sky);
+  w.hide_emitters = hide_emitters;
+  w.sky_samples = all && *all - *others > kSkyThatPays * *all;
 }
 
 }  // namespace ls::render

@@ -7,7 +7,7 @@
 #include "common/base/overloaded.h"
 #include "common/scene/schema/traits.h"
 #include "worker/render/math/blackbody.h"
-#include "worker/render/math/color.h"
+#include "worker/render/math/transform.h"
 #include "worker/render/media/grid_load.h"
 
 namespace ls::render {
@@ -238,7 +238,7 @@ Result<void> HeteroBuilder::black_bodies(const Volume& temperature) {
   out.kelvin_offset = static_cast<float>(m.temperature_offset);
   out.peak_one = m.peak_one;
   out.weight = weight;
-  // The hottest of the bodies of peak 1 need not be the brightest, so the bound for all of them is used.
+  // The hottest of the bodies of peak 1 need not be the brightest, so a bound for all temperatures is used.
   const C3 hottest = light(out.emitter[0]->max_value());
   const double largest = is_black(hottest) ? 0 : m.peak_one ? kBrightestOfPeakOne : max_component(hottest);
   return shine(out, EmissionKind::black_body, k, largest * heaviest);

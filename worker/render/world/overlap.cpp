@@ -44,14 +44,14 @@ constexpr int kMaxCrossings = 1 << 12;  // largest number of surfaces that a ray
 // ray's origin.
 using Left = std::map<std::pair<std::uint32_t, std::uint32_t>, int>;  // key: surface and instance
 void note_left(const World& w, V3 o, const V3& d, Left& left) {
-  std::map<std::pair<std::uint32_t, std::uint32_t>, bool> seen;
+  std::set<Left::key_type> seen;
   for (int i = 0; i < kMaxCrossings; ++i) {
     const auto primitive = w.accel.nearest(o, d, kInfinity);
     SurfaceHit hit;
     if (!primitive || !w.geometry.complete(*primitive, o, d, hit)) return;
     const SurfaceInfo& s = w.geometry.surfaces[hit.surface];
     const std::pair key{hit.surface, hit.primitive.instance};
-    if (s.transition && !s.sheet && seen.try_emplace(key, true).second && dot(d, hit.ng) > 0) ++left[key];
+    if (s.transition && !s.sheet && seen.insert(key).second && dot(d, hit.ng) > 0) ++left[key];
     o = offset_point(hit, d);
   }
 }

@@ -1,5 +1,5 @@
-// Renders some camera paths before the first sample, to learn which techniques pay for a scene, that is,
-// reduce its noise by more than they cost. The results depend only on the scene and the size of the full
+// Renders some camera paths and rays before the first sample, to learn which techniques pay for a scene, that
+// is, reduce its noise by more than they cost. The results depend only on the scene and the size of the full
 // frame, not on the seed, the number of samples, a crop or the number of threads. The world must be otherwise
 // complete, and is the same afterwards.
 #pragma once
@@ -46,5 +46,15 @@ std::vector<PilotPixel> pilot_pixels(World& w, int max_depth, int threads);
 // rendered in two ways; false if one of them is empty. Both noises are weighted by the mean of the two
 // results, so that a rare bright sample lowers the weight of its pixel in both and does not decide alone.
 bool is_noisier(const std::vector<PilotPixel>& a, const std::vector<PilotPixel>& b, double factor);
+
+// Mean probabilities that media scatter or absorb a camera ray before it hits a surface.
+struct CameraCollisions {
+  float all = 0;  // over all camera rays
+  float met = 0;  // over the rays with a probability above 1e-3; 0 if there are none
+};
+
+// Computes the means over a lattice of camera rays of the full frame, of which the image may be a crop. Where
+// media overlap, only one of them counts at each place.
+CameraCollisions camera_collisions(const World& w);
 
 }  // namespace ls::render

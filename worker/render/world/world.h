@@ -62,7 +62,7 @@ class World {
   MisHeuristic heuristic = MisHeuristic::power;
   // With Features::aimed:
   Lamps lamps;                // lights without extent, near which directions are also sampled
-  bool lamp_flights = false;  // a share of the flights through homogeneous media end near lamps
+  bool lamp_flights = false;  // true if a share of the flights through homogeneous media ends near lamps
   int camera_points = 0;      // number of points on a segment (segment_nee.h); 0: none
   // With Features::connected:
   Lights::Directional sun;  // the light that the light vertices come from
@@ -72,13 +72,13 @@ class World {
   float connections_per_ray = 1;
   float faint = 0;  // connections that would add less than this are made at random (Russian roulette)
   mutable LightVertexCache light_vertices;  // safe from several threads
-  // With Features::grids: shadow rays that could add less than this are traced at random (shadow_roulette.h);
+  // With Features::grids: shadow rays that could add less than this are traced at random (roulette.h);
   // 0: all are traced.
   float faint_shadow = 0;
-  // The mean radiance of the image, for Russian roulette (splitting.h); 0: roulette compares with 1
+  // The mean radiance of the image, for Russian roulette (roulette.h); 0: roulette compares with 1
   float mean_radiance = 0;
-  bool paths_split = false;  // paths split at their first vertex if it is in a grid (splitting.h)
-  // True if the first vertex, on a surface, samples a second direction towards the sky (sky_samples.h)
+  bool paths_split = false;  // paths split at their first vertex if it is in a grid (roulette.h)
+  // True if the first vertex, on a surface, samples a second direction towards the sky (aim.h)
   bool sky_samples = false;
   // With Features::reuse: the number of pixels whose paths share their tails (path_reuse.h)
   int reuse = 0;

@@ -192,15 +192,12 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
   w.geometry = std::move(*geometry);
   w.inputs.add(HealthCause::degenerate_triangle, w.geometry.dropped_triangles);
   w.inputs.add(HealthCause::negative_texel, w.geometry.attributes.clamped);
-  auto textures =
-      TextureTable::build(scene,
-                          [&](const Asset& a) -> Result<ImageData> {
-                            const auto it = files.find(a.digest);
-                            if (it == files.end())
-                              return fail(Errc::internal, "no file was given for '" + a.name + "'");
-                            return load_image(it->second, a.name);
-                          },
-                          {&w.geometry.attributes, w.geometry.indices});
+  const auto load = [&](const Asset& a, auto... most_pixels) -> Result<ImageData> {
+    const auto it = files.find(a.digest);
+    if (it == files.end()) return fail(Errc::internal, "no file was given for '" + a.name + "'");
+    return load_image(it->second, a.name, most_pixels...);
+  };
+  auto textures = TextureTable::build(scene, load, {&w.geometry.attributes, w.geometry.indices});
   if (!textures) return tl::unexpected(textures.error());
   w.textures = std::move(*textures);
   auto bsdfs = BsdfTable::build(scene, w.textures);
@@ -214,10 +211,8 @@ Result<std::shared_ptr<World>> make_world(const Scene& scene, const RenderSettin
     if (scene.sensor.medium) w.camera_medium = scene.sensor.medium->value;
   }
   w.coincident = find_coincident(w.geometry).any;
-  auto lights = Lights::build(scene, w.geometry, w.textures, [&](const Asset& a) -> Result<ImageData> {
-    const auto it = files.find(a.digest);
-    if (it == files.end()) return fail(Errc::internal, "no file was given for '" + a.name + "'");
-    auto image = load_image(it->second, a.name, kMaxEnvironmentPixels);
+  auto lights = Lights::build(scene, w.geometry, w.textures, [&](const Asset& a) {
+    auto image = load(a, kMaxEnvironmentPixels);
     if (!image && image.error().code == Errc::resource_exhausted)
       image.error().message += "; scale the environment map down to 8192 x 4096 pixels or less";
     return image;

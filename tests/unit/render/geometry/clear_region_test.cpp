@@ -1,5 +1,5 @@
-// Regions in which no surface lies: which bodies have one, which points are in it, where rays leave it for
-// good, and that pixels are the same, up to rounding, as with every ray traced.
+// Regions without surfaces: which bodies have one, which points it contains, where rays leave it for good;
+// and that the image is the same, up to rounding, as if every ray were traced.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -16,7 +16,7 @@ using test::operator*;
 using test::SceneBuilder;
 using test::translate;
 
-// A body of grey medium under a sun and a sky, above a floor.
+// A body filled with a grey medium, above a floor, under a sun and a sky.
 SceneBuilder body(const ls::Geometry& g, const Transform& to_world, bool grid = false) {
   SceneBuilder b({12, 8});
   std::vector<float> values;
@@ -36,7 +36,7 @@ const ClearRegion* region_of(const World& w) { return w.media.at(0).clear; }
 std::shared_ptr<World> made(const SceneBuilder& b) {
   return make_world(b.scene, test::settings_of(b.scene), b.files, 1).value();
 }
-// The world's coordinates of a point of the scene.
+// Returns the world's coordinates of a point that is given in scene coordinates.
 V3 in_world(const World& w, const Vec3& p) {
   return V3((V3d(p[0], p[1], p[2]) - w.geometry.center) * w.geometry.scale);
 }
@@ -94,7 +94,7 @@ TEST(ClearRegion, IsNotWhereAnotherSurfaceMayBe) {
   })) << "beside it";
 }
 
-// Meshes of these corners, with faces as polygons that are divided into triangles from their first corners.
+// True if a mesh has a clear region. `corners` and `faces` are OBJ text; faces are polygons.
 bool has_region(const std::string& corners, const std::string& faces) {
   SceneBuilder b = body(CubeShape{}, {});
   b.scene.shapes[0].geometry = MeshShape{b.asset("body.obj", corners + faces), MeshFormat::obj};
@@ -138,7 +138,7 @@ TEST(ClearRegion, IsNotWhereAFlightHasToKnowItsEnd) {
   })) << "points are sampled about the lamp";
 }
 
-// The distance, in units of the scene, at which a ray from the middle of the body leaves the world of `b`.
+// The distance, in units of the scene, at which a ray from the middle of the body leaves the body for good.
 std::optional<float> way_out(const SceneBuilder& b, const V3& d) {
   const auto w = made(b);
   const ClearRegion* const region = region_of(*w);

@@ -1,4 +1,4 @@
-// Surfaces that lie on each other.
+// Surfaces that coincide.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -16,8 +16,9 @@ using test::SceneBuilder;
 using test::translate;
 using test::operator*;
 
-// Fog that stands on a floor, lit from below only: what gets through the floor is an error.
-// All of it is turned by `turn`: rounded corners of floor and box then lie in no common plane.
+// Counts samples of fog on a floor that are not black. The scene is lit only from below the floor, so all
+// light is a leak. `turn` rotates the scene, so that the rounded corners of floor and box have no common
+// plane.
 std::uint64_t lit_from_below(const Transform& turn, double floor, bool light_is_a_plane) {
   SceneBuilder builder({4, 4});
   const MediumIndex fog = builder.homogeneous({.5, .5, .5}, {.9, .9, .9});
@@ -46,7 +47,7 @@ TEST(FogOnAFloor, LetsNoLightThroughTheFloor) {
   for (const Transform& turn : {Transform{}, test::rotate_x(17) * test::rotate_y(31)}) {
     EXPECT_EQ(lit_from_below(turn, 4, false), 0u);
     EXPECT_EQ(lit_from_below(turn, 40, false), 0u);
-    EXPECT_EQ(lit_from_below(turn, 40, true), 0u);  // no way round the edge reaches the light
+    EXPECT_EQ(lit_from_below(turn, 40, true), 0u);  // no path around the floor's edge reaches the light
   }
 }
 
@@ -80,7 +81,8 @@ TEST(Coincident, AreFoundAmongRoundShapes) {
   EXPECT_FALSE(found(1.001));
 }
 
-// No other instantiation looks for them; that media overlap is another matter.
+// Only the general instantiation of the path tracer (`everything`) handles coincident surfaces. They do not
+// imply that media overlap.
 TEST(Coincident, AreAMatterOfTheGeneralInstantiationWithOrWithoutMedia) {
   for (const bool foggy : {false, true}) {
     SceneBuilder builder({1, 1});
@@ -97,7 +99,7 @@ TEST(Coincident, AreAMatterOfTheGeneralInstantiationWithOrWithoutMedia) {
   }
 }
 
-// All that lies between two points, whatever its kind, each once.
+// between() lists each surface between two points once, of whatever kind.
 TEST(Coincident, AreAllListedByTheAccelerationStructure) {
   SceneBuilder builder({1, 1});
   const BsdfIndex null = builder.null(), grey = builder.diffuse(.5);
@@ -112,7 +114,7 @@ TEST(Coincident, AreAllListedByTheAccelerationStructure) {
   EXPECT_EQ(w->accel.between(at(.1), at(.5)).count, 0);
 }
 
-// Apart from each other, and too many to compare all with all.
+// The spheres are apart from each other, but there are too many to compare all pairs.
 TEST(Coincident, AreTakenForGrantedOnceWhereThereAreTooManyToCompare) {
   constexpr int kSpheres = 12'000;
   SceneBuilder builder({1, 1});
@@ -128,7 +130,7 @@ TEST(Coincident, AreTakenForGrantedOnceWhereThereAreTooManyToCompare) {
   for (const SurfaceInfo& s : g->surfaces) EXPECT_EQ(s.coincident_reach, 1);
 }
 
-// Instances of every shape of a group of many: more boxes than can be listed.
+// Many instances of a group of many shapes: more boxes than can be listed.
 TEST(Coincident, AreTakenForGrantedWhereInstancesMakeTooManyBoxes) {
   constexpr int kShapes = 3'000, kInstances = 3'000;
   SceneBuilder builder({1, 1});
@@ -145,7 +147,7 @@ TEST(Coincident, AreTakenForGrantedWhereInstancesMakeTooManyBoxes) {
   for (const SurfaceInfo& s : g->surfaces) EXPECT_EQ(s.coincident_reach, 1);
 }
 
-// A glass plate and the fog in it, with the same faces: both are crossed or none.
+// A glass body and the fog in it have the same faces: a ray crosses either both or none.
 TEST(Coincident, MediaBeginWithTheGlassThatTheyFill) {
   SceneBuilder builder({1, 1});
   HomogeneousMedium m;
@@ -160,13 +162,14 @@ TEST(Coincident, MediaBeginWithTheGlassThatTheyFill) {
   int whole = 0;
   for (std::uint64_t s = 0; s < 64; ++s) {
     const double light = render_sample(*w, 0, 0, s).rgb[0];
-    whole += std::abs(light - 2) < 1e-2;  // but for the share 2.5e-9 that is reflected
+    // The tolerance includes the share 2.5e-9 that the glass reflects.
+    whole += std::abs(light - 2) < 1e-2;
   }
   EXPECT_EQ(whole, 64);
 }
 
-// A floor under a box of fog of optical depth 1, lit straight down through a pane in one of the box's faces:
-// rho / pi times what the pane and the fog leave. Parallel light has no noise.
+// The radiance of a floor under a box of fog of optical depth 1, lit from straight above through a pane in
+// one of the box's faces: rho / pi times the transmittances of pane and fog. Parallel light has no noise.
 double under_a_pane(BsdfIndex (*pane)(SceneBuilder&), const Transform& at, bool pane_first,
                     const char* integrator, bool instanced = false) {
   SceneBuilder builder({2, 2});
@@ -205,13 +208,13 @@ TEST(PaneOnABoundary, TakesItsShareOfShadowRaysWhicheverOfTheTwoIsMet) {
         EXPECT_NEAR(under_a_pane(half_mask, at, first, "volpath_distant_mis"), .5 * fog * lit, 1e-5 * lit);
         EXPECT_NEAR(under_a_pane(half_mask, at, first, "path"), .5 * lit, 1e-5 * lit);
         EXPECT_NEAR(under_a_pane(half_mask, at, first, "volpath", true), .5 * fog * lit, 1e-5 * lit);
-        // Of a pane R = .04 a side: (1 - R) / (1 + R).
+        // With R = .04 for one side, a pane transmits (1 - R) / (1 + R).
         EXPECT_NEAR(under_a_pane(thin_glass, at, first, "volpath"), .96 / 1.04 * fog * lit, 1e-5 * lit);
       }
 }
 
-// A room whose walls are lit by a light that lets all light pass and lies on them: whatever of the two a ray
-// meets, L + rho L + rho^2 L ... = L / (1 - rho) everywhere.
+// A room in which a light that lets all light pass coincides with the walls. Whichever of the two surfaces a
+// ray meets, the radiance is L + rho L + rho^2 L ... = L / (1 - rho) everywhere.
 TEST(LightThatLetsLightPass, ShinesOnTheWallThatItLiesOn) {
   for (const double aside : {0., 1e-7, -1e-7, 5e-7, -5e-7})
     for (const bool first : {false, true}) {
@@ -235,7 +238,7 @@ TEST(LightThatLetsLightPass, ShinesOnTheWallThatItLiesOn) {
     }
 }
 
-// Seen through fog, on the fog's own faces: behind all of it, and before it.
+// A light on one face of a box of fog, seen either through all of the fog or in front of it.
 TEST(LightThatLetsLightPass, ShinesOnTheFaceOfAMediumThatItLiesOn) {
   for (const double face : {-1., 1.})
     for (const bool first : {false, true}) {

@@ -1,10 +1,11 @@
-// Cylinders: where rays meet them, what they find there, and their light.
+// Cylinders: intersections with rays, the data of hits, and their light.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
 #include "tests/support/chi_square.h"
+#include "tests/unit/render/hits.h"
 #include "tests/unit/render/light_bench.h"
 
 namespace ls::render {
@@ -29,7 +30,7 @@ Cylinder tube(double radius, double length, const V3d& p0 = V3d(0)) {
 TEST(CylinderIntersection, IsExactForDistantThinAndGrazingRays) {
   EXPECT_NEAR(intersect(tube(1, 2), {-1e6, 0, 1}, {1, 0, 0}, 0, kEndless), 1e6 - 1, 1e-9);
   EXPECT_NEAR(intersect(tube(1e-6, 2), {-1, 0, 1}, {1, 0, 0}, 0, kEndless), 1 - 1e-6, 1e-15);
-  // At height 1 - 1e-12 over the axis: half chord sqrt(2e-12).
+  // At a distance of 1 - 1e-12 from the axis half the chord is sqrt(2e-12).
   EXPECT_NEAR(intersect(tube(1, 2), {-5, 1 - 1e-12, 1}, {1, 0, 0}, 0, kEndless), 5 - std::sqrt(2e-12), 1e-9);
   EXPECT_EQ(intersect(tube(1, 2), {-5, 1 + 1e-12, 1}, {1, 0, 0}, 0, kEndless), kEndless);
   EXPECT_EQ(intersect(tube(1, 2), {5, 0, 1}, {1, 0, 0}, 0, kEndless), kEndless) << "behind";
@@ -38,33 +39,14 @@ TEST(CylinderIntersection, IsExactForDistantThinAndGrazingRays) {
 
 TEST(CylinderIntersection, SeesTheFarWallThroughTheOpenEnd) {
   const Cylinder c = tube(1, 2);
-  // Falling at 45 degrees: it passes over the near wall and meets the far one at z = 1.
+  // The ray falls at 45 degrees, passes above the near wall and meets the far wall at z = 1.
   EXPECT_NEAR(intersect(c, {-2, 0, 4}, {1, 0, -1}, 0, kEndless), 3, 1e-12);
   EXPECT_EQ(intersect(c, {-2, 0, 6}, {1, 0, -1}, 0, kEndless), kEndless) << "over both";
   EXPECT_EQ(intersect(c, {0, 0, -1}, {0, 0, 1}, 0, kEndless), kEndless) << "along the axis";
   EXPECT_NEAR(intersect(c, {0, 0, 1}, {0, 2, 0}, 0, kEndless), .5, 1e-15) << "from inside";
 }
 
-BsdfIndex brushed_and_textured(SceneBuilder& builder) {
-  const TextureIndex grey = builder.texture({.5, .5, .5}), white = builder.texture({1, 1, 1});
-  RoughConductorBsdf b;
-  b.alpha_u = builder.texture({.1, .1, .1});
-  b.alpha_v = builder.texture({.3, .3, .3});
-  b.specular_reflectance =
-      SceneBuilder::push<TextureTag>(builder.scene.textures, Texture(CheckerboardTexture{grey, white, {}}));
-  return SceneBuilder::push<BsdfTag>(builder.scene.bsdfs, Bsdf(b));
-}
-
-SurfaceHit hit_from(const World& w, const V3d& from, const V3d& to) {
-  const auto at = [&](const V3d& p) { return (p - w.geometry.center) * w.geometry.scale; };
-  const V3 o(at(from)), d((at(to) - at(from)).normalized());
-  const auto primitive = w.accel.nearest(o, d, kInfinity);
-  SurfaceHit hit;
-  EXPECT_TRUE(primitive && w.geometry.complete(*primitive, o, d, hit));
-  return hit;
-}
-
-// What Mitsuba 3.9.1 says (scalar_rgb, ray_intersect): shading normal, uv, direction of dp/du.
+// Values of Mitsuba 3.9.1 (scalar_rgb, ray_intersect): shading normal, uv, direction of dp/du.
 struct Seen {
   CylinderShape shape;
   Transform to_world;
@@ -116,14 +98,14 @@ const Seen kSeen[] = {
 TEST(Cylinders, NormalsUvAndTangentsAreMitsubas) {
   for (const Seen& s : kSeen) {
     SceneBuilder builder;
-    builder.shape(s.shape, s.to_world, brushed_and_textured(builder));
+    builder.shape(s.shape, s.to_world, brushed(builder));
     const auto world = test::world_of(builder);
-    const SurfaceHit h = hit_from(*world, s.from, s.to);
-    // Mitsuba's figures are printed to 6 digits.
+    const SurfaceHit h = hit_towards(*world, s.from, s.to);
+    // Mitsuba's values are printed with 6 digits.
     EXPECT_LT((h.shading.n - s.normal).length(), 2e-5f) << h.shading.n << s.normal;
     EXPECT_LT((h.uv - s.uv).length(), 2e-5f) << h.uv << s.uv;
     EXPECT_LT((h.shading.s - s.along_u).length(), 2e-5f) << h.shading.s << s.along_u;
-    // The point lies on the surface: at the radius from the axis.
+    // The point is on the surface: its distance from the axis is the radius.
     const Cylinder& c = world->geometry.cylinders.at(0);
     const V3d q = V3d(h.p) - c.p0;
     EXPECT_NEAR((q - c.axis * q.dot(c.axis)).length(), c.radius, 2e-7);
@@ -135,17 +117,17 @@ TEST(Cylinders, AFlipTurnsTheirNormalsInwards) {
     SceneBuilder builder;
     builder.shape(CylinderShape{}, test::scale(1, mirrored ? -1 : 1, 1), builder.diffuse(.5)).flip_normals =
         true;
-    EXPECT_LT(hit_from(*test::world_of(builder), {5, .1, .5}, {0, 0, .5}).ng.x, -.9f);
+    EXPECT_LT(hit_towards(*test::world_of(builder), {5, .1, .5}, {0, 0, .5}).ng.x, -.9f);
   }
 }
 
-// A path that bounces about in a cylinder between two disks must never get out.
+// A path that bounces inside a cylinder closed by two disks must never get out.
 TEST(Cylinders, ClosedByDisksLoseNoRay) {
   for (const double s : {1e-4, 1., 12345.6}) {
     const Transform t = test::rotate_x(33) * test::rotate_y(21) * test::scale(s);
     SceneBuilder builder;
     const BsdfIndex grey = builder.diffuse(.5);
-    // The lids reach over the rim by a thousandth: there is no edge to slip through.
+    // The disks are wider than the cylinder by a thousandth, so there is no gap at the edge.
     builder.shape(between({0, 0, -1}, {0, 0, 1}, 1), t, grey);
     for (const double z : {-.999, .999})
       builder.shape(DiskShape{}, t * translate({0, 0, z}) * test::scale(1.001), grey);
@@ -175,9 +157,9 @@ TEST(Cylinders, ClosedByDisksLoseNoRay) {
   }
 }
 
-// The share of light that a plane element gets from a cylinder across its normal, which passes through one
-// end of it: configuration factor of length L and distance H in radii (Leuenberger and Person 1956; Howell's
-// catalogue B-31).
+// The configuration factor from a plane element to a cylinder of length L at the distance H, both in radii.
+// The cylinder is parallel to the element, whose normal passes through one end of it (Leuenberger and Person
+// 1956; Howell's catalogue B-31).
 double configuration_factor(double length, double distance) {
   const double l = length, h = distance, x = (1 + h) * (1 + h) + l * l, y = (1 - h) * (1 - h) + l * l;
   return std::atan(l / std::sqrt(h * h - 1)) / (M_PI * h) +
@@ -196,9 +178,9 @@ TEST(CylinderLights, GiveTheIrradianceOfTheirConfigurationFactor) {
 }
 
 TEST(CylinderLights, ShineInwardsWhereFlipped) {
-  // From the middle of the axis a tube of half length L fills the polar angles theta about it from `edge` to
-  // pi - edge. On a plane that holds the axis: the integral of sin^2 theta over them, times that of the
-  // cosine of the azimuth over half a turn, 2.
+  // From the middle of the axis, a tube of half length L covers the polar angles theta from `edge` to pi -
+  // edge. The irradiance of a plane that contains the axis is the integral of sin^2 theta over these angles,
+  // times the integral of the cosine of the azimuth over half a turn, which is 2.
   const double half = 2, edge = std::atan(1 / half);
   const double expected = (M_PI - 2 * edge) / 2 + std::sin(2 * edge) / 2;
   const LightBench bench(area(between({0, 0, -half}, {0, 0, half}, 1), {}, true));
@@ -208,7 +190,7 @@ TEST(CylinderLights, ShineInwardsWhereFlipped) {
 }
 
 TEST(CylinderLights, AreSampledUniformlyByArea) {
-  // Counts in 16 x 16 cells of uv.
+  // Sampled points are counted in 16 x 16 cells of uv.
   const LightBench b(area(between({0, 0, 0}, {0, 0, 2}, .7), {}));
   RandomStream r(17);
   constexpr int kSamples = 1 << 18;
@@ -229,7 +211,7 @@ TEST(CylinderLights, AreSampledUniformlyByArea) {
   tally.close();
 }
 
-// A cylinder of null walls around an absorbing medium: Beer's law across it.
+// Null walls around an absorbing medium: the transmittance follows Beer's law.
 TEST(Cylinders, HoldMedia) {
   SceneBuilder builder;
   const MediumIndex fog = builder.homogeneous({.5, 1, 2}, {0, 0, 0});

@@ -1,13 +1,16 @@
-// Intersections at extreme scales, orientation, tangents and closed boxes.
+// Intersections at extreme scales, orientation, tangents and closed boxes; rays that begin far outside of the
+// scene, and cameras whose rays are not finite.
 #include "worker/render/geometry/geometry.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "tests/support/render_check.h"
-#include "worker/render/world/world.h"
+#include "tests/unit/render/hits.h"
 
 namespace ls::render {
 namespace {
@@ -15,6 +18,7 @@ namespace {
 using test::SceneBuilder;
 using test::translate;
 using test::operator*;
+
 constexpr double kFarOut = std::numeric_limits<double>::infinity();
 
 Sphere sphere(const V3d& c, double r) {
@@ -28,7 +32,7 @@ TEST(SphereIntersection, IsExactForDistantTinyAndGrazingRays) {
   EXPECT_NEAR(intersect(sphere({0, 0, 1e6}, 1), {0, 0, 0}, {0, 0, 1}, 0, kFarOut), 1e6 - 1, 1e-9);
   EXPECT_NEAR(intersect(sphere({0, 0, 1}, 1e-6), {0, 0, 0}, {0, 0, 1}, 0, kFarOut), 1 - 1e-6, 1e-15);
   EXPECT_NEAR(intersect(sphere({0, 0, 0}, 1), {0, 0, 0}, {0, 0, 1}, 0, kFarOut), 1, 0);
-  // Height 1 - 1e-12 over the centre: half chord sqrt(2e-12).
+  // At a distance of 1 - 1e-12 from the centre half the chord is sqrt(2e-12).
   EXPECT_NEAR(intersect(sphere({0, 0, 0}, 1), {-5, 1 - 1e-12, 0}, {1, 0, 0}, 0, kFarOut),
               5 - std::sqrt(2e-12), 1e-9);
   EXPECT_EQ(intersect(sphere({0, 0, 0}, 1), {-5, 1 + 1e-12, 0}, {1, 0, 0}, 0, kFarOut), kFarOut);
@@ -36,7 +40,8 @@ TEST(SphereIntersection, IsExactForDistantTinyAndGrazingRays) {
   EXPECT_EQ(intersect(sphere({0, 0, 0}, 1), {0, 0, -5}, {0, 0, 1}, 0, 4), kFarOut) << "beyond t_max";
 }
 
-// A box of size 2 with a lamp of 1e5 at 1e7: about the middle of all, 2 is two last places of float32.
+// A box of size 2, and a lamp of radius 1e5 at 1e7. If the world were centred on both, 2 would be two ulps of
+// float32 coordinates.
 TEST(World, IsAboutTheMeshThatElseWouldHaveNoFormLeft) {
   SceneBuilder builder;
   builder.shape(CubeShape{}, {}, builder.diffuse(.5));
@@ -80,7 +85,7 @@ V3 any_direction(std::mt19937& rng) {
   return V3(V3d(x, y, z).normalized());
 }
 
-// A path that bounces about inside a closed shape must never get out.
+// Counts how often a path that bounces inside a closed shape gets out.
 std::uint64_t leaks(const ls::Geometry& shape, const Transform& t, int rays, unsigned seed) {
   SceneBuilder builder;
   builder.shape(shape, t, builder.diffuse(.5));
@@ -98,7 +103,8 @@ std::uint64_t leaks(const ls::Geometry& shape, const Transform& t, int rays, uns
       continue;
     }
     d = any_direction(rng);
-    if (dot(d, hit.ng) * dot(hit.ng, hit.p) > 0) d = -d;  // inwards: these shapes are about the origin
+    // The centre of these shapes is the origin: d is turned inwards.
+    if (dot(d, hit.ng) * dot(hit.ng, hit.p) > 0) d = -d;
     o = offset_point(hit, d);
   }
   return lost;
@@ -114,21 +120,13 @@ TEST(ClosedShapes, LoseNoRayAtAnyScale) {
   EXPECT_EQ(leaks(CubeShape{}, {}, 400000, 4), 0u);
 }
 
-SurfaceHit geometry_hit(const World& w, const V3d& from, const V3d& to) {
-  const auto at = [&](const V3d& p) { return (p - w.geometry.center) * w.geometry.scale; };
-  const V3 o(at(from)), d((at(to) - at(from)).normalized());
-  const auto primitive = w.accel.nearest(o, d, kInfinity);
-  SurfaceHit hit;
-  EXPECT_TRUE(primitive && w.geometry.complete(*primitive, o, d, hit));
-  return hit;
-}
 std::shared_ptr<const World> one(const ls::Geometry& g, const Transform& t, bool flip) {
   SceneBuilder builder;
   builder.shape(g, t, builder.diffuse(.5)).flip_normals = flip;
   return test::world_of(builder);
 }
 
-// What Mitsuba 3.9.1 says of rays at unit shapes (scalar_rgb, ray_intersect): shading normal, uv, and the
+// Values of Mitsuba 3.9.1 for rays at unit shapes (scalar_rgb, ray_intersect): shading normal, uv, and the
 // direction of dp/du.
 struct SeenShape {
   const char* shape;
@@ -166,7 +164,7 @@ const SeenShape kSeenShapes[] = {
     {"sphere", {.6, .8, -5}, {0, 0, 0}, {.11767f, .156893f, -.980581f}, {.147584f, .937167f}, {-.8f, .6f, 0}},
     {"disk", {.6, .4, 5}, {.3, .2, 0}, {0, 0, 1}, {.360555f, .0935835f}, {.83205f, .5547f, 0}},
 };
-// Mitsuba's figures are printed to 6 digits (dp/du to 5).
+// Mitsuba's values are printed with 6 digits (dp/du with 5).
 void expect_near(const V3& a, const V3& b, const char* what) {
   EXPECT_LT((a - b).length(), 2e-5f) << what << a << b;
 }
@@ -177,37 +175,26 @@ ls::Geometry named(const std::string& name) {
   return SphereShape{};
 }
 
-// A material that wants all that a hit can say.
-BsdfIndex brushed_shape(SceneBuilder& builder) {
-  const TextureIndex grey = builder.texture({.5, .5, .5}), white = builder.texture({1, 1, 1});
-  RoughConductorBsdf b;
-  b.alpha_u = builder.texture({.1, .1, .1});
-  b.alpha_v = builder.texture({.3, .3, .3});
-  b.specular_reflectance =
-      SceneBuilder::push<TextureTag>(builder.scene.textures, Texture(CheckerboardTexture{grey, white, {}}));
-  return SceneBuilder::push<BsdfTag>(builder.scene.bsdfs, Bsdf(b));
-}
-
 TEST(Shapes, NormalsUvAndTangentsAreMitsubas) {
   for (const SeenShape& s : kSeenShapes) {
     SceneBuilder builder;
-    builder.shape(named(s.shape), {}, brushed_shape(builder));
-    const SurfaceHit h = geometry_hit(*test::world_of(builder), s.from, s.to);
+    builder.shape(named(s.shape), {}, brushed(builder));
+    const SurfaceHit h = hit_towards(*test::world_of(builder), s.from, s.to);
     expect_near(h.shading.n, s.normal, s.shape);
     expect_near({h.uv.x, h.uv.y, 0}, {s.uv.x, s.uv.y, 0}, s.shape);
     expect_near(h.shading.s, s.along_u, s.shape);
   }
 }
 
-// The side that shines, by Mitsuba 3.9.1: flat shapes and cubes keep the normal that was mapped, a mirrored
-// sphere turns inside out, a flip turns them all.
+// The side that shines in Mitsuba 3.9.1: flat shapes and cubes keep the transformed normal, a mirrored sphere
+// is inside out, and flip_normals reverses the normals of each.
 TEST(Shapes, ShineToTheSideThatMitsubaSays) {
   for (const char* name : {"cube", "rectangle", "disk", "sphere"}) {
     for (const bool mirror : {false, true}) {
       for (const bool flip : {false, true}) {
         const bool inside_out = flip != (mirror && std::string(name) == "sphere");
         const auto world = one(named(name), test::scale(mirror ? -1 : 1, 1, 1), flip);
-        const SurfaceHit h = geometry_hit(*world, {.3, .2, 5}, {.3, .2, 0});
+        const SurfaceHit h = hit_towards(*world, {.3, .2, 5}, {.3, .2, 0});
         EXPECT_EQ(h.ng.z > 0, !inside_out) << name << mirror << flip;
         EXPECT_EQ(h.shading.n.z > 0, !inside_out) << name << mirror << flip;
       }
@@ -215,7 +202,7 @@ TEST(Shapes, ShineToTheSideThatMitsubaSays) {
   }
 }
 
-// A square in z = 0 by an OBJ file with or without vertex normals along +z or -z.
+// The hit on a square in z = 0 that is read from an OBJ file, with or without vertex normals along +z or -z.
 SurfaceHit square_hit(bool normals, bool mirror, int z = 1) {
   std::string text = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn 0 0 " + std::to_string(z) + "\n";
   text += normals ? "f 1//1 2//1 3//1\nf 1//1 3//1 4//1\n" : "f 1 2 3\nf 1 3 4\n";
@@ -224,7 +211,7 @@ SurfaceHit square_hit(bool normals, bool mirror, int z = 1) {
   mesh.file = builder.asset("square.obj", text);
   mesh.face_normals = !normals;
   builder.shape(mesh, test::scale(mirror ? -1 : 1, 1, 1), builder.diffuse(.5));
-  return geometry_hit(*test::world_of(builder), {.3, .2, 5}, {.3, .2, 0});
+  return hit_towards(*test::world_of(builder), {.3, .2, 5}, {.3, .2, 0});
 }
 
 TEST(Meshes, FollowTheirNormalsAndElseTheirWinding) {
@@ -242,8 +229,8 @@ TEST(Meshes, FollowTheirNormalsEvenAgainstTheirWinding) {
   }
 }
 
-// Light in a closed room whose normals point inwards, against its winding; the medium lies where the winding
-// has the inside.
+// A closed room that emits light. Its vertex normals point inwards, against its winding, and its medium is on
+// the side that is inside by the winding.
 TEST(Meshes, ShineToTheSideOfTheirNormalsAndKeepTheirMediaInside) {
   std::string text =
       "v -1 -1 -1\nv 1 -1 1\nv -1 1 1\nv 1 1 -1\nvn 1 1 1\nvn -1 1 -1\nvn 1 -1 -1\nvn -1 -1 1\n";
@@ -271,7 +258,8 @@ TEST(Meshes, ShineToTheSideOfTheirNormalsAndKeepTheirMediaInside) {
 }
 
 TEST(Meshes, WithoutNormalsAreSmooth) {
-  // A roof without normals, hit near its ridge; Mitsuba 3.9.1: shading normal (.0358577, 0, .999357).
+  // A roof without normals, hit near its ridge. The shading normal of Mitsuba 3.9.1 is (.0358577, 0,
+  // .999357).
   const std::string text =
       "v -1 -1 0\nv 0 -1 1\nv 0 1 1\nv -1 1 0\nv 1 -1 0\nv 1 1 0\nf 1 2 3\nf 1 3 4\nf 2 5 6\nf 2 6 3\n";
   SceneBuilder builder;
@@ -279,7 +267,7 @@ TEST(Meshes, WithoutNormalsAreSmooth) {
   mesh.file = builder.asset("roof.obj", text);
   builder.shape(mesh, {}, builder.diffuse(.5));
 
-  const SurfaceHit h = geometry_hit(*test::world_of(builder), {.05, .2, 5}, {.05, .2, 0});
+  const SurfaceHit h = hit_towards(*test::world_of(builder), {.05, .2, 5}, {.05, .2, 0});
 
   expect_near(h.shading.n, {.0358577f, 0, .999357f}, "smooth");
   expect_near(h.ng, {.707107f, 0, .707107f}, "flat");
@@ -288,7 +276,7 @@ TEST(Meshes, WithoutNormalsAreSmooth) {
 TEST(Normals, ShadingFrameIsRightHandedAndAgreesWithTheGeometricNormal) {
   for (const ls::Geometry& g : {ls::Geometry{CubeShape{}}, ls::Geometry{SphereShape{}},
                                 ls::Geometry{DiskShape{}}, ls::Geometry{RectangleShape{}}}) {
-    const SurfaceHit h = geometry_hit(*one(g, {}, false), {.3, .4, 5}, {.2, .3, 0});
+    const SurfaceHit h = hit_towards(*one(g, {}, false), {.3, .4, 5}, {.2, .3, 0});
     EXPECT_NEAR(dot(h.shading.n, h.ng), 1, 1e-6);
     EXPECT_NEAR(dot(cross(h.shading.s, h.shading.t), h.shading.n), 1, 1e-6);
   }
@@ -300,6 +288,54 @@ TEST(Offset, LeavesToTheSideOfTheDirection) {
     EXPECT_EQ(p.z > .125f, z > 0);
     EXPECT_NEAR(std::abs(p.z - .125f), 0x1p-20f, 0x1p-26f);
   }
+}
+
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+// Debian's build of Embree aborts for rays whose origin is farther than 1.8e18. A flight through an extremely
+// thin medium can get there.
+TEST(FarAway, RaysMeetNothingAndNothingHidesLight) {
+  SceneBuilder builder;
+  builder.shape(SphereShape{}, {}, builder.diffuse(.5));
+  const auto w = test::world_of(builder);
+  for (const float far : {1e10f, 1e18f, 1e20f, 3e38f}) {
+    EXPECT_FALSE(w->accel.nearest({0, 0, far}, {0, 0, -1}, kInf)) << far;
+    EXPECT_FALSE(w->accel.nearest({-far, 0, 0}, {0, 1, 0}, kInf)) << far;
+    EXPECT_FALSE(w->accel.occluded({0, far, 0}, {0, -1, 0}, kInf)) << far;
+  }
+  EXPECT_TRUE(w->accel.nearest({0, 0, 1e3f}, {0, 0, -1}, kInf));
+  EXPECT_TRUE(w->accel.occluded({0, 0, 1e3f}, {0, 0, -1}, kInf));
+  EXPECT_TRUE(w->accel.occluded({0, 0, std::nanf("")}, {0, 0, -1}, kInf));
+}
+
+TEST(FarAway, AMediumThatIsAllButNothingRendersClean) {
+  SceneBuilder builder({8, 8});
+  builder.shape(SphereShape{}, {}, builder.diffuse(.5));
+  builder.scene.emitters.push_back(PointEmitter{{0, 0, 3}, {1, 1, 1}});
+  builder.scene.sensor.medium = builder.homogeneous({1e-20, .3, 1.7}, {.9, .9, .9});
+  builder.look({0, -5, 0}, {0, 0, 0}, 60);
+  const auto e = test::estimate(builder, 64);
+  EXPECT_EQ(e.health.nonfinite, 0u);
+  EXPECT_GT(e.mean[0], 0);
+}
+
+std::string refusal(const Sensor& sensor) {
+  SceneBuilder builder;
+  builder.shape(SphereShape{}, {}, builder.diffuse(.5));
+  builder.scene.sensor = sensor;
+  const auto w = build_world(builder.scene, test::settings_of(builder.scene), builder.files, 1);
+  return w ? "" : w.error().message;
+}
+
+TEST(FarAway, CamerasWhoseRaysAreNoNumbersAreRefused) {
+  constexpr double kHuge = 1.7e308;
+  const auto refused = testing::HasSubstr("the rays of the sensor leave the range of single precision");
+  EXPECT_THAT(refusal({.principal_point_offset = {-kHuge, 0}}), refused);
+  EXPECT_THAT(refusal({.principal_point_offset = {0, kHuge}}), refused);
+  EXPECT_THAT(refusal({.near_clip = 1e300, .far_clip = kHuge}), refused);
+  EXPECT_THAT(refusal({.aperture_radius = kHuge}), refused);
+  EXPECT_THAT(refusal({.aperture_radius = 1e-30, .focus_distance = 1e-300}), refused);
+  EXPECT_EQ(refusal({.fov = 179.9, .far_clip = kHuge, .aperture_radius = 3, .focus_distance = 1e-3}), "");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Instances of groups against the same shapes placed by themselves: what rays find, and light.
+// Instances of groups are compared with the same shapes placed directly: hits of rays, and light.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <random>
 
 #include "tests/support/render_check.h"
-#include "worker/render/world/world.h"
+#include "tests/unit/render/hits.h"
 
 namespace ls::render {
 namespace {
@@ -16,17 +16,7 @@ using test::translate;
 using test::operator*;
 using testing::HasSubstr;
 
-BsdfIndex brushed_instance(SceneBuilder& builder) {
-  const TextureIndex grey = builder.texture({.5, .5, .5}), white = builder.texture({1, 1, 1});
-  RoughConductorBsdf b;
-  b.alpha_u = builder.texture({.1, .1, .1});
-  b.alpha_v = builder.texture({.3, .3, .3});
-  b.specular_reflectance =
-      SceneBuilder::push<TextureTag>(builder.scene.textures, Texture(CheckerboardTexture{grey, white, {}}));
-  return SceneBuilder::push<BsdfTag>(builder.scene.bsdfs, Bsdf(b));
-}
-
-// A bumpy sheet with normals of its own, as an OBJ file.
+// A bumpy sheet with vertex normals, as an OBJ file.
 MeshShape sheet(SceneBuilder& builder) {
   std::string text;
   constexpr int kSide = 6;
@@ -53,7 +43,7 @@ MeshShape sheet(SceneBuilder& builder) {
   return mesh;
 }
 
-// The shapes of `kit` become a group, seen where the transforms say.
+// Makes the shapes of `builder` a group with one instance for each transform.
 SceneBuilder instanced(SceneBuilder builder, const std::vector<Transform>& places) {
   const auto group = SceneBuilder::push<GroupTag>(builder.scene.groups, ShapeGroup{});
   for (Shape& s : builder.scene.shapes) s.group = group;
@@ -72,7 +62,7 @@ SceneBuilder copied(SceneBuilder builder, const std::vector<Transform>& places) 
 
 struct Met {
   bool any = false;
-  V3d p;  // in the scene
+  V3d p;  // in scene coordinates
   SurfaceHit hit;
 };
 Met meet(const World& w, const V3d& from, const V3d& d) {
@@ -84,10 +74,11 @@ Met meet(const World& w, const V3d& from, const V3d& d) {
   return m;
 }
 
-// Rays from all around at both worlds. `bend`: what 1 - cos between shading normals may be; where a map
-// stretches, normals interpolated before it and after it are not the same.
+// Traces rays from all around in both worlds and compares the hits. `bend` is the largest allowed 1 - cos
+// between shading normals: if a map stretches, normals interpolated before it and after it differ.
 void expect_alike(const SceneBuilder& a, const SceneBuilder& b, const char* name, float bend = 1e-5f) {
-  constexpr double tolerance = 4e-6;  // of positions, as a share of the world: tens of float32 roundings
+  // The tolerance of positions relative to the world's size: tens of float32 roundings
+  constexpr double tolerance = 4e-6;
   const auto wa = test::world_of(a), wb = test::world_of(b);
   std::mt19937 rng(5);
   std::normal_distribution<double> normal;
@@ -100,7 +91,7 @@ void expect_alike(const SceneBuilder& a, const SceneBuilder& b, const char* name
     const V3d from = wb->geometry.center + V3d(x, y, z).normalized() * (3 * size),
               to = wb->geometry.center + V3d(tx, ty, tz) * (.7 * size), d = (to - from).normalized();
     const Met ma = meet(*wa, from, d), mb = meet(*wb, from, d);
-    // At silhouettes and edges the two may differ by their rounding.
+    // At silhouettes and edges rounding may lead to different hits.
     if (ma.any != mb.any || (ma.any && (ma.p - mb.p).length() > 1e-3 * size)) {
       ++differ;
       continue;
@@ -120,8 +111,9 @@ void expect_alike(const SceneBuilder& a, const SceneBuilder& b, const char* name
   EXPECT_LT(differ, 20) << name;
 }
 
-// What the BVH says is met is met: it takes rays to a group's space in float32, where one that passes a small
-// ball by a hair may go through it. A path that lost such a meeting would see what is behind everything.
+// complete() must confirm each hit that the BVH finds. The BVH transforms rays to a group's space in float32,
+// so for rays that barely touch a small ball the two could disagree. A path that lost such a hit would see
+// what is behind everything.
 TEST(Instances, WhatTheBvhFindsIsFoundAgain) {
   for (const bool ball : {true, false}) {
     SceneBuilder builder;
@@ -139,7 +131,7 @@ TEST(Instances, WhatTheBvhFindsIsFoundAgain) {
     const V3d u = V3d(along.y, -along.x, 0).normalized(), v = along.cross(u);
     std::uint64_t met = 0;
     for (int i = 0; i < 2'000'000; ++i) {
-      // About the rim of the ball, to a thousandth of its radius.
+      // Rays towards the rim of the ball, within a thousandth of its radius.
       const double angle = 2 * 3.14159265358979 * uniform(rng), r = .003 * (.9995 + .001 * uniform(rng));
       const V3d to = center + u * (r * std::cos(angle)) + v * (r * std::sin(angle));
       const V3 o((from - w->geometry.center) * w->geometry.scale), d((to - from).normalized());
@@ -160,7 +152,7 @@ const Transform kMirrored = translate({0, 3, 0}) * test::rotate_x(10) * test::sc
 
 TEST(Instances, ShowMeshesAsIfTheyWerePlacedThemselves) {
   SceneBuilder builder;
-  builder.shape(sheet(builder), test::rotate_x(15), brushed_instance(builder));
+  builder.shape(sheet(builder), test::rotate_x(15), brushed(builder));
   expect_alike(instanced(builder, {kSimilar}), copied(builder, {kSimilar}), "similar");
   expect_alike(instanced(builder, {kStretched}), copied(builder, {kStretched}), "stretched", .01f);
   expect_alike(instanced(builder, {kMirrored}), copied(builder, {kMirrored}), "mirrored", .01f);
@@ -173,12 +165,12 @@ TEST(Instances, ShowAnalyticShapesAsIfTheyWerePlacedThemselves) {
        {ls::Geometry{SphereShape{}}, ls::Geometry{CylinderShape{}}, ls::Geometry{DiskShape{}},
         ls::Geometry{CubeShape{}}, ls::Geometry{RectangleShape{}}}) {
     SceneBuilder builder;
-    builder.shape(g, translate({.2, .1, -.3}) * test::scale(.8), brushed_instance(builder));
+    builder.shape(g, translate({.2, .1, -.3}) * test::scale(.8), brushed(builder));
     expect_alike(instanced(builder, {kSimilar}), copied(builder, {kSimilar}), "analytic");
   }
 }
 
-// An ellipsoid, which no shape by itself can be: x^2/4 + y^2 + z^2/9 = 1.
+// An ellipsoid, x^2/4 + y^2 + z^2/9 = 1, which is possible only as an instance of a sphere.
 TEST(Instances, StretchSpheres) {
   SceneBuilder builder;
   builder.shape(SphereShape{}, {}, builder.diffuse(.5));
@@ -196,7 +188,7 @@ TEST(Instances, StretchSpheres) {
   }
 }
 
-// What Mitsuba 3.9.1 says of a ray at instances of unit shapes: normal, uv, direction of dp/du.
+// Values of Mitsuba 3.9.1 for a ray at instances of unit shapes: normal, uv, direction of dp/du.
 struct SeenInstance {
   ls::Geometry shape;
   Transform to_world;
@@ -236,7 +228,7 @@ TEST(Instances, HaveMitsubasNormalsUvAndTangents) {
   };
   for (const SeenInstance& s : all) {
     SceneBuilder builder;
-    builder.shape(s.shape, {}, brushed_instance(builder));
+    builder.shape(s.shape, {}, brushed(builder));
     const auto w = test::world_of(instanced(builder, {s.to_world}));
     const Met m = meet(*w, {5, .1, .2}, V3d(-5, -.1, -.05).normalized());
     ASSERT_TRUE(m.any);
@@ -246,7 +238,7 @@ TEST(Instances, HaveMitsubasNormalsUvAndTangents) {
   }
 }
 
-// A mirrored instance keeps inside and outside, as in Mitsuba: its normals stay on their side.
+// As in Mitsuba, normals of a mirrored instance keep pointing outwards.
 TEST(Instances, KeepOutsideOutsideWhenMirrored) {
   for (const ls::Geometry& g :
        {ls::Geometry{SphereShape{}}, ls::Geometry{CubeShape{}}, ls::Geometry{CylinderShape{}}}) {
@@ -261,7 +253,7 @@ TEST(Instances, KeepOutsideOutsideWhenMirrored) {
   }
 }
 
-// A room in which light goes about, with furniture.
+// Objects of several shapes and materials.
 SceneBuilder furniture() {
   SceneBuilder builder({12, 8});
   builder.shape(sheet(builder), translate({0, 0, .4}) * test::scale(.3), builder.diffuse(.7));
@@ -281,13 +273,14 @@ SceneBuilder with_room(SceneBuilder builder) {
 }
 
 TEST(Instances, GiveTheLightOfTheirCopies) {
-  // Spheres and cylinders can be copied under similar maps only.
+  // Spheres and cylinders can be placed directly only by transforms that scale uniformly.
   const std::vector<Transform> places = {translate({.6, 0, 0}) * test::rotate_x(20) * test::scale(1.1),
                                          translate({-.9, .5, -.2}) * test::rotate_y(35) * test::scale(.6)};
   const auto a = test::estimate(with_room(instanced(furniture(), places)), 256),
              b = test::estimate(with_room(copied(furniture(), places)), 256);
   for (std::size_t c = 0; c < 3; ++c) {
-    // The same random numbers meet the same surfaces but for rounding: far closer than independent images.
+    // With the same random numbers, paths meet the same surfaces up to rounding, so the images are much
+    // closer than independent ones.
     EXPECT_NEAR(a.mean[c], b.mean[c], std::max(.5 * b.standard_error[c], 1e-4 * b.mean[c]));
   }
   EXPECT_EQ(a.health.nonfinite + a.health.negative, 0u);
@@ -299,7 +292,7 @@ TEST(Instances, HoldMediaWhoseLengthsAreTheWorlds) {
   builder.container(CubeShape{}, test::scale(.5), builder.null(), fog);
   builder = instanced(std::move(builder), {translate({4, 0, 0}) * test::scale(3, 2, 1)});
   builder.environment();
-  builder.look({4, -9, 0}, {4, 0, 0});  // through 2 units of it
+  builder.look({4, -9, 0}, {4, 0, 0});  // through 2 units of the medium
   const auto e = test::estimate(builder, 64);
   for (std::size_t c = 0; c < 3; ++c)
     EXPECT_NEAR(e.mean[c], std::exp(-2 * std::get<HomogeneousMedium>(builder.scene.media[0]).sigma_t[c]),
@@ -313,9 +306,9 @@ TEST(Instances, OfMasksLetTheirShareOfLightThrough) {
       RectangleShape{}, {},
       builder.bsdf(MaskBsdf{builder.texture({.25, .25, .25}), builder.bsdf(TwoSidedBsdf{grey, grey})}));
   builder.shape(RectangleShape{}, translate({9, 0, 0}) * test::scale(.1),
-                grey);  // something opaque beside it
+                grey);  // something opaque next to it
   builder = instanced(std::move(builder), {translate({0, 0, 1}), translate({0, 0, 1.5})});
-  // A floor under two masks, lit from straight above: irradiance (1 - .25)^2.
+  // A floor under two masks, lit from straight above, has the irradiance (1 - .25)^2.
   builder.shape(RectangleShape{}, test::scale(.5), builder.diffuse(1));
   builder.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, {test::kPi, test::kPi, test::kPi}});
   builder.scene.integrator.max_depth = 2;
@@ -344,7 +337,7 @@ TEST(Instances, KeepAGroupInMemoryOnce) {
   const auto many = test::world_of(instanced(builder, places)),
              one = test::world_of(instanced(builder, {{}}));
   EXPECT_EQ(many->geometry.triangle_count(), one->geometry.triangle_count());
-  // A kilobyte for an instance, in the BVH and beside it.
+  // Allows a kilobyte of memory per instance, in the BVH and elsewhere.
   EXPECT_LT(many->accel.bytes() + many->geometry.bytes(),
             one->accel.bytes() + one->geometry.bytes() + 20000 * 1024u);
   EXPECT_TRUE(meet(*many, {50, 50, 5}, {0, 0, -1}).any);
@@ -374,7 +367,8 @@ TEST(Instances, ThatCannotBePlacedAreRefused) {
               HasSubstr("instance 2: its to_world has no inverse"));
   EXPECT_THAT(error_of(instanced(builder, {{}, test::scale(1e-30)})),
               HasSubstr("instance 2: its to_world makes the group too small"));
-  // Small beside the world: rays in its space would begin beyond what Embree takes, and it stops the process.
+  // Such instances are so small or flat that rays in the group's space would begin farther away than Embree
+  // accepts; it would abort the process.
   EXPECT_THAT(error_of(instanced(builder, {{}, test::scale(1e20, 1, 1)})),
               HasSubstr("instance 1: its to_world makes the group too small or too flat"));
   EXPECT_THAT(error_of(instanced(builder, {test::scale(1e300)})), HasSubstr("instance 1"));

@@ -1,4 +1,4 @@
-// `mesh_attribute` textures in worlds: values at hits, light, instances, and what is refused.
+// `mesh_attribute` textures in worlds: values at hits, light, instances, and refused input.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ using test::SceneBuilder;
 using test::translate;
 using testing::HasSubstr;
 
-// A square in z = 0 from (0, 0) to (1, 1), of two triangles and one without area between them.
+// A square in z = 0 from (0, 0) to (1, 1) of two triangles, with a triangle without area between them.
 std::string square(const std::string& vertex, const std::vector<std::string>& at_vertex,
                    const std::string& face, const std::vector<std::string>& at_face) {
   std::string s =
@@ -56,7 +56,7 @@ void expect_near(const C3& a, const C3& b) {
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(a[k], b[k], 2e-6f);
 }
 
-// Mitsuba 3.9.1: mesh_attribute.eval at (.2, .3, 0) of such a mesh gave (.32, .5, .74) from these corners.
+// From these corners mesh_attribute.eval of Mitsuba 3.9.1 gave (.32, .53, .74) at (.2, .3, 0).
 TEST(MeshAttributes, OfVerticesAreInterpolatedAndThoseOfFacesAreNot) {
   for (const char* name : {"vertex_color", "face_stamp"}) {
     SceneBuilder builder;
@@ -70,7 +70,8 @@ TEST(MeshAttributes, OfVerticesAreInterpolatedAndThoseOfFacesAreNot) {
                    .3f * .2f + .4f * .7f + .6f * .1f});
     } else {
       expect_near(albedo_at(bench, {5.2, .3, 0}), C3(.25f));
-      expect_near(albedo_at(bench, {5.9, .8, 0}), C3(.75f));  // the second is gone, with what it had
+      // The second triangle was left out, together with its value.
+      expect_near(albedo_at(bench, {5.9, .8, 0}), C3(.75f));
     }
     EXPECT_EQ(bench.world->geometry.dropped_triangles, 1u) << "counted, by whoever leaves it out";
   }
@@ -115,8 +116,8 @@ TEST(MeshAttributes, OfCheckerboardsAndInNormalMapsAndMasksAreReadToo) {
   EXPECT_FLOAT_EQ(bench.world->bsdfs.null_transmission(masked, hit.uv_point(), {0, 0, 1}).probability, .25f);
 }
 
-// A lit square whose faces shine differently: as bright as two triangles of their own, by sampling and by
-// sight.
+// A light whose faces have different radiances: light samples and hits must agree, and each face must get
+// half of the samples.
 TEST(MeshAttributes, ShineAsTheyAreSampled) {
   SceneBuilder builder;
   const BsdfIndex black = builder.diffuse(0);
@@ -132,9 +133,9 @@ TEST(MeshAttributes, ShineAsTheyAreSampled) {
     ASSERT_TRUE(s);
     SurfaceHit hit;
     const auto id = bench.world->accel.nearest(x, s->direction, kInfinity);
-    if (!id || !bench.world->geometry.complete(*id, x, s->direction, hit)) continue;  // the rim
+    if (!id || !bench.world->geometry.complete(*id, x, s->direction, hit)) continue;  // missed at the rim
     const C3 seen = bench.world->lights.emitted(hit, -s->direction);
-    // Next to the diagonal rounding may take the other triangle.
+    // Next to the diagonal rounding may select the other triangle.
     if (std::abs(hit.uv.x + hit.uv.y - 1) < 1e-5f) continue;
     ASSERT_EQ(seen, s->radiance) << i;
     ASSERT_TRUE(seen.x == 1 || seen.x == 3) << seen.x;
@@ -185,7 +186,7 @@ TEST(MeshAttributes, ThatAMeshDoesNotHaveAreRefusedByName) {
   EXPECT_THAT(w.error().message, HasSubstr("\"vertex_color\", but only meshes have attributes"));
 }
 
-// Mitsuba 3.9.1 takes bytes from 0 to 255 as they are.
+// Mitsuba 3.9.1 uses bytes as numbers from 0 to 255.
 TEST(MeshAttributes, OfBytesNeedAScale) {
   const std::string bytes = square("property uchar red\nproperty uchar green\nproperty uchar blue\n",
                                    {"0 128 255", "0 128 255", "0 128 255", "0 128 255"}, "", {"", "", ""});

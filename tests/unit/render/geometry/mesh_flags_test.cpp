@@ -1,5 +1,5 @@
 // face_normals, flip_normals and flip_tex_coords of OBJ, PLY and `.serialized` meshes, and polygons of many
-// corners: what a ray finds, against Mitsuba 3.9.1.
+// corners: hits are compared with those of Mitsuba 3.9.1.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <zlib.h>
@@ -48,7 +48,7 @@ template <class T>
 void put(std::string& s, const T& v) {
   s.append(reinterpret_cast<const char*>(&v), sizeof v);
 }
-// Its triangles are those of a fan from the first corner.
+// The polygon as a fan of triangles from its first corner, as a `.serialized` file.
 std::string serialized(const Polygon& polygon) {
   std::string body;
   put(body, std::uint32_t{0x1 | 0x2 | 0x1000});
@@ -85,7 +85,7 @@ LightBench bench_of(const std::string& file, MeshFormat format, const Flags& fla
   mesh.face_normals = flags.face_normals;
   mesh.flat_without_normals = flags.flat_without_normals;
   mesh.flip_tex_coords = flags.flip_tex_coords;
-  // A texture, so that hits carry uv.
+  // The material has a texture, so that hits have uv.
   const TextureIndex dark = builder.texture({.1, .1, .1}), light = builder.texture({.9, .9, .9});
   const TextureIndex checks =
       SceneBuilder::push<TextureTag>(builder.scene.textures, Texture(CheckerboardTexture{dark, light, {}}));
@@ -109,14 +109,15 @@ const Format kFormats[] = {{"obj", MeshFormat::obj, obj},
                            {"ply", MeshFormat::ply, ply},
                            {"serialized", MeshFormat::serialized, serialized}};
 
-// At (.5, .7) Mitsuba 3.9.1 showed the normal (0, 0, 1), the shading normal (.17465, .08753, .98073) and the
-// uv
-// (.32, .505), all turned round by flip_normals, flat by face_normals, and (.32, .495) by flip_tex_coords.
+// At (.5, .7) Mitsuba 3.9.1 gave the normal (0, 0, 1), the shading normal (.17465, .08753, .98073) and the uv
+// (.32, .505). flip_normals reversed both normals, face_normals made the shading normal (0, 0, 1), and
+// flip_tex_coords gave the uv (.32, .495).
 TEST(MeshFlags, TurnNormalsAndCoordinatesAsInMitsuba) {
   for (const Format& f : kFormats)
     for (int k = 0; k < 8; ++k) {
       const Flags flags{(k & 1) != 0, (k & 2) != 0, (k & 4) != 0};
-      if (flags.flip_tex_coords && f.format == MeshFormat::serialized) continue;  // has no such parameter
+      // This format lacks the parameter.
+      if (flags.flip_tex_coords && f.format == MeshFormat::serialized) continue;
       const SurfaceHit hit = hit_at(bench_of(f.write(kQuad), f.format, flags), .5, .7);
       const float sign = flags.flip_normals ? -1.f : 1.f;
       const V3 ng = V3(0, 0, sign), ns = flags.face_normals ? ng : V3(.17465f, .08753f, .98073f) * sign;
@@ -139,15 +140,15 @@ TEST(MeshFlags, AMeshWithoutNormalsIsSmoothUnlessItIsToBeFlat) {
     EXPECT_LT((hit.ng - V3(-side, 0, side)).length(), 1e-6f);
     EXPECT_LT((hit.shading.n - (flat ? V3(-side, 0, side) : V3(0, 0, 1))).length(), 2e-3f) << flat;
   }
-  // A file's own normals are shown all the same.
+  // Vertex normals from the file are used nevertheless.
   Flags flags;
   flags.flat_without_normals = true;
   EXPECT_EQ(hit_at(bench_of(obj(kQuad), MeshFormat::obj, flags), .5, .7).shading.n,
             hit_at(bench_of(obj(kQuad), MeshFormat::obj, {}), .5, .7).shading.n);
 }
 
-// A polygon of seven corners, bent, is the fan of triangles from its first one, in every format to the last
-// bit.
+// A polygon of seven corners that is not flat is read as the fan of triangles from its first corner: the
+// formats agree bit for bit.
 TEST(MeshFlags, PolygonsAreFansInEveryFormat) {
   Polygon seven;
   for (int i = 0; i < 7; ++i) {

@@ -1,4 +1,4 @@
-// Rays that start on surfaces: small closed shapes in huge scenes keep them in.
+// Rays that start on surfaces: small closed shapes in huge scenes let none escape.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -20,8 +20,8 @@ V3 random_direction(std::mt19937& rng) {
   return V3(V3d(x, y, z).normalized());
 }
 
-// Of `rays` that bounce about inside the closed shapes about `center`, in scene units, those that meet
-// nothing or something else: surfaces from `others` on.
+// Lets a path of `rays` rays bounce inside the closed shapes around `center` (in scene units). Returns how
+// many rays meet nothing or one of the surfaces from `others` on.
 std::uint64_t leaks(const World& w, const V3d& center, std::uint32_t others, int rays, unsigned seed) {
   const V3 middle((center - w.geometry.center) * w.geometry.scale);
   std::mt19937 rng(seed);
@@ -36,14 +36,16 @@ std::uint64_t leaks(const World& w, const V3d& center, std::uint32_t others, int
       continue;
     }
     d = random_direction(rng);
-    if (dot(d, hit.ng) * dot(hit.ng, hit.p - middle) > 0) d = -d;  // inwards: these shapes are star-shaped
+    // These shapes are star-shaped: d is turned inwards.
+    if (dot(d, hit.ng) * dot(hit.ng, hit.p - middle) > 0) d = -d;
     o = offset_point(hit, d);
   }
   return lost;
 }
 
-// A box of 1e-4 in a scene of 1e6. The world's middle is that of the scene, so that a box near it has small
-// coordinates, of which it takes up a share: 1e-4 of 2, at least, and float32 gives it 800 places.
+// A box of size 1e-4 in a scene of size 1e6. The centre of the world is that of the scene, so boxes near it
+// have small coordinates: their size is at least 1e-4 / 2 of their largest coordinate, about 800 times
+// float32's resolution of 2^-24.
 TEST(Offsets, AreAsSmallAsWhatTheyLeave) {
   const Transform turn = test::rotate_x(33) * test::rotate_y(21);
   for (const V3d& at : {V3d(0, 0, 0), V3d(.3, -.2, .1), V3d(2, 1, -1)})
@@ -56,8 +58,8 @@ TEST(Offsets, AreAsSmallAsWhatTheyLeave) {
     }
 }
 
-// The bounced light of a closed grey box: Le / (1 - .5), in a box of 1e-4 as in one of 1e6, alone and beside
-// something huge.
+// In a closed grey box that emits light the radiance is Le / (1 - .5), for sizes from 1e-4 to 1e6, alone and
+// next to something huge.
 TEST(Offsets, KeepTheLightOfAFurnace) {
   for (const double size : {1e-4, 1., 1e6})
     for (const double beside : {0., 1e6}) {
@@ -78,8 +80,8 @@ TEST(Offsets, KeepTheLightOfAFurnace) {
     }
 }
 
-// Instances are traced in their group's space: stretched, turned and mirrored as far as single precision
-// goes.
+// Instances are traced in their group's space. These are stretched, turned and mirrored as far as single
+// precision allows.
 TEST(Offsets, HoldInStretchedAndMirroredInstances) {
   const Transform turn = test::rotate_x(40) * test::rotate_y(-25);
   for (const Vec3& s :
@@ -98,7 +100,8 @@ TEST(Offsets, HoldInStretchedAndMirroredInstances) {
       }
 }
 
-// Without an inverse, or flatter beside their world than single precision can trace (N44).
+// Instances whose transform has no inverse, or that are too flat, compared with the world, for tracing in
+// single precision (docs/measurements/stability.md N44).
 TEST(Offsets, RefuseInstancesThatAreTooFlat) {
   for (const Vec3& s : {Vec3{0, 1, 1}, Vec3{1e-30, 1e-30, 1e-30}, Vec3{1e-6, 1, 1e6}}) {
     SceneBuilder builder;

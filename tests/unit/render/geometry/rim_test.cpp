@@ -1,4 +1,4 @@
-// Closed bodies of few triangles with normals of their own: at the rim these point away from who looks.
+// Closed bodies of few triangles with vertex normals: at the rim these normals point away from the viewer.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@ namespace {
 
 using test::SceneBuilder;
 
-// A ball of 8 x 5 corners, as an OBJ file, with a ball's normals.
+// A ball of 8 x 6 corners with the normals of a sphere, as an OBJ file.
 MeshShape coarse_ball(SceneBuilder& builder) {
   constexpr int kAround = 8, kDown = 5;
   std::string text;
@@ -55,8 +55,8 @@ TEST(Rims, LetNoLightOutOfAClosedBody) {
   EXPECT_EQ(seen.mean[1], 0);
 }
 
-// Under a sky of 1 nothing is brighter than it, and no pixel of the ball is black: what is turned away is
-// seen by the true normal.
+// Under a sky of radiance 1 no pixel of the ball is brighter than the sky, and none is black: where the
+// interpolated normal faces away from the viewer, the geometric normal is used.
 TEST(Rims, AreNotBlack) {
   const SceneBuilder builder = ball(false);
   const auto world = test::world_of(builder);

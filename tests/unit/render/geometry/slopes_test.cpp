@@ -1,5 +1,5 @@
-// dp/du and dp/dv of hits on every kind of shape, for bump maps: they say how far apart neighbouring hits
-// are.
+// dp/du and dp/dv of hits on all kinds of shapes, as bump maps need them: they must match the distances
+// between neighbouring hits.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,7 +21,7 @@ SceneBuilder bumpy(const ls::Geometry& g, bool flip) {
   const TextureIndex heights = SceneBuilder::push<TextureTag>(builder.scene.textures, Texture(t));
   const BsdfIndex grey = builder.diffuse(.5);
   const BsdfIndex bump = builder.bsdf(BumpMapBsdf{heights, 1, grey});
-  // Of any size but 1, so that the world's scale shows.
+  // The size is far from 1, so that the world's scale matters.
   Shape& s = builder.shape(
       g, translate({300, 20, -40}) * test::rotate_x(35) * test::rotate_y(50) * test::scale(70), bump);
   s.flip_normals = flip;
@@ -53,8 +53,9 @@ TEST(Slopes, SayHowFarNeighboursAreApart) {
         const V3 predicted =
             (p.shading.to_world(p.du) * moved.x + p.shading.to_world(p.dv) * moved.y) * scale;
         const V3 apart = q.p - p.p;
-        // A chord of up to 4e-3 / .2 of the ball's radius departs from its tangent by half of that, and a
-        // turn of 2 pi / 100 about a pole or centre by half of itself: 4 % of the chord at the most.
+        // The chord is at most 4e-3 / .2 of the ball's radius and deviates from the tangent by half of that.
+        // An azimuth of at most 2 pi / 100 about a pole or centre adds half of itself. Together these are at
+        // most 4 % of the chord.
         ASSERT_LT((predicted - apart).length(), .06f * apart.length() + 2e-6f)
             << g.index() << " at " << p.uv.x << " " << p.uv.y;
       }
@@ -62,8 +63,7 @@ TEST(Slopes, SayHowFarNeighboursAreApart) {
     }
 }
 
-// A slope is a length over a length: the same bumps on a scene ten thousand times as large are as steep if
-// they are ten thousand times as high.
+// A slope is a ratio of lengths, in units of the scene: du and dv do not depend on the world's scale.
 TEST(Slopes, AreThoseOfTheSceneNotOfTheWorld) {
   const LightBench b(bumpy(RectangleShape{}, false));
   SurfaceHit hit;

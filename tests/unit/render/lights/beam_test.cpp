@@ -26,19 +26,20 @@ SceneBuilder shining(const ls::Geometry& g, const Transform& t, const Beam& b) {
   return builder;
 }
 double cosine(double degrees) { return std::cos(degrees * M_PI / 180); }
-// Of radiance at this angle, written as the documentation has it.
+// The share of the full radiance that leaves at this angle, by the formula of the documentation.
 double share(const Beam& b, double degrees) {
   if (degrees <= b.beam) return 1;
   if (degrees >= b.cutoff) return 0;
   return std::pow((cosine(degrees) - cosine(b.cutoff)) / (cosine(b.beam) - cosine(b.cutoff)), b.falloff);
 }
-// 2 pi integral share cos sin da in closed form.
+// The flux per unit radiance and area, 2 pi times the integral of share cos sin over the angle, in closed
+// form.
 double flux(const Beam& b) {
   const double cc = b.cutoff < 90 ? cosine(b.cutoff) : 0, cb = b.beam < 90 ? cosine(b.beam) : 0, w = cb - cc;
   return 2 * M_PI * ((1 - cb * cb) / 2 + w * (cc / (b.falloff + 1) + w / (b.falloff + 2)));
 }
 
-// Far away on a ray at the angle a the irradiance is L A cos a share(a) / d^2.
+// Far away from the light, on a ray at the angle a, the irradiance is L A cos a share(a) / d^2.
 TEST(AreaBeam, HasItsRadianceAtEveryAngle) {
   for (const Beam& beam : kBeams) {
     const LightBench b(shining(RectangleShape{}, test::scale(.5), beam));
@@ -46,15 +47,15 @@ TEST(AreaBeam, HasItsRadianceAtEveryAngle) {
       const double a = degrees * M_PI / 180, d = 1000;
       const V3 towards(std::sin(a), 0, std::cos(a));
       const auto e = b.irradiance(V3d(towards) * d, -towards, 32);
-      // Seen from there the light is 1 / 1000 rad wide, over which the share changes by at most
-      // falloff / transition (.01 rad for the narrowest) of itself, evenly on both sides.
+      // From that distance the light is 1 / 1000 rad wide. Over this width the share changes by at most
+      // falloff / transition of itself (the narrowest transition is .01 rad), evenly on both sides.
       const double expected = cosine(degrees) * share(beam, degrees) / (d * d);
       EXPECT_NEAR(e.mean, expected, 5 * e.se + 1e-3 * std::pow(d, -2)) << beam.cutoff << " at " << degrees;
     }
   }
 }
 
-// All that it sends through a sphere around it: closed form of the integral over angles.
+// The flux through a sphere around the light is compared with the closed form of the integral over angles.
 TEST(AreaBeam, SendsTheFluxOfTheClosedForm) {
   for (const Beam& beam : kBeams) {
     const LightBench b(shining(RectangleShape{}, test::scale(.5), beam));
@@ -66,8 +67,8 @@ TEST(AreaBeam, SendsTheFluxOfTheClosedForm) {
       const V3 towards(std::sin(a), 0, std::cos(a));
       sum += b.irradiance(V3d(towards) * d, -towards, 4).mean * d * d * 2 * M_PI * std::sin(a) * step;
     }
-    // Midpoints: quadratic in a step of 1/400. The light is 1/1000 rad wide as seen from there, which blurs
-    // the edge of the narrowest beam (of .09 rad) over 1 % of its angle, evenly.
+    // The error of the midpoint rule is quadratic in the step of 1/400. From there the light is 1/1000 rad
+    // wide, which blurs the edge of the narrowest beam (of .09 rad) evenly over 1 % of its angle.
     EXPECT_NEAR(sum, flux(beam), 5e-3 * flux(beam)) << beam.cutoff;
   }
 }
@@ -79,29 +80,18 @@ TEST(AreaBeam, AHitHasTheRadianceAndDensityOfItsSample) {
     for (const Beam& beam : {kBeams[1], kBeams[3], kBeams[4]}) {
       const LightBench b(shining(g, up, beam));
       const V3 x = b.at({.3, .2, -1});
-      RandomStream r(5);
-      int hits = 0;
-      for (int i = 0; i < 4000; ++i) {
-        const auto s =
-            b.world->lights.sample(b.world->lights.choose(numbers(0, r.uniform(), r.uniform())), x);
-        if (!s) continue;
-        const auto primitive = b.world->accel.nearest(x, s->direction, kInfinity);
-        SurfaceHit hit;
-        if (!primitive || !b.world->geometry.complete(*primitive, x, s->direction, hit)) continue;
-        if (std::abs(hit.t - s->distance) > 1e-4f * s->distance + 1e-5f) continue;  // another face in front
-        const float c = std::abs(dot(hit.ng, s->direction));
-        if (c < .05f) continue;
-        ++hits;
-        // Cosines are good to 2^-20 of the world in a length of 1/100 of it, over the width of the
-        // transition.
-        ASSERT_NEAR(b.world->lights.emitted(hit, -s->direction).x, s->radiance.x, 2e-3) << g.index();
-        ASSERT_NEAR(b.world->lights.pdf(hit, x, s->direction) / s->pdf, 1, 1e-4 / c) << g.index();
-      }
+      const int hits =
+          for_hits_of_samples(b, x, 4000, [&](const LightSample& s, const SurfaceHit& hit, float cosine) {
+            // Cosines are accurate to 2^-20 of the world's size over a length of 1/100 of it, relative to the
+            // width of the transition.
+            ASSERT_NEAR(b.world->lights.emitted(hit, -s.direction).x, s.radiance.x, 2e-3) << g.index();
+            ASSERT_NEAR(b.world->lights.pdf(hit, x, s.direction) / s.pdf, 1, 1e-4 / cosine) << g.index();
+          });
       EXPECT_GT(hits, 100) << g.index() << " " << beam.cutoff;
     }
 }
 
-// With MIS against directions of the floor's own that meet the light.
+// The estimate combines light samples, by MIS, with directions that the floor samples and that hit the light.
 TEST(AreaBeam, LightsAFloorAsItsSamplingAlone) {
   for (const Beam& beam : {kBeams[1], kBeams[3]}) {
     SceneBuilder builder = shining(RectangleShape{}, translate({0, 0, 1}) * test::rotate_x(180), beam);

@@ -1,4 +1,4 @@
-// Samples of environment maps: their densities are exactly those of the samples.
+// Sampling of environment maps: samples have exactly the density that pdf reports.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -42,15 +42,16 @@ std::vector<NamedSky> skies() {
   return all;
 }
 
-// The map's own direction at the azimuth 2 pi u and with the cosine z.
+// The direction, in the map's own space, with the azimuth 2 pi u and the cosine z.
 V3 direction(double u, double z) {
   const double r = std::sqrt(std::max(0., 1 - z * z));
   return V3(V3d(std::sin(2 * kPiD * u) * r, z, -std::cos(2 * kPiD * u) * r));
 }
 
-// Within a cell the density is bilinear in azimuth and cosine, so that the midpoint rule is exact.
+// A grid of `per` x `per` parts of each cell. Within a cell the density is bilinear in azimuth and cosine, so
+// that the midpoint rule is exact.
 struct Bins {
-  int across, down, per = 2;  // cells, and parts of a cell
+  int across, down, per = 2;  // numbers of cells across and down, and of parts along each side of a cell
   explicit Bins(const SkyImage& s) : across(s.width), down(s.height - 1) {}
   int size() const { return across * down * per * per; }
   double edge(int row) const {  // cosine at the upper edge of a row of parts
@@ -79,7 +80,7 @@ TEST(EnvironmentMap, DensityIntegratesToOne) {
     double sum = 0;
     for (int row = 0; row < bins.down * bins.per; ++row)
       for (int column = 0; column < bins.across * bins.per; ++column) sum += bins.share(m, column, row);
-    // Each part's density is off by the rounding of its place, 2^-24 of a turn, of which a cell is 1/64th.
+    // The place of each part is rounded by 2^-24 of a turn, and a cell is 1/64 of a turn.
     EXPECT_NEAR(sum, 1, 64 * 0x1p-22) << n.name;
   }
 }
@@ -104,7 +105,8 @@ TEST(EnvironmentMap, SamplesFallAsTheirDensitySays) {
   tally.close();
 }
 
-// The first word for which it holds, as it does for all that follow; 2^32 if there is none.
+// Returns the first word for which `holds` is true; it must be true for all words that follow. 2^32 if there
+// is none.
 std::uint64_t first_where(const std::function<bool(std::uint32_t)>& holds) {
   std::uint64_t low = 0, high = std::uint64_t{1} << 32;
   while (low < high) {
@@ -117,8 +119,9 @@ std::uint64_t first_where(const std::function<bool(std::uint32_t)>& holds) {
   return low;
 }
 
-// Between its cells the map has kinks, which differences must not meet: so each cell alone, by the words that
-// choose it. Its share of all words times the stretch of the square onto it is one over the density.
+// Finite differences must not cross the kinks of the map between its cells. So each cell is tested alone,
+// with the words that choose it: its share of all words, times the Jacobian of the map from the unit square
+// onto it, is 1 over the density.
 TEST(EnvironmentMap, EachCellStretchesItsWordsByOneOverTheDensity) {
   std::vector<NamedSky> all = skies();
   SkyImage overcast(12, 7);
@@ -140,7 +143,7 @@ TEST(EnvironmentMap, EachCellStretchesItsWordsByOneOverTheDensity) {
       for (int i = 0; i < bins.across; i += 1 + bins.across / 8) {
         const std::uint64_t x0 = first_where([&](std::uint32_t x) { return column_of(x) >= i; });
         const std::uint64_t x1 = first_where([&](std::uint32_t x) { return column_of(x) > i; });
-        // Of fewer words the differences would see the single ones.
+        // With fewer words than these, single words would be visible in the differences.
         if (y1 < y0 + (1 << 24) || x1 < x0 + (1 << 24)) continue;
         const double wide = static_cast<double>(x1 - x0), high = static_cast<double>(y1 - y0);
         const auto word = [](std::uint64_t first, double words, float u) {
@@ -166,14 +169,14 @@ TEST(EnvironmentMap, AConstantMapIsSampledUniformly) {
   for (int i = 0; i < 1000; ++i) {
     const std::uint32_t x = r.bits(), y = r.bits();
     const EnvironmentMap::Light l = m.at(m.sample(x, y));
-    // Shares of 2^-32 words, of cells of 1/128 and more; float32.
+    // The probabilities of cells, of at least 1/128, are rounded to 2^-32; the rest is float32 rounding.
     EXPECT_NEAR(l.pdf * 4 * kPi, 1, 1e-5f);
     EXPECT_FLOAT_EQ(l.radiance.x, 3);
   }
   EXPECT_NEAR(m.flux(), 3 * 4 * kPiD, 1e-4);
 }
 
-// Away from the poles light over density is constant for one colour: no noise of its own.
+// For a grey map, light over density is nearly constant away from the poles, so that sampling adds no noise.
 TEST(EnvironmentMap, DensityFollowsTheLight) {
   SkyImage s(64, 32);
   std::mt19937 rng(5);
@@ -195,7 +198,8 @@ TEST(EnvironmentMap, DensityFollowsTheLight) {
     square += v * v;
   }
   const double mean = sum / kSamples, relative = (square / kSamples - mean * mean) / (mean * mean);
-  EXPECT_LT(relative, 1e-3);  // 1/8 in the two cells of rows next to the poles, which have 1/400 of all light
+  // The variance is 1/8 in the two rows of cells next to the poles, which have 1/400 of all light.
+  EXPECT_LT(relative, 1e-3);
 }
 
 TEST(EnvironmentMap, TheFirstAndTheLastWordMeanPlacesWithLight) {

@@ -1,5 +1,5 @@
-// Environment maps: which direction each texel is, what is between them, what is refused, and scenes under
-// them.
+// Environment maps: the directions of texels, the interpolation between them, refused maps, and scenes under
+// maps.
 #include "worker/render/lights/envmap.h"
 
 #include <gmock/gmock.h>
@@ -27,7 +27,7 @@ std::string refusal(const SkyImage& s, const Transform& t = {}, double scale = 1
   const auto m = try_map(s, t, scale);
   return m ? "accepted" : m.error().message;
 }
-// Texel (x, y) is 10 y + x + 1, but a pole's row is one value.
+// Texel (x, y) has the value 10 y + x + 1; the rows at the poles have one value each.
 SkyImage numbered() {
   SkyImage s(4, 3);
   for (int y = 0; y < 3; ++y)
@@ -38,11 +38,12 @@ SkyImage numbered() {
   return s;
 }
 float value(const EnvironmentMap& m, const V3& d) { return m.at(normalize(d)).radiance.x; }
-// Directions are float32, and a texel of these maps a good radian: 2^-20 of the values, which are below 32.
+// Directions are float32 and texels of these maps are more than a radian wide, so values, which are below 32,
+// are accurate to 2^-20 of 32.
 constexpr float kEps = 32 * 0x1p-20f;
 
-// Mitsuba 3: (u, v) = (atan2(x, -z) / 2 pi, acos(y) / pi). The columns' centres are at u = 1/8, 3/8, 5/8,
-// 7/8: halfway between the axes of the horizon, from -z over +x to +z and -x.
+// In Mitsuba 3 (u, v) = (atan2(x, -z) / 2 pi, acos(y) / pi). The centres of the columns are at u = 1/8, 3/8,
+// 5/8 and 7/8, halfway between the axes of the horizon: from -z over +x to +z and -x.
 TEST(EnvironmentMap, TexelsLieWhereMitsubaPutsThem) {
   const EnvironmentMap m = map_of(numbered());
   EXPECT_NEAR(value(m, {1, 0, -1}), 11, kEps) << "u = 1/8: from -z towards +x";
@@ -58,10 +59,10 @@ TEST(EnvironmentMap, IsBilinearBetweenTexelsAndRepeatsAround) {
   EXPECT_NEAR(value(m, {1, 0, 0}), 11.5, kEps) << "u = 1/4";
   EXPECT_NEAR(value(m, {0, 0, 1}), 12.5, kEps) << "the middle of the image";
   EXPECT_NEAR(value(m, {0, 0, -1}), 12.5, kEps) << "its left and right edge: of 14 and 11";
-  // A quarter turn further by 22.5 degrees: a quarter of the way from 14 to 11.
+  // 22.5 degrees from the centre of the column with the value 14: a quarter of the way to the column with 11.
   const auto s = static_cast<float>(std::sin(kPiExact / 8)), c = static_cast<float>(std::cos(kPiExact / 8));
   EXPECT_NEAR(value(m, {-s, 0, -c}), 14 + (11 - 14) * .25, kEps);
-  // 45 degrees above the horizon: half of the pole's.
+  // 45 degrees above the horizon: the mean of the pole and the horizon.
   const auto r = static_cast<float>(std::sqrt(.5));
   EXPECT_NEAR(value(m, {r, 1, -r}), (11 + 1) / 2., kEps);
   EXPECT_NEAR(value(m, {r, -1, r}), (12 + 21) / 2., kEps);
@@ -69,11 +70,11 @@ TEST(EnvironmentMap, IsBilinearBetweenTexelsAndRepeatsAround) {
 
 TEST(EnvironmentMap, ToWorldTurnsAndMirrorsItAndNothingElse) {
   const SkyImage s = numbered();
-  // z to x, and so the middle of the image to +x.
+  // Turns z to x, so the middle of the image is at +x.
   EXPECT_NEAR(value(map_of(s, test::rotate_y(90)), {1, 0, 0}), 12.5, kEps);
-  // y to z: the pole.
+  // Turns y to z, so the pole is at +z.
   EXPECT_NEAR(value(map_of(s, test::rotate_x(90)), {0, 0, 1}), 1, kEps);
-  // First about x, then about y.
+  // Turns first about x, then about y.
   EXPECT_NEAR(value(map_of(s, test::rotate_y(90) * test::rotate_x(90)), {1, 0, 0}), 1, kEps);
   EXPECT_NEAR(value(map_of(s, test::scale(-1, 1, 1)), {-1, 0, -1}), 11, kEps);
   EXPECT_NEAR(value(map_of(s, test::translate({5, 6, 7}) * test::scale(3)), {1, 0, -1}), 11, kEps);
@@ -119,7 +120,7 @@ TEST(EnvironmentMap, MoreThan8192By4096PixelsAreRefused) {
               HasSubstr("'huge.exr' has 16384 x 8192 pixels; scale it down to 8192 x 4096"));
 }
 
-// ---- in a world
+// Maps in a world
 
 SceneBuilder under_sky(const SkyImage& s, const Transform& t = {}) {
   SceneBuilder builder({4, 4});
@@ -132,13 +133,13 @@ SceneBuilder under_sky(const SkyImage& s, const Transform& t = {}) {
 
 TEST(EnvironmentMap, GivesTheIrradianceOfOneTexel) {
   const SkyImage black(32, 16);
-  // y up in the map is z up here; the sun 60 degrees above the horizon, all around.
+  // The map's +y is +z here. The bright texel is 60 degrees above the horizon, at several azimuths.
   for (const int x : {0, 5, 17, 31}) {
     SkyImage s = black;
     s.set(x, 5, {34000, 34000, 34000});
     const auto world = test::world_of(under_sky(s, test::rotate_x(90)));
     const Vec3 e = test::one_texel_irradiance(32, 16, x, 5);
-    // rotate_x(90): (x, y, z) becomes (x, -z, y).
+    // rotate_x(90) turns (x, y, z) to (x, -z, y).
     const V3 expected(V3d(e[0], -e[2], e[1]) * 34000.);
     RandomStream r(4);
     constexpr int kSide = 128;
@@ -154,7 +155,8 @@ TEST(EnvironmentMap, GivesTheIrradianceOfOneTexel) {
       sum += V3d(l->direction) * double{l->radiance.x / l->pdf};
     }
     const V3 mean(sum / double{kSide * kSide});
-    // Stratified: the error of a smooth integrand is of the order of 1 / side^2 of its variation, of .2.
+    // With stratified samples the error of a smooth integrand is about 1 / side^2 of its variation, which is
+    // .2.
     for (int k = 0; k < 3; ++k)
       EXPECT_NEAR(mean[k], expected[k], 1e-4f * std::sqrt(dot(expected, expected))) << x;
   }
@@ -167,7 +169,7 @@ TEST(EnvironmentMap, IsSeenByTheCameraUnlessEmittersAreHidden) {
   EXPECT_FLOAT_EQ(static_cast<float>(render_sample(*test::world_of(builder), 0, 0, 0).rgb[1]), 2);
   builder.scene.integrator.hide_emitters = true;
   EXPECT_EQ(render_sample(*test::world_of(builder), 0, 0, 0).rgb[1], 0);
-  // What it lights is still lit: half of the 0.5 that comes from above is reflected.
+  // The map still lights the scene: half of the radiance 0.5 that comes from above is reflected.
   SceneBuilder lit = under_sky(s);
   lit.scene.integrator.hide_emitters = true;
   const test::Estimate e = test::estimate(lit, 256);
@@ -175,7 +177,8 @@ TEST(EnvironmentMap, IsSeenByTheCameraUnlessEmittersAreHidden) {
 }
 
 TEST(EnvironmentMap, IsSampledAsOftenAsItsPowerSays) {
-  // Flux through the world's bounding ball against a point light's: half by power, half one in two.
+  // A light is chosen with the probability 1/2 in proportion to power, else uniformly. The power of the map
+  // is the flux through the ball that bounds the world.
   SceneBuilder builder = under_sky(SkyImage(8, 5, 1));
   builder.scene.emitters.push_back(PointEmitter{{0, 0, 1}, {1, 1, 1}});
   const auto world = test::world_of(builder);
@@ -185,7 +188,7 @@ TEST(EnvironmentMap, IsSampledAsOftenAsItsPowerSays) {
   const double expected = .25 + .5 * power / (power + 4 * kPiExact);
   ASSERT_TRUE(l);
   EXPECT_NEAR(l->pdf * 4 * kPiExact, expected, 1e-4);
-  // As a path that leaves finds it: one whose direction had the same density shares it in halves.
+  // A path that leaves the scene in this direction, sampled with the same density, gets half of the light.
   EXPECT_FLOAT_EQ(world->lights.environment(V3(0), l->direction, l->pdf, {}).x, .5f);
   EXPECT_FLOAT_EQ(world->lights.environment(V3(0), l->direction, kInfinity, {}).x, 1);
 }

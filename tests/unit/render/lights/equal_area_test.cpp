@@ -1,4 +1,4 @@
-// Square environment maps of pbrt-v4: which direction each texel is, and what light it gives.
+// Square environment maps of pbrt-v4: the directions of texels, and the light that they give.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ using test::SkyImage;
 using ::testing::HasSubstr;
 
 constexpr double kPiBook = std::numbers::pi;
-// A texel's solid angle, times the number of texels.
+// The solid angle of a texel times the number of texels.
 constexpr double kWholeSphere = 4 * kPiBook;
 
 Result<EnvironmentMap> try_square_map(const SkyImage& s, double scale = 1, const Transform& t = {}) {
@@ -31,8 +31,9 @@ EnvironmentMap square_map(const SkyImage& s, double scale = 1, const Transform& 
   return std::move(*m);
 }
 
-// The direction of a place as Pharr, Jakob and Humphreys write it ("Physically Based Rendering", 4th edition,
-// section 3.8.3), in double: by the signed distance to the diagonal, and not by folding.
+// The direction of a place by the formulas of Pharr, Jakob and Humphreys ("Physically Based Rendering", 4th
+// edition, section 3.8.3), in double. They use the signed distance to the diagonal; the renderer folds the
+// square instead.
 V3d book_direction(double px, double py) {
   const double u = 2 * px - 1, v = 2 * py - 1, distance = 1 - (std::abs(u) + std::abs(v));
   const double r = 1 - std::abs(distance);
@@ -59,7 +60,7 @@ TEST(EqualArea, DirectionsAreThoseOfTheBook) {
     for (int j = 0; j <= 64; ++j) {
       const V3 d = equal_area_direction({static_cast<float>(i) / 64, static_cast<float>(j) / 64});
       const V3d want = book_direction(i / 64., j / 64.);
-      // Some roundings of numbers up to 1 in float32.
+      // The error of a few float32 roundings of numbers up to 1.
       EXPECT_LT((V3d(d) - want).length(), 0x1p-21) << i << " " << j;
     }
 }
@@ -68,8 +69,8 @@ TEST(EqualArea, PlacesAndDirectionsAreInverse) {
   RandomStream r(5);
   for (int i = 0; i < 100000; ++i) {
     const V2 p(r.uniform(), r.uniform()), back = equal_area_place(equal_area_direction(p));
-    // On the border two places are one direction, which is why it is kept away from; places change less than
-    // directions do, whose error is 2^-21.
+    // On the border one direction has two places, so places close to it are skipped. Elsewhere places change
+    // less than directions, whose error is 2^-21.
     if (std::min(p.x, p.y) < 1e-6f || std::max(p.x, p.y) > 1 - 1e-6f) continue;
     EXPECT_NEAR(back.x, p.x, 0x1p-21) << p.x << " " << p.y;
     EXPECT_NEAR(back.y, p.y, 0x1p-21) << p.x << " " << p.y;
@@ -82,7 +83,7 @@ TEST(EqualArea, StretchesAllAreasAlike) {
   });
 }
 
-// Texels without filtering: any place that is not next to a texel's edge has that texel's radiance.
+// Texels are not filtered: a direction that is not next to a texel's edge has exactly that texel's radiance.
 TEST(EqualArea, EachTexelIsWhereItsPlaceIs) {
   constexpr int kSide = 7;
   SkyImage s(kSide, kSide);
@@ -124,9 +125,8 @@ TEST(EqualArea, SixAxesHaveTheirColours) {
   EXPECT_EQ(red(turned, {1, 0, 0}), 2);
 }
 
-// The integral of direction x radiance over all directions, of red: the irradiance of a plane is its product
-// with the normal, if all light is above the plane. By the map's own samples, of a stratified square of
-// words.
+// The integral of direction times radiance (red) over all directions, by stratified samples of the map. If
+// all light is above a plane, the irradiance of the plane is the product of this vector and the normal.
 V3d light_flow(
     const EnvironmentMap& m, const std::function<bool(const V3&)>& counts = [](const V3&) { return true; }) {
   constexpr int kSide = 512;
@@ -139,15 +139,15 @@ V3d light_flow(
     const std::uint32_t x = word(i % kSide), y = word(i / kSide);
     const V3 d = m.sample(x, y);
     const EnvironmentMap::Light l = m.at(d);
-    // Next to a texel's edge the rounded direction may be its neighbour's, which may be black.
+    // Next to a texel's edge a rounded direction may lie in the neighbouring texel, which may be black.
     if (counts(d) && l.pdf > 0) sum += V3d(d) * double{l.radiance.x / l.pdf};
   }
   return sum / double{kSide} / double{kSide};
 }
 bool is_above_square(const V3& d) { return d.z > 0; }
 // Light over density is the map's flux, at most 8 pi here, and z changes by 1 / 512 of its range of 2 within
-// a stratum: the mean of 512^2 independent errors of this is that divided by 512, of which this is three
-// times as much.
+// a stratum. The standard deviation of the mean of 512^2 such independent errors is that divided by 512; the
+// limit is three times as large.
 constexpr double kStrataError = 3 * 8 * kPiBook * 2 / (512. * 512);
 
 TEST(EqualArea, AConstantMapHasItsIrradianceAndIsSampledUniformly) {
@@ -158,8 +158,9 @@ TEST(EqualArea, AConstantMapHasItsIrradianceAndIsSampledUniformly) {
 }
 
 TEST(EqualArea, AHemisphereHasTheIrradiancePi) {
-  // Texels on the fold are one half in light and have half of its radiance. The half of the light that they
-  // lack above lies within 2 / side of the fold: 8 pi / (3 side^2), as derived below.
+  // Half of each texel on the fold is in the lit hemisphere, so it has half of the radiance. The half of the
+  // light that these texels lack above the fold lies within 2 / side of it: 8 pi / (3 side^2), as derived
+  // below.
   constexpr int kSide = 32;
   SkyImage s(kSide, kSide);
   for (int y = 0; y < kSide; ++y)
@@ -169,10 +170,10 @@ TEST(EqualArea, AHemisphereHasTheIrradiancePi) {
       s.set(x, y, {v, v, v});
     }
   const EnvironmentMap m = square_map(s);
-  // 2 side halves of texels of the solid angle 2 pi / side^2 each; their z = 1 - r^2 is 2 (1 - r), of which
-  // the mean over a triangle is 2 x (2 / side) / 3.
+  // 2 side halves of texels, of the solid angle 2 pi / side^2 each, are above the fold. There z = 1 - r^2 is
+  // about 2 (1 - r), whose mean over a triangle is 2 x (2 / side) / 3.
   const double lacking = .5 * (2 * kSide) * (2 * kPiBook / (kSide * kSide)) * 4 / (3. * kSide);
-  // z is 2 (1 - r) to within r - 1 <= 1 / 16 of it.
+  // The relative error of z = 2 (1 - r) is below 1 / 16 there.
   EXPECT_NEAR(light_flow(m, is_above_square).z, kPiBook - lacking, lacking / 16 + kStrataError);
   EXPECT_NEAR(m.flux(), kWholeSphere / 2, 1e-5);
 }
@@ -189,15 +190,16 @@ TEST(EqualArea, ACosineHasTwoThirdsOfPi) {
       s.set(x, y, {z, z, z});
     }
   const double want = 2 * kPiBook / 3 - 2 * kPiBook / (kSide * kSide);
-  // The 2 side texels on the fold are black, as z is 0 in their centres. The smooth map's z^2 above the fold
-  // is 4 (1 - r)^2 there, of which the mean over a triangle is 4 (2 / side)^2 / 6.
+  // The 2 side texels on the fold are black, since z is 0 at their centres. In the smooth map z^2 above the
+  // fold is 4 (1 - r)^2 there, and its mean over a triangle is 4 (2 / side)^2 / 6.
   const double fold = 2 * kSide * (2 * kPiBook / (kSide * kSide)) * 8 / (3. * kSide * kSide);
   EXPECT_NEAR(light_flow(square_map(s), is_above_square).z, want, fold + kStrataError);
 }
 
 TEST(EqualArea, OneBrightTexelGivesItsLight) {
   constexpr int kSide = 16;
-  // Next to the centre, within a quadrant, across the fold, at an edge's middle, in a corner, at the border.
+  // Texels next to the centre, within a quadrant, across the fold, at the middle of an edge, in a corner, and
+  // at the border
   for (const auto& [x, y] : {std::pair{7, 7}, {10, 6}, {3, 4}, {15, 8}, {0, 15}, {2, 0}}) {
     SkyImage s(kSide, kSide);
     s.set(x, y, {1000, 1000, 1000});
@@ -208,20 +210,20 @@ TEST(EqualArea, OneBrightTexelGivesItsLight) {
       for (int j = 0; j < kParts; ++j)
         want += book_direction((x + (i + .5) / kParts) / kSide, (y + (j + .5) / kParts) / kSide);
     want = want * (1000 * kWholeSphere / (kSide * kSide) / (kParts * kParts));
-    // Midpoints and strata are both within 1 / 64^2 / 24 of a texel's spread of directions, of .3; and
-    // float32.
+    // The errors of midpoints and of strata are both below 1 / 64^2 / 24 of the spread of directions in a
+    // texel, which is .3; the rest is float32 rounding.
     EXPECT_LT((light_flow(m) - want).length(), 2e-5 * want.length()) << x << " " << y;
   }
 }
 
-// In a stratified square of words each texel gets its share of the rows' strata, and of the columns', to
-// within one.
+// In a stratified square of words, the strata of rows and of columns that choose a texel match its share to
+// within one stratum each.
 TEST(EqualArea, TexelsAreChosenAsTheirDensitySays) {
   constexpr int kSide = 5, kWords = 1024;
   SkyImage s(kSide, kSide);
   for (int y = 0; y < kSide; ++y)
     for (int x = 0; x < kSide; ++x) {
-      const double v = y == 2 ? 0 : (x * 7 + y * 3) % 5;  // a black row, and black texels
+      const double v = y == 2 ? 0 : (x * 7 + y * 3) % 5;  // one black row, and some black texels
       s.set(x, y, {v, v, v});
     }
   const EnvironmentMap m = square_map(s);

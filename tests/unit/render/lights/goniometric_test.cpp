@@ -1,4 +1,4 @@
-// The light with an intensity by direction: where its image's texels shine, and how much.
+// The goniometric light: the directions in which the texels of its image shine, and its intensity there.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -15,8 +15,8 @@ using test::operator*;
 
 constexpr int kSide = 4;
 
-// The direction of a point of the unit square: Clarberg's mapping from the square to the sphere, with which
-// pbrt-v4's book begins (its section on spherical geometry), in double.
+// The direction of a point of the unit square by Clarberg's equal-area map, in double, as in the section on
+// spherical geometry of pbrt-v4's book.
 V3d direction_of(double u, double v) {
   const double x = 2 * u - 1, y = 2 * v - 1, ax = std::abs(x), ay = std::abs(y), inside = 1 - (ax + ay);
   const double r = 1 - std::abs(inside), phi = (r == 0 ? 1 : (ay - ax) / r + 1) * M_PI / 4;
@@ -25,7 +25,7 @@ V3d direction_of(double u, double v) {
           std::copysign(1 - r * r, inside)};
 }
 
-// Texels that are all different.
+// An image whose texels are all different.
 test::SkyImage image() {
   test::SkyImage s(kSide, kSide);
   for (int y = 0; y < kSide; ++y)
@@ -58,7 +58,7 @@ TEST(Goniometric, ShinesInEachDirectionByItsTexel) {
           const V3d p = direction_of((x + du) / kSide, (y + .6) / kSide) * distance;
           const double wanted[] = {3 * (1. + x + kSide * y), x + 1., .25 * (y + 1)};
           const C3 got = arriving(b, p);
-          // Float32: distances squared, and the position relative to the scene's box.
+          // Float32 rounding of squared distances and of the position relative to the scene's box.
           for (int c = 0; c < 3; ++c)
             EXPECT_NEAR(got[c] * distance * distance, wanted[c], 3e-6 * wanted[c]) << x << " " << y;
         }
@@ -68,15 +68,15 @@ TEST(Goniometric, StandsTurnedAndMovedAsItsTransformSays) {
   GoniometricEmitter e;
   e.to_world = test::translate({1, 2, 3}) * test::rotate_x(90);  // +z becomes -y
   const LightBench b(shining(image(), e));
-  // The four texels in the middle of the square, about +z: to the right +x, below +y.
+  // The four texels in the middle of the square surround +z: +x is to the right, +y below.
   EXPECT_NEAR(arriving(b, {1 + .1, 2 - 1, 3 + .05}).x * 1.0125, 1 + 2 + kSide * 2, 1e-4);
   EXPECT_NEAR(arriving(b, {1 - .1, 2 - 1, 3 + .05}).x * 1.0125, 1 + 1 + kSide * 2, 1e-4);
   EXPECT_NEAR(arriving(b, {1 + .1, 2 - 1, 3 - .05}).x * 1.0125, 1 + 2 + kSide * 1, 1e-4);
   EXPECT_EQ(arriving(b, {1, 2, 3}), C3(0)) << "in it";
 }
 
-// Directions spread evenly over the sphere fall into texels of equal areas alike: within what a lattice of
-// 200,000 points errs by along edges of the texels, some hundreds of points each.
+// Of directions spread evenly over the sphere, texels of equal solid angle get equally many. With a lattice
+// of 200,000 points the error arises along the edges of texels, which a few hundred points are close to.
 TEST(Goniometric, GivesEveryTexelTheSameSolidAngle) {
   constexpr int kPoints = 200000;
   std::array<int, kSide * kSide> count{};

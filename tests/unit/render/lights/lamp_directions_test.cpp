@@ -1,4 +1,4 @@
-// Directions near lamps: their density, their samples, and the second moment that they bound.
+// Directions near lamps: their density, their samples, and the second moment, which they make finite.
 #include "worker/render/lights/lamp_directions.h"
 
 #include <gtest/gtest.h>
@@ -18,8 +18,8 @@ Lamps lamps(std::initializer_list<V3> positions) {
   return all;
 }
 
-// The mean of value(w, density of w) over directions of the mixture, whose own distribution is uniform, and
-// its standard error.
+// The mean, and its standard error, of value(w, density of w) over directions w of a mixture whose own
+// distribution is uniform.
 struct Mean {
   double value = 0, error = 0;
 };
@@ -47,8 +47,8 @@ Mean mean_of(const LampDirections& directions, Value value) {
   return {mean, std::sqrt((squares / kSamples - mean * mean) / kSamples)};
 }
 
-// A direction's function over its density has the function's integral as its mean if, and only if, the
-// density is that of the samples. Five standard errors each: 6e-7.
+// The mean of a function over the density is the integral of the function if, and only if, the samples have
+// this density. Each test allows five standard errors, which are exceeded with probability 6e-7.
 TEST(LampDirections, HaveTheDensityThatTheySay) {
   for (const Lamps& all : {lamps({{1, 2, 3}}), lamps({{1, 2, 3}, {-4, 0, 1}, {.5f, -1, 2.1f}})}) {
     const LampDirections directions(all, kVertex);
@@ -63,8 +63,8 @@ TEST(LampDirections, HaveTheDensityThatTheySay) {
 }
 
 // Light near a lamp grows as 1 / sin(theta), where theta is the angle to the lamp. The test compares the
-// second moment of this function, as sampled, with its quadrature over theta. Uniform directions alone would
-// have an infinite one.
+// sampled second moment of this function with a quadrature over theta. With uniform directions alone it would
+// be infinite.
 TEST(LampDirections, BoundTheSecondMomentOfLightNearALamp) {
   const LampDirections directions(lamps({{1, 2, 3}}), kVertex);
   const V3 to_lamp = normalize(V3(1, 2, 3) - kVertex);

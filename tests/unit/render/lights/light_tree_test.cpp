@@ -1,4 +1,4 @@
-// The tree of many lights: probabilities that are what they say, and less noise.
+// The tree of many lights: its probabilities are exact, and it reduces noise.
 #include "worker/render/lights/light_tree.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ using test::translate;
 
 constexpr std::uint64_t kWords = std::uint64_t{1} << 32;
 
-// Lights of all kinds in a hall 20 wide, their strengths from 1 to 1000; one sun beside them.
+// Lights of all kinds, of strengths from 1 to 1000, in a hall 20 units wide, and a sun.
 SceneBuilder hall(int lights) {
   SceneBuilder builder;
   const BsdfIndex floor = builder.diffuse(.5), black = builder.diffuse(0);
@@ -103,7 +103,7 @@ TEST(LightTree, SharesAllWordsAmongItsLightsAndFindsByThem) {
   }
 }
 
-// Word by word: each light is found by exactly as many as it says.
+// Each light is found by exactly as many words as words_of() returns.
 TEST(LightTree, FindsEachLightByItsNumberOfWords) {
   RandomStream r(2);
   constexpr std::uint64_t words = 5000;
@@ -153,17 +153,17 @@ TEST(LightTree, CopesWithLightsInOnePlaceAndWithExtremes) {
   }
 }
 
-// A million lights, of intensities 1e-20 to 1e20. All words are shared out to the last. A
-// light is without one only where its node has fewer words than lights: no more than a word's share for each
-// light is lost (4e-7 of the sum here). The dim, of which those below 1e9 have 1e-10 of the sum, have as many
-// words as there are of them at most, 2.3e-4 of all: ten of a thousand that are looked up will not be theirs.
+// A million lights have intensities from 1e-20 to 1e20. All words are given to lights. A light gets no word
+// only where its node has fewer words than lights, so the lost intensity is at most one word's share per
+// light (here 4e-7 of the sum). Lights below 1e9 have 1e-10 of the total intensity and get at most one word
+// each, 2.3e-4 of all words; so at most ten of a thousand words find such a light.
 TEST(LightTree, SharesAllWordsAmongAMillionLightsFortyOrdersApart) {
   constexpr std::size_t n = 1'000'000;
   RandomStream r(30);
   std::vector<LightBounds> lights = random_bounds(n, r);
   for (std::size_t i = 0; i < n; ++i) {
     lights[i].intensity = std::pow(10., 40 * r.uniform() - 20);
-    lights[i].cos_spread = -1;  // all shine everywhere
+    lights[i].cos_spread = -1;  // all shine in all directions
   }
   const LightTree tree = LightTree::build(lights);
   const V3 x(.5f, .5f, 2);
@@ -187,7 +187,7 @@ TEST(LightTree, SharesAllWordsAmongAMillionLightsFortyOrdersApart) {
   EXPECT_LE(dim, 10);
 }
 
-// ---- as part of Lights ----
+// The tree as a part of Lights
 TEST(ManyLights, ProbabilitiesSumToOneAndAreThoseOfTheWords) {
   const LightBench b(hall(200));
   const Lights& lights = b.world->lights;
@@ -196,8 +196,7 @@ TEST(ManyLights, ProbabilitiesSumToOneAndAreThoseOfTheWords) {
   for (int k = 0; k < 10; ++k) {
     const V3 x = b.at({20 * r.uniform() - 10., 20 * r.uniform() - 10., 3. * r.uniform()});
     const V3 n = k % 3 ? random_direction(r) : V3(0);
-    // Ends of the runs of words of one choice, by bisection, would do; every 2^16-th word is plain and
-    // enough: a light's words lie in two runs at most.
+    // Every 2^16-th word is tried. That is enough, because the words of a light form at most two runs.
     std::vector<double> seen(lights.count(), 0), said(lights.count(), 0);
     constexpr int kProbes = 1 << 16;
     for (int i = 0; i < kProbes; ++i) {
@@ -211,7 +210,7 @@ TEST(ManyLights, ProbabilitiesSumToOneAndAreThoseOfTheWords) {
     double sum = 0;
     for (std::size_t i = 0; i < seen.size(); ++i) {
       sum += said[i];
-      EXPECT_NEAR(seen[i], said[i], 3. / kProbes) << i;  // two runs, each a probe off at the most
+      EXPECT_NEAR(seen[i], said[i], 3. / kProbes) << i;  // at each of two runs, at most one probe is off
     }
     EXPECT_NEAR(sum, 1, 200. / kProbes) << "but for those that no probe met";
   }
@@ -229,17 +228,18 @@ TEST(ManyLights, AHitHasTheDensityOfItsSample) {
     const auto primitive = b.world->accel.nearest(x, s->direction, kInfinity);
     SurfaceHit hit;
     if (!primitive || !b.world->geometry.complete(*primitive, x, s->direction, hit)) continue;
-    if (std::abs(hit.t - s->distance) > 1e-5f) continue;  // something in front
+    if (std::abs(hit.t - s->distance) > 1e-5f) continue;  // another surface is in front of the light
     const float c = std::abs(dot(hit.ng, s->direction));
     if (c < .1f) continue;
     ++hits;
-    // The light's point is 2^-20 of the world off its surface, at distances from 1/60 of it.
+    // The sampled point is 2^-20 of the world's size off the light's surface, at distances of at least 1/60
+    // of that size.
     ASSERT_NEAR(lights.pdf(hit, x, s->direction, {x, n}) / s->pdf, 1, 2e-4 / c);
   }
   EXPECT_GT(hits, 1000);
 }
 
-// The mean over the table's choices, over the tree's, and their variance by plain counts.
+// Mean and variance of the values of one way of choosing lights.
 struct Moments {
   double sum = 0, square = 0;
   int n = 0;
@@ -249,8 +249,8 @@ struct Moments {
   double error() const { return std::sqrt(variance() / n); }
 };
 
-// How much less the tree's variance is than the table's, as the geometric mean over these points of the
-// floor; and that all ways of choosing have one mean.
+// Returns the variance of the table over that of the tree, as the geometric mean over these points of the
+// floor. Also checks that all ways of choosing have the same mean.
 double variance_gain(const LightBench& b, const std::vector<Vec3>& places) {
   const Lights& lights = b.world->lights;
   RandomStream r(8);
@@ -286,7 +286,7 @@ TEST(ManyLights, TheTreeIsRightAndLessNoisyThanTheTable) {
   }
 }
 
-// Lamps that are alike, along a street.
+// Equal lamps along a street.
 TEST(ManyLights, OfAStreetTheNearLampsAreFound) {
   SceneBuilder builder;
   builder.shape(RectangleShape{}, test::scale(600, 10, 1), builder.diffuse(.5));
@@ -316,7 +316,7 @@ TEST(ManyLights, FewAreLeftToTheTable) {
   }
 }
 
-// Rendered, with the floor's own directions meeting some of the lights.
+// Renders an image, in which directions that the floor samples hit some of the lights.
 TEST(ManyLights, LightAFloorAsOneByOne) {
   SceneBuilder builder = hall(60);
   builder.look({0, -3, 4}, {0, 0, 0}, 20);
@@ -325,7 +325,7 @@ TEST(ManyLights, LightAFloorAsOneByOne) {
   for (int g = 0; g < 2; ++g) {
     SceneBuilder& k = groups[g];
     k.look({0, -3, 4}, {0, 0, 0}, 20);
-    // Half of the lights each: too few for a tree.
+    // Each image has half of the lights, too few for a tree.
     std::size_t i = 0;
     for (Shape& s : k.scene.shapes)
       if (s.emitter && static_cast<int>(i++ % 2) != g) s.emitter.reset();

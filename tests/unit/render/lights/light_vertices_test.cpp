@@ -33,7 +33,7 @@ TEST(SunMap, IsEmptyUntilTheSunIsFound) {
   EXPECT_FALSE(learned().empty());
 }
 
-// The density of a ray is that of all points on it, and 1 / density has the mean of the plane's area.
+// A ray has the density of all points on it, and the mean of 1 / density over rays is the area of the plane.
 TEST(SunMap, RaysHaveTheDensityOfTheirPoints) {
   const SunMap map = learned();
   RandomStream random(7);
@@ -59,7 +59,7 @@ TEST(SunMap, RaysHaveTheDensityOfTheirPoints) {
   EXPECT_LT(error, .2);
 }
 
-// A large scene of which the paths see a small room: the rays go there.
+// The paths saw only a small room of a large scene, so the rays start towards this room.
 TEST(SunMap, FitsTheRaysToWhereTheSunWasFound) {
   SunMap map({0, 0, 1}, 1000);
   map.learn({1, 2, 3}, 1);
@@ -71,11 +71,13 @@ TEST(SunMap, FitsTheRaysToWhereTheSunWasFound) {
     const V3 o = map.sample({random.bits(), random.bits(), random.bits(), random.bits()}).o;
     near += std::abs(o.x - 1.5f) < 2 && std::abs(o.y - 1.5f) < 2;
   }
-  EXPECT_GT(near, 850);  // 95 % of them: 50 of 1000 with a standard deviation of 7 go elsewhere
+  // About 95 % of the rays: 50 of 1000 start elsewhere, with a standard deviation of 7.
+  EXPECT_GT(near, 850);
   EXPECT_GT(map.density({900, 0, 0}), 0);
 }
 
-// Against the densities of all ways to find a path of five vertices, the last of which is lit.
+// Compares with the densities of all strategies that find a path of five vertices, of which the sun lights
+// the last.
 TEST(SubpathDensities, AddUpTheDensitiesOfAllWaysToFindAPath) {
   constexpr std::size_t kLast = 4;
   RandomStream random(5);
@@ -83,7 +85,8 @@ TEST(SubpathDensities, AddUpTheDensitiesOfAllWaysToFindAPath) {
   const auto vector = [&] { return V3(number(), -number(), number()); };
   for (int repeat = 0; repeat < 20; ++repeat) {
     std::array<V3, kLast + 1> v, n;
-    // Densities of directions: at each vertex to the next one by the camera, and to the one before by the sun
+    // Densities of directions at each vertex: `ahead`, with which the camera samples the next vertex, and
+    // `back`, with which the sun samples the previous one
     std::array<float, kLast + 1> ahead{}, back{};
     for (std::size_t i = 0; i <= kLast; ++i) {
       v[i] = vector();
@@ -109,7 +112,8 @@ TEST(SubpathDensities, AddUpTheDensitiesOfAllWaysToFindAPath) {
     for (std::size_t i = kLast; i-- > 0;)
       sun[i] = SubpathDensities::extended(v[i] - v[i + 1], back[i + 1], sun[i + 1].sum(ahead[i + 1]), n[i],
                                           n[i + 1]);
-    std::array<double, kLast + 1> density;  // of the way in which the camera samples vertices 0 to k
+    // The density of each strategy k, in which the camera samples vertices 0 to k
+    std::array<double, kLast + 1> density;
     double all = 0;
     for (std::size_t k = 0; k <= kLast; ++k) {
       density[k] = 1;
@@ -119,13 +123,13 @@ TEST(SubpathDensities, AddUpTheDensitiesOfAllWaysToFindAPath) {
     for (std::size_t k = 0; k <= kLast; ++k) {
       double others = k > 0 ? double{by_sun(k) * camera[k].sum(back[k])} : 0;
       if (k < kLast) others += double{by_camera(k + 1) * sun[k + 1].sum(ahead[k + 1])};
-      // Each float operation is off by 6e-8 at most; there are fewer than a hundred
+      // Each float operation has an error of at most 6e-8, and there are fewer than a hundred operations
       EXPECT_NEAR((1 + others) * density[k] / all, 1, 1e-5) << k;
     }
   }
 }
 
-// Light vertices around the origin, in two blocks of which the second is not full.
+// Light vertices around the origin; kCandidates of them fill a block.
 LightVertices some(std::size_t count) {
   LightVertices all;
   RandomStream random(3);
@@ -220,7 +224,7 @@ TEST(LightVertices, AtTheReceiverItselfAreNoTrouble) {
   EXPECT_FLOAT_EQ(c.weight, 1);
 }
 
-// With g this near to 1 the phase function's denominator is all rounding.
+// With g so close to 1, the denominator of the phase function consists of rounding errors.
 TEST(LightVertices, InMediaThatScatterSharplyAreChosen) {
   for (const float g : {-.99999f, .9995f, .9999f, .99999f}) {
     LightVertices all;
@@ -244,7 +248,7 @@ TEST(LightVertices, InMediaThatScatterSharplyAreChosen) {
   }
 }
 
-// Two vertices at one place, one of which also shines upwards through a lobe.
+// Two vertices are at the same place, and one of them also shines upwards through a lobe.
 TEST(LightVertices, AreChosenByTheirLobes) {
   LightVertices all;
   LightVertex y;

@@ -1,11 +1,12 @@
-// Lights: irradiance by their own sampling against closed forms, and densities that agree with the sampling.
+// Lights: the irradiance by their own sampling is compared with closed forms, and their densities with the
+// samples.
 #include "worker/render/lights/lights.h"
-#include "common/base/clock.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "common/base/clock.h"
 #include "tests/unit/render/light_bench.h"
 
 namespace ls::render {
@@ -13,11 +14,12 @@ namespace {
 
 using test::SceneBuilder;
 using test::operator*;
+using test::scale;
 using test::translate;
 
 TEST(Lights, RectangleGivesLambertsIrradiance) {
-  // Four corners of half sides a, b at height h: A/sqrt(1+A^2) atan(B/sqrt(1+A^2)) + the same with A, B
-  // swapped.
+  // Sums over the four corners of a rectangle of half sides a and b at height h. With A = a / h and B = b / h
+  // a corner gives A / sqrt(1 + A^2) atan(B / sqrt(1 + A^2)), plus the same with A and B exchanged.
   const double a = .8 / 1.25, b = .5 / 1.25;
   const auto half = [](double p, double q) { return p / std::hypot(1, p) * std::atan(q / std::hypot(1, p)); };
   const LightBench bench(
@@ -39,22 +41,22 @@ TEST(Lights, DiskGivesPiSineSquared) {
 TEST(Lights, SphereGivesPiTimesTheSquareOfRadiusOverDistance) {
   for (const double distance : {1.01, 2., 100., 1e5}) {
     const LightBench bench(area(SphereShape{}, {}));
-    // At 1e5 radii directions are 1e-5 apart: their float32 rounding is 1e-2 of that, but cancels in the
-    // mean.
+    // At a distance of 1e5 radii the directions span 1e-5. Their float32 rounding is 1e-2 of that, but
+    // cancels in the mean.
     expect_close(bench.irradiance({0, 0, -distance}, {0, 0, 1}), M_PI / (distance * distance));
   }
 }
 
 TEST(Lights, InsideAShiningSphereIrradianceIsPiEverywhere) {
   const LightBench bench(area(SphereShape{}, {}, true));
-  // Uniform directions: the cosine's relative variance is 5/3 of its mean 1/4.
+  // Directions are sampled uniformly, so the relative variance of the cosine, whose mean is 1/4, is 5/3.
   for (const V3d& x : {V3d(0, 0, 0), V3d(.3, -.5, .2), V3d(0, 0, -.999), V3d(0, 0, -1)}) {
     expect_close(bench.irradiance(x, {0, 0, 1}, 256), M_PI);
   }
 }
 
 TEST(Lights, MeshGivesTheIrradianceOfItsFaces) {
-  // A cube of half side .5, its lower face 1 above: only that face is turned towards the point.
+  // A cube of half side .5, whose lower face is 1 unit above the point; only that face points towards it.
   const LightBench bench(area(CubeShape{}, translate({0, 0, 1.5}) * test::scale(.5)));
   const double x = .5;
   const auto e = bench.irradiance({0, 0, 0}, {0, 0, 1}, 512);
@@ -70,7 +72,7 @@ TEST(Lights, SpotFallsOffLinearlyInTheAngle) {
     const double a = degrees * M_PI / 180, share = std::clamp((30 - degrees) / 20, 0., 1.);
     const auto e =
         bench.irradiance({3 * std::sin(a), 0, 3 * std::cos(a)}, V3(-std::sin(a), 0, -std::cos(a)), 2);
-    // The angle is the arc cosine of a float32: 2^-24 / sin(angle) off, against 20 degrees.
+    // The angle is the arc cosine of a float32, with an error of 2^-24 / sin(angle) relative to 20 degrees.
     EXPECT_NEAR(e.mean, 2. / 9 * share, 2. / 9 * 2e-6) << degrees;
   }
 }
@@ -86,7 +88,7 @@ TEST(Lights, PointFollowsTheInverseSquareAtAllScales) {
   }
 }
 
-// The density that a hit claims is the one that a sample of the same point had.
+// pdf() of a hit equals the density of a sample at the same point.
 TEST(Lights, DensityOfAHitIsThatOfItsSample) {
   struct Named {
     const char* name;
@@ -107,28 +109,17 @@ TEST(Lights, DensityOfAHitIsThatOfItsSample) {
   for (const Named& n : all) {
     const LightBench b(n.builder);
     const V3 x = b.at(n.x);
-    RandomStream r(5);
-    int hits = 0;
-    for (int i = 0; i < 2000; ++i) {
-      const float u = r.uniform(), v = r.uniform();
-      const auto s = b.world->lights.sample(b.world->lights.choose(numbers(0, u, v)), x);
-      if (!s) continue;
-      const auto primitive = b.world->accel.nearest(x, s->direction, kInfinity);
-      SurfaceHit hit;
-      if (!primitive || !b.world->geometry.complete(*primitive, x, s->direction, hit)) continue;  // the rim
-      if (std::abs(hit.t - s->distance) > 1e-4f * s->distance + 1e-5f) continue;  // another face in front
-      const float cosine = std::abs(dot(hit.ng, s->direction));
-      if (cosine < .05f) continue;  // grazing: the light's offset moves the point along it
-      ++hits;
-      ASSERT_NEAR(b.world->lights.pdf(hit, x, s->direction) / s->pdf, 1, 1e-4 / cosine) << n.name;
-      ASSERT_EQ(b.world->lights.emitted(hit, -s->direction).x, 1.f) << n.name;
-    }
+    const int hits =
+        for_hits_of_samples(b, x, 2000, [&](const LightSample& s, const SurfaceHit& hit, float cosine) {
+          ASSERT_NEAR(b.world->lights.pdf(hit, x, s.direction) / s.pdf, 1, 1e-4 / cosine) << n.name;
+          ASSERT_EQ(b.world->lights.emitted(hit, -s.direction).x, 1.f) << n.name;
+        });
     EXPECT_GT(hits, 300) << n.name;
   }
 }
 
-// Two colours in the quarters of azimuth and polar angle: from a point on the equator's plane or below a pole
-// as much is seen of one as of the other.
+// A sphere with two colours in alternate quarters of azimuth and polar angle: from the plane of the equator
+// or below a pole, equal parts of both colours are visible.
 SceneBuilder checkered_sphere(bool flip) {
   SceneBuilder builder = area(SphereShape{}, {}, flip);
   const TextureIndex dark = builder.texture({.25, .25, .25}), bright = builder.texture({1.5, 1.5, 1.5});
@@ -159,7 +150,7 @@ TEST(Lights, ASampleOfATexturedLightHasTheColourThatIsSeenThere) {
       ++count;
       same += s->radiance == b.world->lights.emitted(hit, -s->direction);
     }
-    // Rounding may put a point on the other side of a colour's border, a share of 1e-6 of all.
+    // Rounding may move a point, with a probability of 1e-6, across a border between the colours.
     EXPECT_GT(count, 1900);
     EXPECT_GE(same, count - 2);
   }
@@ -176,7 +167,8 @@ TEST(Lights, EachOfManyIsChosenAsOftenAsItsProbabilitySays) {
   const auto light_of = [&](std::uint64_t word) {
     return b.world->lights.choose({static_cast<std::uint32_t>(word), 0, 0}).light;
   };
-  const auto end_of = [&](std::uint32_t light, std::uint64_t from) {  // first word of the next light
+  // Returns the first word of the next light.
+  const auto end_of = [&](std::uint32_t light, std::uint64_t from) {
     std::uint64_t lo = from, hi = std::uint64_t{1} << 32;
     while (lo < hi) {
       const std::uint64_t mid = (lo + hi) / 2;
@@ -199,8 +191,8 @@ TEST(Lights, EachOfManyIsChosenAsOftenAsItsProbabilitySays) {
   EXPECT_EQ(word, std::uint64_t{1} << 32);
 }
 
-// CPU time of this thread alone, and as a multiple of another linear step's: neither the machine nor its load
-// matters.
+// Compares CPU time of this thread with that of another step of linear cost, so that neither the machine nor
+// its load matters.
 TEST(Lights, TakeTimeInProportionToShapesNotToShapesTimesTriangles) {
   SceneBuilder builder = area(RectangleShape{}, {});
   constexpr int kShapes = 20000;
@@ -254,6 +246,45 @@ TEST(Lights, LightsWithoutPowerAreLeftOut) {
   const LightBench b(builder);
   EXPECT_FALSE(b.world->lights.can_sample());
   EXPECT_EQ(b.world->lights.left_out(), 2u);
+}
+
+// A lamp of half size `size` near the centre of a ball of radius 1 that encloses it.
+SceneBuilder lamp_in_a_ball(const ls::Geometry& g, double size) {
+  SceneBuilder builder;
+  builder.lamp(g, translate({1e-4, -2e-4, 3e-5}) * test::rotate_x(33) * scale(size));
+  builder.shape(SphereShape{}, {}, builder.diffuse(.5)).flip_normals = true;
+  return builder;
+}
+
+V3 direction_of(RandomStream& r) {
+  const float z = 2 * r.uniform() - 1;
+  const V2 c = unit_circle(r.uniform());
+  const float sine = std::sqrt(1 - z * z);
+  return {sine * c.x, sine * c.y, z};
+}
+
+TEST(SmallLamp, IsNotHiddenByItself) {
+  const ls::Geometry kinds[] = {RectangleShape{}, DiskShape{}, CubeShape{}, SphereShape{},
+                                CylinderShape{{0, 0, -1}, {0, 0, 1}, .5}};
+  for (const ls::Geometry& kind : kinds)
+    for (const double size : {.2, .02, .001}) {
+      const LightBench b(lamp_in_a_ball(kind, size));
+      RandomStream r(3);
+      int sampled = 0, hidden = 0;
+      for (int i = 0; i < 20000; ++i) {
+        const V3 x = direction_of(r) * (.9f * static_cast<float>(b.world->geometry.scale));
+        const auto s =
+            b.world->lights.sample(b.world->lights.choose(numbers(0, r.uniform(), r.uniform())), x);
+        if (!s) continue;
+        ++sampled;
+        const V3 f = s->target - x;  // shadow rays are aimed at the target
+        const float distance = std::sqrt(dot(f, f));
+        hidden += b.world->accel.occluded(x, f / distance, distance) ? 1 : 0;
+      }
+      // Half of the points see only the back of a flat lamp
+      EXPECT_GT(sampled, 5000) << kind.index() << ' ' << size;
+      EXPECT_EQ(hidden, 0) << kind.index() << ' ' << size << " of " << sampled;
+    }
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The choice of a light by place: its probabilities, what they follow, and odd input.
+// The choice of a light by place: its probabilities, the formula that they follow, and unusual input.
 #include "worker/render/lights/local_lights.h"
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ LightVisits two_rooms(int count) {
 TEST(LocalLights, AreChosenWhereTheyReach) {
   const LocalLights lights(two_rooms(20000), kTable);
   for (const V3& n : {V3(1, 0, 0), V3(0, -1, 0), V3(.1f, .2f, .9f)}) {
-    // All but the table's quarter
+    // The table of all lights keeps a quarter of the probability
     EXPECT_NEAR(lights.probability(0, {-.5f, .5f, .5f}, n), .75 + .25 * .6, .01);
     EXPECT_NEAR(lights.probability(1, {.5f, .5f, .5f}, n), .75 + .25 * .3, .01);
     EXPECT_NEAR(lights.probability(2, {.5f, .5f, .5f}, n), .25 * .1, 1e-6);
@@ -44,7 +44,7 @@ TEST(LocalLights, AreDrawnWithTheProbabilityThatTheyHave) {
   for (int i = 0; i < 200; ++i) {
     const V3 p(4 * random.uniform() - 2, 4 * random.uniform() - 2, random.uniform());
     const V3 n(random.uniform() - .5f, random.uniform() - .5f, random.uniform() - .5f);
-    // The words of each light are consecutive, so the probabilities are found by their ends
+    // The words of each light are consecutive, so the first and the last word of each light are tried
     double before = 0;
     for (std::uint32_t l = 0; l < 3; ++l) {
       const float probability = lights.probability(l, p, n);
@@ -62,7 +62,8 @@ TEST(LocalLights, AreDrawnWithTheProbabilityThatTheyHave) {
 }
 
 TEST(LocalLights, FollowTheSquareRootOfTheMeanSquare) {
-  // Everywhere the first light brings nine parts of ten in one visit of four, and else the second all
+  // At every fourth place the first light brings 9/10 of the light and the second 1/10; at all other places
+  // the second brings all of it
   LightVisits visits;
   for (int i = 0; i < 4000; ++i)
     visits.add({static_cast<float>(i) * 1e-3f, 0, 0}, {0, 0, 1},
@@ -102,7 +103,7 @@ TEST(LocalLights, TakeOddVisits) {
   EXPECT_TRUE(visits.places.empty()) << "dark, or without a meaning";
 
   for (int i = 0; i < 1000; ++i) visits.add({1, 2, 3}, {0, 0, 1}, std::array{1.f, 0.f, 0.f});
-  // Half of the places have the smallest coordinate, which no plane can divide from the others by the median
+  // More than half of the places have the smallest coordinate, so a plane at the median cannot separate them
   for (int i = 0; i < 900; ++i)
     visits.add({2, 2, static_cast<float>(i)}, {0, 1, 0}, std::array{i < 500 ? 0.f : 1.f, 1.f, 0.f});
   for (int i = 0; i < 1000; ++i) visits.add({2, 2, 0}, {0, 1, 0}, std::array{0.f, 1.f, 0.f});

@@ -1,4 +1,4 @@
-// Portals: the plane on which they are found, the density of their directions, and odd input.
+// Portals: the plane on which they are found, the density of their directions, and unusual input.
 #include "worker/render/lights/portals.h"
 
 #include <gtest/gtest.h>
@@ -14,9 +14,9 @@ namespace {
 
 using Found = Portals::Found;
 
-// A room of 2 x 2 x 2 about the origin whose sky is seen through a window at the given axis and offset, from
-// -0.1 to 0.3 and from 0.4 to 0.7 on the two axes after that: rays from points in the room to points of the
-// window.
+// A room of 2 x 2 x 2 units about the origin, from which the sky is visible through a window. The window is
+// in the plane of the given axis and offset; on the next two axes it extends from -0.1 to 0.3 and from 0.4 to
+// 0.7. rays() start at points in the room and pass through the window.
 struct Window {
   int axis = 0;
   float offset = .8f;
@@ -43,16 +43,16 @@ struct Window {
     return all;
   }
 };
-// The share of the samples that must lead through the window: 16 times its share of the wall. It cannot be 1:
-// a fifth of the samples is uniform over the portal's rectangle, which has a margin, and on a plane that is
-// not quite that of the window, rays at grazing angles are spread.
+// The share of the samples that must pass through the window: 16 times its share of the wall. It cannot be 1:
+// a fifth of the samples is uniform over the portal's rectangle, which has a margin. If the portal is not
+// exactly in the plane of the window, rays at grazing angles also spread on it.
 constexpr double kUseful = .5;
 
 V3 at_plane(const Window& w, const V3& p, const V3& d) {
   return p + d * ((w.offset - p[w.axis]) / d[w.axis]);
 }
 
-// The share of the samples of a point in the room that lead through the window
+// The share of the samples from a point in the room that pass through the window
 double share_through(const Window& window, const Portals& portals, RandomStream& random) {
   constexpr int kSamples = 2000;
   const V3 p(.1f, -.3f, .2f);
@@ -83,17 +83,17 @@ std::vector<Found> through(std::initializer_list<Window> windows) {
   return all;
 }
 
-// The means of functions of sampled directions are the integrals of these functions times the density, which
-// are estimated by uniform directions; the integral of the density is the share of samples that have a
-// direction. Five standard errors each.
+// The mean of a function over sampled directions is the integral of the function times the density, and the
+// integral of the density is the share of samples that have a direction. Both integrals are estimated by
+// uniform directions. Each test allows five standard errors.
 TEST(Portals, HaveTheDensityThatTheySay) {
   const std::vector<Found> found = through({Window{0, .8f}, Window{1, -.7f}, Window{2, .9f}});
   const Portals portals(found);
   for (const V3& p : {V3(0, 0, 0), V3(.5f, -.2f, .6f), V3(-.9f, .9f, -.9f), V3(.95f, 0, 0), V3(2, 3, 4)}) {
     constexpr int kSamples = 1 << 18;
     RandomStream random(7);
-    double sampled = 0;  // samples that have a direction
-    int rounded = 0;     // samples of density 0
+    double sampled = 0;  // share of the samples that have a direction
+    int rounded = 0;     // number of samples of density 0
     std::array<double, 2> by_samples{}, by_sphere{}, squares{}, sphere_squares{};
     const auto values = [](const V3& d) { return std::array<double, 2>{std::max(0.f, d.x), d.y * d.z}; };
     for (int i = 0; i < kSamples; ++i) {
@@ -106,8 +106,8 @@ TEST(Portals, HaveTheDensityThatTheySay) {
       }
       sampled += d ? 1. / kSamples : 0;
     }
-    // A sample at the edge of a rectangle may be rounded to a place beside it, where no light was learned:
-    // the places of points in a room have errors of 1e-6 of its rectangles.
+    // A sample at the edge of a rectangle may be rounded to a place outside of it, where the density is 0.
+    // The places of points in a room have errors of 1e-6 of the size of the rectangles.
     EXPECT_LE(rounded, 1e-4 * kSamples);
     double integral = 0, integral_squares = 0;
     for (int i = 0; i < kSamples; ++i) {
@@ -163,7 +163,8 @@ TEST(Portals, BearOddInput) {
   EXPECT_FALSE(Portals({}).any());
   const V3 p(.1f, .2f, .3f), d(1, 0, 0);
   EXPECT_FALSE(Portals(std::vector<Found>{{p, d, 1}}).any()) << "one point encloses no room";
-  // All points on a line, whose box has no volume; directions along its faces and edges; light of all sizes
+  // All points are on a line, so their box has no volume. Directions are along its faces and edges, and the
+  // values of light span the range of float32
   std::vector<Found> flat;
   for (int i = 0; i < 100; ++i)
     flat.push_back({{static_cast<float>(i) * .01f, 0, 0},

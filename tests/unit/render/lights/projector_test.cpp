@@ -1,4 +1,4 @@
-// The projector: Mitsuba 3's values, and what its image does on a wall.
+// The projector: values of Mitsuba 3, and the image on a wall.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -45,7 +45,7 @@ const OracleRow kOracle[] = {
     {FovAxis::diagonal, {1.1, 3.7, 0}, {0, 0, 0}},
 };
 
-// 3 x 2 texels: (1 + x + 3 y, (x + 1) / 2, (y + 1) / 4).
+// An image of 3 x 2 texels with the values (1 + x + 3 y, (x + 1) / 2, (y + 1) / 4).
 test::SkyImage slide() {
   test::SkyImage s(3, 2);
   for (int y = 0; y < 2; ++y)
@@ -69,7 +69,8 @@ C3 arriving_through(const LightBench& b, const V3d& p) {
 }
 
 TEST(Projector, ArrivesAsInMitsuba) {
-  for (const double size : {.01, 1., 300.})  // of the scene, and so of its units
+  // The size of the scene, and so of the world's unit of length
+  for (const double size : {.01, 1., 300.})
     for (const OracleRow& row : kOracle) {
       ProjectorEmitter e;
       e.to_world = test::look_at({1, 2, 5}, {1.5, 2, 0}, {0, 1, 0});
@@ -78,7 +79,8 @@ TEST(Projector, ArrivesAsInMitsuba) {
       e.scale = kScale;
       const LightBench b(projecting(slide(), e, size));
       const C3 got = arriving_through(b, row.p);
-      // Float32 on both sides: 1e-7 of the distance to the texels' edges is far from any of these points.
+      // Both sides compute in float32. Its errors, 1e-7, are far smaller than the distances of these points
+      // to the edges of texels.
       for (int c = 0; c < 3; ++c) EXPECT_NEAR(got[c], row.value[c], 3e-6 * row.value[c]) << row.p.x;
     }
 }
@@ -111,13 +113,13 @@ TEST(Projector, AsIntensityIsEvenInAllDirections) {
   for (const double distance : {.5, 1., 8.})
     for (const double x : {-.9, 0., .6}) {
       const V3d at = V3d(x, .3, 1) * distance;
-      const double want = .75 / at.dot(at);  // float32, of the squared distance
+      const double want = .75 / at.dot(at);  // in float32, with the squared distance
       EXPECT_NEAR(arriving_through(b, at).x, want, 3e-6 * want);
     }
 }
 
-// By this intensity the light tree chooses. Were it that along the axis, a wide projector would be chosen too
-// seldom where its corners shine.
+// The light tree chooses by this intensity. If it were the intensity along the axis, a wide projector would
+// be chosen too seldom where its corners shine.
 TEST(Projector, HasTheMeanIntensityOfItsDirectionsInTheTree) {
   for (const bool even : {false, true}) {
     ProjectorEmitter e;
@@ -128,7 +130,8 @@ TEST(Projector, HasTheMeanIntensityOfItsDirectionsInTheTree) {
     const LightWorld lit{b.world->geometry, b.world->textures};
     const ProjectorLight light = make_light(std::get<ProjectorEmitter>(builder.scene.emitters.front()), lit);
 
-    constexpr int kSteps = 300;  // a multiple of the texels in both directions
+    // A multiple of the numbers of texels in both directions
+    constexpr int kSteps = 300;
     double intensity = 0, directions = 0;
     for (int i = 0; i < kSteps; ++i)
       for (int j = 0; j < kSteps; ++j) {
@@ -141,7 +144,7 @@ TEST(Projector, HasTheMeanIntensityOfItsDirectionsInTheTree) {
       }
     const double mean = intensity / directions;
 
-    // The steps are squares that the middle stands for: to (width of a step)^2, which is 1e-4.
+    // The midpoint rule over squares has an error of (width of a step)^2, which is 1e-4.
     EXPECT_NEAR(light.bounds(lit).intensity, mean, 1e-4 * mean) << even;
   }
 }

@@ -12,7 +12,7 @@ using test::SceneBuilder;
 
 constexpr double kRadii[] = {1e-3, .267, 5, 45, 90};
 
-// Shines from +z, with irradiance 2, upon a small floor.
+// A sun that shines from +z, with the irradiance 2, on a small floor.
 SceneBuilder sunny(double radius, const Vec3& direction = {0, 0, -1}) {
   SceneBuilder builder;
   builder.shape(RectangleShape{}, test::scale(.1), builder.diffuse(.5));
@@ -29,7 +29,7 @@ TEST(Sun, GivesAPlaneThatFacesItTheStatedIrradiance) {
   }
 }
 
-// As long as all of it is above the plane, the mean direction of a disk is its centre.
+// While the whole disk is above the plane, its mean direction is its centre.
 TEST(Sun, FollowsTheCosineWhileItIsUp) {
   for (const double radius : {.267, 5., 40.})
     for (const double angle : {10., 49.}) {
@@ -53,7 +53,7 @@ TEST(Sun, EverySampleIsSeenAsWhatItIs) {
       EXPECT_FALSE(s->delta);
       ASSERT_FLOAT_EQ(s->radiance.x, static_cast<float>(radiance(radius)));
       ASSERT_FLOAT_EQ(s->pdf, static_cast<float>(1 / solid_angle));
-      // A path that leaves that way, chosen with density q, counts q / (q + p) of it.
+      // A path that leaves in this direction, sampled with the density q, gets q / (q + p) of the light.
       const C3 full = b.world->lights.environment(V3(0), s->direction, kInfinity, {});
       if (is_black(full)) continue;
       ++seen;
@@ -66,8 +66,8 @@ TEST(Sun, EverySampleIsSeenAsWhatItIs) {
       ASSERT_EQ(parts.sampled, full);
       ASSERT_FLOAT_EQ(parts.pdf, s->pdf);
     }
-    // A direction is good to 6e-8 in each component: the rim is blurred by that, of a disk of radius 1.7e-5
-    // at the least, and so up to 2 sqrt(3) 6e-8 / 1.7e-5 = 1.2 % of its area.
+    // Each component of a direction is accurate to 6e-8. This blurs the rim of the disk, whose radius is at
+    // least 1.7e-5, so at most 2 sqrt(3) 6e-8 / 1.7e-5 = 1.2 % of its area.
     EXPECT_GE(seen, radius > .1 ? 9990 : 9850) << radius;
   }
 }
@@ -96,8 +96,8 @@ TEST(Sun, OfNoSizeIsTheParallelLight) {
   }
 }
 
-// Next-event estimation and paths that leave the scene share it by their densities: together all of it, on a
-// floor (radiance .5 E / pi), in a mirror and for the camera.
+// Next-event estimation and paths that leave the scene share the light by their densities. Together they must
+// find all of it: on a floor (radiance .5 E / pi), in a mirror and for the camera.
 TEST(Sun, IsCountedOnceByAllWaysOfFindingIt) {
   for (const double radius : {2., 30., 80.}) {
     SceneBuilder builder = sunny(radius);

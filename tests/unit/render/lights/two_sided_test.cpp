@@ -1,4 +1,4 @@
-// Area lights whose back shines like their front.
+// Area lights that shine on both sides.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -42,9 +42,9 @@ TEST(TwoSidedLight, ASphereShinesInwardsAndOutwards) {
   for (const double d : {1.5, 4.}) expect_close(bench.irradiance({0, 0, d}, {0, 0, -1}), M_PI / (d * d));
 }
 
-// A cylinder of radius 1 and length 2 h about the z axis, seen from its middle: what lies at the height z in
-// a ring of the width dz has the form factor for a plane with the normal along z, and the upper half gives pi
-// (1 - share of the open end) with the end a disk at h: pi - pi / (1 + h^2).
+// A cylinder of radius 1 and length 2 h about the z axis, seen from its middle by a plane whose normal is
+// along z. The upper half of the cylinder gives pi minus the share of the open end, a disk at height h: pi -
+// pi / (1 + h^2).
 TEST(TwoSidedLight, ACylinderShinesInwards) {
   const double h = 1.5;
   const LightBench bench(two_sided(CylinderShape{{0, 0, -h}, {0, 0, h}, 1}, {}));
@@ -60,24 +60,12 @@ TEST(TwoSidedLight, AHitHasTheRadianceAndDensityOfItsSample) {
     for (const V3d& place : {V3d(.3, .2, -4), V3d(.3, .2, 4), V3d(.1, .2, -.3)}) {
       const LightBench b(two_sided(g, turned));
       const V3 x = b.at(place);
-      RandomStream r(5);
-      int hits = 0;
-      for (int i = 0; i < 4000; ++i) {
-        const auto s =
-            b.world->lights.sample(b.world->lights.choose(numbers(0, r.uniform(), r.uniform())), x);
-        if (!s) continue;
-        const auto primitive = b.world->accel.nearest(x, s->direction, kInfinity);
-        SurfaceHit hit;
-        if (!primitive || !b.world->geometry.complete(*primitive, x, s->direction, hit)) continue;
-        // Another face is in front, or beside it at an edge. Samples end 2^-20 of the world before the light.
-        if (std::abs(hit.t - s->distance) > 1e-5f * s->distance + 4e-6f) continue;
-        const float c = std::abs(dot(hit.ng, s->direction));
-        if (c < .05f) continue;
-        ++hits;
-        ASSERT_EQ(b.world->lights.emitted(hit, -s->direction), s->radiance) << g.index();
-        // As of beams: cosines are good to 2^-20 of the world in a length of 1/100 of it.
-        ASSERT_NEAR(b.world->lights.pdf(hit, x, s->direction) / s->pdf, 1, 1e-4 / c) << g.index();
-      }
+      const int hits =
+          for_hits_of_samples(b, x, 4000, [&](const LightSample& s, const SurfaceHit& hit, float cosine) {
+            ASSERT_EQ(b.world->lights.emitted(hit, -s.direction), s.radiance) << g.index();
+            // Cosines are accurate to 2^-20 of the world's size over a length of 1/100 of it.
+            ASSERT_NEAR(b.world->lights.pdf(hit, x, s.direction) / s.pdf, 1, 1e-4 / cosine) << g.index();
+          });
       EXPECT_GT(hits, 300) << g.index() << " " << place.z;
     }
 }
@@ -100,9 +88,9 @@ TEST(TwoSidedLight, TheFarWallOfASphereIsFoundByDirectionsAlone) {
   }
 }
 
-// A floor of albedo 1/2 under a sphere of radius 1/2 at height 4 that lets light through: each ray towards it
-// meets the near wall and the far one, so the irradiance is 2 pi (r / d)^2, and the radiance half of that
-// over pi.
+// A floor of albedo 1/2 lies under a sphere of radius 1/2 at height 4 that lets light through. Each ray
+// towards the sphere meets its near wall and its far wall, so the irradiance is 2 pi (r / d)^2, and the
+// radiance is half of that over pi.
 TEST(TwoSidedLight, BothWallsOfAClearSphereLightTheFloor) {
   SceneBuilder builder({1, 1});
   Shape& lamp = builder.lamp(SphereShape{}, translate({0, 0, 4}) * test::scale(.5));
@@ -113,7 +101,8 @@ TEST(TwoSidedLight, BothWallsOfAClearSphereLightTheFloor) {
 
   const test::Estimate e = test::estimate(builder, 1 << 16);
 
-  // 0.2 degrees are 0.006 at the floor, which changes the irradiance by (0.006 / 4)^2
+  // The field of view of 0.2 degrees covers 0.006 units of the floor, over which the irradiance changes by
+  // (0.006 / 4)^2
   EXPECT_NEAR(e.mean[0], 1. / 64, 5 * e.standard_error[0] + 1e-5 / 64);
   EXPECT_LT(e.standard_error[0], .01 / 64);
 }
@@ -142,7 +131,7 @@ TEST(TwoSidedLight, HasThePowerOfTwo) {
   EXPECT_NEAR(b.world->lights.choose(numbers(0, 0, 0)).probability, 7. / 12, 1e-6);
 }
 
-// Beams of 30 degrees to both sides: pi sin^2 of the flux of a plain light each.
+// Beams of 30 degrees to both sides: each has sin^2 30 of the flux pi of a plain light.
 TEST(TwoSidedLight, ABeamShinesBothWays) {
   SceneBuilder builder = two_sided(RectangleShape{}, test::scale(.5));
   builder.scene.shapes[0].emitter->cutoff_angle = builder.scene.shapes[0].emitter->beam_width = 30;
@@ -151,13 +140,13 @@ TEST(TwoSidedLight, ABeamShinesBothWays) {
     const double a = degrees * M_PI / 180, d = 1000;
     const V3 towards(std::sin(a), 0, std::cos(a));
     const double lit = degrees < 30 || degrees > 150 ? std::abs(std::cos(a)) / (d * d) : 0;
-    // As of beams: seen from there the light is 1 / 1000 rad wide.
+    // From that distance the light is 1 / 1000 rad wide.
     EXPECT_NEAR(b.irradiance(V3d(towards) * d, -towards, 32).mean, lit, 2e-3 / (d * d)) << degrees;
   }
 }
 
-// 40 of them in a plane, chosen by the tree, and 20 faint ones that only shine down: the irradiance on both
-// sides is the sum of that of each.
+// 40 two-sided lights in a plane, chosen by the tree, and 20 faint ones that only shine down. The irradiance
+// on each side is the sum of those of the lights that shine there.
 TEST(TwoSidedLight, ManyAreFoundFromBehindByTheTree) {
   SceneBuilder builder;
   constexpr double kSize = .05, kHeight = 3, kFaint = .01;
@@ -170,7 +159,7 @@ TEST(TwoSidedLight, ManyAreFoundFromBehindByTheTree) {
       builder.lamp(RectangleShape{}, at, {kFaint, kFaint, kFaint}).flip_normals = true;
     else
       builder.lamp(RectangleShape{}, at).emitter->two_sided = true;
-    // A small light gives L A cos^2 / d^2, up to (size / d)^2 = 3e-4 of it.
+    // A small light gives L A cos^2 / d^2, with a relative error of at most (size / d)^2 = 3e-4.
     const double d2 = x * x + y * y + kHeight * kHeight,
                  e = 4 * kSize * kSize * kHeight * kHeight / (d2 * d2);
     (faint ? of_faint : of_all) += e * (faint ? kFaint : 1);
@@ -193,8 +182,8 @@ TEST(TwoSidedLight, ManyAreFoundFromBehindByTheTree) {
     }
     const double deviation = std::sqrt(square - sum * sum);
     EXPECT_NEAR(sum, expected, 5 * deviation / std::sqrt(kN) + 1e-3 * expected) << side;
-    // A tree that knew only the fronts would choose the faint ones from behind, and leave the others to the
-    // sixteenth that goes by the table: a deviation of four times the mean.
+    // A tree that considered only the fronts would choose the faint lights from behind, and find the others
+    // only by the 1/16 of the words that use the table: the deviation would be four times the mean.
     EXPECT_LT(deviation, sum) << side;
   }
 }

@@ -1,4 +1,4 @@
-// Directions that stay directions.
+// Frames stay orthonormal, and directions stay unit vectors.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// Numbers of a sample: functions of (seed, pixel, sample, vertex, purpose), well spread within a half of a
-// pixel, unrelated otherwise.
+// The random numbers of a sample: they are functions of (seed, pixel, sample, vertex, purpose), form
+// low-discrepancy points within a half of a pixel's samples, and are independent otherwise.
 #include "worker/render/math/sampler.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,8 @@ std::array<std::uint32_t, 4> sobol4(std::uint32_t index, std::uint64_t key) {
   return sobol4_reversed(reverse_bits(index), key);
 }
 
-// Points 2^k with one in each elementary interval of area 2^-k: a (0, k, 2)-net in base 2.
+// True if these 2^k points form a (0, k, 2)-net in base 2: each elementary interval of area 2^-k contains one
+// point.
 bool is_net(const std::vector<std::array<std::uint32_t, 2>>& points, int k) {
   for (int a = 0; a <= k; ++a) {
     std::set<std::uint64_t> cells;
@@ -52,7 +53,8 @@ TEST(Sobol, EveryDimensionIsStratifiedOnItsOwn) {
 }
 
 TEST(Sobol, AlignedBlocksOfARoundAreNetsToo) {
-  for (const std::uint32_t start : {32u, 64u, 96u, 1024u}) {  // rounds are half a power of two per half
+  // A round has a power of two of samples in each half
+  for (const std::uint32_t start : {32u, 64u, 96u, 1024u}) {
     std::vector<std::array<std::uint32_t, 2>> points;
     for (std::uint32_t i = start; i < start + 32; ++i) {
       const auto p = sobol4(i, 5);
@@ -73,7 +75,8 @@ TEST(SampleStream, HalvesAreTheEvenAndTheOddSamplesEachStratified) {
   }
 }
 
-// Mean product of two centred uniforms over n pairs has standard deviation 1 / (12 sqrt n); 5 of them: 6e-7.
+// The mean product of two centred uniform numbers over n pairs has the standard deviation 1 / (12 sqrt n).
+// The limit is 5 of them, which is exceeded with probability 6e-7.
 constexpr int kPairs = 4096;
 constexpr double kLimit = 5 / (12. * 64);
 double correlation(const auto& a, const auto& b) {
@@ -102,7 +105,8 @@ TEST(SampleStream, PixelsHalvesSeedsVerticesAndPurposesAreUncorrelated) {
 }
 
 TEST(SampleStream, NoKeyRepeatsOverAJobOfAMillionNumbers) {
-  // First words of tracker streams: 64-bit keys; 2^20 of them collide by chance with probability 3e-8.
+  // The first words of trackers' streams are 64-bit hashes; among 2^20 of them a collision has the
+  // probability 3e-8.
   std::vector<std::uint64_t> keys;
   for (std::uint32_t y = 0; y < 16; ++y)
     for (std::uint32_t x = 0; x < 16; ++x)
@@ -127,7 +131,7 @@ TEST(Exponential, IsTheLogarithmToTheLastPlacesAtBothEnds) {
   const auto check = [](std::uint32_t bits) {
     const double x = (static_cast<double>(~bits) + .5) * 0x1p-32, y = (bits + .5) * 0x1p-32;
     const double exact = x < .5 ? -std::log1p(-x) : -std::log(y);
-    // Four roundings of 2^-24 and a logarithm good to one unit in its last place.
+    // The error is that of four roundings of 2^-24 and of a logarithm that is accurate to one ulp.
     ASSERT_NEAR(exponential(bits) / exact, 1, 6 * 0x1p-24) << bits;
   };
   EXPECT_FLOAT_EQ(exponential(0), 33 * std::log(2.f));
@@ -141,11 +145,11 @@ TEST(Exponential, IsTheLogarithmToTheLastPlacesAtBothEnds) {
   for (std::uint32_t i = 0; i < 300; ++i) check(~i);
 }
 
-// A thin medium scatters the share 1 - e^-depth of all flights: as many of the 2^32 inputs, to
-// one.
+// A medium of optical depth `depth` scatters the share 1 - e^-depth of all flights: that share of the 2^32
+// inputs, to within one input.
 TEST(Exponential, TheShareBelowAThinDepthIsThatDepth) {
   for (const double depth : {1e-9, 1e-8, 3e-8, 1e-7, 1e-6, 1e-3, .5, .7, 2.}) {
-    std::uint64_t lo = 0, hi = 1ull << 32;  // depths fall with bits: the first input below the depth
+    std::uint64_t lo = 0, hi = 1ull << 32;  // bisection: depths decrease with the input
     while (lo < hi) {
       const std::uint64_t mid = (lo + hi) / 2;
       if (exponential(static_cast<std::uint32_t>(mid)) < static_cast<float>(depth)) {
@@ -183,12 +187,12 @@ TEST(RandomStream, ItsExponentialsResolveThinDepths) {
     ASSERT_GT(e, 0);
     if (e < 0x1p-13f) {
       ++below;
-      // -log of a float32 near 1 would be a multiple of 2^-24, but for its second order.
+      // -log of a float32 near 1 would be a multiple of 2^-24, up to its second-order term.
       odd += std::abs(std::remainder(e, 0x1p-24f)) > .25f * 0x1p-24f;
     }
   }
   EXPECT_NEAR(below, kN * 0x1p-13, 5 * std::sqrt(kN * 0x1p-13));
-  EXPECT_GT(odd, below / 4);  // half of them on average, of 512
+  EXPECT_GT(odd, below / 4);  // on average half of the 512
 }
 
 }  // namespace

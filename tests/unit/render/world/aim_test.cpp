@@ -1,9 +1,14 @@
-// Where paths look for light beside the vertices that they reach by chance: which scenes use it, and that it
-// brings what it is for. That the image stays the same is tested in tests/statistical and tests/property.
+// Additional points on segments, directions near lamps and directions towards the sky (aim.h): which scenes
+// use them, and that they reduce noise. That the image stays the same is tested in techniques_test.cpp,
+// tests/statistical and tests/property.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/support/render_check.h"
+#include "tests/support/sky_yard.h"
+#include "worker/render/world/aim.h"
+#include "worker/render/world/pilot.h"
+#include "worker/render/world/world_build.h"
 
 namespace ls::render {
 namespace {
@@ -82,13 +87,13 @@ TEST(Aim, LeavesOutWhatASceneDoesNotNeed) {
     EXPECT_THAT(report(builder).variant, Not(HasSubstr("aimed")));
 }
 
-// A crop has the pixels of the full frame, so the choice must not look at the crop alone.
+// A crop must have the pixels of the full frame, so the decision must not depend on the crop.
 TEST(Aim, ChoosesForACropAsForTheWholeFrame) {
   SceneBuilder whole = fog(.1);
   add_sun(whole);
   SceneBuilder crop = whole;
   crop.scene.film.crop_offset = {0, 0};
-  crop.scene.film.crop_size = {4, 4};  // sees next to nothing of the fog
+  crop.scene.film.crop_size = {4, 4};  // shows hardly any fog
   const auto a = render_tile(*test::world_of(whole), {0, 0, 4, 4}, {0, 8}, nullptr, nullptr);
   const auto b = render_tile(*test::world_of(crop), {0, 0, 4, 4}, {0, 8}, nullptr, nullptr);
   EXPECT_EQ(a.sums, b.sums);
@@ -99,10 +104,10 @@ double squared_error(const SceneBuilder& builder) {
   return estimate.standard_error[1] * estimate.standard_error[1];
 }
 
-// With the optical depth 0.2 a flight ends in the fog in a share p = 0.18 of all samples, and then brings all
-// that is scattered there: the variance of a sample is (1 - p) / p = 4.5 times the square of its mean. Points
-// on the segment leave what the sun's way through the fog varies by: its transmittance lies between 1 and
-// exp(-0.2), so the variance is below 0.01 times that square.
+// With an optical depth of 0.2 a share p = 0.18 of the flights ends in the fog, and only these find the light
+// that is scattered there: the variance of a sample is (1 - p) / p = 4.5 times the square of its mean. With
+// points on the segment only the sun's transmittance through the fog varies, between 1 and exp(-0.2), so the
+// variance is below 0.01 times that square.
 TEST(Aim, TakesTheNoiseFromLightScatteredOnceInThinFog) {
   for (const bool grid : {false, true}) {
     SceneBuilder points = fog(.1, grid, 0);
@@ -115,6 +120,66 @@ TEST(Aim, TakesTheNoiseFromLightScatteredOnceInThinFog) {
     none.scene.integrator.camera_points = -1;
     EXPECT_LT(squared_error(points), .01 * squared_error(none)) << grid;
   }
+}
+
+SceneBuilder yard() { return test::sky_yard({32, 16}); }
+
+bool looks(const SceneBuilder& b) { return test::world_of(b)->sky_samples; }
+template <class Change>
+bool looks_with(Change change) {
+  SceneBuilder b = yard();
+  change(b);
+  return looks(b);
+}
+
+TEST(SkySamples, AreTakenWhereTheSkyLightsTheScene) {
+  EXPECT_TRUE(looks(yard()));
+  EXPECT_FALSE(looks_with([](SceneBuilder& b) {
+    std::get<ConstantEmitter>(b.scene.emitters.front()).radiance = {1e-5, 1e-5, 1e-5};
+  })) << "the lamp is far brighter";
+}
+
+// The mean radiance of the pilot's paths of two segments, from which the decision is made.
+double light_scattered_once(const SceneBuilder& b, std::uint64_t seed = 0) {
+  RenderSettings settings = test::settings_of(b.scene);
+  settings.seed = seed;
+  const auto world = make_world(b.scene, settings, b.files, 1).value();
+  return pilot_radiance(*world, 2).value();
+}
+
+TEST(SkySamples, AreTheSameForEverySeedAndCrop) {
+  const double light = light_scattered_once(yard());
+  EXPECT_GT(light, 0);
+  EXPECT_EQ(light_scattered_once(yard(), 7), light);
+  SceneBuilder crop = yard();
+  crop.scene.film.crop_offset = {8, 4};
+  crop.scene.film.crop_size = {5, 6};
+  EXPECT_EQ(light_scattered_once(crop), light);
+  EXPECT_TRUE(looks(crop));
+}
+
+TEST(SkySamples, AreLeftOutWhereTheyAreNotNeeded) {
+  EXPECT_FALSE(looks_with([](SceneBuilder& b) { b.scene.integrator.sky_samples = -1; }));
+  EXPECT_FALSE(looks_with([](SceneBuilder& b) { b.scene.emitters.clear(); })) << "no sky";
+  EXPECT_FALSE(looks_with([](SceneBuilder& b) { b.scene.integrator.max_depth = 1; }))
+      << "light that is not scattered";
+  EXPECT_FALSE(looks_with([](SceneBuilder& b) { b.scene.integrator.name = "volpath_distant_mis"; }));
+  EXPECT_FALSE(looks_with([](SceneBuilder& b) {
+    b.container(SphereShape{{0, -1, 1}, .2}, {}, b.null(), b.homogeneous({1, 1, 1}, {.5, .5, .5}));
+  })) << "fog";
+  EXPECT_FALSE(looks(test::sky_yard({8, 8}))) << "fewer pixels than the measurement has paths for";
+}
+
+TEST(SkySamples, ReduceNoise) {
+  SceneBuilder without = yard();
+  without.scene.integrator.sky_samples = -1;
+  const auto noise = [](const SceneBuilder& b) {
+    const auto e = test::estimate(b, 32);
+    return e.standard_error[1];
+  };
+  // The two images are the same in each run. Each standard error is that of a sum over 512 pixels, so it is
+  // accurate to about 1 / sqrt(2 * 512) = 3 %. A second direction removes a sixth of the noise.
+  EXPECT_LT(noise(yard()), .95 * noise(without));
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Samples that are rejected or kept though something is wrong with them: counted by cause, located, and
-// replayed.
+// Samples that are rejected, and samples that are kept although something is wrong with them: they are
+// counted by cause, located, and replayed.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,7 +17,8 @@ using test::SceneBuilder;
 using test::operator*;
 
 TEST(Health, SamplesTooLargeToBeAddedUpAreCountedAndContributeNothing) {
-  for (const double radiance : {1e30, 2e38}) {  // of the second even two are more than a float32 holds
+  // Two samples of the second value already exceed the range of float32.
+  for (const double radiance : {1e30, 2e38}) {
     SceneBuilder builder({2, 2});
     builder.environment(radiance);
     const auto world = test::world_of(builder);
@@ -34,12 +35,11 @@ TEST(Health, SamplesTooLargeToBeAddedUpAreCountedAndContributeNothing) {
   EXPECT_EQ(r.health.nonfinite, 0u);
 }
 
-// One pixel's samples see a lamp that is too bright, the others do not: exactly those are told of, each in
-// its tile.
+// The lamp, which is too bright, is visible only in some pixels: exactly their samples are reported.
 TEST(Health, RejectedSamplesAreLocatedByPixelAndReplayed) {
   SceneBuilder builder({4, 4});
-  // Seen 1 wide and high from a distance of 2: a quarter of the picture a side, its second column and third
-  // row.
+  // Seen from a distance of 2, the view is 2 units wide and high. The lamp covers a quarter of that in each
+  // direction: the second column and the third row.
   builder.lamp(RectangleShape{}, test::translate({-.5, 0, -.5}) * test::rotate_x(90) * test::scale(.25),
                {1e30, 0, 0});
   builder.look({0, -2, 0}, {0, 0, 0}, 2 * std::atan(.5) * 180 / test::kPi);
@@ -67,7 +67,7 @@ TEST(Health, RejectedSamplesAreLocatedByPixelAndReplayed) {
   EXPECT_LT(entry.count, 16u * 6) << "only some pixels see it";
 }
 
-// No scene that is accepted is known to give these: they are put into the finished world by hand.
+// No accepted scene is known to produce such samples, so the finished world is changed.
 TEST(Health, EveryKindOfBadSampleHasItsCause) {
   const auto causes = [](auto spoil) {
     SceneBuilder builder({4, 4});
@@ -95,7 +95,8 @@ TEST(Health, EveryKindOfBadSampleHasItsCause) {
   EXPECT_GT(below.negative, 0u);
 }
 
-// A cube whose density is greater than the bound of its cell, halved by hand: no grid that is read is so.
+// A cube whose density exceeds the bound of its cell, because the test halves the bound. Grids that are read
+// never violate their bounds.
 struct OverItsBound {
   const char* name;
   VolumeFilter filter;
@@ -154,9 +155,9 @@ TEST(Health, TellsOfChangedInputsByCause) {
   EXPECT_EQ(changed_inputs(*test::world_of(builder)), expected);
 }
 
-// Denormal densities: units trace with such numbers as zeros, whatever their thread is set to, and leave it
-// as it was. So they cost what zeros cost. (Taken as numbers these would be an extinction of 8e-10, by their
-// scale, and shine 16 along 2.)
+// Denormal densities count as zeros while rays are traced, whatever the mode of the thread was before, and
+// that mode is restored. So they cost as much time as zeros. (As numbers these densities would have, after
+// scaling, an extinction of 8e-10, and would emit a radiance of 16 along 2 units.)
 TEST(Health, DenormalNumbersAreZerosWhileRaysAreTracedInEveryThread) {
   SceneBuilder builder({4, 4});
   const VolumeIndex grid =

@@ -1,4 +1,5 @@
-// Leaving out what no light gets into, and phase functions that nothing asks, does not change a bit.
+// Leaving out media that no light reaches, and phase functions of media that do not scatter, does not change
+// a bit.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -27,7 +28,8 @@ SceneBuilder room() {
   builder.scene.emitters.push_back(PointEmitter{{1, -1, 1.5}, {1, 1, 1}});
   builder.environment(.1);
   builder.look({0, -5, 1}, {0, 0, 0}, 40);
-  // More random numbers would be keyed by the segments that dead parts add to a path
+  // Dead parts add segments to paths. Camera points and lamp directions would draw random numbers by segment,
+  // so they are switched off
   builder.scene.integrator.camera_points = -1;
   builder.scene.integrator.phase_only = true;
   return builder;
@@ -43,14 +45,14 @@ MediumIndex cloud(SceneBuilder& builder, int channels = 3) {
       builder.grid({2, 2, 2}, values, translate({-1, -1, -1}) * test::scale(2), channels), {.9, .9, .9}, 1,
       .5);
 }
-// A ball of fog that light gets into, beside all else.
+// A ball of fog that light reaches, in addition to the rest of the scene.
 void add_fog(SceneBuilder& builder, double albedo = .8, double g = 0) {
   builder.container(SphereShape{}, translate({-1, -.5, .2}) * test::scale(.5), builder.null(),
                     builder.homogeneous({.8, .8, .8}, {albedo, albedo, albedo}, g));
 }
 
-// What pruning takes out of it, which must be a medium, changes nothing. The instantiation is the one of what
-// is left.
+// Expects that pruning removes at least one medium and changes no bit, and that the pruned scene is rendered
+// by the given instantiation.
 void expect_same_without_medium(SceneBuilder builder, const std::string& variant) {
   std::string before, after;
   const TileResult whole_scene = render(builder, &before);
@@ -107,7 +109,7 @@ TEST(LeaveOutInteriors, BesideMediaThatOverlap) {
   EXPECT_EQ(render(builder).sums, before.sums);
 }
 
-// What pruning would do wrong if it took more: the medium shows.
+// Pruning must keep this medium: without it the image changes.
 TEST(LeaveOutInteriors, OfGlassShow) {
   SceneBuilder builder = room();
   Shape& ball = builder.container(SphereShape{}, test::scale(.5), builder.glass(1.5), cloud(builder));
@@ -117,8 +119,8 @@ TEST(LeaveOutInteriors, OfGlassShow) {
   EXPECT_NE(render(builder).sums, before.sums);
 }
 
-// A room of shapes of all kinds, turned and laid into each other as it comes, with fog of several kinds in
-// and about them; sometimes around the camera, too.
+// A room of shapes of all kinds at random places and orientations, which may intersect. Media of several
+// kinds are in them and around them, sometimes also around the camera.
 SceneBuilder random_room(std::uint32_t seed) {
   std::mt19937 random(seed);
   const auto one_of = [&](std::uint32_t n) { return static_cast<std::uint32_t>(random() % n); };
@@ -157,7 +159,7 @@ TEST(LeaveOutInteriors, OfRandomRooms) {
   int pruned = 0;
   for (std::uint32_t seed = 0; seed < 150; ++seed) {
     SceneBuilder builder = random_room(seed);
-    builder.scene = scene::compacted(builder.scene);  // media are drawn in the order of their numbers
+    builder.scene = scene::compacted(builder.scene);  // random numbers in media depend on their indices
     const Scene left = scene::pruned(builder.scene, {}).scene;
     EXPECT_EQ(scene::pruned(left, {}).scene, left) << seed;
     if (left.media.size() == builder.scene.media.size()) continue;

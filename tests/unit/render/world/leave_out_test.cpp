@@ -1,4 +1,4 @@
-// What a scene does not need costs it nothing, and leaving it out does not change a bit.
+// Features that a scene does not need take no time, and leaving them out does not change a bit.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -26,7 +26,8 @@ SceneBuilder plain_room() {
   builder.scene.emitters.push_back(PointEmitter{{1, -1, 1}, {1, 1, 1}});
   builder.environment(.1);
   builder.look({0, -5, 1}, {0, 0, 0}, 40);
-  // More random numbers would be keyed by the segments that dead parts add to a path
+  // Dead parts add segments to paths. Camera points and lamp directions would draw random numbers by segment,
+  // so they are switched off
   builder.scene.integrator.camera_points = -1;
   builder.scene.integrator.phase_only = true;
   return builder;
@@ -49,7 +50,7 @@ SceneBuilder with(SceneBuilder builder, auto change) {
   return builder;
 }
 
-// Scenes with something dead in them that no ray stops at and that next-event estimation does not choose.
+// Scenes with dead parts: no ray stops at them, and next-event estimation does not choose them.
 std::vector<SceneBuilder> scenes_with_dead_parts() {
   std::vector<SceneBuilder> all;
   for (SceneBuilder (*base)() : {plain_room, foggy, cloudy}) {
@@ -64,21 +65,21 @@ std::vector<SceneBuilder> scenes_with_dead_parts() {
     all.push_back(with(base(), blended(0, false)));
     all.push_back(with(base(), blended(1, false)));
     all.push_back(with(base(), blended(1, true)));
-    all.push_back(with(base(), [](SceneBuilder& k) {  // a mask that hides nothing of a ball
+    all.push_back(with(base(), [](SceneBuilder& k) {  // a mask that hides no part of a ball
       k.shape(SphereShape{}, translate({.2, -.6, .4}) * test::scale(.4),
               k.bsdf(MaskBsdf{k.texture({1, 1, 1}), k.diffuse(.4)}));
     }));
-    all.push_back(with(base(), [](SceneBuilder& k) {  // one that hides all of it, but its light
+    all.push_back(with(base(), [](SceneBuilder& k) {  // a mask that hides all of a ball except for its light
       k.shape(SphereShape{}, translate({.2, -.6, .4}) * test::scale(.4),
               k.bsdf(MaskBsdf{k.texture({0, 0, 0}), k.diffuse(.4)}))
           .emitter = AreaEmitter{k.texture({1, 2, 3})};
     }));
-    all.push_back(with(base(), [](SceneBuilder& k) {  // black lights before and behind those that shine
+    all.push_back(with(base(), [](SceneBuilder& k) {  // black lights before and after others
       k.scene.emitters.insert(k.scene.emitters.begin(), PointEmitter{{2, -1, 1}, {0, 0, 0}});
       k.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, {0, 0, 0}});
       k.scene.shapes.front().emitter = AreaEmitter{k.texture({0, 0, 0})};
     }));
-    all.push_back(with(base(), [](SceneBuilder& k) {  // a medium that does nothing, seen through its boundary
+    all.push_back(with(base(), [](SceneBuilder& k) {  // a medium without effect, seen through its boundary
       const MediumIndex fog = k.homogeneous({.5, .5, .5}, {.5, .5, .5});
       Shape& s = k.container(SphereShape{}, translate({.2, -2.6, .4}) * test::scale(.4), k.null(),
                              k.homogeneous({0, 0, 0}, {.5, .5, .5}));
@@ -101,7 +102,8 @@ TEST(LeaveOut, TakingOutDeadPartsDoesNotChangeABit) {
     changed += world->null_transmission;
     ++scene;
   }
-  EXPECT_EQ(changed, 0);  // no mask or blend is left that shadow rays would have to look at
+  // No mask or blend is left that shadow rays would have to handle.
+  EXPECT_EQ(changed, 0);
 }
 
 TEST(LeaveOut, AWorldHasNoStructureThatItsSceneDoesNotUse) {
@@ -157,7 +159,7 @@ TEST(LeaveOut, TheCheapestInstantiationIsTheOneThatTheNeedsName) {
             "surfaces that light passes");
   EXPECT_EQ(variant(foggy()), "homogeneous grey media");
   EXPECT_EQ(variant(cloudy()), "grey grids");
-  // Fog that stands on a floor: what looks for surfaces on each other is in the general one alone.
+  // Fog on a floor: only the general instantiation handles coincident surfaces.
   EXPECT_EQ(variant(with(foggy(),
                          [](SceneBuilder& k) {
                            k.shape(RectangleShape{}, translate({0, 0, -.9}) * test::scale(3), k.diffuse(.5));
@@ -200,7 +202,7 @@ TEST(LeaveOutCounters, AreExactlyZeroForWhatASceneDoesNotUse) {
                 fog.light_tree + fog.lens,
             0u);
 
-  // In grids only lights that are points, in them or near, have points sampled about them.
+  // In grids, points are sampled equi-angularly only about point lights in them or near them.
   EXPECT_GT(counted(cloudy()).equiangular, 0u);
   const WorkCounters cloud = counted(with(cloudy(), [](SceneBuilder& k) { k.scene.emitters.clear(); }));
   EXPECT_GT(std::min({cloud.phase, cloud.density, cloud.macro_cells}), 0u);

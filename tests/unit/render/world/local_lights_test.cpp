@@ -1,5 +1,6 @@
-// Which scenes choose lights by place, what that brings, and that it depends on nothing that it should not
-// depend on. That the image stays the same is tested in tests/property/local_lights_test.cpp.
+// The choice of lights by place: which scenes use it, how much noise it removes, and that it does not depend
+// on the seed, the crop or the threads. That the image stays the same is tested in
+// tests/property/local_lights_test.cpp.
 #include <gtest/gtest.h>
 
 #include "tests/support/lamp_room.h"
@@ -32,14 +33,14 @@ TEST(LocalLights, AreUsedWhereMostLampsAreInOtherRooms) {
 TEST(LocalLights, AreLeftOutWhereTheyAreNotNeeded) {
   EXPECT_FALSE(is_local_with([](Scene& s) { s.integrator.local_lights = -1; }));
   EXPECT_FALSE(is_local(test::LampRoom{}.builder())) << "one lamp";
-  for (const int lamps : {63, 64})  // in the right room, besides one in the left room
+  for (const int lamps : {63, 64})  // this many in the right room, and one in the left room
     EXPECT_EQ(is_local(LampRooms{.lamps = lamps, .local_lights = 1}.builder()), lamps == 63);
   EXPECT_FALSE(is_local_with([](Scene& s) { s.integrator.name = "volpath_distant_mis"; }, {.fog = .3}));
   EXPECT_TRUE(is_local_with([](Scene& s) { s.integrator.name = "path"; }));
 }
 
-// Two equal lamps that shine everywhere: the table is nearly as good, so the image is as if nothing had been
-// learned.
+// Two equal lamps shine everywhere. The table of all lights is nearly as good, so learning leaves the image
+// unchanged.
 TEST(LocalLights, LeaveNoTraceWhereTheyDoNotPay) {
   SceneBuilder room = test::SunnyRoom{.light_vertices = -1}.builder();
   room.scene.integrator.path_reuse = -1;
@@ -86,9 +87,9 @@ TEST(LocalLights, ReduceNoise) {
   const auto noise = [](int local_lights) {
     return test::estimate(LampRooms{.local_lights = local_lights}.builder({24, 24}), 32).standard_error[1];
   };
-  // Always the same images. Their standard errors are those of sums over 576 pixels, so each is known to
-  // about 1 / sqrt(2 * 576) = 3 %, and less well where few bright pixels decide. Of seven lamps one reaches
-  // most of what is seen.
+  // The two images are the same in each run. Each standard error is that of a sum over 576 pixels, so it is
+  // accurate to about 1 / sqrt(2 * 576) = 3 %, and less if few bright pixels dominate. One of seven lamps
+  // lights most of what is visible.
   EXPECT_LT(noise(0), .7 * noise(-1));
 }
 

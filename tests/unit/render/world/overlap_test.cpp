@@ -1,5 +1,5 @@
-// Media within and across each other. Media that glow and neither absorb nor scatter show, without noise, how
-// far a ray went through each: what is in effect is asked of the geometry, point by point, and compared.
+// Nested and intersecting media. Media that only emit show, without noise, how far a ray travelled in each.
+// The expected light is computed from the geometry, point by point.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,7 +31,7 @@ void look_along_x(SceneBuilder& builder, const Vec3& from) {
 }
 double seen(const SceneBuilder& builder) { return render_sample(*test::world_of(builder), 0, 0, 0).rgb[0]; }
 
-// A cube or ball and what is in it.
+// A cube or ball, and the index of the medium in it.
 struct Body {
   bool ball = false;
   V3d center{0, 0, 0};
@@ -42,7 +42,7 @@ struct Body {
     if (ball) return q.length() < size;
     return std::max({std::abs(q.x), std::abs(q.y), std::abs(q.z)}) < size;
   }
-  // Where the line p + t (1, 0, 0) meets it.
+  // Adds the two t at which the line p + t (1, 0, 0) meets the body.
   void ends(const V3d& p, std::vector<double>& at) const {
     const V3d q = p - center;
     const double half = ball ? std::sqrt(std::max(0., size * size - q.y * q.y - q.z * q.z)) : size;
@@ -55,8 +55,8 @@ struct Glow {
   int priority;
 };
 
-// The light that a ray along +x gathers, by asking every body at the middle of each stretch between any two
-// boundaries.
+// The light that a ray along +x collects. Between two successive boundaries the media are those that contain
+// the point halfway between them.
 double expected_along_x(const std::vector<Body>& bodies, const std::vector<Glow>& media, const V3d& from) {
   std::vector<double> at{0};
   for (const Body& b : bodies) b.ends(from, at);
@@ -91,7 +91,8 @@ SceneBuilder scene_of(const std::vector<Body>& bodies, const std::vector<Glow>& 
   return builder;
 }
 
-// Positions in a world of size 10 are good to 2^-20 of it; per boundary and unit of emission.
+// The error for each boundary and unit of emission: positions in a world of size 10 are accurate to 2^-20 of
+// it.
 constexpr double kPerBoundary = 1e-4;
 
 TEST(Overlaps, AddUpOrGiveWayByPriorityInRandomCrowds) {
@@ -114,7 +115,7 @@ TEST(Overlaps, AddUpOrGiveWayByPriorityInRandomCrowds) {
   }
 }
 
-// Cubes on a lattice: most faces lie on those of others.
+// Cubes on a lattice, so that most of their faces coincide.
 TEST(Overlaps, AreRightWhereManyFacesLieOnEachOther) {
   std::mt19937 rng(8);
   const std::vector<Glow> media{{1, 0}, {3, 0}, {10, 1}, {30, -1}, {.1, 1}};
@@ -134,7 +135,7 @@ TEST(Overlaps, AreRightWhereManyFacesLieOnEachOther) {
   }
 }
 
-// The camera inside of several: the sensor names one of them, the others are found.
+// The camera is inside several media. The sensor names one of them; the others must be found.
 TEST(Overlaps, AreAroundTheCameraToo) {
   std::mt19937 rng(9);
   std::uniform_real_distribution<double> u(-.5, .5), size(.8, 2);
@@ -158,7 +159,8 @@ TEST(Overlaps, AreAroundTheCameraToo) {
   }
 }
 
-// Across a boundary the camera sees the same from both sides, up to the step.
+// A camera on one side of a boundary gets the same light as on the other, up to the distance between the two
+// places.
 TEST(Overlaps, AreSeenAlikeFromBothSidesOfABoundary) {
   const std::vector<Glow> media{{1, 0}, {3, 0}};
   const std::vector<Body> bodies{{false, {0, 0, 0}, 2, 0}, {true, {0, 0, 0}, 1, 1}};
@@ -177,7 +179,7 @@ TEST(Overlaps, AreSeenAlikeFromBothSidesOfABoundary) {
   }
 }
 
-// A boundary that says what is outside of it takes that away inside, and gives it back.
+// A boundary that names an exterior medium replaces this medium inside, and restores it where the ray leaves.
 TEST(Overlaps, ReplaceTheExteriorThatABoundaryNames) {
   SceneBuilder builder({1, 1});
   const MediumIndex fog = glowing(builder, 1), amber = glowing(builder, 10);
@@ -188,8 +190,9 @@ TEST(Overlaps, ReplaceTheExteriorThatABoundaryNames) {
   EXPECT_NEAR(seen(builder), 4 * 1 + 2 * 10, 1e-3);
 }
 
-// Nor does a ball take away what is around it by naming another outside: what is there does not depend on the
-// way, and not on whether a medium of nothing is left out.
+// The exterior that a ball names is not the medium around it. This must not replace the medium around it: the
+// medium at a point depends neither on the path to the point nor on whether a medium without effect is left
+// out.
 TEST(Overlaps, DoNotReplaceTheCamerasMediumByAnExteriorThatIsNot) {
   for (const bool named : {false, true}) {
     SceneBuilder builder({1, 1});
@@ -203,7 +206,7 @@ TEST(Overlaps, DoNotReplaceTheCamerasMediumByAnExteriorThatIsNot) {
   }
 }
 
-// What lies beyond far_clip is not seen: neither surfaces nor media.
+// Neither surfaces nor media are visible beyond far_clip.
 TEST(Overlaps, AndOtherMediaEndWhereTheCameraSeesNoFarther) {
   for (const bool two : {false, true}) {
     SceneBuilder builder({1, 1});
@@ -216,7 +219,7 @@ TEST(Overlaps, AndOtherMediaEndWhereTheCameraSeesNoFarther) {
   }
 }
 
-// A medium of nothing that is preferred is a hole.
+// An empty medium of higher priority is a hole.
 TEST(Overlaps, CanBeHollowedOut) {
   SceneBuilder builder({1, 1});
   const MediumIndex fog = glowing(builder, 1), hole = glowing(builder, 0, 5);
@@ -227,7 +230,8 @@ TEST(Overlaps, CanBeHollowedOut) {
   EXPECT_NEAR(seen(builder), 4, 1e-3);
 }
 
-// Six rectangles around a place are a body; a path may leave by another one than it came in.
+// Six rectangles around a place enclose it: a path may leave through another one than the one through which
+// it entered.
 TEST(Overlaps, EndWhereARoomOfSheetsEnds) {
   SceneBuilder builder({1, 1});
   const MediumIndex fog = glowing(builder, 1), amber = glowing(builder, 10);
@@ -255,7 +259,7 @@ TEST(Overlaps, RejectSamplesInsideOfTooMuchAtOnce) {
   }
 }
 
-// ---- what does not overlap is as it was: the same bits with the state as by the last boundary's word
+// Without overlaps the state of media gives the same bits as following the last boundary
 SceneBuilder nested_by_the_book() {
   SceneBuilder builder({8, 8});
   const MediumIndex fog = builder.homogeneous({.3, .4, .5}, {.9, .8, .7}, .3),
@@ -277,7 +281,7 @@ SceneBuilder nested_by_the_book() {
 TEST(Overlaps, ThatAreNoneChangeNoBit) {
   const SceneBuilder builder = nested_by_the_book();
   const auto world = test::world_of(builder);
-  ASSERT_TRUE(world->overlaps);  // by their boxes
+  ASSERT_TRUE(world->overlaps);  // their bounding boxes overlap
   const auto with = render_tile_as(*world, "everything", {0, 0, 8, 8}, {0, 64});
   const_cast<World&>(*world).overlaps = false;
   const auto without = render_tile_as(*world, "everything", {0, 0, 8, 8}, {0, 64});
@@ -298,12 +302,12 @@ TEST(Overlaps, AreNeededByScenesThatHaveThemOnly) {
     return test::world_of(builder)->need.overlaps;
   };
   EXPECT_FALSE(needs({2.01, 0, 0}, false));
-  EXPECT_TRUE(needs({2, 0, 0}, false));    // touch
-  EXPECT_TRUE(needs({1, 0, 0}, false));    // cross
-  EXPECT_TRUE(needs({2.01, 0, 0}, true));  // stand in what is around the camera
+  EXPECT_TRUE(needs({2, 0, 0}, false));    // they touch
+  EXPECT_TRUE(needs({1, 0, 0}, false));    // they intersect
+  EXPECT_TRUE(needs({2.01, 0, 0}, true));  // they are in the medium of the camera
 }
 
-// ---- mirrored bodies
+// Mirrored bodies
 MeshShape cube_file(SceneBuilder& builder, bool normals) {
   std::string text;
   for (const char* v : {"-1 -1 -1", "1 -1 -1", "1 1 -1", "-1 1 -1", "-1 -1 1", "1 -1 1", "1 1 1", "-1 1 1"})
@@ -333,7 +337,8 @@ TEST(MirroredBodies, KeepTheirMediumInside) {
         builder.container(g, test::scale(1, mirrored ? -1 : 1, 1), builder.null(), fog).flip_normals =
             flipped;
         look_along_x(builder, {-3, .1, .2});
-        // Turned round by hand and not mirrored, inside is outside: what lies behind the body, without end.
+        // A body with flip_normals that is not mirrored has its medium outside: the ray enters it behind the
+        // body, without end.
         const double through = kind == 0 ? 2 * std::sqrt(1 - .05) : 2;
         const double light = seen(builder);
         if (flipped && !mirrored)

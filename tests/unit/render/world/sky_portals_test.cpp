@@ -1,5 +1,5 @@
-// Which scenes look for the sky through portals, what that brings, and that it depends on nothing that it
-// should not depend on. That the image stays the same is tested in tests/property/sky_portals_test.cpp.
+// Portals: which scenes use them, how much noise they remove, and that they do not depend on the crop or the
+// threads. That the image stays the same is tested in tests/property/sky_portals_test.cpp.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -32,7 +32,7 @@ TEST(SkyPortals, AreUsedWhereTheSkyIsRarelySeen) {
   EXPECT_FALSE(has_portals(test::sky_yard({32, 16}))) << "half of the sky is seen from everywhere";
 }
 
-// Scenes whose paths find portals, but where these do not pay: each is rendered as if it had none.
+// In these scenes paths find portals that do not pay: the image is that without portals.
 TEST(SkyPortals, LeaveNoTraceWhereTheyDoNotPay) {
   const auto with = [](auto&& change, SkyRoom room) {
     SceneBuilder b = room.builder();
@@ -46,7 +46,7 @@ TEST(SkyPortals, LeaveNoTraceWhereTheyDoNotPay) {
   const auto wide_sun = [](SceneBuilder& b) {
     b.scene.emitters.push_back(DirectionalEmitter{{-1, -1, -.1}, {2, 2, 2}, 5});
   };
-  // A sky that is nearly all sun, which shines through the slit
+  // A sky whose light comes almost entirely from the sun, which shines through the slit
   const auto sunny = [](SceneBuilder& b) {
     b.scene.emitters.clear();
     SkyImage sky(512, 257, .01f);
@@ -98,9 +98,9 @@ TEST(SkyPortals, ReduceNoise) {
     return test::estimate(SkyRoom{.image = image, .sky_portals = sky_portals}.builder({24, 24}), 32)
         .standard_error[1];
   };
-  // Always the same images. Their standard errors are those of sums over 576 pixels, so each is known to
-  // about 1 / sqrt(2 * 576) = 3 %, and less well where few bright pixels decide; portals take more than half
-  // away.
+  // The two images are the same in each run. Each standard error is that of a sum over 576 pixels, so it is
+  // accurate to about 1 / sqrt(2 * 576) = 3 %, and less if few bright pixels dominate. Portals remove more
+  // than half of the noise.
   for (const bool image : {false, true}) EXPECT_LT(noise(0, image), .7 * noise(-1, image)) << image;
 }
 

@@ -1,4 +1,4 @@
-// Which techniques a world uses, and that each goes when it is switched off and leaves the picture the same.
+// Which techniques a world uses; and that each can be switched off, which does not change the expected image.
 #include "common/job/techniques.h"
 
 #include <gtest/gtest.h>
@@ -84,7 +84,7 @@ std::vector<Case> cases() {
           {Technique::local_lights, test::LampRooms{}.builder({24, 16})}};
 }
 
-// What off_switch() says, done to the description that the reader would make of it.
+// The scene with the parameter set to the value that off_switch() returns.
 SceneBuilder switched_off(const Case& c) {
   SceneBuilder out = c.builder;
   IntegratorSettings& i = out.scene.integrator;
@@ -120,7 +120,7 @@ TEST(Techniques, EachIsUsedWhereItPaysAndGoneWhenItIsSwitchedOff) {
 
 TEST(Techniques, WithoutOneOfThemTheImageIsTheSame) {
   for (const Case& c : cases()) {
-    // Its pixels depend on each other: tests/property/path_reuse_test.cpp
+    // The pixels of path reuse depend on each other: tests/property/path_reuse_test.cpp tests it
     if (c.technique == Technique::path_reuse) continue;
     const auto with = test::estimate(c.builder, 64), without = test::estimate(switched_off(c), 64);
     for (std::size_t k = 0; k < 3; ++k)

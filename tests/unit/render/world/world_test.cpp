@@ -1,5 +1,5 @@
-// Whole worlds: every variant, every power-of-two scale and every thread count gives the same bits; what
-// cannot be built says so.
+// Whole worlds: every variant, every power-of-two scale and every number of threads gives the same bits, and
+// scenes that cannot be built are refused with a message.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -21,10 +21,10 @@ using testing::HasSubstr;
 struct Named {
   const char* name;
   SceneBuilder builder;
-  std::size_t variants;  // that cover it
+  std::size_t variants;  // number of specialised variants that cover it
 };
 
-// A floor, a light of each of some kinds, and a place for a medium.
+// A floor, objects, lights of several kinds, and space for a medium.
 SceneBuilder room() {
   SceneBuilder builder({12, 8});
   const BsdfIndex white = builder.diffuse(.6);
@@ -67,7 +67,7 @@ SceneBuilder with_medium(auto make) {
 }
 const Transform kBox = translate({-1, -1, -1}) * test::scale(2);
 
-// Panes and masks in front of everything, and around a medium if there is one.
+// Adds panes and masks in front of everything, and around the medium if there is one.
 SceneBuilder veiled(SceneBuilder builder) {
   const TextureIndex white = builder.texture({1, 1, 1}), tint = builder.texture({.9, .5, .7}),
                      rough = builder.texture({.2, .2, .2});
@@ -154,7 +154,8 @@ TEST(World, EveryVariantThatCoversASceneGivesTheSameBits) {
     const auto world = test::world_of(n.builder);
     const auto names = covering_variants(*world);
     const TileResult first = render(*world);
-    EXPECT_EQ(names.size(), n.variants + 1) << n.name;  // and the one that parts the light
+    // One more variant is the one for AOVs of light.
+    EXPECT_EQ(names.size(), n.variants + 1) << n.name;
     EXPECT_EQ(names.front(), describe(*world).variant);
     EXPECT_EQ(first.health.nonfinite + first.health.negative + first.health.majorant_violations, 0u)
         << n.name;
@@ -206,7 +207,7 @@ TEST(World, RoundsContinueTheSequenceWhateverTheirGrouping) {
   const auto sums = [&](SampleRange r) { return render_tile(*world, all, r, nullptr, nullptr).sums; };
   const auto whole = sums({0, 16}), first = sums({0, 4}), second = sums({4, 16});
   for (std::size_t i = 0; i < whole.size(); ++i) {
-    // Three roundings to float32 of sums in double.
+    // The error is that of three roundings of sums in double to float32.
     ASSERT_NEAR(whole[i], double{first[i]} + second[i], 3 * 0x1p-24 * whole[i]);
   }
 }
@@ -236,7 +237,7 @@ TEST(World, TheSamplesOfASampleRangeAreThoseThatReplayGives) {
   }
 }
 
-// The whole scene 2^k times as large, media thinner by as much, lights as bright as they must be.
+// The scene enlarged by 2^k, with thinner media and brighter lights, so that the image is the same.
 SceneBuilder scaled(SceneBuilder builder, int k) {
   const double f = std::ldexp(1., k);
   const auto move = [&](Transform& t) { t = test::scale(f) * t; };
@@ -280,7 +281,7 @@ TEST(World, AThinLensScalesWithTheScene) {
     EXPECT_EQ(render(*test::world_of(scaled(builder, k))).sums, reference) << k;
 }
 
-// ---- what cannot be built
+// Scenes that cannot be built
 
 std::string error_of(const SceneBuilder& builder) {
   const auto w = build_world(builder.scene, test::settings_of(builder.scene), builder.files, 1);
@@ -323,7 +324,7 @@ TEST(World, RefusesGridsThatAreNotNumbersOrHaveNoPlace) {
   EXPECT_THAT(error_of(with_grid(std::nanf(""), kBox)), HasSubstr("grid.vol"));
   EXPECT_THAT(error_of(with_grid(std::numeric_limits<float>::infinity(), kBox)), HasSubstr("grid.vol"));
   EXPECT_THAT(error_of(with_grid(1, test::scale(0))), HasSubstr("inverted"));
-  // Finite maps whose determinants are not, or have no finite inverse.
+  // Finite maps with a determinant that is not finite, or without a finite inverse.
   EXPECT_THAT(error_of(with_grid(1, test::scale(1e200))), HasSubstr("inverted"));
   EXPECT_THAT(error_of(with_grid(1, test::scale(1e-105))), HasSubstr("inverted"));
   EXPECT_EQ(error_of(with_grid(1, kBox)), "");
@@ -417,10 +418,10 @@ TEST(World, AnEmptySceneIsItsSky) {
   SceneBuilder builder({2, 2});
   builder.environment(.25);
   const TileResult r = render_tile(*test::world_of(builder), {0, 0, 2, 2}, {0, 4}, nullptr, nullptr);
-  for (const float s : r.sums) EXPECT_EQ(s, .5f);  // two samples a half
+  for (const float s : r.sums) EXPECT_EQ(s, .5f);  // each half has two samples
 }
 
-// Such light counts like that of an emitter that the path meets.
+// Light that media emit counts at the same depth as that of an emitter that the path hits.
 TEST(World, LightGivenOffByMediaCountsAtTheDepthOfItsPath) {
   const auto mean = [](int max_depth, bool hidden, double floor) {
     SceneBuilder builder({4, 4});
@@ -433,12 +434,12 @@ TEST(World, LightGivenOffByMediaCountsAtTheDepthOfItsPath) {
     builder.look({0, 0, 9}, {0, 0, 0}, 1e-3, {0, 1, 0});
     return test::estimate(builder, 64).mean;
   };
-  // Through 2 units of it, to a black floor.
+  // The ray crosses 2 units of the medium and ends at a black floor.
   const std::array<double, 3> through{2, 4, 6}, dark{0, 0, 0};
   EXPECT_EQ(mean(0, false, 0), dark);
   EXPECT_EQ(mean(1, false, 0), through);
   EXPECT_EQ(mean(1, true, 0), dark);
-  // What a white floor scatters meets it a segment later, seen or not.
+  // Light that a white floor scatters is one segment deeper, whether emitters are hidden or not.
   EXPECT_EQ(mean(1, false, 1), through);
   EXPECT_GT(mean(2, false, 1)[0], 2.001);
   EXPECT_GT(mean(2, true, 1)[0], .001);

@@ -1,6 +1,6 @@
-#include "worker/render/world/splitting.h"
+#include "worker/render/world/roulette.h"
 
-#include "worker/render/world/camera_collisions.h"
+#include "worker/render/world/pilot.h"
 
 namespace ls::render {
 namespace {
@@ -16,6 +16,11 @@ void learn_splitting(const IntegratorSettings& settings, float mean_radiance, Wo
   if (settings.path_splitting < 0 || !w.depth_allows(2)) return;
   w.mean_radiance = mean_radiance;
   w.paths_split = camera_collisions(w).all < kSplitsPay;
+}
+
+void learn_shadow_roulette(const IntegratorSettings& settings, float mean_radiance, World& w) {
+  if (settings.shadow_roulette < 0 || !w.lights.can_sample()) return;
+  w.faint_shadow = kFaintShadowRay * mean_radiance;
 }
 
 }  // namespace ls::render

@@ -1,6 +1,7 @@
-// Which paths split and end, and by what. That the image stays the same is tested here for scenes in which
-// paths meet several media or surfaces, and in techniques_test.cpp.
-#include "worker/render/world/splitting.h"
+// Splitting and roulette of paths, and roulette of shadow rays: which scenes use them. That the image stays
+// the same is tested here for scenes in which paths meet several media or surfaces, and in
+// techniques_test.cpp.
+#include "worker/render/world/roulette.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +10,7 @@
 #include "tests/support/lit_cloud.h"
 #include "tests/support/render_check.h"
 #include "tests/support/significance.h"
-#include "worker/render/world/camera_collisions.h"
+#include "worker/render/world/pilot.h"
 
 namespace ls::render {
 namespace {
@@ -21,7 +22,7 @@ using test::operator*;
 
 constexpr FrameSize kFrame{32, 16};
 
-// A cloud in front of a sky, of which the camera sees both.
+// A cloud in front of a sky; both are visible.
 SceneBuilder cloud_in_the_sky() {
   SceneBuilder b = test::lit_cloud(kFrame);
   b.look({0, 0, 4}, {0, 0, 0}, 60, {0, 1, 0});
@@ -88,14 +89,14 @@ TEST(Splitting, IsLeftOutWhereItIsNotNeeded) {
   expect_none(test::world_of(fog), "no grid");
   expect_none(test::world_of(test::lit_cloud({8, 8})), "fewer pixels than the measurement has paths for");
   expect_none(world_with([](Scene& s) { s.integrator.light_vertices = 1; }), "light vertices");
-  // The camera is close to the cloud, so that it sees nothing else
+  // The camera is so close to the cloud that nothing else is visible
   SceneBuilder close = cloud_in_the_sky();
   close.look({0, 0, 1.2}, {0, 0, 0}, 30, {0, 1, 0});
   EXPECT_GT(test::world_of(close)->mean_radiance, 0);
   EXPECT_FALSE(test::world_of(close)->paths_split);
 }
 
-// A box of fog 2 units deep, or two of them one behind the other, fills the left half of the frame.
+// A box of fog 2 units deep, or two of them in a row, covers the left half of the frame.
 TEST(CameraCollisions, AreThoseOfTheOpticalDepth) {
   SceneBuilder b({32, 32});
   b.look({0, 0, 1000}, {0, 0, 0}, .1, {0, 1, 0});
@@ -103,15 +104,15 @@ TEST(CameraCollisions, AreThoseOfTheOpticalDepth) {
   b.container(CubeShape{}, translate({-10, 0, 0}) * scale(10, 10, 1), b.null(), fog);
   const auto expect = [&](double depth) {
     const CameraCollisions c = camera_collisions(*test::world_of(b));
-    // The rays at the corners are 0.07 degrees from parallel, which makes depths larger by 7e-7 of themselves
-    // at most, and probabilities by 3e-7; the rest is rounding
+    // The rays at the corners deviate by 0.07 degrees from parallel rays. This increases optical depths by at
+    // most 7e-7 of themselves, and probabilities by 3e-7; the rest is rounding
     EXPECT_NEAR(c.met, -std::expm1(-depth), 1e-6);
     EXPECT_NEAR(c.all, -std::expm1(-depth) / 2, 1e-6);
   };
   expect(.6);
   b.container(CubeShape{}, translate({-10, 0, -5}) * scale(10, 10, 1), b.null(), fog);
   expect(1.2);
-  // A wall between the two
+  // A wall between the two boxes
   b.shape(RectangleShape{}, translate({0, 0, -2}) * scale(20), b.diffuse(.5));
   expect(.6);
 }
@@ -169,8 +170,8 @@ TEST(Splitting, EveryVariantThatAimsSplitsAlike) {
   expect_same_bits(*world, 2);
 }
 
-// Both tests compare always the same two images. Their standard errors are those of sums over 512 pixels: if
-// these erred as normal distributions do, each would be known to 1 / sqrt(2 * 512) = 3 %.
+// In both tests the two images are the same in each run. Their standard errors are those of sums over 512
+// pixels; for normal distributions each would be accurate to 1 / sqrt(2 * 512) = 3 %.
 double noise(const SceneBuilder& b) { return test::estimate(b, 64).standard_error[1]; }
 
 TEST(Splitting, OfPathsAloneReducesNoise) {
@@ -181,8 +182,54 @@ TEST(Splitting, OfPathsAloneReducesNoise) {
 
 TEST(Splitting, RouletteAloneReducesNoiseOnDarkGround) {
   SceneBuilder b = cloud_over_ground();
-  b.look({0, -1, 4}, {0, -1.2, 2.5}, 30, {0, 1, 0});  // only ground, so that no path splits
+  b.look({0, -1, 4}, {0, -1.2, 2.5}, 30, {0, 1, 0});  // shows only ground, so no path splits
   EXPECT_LT(noise(b), .9 * noise(without_splitting(b)));
+}
+
+TEST(ShadowRoulette, TracesFaintShadowRaysLessOften) {
+  EXPECT_EQ(shadow_ray_probability(2, 1), 1);
+  EXPECT_EQ(shadow_ray_probability(1, 1), 1);
+  EXPECT_EQ(shadow_ray_probability(.5f, 1), .5f);
+  EXPECT_EQ(shadow_ray_probability(0, 1), kLeastTraced);
+  EXPECT_EQ(shadow_ray_probability(0, 0), 1) << "no roulette";
+}
+
+// The renderer estimates the mean radiance by 512 paths. If their standard deviation is at most twice the
+// mean, the standard error is at most 0.09 of it, and a factor of 2 is more than 5 standard errors away.
+TEST(ShadowRoulette, MeasuresByTheMeanRadiance) {
+  const SceneBuilder b = test::lit_cloud({128, 64});
+  const auto mean = test::estimate(b, 4).mean;
+  const double all = (mean[0] + mean[1] + mean[2]) / 3;
+  const double faint = double{test::world_of(b)->faint_shadow};
+  EXPECT_GT(faint, all / 2);
+  EXPECT_LT(faint, all * 2);
+}
+
+TEST(ShadowRoulette, IsTheSameForEverySeedAndCrop) {
+  const SceneBuilder whole = test::lit_cloud(kFrame);
+  SceneBuilder crop = test::lit_cloud(kFrame);
+  crop.scene.film.crop_offset = {8, 4};
+  crop.scene.film.crop_size = {5, 6};
+  const float faint = test::world_of(whole)->faint_shadow;
+  EXPECT_GT(faint, 0);
+  EXPECT_EQ(test::world_of(whole, 7)->faint_shadow, faint);
+  EXPECT_EQ(test::world_of(crop)->faint_shadow, faint);
+}
+
+TEST(ShadowRoulette, IsLeftOutWhereItIsNotNeeded) {
+  const auto faint = [](auto&& change) {
+    SceneBuilder b = test::lit_cloud(kFrame);
+    change(b.scene);
+    return test::world_of(b)->faint_shadow;
+  };
+  EXPECT_EQ(faint([](Scene& s) { s.integrator.shadow_roulette = -1; }), 0);
+  EXPECT_EQ(faint([](Scene& s) { s.emitters.pop_back(); }), 0) << "a sky of one radiance is not sampled";
+  EXPECT_EQ(faint([](Scene& s) { s.integrator.max_depth = 1; }), 0) << "light that is not scattered";
+  EXPECT_EQ(faint([](Scene& s) { s.integrator.name = "volpath_distant_mis"; }), 0);
+  SceneBuilder fog({32, 16});
+  fog.container(CubeShape{}, {}, fog.null(), fog.homogeneous({1, 1, 1}, {.9, .9, .9}));
+  fog.scene.emitters.push_back(DirectionalEmitter{{.3, -1, -.2}, {3, 3, 3}});
+  EXPECT_EQ(test::world_of(fog)->faint_shadow, 0);
 }
 
 }  // namespace

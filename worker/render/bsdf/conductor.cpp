@@ -1,19 +1,17 @@
-#include "worker/render/bsdf/coated_conductor.h"
+#include "worker/render/bsdf/conductor.h"
 
 #include <cmath>
-
-#include "worker/render/bsdf/visible_normals.h"
 
 namespace ls::render {
 namespace {
 
 constexpr double kGrazing = 1e-6;  // the least cosine of the tables
-// The largest error of the tables of this file. What stays in the coat is lowered by it, so that no surface
-// gives back more than it gets.
+// The largest error of the tables of this file. The share of light that stays in the coat is reduced by it,
+// so that table errors cannot make a surface reflect more light than it receives.
 constexpr double kTolerance = 2e-3;
 
-// The direction inside the coat that is refracted to w, as if it were mirrored up: above the surface. Its z
-// is 0 if there is none, which is so beyond the critical angle of a coat of a lower index.
+// Returns the direction, with z > 0, of light inside the coat that leaves it in the direction w. Its z is 0
+// if there is none: if the coat's index is below that outside and w is beyond the critical angle.
 V3 refracted(const V3& w, float ior) {
   const auto cos_t = static_cast<float>(-fresnel_dielectric(w.z, ior).cos_t);
   return {w.x / ior, w.y / ior, cos_t};
@@ -26,7 +24,9 @@ struct SeenCoatedConductor {
   Metal metal;
   RoughCoatedConductor::Shares coat_o;
   float staying_o;
-  C3 rest;  // colour of the light that stays in the coat first
+  // Colour of the third part of the value (`rest` in conductor.h): light that stays in the coat at
+  // first.
+  C3 rest;
   float p_coat, p_base, p_rest;
 
   SeenCoatedConductor(const RoughCoatedConductor& material, const Lookup& look, const V3& w)
@@ -34,8 +34,9 @@ struct SeenCoatedConductor {
     coat_o = m.shares(wo.z);
     if (!(inner_o.z > 0)) coat_o.through = 0;
     staying_o = m.tables.staying.at(wo.z);
-    // Light that stays has met the metal once. It meets it again at least once, and after each time `leaving`
-    // of it leaves and `internal` is reflected.
+    // Light that stays in the coat has been reflected once by the metal, with the factor F. It meets the
+    // metal at least once more, each time with the factor `again`. After each such reflection the share
+    // `leaving` leaves the coat and the share `internal` is reflected back to the metal.
     const C3 F = m.mean_fresnel * metal.tint, again = F * m.tables.metal_albedo;
     rest = F * again * m.tables.leaving / (C3(1) - again * m.tables.internal);
     p_coat = coat_o.reflected;
@@ -66,8 +67,8 @@ struct SeenCoatedConductor {
     if (!(coat_o.through > 0) || !(coat_i.through > 0) || !(inner_i.z > 0)) return;
     const V3 h = normalize(inner_o + inner_i);
     const float D = m.base.D(h), G = m.base.G1_over_cos(inner_o) * m.base.G1_over_cos(inner_i);
-    const float squeezed = wi.z / sqr(m.ior);  // the projected solid angle inside over that outside, times
-                                               // the cosine wi.z
+    // The ratio of the projected solid angles inside and outside, times the cosine of wi
+    const float squeezed = wi.z / sqr(m.ior);
     e.f_cos += series(metal.reflectance(dot(inner_o, h)), std::min(coat_o.reflected, coat_i.reflected)) *
                (coat_o.through * coat_i.through * squeezed * .25f * D * G);
     e.pdf += p_base * D * m.base.pdf_over_D(inner_o) * squeezed / inner_i.z;
@@ -84,7 +85,8 @@ struct SeenCoatedConductor {
     return e;
   }
 
-  // Returns a direction with z <= 0 if there is none.
+  // Samples a direction of the part `metal`. Returns a direction with z <= 0 if the light does not leave the
+  // coat.
   V3 sample_base(const V2& u) const {
     if (!(inner_o.z > 0)) return {0, 0, 0};
     const V3 w = normalize(reflect(inner_o, m.base.sample_normal(inner_o, u)));
@@ -114,14 +116,15 @@ struct SeenCoatedConductor {
   }
 };
 
-// Calls f(wi, weight) for directions into which a metal that absorbs nothing reflects light from wo, both
-// inside the coat. The weights sum to the share of the light that its facets do not mask.
+// Calls f(wi, weight) for a set of directions wi into which a metal that absorbs nothing reflects light from
+// wo. wi and wo are inside the coat. The weights sum to the share of the light that the metal's facets do not
+// mask.
 template <class F>
 void for_reflections(const Microfacets& facets, const V3& wo, F f) {
   constexpr int kSteps = 32;
   for (int i = 0; i < kSteps; ++i)
     for (int j = 0; j < kSteps; ++j) {
-      // The azimuth moves on by the golden ratio of a step from row to row, so that no two rows are alike.
+      // From row to row the azimuths move by the golden ratio of a step, so that no two rows are alike.
       const double row = (i + .5) / kSteps, turn = .6180339887498949 * i;
       const V2 u(static_cast<float>((j + turn - std::floor(turn)) / kSteps), static_cast<float>(row));
       const V3 wi = normalize(reflect(wo, facets.sample_visible(wo, u)));
@@ -135,7 +138,8 @@ V3 at_cosine(double mu, double phi) {
           static_cast<float>(mu)};
 }
 
-// The shares of light from one side that a rough coat reflects and lets through, by the cosine there.
+// The shares of light from one side that a rough coat reflects and transmits, as tables over the cosine on
+// that side.
 struct RoughShares {
   CosineTable reflected, refracted;
 
@@ -151,7 +155,7 @@ struct RoughShares {
   }
 };
 
-// Makes the tables of one material, whose other members are set.
+// Computes the tables of a material whose other members are set.
 class Tabulator {
  public:
   explicit Tabulator(const RoughCoatedConductor& m) : m_(m) {}
@@ -167,8 +171,9 @@ class Tabulator {
       const RoughShares outside(double{m_.coat.ax}, ior);
       inside_.emplace(double{m_.coat.ax}, 1 / ior);
       t.reflected = outside.reflected;
-      // Light crosses the coat once each way, and more of it is masked or reflected back on the way out. The
-      // value must be the same both ways, so each way gets the geometric mean of the two.
+      // Light crosses the coat once in each direction, and on the way out more of it is masked or reflected
+      // back. The value must be reciprocal, so each crossing gets the geometric mean of both transmittances,
+      // but at most that of the way in.
       t.through = CosineTable(
           [&](double mu) {
             const auto z = static_cast<float>(std::max(mu, kGrazing));
@@ -186,7 +191,7 @@ class Tabulator {
         [&](double mu) {
           const double z = std::max(mu, kGrazing);
           if (!m_.anisotropic()) return staying(at_cosine(z, 0));
-          // The least over the azimuths, so that the energy stays below 1 at each of them
+          // The least of three azimuths is used, so that the energy stays below 1 at each of them.
           return std::min({staying(at_cosine(z, 0)), staying(at_cosine(z, .25 * M_PI)),
                            staying(at_cosine(z, .5 * M_PI))});
         },
@@ -207,8 +212,9 @@ class Tabulator {
     return std::min(sum, 1.);
   }
 
-  // The share of light from wo that the metal reflects, that is not masked, and that is not part of the
-  // series.
+  // Returns the share of light from wo that stays in the coat at first, minus kTolerance: light that the
+  // metal reflects, that its facets do not mask, and that the series of the part `metal` (conductor.h)
+  // leaves out.
   double staying(const V3& wo) const {
     const V3 inner = refracted(wo, m_.ior);
     const auto coat_o = m_.shares(wo.z);
@@ -232,7 +238,7 @@ class Tabulator {
   }
 
   RoughCoatedConductor m_;
-  // Only of a rough coat: its shares for light from inside, and what it lets in from outside
+  // For a rough coat only: its shares for light from inside, and its transmittance for light from outside.
   std::optional<RoughShares> inside_;
   CosineTable entering_;
 };
@@ -250,7 +256,8 @@ std::optional<BsdfSample> RoughCoatedConductor::sample(const Lookup& look, const
 std::variant<Conductor, RoughConductor, CoatedConductor, RoughCoatedConductor> make_material(
     const CoatedConductorBsdf& b, MaterialBuilder& builder) {
   const double ior = builder.index(b.int_ior, b.ext_ior);
-  // Facets of a larger roughness mask all but 1e-4 of the light, whatever it is.
+  // Facets of a larger roughness than this mask all but 1e-4 of the light, so larger values make no
+  // difference.
   constexpr double kLargestAlpha = 1e4;
   const auto alpha = [&](double given) {
     const double a = double{builder.roughness(Microfacet::ggx, given).u.value.x};
@@ -258,14 +265,13 @@ std::variant<Conductor, RoughConductor, CoatedConductor, RoughCoatedConductor> m
   };
   const double coat = alpha(b.coat_alpha), u = alpha(b.alpha_u), v = alpha(b.alpha_v);
   const bool mirror = u < double{kSpecularAlpha} && v < double{kSpecularAlpha};
-  RoughCoatedConductor m;
   CoatedConductorBsdf inside = b;
   for (std::size_t c = 0; c < 3; ++c) inside.eta[c] /= b.int_ior, inside.k[c] /= b.int_ior;
-  set_metal(m, inside, builder);
+  auto m = metal_of<RoughCoatedConductor>(inside, builder);
   if (builder.refused()) return static_cast<const Conductor&>(m);
   m.ior = static_cast<float>(ior);
   m.coat_is_smooth = coat < double{kSpecularAlpha};
-  if (ior == 1) {  // nothing of the coat is seen
+  if (ior == 1) {  // a coat with the index of its surroundings is invisible
     if (mirror) return static_cast<const Conductor&>(m);
     RoughConductor plain;
     static_cast<Conductor&>(plain) = m;
