@@ -11,8 +11,8 @@
 #include "cli/output/output_file.h"
 #include "cli/scale/engines.h"
 #include "cli/scale/farm_up.h"
-#include "common/base/spawn.h"
 #include "common/base/secret.h"
+#include "common/base/spawn.h"
 
 namespace ls::cli {
 namespace {
