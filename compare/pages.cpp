@@ -112,8 +112,7 @@ std::string points_csv(const Results& results) {
 std::string summary_csv(const Results& results) {
   std::string out =
       "scene,entrant,seeds,spp,seconds,relmse,relmse_lo,relmse_hi,efficiency,efficiency_lo,efficiency_hi,"
-      "slope,"
-      "slope_lo,slope_hi,ratio,ratio_lo,ratio_hi,spread\n";
+      "slope,slope_lo,slope_hi,ratio,ratio_lo,ratio_hi,spread\n";
   for (const Race& race : results.races)
     for (const Row& row : rows_of(race))
       out +=

@@ -63,17 +63,15 @@ Result<Pixels> read_picture(const std::filesystem::path& exr, FrameSize size) {
   auto image = read_exr_rgb(exr, limits);
   if (!image) return tl::unexpected(image.error());
   if (image->size != size)
-    return fail(Errc::invalid_argument,
-                fmt::format("{} is {} x {} pixels, and the race is one of {} x {}", exr.string(),
-                            image->size.width, image->size.height, size.width, size.height));
+    return bad_argument(fmt::format("{} is {} x {} pixels, and the race is one of {} x {}", exr.string(),
+                                    image->size.width, image->size.height, size.width, size.height));
   const auto bad =
       std::find_if(image->rgb.begin(), image->rgb.end(), [](float v) { return !std::isfinite(v); });
   if (bad != image->rgb.end()) {
     const auto count = std::count_if(bad, image->rgb.end(), [](float v) { return !std::isfinite(v); });
     const auto pixel = (bad - image->rgb.begin()) / 3;
-    return fail(Errc::invalid_argument,
-                fmt::format("{} has {} values that are NaN or infinite, the first in pixel {},{}",
-                            exr.string(), count, pixel % size.width, pixel / size.width));
+    return bad_argument(fmt::format("{} has {} values that are NaN or infinite, the first in pixel {},{}",
+                                    exr.string(), count, pixel % size.width, pixel / size.width));
   }
   return std::move(image->rgb);
 }

@@ -128,9 +128,9 @@ void take_notes(Race& race, const Lanes& lanes) {
 }
 
 tl::unexpected<Error> no_judge() {
-  return fail(Errc::invalid_argument,
-              "without --reference the pictures are measured against those of the other seeds by an "
-              "integrator that sees all of the scene: there must be one, and two seeds at least");
+  return bad_argument(
+      "without --reference the pictures are measured against those of the other seeds by an "
+      "integrator that sees all of the scene: there must be one, and two seeds at least");
 }
 
 }  // namespace
@@ -165,8 +165,7 @@ Result<void> judge(Race& race, const Lanes& lanes, std::size_t seeds,
     if (!best) return no_judge();
     race.reference = fmt::format(
         "the final pictures of all other seeds by {}: the means of their halves are two references, "
-        "independent of "
-        "each other and of the picture",
+        "independent of each other and of the picture",
         race.entrants[*best].name);
   }
   for (std::size_t s = 0; s < seeds; ++s) {

@@ -53,8 +53,7 @@ std::vector<std::string> paragraphs_before(const Results& results) {
   std::string limit = c.most_spp < kNoLimit ? fmt::format(" or {} samples a pixel", c.most_spp) : "";
   out.push_back(
       fmt::format("Each entrant has {} s{} ({}) for each of {}, after loading the scene; those of one seed "
-                  "take turns on the same "
-                  "cores. {}. The machine: {}. {}.",
+                  "take turns on the same cores. {}. The machine: {}. {}.",
                   report::given(c.time), limit, clock_words(c), plural(results.seeds, "seed"),
                   results.seeds == 1 ? fmt::format("The seed is {}", results.first_seed)
                                      : fmt::format("The seeds are {} to {}", results.first_seed,
@@ -79,14 +78,11 @@ std::vector<std::string> paragraphs_before(const Results& results) {
 std::string wide_words() {
   return fmt::format(
       "relMSE is the mean of (x - truth)² / (truth² + 0.01) at the end, efficiency 1 / (relMSE × seconds). "
-      "Both are "
-      "geometric means over the seeds with 95 % intervals by Student's t over their logarithms. Slope: s of "
-      "relMSE ~ "
-      "seconds⁻ˢ, 1 for independent samples, more where samples are spread better than by chance. The last "
-      "column is "
-      "how many times as efficient the first entrant is, seed by seed. 'Tail': the largest error of the "
-      "seeds is more "
-      "than {:g} times the smallest, so that a few pixels decide, and the geometric mean is kind.",
+      "Both are geometric means over the seeds with 95 % intervals by Student's t over their logarithms. "
+      "Slope: s of relMSE ~ seconds⁻ˢ, 1 for independent samples, more where samples are spread better than "
+      "by chance. The last column is how many times as efficient the first entrant is, seed by seed. 'Tail': "
+      "the largest error of the seeds is more than {:g} times the smallest, so that a few pixels decide, and "
+      "the geometric mean is kind.",
       kHeavySpread);
 }
 
@@ -135,10 +131,8 @@ std::string forecast_words(const Results& results) {
   if (count == 0) return "";
   return fmt::format(
       "At each doubling of their samples our renders were asked how much longer they would need to a half, a "
-      "quarter "
-      "and an eighth of the error they estimated then. {} of {} answers hold the actual core seconds in "
-      "their 95 % "
-      "interval ({:.1f} %). Counted are those whose interval ends within the race.",
+      "quarter and an eighth of the error they estimated then. {} of {} answers hold the actual core seconds "
+      "in their 95 % interval ({:.1f} %). Counted are those whose interval ends within the race.",
       within, count, 100. * static_cast<double>(within) / static_cast<double>(count));
 }
 

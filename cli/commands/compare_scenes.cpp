@@ -89,7 +89,7 @@ class SceneRace {
     std::vector<race::ReferenceFile> read;
     for (const auto& file : files) {
       auto picture = race::read_reference(file, race_.conditions.size);
-      if (!picture) return fail(Errc::invalid_argument, "--reference: " + picture.error().message);
+      if (!picture) return bad_argument("--reference: " + picture.error().message);
       if (auto own = refuse_own_noise(*picture); !own) return tl::unexpected(own.error());
       read.push_back(std::move(*picture));
     }
@@ -103,12 +103,10 @@ class SceneRace {
     for (const Digest& scene : scenes_)
       for (std::size_t i = 0; i < options_.seeds; ++i)
         if (const std::uint64_t seed = options_.first_seed + i; same_noise(file.picture.origin, scene, seed))
-          return fail(
-              Errc::invalid_argument,
-              fmt::format(
-                  "--reference: {} was rendered from this scene with seed {}, which races, too: its noise is "
-                  "the same noise; race other seeds (--seed {})",
-                  file.name, seed, seed + 1));
+          return bad_argument(fmt::format(
+              "--reference: {} was rendered from this scene with seed {}, which races, too: its noise is "
+              "the same noise; race other seeds (--seed {})",
+              file.name, seed, seed + 1));
     return {};
   }
 

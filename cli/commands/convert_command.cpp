@@ -188,9 +188,8 @@ void add_convert(CLI::App& app, Action& action) {
   const auto [convert, flags] = add_command<ConvertFlags>(
       app, action, "convert",
       "write a scene as canonical Mitsuba 3 XML. Its files are copied to OUT's folder under the names that "
-      "the "
-      "scene has for them, unless they are there; a name that leads out of the folder becomes one in it. OUT "
-      "has the same digest then, if no file had to be renamed; it is printed",
+      "the scene has for them, unless they are there; a name that leads out of the folder becomes one in it. "
+      "OUT has the same digest then, if no file had to be renamed; it is printed",
       run);
   convert->add_option("in", flags->in, "the scene")->required()->type_name("IN");
   convert->add_option("out", flags->out, "the XML file to write")->required()->type_name("OUT");

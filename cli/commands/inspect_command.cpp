@@ -83,9 +83,8 @@ tl::expected<ordered_json, coordinator::Rejected> count_work([[maybe_unused]] co
   for (const auto& [name, counter] : render::kWorkCounters) work[name] = render::work_counters().*counter;
   return work;
 #else
-  return tl::unexpected(coordinator::Rejected{
-      {Errc::invalid_argument, "this build does not count work: configure one with -DLIGHTSHAFT_COUNT=ON"},
-      {}});
+  return coordinator::rejected(
+      {Errc::invalid_argument, "this build does not count work: configure one with -DLIGHTSHAFT_COUNT=ON"});
 #endif
 }
 

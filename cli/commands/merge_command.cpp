@@ -44,10 +44,10 @@ Result<std::vector<fs::path>> files_of(const std::vector<std::string>& arguments
     const auto before = static_cast<std::ptrdiff_t>(files.size());
     for (fs::directory_iterator entry(argument, error), end; !error && entry != end; entry.increment(error))
       if (entry->path().extension() == ".exr") files.push_back(entry->path());
-    if (error) return fail(Errc::invalid_argument, fmt::format("{}: {}", argument, error.message()));
+    if (error) return bad_argument(fmt::format("{}: {}", argument, error.message()));
     std::sort(files.begin() + before, files.end());
   }
-  if (files.empty()) return fail(Errc::invalid_argument, "there is no .exr file in the folders given");
+  if (files.empty()) return bad_argument("there is no .exr file in the folders given");
   return files;
 }
 
@@ -98,12 +98,11 @@ tl::expected<CryptomatteManifests, coordinator::Rejected> manifests(const MergeF
       read_local_scene(flags.scene, *defines, false, flags.frame, aovs.any_of(aovs_of(AovKind::ids)));
   if (!scene) return tl::unexpected(scene.error());
   if (!is_of(scene->scene, merged.scene))
-    return tl::unexpected(coordinator::Rejected{
+    return coordinator::rejected(
         {Errc::invalid_argument,
          fmt::format("the partials are of scene {}, and {} is another one: give the same scene file, with "
                      "the same -D and --frame",
-                     merged.scene.hex(), flags.scene)},
-        {}});
+                     merged.scene.hex(), flags.scene)});
   return coordinator::manifests_of(scene->scene, aovs);
 }
 

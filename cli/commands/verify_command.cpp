@@ -50,12 +50,10 @@ Result<FinalPicture> open_image(const std::string& path) {
 // (machines of one class give the same bits).
 Result<void> check_same(const SealedImage& image, const LocalScene& scene, const VerifyFlags& flags) {
   if (const Digest mine = digest_of(scene.scene); mine != image.scene)
-    return fail(
-        Errc::invalid_argument,
-        fmt::format(
-            "{} was rendered from scene {}, and {} is scene {}: give the same scene file, with the same -D "
-            "and --frame",
-            flags.image, image.scene.hex(), flags.scene, mine.hex()));
+    return bad_argument(fmt::format(
+        "{} was rendered from scene {}, and {} is scene {}: give the same scene file, with the same -D "
+        "and --frame",
+        flags.image, image.scene.hex(), flags.scene, mine.hex()));
   if (render::numeric_class() != image.numeric_class)
     return fail(
         Errc::failed_precondition,

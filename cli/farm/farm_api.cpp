@@ -120,13 +120,13 @@ Result<HttpClient::Options> connection_of(const FarmOptions& options) {
   HttpClient::Options o;
   o.url = options.url.empty() ? environment("LIGHTSHAFT_URL") : options.url;
   if (o.url.empty())
-    return fail(Errc::invalid_argument,
-                "where is the coordinator? Give --to URL or set LIGHTSHAFT_URL, http://localhost:8080 say");
+    return bad_argument(
+        "where is the coordinator? Give --to URL or set LIGHTSHAFT_URL, http://localhost:8080 say");
   o.ca = options.ca.empty() ? environment("LIGHTSHAFT_CA") : options.ca;
   o.token = environment("LIGHTSHAFT_TOKEN");
   if (!options.token_file.empty()) {
     auto token = read_secret(options.token_file);
-    if (!token) return fail(Errc::invalid_argument, "--token-file: " + token.error().message);
+    if (!token) return bad_argument("--token-file: " + token.error().message);
     o.token = std::move(*token);
   }
   return o;

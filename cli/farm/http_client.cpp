@@ -88,7 +88,7 @@ std::size_t read_file_chunk(char* data, std::size_t size, std::size_t count, voi
 
 Result<void> check_url(const std::string& url) {
   const auto wrong = [&](std::string_view why) {
-    return fail(Errc::invalid_argument, fmt::format("the coordinator's address '{}' {}", url, why));
+    return bad_argument(fmt::format("the coordinator's address '{}' {}", url, why));
   };
   if (!url.starts_with("http://") && !url.starts_with("https://"))
     return wrong("must begin with http:// or https://");
@@ -135,10 +135,10 @@ Result<HttpClient> HttpClient::open(Options options) {
     if (auto ok = check_url(url); !ok) return tl::unexpected(ok.error());
   if (std::any_of(options.token.begin(), options.token.end(),
                   [](unsigned char c) { return c <= ' ' || c >= 0x7f; }))
-    return fail(Errc::invalid_argument, "the token has characters that a token cannot have");
+    return bad_argument("the token has characters that a token cannot have");
   std::error_code error;
   if (!options.ca.empty() && !fs::exists(options.ca, error))
-    return fail(Errc::invalid_argument, fmt::format("there is no CA file {}", options.ca));
+    return bad_argument(fmt::format("there is no CA file {}", options.ca));
   static std::once_flag once;
   std::call_once(once, [] { curl_global_init(CURL_GLOBAL_DEFAULT); });
   auto state = std::make_unique<State>();

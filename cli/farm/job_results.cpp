@@ -50,8 +50,7 @@ Result<Plan> plan_sequence(const std::string& id, const json& job, const json& f
     return fail(Errc::internal, "the coordinator does not say which frames the job has");
   for (const auto& [option, name] : {std::pair("-o", wanted.image), std::pair("--html", wanted.html)})
     if (!name.empty() && !has_frame_number(name) && list->size() != 1)
-      return fail(
-          Errc::invalid_argument,
+      return bad_argument(
           fmt::format("{} {}: job {} has {} frames: give a name with # for their numbers, out_#### say, "
                       "or choose one by --frame N",
                       option, name, id, list->size()));

@@ -173,7 +173,8 @@ class LocalRender {
     if (!view) return print_error(view.error());
     if (const auto error = farm_->agent_error()) return print_error(*error);
     if (view->state == JobState::failed) {
-      if (const auto fault = farm_->scene_fault()) return print_rejected(cli::scene_fault(scene_, *fault));
+      if (const auto fault = farm_->scene_fault())
+        return print_rejected(cli::scene_fault(scene_.name, *fault));
       return print_error({Errc::internal, view->error});
     }
     // A paused job cannot be resumed in this process. So the image is written as far as it is rendered, and

@@ -93,15 +93,18 @@ std::optional<std::string> unused_define(const std::map<std::string, std::string
   return std::nullopt;
 }
 
-tl::unexpected<coordinator::Rejected> refused(const std::string& path, std::string text) {
-  Diagnostic d;
-  d.place.file = path;
-  d.text = std::move(text);
-  return tl::unexpected(coordinator::Rejected{{Errc::invalid_argument, d.text}, {std::move(d)}});
+tl::unexpected<coordinator::Rejected> refused(const std::string& path, const std::string& text) {
+  return tl::unexpected(scene_fault(path, text));
+}
+
+tl::unexpected<coordinator::Rejected> unreadable(const std::string& path,
+                                                 std::vector<Diagnostic> diagnostics) {
+  return tl::unexpected(coordinator::Rejected{
+      {Errc::invalid_argument, fmt::format("{} cannot be read", path)}, std::move(diagnostics)});
 }
 
 tl::expected<std::string, coordinator::Rejected> read_text(const std::string& path) {
-  if (std::string why = scene::why_no_scene(path); !why.empty()) return refused(path, std::move(why));
+  if (std::string why = scene::why_no_scene(path); !why.empty()) return refused(path, why);
   std::error_code error;
   const auto status = fs::status(path, error);
   if (status.type() == fs::file_type::not_found) return refused(path, "there is no such file");
@@ -146,13 +149,10 @@ tl::expected<LocalScene, coordinator::Rejected> SceneReader::read(std::optional<
   ReadResult read = read_scene(in.path, in.text, in.folder, {in.defines, in.strict, frame, labels});
   const std::string included = in.folder.take_included_texts();
   auto files = in.folder.take_files();
-  if (!read.scene)
-    return tl::unexpected(coordinator::Rejected{
-        {Errc::invalid_argument, fmt::format("{} cannot be read", in.path)}, std::move(read.diagnostics)});
+  if (!read.scene) return unreadable(in.path, std::move(read.diagnostics));
   // The glTF reader checks the -D options itself.
   if (!scene::gltf::is_gltf(in.path))
-    if (auto unused = unused_define(in.defines, in.text + included))
-      return refused(in.path, std::move(*unused));
+    if (const auto unused = unused_define(in.defines, in.text + included)) return refused(in.path, *unused);
   LocalScene scene{in.path,          in.text, std::move(*read.scene), std::move(read.diagnostics),
                    std::move(files), frame};
   scene.made = in.folder.kept();
@@ -179,9 +179,7 @@ tl::expected<LocalScene, coordinator::Rejected> SceneReader::read_all(const Fram
       first = std::move(*scene);
     }
   }
-  if (!wrong.empty())
-    return tl::unexpected(coordinator::Rejected{
-        {Errc::invalid_argument, fmt::format("{} cannot be read", impl_->path)}, wrong.take()});
+  if (!wrong.empty()) return unreadable(impl_->path, wrong.take());
   first->warnings = warned.take();
   return std::move(*first);
 }
@@ -199,15 +197,20 @@ tl::expected<LocalTest, coordinator::Rejected> read_local_test(const std::string
   if (!text) return tl::unexpected(std::move(text.error()));
   RecordedFolder folder(fs::path(path).parent_path());
   NoriTestResult read = read_nori_test(path, *text, folder, {{}, strict, {}});
-  if (!read.test)
-    return tl::unexpected(coordinator::Rejected{
-        {Errc::invalid_argument, fmt::format("{} cannot be read", path)}, std::move(read.diagnostics)});
+  if (!read.test) return unreadable(path, std::move(read.diagnostics));
   return LocalTest{std::move(*read.test), std::move(read.diagnostics), folder.take_files()};
 }
 
 bool is_needed(const LocalScene& scene, const JobSpec& spec, const LocalFile& file) {
   const std::string integrator = spec.integrator.value_or(scene.scene.integrator.name);
   return file.is_text || scene.needed[scene::sees_media(integrator)].contains(file.digest);
+}
+
+coordinator::Rejected scene_fault(const std::string& scene, const std::string& text) {
+  Diagnostic d;
+  d.place.file = scene;
+  d.text = text;
+  return {{Errc::invalid_argument, text}, {std::move(d)}};
 }
 
 coordinator::SubmitRequest submit_request(const LocalScene& scene, const JobSpec& spec) {

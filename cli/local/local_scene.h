@@ -81,6 +81,10 @@ struct LocalTest {
 };
 tl::expected<LocalTest, coordinator::Rejected> read_local_test(const std::string& path, bool strict);
 
+// Returns an error that the scene caused, with the message `text`, as a diagnostic of the scene as a whole:
+// its place is the scene's name without a line.
+coordinator::Rejected scene_fault(const std::string& scene, const std::string& text);
+
 coordinator::SubmitRequest submit_request(const LocalScene& scene, const JobSpec& spec);
 
 }  // namespace ls::cli

@@ -26,8 +26,4 @@ tl::expected<LocalWorld, coordinator::Rejected> build_local_world(const LocalSce
 tl::expected<std::shared_ptr<const render::World>, coordinator::Rejected> build_world_again(
     const LocalScene& scene, const RenderSettings& settings, int threads);
 
-// Returns an error that the scene caused, with the message `text`, as a diagnostic of the scene as a whole:
-// its place is the scene's name without a line.
-coordinator::Rejected scene_fault(const LocalScene& scene, const std::string& text);
-
 }  // namespace ls::cli

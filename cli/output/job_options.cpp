@@ -163,7 +163,7 @@ Result<JobSpec> JobOptions::parse() const {
   spec.defines = std::move(*values);
   if (!frames.empty()) {
     const auto range = parse_frames(frames);
-    if (!range) return fail(Errc::invalid_argument, "--" + range.error().message);
+    if (!range) return bad_argument("--" + range.error().message);
     spec.frames = *range;
     if (spec.defines.contains("frame"))
       return bad_argument("-D frame: with --frames the scene's $frame is the number of the frame");

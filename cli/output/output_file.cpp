@@ -21,15 +21,14 @@ Result<void> check_output(const std::string& option, const fs::path& file) {
   std::error_code error;
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   if (!fs::is_directory(folder, error))
-    return fail(Errc::invalid_argument,
-                fmt::format("{} {}: there is no folder {}", option, file.string(), folder.string()));
+    return bad_argument(fmt::format("{} {}: there is no folder {}", option, file.string(), folder.string()));
   const fs::file_status status = fs::status(file, error);
   if (fs::is_directory(status))
-    return fail(Errc::invalid_argument, fmt::format("{} {}: this is a folder", option, file.string()));
+    return bad_argument(fmt::format("{} {}: this is a folder", option, file.string()));
   if (!fs::exists(status) || fs::is_regular_file(status)) return check_folder(option, folder);
   if (::access(file.c_str(), W_OK) != 0)
-    return fail(Errc::invalid_argument,
-                fmt::format("{} {}: cannot be written: {}", option, file.string(), std::strerror(errno)));
+    return bad_argument(
+        fmt::format("{} {}: cannot be written: {}", option, file.string(), std::strerror(errno)));
   return {};
 }
 
@@ -38,8 +37,7 @@ Result<ImageFormat> image_format(const fs::path& file) {
   std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
   if (ending.empty() || ending == ".exr") return ImageFormat::exr;
   if (ending == ".png") return ImageFormat::png;
-  return fail(
-      Errc::invalid_argument,
+  return bad_argument(
       fmt::format("-o {}: an image is written as .exr (all layers) or .png (8-bit colours)", file.string()));
 }
 
@@ -47,8 +45,8 @@ Result<void> check_folder(const std::string& option, const fs::path& folder) {
   std::string trial = (folder / ".lightshaft-XXXXXX").string();
   const coordinator::File made(::mkostemp(trial.data(), O_CLOEXEC));
   if (!made)
-    return fail(Errc::invalid_argument, fmt::format("{}: no file can be made in the folder {}: {}", option,
-                                                    folder.string(), std::strerror(errno)));
+    return bad_argument(fmt::format("{}: no file can be made in the folder {}: {}", option, folder.string(),
+                                    std::strerror(errno)));
   ::unlink(trial.c_str());
   return {};
 }
@@ -57,9 +55,9 @@ Result<void> check_numbered(const std::string& option, const std::string& name, 
   if (has_frame_number(name) || frames.count() == 1) return {};
   const fs::path path(name);
   const fs::path better = path.parent_path() / (path.stem().string() + "_####" + path.extension().string());
-  return fail(Errc::invalid_argument,
-              fmt::format("{} {}: {} frames need as many names: {} say, where #### is the frame's number",
-                          option, name, frames.count(), better.string()));
+  return bad_argument(
+      fmt::format("{} {}: {} frames need as many names: {} say, where #### is the frame's number", option,
+                  name, frames.count(), better.string()));
 }
 
 Result<void> check_outputs(const std::string& option, const std::string& name,

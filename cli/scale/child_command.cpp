@@ -120,8 +120,8 @@ Result<LongCommand> LongCommand::start(const Words& words, const std::string& in
   // Writing does not block: a pipe holds 64 KiB without a reader, far more than a command with its token.
   ::fcntl(in.write, F_SETFL, O_NONBLOCK);
   const bool sent = ::write(in.write, input.data(), input.size()) == static_cast<ssize_t>(input.size());
-  const Result<pid_t> pid = sent ? start_program(words, {in.read, file, file})
-                                 : fail(Errc::invalid_argument, "the command is too long");
+  const Result<pid_t> pid =
+      sent ? start_program(words, {in.read, file, file}) : bad_argument("the command is too long");
   Pipe::close(file);
   if (!pid) return tl::unexpected(pid.error());
   return LongCommand(*pid, std::exchange(in.write, -1));
