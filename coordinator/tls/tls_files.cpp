@@ -18,6 +18,7 @@
 #include <optional>
 
 #include "common/base/secret.h"
+#include "common/base/spawn.h"
 
 namespace ls::tls {
 namespace {
