@@ -2,7 +2,6 @@
 
 #include <array>
 #include <charconv>
-#include <cstring>
 #include <optional>
 #include <random>
 #include <unordered_map>

@@ -3,7 +3,6 @@
 
 #include <csetjmp>
 #include <cstring>
-#include <memory>
 
 #include "common/assets/image.h"
 

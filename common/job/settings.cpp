@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
-
 #include "common/image/frame/rounds.h"
 #include "common/job/json_fields.h"
 #include "common/job/limits.h"
