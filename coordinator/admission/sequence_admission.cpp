@@ -13,40 +13,6 @@ namespace {
 
 constexpr std::uint32_t kMostBadFrames = 64;  // reading stops after this many frames with errors
 
-// Checks the limits that apply to all frames together.
-class Budget {
- public:
-  explicit Budget(std::uint32_t frames) : frames_(frames) {}
-
-  // Call scene() once with the size of the scene's main file, before the frames are read, and frame() for
-  // every frame.
-  Result<void> scene(std::size_t bytes) const {
-    if (bytes <= limits::kMaxSequenceText / frames_) return {};
-    return too_much("bytes of scene text", limits::kMaxSequenceText);
-  }
-  Result<void> frame(const Admission& admission) {
-    text_ += admission.text_bytes;
-    kept_ += admission.scene_json.size();
-    files_ += admission.job.assets.size();
-    tiles_ += TileGrid{admission.job.settings.size, admission.job.settings.tile}.count();
-    if (text_ > limits::kMaxSequenceText || kept_ > limits::kMaxSequenceText)
-      return too_much("bytes of scene text", limits::kMaxSequenceText);
-    if (files_ > limits::kMaxSequenceFiles) return too_much("files", limits::kMaxSequenceFiles);
-    if (tiles_ > limits::kMaxSequenceTiles) return too_much("tiles", limits::kMaxSequenceTiles);
-    return {};
-  }
-
- private:
-  tl::unexpected<Error> too_much(std::string_view what, std::uint64_t most) const {
-    return fail(Errc::invalid_argument,
-                fmt::format("{} frames have more than {} {} together: make several jobs of them", frames_,
-                            most, what));
-  }
-
-  std::uint32_t frames_;
-  std::uint64_t text_ = 0, kept_ = 0, files_ = 0, tiles_ = 0;
-};
-
 // Drops each warning of a frame that an earlier frame has already.
 void merge_warnings(std::vector<Admission>& frames) {
   std::set<std::string> reported;
@@ -69,8 +35,14 @@ void note_if_all_are_one(std::vector<Admission>& frames) {
 tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitRequest& request,
                                                               const BlobStore& blobs) {
   const auto numbers = request.spec.frames.value().frames();
-  Budget budget(static_cast<std::uint32_t>(numbers.size()));
-  if (auto fits = budget.scene(request.scene_text.size()); !fits) return rejected(fits.error());
+  const auto too_much = [&](std::string_view what, std::uint64_t most) {
+    return rejected({Errc::invalid_argument,
+                     fmt::format("{} frames have more than {} {} together: make several jobs of them",
+                                 numbers.size(), most, what)});
+  };
+  if (request.scene_text.size() > limits::kMaxSequenceText / numbers.size())
+    return too_much("bytes of scene text", limits::kMaxSequenceText);
+  std::uint64_t text = 0, kept = 0, files = 0, tiles = 0;  // of all frames together
   std::vector<Admission> frames;
   FrameDiagnostics found;
   std::uint32_t bad = 0;
@@ -89,7 +61,14 @@ tl::expected<std::vector<Admission>, Rejected> admit_sequence(const SubmitReques
     }
     found.add(frame, {});
     if (bad > 0) continue;
-    if (auto fits = budget.frame(*taken); !fits) return rejected(fits.error());
+    text += taken->text_bytes;
+    kept += taken->scene_json.size();
+    files += taken->job.assets.size();
+    tiles += TileGrid{taken->job.settings.size, taken->job.settings.tile}.count();
+    if (text > limits::kMaxSequenceText || kept > limits::kMaxSequenceText)
+      return too_much("bytes of scene text", limits::kMaxSequenceText);
+    if (files > limits::kMaxSequenceFiles) return too_much("files", limits::kMaxSequenceFiles);
+    if (tiles > limits::kMaxSequenceTiles) return too_much("tiles", limits::kMaxSequenceTiles);
     frames.push_back(std::move(*taken));
   }
   if (bad > 0)

@@ -158,13 +158,6 @@ json to_value(const WorkerView& v) {
           {"last_seen_seconds", number(v.last_seen_seconds)}};
 }
 
-template <class View>
-std::string listed(const char* key, const std::vector<View>& views) {
-  json all = json::array();
-  for (const auto& v : views) all.push_back(to_value(v));
-  return dump(json{{key, std::move(all)}});
-}
-
 }  // namespace
 
 std::string time_json(const TimeSplit& time) { return dump(to_value(time)); }
@@ -180,7 +173,11 @@ std::string jobs_json(const JobsPage& page) {
                    {"owners", page.owners}});
 }
 std::string worker_json(const WorkerView& worker) { return dump(to_value(worker)); }
-std::string workers_json(const std::vector<WorkerView>& workers) { return listed("workers", workers); }
+std::string workers_json(const std::vector<WorkerView>& workers) {
+  json all = json::array();
+  for (const WorkerView& worker : workers) all.push_back(to_value(worker));
+  return dump(json{{"workers", std::move(all)}});
+}
 
 std::string video_json(const VideoView& v) {
   static constexpr const char* kStates[] = {"none", "waiting", "making", "ready", "failed"};

@@ -23,17 +23,9 @@ std::string lower(std::string text) {
   return text;
 }
 
+// Returns the place of the state in the order JobOrder::active.
 int rank(JobState state) {
-  switch (state) {
-    case JobState::running:
-      return 0;
-    case JobState::paused:
-      return 1;
-    case JobState::queued:
-      return 2;
-    default:
-      return 3;
-  }
+  return state == JobState::running ? 0 : state == JobState::paused ? 1 : state == JobState::queued ? 2 : 3;
 }
 
 bool asked_for(const Row& row, const JobsAsked& asked, const std::string& search) {

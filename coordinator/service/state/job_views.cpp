@@ -205,12 +205,11 @@ JobView JobViews::sequence(const JobId& id, const Sequence& sequence, bool with_
     if (totals.began_unix > 0) began = began > 0 ? std::min(began, totals.began_unix) : totals.began_unix;
     ended = std::max(ended, totals.ended_unix);
   }
-  SequenceFacts facts;
-  facts.id = id;
-  facts.range = sequence.range();
-  facts.warnings = sequence.warnings;
-  facts.cores = farm_.cores_connected();
-  facts.workers = farm_.workers_connected();
+  SequenceFacts facts{.id = id,
+                      .range = sequence.range(),
+                      .warnings = sequence.warnings,
+                      .cores = farm_.cores_connected(),
+                      .workers = farm_.workers_connected()};
   if (began > 0)
     facts.elapsed_seconds = std::max(0.0, (open || ended == 0 ? system_unix_seconds() : ended) - began);
   JobView view = sequence_view(facts, views);
