@@ -70,15 +70,10 @@ void obey_signals(worker::Agent& agent, const sigset_t& signals) {
   }
 }
 
-std::optional<worker::LinkTls> tls_of(const worker::Options& options) {
-  if (options.tls_ca.empty()) return std::nullopt;
-  return worker::LinkTls{options.tls_ca, options.tls_cert, options.tls_key};
-}
-
 std::unique_ptr<worker::CoordinatorLink> link_to(const worker::Options& options) {
   std::vector<std::unique_ptr<worker::CoordinatorLink>> links;
   for (const auto& address : options.coordinators)
-    links.push_back(worker::make_grpc_link(address, options.join_token, tls_of(options)));
+    links.push_back(worker::make_grpc_link(address, options.join_token, options.tls));
   if (links.size() == 1) return std::move(links.front());
   return std::make_unique<worker::LinkRing>(std::move(links), std::hash<std::string>()(options.name));
 }

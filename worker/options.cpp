@@ -82,8 +82,10 @@ Result<std::string> join_token(const std::string& file) {
 }
 
 Result<void> read_tls(const Files& files, Options& o) {
+  if (files.tls_ca.empty()) return {};
+  LinkTls& tls = o.tls.emplace();
   const std::pair<const std::string&, std::string&> all[] = {
-      {files.tls_ca, o.tls_ca}, {files.tls_cert, o.tls_cert}, {files.tls_key, o.tls_key}};
+      {files.tls_ca, tls.ca}, {files.tls_cert, tls.cert}, {files.tls_key, tls.key}};
   for (const auto& [file, text] : all) {
     if (file.empty()) continue;
     auto pem = read_pem(file);

@@ -3,11 +3,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "common/base/log.h"
+#include "worker/client/client.h"
 #include "worker/fake/fake.h"
 
 namespace ls::worker {
@@ -24,7 +26,7 @@ struct Options {
   std::string name;
   std::vector<std::string> tags;
   std::string join_token;
-  std::string tls_ca, tls_cert, tls_key;  // PEM texts; empty: no encryption
+  std::optional<LinkTls> tls;  // nullopt: no encryption
   bool fake = false;
   FakeOptions fake_options;
   std::string fake_fault_text;

@@ -23,11 +23,9 @@ namespace {
 constexpr int kUsage = 2;
 
 std::unique_ptr<worker::CoordinatorLink> link_to(const worker::Options& options, int number) {
-  std::optional<worker::LinkTls> tls;
-  if (!options.tls_ca.empty()) tls = {options.tls_ca, options.tls_cert, options.tls_key};
   std::vector<std::unique_ptr<worker::CoordinatorLink>> links;
   for (const auto& address : options.coordinators)
-    links.push_back(worker::make_grpc_link(address, options.join_token, tls));
+    links.push_back(worker::make_grpc_link(address, options.join_token, options.tls));
   return std::make_unique<worker::LinkRing>(std::move(links), static_cast<std::uint64_t>(number));
 }
 

@@ -106,12 +106,9 @@ void of_nothing(Table& t) {
           [=](const Bench& b) { return every_value(b, lamp(true, false), 16, grey(0), 0); });
   t.exact("N29-light-of-no-power", "N29", "A black light is left out: the same bits as without it.",
           [](const Bench& b) {
-            SceneBuilder with = floor_point();
-            with.scene.emitters.push_back(PointEmitter{{.5, 0, 1}, rgb(3)});
-            const SceneBuilder without = with;
-            with.scene.emitters.push_back(PointEmitter{{0, .5, 1}, rgb(0)});
-            with.scene.emitters.push_back(DirectionalEmitter{{0, 0, -1}, rgb(0)});
-            return same_bits(b, with, without, 16);
+            const SceneBuilder without = with(floor_point(), PointEmitter{{.5, 0, 1}, rgb(3)});
+            const SceneBuilder dark = with(without, PointEmitter{{0, .5, 1}, rgb(0)});
+            return same_bits(b, with(dark, DirectionalEmitter{{0, 0, -1}, rgb(0)}), without, 16);
           });
   t.exact("N29-only-black-lights", "N29", "Lights of no power alone: black.", [](const Bench& b) {
     SceneBuilder builder = floor_point();
@@ -126,23 +123,17 @@ void orders_apart(Table& t) {
   for (const bool tree : {false, true}) {
     const int count = tree ? 1000 : 4;
     double irradiance = 0;
-    std::vector<PointEmitter> lamps;
+    SceneBuilder builder = floor_point();
     for (int i = 0; i < count; ++i) {
       const double power = std::pow(10., -20 + 40. * i / (count - 1)), a = 2.4 * i;
       const Vec3 p{std::cos(a) * .9, std::sin(a) * .9, 1 + .001 * i};
       const double d2 = .81 + p[2] * p[2];
       irradiance += power * p[2] / std::pow(d2, 1.5);
-      lamps.push_back({p, rgb(power)});
+      builder.scene.emitters.push_back(PointEmitter{p, rgb(power)});
     }
-    t.mean(
-        fmt::format("N30-{}-lamps-of-1e-20-to-1e20", count), "N30 N31",
-        "Lamps of powers forty orders apart: the brightest make up the sum, and none is lost.",
-        [=] {
-          SceneBuilder builder = floor_point();
-          for (const PointEmitter& lamp : lamps) builder.scene.emitters.push_back(lamp);
-          return builder;
-        },
-        reflected(irradiance));
+    t.mean(fmt::format("N30-{}-lamps-of-1e-20-to-1e20", count), "N30 N31",
+           "Lamps of powers forty orders apart: the brightest make up the sum, and none is lost.", builder,
+           reflected(irradiance));
   }
   // A point light (delta light) reflected by a mirror (delta lobe): no sampling strategy can find this path,
   // and none may divide by a pdf of 0.

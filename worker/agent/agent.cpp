@@ -16,6 +16,8 @@ namespace {
 constexpr Duration kWelcomeLimit = std::chrono::seconds(30);
 // A connection that lasted this long resets the back-off.
 constexpr Duration kGoodConnection = std::chrono::seconds(5);
+// First pause after a lost connection, and after a problem of this machine such as a full disk.
+constexpr Duration kFirstPause = std::chrono::milliseconds(100), kFirstTroublePause = std::chrono::seconds(1);
 constexpr Duration kLongestWait = std::chrono::seconds(1);
 constexpr int kProgressWhenIdle = 5;  // an idle worker sends only every fifth progress report
 constexpr std::size_t kJobsRemembered = 64;
@@ -27,8 +29,8 @@ Agent::Impl::Impl(AgentOptions o, CoordinatorLink& l, RenderBackend& b, BlobFile
       backend(b),
       files(f),
       clock(c),
-      backoff(options.backoff_first, options.backoff_most, options.backoff_seed),
-      trouble_backoff(options.trouble_first, options.backoff_most, options.backoff_seed) {}
+      backoff(kFirstPause, options.backoff_most, options.backoff_seed),
+      trouble_backoff(kFirstTroublePause, options.backoff_most, options.backoff_seed) {}
 
 Result<void> Agent::Impl::run() {
   connection_timer = last_busy = clock.now();

@@ -28,10 +28,7 @@ struct AgentOptions {
   // No further unit is begun while unacknowledged results occupy this many bytes
   std::size_t outbox_bytes = 64 << 20;
   Duration progress_period = std::chrono::seconds(1);
-  Duration backoff_first = std::chrono::milliseconds(100);
-  Duration backoff_most = std::chrono::seconds(10);
-  // Pause after a problem of this machine, such as a full disk; grows up to backoff_most
-  Duration trouble_first = std::chrono::seconds(1);
+  Duration backoff_most = std::chrono::seconds(10);  // longest pause before another attempt
   // If the worker has held no units for this long, it drains; if it has not joined the coordinator by then,
   // run() ends with an error. Zero: no limit
   Duration idle_limit = Duration::zero();

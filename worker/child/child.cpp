@@ -34,6 +34,9 @@ std::size_t floats_of(const LocalJob& job, const LeaseUnit& unit) {
 }
 // If this many children in a row exit before they are ready, the backend is broken.
 constexpr int kUnreadyChildren = 5;
+// Longest time from a child's start to its hello. This includes the computations that determine the numeric
+// class (machines of one class render the same bits).
+constexpr Duration kStartLimit = std::chrono::minutes(2);
 // Time after setting the stop flag within which the child must answer; otherwise it is killed
 constexpr Duration kStopLimit = std::chrono::seconds(10);
 
@@ -140,7 +143,7 @@ Result<std::shared_ptr<Process>> ChildBackend::spawn_greeted() {
 // Waits for the child's hello. unavailable: the child exited before its hello, not by a signal, and an
 // earlier child was ready; so another attempt may succeed.
 Result<void> ChildBackend::greet(Process& process) {
-  const TimePoint deadline = clock_.now() + options_.start_limit;
+  const TimePoint deadline = clock_.now() + kStartLimit;
   const auto answer = process.ask(process.control_fd(), Request{.kind = Kind::hello}, {}, [&] {
     if (clock_.now() > deadline) process.kill();
   });
@@ -247,11 +250,11 @@ tl::expected<void, UnitFailure> ChildBackend::prepare_in(Process& process, const
   const TimePoint deadline = clock_.now() + options_.prepare_limit;
   bool too_long = false;
   process.preparing = true;
-  const auto answer =
-      process.ask(process.control_fd(), Request{.kind = Kind::prepare, .job = number}, text, [&] {
-        too_long = clock_.now() > deadline;
-        if (too_long) process.kill();
-      });
+  const Request request{.kind = Kind::prepare, .job = number};
+  const auto answer = process.ask(process.control_fd(), request, text, [&] {
+    too_long = clock_.now() > deadline;
+    if (too_long) process.kill();
+  });
   if (!answer) {
     const Process::End end = process.end();
     return tl::unexpected<UnitFailure>(
@@ -342,7 +345,7 @@ ChildBackend::Attempt ChildBackend::attempt(Process& process, int index, std::ui
       return {unit_failure("the renderer's answer cannot be read: " + health.error().message), false};
     out.health = std::move(*health);
   }
-  return {std::move(out), false};
+  return {std::move(out)};
 }
 
 ChildBackend::Attempt ChildBackend::judge_death(Process& process, int index) {
@@ -353,12 +356,12 @@ ChildBackend::Attempt ChildBackend::judge_death(Process& process, int index) {
   const bool known = hung >= 0 || process.some_slot_crashed() || process.preparing;
   const bool guilty = hung >= 0 ? hung == index : crashed || !known;
   if (!guilty) return {unit_failure("the renderer died of another unit"), true};
-  UnitFailure failure;
+  UnitFailure failure{.reason = hung == index
+                                    ? fmt::format("the renderer hung: no sample finished within {:.3g} s",
+                                                  seconds(options_.hang_limit))
+                                    : fmt::format("the renderer {}", end.text),
+                      .signal = end.signal};
   note_place(slot, failure);
-  failure.signal = end.signal;
-  failure.reason = hung == index ? fmt::format("the renderer hung: no sample finished within {:.3g} s",
-                                               seconds(options_.hang_limit))
-                                 : fmt::format("the renderer {}", end.text);
   if (process.garbled)
     failure.reason = "the renderer answered nonsense";
   else if (end.signal == SIGKILL && hung < 0)

@@ -7,7 +7,6 @@
 // which unit was at fault (SIGKILL: the system was out of memory), all running units are reported as failed.
 #pragma once
 
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -21,17 +20,12 @@ namespace ls::worker {
 inline constexpr int kMostChildThreads = 256;
 
 struct ChildOptions {
-  // The child's program. The default is this same program, even if its file was replaced after the start.
-  std::filesystem::path executable = "/proc/self/exe";
   std::vector<std::string> arguments;  // arguments with which the child calls serve(): see worker/main.cpp
   // Number of units rendered at the same time: the caller's number of threads
   int slots = 1;
   Duration hang_limit = std::chrono::minutes(5);      // longest time that a thread may take for one sample
   Duration prepare_limit = std::chrono::minutes(30);  // longest time to make a scene ready to render
   Duration forget_limit = std::chrono::minutes(1);    // longest time to free such a scene
-  // Longest time from the child's start to its hello. This includes the computations that determine the
-  // numeric class (machines of one class render the same bits)
-  Duration start_limit = std::chrono::minutes(2);
   // Pause before the replacement of a child that exited before it was ready; doubles each time.
   Duration respawn_pause = std::chrono::seconds(1);
 };
